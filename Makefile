@@ -1,0 +1,56 @@
+# make demo    a simulated clutch's life, posted run by run, with its prognosis      (ARGS=--exit to end by itself)
+# make test    all tests
+# make check   formatting, lint, types, layers
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+ARGS ?=
+
+# versions age a week before they are locked; no index is named
+LOCK := --universal --python-version 3.11 --generate-hashes --no-emit-index-url --upgrade --quiet --exclude-newer "7 days" \
+	--custom-compile-command "make lock"
+
+.PHONY: demo test check benchmark real lock clean
+.DELETE_ON_ERROR:
+
+demo: $(VENV)/.runs
+	$(BIN)/clutchlife demo $(ARGS)
+
+test: $(VENV)/.tests
+	$(BIN)/python -m tests.browser
+	$(BIN)/python -m pytest -n 2 --dist worksteal $(ARGS)
+
+check: $(VENV)/.tests
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+benchmark: $(VENV)/.tests
+	$(BIN)/python -m tests.benchmarks $(ARGS)
+
+real: $(VENV)/.tests
+	$(BIN)/python -m tests.real $(ARGS)
+
+$(VENV)/.python:
+	@command -v $(PYTHON) >/dev/null || { echo "Clutchlife needs Python 3.11 or later; '$(PYTHON)' is not there. Name another: make PYTHON=..." >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Clutchlife needs Python 3.11 or later, '$(PYTHON)' is $$($(PYTHON) --version). Name another: make PYTHON=..." >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' || { echo "'$(PYTHON)' cannot make virtual environments; on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	@touch $@
+
+$(VENV)/.runs: $(VENV)/.python pyproject.toml docker/requirements.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r docker/requirements.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
+	@touch $@
+
+$(VENV)/.tests: $(VENV)/.runs tests/requirements.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r tests/requirements.txt
+	@touch $@
+
+lock:
+	uv pip compile $(LOCK) pyproject.toml -o docker/requirements.txt
+	uv pip compile $(LOCK) pyproject.toml --group test -o tests/requirements.txt
+
+clean:
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -1,0 +1,103 @@
+"""Eq. 6: how a friction quantity drifts with use, its inverse, its sensitivities and the kinetics behind it.
+
+    ξ(ζ) = ξ0 + Δ [1 - (1 + ζ/φ)^-ε]
+
+The share D = (1 + ζ/φ)^-ε that is still to be lost obeys general-order kinetics, dD/dζ = -k Dⁿ with n = 1 + 1/ε and
+k = ε/φ. The rate k is where the severity of the load enters, so ζ may be an energy as well as a number of cycles.
+Given (φ, ε) the law is linear in ξ0 and Δ. It saturates at ξ0 + Δ: a level beyond that is never reached.
+
+Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, eq. 6.
+"""
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from models.arrays import FloatArray
+
+Number: TypeAlias = float | FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Degradation:
+    """The coefficients of eq. 6, floats or arrays that broadcast against each other.
+
+    `initial` ξ0 and `change` Δ are in the unit of the quantity, `scale` φ > 0 in that of ζ (cycles), `exponent` ε > 0
+    [-]. Raises ValueError where one is not finite or scale or exponent is not positive.
+    """
+
+    initial: Number
+    change: Number
+    scale: Number
+    exponent: Number
+
+    def __post_init__(self) -> None:
+        for name in ("initial", "change", "scale", "exponent"):
+            if not np.isfinite(getattr(self, name)).all():
+                raise ValueError(f"{name} must be finite")
+        for name in ("scale", "exponent"):
+            if not np.greater(getattr(self, name), 0.0).all():
+                raise ValueError(f"{name} must be positive, got a minimum of {np.min(getattr(self, name))}")
+
+
+def progress_fraction(zeta: Number, scale: Number, exponent: Number) -> FloatArray:
+    """Share of the whole change that has happened, 1 - (1 + ζ/φ)^-ε, in [0, 1); ζ >= 0, φ > 0, ε > 0, broadcast.
+
+    Accurate to rounding for the smallest ζ/φ: the power is taken by log1p and expm1.
+
+    >>> float(progress_fraction(15_000.0, 5_000.0, 0.5))
+    0.5
+    """
+    return np.asarray(-np.expm1(-np.asarray(exponent) * np.log1p(np.asarray(zeta) / scale)))
+
+
+def value(zeta: Number, degradation: Degradation) -> FloatArray:
+    """Eq. 6, ξ(ζ) in the unit of ξ0; ζ >= 0 broadcasts against the coefficients."""
+    d = degradation
+    return np.asarray(d.initial + d.change * progress_fraction(zeta, d.scale, d.exponent))
+
+
+def sensitivities(zeta: Number, degradation: Degradation) -> FloatArray:
+    """∂ξ/∂(ξ0, Δ, log φ, log ε) [..., 4] at ζ >= 0, broadcast.
+
+    With x = ζ/φ and D = (1 + x)^-ε: 1, 1 - D, -Δ ε D x/(1 + x), Δ ε D log(1 + x).
+    """
+    d = degradation
+    ratio = np.asarray(zeta) / d.scale
+    stretched = np.log1p(ratio)
+    left = np.exp(-np.asarray(d.exponent) * stretched)
+    pull = d.change * d.exponent * left
+    columns = (1.0, progress_fraction(zeta, d.scale, d.exponent), -pull * ratio / (1.0 + ratio), pull * stretched)
+    return np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=np.float64) for c in columns)), axis=-1)
+
+
+def first_passage(level: Number, degradation: Degradation) -> FloatArray:
+    """The ζ at which ξ is `level`: φ [(1 - (level - ξ0)/Δ)^(-1/ε) - 1], or inf where eq. 6 never takes that value.
+
+    It is monotone, so there is at most one such ζ; a constant (Δ = 0) is at its level from ζ = 0 on. Also inf where ζ
+    is beyond what a float holds.
+    """
+    d = degradation
+    gap = np.asarray(level, dtype=np.float64) - d.initial
+    change = np.asarray(d.change, dtype=np.float64)
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        share = np.where(gap == 0.0, 0.0, gap / change)
+        inside = reaches(level, degradation)
+        growth = np.expm1(-np.log1p(-np.where(inside, share, 0.0)) / d.exponent)
+        return np.where(inside, d.scale * growth, np.inf)
+
+
+def reaches(level: Number, degradation: Degradation) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    """Whether eq. 6 ever takes the value `level`: it starts there, or `level` lies between ξ0 and ξ0 + Δ
+    (excluded)."""
+    d = degradation
+    gap = np.asarray(level, dtype=np.float64) - d.initial
+    towards = np.where(np.asarray(d.change) < 0.0, -gap, gap)
+    return np.asarray((gap == 0.0) | ((towards > 0.0) & (towards < np.abs(d.change))))
+
+
+def kinetics(degradation: Degradation) -> tuple[FloatArray, FloatArray]:
+    """The rate k = ε/φ [1/ζ] and the order n = 1 + 1/ε [-] of dD/dζ = -k Dⁿ, D(0) = 1."""
+    exponent = np.asarray(degradation.exponent, dtype=np.float64)
+    return np.asarray(exponent / degradation.scale), np.asarray(1.0 + 1.0 / exponent)

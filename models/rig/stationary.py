@@ -1,0 +1,88 @@
+"""The stationary Stribeck test of the simulated rig (section 2.3.3): a clutch held on 7 x 40 plateaus, 5 s each.
+
+The measured torque of plateau i is simulated as
+
+    M_i = g S(v_i, p_i) (1 + s η_i) + f ν_i ,    g = 1 + r κ,    η_i, ν_i, κ standard normal
+
+with sensor noise s, additive floor f and a gain g that is one number a run, rounded to the recorder's counts. Oil
+temperature is recorded and swings about its set point as a thermostat lets it; it does not act on the torque.
+
+Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.protocol import REFERENCE_SPEEDS
+from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
+from models.runs import Plateaus
+from models.stribeck import torque
+
+#: Time on one plateau [s] (section 2.3.3).
+PLATEAU_DURATION = 5.0
+#: Middle of the range in which the oil is kept, 80 to 90 °C [K], and the most that the simulated oil leaves it [K].
+OIL_TEMPERATURE = 273.15 + 85.0
+OIL_SWING = 4.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sensor:
+    """How the simulated rig measures. Everything is >= 0, and a zero switches its part off.
+
+    `noise` [-] of torque a plateau, `floor` [Nm] added to that, `gain_scatter` [-] of torque from run to run (all
+    standard deviations), `torque_counts` [1/Nm] and `temperature_counts` [1/K] of the recorder. Raises ValueError on
+    negative or not finite values.
+    """
+
+    noise: float = 0.01
+    floor: float = 0.02
+    gain_scatter: float = 0.002
+    torque_counts: float = 1000.0
+    temperature_counts: float = 10.0
+
+    def __post_init__(self) -> None:
+        for name in ("noise", "floor", "gain_scatter", "torque_counts", "temperature_counts"):
+            setting = getattr(self, name)
+            if not (math.isfinite(setting) and setting >= 0):
+                raise ValueError(f"{name} must be finite and not negative, got {setting}")
+
+
+NOISELESS = Sensor(noise=0.0, floor=0.0, gain_scatter=0.0, torque_counts=0.0, temperature_counts=0.0)
+
+
+def stationary_test(
+    clutch: SimulatedClutch, cycles: float, rng: np.random.Generator, sensor: Sensor | None = None
+) -> Plateaus:
+    """Simulate one stationary test after cycles >= 0: 280 rows in the reference's order, by pressure, speed rising.
+
+    Every random number is drawn whatever the sensor, so two sensors see the same clutch in the same mood.
+    """
+    sensor = Sensor() if sensor is None else sensor
+    true = torque(
+        clutch.geometry.sliding_velocity(REFERENCE_SPEEDS), clutch.parameters(PROTOCOL_PRESSURES[:, np.newaxis], cycles)
+    ).ravel()
+    gain = 1.0 + sensor.gain_scatter * float(rng.standard_normal())
+    relative, added = rng.standard_normal((2, true.size))
+    measured = gain * true * (1.0 + sensor.noise * relative) + sensor.floor * added
+    return Plateaus(
+        pressure=np.repeat(PROTOCOL_PRESSURES, REFERENCE_SPEEDS.size),
+        speed=np.tile(REFERENCE_SPEEDS, PROTOCOL_PRESSURES.size),
+        torque=_rounded(measured, sensor.torque_counts),
+        oil_temperature=_oil_temperature(true.size, rng, sensor),
+    )
+
+
+def _oil_temperature(rows: int, rng: np.random.Generator, sensor: Sensor) -> FloatArray:
+    """Oil temperature [rows] K: a swing of the thermostat, within 80 to 90 °C."""
+    amplitude, period = rng.uniform(0.4, 1.0) * OIL_SWING, rng.uniform(600.0, 1500.0)
+    phase = rng.uniform(0.0, 2 * math.pi)
+    time = PLATEAU_DURATION * np.arange(rows)
+    swing = amplitude * np.sin(2 * math.pi * time / period + phase)
+    return OIL_TEMPERATURE + _rounded(swing, sensor.temperature_counts)
+
+
+def _rounded(values: FloatArray, counts: float) -> FloatArray:
+    return np.asarray(values if counts == 0 else np.round(values * counts) / counts, dtype=np.float64)

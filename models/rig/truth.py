@@ -1,0 +1,160 @@
+"""The simulated clutch: what a rig would see if it had no noise. Everything here is simulated, nothing was measured.
+
+Stribeck curve of eq. 3, its parameters over pressure in the shapes of fig. 9,
+
+    M_s, V_S, C_v = α + β p          M̄_c = c_∞ + a e^{-p/p_0}
+
+and each of them over life multiplied by its own eq. 6 with ξ0 = 1, so that Δ is a share of the fresh value.
+
+The reference's figures carry no numbers that survive, so the nominal ones are made: 25 Nm fresh at 5 bar and 1000 rpm,
+the signs and shapes of figs. 6, 7, 9 and 10, and a mean coefficient of friction (COF) halved near 15,000 duty cycles.
+
+Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, eqs. 2, 3 and 6, sections 2.3.3 and 3.1.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import brentq
+
+from models.arrays import FloatArray
+from models.clutch import Geometry
+from models.degradation import Degradation, value
+from models.protocol import REFERENCE_SPEEDS
+from models.stribeck import StribeckParameters, torque
+
+#: The protocol's pressures (section 2.3.3): 4 to 7 bar by 0.5 bar [7] Pa; its 40 speeds are REFERENCE_SPEEDS.
+PROTOCOL_PRESSURES: FloatArray = np.linspace(4.0e5, 7.0e5, 7)
+
+#: The end of life is looked for between new and this many duty cycles, on a grid as fine as this.
+HORIZON = 1_000_000.0
+_BRACKETS = np.concatenate([[0.0], np.geomspace(1.0, HORIZON, 240)])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Linear:
+    """α + β p: `offset` in the parameter's unit, `per_pressure` in that unit per Pa."""
+
+    offset: float
+    per_pressure: float
+
+    def __call__(self, pressure: FloatArray) -> FloatArray:
+        """At pressure [...] Pa, shape kept."""
+        return self.offset + self.per_pressure * pressure
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asymptotic:
+    """c_∞ + a e^{-p/p_0}: `floor` c_∞ [-], `amplitude` a [-], `decay` p_0 [Pa]."""
+
+    floor: float
+    amplitude: float
+    decay: float
+
+    def __call__(self, pressure: FloatArray) -> FloatArray:
+        """At pressure [...] Pa, shape kept."""
+        return self.floor + self.amplitude * np.exp(-pressure / self.decay)
+
+
+def _share(change: float, scale: float, exponent: float) -> Degradation:
+    return Degradation(initial=1.0, change=change, scale=scale, exponent=exponent)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulatedClutch:
+    """A clutch that exists only here: four pressure laws when fresh, and four courses of eq. 6 that multiply them.
+
+    The defaults are the nominal clutch; `draw` makes others around it. Courses are dimensionless (initial = 1), their
+    abscissa is duty cycles. Meant for 4 to 8 bar: below 3.7 bar the nominal Coulomb ratio exceeds 1.
+    """
+
+    geometry: Geometry = field(default_factory=Geometry)
+    static_torque: Linear = Linear(offset=1.0, per_pressure=4.8e-5)
+    coulomb_ratio: Asymptotic = Asymptotic(floor=0.60, amplitude=4.2, decay=1.62e5)
+    stribeck_velocity: Linear = Linear(offset=0.2, per_pressure=0.96e-5)
+    viscous_coefficient: Linear = Linear(offset=0.1, per_pressure=0.24e-5)
+    static_torque_course: Degradation = field(default_factory=lambda: _share(-0.66, 3700.0, 0.55))
+    coulomb_ratio_course: Degradation = field(default_factory=lambda: _share(-0.56, 4000.0, 0.80))
+    stribeck_velocity_course: Degradation = field(default_factory=lambda: _share(-0.94, 2200.0, 1.00))
+    viscous_coefficient_course: Degradation = field(default_factory=lambda: _share(1.00, 6500.0, 0.90))
+
+    def parameters(self, pressure: float | FloatArray, cycles: float | FloatArray) -> StribeckParameters:
+        """The true parameters at pressure > 0 [Pa] after cycles >= 0; arrays broadcast. Raises ValueError outside."""
+        p, zeta = np.asarray(pressure, dtype=np.float64), np.asarray(cycles, dtype=np.float64)
+        if not (np.isfinite(p).all() and (p > 0).all()):
+            raise ValueError(f"pressure must be finite and positive, got {pressure}")
+        if not (np.isfinite(zeta).all() and (zeta >= 0).all()):
+            raise ValueError(f"cycles must be finite and not negative, got {cycles}")
+        return StribeckParameters(
+            static_torque=self.static_torque(p) * value(zeta, self.static_torque_course),
+            coulomb_ratio=self.coulomb_ratio(p) * value(zeta, self.coulomb_ratio_course),
+            stribeck_velocity=self.stribeck_velocity(p) * value(zeta, self.stribeck_velocity_course),
+            viscous_coefficient=self.viscous_coefficient(p) * value(zeta, self.viscous_coefficient_course),
+        )
+
+    def mean_cofs(self, cycles: FloatArray) -> FloatArray:
+        """True mean COF [m] after cycles [m]: the mean over the protocol's 7 pressures and 40 speeds."""
+        pressures = PROTOCOL_PRESSURES[:, np.newaxis]
+        at = self.parameters(pressures, np.asarray(cycles, dtype=np.float64)[:, np.newaxis, np.newaxis])
+        torques = torque(self.geometry.sliding_velocity(REFERENCE_SPEEDS), at)
+        unit = np.array([self.geometry.torque_per_cof(float(p)) for p in PROTOCOL_PRESSURES])
+        return np.asarray((torques / unit[:, np.newaxis]).mean(axis=(1, 2)), dtype=np.float64)
+
+    def mean_cof(self, cycles: float) -> float:
+        """True mean COF [-] after cycles >= 0."""
+        return float(self.mean_cofs(np.array([cycles]))[0])
+
+    def end_of_life(self, fraction: float = 0.5) -> float | None:
+        """Duty cycles at which mean COF first is `fraction` of its initial value, by root finding.
+
+        None where it never is within a million cycles: eq. 6 saturates. Raises ValueError unless 0 < fraction < 1.
+        """
+        if not 0 < fraction < 1:
+            raise ValueError(f"fraction must lie between 0 and 1, got {fraction}")
+        excess = self.mean_cofs(_BRACKETS) - fraction * self.mean_cof(0.0)
+        below = np.flatnonzero(excess <= 0)
+        if below.size == 0:
+            return None
+        threshold = fraction * self.mean_cof(0.0)
+        low, high = _BRACKETS[below[0] - 1], _BRACKETS[below[0]]
+        return float(brentq(lambda zeta: self.mean_cof(zeta) - threshold, low, high, xtol=1e-6))
+
+
+def draw(rng: np.random.Generator) -> SimulatedClutch:
+    """A simulated clutch around the nominal one, as clutches of one batch differ: log-normal factors of 5 to 15 %.
+
+    A pressure law scales as a whole, and so do the four ageing rates (a hard or a soft lining), each with a little of
+    its own. The Coulomb ratio stays below 1 from 4 bar on: sliding grips less than rest. The shares lost in the end are
+    spread least (4 %), for they decide whether a clutch ever fails.
+    """
+    nominal = SimulatedClutch()
+
+    def factor(deviation: float) -> float:
+        return math.exp(deviation * float(rng.standard_normal()))
+
+    def scaled(law: Linear, deviation: float) -> Linear:
+        by = factor(deviation)
+        return Linear(offset=law.offset * by, per_pressure=law.per_pressure * by)
+
+    rate = factor(0.15)
+
+    def course(of: Degradation) -> Degradation:
+        change = max(float(of.change) * factor(0.04), -0.99)  # a share that stays above nothing
+        return _share(change, float(of.scale) * rate * factor(0.08), float(of.exponent) * factor(0.05))
+
+    def ratio(law: Asymptotic) -> Asymptotic:
+        floor = law.floor * factor(0.05)
+        most = (0.995 - floor) * math.exp(float(PROTOCOL_PRESSURES[0]) / law.decay)
+        return Asymptotic(floor=floor, amplitude=min(law.amplitude * factor(0.05), most), decay=law.decay)
+
+    return SimulatedClutch(
+        static_torque=scaled(nominal.static_torque, 0.08),
+        coulomb_ratio=ratio(nominal.coulomb_ratio),
+        stribeck_velocity=scaled(nominal.stribeck_velocity, 0.12),
+        viscous_coefficient=scaled(nominal.viscous_coefficient, 0.12),
+        static_torque_course=course(nominal.static_torque_course),
+        coulomb_ratio_course=course(nominal.coulomb_ratio_course),
+        stribeck_velocity_course=course(nominal.stribeck_velocity_course),
+        viscous_coefficient_course=course(nominal.viscous_coefficient_course),
+    )

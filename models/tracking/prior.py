@@ -1,0 +1,87 @@
+"""What is believed of eq. 6's coefficients before a clutch has been measured.
+
+Independent normals on ξ0, Δ, log φ, log ε and the logarithm of the run-to-run scatter, as plain numbers, so that a
+prior learned from other clutches of the same material can take the place of the weak one.
+"""
+
+import math
+from dataclasses import astuple, dataclass, fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from models.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from models.tracking.protocol import Measurement
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prior:
+    """Means and deviations; ξ0, Δ and the scatter in the unit of the quantity, φ in cycles.
+
+    Raises ValueError where a number is not finite or a deviation not positive.
+    """
+
+    initial_mean: float
+    initial_sd: float
+    change_mean: float
+    change_sd: float
+    log_scale_mean: float
+    log_scale_sd: float
+    log_exponent_mean: float
+    log_exponent_sd: float
+    log_scatter_mean: float
+    log_scatter_sd: float
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            number = getattr(self, field.name)
+            if not math.isfinite(number):
+                raise ValueError(f"{field.name} must be finite, got {number}")
+            if field.name.endswith("_sd") and number <= 0:
+                raise ValueError(f"{field.name} must be positive, got {number}")
+
+    def to_array(self) -> FloatArray:
+        """The ten numbers in the order of the fields [10]."""
+        return np.array(astuple(self), dtype=np.float64)
+
+    @classmethod
+    def from_array(cls, numbers: FloatArray) -> "Prior":
+        """The inverse of `to_array`."""
+        return cls(**{field.name: float(x) for field, x in zip(fields(cls), numbers, strict=True)})
+
+    def log_density(self, log_scale: FloatArray, log_exponent: FloatArray, log_scatter: FloatArray) -> FloatArray:
+        """Log density of (log φ, log ε, log s), broadcast, without its constant."""
+        return np.asarray(
+            -0.5
+            * (
+                ((log_scale - self.log_scale_mean) / self.log_scale_sd) ** 2
+                + ((log_exponent - self.log_exponent_mean) / self.log_exponent_sd) ** 2
+                + ((log_scatter - self.log_scatter_mean) / self.log_scatter_sd) ** 2
+            )
+        )
+
+
+def weak(first: "Measurement", *, falling: bool) -> Prior:
+    """A prior that knows little more than the size of the quantity, taken from its first measurement.
+
+    With the size a = √(value² + variance): ξ0 is within some 50 % of a, for the first run need not be at ζ = 0. The
+    change Δ is -0.6 a ± 0.4 a where the quantity is known to be `falling` (mean COF; 7 % remains for a rise) and 0 ±
+    a otherwise (Stribeck parameters). φ has its median at 4,000 cycles and two deviations cover 40 to 400,000, ε its
+    median at 0.8, covering 0.2 to 3.2: together, lives of 10² to 10⁶ cycles. The scatter has its median at 0.3 % of
+    a, two deviations covering 0.06 % to 1.5 %.
+    """
+    size = math.hypot(first.value, math.sqrt(first.variance)) or 1.0
+    return Prior(
+        initial_mean=first.value,
+        initial_sd=0.5 * size,
+        change_mean=-0.6 * size if falling else 0.0,
+        change_sd=0.4 * size if falling else size,
+        log_scale_mean=math.log(4_000.0),
+        log_scale_sd=2.3,
+        log_exponent_mean=math.log(0.8),
+        log_exponent_sd=0.7,
+        log_scatter_mean=math.log(0.003 * size),
+        log_scatter_sd=0.8,
+    )

@@ -1,0 +1,81 @@
+"""What goes into a filter, what comes out of it, and the steps that all of them have.
+
+A filter follows one quantity ξ (mean COF, or one Stribeck parameter at one pressure) along eq. 6. A step returns a
+new state; chance comes in as an argument; a measurement is the fitted value with the fit's variance, and the scatter
+between runs that comes on top of it is unknown and the filter's business.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.degradation import Degradation
+from models.tracking.prior import Prior
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measurement:
+    """One fitted value of the quantity at progress ζ >= 0 (cycles), with the variance >= 0 of its fit.
+
+    Raises ValueError where a number is not finite or negative where it must not be.
+    """
+
+    progress: float
+    value: float
+    variance: float
+
+    def __post_init__(self) -> None:
+        for name in ("progress", "value", "variance"):
+            number = getattr(self, name)
+            if not math.isfinite(number):
+                raise ValueError(f"{name} must be finite, got {number}")
+            if name != "value" and number < 0:
+                raise ValueError(f"{name} must not be negative, got {number}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Posterior:
+    """A weighted sample of eq. 6's coefficients, all arrays [n]; weight >= 0 sums to one.
+
+    `scatter` is the deviation from run to run, in the unit of the quantity.
+    """
+
+    weight: FloatArray
+    initial: FloatArray
+    change: FloatArray
+    scale: FloatArray
+    exponent: FloatArray
+    scatter: FloatArray
+
+    @property
+    def degradation(self) -> Degradation:
+        """The sample as coefficients of eq. 6, each [n]."""
+        return Degradation(initial=self.initial, change=self.change, scale=self.scale, exponent=self.exponent)
+
+    def moments(self, sample: FloatArray) -> tuple[float, float]:
+        """Weighted mean and deviation of a function of the coefficients, evaluated at the sample [n]."""
+        mean = float(self.weight @ sample)
+        return mean, math.sqrt(max(0.0, float(self.weight @ np.square(sample - mean))))
+
+
+State = TypeVar("State")
+
+
+class Tracker(Protocol[State]):
+    """A filter for the coefficients of eq. 6. Same seeds, same answers; a state is never changed in place."""
+
+    @property
+    def name(self) -> str:
+        """What the public contract calls it: `grid`, `particle` or `ukf`."""
+
+    def start(self, prior: Prior) -> State:
+        """The state before the first measurement."""
+
+    def update(self, state: State, measurement: Measurement, rng: np.random.Generator) -> State:
+        """The state that also knows `measurement`; they may come in any order of progress."""
+
+    def posterior(self, state: State, size: int, rng: np.random.Generator) -> Posterior:
+        """About `size` weighted draws of the coefficients given all measurements so far."""

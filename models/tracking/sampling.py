@@ -1,0 +1,68 @@
+"""Draws with less noise than independent ones: systematic resampling and an evenly spread sequence of points.
+
+Sources: J. Carpenter et al., "Improved particle filter for nonlinear problems" (1999) for systematic resampling;
+J. H. Halton, "On the efficiency of certain quasi-random sequences of points" (1960) for the sequence.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from models.arrays import FloatArray
+from models.tracking.protocol import Posterior
+
+
+def systematic(weight: FloatArray, size: int, offset: float) -> NDArray[np.intp]:
+    """Indices [size], ascending, each i drawn weight_i · size times up to rounding; offset uniform in [0, 1)."""
+    edges = np.cumsum(weight)
+    drawn = np.searchsorted(edges, (np.arange(size) + offset) / size * edges[-1], side="right")
+    return np.asarray(np.minimum(drawn, weight.size - 1), dtype=np.intp)
+
+
+def thinned(sample: Posterior, size: int, offset: float) -> Posterior:
+    """A weighted sample reduced to `size` draws of equal weight."""
+    kept = systematic(sample.weight, size, offset)
+    return Posterior(
+        weight=np.full(size, 1.0 / size),
+        initial=sample.initial[kept],
+        change=sample.change[kept],
+        scale=sample.scale[kept],
+        exponent=sample.exponent[kept],
+        scatter=sample.scatter[kept],
+    )
+
+
+def spread_points(size: int, offset: FloatArray) -> FloatArray:
+    """Evenly spread points [size, d] of the open unit cube, d <= 5; a uniform offset [d] makes each of them uniform."""
+    return np.clip((_halton(size, offset.size) + offset) % 1.0, 1e-9, 1.0 - 1e-9)
+
+
+@lru_cache(maxsize=32)
+def _halton(size: int, dimension: int) -> FloatArray:
+    """Halton's points [size, d]: the digits of 1, 2, 3, ... in a prime base, mirrored at the point."""
+    points = np.zeros((size, dimension))
+    for column, base in zip(points.T, (2, 3, 5, 7, 11), strict=False):
+        left, place = np.arange(1, size + 1), 1.0
+        while left.any():
+            left, digit = np.divmod(left, base)
+            place /= base
+            column += place * digit
+    points.setflags(write=False)
+    return points
+
+
+def spread_normals(size: int, offset: FloatArray) -> FloatArray:
+    """The same, as standard normals [size, d]."""
+    return np.asarray(ndtri(spread_points(size, offset)), dtype=np.float64)
+
+
+def correlated_pair(
+    normals: FloatArray, first_variance: FloatArray, second_variance: FloatArray, covariance: FloatArray
+) -> FloatArray:
+    """Standard normals [n, 2] made to have the variances and covariance [n] of each row; [n, 2]."""
+    first = np.sqrt(np.maximum(first_variance, 1e-300))
+    lean = covariance / first
+    rest = np.sqrt(np.maximum(second_variance - lean**2, 0.0))
+    return np.stack([first * normals[:, 0], lean * normals[:, 0] + rest * normals[:, 1]], axis=1)

@@ -1,0 +1,49 @@
+"""The application: its parts put together, nothing made at import."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from fastapi import FastAPI
+from fastapi_offline import FastAPIOffline
+
+from service import problems
+from service.middleware import BodyLimit, SafeHeaders
+from service.routes import clutches, health, life, runs
+from service.routes.context import Context
+from service.settings import CODE_VERSION, Settings
+from service.workflows.views import Remembered
+from storage.database import open_database
+
+_DESCRIPTION = """Condition monitoring and prognostics of wet friction clutches.
+
+Post the Stribeck tests of a rig; each is fitted, the clutch's degradation is tracked, and the duty cycles that remain until
+its mean coefficient of friction has halved are foretold with their uncertainty."""
+
+
+def create_app(settings: Settings) -> FastAPI:
+    """The service on one database, which is opened (and migrated) when it starts and closed when it stops."""
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        database = open_database(settings.database)
+        app.state.context = Context(database=database, settings=settings, remembered=Remembered())
+        try:
+            yield
+        finally:
+            database.close()
+
+    app = FastAPIOffline(
+        title="Clutchlife",
+        version=CODE_VERSION,
+        description=_DESCRIPTION,
+        lifespan=lifespan,
+        redoc_url=None,
+    )
+    problems.install(app)
+    for part in (health, clutches, runs, life):
+        app.include_router(part.router)
+    for twin in (runs.twins, life.twins):
+        app.include_router(twin)
+    app.add_middleware(BodyLimit, most=settings.most_body_bytes)
+    app.add_middleware(SafeHeaders)
+    return app

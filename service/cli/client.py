@@ -1,0 +1,77 @@
+"""The other side of the wire: a client that waits for a service that is away, and tells what it refused."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import httpx2
+
+JSON = {"Content-Type": "application/json"}
+#: Seconds between tries: doubled from the first to the last.
+FIRST_WAIT, LAST_WAIT = 0.25, 15.0
+
+
+class ServiceAwayError(Exception):
+    """The service did not answer, or was busy, for as long as was to be waited."""
+
+
+class RefusedError(Exception):
+    """The service answered that it will not take this; the same again would be refused again."""
+
+    def __init__(self, status: int, problem: dict[str, Any]) -> None:
+        super().__init__(f"{status}: {problem.get('detail') or problem.get('title') or 'refused'}")
+        self.status = status
+        self.problem = problem
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Service:
+    """A running service. `patience` [s] is how long one request is tried again while the service is away or busy."""
+
+    http: httpx2.Client
+    patience: float = 60.0
+    on_wait: Callable[[str, float], None] = lambda _reason, _seconds: None
+
+    def post(self, path: str, body: bytes) -> dict[str, Any]:
+        """The answer to a JSON body; ServiceAwayError, or RefusedError on 4xx."""
+        return self._answer("POST", path, content=body, headers=JSON)
+
+    def get(self, path: str, **params: Any) -> dict[str, Any]:
+        """The answer to a question; ServiceAwayError, or RefusedError on 4xx."""
+        return self._answer("GET", path, params=params)
+
+    def _answer(self, method: str, path: str, **request: Any) -> dict[str, Any]:
+        deadline, wait = time.monotonic() + self.patience, FIRST_WAIT
+        while True:
+            try:
+                response = self.http.request(method, path, **request)
+            except httpx2.TransportError as error:
+                reason = f"no answer ({type(error).__name__})"
+            else:
+                if response.status_code < 400:
+                    found: dict[str, Any] = response.json()
+                    return found
+                if response.status_code < 500:
+                    raise RefusedError(response.status_code, _problem(response))
+                reason = f"it says {response.status_code}"
+                wait = max(wait, float(response.headers.get("Retry-After", 0)))
+            if time.monotonic() + wait > deadline:
+                raise ServiceAwayError(f"{self.http.base_url}: {reason}")
+            self.on_wait(reason, wait)
+            time.sleep(wait)
+            wait = min(2 * wait, LAST_WAIT)
+
+
+def _problem(response: httpx2.Response) -> dict[str, Any]:
+    try:
+        found = response.json()
+    except ValueError:
+        return {"detail": response.text[:500]}
+    return found if isinstance(found, dict) else {"detail": str(found)[:500]}
+
+
+def connect(url: str, *, key: str | None = None, timeout: float = 60.0) -> httpx2.Client:
+    """A client for the service at `url`, with a key where one is needed."""
+    headers = {} if key is None else {"Authorization": f"Bearer {key}"}
+    return httpx2.Client(base_url=url, headers=headers, timeout=timeout)

@@ -1,0 +1,146 @@
+"""`clutchlife demo`: a simulated life, posted run by run to a service of its own, with the prognosis as it sharpens."""
+
+import json
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import webbrowser
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from models.rig import campaign
+from models.rig.campaign import RunKind
+from service.cli.client import Service, ServiceAwayError, connect
+from service.cli.options import Seed, fail, out
+from service.formats import run_files
+
+_PORT = 8000
+#: The demo ends a little after the end of life.
+_STOP = 0.49
+_START_SECONDS = 60.0
+_HEADER = f"{'cycles':>7} {'mean COF':>16} {'of new':>7} {'remaining':>10} {'90 % interval':>17} {'truth':>7}"
+
+
+def demo(
+    seed: Seed = 1,
+    exit_at_end: Annotated[bool, typer.Option("--exit", help="End instead of leaving the service open")] = False,
+) -> None:
+    """Simulate a clutch's life, send it to a service run by run, and watch its remaining life being foretold."""
+    with tempfile.TemporaryDirectory(prefix="clutchlife-demo-") as folder, _service(Path(folder)) as (url, process):
+        out.print(f"Clutchlife at {url}, its database in {folder}", markup=False, soft_wrap=True)
+        with connect(url) as http:
+            _life(Service(http=http), seed)
+        if exit_at_end:
+            return
+        out.print(f"\nThe service stays open at {url} until Ctrl-C.", markup=False)
+        if sys.stdout.isatty():
+            webbrowser.open(url)
+        try:
+            process.wait()
+        except KeyboardInterrupt:
+            out.print("closing")
+
+
+def _life(service: Service, seed: int) -> None:
+    clutch_id, truth = f"sim-{seed}", campaign.simulated_clutch(seed)
+    end = truth.end_of_life()
+    service.post("/v1/clutches", json.dumps(run_files.simulated_clutch_body(clutch_id)).encode())
+    out.print(f"\nA simulated clutch, {clutch_id}: 7 pressures x 40 speeds a test, 1 % noise.")
+    out.print("Duty cycles that remain until its mean COF has halved:\n")
+    out.print(_HEADER, style="bold")
+    inside: list[bool] = []
+    with _progress() as progress:
+        task = progress.add_task("run-in", total=end)
+        for run in campaign.simulate(seed, stop_fraction=_STOP):
+            progress.update(task, description=f"{run.kind.value.replace('_', ' ')}, {run.cycles} cycles")
+            body = json.dumps(run_files.simulated_body(run)).encode()
+            service.post(f"/v1/clutches/{clutch_id}/runs", body)
+            progress.update(task, completed=run.cycles)
+            if run.kind is RunKind.STATIONARY_STRIBECK:
+                said = service.get(f"/v1/clutches/{clutch_id}/remaining-useful-life")
+                progress.console.print(_row(said, end), markup=False)
+                inside += _inside(said, end)
+    truth_said = "it never halves" if end is None else f"it halved at {end:.0f} cycles"
+    out.print(
+        f"The truth: {truth_said}. It lay inside the 90 % interval {sum(inside)} times out of {len(inside)}.\n"
+        "'-' means that too few tests are known yet, or that it may never come."
+    )
+
+
+def _row(said: dict[str, Any], end: float | None) -> str:
+    current, remaining = said["current"], said["remaining_cycles"]
+    cof = f"{current['mean_cof']:.4f} ± {current['mean_cof_sd']:.4f}"
+    interval = f"{_count(remaining['0.05'])} … {_count(remaining['0.95'])}"
+    left = "-" if end is None else f"{max(0.0, end - said['as_of_cycles']):.0f}"
+    share = f"{100 * current['fraction_of_initial']:.1f} %"
+    if said["status"] == "reached":
+        interval = "reached"
+    return f"{said['as_of_cycles']:>7} {cof:>16} {share:>7} {_count(remaining['0.5']):>10} {interval:>17} {left:>7}"
+
+
+def _inside(said: dict[str, Any], end: float | None) -> list[bool]:
+    """Whether the truth lay inside the interval, where one was given and the end of life was ahead."""
+    low, high = (said["end_of_life_cycles"][quantile] for quantile in ("0.05", "0.95"))
+    if low is None or end is None or said["as_of_cycles"] > end:
+        return []
+    return [low <= end and (high is None or end <= high)]
+
+
+def _count(cycles: float | None) -> str:
+    return "-" if cycles is None else f"{cycles:.0f}"
+
+
+def _progress() -> Progress:
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    return Progress(*columns, console=out, transient=True)
+
+
+@contextmanager
+def _service(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """A service in a process of its own, with a database of its own; stopped at the end."""
+    port, log = _free_port(), folder / "service.log"
+    command = [sys.executable, "-m", "service.cli.main", "serve", "--port", str(port), "--log-level", "warning"]
+    with log.open("wb") as file:
+        process = subprocess.Popen(  # noqa: S603  (our own command)
+            [*command, "--database", f"sqlite:///{folder / 'clutchlife.db'}"], stdout=file, stderr=file
+        )
+    url = f"http://127.0.0.1:{port}"
+    try:
+        with connect(url, timeout=5.0) as http:
+            _await_ready(Service(http=http, patience=0.0), process, log)
+        yield url, process
+    finally:
+        process.terminate()
+        process.wait(timeout=20)
+
+
+def _await_ready(service: Service, process: subprocess.Popen[bytes], log: Path) -> None:
+    deadline = time.monotonic() + _START_SECONDS
+    while time.monotonic() < deadline:
+        if process.poll() is not None:
+            fail(f"the service ended with {process.returncode}:\n{log.read_text(encoding='utf-8')}")
+        try:
+            service.get("/readyz")
+        except ServiceAwayError:
+            time.sleep(0.1)
+        else:
+            return
+    fail(f"the service was not ready after {_START_SECONDS:.0f} s:\n{log.read_text(encoding='utf-8')}")
+
+
+def _free_port() -> int:
+    """The usual port where it is free, else any."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", _PORT))
+        except OSError:
+            probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])

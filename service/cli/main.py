@@ -1,0 +1,25 @@
+"""The command `clutchlife`."""
+
+import typer
+
+from service.cli import demo, export, keys, maintain, push, serve, simulate
+
+app = typer.Typer(
+    name="clutchlife",
+    help="Condition monitoring and prognostics of wet friction clutches.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command()(serve.serve)
+app.command()(demo.demo)
+app.command()(simulate.simulate)
+app.command()(push.push)
+app.command()(export.export)
+app.command()(maintain.replay)
+app.command()(maintain.backup)
+app.add_typer(keys.app, name="key")
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,87 @@
+"""`clutchlife push`: send run files, keep what could not be sent, safe to repeat."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.progress import Progress
+
+from service.cli.client import RefusedError, Service, ServiceAwayError, connect
+from service.cli.options import EX_DATAERR, EX_TEMPFAIL, SPOOL, URL, Key, Patience, SpoolFolder, Url, err, fail, out
+from service.cli.spool import Spool
+from service.formats import run_files
+
+
+@dataclass
+class Sent:
+    """What became of the runs that were pushed."""
+
+    stored: int = 0
+    known: int = 0
+    refused: int = 0
+
+
+def push(
+    paths: Annotated[list[Path], typer.Argument(metavar="PATH...", help="Run files, or folders of them")],
+    clutch: Annotated[str, typer.Option(help="The clutch that was tested")],
+    url: Url = URL,
+    key: Key = None,
+    spool: SpoolFolder = SPOOL,
+    patience: Patience = 60.0,
+) -> None:
+    """Send run files. What the service cannot take now waits in the spool and is sent first next time."""
+    try:
+        files = run_files.find(paths)
+    except FileNotFoundError as error:
+        fail(str(error), EX_DATAERR)
+    waiting = Spool.of(spool, url, clutch)
+    for file in files:
+        waiting.add(file.read_bytes())
+    with connect(url, key=key) as http, Progress(console=err, transient=True) as progress:
+        task = progress.add_task("sending", total=len(list(waiting.waiting())))
+
+        def say(reason: str, seconds: float) -> None:
+            progress.update(task, description=f"{reason}; again in {seconds:.0f} s")
+
+        service = Service(http=http, patience=patience, on_wait=say)
+        sent = Sent()
+        try:
+            _register(service, clutch, paths)
+            for entry in waiting.waiting():
+                _send(service, clutch, waiting, entry, sent)
+                progress.update(task, description="sending", advance=1)
+        except ServiceAwayError as error:
+            left = len(list(waiting.waiting()))
+            fail(f"{error}; {left} runs wait in {waiting.folder}: push again to send them", EX_TEMPFAIL)
+        except RefusedError as error:
+            fail(str(error), EX_DATAERR)
+    out.print(f"{sent.stored} stored, {sent.known} known already, {sent.refused} refused")
+    if sent.refused:
+        fail(f"what was refused, and why, is in {waiting.folder / 'refused'}", EX_DATAERR)
+
+
+def _register(service: Service, clutch_id: str, paths: list[Path]) -> None:
+    """Register the clutch from a `clutch.json` in one of the folders; without one it must be known already."""
+    record = next((path / run_files.CLUTCH_FILE for path in paths if (path / run_files.CLUTCH_FILE).is_file()), None)
+    if record is None:
+        service.get(f"/v1/clutches/{clutch_id}")
+        return
+    body = json.loads(record.read_bytes()) | {"clutch_id": clutch_id}
+    service.post("/v1/clutches", json.dumps(body).encode())
+
+
+def _send(service: Service, clutch_id: str, waiting: Spool, entry: Path, sent: Sent) -> None:
+    try:
+        receipt = service.post(f"/v1/clutches/{clutch_id}/runs", entry.read_bytes())
+    except RefusedError as error:
+        if error.status in (401, 403, 404):
+            raise
+        sent.refused += 1
+        aside = waiting.refused(entry, error.problem)
+        err.print(f"refused, {error}: {aside}", markup=False, soft_wrap=True)
+        return
+    waiting.done(entry)
+    sent.known += receipt["duplicate"]
+    sent.stored += not receipt["duplicate"]

@@ -1,0 +1,49 @@
+"""`clutchlife serve`: the service."""
+
+from typing import Annotated
+
+import typer
+import uvicorn
+
+from service.app import create_app
+from service.cli.options import DATABASE, EX_USAGE, Database, err, fail
+from service.security import is_loopback
+from service.settings import Settings
+from storage import keys
+from storage.database import open_database
+from storage.errors import StorageError
+
+LOOPBACK = "127.0.0.1"
+
+
+def serve(
+    host: Annotated[str, typer.Option(help="The address to listen at; without keys, this machine only")] = LOOPBACK,
+    port: Annotated[int, typer.Option(min=0, max=65535)] = 8000,
+    database: Database = DATABASE,
+    log_level: Annotated[str, typer.Option(help="critical, error, warning, info or debug")] = "info",
+) -> None:
+    """Run the service."""
+    try:
+        settings = Settings.from_environment(database)
+        opened = open_database(settings.database)
+        with opened.reading() as connection:
+            has_keys = keys.any_active(connection)
+        opened.close()
+    except (ValueError, StorageError) as error:
+        fail(str(error), EX_USAGE)
+    if not has_keys and not is_loopback(host):
+        err.print(
+            f"clutchlife: no keys are configured, so the service listens at {LOOPBACK} and not at {host}. "
+            "Make one with: clutchlife key create --scope admin",
+            soft_wrap=True,
+        )
+        host = LOOPBACK
+    uvicorn.run(
+        create_app(settings),
+        host=host,
+        port=port,
+        log_level=log_level,
+        access_log=log_level == "debug",
+        server_header=False,
+        timeout_graceful_shutdown=10,
+    )

@@ -1,0 +1,107 @@
+"""A run on its way in: what was sent, checked, with its channels bit for bit, and its step into the models' units."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.runs import Plateaus
+from service.errors import FieldError, InvalidError
+from service.formats.units import CHANNELS
+from service.schemas.base import whole
+
+#: Below this a plateau counts as unloaded: it says nothing of the lining's friction.
+UNLOADED = 0.05e5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IncomingRun:
+    """One run as the rig sent it. `channels` are in the units of their names, `details` is what else was said."""
+
+    kind: str
+    cycles: float
+    run_id: str
+    content_sha256: str
+    started_at: str | None = None
+    origin: str = "measured"
+    channels: Mapping[str, FloatArray] = field(default_factory=dict)
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+
+def name_run(
+    *,
+    kind: str,
+    cycles: float,
+    run_id: str | None,
+    started_at: str | None,
+    origin: str,
+    channels: Mapping[str, FloatArray],
+    details: Mapping[str, Any],
+) -> IncomingRun:
+    """A run with its content's hash, and its name derived from that where none was given.
+
+    The hash covers everything but the name: kind, cycles, time, origin, details and every bit of every channel.
+    Raises InvalidError where a stationary test holds nothing that a curve could be fitted to.
+    """
+    said = [kind, whole(cycles), started_at, origin, dict(details)]
+    digest = hashlib.sha256(json.dumps(said, sort_keys=True, allow_nan=False).encode())
+    for name in sorted(channels):
+        digest.update(f"\n{name}:{channels[name].size}\n".encode())
+        digest.update(np.ascontiguousarray(channels[name], dtype="<f8").tobytes())
+    content = digest.hexdigest()
+    run = IncomingRun(
+        kind=kind,
+        cycles=cycles,
+        run_id=run_id or f"{kind}-{content[:16]}",
+        content_sha256=content,
+        started_at=started_at,
+        origin=origin,
+        channels=channels,
+        details=details,
+    )
+    if kind == "stationary_stribeck" and "time_s" not in channels:
+        _require_curve(channels)
+    return run
+
+
+def stationary_plateaus(channels: Mapping[str, FloatArray]) -> Plateaus:
+    """The loaded plateaus of a stationary test in SI units, rows in the order they were sent."""
+    loaded = channels["pressure_bar"] * CHANNELS["pressure_bar"].factor >= UNLOADED
+    si = {name: CHANNELS[name].to_si(values[loaded]) for name, values in channels.items()}
+    deviation = si.get("torque_sd_nm")
+    return Plateaus(
+        pressure=si["pressure_bar"],
+        speed=si["speed_rpm"],
+        torque=si["torque_nm"],
+        torque_sd=deviation if deviation is not None and bool((deviation > 0).all()) else None,
+        oil_temperature=si.get("oil_temperature_c"),
+    )
+
+
+def _require_curve(channels: Mapping[str, FloatArray]) -> None:
+    """Refuse what no Stribeck curve passes through: one point, one speed, no torque, no pressure."""
+    torque, speed, pressure = channels["torque_nm"], channels["speed_rpm"], channels["pressure_bar"]
+    if torque.size == 1:
+        _refuse("torque_nm", torque, "too_few_points", "a Stribeck curve needs more than one point")
+    if not (pressure * CHANNELS["pressure_bar"].factor >= UNLOADED).any():
+        _refuse("pressure_bar", pressure, "unloaded", "at least one plateau must be loaded with 0.05 bar or more")
+    if (speed == speed[0]).all():
+        _refuse("speed_rpm", speed, "speeds_all_equal", "a Stribeck curve needs more than one speed")
+    if not torque.any():
+        _refuse("torque_nm", torque, "torque_all_zero", "at least one torque must differ from zero")
+
+
+def _refuse(name: str, column: FloatArray, code: str, rule: str) -> None:
+    value = float(column[0])
+    more = "" if column.size == 1 else f" in all {column.size} rows"
+    if more and not (column == value).all():
+        more = f" in row 1 of {column.size}"
+    message = f"{name}: {rule}, got {value:g}{more}"
+    raise InvalidError(
+        message,
+        errors=[FieldError(pointer=f"/channels/{name}/0", row=1, value=f"{value:g}", code=code, message=message)],
+    )

@@ -1,0 +1,70 @@
+"""What a route is given: the database, the clock, and a caller who may ask."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Annotated
+
+from fastapi import Depends, Query, Request
+
+from models.prognosis import HORIZON
+from service.security import Caller, Scope, authorise
+from service.settings import Settings
+from service.workflows.views import Remembered
+from storage.database import Database
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Context:
+    """The service's parts, made when it starts and closed when it stops."""
+
+    database: Database
+    settings: Settings
+    remembered: Remembered
+
+    def now(self) -> str:
+        """The time, UTC, ISO 8601."""
+        return datetime.now(UTC).isoformat(timespec="milliseconds")
+
+
+def context_of(request: Request) -> Context:
+    """The running service's context."""
+    found = request.app.state.context
+    assert isinstance(found, Context)  # noqa: S101  (set when the service starts)
+    return found
+
+
+def caller_of(request: Request) -> Caller:
+    """What the request says of its sender."""
+    return Caller(
+        authorization=request.headers.get("authorization"),
+        address=None if request.client is None else request.client.host,
+        host=request.headers.get("host"),
+    )
+
+
+def allowed(scope: Scope) -> Callable[[Request], Context]:
+    """A dependency that gives the context to callers with that scope and stops the others."""
+
+    def check(request: Request) -> Context:
+        context = context_of(request)
+        authorise(context.database, caller_of(request), scope)
+        return context
+
+    return check
+
+
+Reader = Annotated[Context, Depends(allowed("read"))]
+Ingester = Annotated[Context, Depends(allowed("ingest"))]
+
+Limit = Annotated[int, Query(ge=1, le=1000, description="Items a page")]
+Cursor = Annotated[str | None, Query(max_length=600, description="Where an earlier page ended: its `next`")]
+PressureBar = Annotated[
+    float | None,
+    Query(
+        ge=0, le=1e4, allow_inf_nan=False, description="A pressure of the first stationary test; left out, their mean"
+    ),
+]
+AtCycles = Annotated[
+    float | None, Query(ge=0, le=HORIZON * 1e6, allow_inf_nan=False, description="As it would have been said then")
+]

@@ -1,0 +1,30 @@
+"""Whether the service lives, whether it can work, and the way in for a person."""
+
+from fastapi import APIRouter, Request
+from fastapi.responses import JSONResponse, RedirectResponse, Response
+
+from service.routes.context import context_of
+from service.settings import CODE_VERSION
+
+router = APIRouter(tags=["health"])
+
+
+@router.get("/livez")
+async def livez() -> dict[str, str]:
+    """The process answers."""
+    return {"status": "alive", "version": CODE_VERSION}
+
+
+@router.get("/readyz", responses={503: {"description": "The database cannot be used"}})
+def readyz(request: Request) -> Response:
+    """The database answers too."""
+    database = context_of(request).database
+    ready = database.ready()
+    content = {"status": "ready" if ready else "not ready", "journal_mode": database.journal_mode}
+    return JSONResponse(content, status_code=200 if ready else 503)
+
+
+@router.get("/", include_in_schema=False)
+async def root() -> Response:
+    """To the description of the API."""
+    return RedirectResponse("/docs")

@@ -1,0 +1,187 @@
+"""What is asked of a clutch: stored results, put into the public shapes."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from models.pressure import fit_pressure_laws
+
+from service.schemas.base import whole
+from service.workflows import stored, views
+from service.workflows.foretold import unknown
+from service.workflows.history import ALL_PRESSURES, MEAN_COF
+from service.workflows.receipts import PARAMETER_UNITS
+from service.workflows.views import Remembered
+from storage import channels, fits, predictions, runs
+from storage.clutches import ClutchRow
+from storage.database import Database
+from storage.predictions import PredictionRow
+
+Place = tuple[float, str]
+
+
+def remaining_life(
+    database: Database,
+    remembered: Remembered,
+    clutch_id: str,
+    *,
+    method: str,
+    pressure_bar: float | None,
+    at_cycles: float | None,
+) -> dict[str, Any]:
+    """The remaining useful life as it is now, or as it would have been said at `at_cycles`.
+
+    Raises NotFoundError for an unknown clutch or a pressure that its first stationary test did not measure.
+    """
+    with database.reading() as connection:
+        row = stored.clutch(connection, clutch_id)
+        found = predictions.at(connection, clutch_id, method, ALL_PRESSURES, at_cycles)
+    record = stored.record(row)
+    if pressure_bar is not None:
+        said = _at_pressure(database, remembered, row, method, pressure_bar, at_cycles)
+    elif found is None:
+        said = unknown(None, ALL_PRESSURES, record.end_of_life.cof_fraction)
+    else:
+        said = found.payload
+    return {"clutch_id": clutch_id, "method": method, "revision": row.revision, "origin": record.origin} | said
+
+
+def _at_pressure(
+    database: Database,
+    remembered: Remembered,
+    row: ClutchRow,
+    method: str,
+    pressure_bar: float,
+    at_cycles: float | None,
+) -> dict[str, Any]:
+    key = (row.clutch_id, row.revision, method, pressure_bar, at_cycles)
+    said: dict[str, Any] | None = remembered.find(key)
+    if said is None:
+        with database.reading() as connection:
+            events = stored.events(connection, row.clutch_id)
+        fraction = stored.record(row).end_of_life.cof_fraction
+        said = views.at_pressure(
+            row.clutch_id, events, fraction, method=method, pressure_bar=pressure_bar, at_cycles=at_cycles
+        )
+        remembered.keep(key, said)
+    return said
+
+
+def degradation(database: Database, remembered: Remembered, clutch_id: str) -> dict[str, Any]:
+    """Eq. 6 for every Stribeck parameter and for mean COF."""
+    with database.reading() as connection:
+        row = stored.clutch(connection, clutch_id)
+        key = (clutch_id, row.revision, "degradation")
+        items = remembered.find(key)
+        if items is None:
+            events, levels = stored.events(connection, clutch_id), stored.levels(connection, clutch_id)
+    if items is None:
+        items = views.degradation(clutch_id, events, levels)
+        remembered.keep(key, items)
+    return {"clutch_id": clutch_id, "revision": row.revision, "items": items, "next": None}
+
+
+def run_page(database: Database, clutch_id: str, *, limit: int, after: Place | None) -> tuple[list[Any], Place | None]:
+    """Receipts by cycles, and where the next page starts."""
+    with database.reading() as connection:
+        stored.clutch(connection, clutch_id)
+        rows = runs.page(connection, clutch_id, limit=limit + 1, after=after)
+    more = (rows[limit - 1].cycles, rows[limit - 1].run_id) if len(rows) > limit else None
+    return [row.receipt for row in rows[:limit]], more
+
+
+def one_run(database: Database, clutch_id: str, run_id: str) -> dict[str, Any]:
+    """A receipt with the run's channels, bit for bit as they were sent."""
+    with database.reading() as connection:
+        row = stored.run(connection, clutch_id, run_id)
+        found = channels.read(connection, row.run_key)
+    return row.receipt | {"channels": {name: column.tolist() for name, column in found.items()}}
+
+
+def stribeck_page(
+    database: Database, clutch_id: str, *, limit: int, after: Place | None
+) -> tuple[list[Any], Place | None]:
+    """Stationary tests by cycles: their fits and the pressure laws through them."""
+    with database.reading() as connection:
+        stored.clutch(connection, clutch_id)
+        rows = runs.page(connection, clutch_id, limit=limit + 1, after=after, kind="stationary_stribeck")
+        found = fits.of_clutch(connection, clutch_id)
+    items = []
+    for row in rows[:limit]:
+        laws = fit_pressure_laws([stored.level_fit(each).fit for each in found.get(row.run_key, ())])
+        items.append(
+            {
+                "run_id": row.run_id,
+                "cycles": whole(row.cycles),
+                "fits": row.receipt["fits"],
+                "pressure_laws": None if laws is None else laws,
+            }
+        )
+    more = (rows[limit - 1].cycles, rows[limit - 1].run_id) if len(rows) > limit else None
+    return items, more
+
+
+def loop_page(database: Database, clutch_id: str) -> list[dict[str, Any]]:
+    """Friction loops by cycles and pressure."""
+    with database.reading() as connection:
+        stored.clutch(connection, clutch_id)
+        rows = runs.page(connection, clutch_id, kind="dynamic_stribeck")
+    return [{"run_id": row.run_id, "cycles": whole(row.cycles)} | loop for row in rows for loop in row.receipt["loops"]]
+
+
+def series(database: Database, clutch_id: str) -> Iterator[dict[str, Any]]:
+    """Flat rows: each quantity of each test by cycles, then the remaining cycles as they were foretold."""
+    with database.reading() as connection:
+        stored.clutch(connection, clutch_id)
+        rows = runs.page(connection, clutch_id, kind="stationary_stribeck")
+        foretold = predictions.history(connection, clutch_id, "particle", ALL_PRESSURES)
+    for row in rows:
+        for fit in row.receipt["fits"]:
+            yield from _fit_rows(row.receipt, fit)
+    for each in foretold:
+        yield from _foretold_rows(each)
+
+
+def _fit_rows(receipt: dict[str, Any], fit: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    values = [(MEAN_COF, "1", fit["mean_cof"], fit["mean_cof_sd"])]
+    for public, unit in PARAMETER_UNITS.values():
+        values.append((public, unit, fit["parameters"][public], fit["standard_errors"][public]))
+    for quantity, unit, value, sd in values:
+        yield {
+            "cycles": receipt["cycles"],
+            "time": receipt["started_at"] or receipt["received_at"],
+            "run_id": receipt["run_id"],
+            "quantity": quantity,
+            "unit": unit,
+            "pressure_bar": fit["pressure_bar"],
+            "value": value,
+            "lower": None if value is None else value - _NINETY * sd,
+            "upper": None if value is None else value + _NINETY * sd,
+        }
+
+
+#: Half the width of a normal's 90 % interval in deviations.
+_NINETY = 1.6448536269514722
+
+
+def _foretold_rows(row: PredictionRow) -> Iterator[dict[str, Any]]:
+    current, remaining = row.payload["current"], row.payload["remaining_cycles"]
+    mean, sd = current["mean_cof"], current["mean_cof_sd"]
+    bounds = (None, None) if mean is None else (mean - _NINETY * sd, mean + _NINETY * sd)
+    values = (
+        (MEAN_COF, "1", mean, *bounds),
+        ("health", "1", current["health"], None, None),
+        ("remaining_cycles", "cycles", remaining["0.5"], remaining["0.05"], remaining["0.95"]),
+        ("probability_of_reaching", "1", row.payload["probability_of_reaching"], None, None),
+    )
+    for quantity, unit, value, lower, upper in values:
+        yield {
+            "cycles": whole(row.cycles),
+            "time": None,
+            "run_id": None,
+            "quantity": quantity,
+            "unit": unit,
+            "pressure_bar": None,
+            "value": value,
+            "lower": lower,
+            "upper": upper,
+        }

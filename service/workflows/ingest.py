@@ -1,0 +1,123 @@
+"""A run comes in: fitted, stored, tracked, its remaining life foretold, in one transaction."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from sqlalchemy import Connection
+
+from models.clutch import Geometry
+from service.errors import ConflictError
+from service.formats.incoming import IncomingRun
+from service.settings import CODE_VERSION
+from service.workflows import stored
+from service.workflows.analysis import LATE, Analysis, Warned, analyse
+from service.workflows.history import ByPressure, Event, lives, order, reference_velocities
+from service.workflows.receipts import fit_receipt, mean_cofs, receipt
+from service.workflows.replay import refresh_cofs
+from service.workflows.retrack import retrack
+from storage import channels, clutches, fits, runs
+from storage.clutches import ClutchRow
+from storage.database import Database
+from storage.runs import NewRun, RunRow
+
+
+def ingest(database: Database, clutch_id: str, run: IncomingRun, *, received_at: str) -> tuple[dict[str, Any], bool]:
+    """Take in a run; returns its receipt and whether it is new.
+
+    The same run again gives the same receipt, marked a duplicate. Raises NotFoundError for an unknown clutch and
+    ConflictError where other content is known under the run's name; then nothing has changed.
+    """
+    with database.reading() as connection:
+        clutch = stored.clutch(connection, clutch_id)
+        known = runs.get(connection, clutch_id, run.run_id)
+    if known is not None:
+        return _repeat(known, run), False
+    geometry = stored.record(clutch).geometry.to_model()
+    analysis = analyse(run, geometry)
+    with database.writing() as connection:
+        known = runs.get(connection, clutch_id, run.run_id)
+        if known is not None:
+            return _repeat(known, run), False
+        return _store(connection, clutch, geometry, run, analysis, received_at), True
+
+
+def _repeat(known: RunRow, run: IncomingRun) -> dict[str, Any]:
+    if known.content_sha256 != run.content_sha256:
+        raise ConflictError(
+            f"run_id {run.run_id!r} is known with other content: its sha256 is {known.content_sha256}, "
+            f"that of the content sent is {run.content_sha256}"
+        )
+    return known.receipt | {"duplicate": True}
+
+
+def _store(
+    connection: Connection,
+    clutch: ClutchRow,
+    geometry: Geometry,
+    run: IncomingRun,
+    analysis: Analysis,
+    received_at: str,
+) -> dict[str, Any]:
+    before = stored.events(connection, clutch.clutch_id)
+    event = _event(run, analysis, received_at)
+    cofs = _cofs(order([*before, event]), event, analysis, geometry)
+    event = _event(run, analysis, received_at, cofs)
+    late = _late(before, event)
+    answer = receipt(
+        clutch.clutch_id,
+        run,
+        received_at=received_at,
+        fits=[fit_receipt(level.fit, cofs.get(level.fit.pressure)) for level in analysis.fits],
+        warnings=[*analysis.warnings, *late],
+    )
+    run_key = runs.insert(
+        connection,
+        NewRun(
+            clutch_id=clutch.clutch_id,
+            run_id=run.run_id,
+            kind=run.kind,
+            cycles=run.cycles,
+            started_at=run.started_at,
+            received_at=received_at,
+            content_sha256=run.content_sha256,
+            details=stored.details(run, analysis),
+            receipt=answer,
+            code_version=CODE_VERSION,
+        ),
+    )
+    channels.write(connection, run_key, run.channels)
+    fits.write(connection, run_key, stored.fit_rows(analysis.fits, cofs))
+    clutches.bump_revision(connection, clutch.clutch_id)
+    if late or event.rebuild:  # the reference test may be another one now, and with it the protocol of all means
+        retrack(connection, clutch, refresh_cofs(connection, clutch.clutch_id, geometry))
+    else:
+        retrack(connection, clutch, order([*before, event]), newest=event)
+    return answer
+
+
+def _event(run: IncomingRun, analysis: Analysis, received_at: str, cofs: ByPressure | None = None) -> Event:
+    return Event(
+        run_id=run.run_id,
+        kind=run.kind,
+        cycles=run.cycles,
+        moment=stored.moment(run.started_at, received_at),
+        speed_range=analysis.speed_range,
+        cofs=cofs or {},
+        rebuild=run.details.get("event") == "rebuild",
+    )
+
+
+def _cofs(events: Sequence[Event], event: Event, analysis: Analysis, geometry: Geometry) -> ByPressure:
+    """The run's mean COFs over the protocol of its life's first stationary test, which may be itself."""
+    life = next(life for life in lives(events) if event in life.events)
+    if life.speed_range is None:
+        return {}
+    return mean_cofs(analysis.fits, reference_velocities(life.speed_range, geometry), geometry)
+
+
+def _late(before: Sequence[Event], new: Event) -> list[Warned]:
+    latest = max((event.cycles for event in before), default=0.0)
+    if new.cycles >= latest:
+        return []
+    message = f"the run's {new.cycles:g} cycles lie before the latest known {latest:g}: all was tracked anew"
+    return [Warned(code=LATE, message=message)]

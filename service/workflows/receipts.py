@@ -1,0 +1,97 @@
+"""Receipts: what the service made of a run, in the public names and units."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from models.arrays import FloatArray
+from models.clutch import Geometry
+from models.identification import StribeckFit, mean_torque
+from service.formats.incoming import IncomingRun
+from service.formats.units import PASCALS_PER_BAR
+from service.schemas.base import whole
+from service.settings import CODE_VERSION
+from service.workflows.analysis import LevelFit, Warned
+
+Value = tuple[float, float]
+
+PARAMETER_UNITS = {
+    "static_torque": ("static_torque_nm", "Nm"),
+    "coulomb_ratio": ("coulomb_ratio", "1"),
+    "stribeck_velocity": ("stribeck_velocity_m_s", "m/s"),
+    "viscous_coefficient": ("viscous_coefficient", "Nm/(m/s)^0.3"),
+}
+
+#: Four parameters cannot be told from fewer distinct speeds, and a mean over the protocol would be an extrapolation.
+FEWEST_SPEEDS = 4
+
+
+def mean_cof(level: LevelFit, velocities: FloatArray, geometry: Geometry) -> tuple[float, float] | None:
+    """Mean COF over the protocol's velocities [m] m/s and its deviation; None where the level cannot say it."""
+    if level.speeds < FEWEST_SPEEDS:
+        return None
+    torque, deviation = mean_torque(level.fit, velocities)
+    per_cof = geometry.torque_per_cof(level.mean_pressure)
+    cof, cof_sd = torque / per_cof, deviation / per_cof
+    usable = math.isfinite(cof) and math.isfinite(cof_sd) and 0 < cof_sd < cof
+    return (cof, cof_sd) if usable else None
+
+
+def mean_cofs(levels: Sequence[LevelFit], velocities: FloatArray, geometry: Geometry) -> dict[float, Value]:
+    """Mean COF and its deviation by pressure [Pa], for the levels that can say it."""
+    found = {level.fit.pressure: mean_cof(level, velocities, geometry) for level in levels}
+    return {pressure: value for pressure, value in found.items() if value is not None}
+
+
+def fit_receipt(fit: StribeckFit, cof: Value | None) -> dict[str, Any]:
+    """One fit as a receipt shows it, with its mean COF where it can say it."""
+    names = [public for public, _ in PARAMETER_UNITS.values()]
+    return {
+        "pressure_bar": bar(fit.pressure),
+        "parameters": dict(zip(names, map(float, fit.parameters.as_array()), strict=True)),
+        "standard_errors": dict(zip(names, map(float, fit.covariance.diagonal() ** 0.5), strict=True)),
+        "mse_percent": fit.mse_percent,
+        "rmse_nm": fit.rmse,
+        "noise_nm": fit.noise,
+        "acceptable": fit.acceptable,
+        "mean_cof": None if cof is None else cof[0],
+        "mean_cof_sd": None if cof is None else cof[1],
+        "points": fit.points,
+        "status": fit.status.value,
+        "undetermined": [PARAMETER_UNITS[name][0] for name in fit.undetermined],
+        "message": fit.message,
+    }
+
+
+def bar(pressure: float) -> float:
+    """Pa to bar, free of the last bits' noise."""
+    return round(pressure / PASCALS_PER_BAR, 9)
+
+
+def receipt(
+    clutch_id: str,
+    run: IncomingRun,
+    *,
+    received_at: str,
+    fits: Sequence[dict[str, Any]],
+    warnings: Sequence[Warned],
+) -> dict[str, Any]:
+    """The receipt of a run."""
+    return {
+        "clutch_id": clutch_id,
+        "run_id": run.run_id,
+        "kind": run.kind,
+        "cycles": whole(run.cycles),
+        "started_at": run.started_at,
+        "origin": run.origin,
+        "received_at": received_at,
+        "content_sha256": run.content_sha256,
+        "duplicate": False,
+        "warnings": [{"code": each.code, "message": each.message} for each in warnings],
+        "fits": list(fits),
+        "loops": [],
+        "duty": run.details.get("duty"),
+        "event": run.details.get("event"),
+        "note": run.details.get("note"),
+        "code_version": CODE_VERSION,
+    }

@@ -1,0 +1,104 @@
+"""Bring a clutch's stored tracks, predictions and summary up to date with its history."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from sqlalchemy import Connection
+
+from models.prognosis import HORIZON
+from models.tracking.particle import ParticleState
+from models.tracking.ukf import UkfState
+from service.settings import CODE_VERSION
+from service.workflows import stored
+from service.workflows.foretold import unknown
+from service.workflows.history import ALL_PRESSURES, Event, Life, lives
+from service.workflows.tracks import Prediction, States, Tracked, follow
+from storage import clutches, filter_states, predictions
+from storage.clutches import ClutchRow
+from storage.filter_states import FilterStateRow
+from storage.predictions import PredictionRow
+
+#: What a list shows of a clutch, out of the particle filter's prediction.
+SUMMARY = ("status", "as_of_cycles", "current", "remaining_cycles")
+#: A clutch of which nothing can be said comes after all others.
+RANK_UNKNOWN = 2 * HORIZON
+#: The exact filter is laid anew over the whole history at each step: only these carry a state from run to run.
+_CARRIED: dict[str, type[ParticleState] | type[UkfState]] = {"particle": ParticleState, "ukf": UkfState}
+
+
+def retrack(connection: Connection, clutch: ClutchRow, events: Sequence[Event], *, newest: Event | None = None) -> None:
+    """Track anew what the ordered history asks for: one step where `newest` comes last, else all of it."""
+    fraction = stored.record(clutch).end_of_life.cof_fraction
+    found = lives(events)
+    states = None if newest is None else _carried(connection, clutch.clutch_id, found[-1], newest)
+    walks: list[tuple[Life, States, int]]
+    if states is None:
+        predictions.clear(connection, clutch.clutch_id)
+        walks = [(life, {}, 0) for life in found]
+    else:
+        walks = [(found[-1], states, len(found[-1].events) - 1)]
+    said: dict[tuple[float, str], Prediction] = {}
+    last: States = {}
+    for life, start, first_event in walks:
+        last = start
+        for states_then, foretold in follow(clutch.clutch_id, life, fraction, start, first_event=first_event):
+            last = states_then
+            said |= {(each.cycles, each.method): each for each in foretold}
+    _write(connection, clutch.clutch_id, list(said.values()), last)
+    if events:
+        cycles = events[-1].cycles
+        summary, rank = _summarise(said[cycles, "particle"].payload)
+        clutches.set_summary(connection, clutch.clutch_id, rank, summary | {"runs": len(events)})
+
+
+def _carried(connection: Connection, clutch_id: str, life: Life, newest: Event) -> States | None:
+    """The stored states from before `newest`, or None where one step on from them would not give the whole truth."""
+    last = life.events[-1]
+    is_test = newest.speed_range is not None
+    if newest.rebuild or (newest is not last and (is_test or newest.cycles < last.cycles)):
+        return None
+    index = life.events.index(newest)
+    before = sum(1 for event in life.pooled().events if event != index)
+    rows = {method: row for (method, _), row in filter_states.get(connection, clutch_id).items()}
+    if rows.keys() != (_CARRIED.keys() if before else set()):
+        return None
+    if any(row.runs != before or row.code_version != CODE_VERSION for row in rows.values()):
+        return None
+    return {m: Tracked(runs=row.runs, state=_CARRIED[m].from_arrays(dict(row.arrays))) for m, row in rows.items()}
+
+
+def _write(connection: Connection, clutch_id: str, said: Sequence[Prediction], states: States) -> None:
+    rows = [
+        PredictionRow(
+            cycles=each.cycles,
+            method=each.method,
+            pressure=ALL_PRESSURES,
+            payload=each.payload,
+            code_version=CODE_VERSION,
+        )
+        for each in said
+    ]
+    predictions.put(connection, clutch_id, rows)
+    filter_states.clear(connection, clutch_id)
+    carried = [
+        FilterStateRow(
+            method=method,
+            pressure=ALL_PRESSURES,
+            runs=tracked.runs,
+            arrays=tracked.state.to_arrays(),
+            code_version=CODE_VERSION,
+        )
+        for method, tracked in states.items()
+        if method in _CARRIED
+    ]
+    filter_states.put(connection, clutch_id, carried)
+
+
+def _summarise(payload: dict[str, Any]) -> tuple[dict[str, Any], float]:
+    """What a list shows of a clutch, and its rank: the fewer cycles remain, the earlier in the list."""
+    median = payload["remaining_cycles"]["0.5"]
+    if payload["status"] == unknown(None, ALL_PRESSURES, 0.5)["status"]:
+        rank = RANK_UNKNOWN
+    else:
+        rank = HORIZON if median is None else float(median)
+    return {name: payload[name] for name in SUMMARY}, rank

@@ -1,0 +1,92 @@
+"""Clutches: the record as it was posted, and the summary that lists show."""
+
+from dataclasses import dataclass
+
+import sqlalchemy as sa
+from sqlalchemy import Connection, Row, bindparam, select, tuple_, update
+
+from storage.json_text import Json, to_object, to_text
+from storage.tables import clutch
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClutchRow:
+    """A clutch. `record` has its defaults filled in, `created_at` is ISO 8601, lists sort by `rank`, ascending."""
+
+    clutch_id: str
+    record: Json
+    content_sha256: str
+    created_at: str
+    revision: int
+    rank: float
+    summary: Json
+
+
+_insert = sa.insert(clutch)
+_of_wanted = clutch.c.clutch_id == bindparam("wanted")
+_by_id = select(clutch).where(_of_wanted)
+_worst_first = select(clutch).order_by(clutch.c.rank, clutch.c.clutch_id).limit(bindparam("most"))
+_worst_first_after = _worst_first.where(
+    tuple_(clutch.c.rank, clutch.c.clutch_id) > tuple_(bindparam("after_rank"), bindparam("after_id"))
+)
+_set_summary = update(clutch).where(_of_wanted).values(rank=bindparam("new_rank"), summary=bindparam("new_summary"))
+_bump = update(clutch).where(_of_wanted).values(revision=clutch.c.revision + 1)
+_revision = select(clutch.c.revision).where(_of_wanted)
+_ids = select(clutch.c.clutch_id).order_by(clutch.c.clutch_id)
+
+
+def insert(connection: Connection, row: ClutchRow) -> None:
+    """Store a new clutch. Raises IntegrityError where its id is taken."""
+    values = {
+        "clutch_id": row.clutch_id,
+        "record": to_text(row.record),
+        "content_sha256": row.content_sha256,
+        "created_at": row.created_at,
+        "revision": row.revision,
+        "rank": row.rank,
+        "summary": to_text(row.summary),
+    }
+    connection.execute(_insert, values)
+
+
+def get(connection: Connection, clutch_id: str) -> ClutchRow | None:
+    """The clutch, or None."""
+    found = connection.execute(_by_id, {"wanted": clutch_id}).first()
+    return None if found is None else _row(found)
+
+
+def page(connection: Connection, *, limit: int, after: tuple[float, str] | None = None) -> list[ClutchRow]:
+    """At most `limit` clutches, worst first; `after` is the (rank, clutch_id) of the last one already seen."""
+    if after is None:
+        found = connection.execute(_worst_first, {"most": limit})
+    else:
+        found = connection.execute(_worst_first_after, {"most": limit, "after_rank": after[0], "after_id": after[1]})
+    return [_row(each) for each in found]
+
+
+def set_summary(connection: Connection, clutch_id: str, rank: float, summary: Json) -> None:
+    """Replace what lists show of a clutch. Raises LookupError on an unknown one."""
+    changed = connection.execute(_set_summary, {"wanted": clutch_id, "new_rank": rank, "new_summary": to_text(summary)})
+    if changed.rowcount != 1:
+        raise LookupError(f"clutch {clutch_id!r} is not stored")
+
+
+def bump_revision(connection: Connection, clutch_id: str) -> int:
+    """Raise the clutch's revision by one and return it. Raises LookupError on an unknown one."""
+    changed = connection.execute(_bump, {"wanted": clutch_id})
+    if changed.rowcount != 1:
+        raise LookupError(f"clutch {clutch_id!r} is not stored")
+    revision: int = connection.execute(_revision, {"wanted": clutch_id}).scalar_one()
+    return revision
+
+
+def all_ids(connection: Connection) -> list[str]:
+    """The ids of all clutches, ascending."""
+    return list(connection.execute(_ids).scalars())
+
+
+def _row(found: Row[tuple[object, ...]]) -> ClutchRow:
+    values = found._asdict()
+    values["record"] = to_object(values["record"])
+    values["summary"] = to_object(values["summary"])
+    return ClutchRow(**values)

@@ -1,0 +1,56 @@
+"""Access keys. Only the hash of a secret is kept; a revoked key stays listed and opens nothing."""
+
+from dataclasses import asdict, dataclass
+
+import sqlalchemy as sa
+from sqlalchemy import Connection, bindparam, exists, select, update
+
+from storage.tables import access_key
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeyRow:
+    """A key: `secret_sha256` in hexadecimal, times ISO 8601, `revoked_at` None while it is active."""
+
+    key_id: str
+    scope: str
+    secret_sha256: str
+    note: str
+    created_at: str
+    revoked_at: str | None = None
+
+
+_insert = sa.insert(access_key)
+_active = access_key.c.revoked_at.is_(None)
+_by_hash = select(access_key).where(access_key.c.secret_sha256 == bindparam("wanted"), _active)
+_any_active = select(exists().where(_active))
+_all = select(access_key).order_by(access_key.c.created_at, access_key.c.key_id)
+_revoke = (
+    update(access_key).where(access_key.c.key_id == bindparam("wanted"), _active).values(revoked_at=bindparam("at"))
+)
+
+
+def insert(connection: Connection, row: KeyRow) -> None:
+    """Store a new key. Raises IntegrityError where its id or its secret is taken."""
+    connection.execute(_insert, asdict(row))
+
+
+def by_secret_hash(connection: Connection, secret_sha256: str) -> KeyRow | None:
+    """The active key with this hash; None where there is none or it has been revoked."""
+    found = connection.execute(_by_hash, {"wanted": secret_sha256}).first()
+    return None if found is None else KeyRow(**found._asdict())
+
+
+def any_active(connection: Connection) -> bool:
+    """Whether any key opens anything: without one the service keeps to the loopback."""
+    return bool(connection.execute(_any_active).scalar_one())
+
+
+def all_keys(connection: Connection) -> list[KeyRow]:
+    """All keys, revoked ones too, oldest first."""
+    return [KeyRow(**found._asdict()) for found in connection.execute(_all)]
+
+
+def revoke(connection: Connection, key_id: str, revoked_at: str) -> bool:
+    """Revoke a key; False where there is no active key of this id."""
+    return connection.execute(_revoke, {"wanted": key_id, "at": revoked_at}).rowcount == 1

@@ -1,0 +1,59 @@
+"""Bring a database to the code's revision. A step is named, and applied and recorded in the caller's transaction.
+
+A new step is a file in `versions/` whose `revision` is its own name and whose `down_revision` is the step before.
+Steps only go forward: going back is restoring a backup.
+"""
+
+import threading
+from functools import cache
+from pathlib import Path
+
+from alembic import command
+from alembic.config import Config
+from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy import Connection
+
+from storage.errors import DatabaseTooNew
+
+# Alembic keeps the step that it runs in module globals: one at a time in a process.
+_one_at_a_time = threading.Lock()
+
+
+def _config() -> Config:
+    config = Config()
+    # A % in a path would be read as interpolation.
+    config.set_main_option("script_location", str(Path(__file__).parent).replace("%", "%%"))
+    config.set_main_option("path_separator", "os")
+    return config
+
+
+@cache
+def head() -> str:
+    """The revision that this code needs."""
+    revision = ScriptDirectory.from_config(_config()).get_current_head()
+    if revision is None:
+        raise RuntimeError("the migrations are missing from this installation")
+    return revision
+
+
+def current(connection: Connection) -> str | None:
+    """The revision that the database is at; None where it is empty."""
+    return MigrationContext.configure(connection).get_current_revision()
+
+
+def upgrade(connection: Connection) -> None:
+    """Run the steps that are missing, without committing. The transaction must have been begun as a writing one.
+
+    Raises DatabaseTooNew where the database is at a revision that this code does not know.
+    """
+    with _one_at_a_time:
+        config = _config()
+        known = {step.revision for step in ScriptDirectory.from_config(config).walk_revisions()}
+        at = current(connection)
+        if at is not None and at not in known:
+            raise DatabaseTooNew(
+                f"the database is at revision {at}, this release knows up to {head()}: use a newer one"
+            )
+        config.attributes["connection"] = connection
+        command.upgrade(config, "head")

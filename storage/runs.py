@@ -1,0 +1,119 @@
+"""Runs: what was sent, and the receipt that was answered. Their order is by cycles, then by run_id."""
+
+from dataclasses import dataclass, fields
+
+import sqlalchemy as sa
+from sqlalchemy import Connection, Row, bindparam, or_, select, tuple_, update
+
+from storage.json_text import Json, to_object, to_text
+from storage.tables import run
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewRun:
+    """A run that is about to be stored. `cycles` since new; `details` holds what only some kinds have."""
+
+    clutch_id: str
+    run_id: str
+    kind: str
+    cycles: float
+    started_at: str | None
+    received_at: str
+    content_sha256: str
+    details: Json
+    receipt: Json
+    code_version: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunRow(NewRun):
+    """A stored run; `run_key` is what its channels and fits hang on."""
+
+    run_key: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunInOrder:
+    """As much of a run as tracking needs."""
+
+    run_key: int
+    run_id: str
+    kind: str
+    cycles: float
+    started_at: str | None
+    received_at: str
+    details: Json
+
+
+_insert = sa.insert(run)
+_of_clutch = run.c.clutch_id == bindparam("of_clutch")
+_one = select(run).where(_of_clutch, run.c.run_id == bindparam("wanted"))
+_ordered = (
+    select(run)
+    .where(_of_clutch, or_(bindparam("of_kind").is_(None), run.c.kind == bindparam("of_kind")))
+    .order_by(run.c.cycles, run.c.run_id)
+    .limit(bindparam("most"))
+)
+_ordered_after = _ordered.where(
+    tuple_(run.c.cycles, run.c.run_id) > tuple_(bindparam("after_cycles"), bindparam("after_id"))
+)
+_light = (
+    select(run.c.run_key, run.c.run_id, run.c.kind, run.c.cycles, run.c.started_at, run.c.received_at, run.c.details)
+    .where(_of_clutch)
+    .order_by(run.c.cycles, run.c.run_id)
+)
+_set_results = update(run).where(run.c.run_key == bindparam("wanted"))
+
+
+def insert(connection: Connection, row: NewRun) -> int:
+    """Store a new run and return its key. Raises IntegrityError where the clutch is unknown or has this run_id."""
+    values = {field.name: getattr(row, field.name) for field in fields(NewRun)}
+    values["details"] = to_text(row.details)
+    values["receipt"] = to_text(row.receipt)
+    return connection.execute(_insert, values).lastrowid
+
+
+def get(connection: Connection, clutch_id: str, run_id: str) -> RunRow | None:
+    """The run, or None."""
+    found = connection.execute(_one, {"of_clutch": clutch_id, "wanted": run_id}).first()
+    return None if found is None else _row(found)
+
+
+def page(
+    connection: Connection,
+    clutch_id: str,
+    *,
+    limit: int | None = None,
+    after: tuple[float, str] | None = None,
+    kind: str | None = None,
+) -> list[RunRow]:
+    """Runs of a clutch in order, of one kind or all, at most `limit`; `after` is the last (cycles, run_id) seen."""
+    values = {"of_clutch": clutch_id, "of_kind": kind, "most": -1 if limit is None else limit}
+    if after is None:
+        found = connection.execute(_ordered, values)
+    else:
+        found = connection.execute(_ordered_after, {**values, "after_cycles": after[0], "after_id": after[1]})
+    return [_row(each) for each in found]
+
+
+def in_order(connection: Connection, clutch_id: str) -> list[RunInOrder]:
+    """All runs of a clutch in order, without their receipts."""
+    return [
+        RunInOrder(**found._asdict() | {"details": to_object(found.details)})
+        for found in connection.execute(_light, {"of_clutch": clutch_id})
+    ]
+
+
+def set_results(connection: Connection, run_key: int, details: Json, receipt: Json, code_version: str) -> None:
+    """Replace a run's details and receipt, as a recomputation does. Raises LookupError on an unknown run."""
+    texts = {"details": to_text(details), "receipt": to_text(receipt)}
+    values = {"wanted": run_key, "code_version": code_version} | texts
+    if connection.execute(_set_results, values).rowcount != 1:
+        raise LookupError(f"run {run_key} is not stored")
+
+
+def _row(found: Row[tuple[object, ...]]) -> RunRow:
+    values = found._asdict()
+    values["details"] = to_object(values["details"])
+    values["receipt"] = to_object(values["receipt"])
+    return RunRow(**values)

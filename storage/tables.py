@@ -1,0 +1,122 @@
+"""The tables. Everything that a request asks for is stored; raw channels are kept for ever and bit for bit.
+
+Units are SI (pressure in Pa; 0 stands for the mean over the reference pressures), cycles are duty cycles since new,
+times are ISO 8601 text that the caller makes. Columns that hold JSON are text, written by `storage.json_text`.
+"""
+
+from sqlalchemy import (
+    REAL,
+    Column,
+    ForeignKey,
+    Index,
+    Integer,
+    LargeBinary,
+    MetaData,
+    Table,
+    Text,
+    UniqueConstraint,
+)
+
+metadata = MetaData()
+
+#: `record` is the clutch as it was posted, defaults filled in; `rank` sorts lists, worst first ascending.
+clutch = Table(
+    "clutch",
+    metadata,
+    Column("clutch_id", Text, primary_key=True),
+    Column("record", Text, nullable=False),
+    Column("content_sha256", Text, nullable=False),
+    Column("created_at", Text, nullable=False),
+    Column("revision", Integer, nullable=False),
+    Column("rank", REAL, nullable=False),
+    Column("summary", Text, nullable=False),
+    Index("clutch_worst_first", "rank", "clutch_id"),
+)
+
+#: `details` holds what only some kinds have (duty, event, note, origin); `receipt` is exactly what was answered.
+run = Table(
+    "run",
+    metadata,
+    Column("run_key", Integer, primary_key=True),
+    Column("clutch_id", Text, ForeignKey("clutch.clutch_id"), nullable=False),
+    Column("run_id", Text, nullable=False),
+    Column("kind", Text, nullable=False),
+    Column("cycles", REAL, nullable=False),
+    Column("started_at", Text),
+    Column("received_at", Text, nullable=False),
+    Column("content_sha256", Text, nullable=False),
+    Column("details", Text, nullable=False),
+    Column("receipt", Text, nullable=False),
+    Column("code_version", Text, nullable=False),
+    UniqueConstraint("clutch_id", "run_id", name="run_once_per_clutch"),
+    Index("run_in_order", "clutch_id", "cycles", "run_id"),
+)
+
+channel = Table(
+    "channel",
+    metadata,
+    Column("run_key", Integer, ForeignKey("run.run_key"), primary_key=True),
+    Column("name", Text, primary_key=True),
+    Column("position", Integer, nullable=False),
+    Column("codec", Text, nullable=False),
+    Column("length", Integer, nullable=False),
+    Column("data", LargeBinary, nullable=False),
+)
+
+fit = Table(
+    "fit",
+    metadata,
+    Column("run_key", Integer, ForeignKey("run.run_key"), primary_key=True),
+    Column("pressure", REAL, primary_key=True),
+    Column("mean_pressure", REAL, nullable=False),
+    Column("static_torque", REAL, nullable=False),
+    Column("coulomb_ratio", REAL, nullable=False),
+    Column("stribeck_velocity", REAL, nullable=False),
+    Column("viscous_coefficient", REAL, nullable=False),
+    Column("covariance", Text, nullable=False),
+    Column("status", Text, nullable=False),
+    Column("undetermined", Text, nullable=False),
+    Column("noise", REAL, nullable=False),
+    Column("mse_percent", REAL),
+    Column("rmse", REAL, nullable=False),
+    Column("points", Integer, nullable=False),
+    Column("speeds", Integer, nullable=False),
+    Column("mean_cof", REAL),
+    Column("mean_cof_sd", REAL),
+    Column("message", Text, nullable=False),
+    Column("code_version", Text, nullable=False),
+)
+
+prediction = Table(
+    "prediction",
+    metadata,
+    Column("clutch_id", Text, ForeignKey("clutch.clutch_id"), primary_key=True),
+    Column("method", Text, primary_key=True),
+    Column("pressure", REAL, primary_key=True),
+    Column("cycles", REAL, primary_key=True),
+    Column("payload", Text, nullable=False),
+    Column("code_version", Text, nullable=False),
+)
+
+filter_state = Table(
+    "filter_state",
+    metadata,
+    Column("clutch_id", Text, ForeignKey("clutch.clutch_id"), primary_key=True),
+    Column("method", Text, primary_key=True),
+    Column("pressure", REAL, primary_key=True),
+    Column("runs", Integer, nullable=False),
+    Column("arrays", LargeBinary, nullable=False),
+    Column("code_version", Text, nullable=False),
+)
+
+access_key = Table(
+    "access_key",
+    metadata,
+    Column("key_id", Text, primary_key=True),
+    Column("scope", Text, nullable=False),
+    Column("secret_sha256", Text, nullable=False),
+    Column("note", Text, nullable=False),
+    Column("created_at", Text, nullable=False),
+    Column("revoked_at", Text),
+    UniqueConstraint("secret_sha256", name="access_key_secret"),
+)

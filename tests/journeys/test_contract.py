@@ -1,0 +1,216 @@
+"""The public contract's examples, one after another, against a running service."""
+
+import csv
+import io
+from typing import Any
+
+import httpx2
+import pytest
+
+from tests.support import stationary
+
+CLUTCH = {
+    "clutch_id": "bench3-017",
+    "geometry": {"inner_diameter_mm": 99, "outer_diameter_mm": 133, "friction_faces": 2},
+    "oil": {"kinematic_viscosity_40c_cst": 56, "kinematic_viscosity_100c_cst": 9.3},
+    "end_of_life": {"cof_fraction": 0.5},
+    "friction_material": "paper",
+    "reaction_plate": "steel",
+    "fluid": "ATF",
+}
+BASE = "/v1/clutches/bench3-017"
+PARAMETERS = {"static_torque_nm", "coulomb_ratio", "stribeck_velocity_m_s", "viscous_coefficient"}
+QUANTILES = ["0.05", "0.1", "0.25", "0.5", "0.75", "0.9", "0.95"]
+
+
+def post_life(http: httpx2.Client, last: int = 7) -> list[dict[str, Any]]:
+    """The clutch and a test every thousand cycles; the receipts."""
+    assert http.post("/v1/clutches", json=CLUTCH).status_code == 201
+    receipts = []
+    for cycles in range(0, last * 1000 + 1, 1000):
+        answer = http.post(f"{BASE}/runs", json=stationary(cycles, run_id=f"stationary-{cycles}"))
+        assert answer.status_code == 201, answer.text
+        receipts.append(answer.json())
+    return receipts
+
+
+def test_a_clutch_is_registered_once(http: httpx2.Client) -> None:
+    first = http.post("/v1/clutches", json=CLUTCH)
+    again = http.post("/v1/clutches", json=CLUTCH)
+    other = http.post("/v1/clutches", json=CLUTCH | {"fluid": "ATF 2"})
+    assert [first.status_code, again.status_code, other.status_code] == [201, 200, 409]
+    assert first.json() == again.json()
+    assert other.headers["content-type"] == "application/problem+json"
+    assert first.headers["location"] == BASE
+    assert http.get(BASE).json() | CLUTCH == http.get(BASE).json() | CLUTCH
+    assert http.post("/v1/clutches", json={"clutch_id": "all-defaults"}).json()["oil"] == CLUTCH["oil"]
+
+
+def test_a_run_gets_its_receipt(http: httpx2.Client) -> None:
+    receipt = post_life(http, last=0)[0]
+    assert receipt["clutch_id"] == "bench3-017"
+    assert (receipt["kind"], receipt["cycles"], receipt["duplicate"]) == ("stationary_stribeck", 0, False)
+    assert len(receipt["content_sha256"]) == 64
+    assert [fit["pressure_bar"] for fit in receipt["fits"]] == [4.0, 4.5, 5.0, 5.5, 6.0, 6.5, 7.0]
+    for fit in receipt["fits"]:
+        assert set(fit["parameters"]) == set(fit["standard_errors"]) == PARAMETERS
+        assert fit["acceptable"] is (fit["mse_percent"] < 5)
+        assert 0 < fit["mean_cof_sd"] < 0.01 * fit["mean_cof"]
+    assert receipt["loops"] == []
+    again = http.post(f"{BASE}/runs", json=stationary(0, run_id="stationary-0"))
+    assert (again.status_code, again.json()) == (200, receipt | {"duplicate": True})
+    assert http.post(f"{BASE}/runs", json=stationary(5, run_id="stationary-0")).status_code == 409
+    assert http.post("/v1/clutches/nobody/runs", json=stationary(0)).status_code == 404
+
+
+def test_all_kinds_of_runs_are_taken(http: httpx2.Client) -> None:
+    post_life(http, last=0)
+    duty = {"cycles": 1000, "energy_per_cycle_kj": 18.0, "initial_speed_rpm": 2000, "maximum_pressure_bar": 8}
+    sampled = {
+        "time_s": [0.0, 0.1, 0.2],
+        "pressure_bar": [5.0, 5.0, 5.0],
+        "speed_rpm": [0.0, 10.0, -0.2],
+        "torque_nm": [1, 2, 3],
+    }
+    for body in (
+        {"kind": "run_in", "cycles": 0, "duty": {"cycles": 200}},
+        {"kind": "duty_cycles", "cycles": 1000, "duty": duty},
+        {"kind": "duty_cycles", "cycles": 2000, "duty": duty, "channels": sampled},
+        {"kind": "dynamic_stribeck", "cycles": 2000, "channels": sampled},
+        {"kind": "maintenance", "cycles": 2000, "event": "oil_change", "note": "fresh ATF"},
+    ):
+        answer = http.post(f"{BASE}/runs", json=body)
+        assert answer.status_code == 201, answer.text
+        again = http.post(f"{BASE}/runs", json=body)
+        assert (again.status_code, again.json()["run_id"]) == (200, answer.json()["run_id"])
+    items = http.get(f"{BASE}/runs").json()["items"]
+    assert [item["cycles"] for item in items] == sorted(item["cycles"] for item in items)
+    assert len(items) == 6
+    assert http.get(f"{BASE}/remaining-useful-life").json()["as_of_cycles"] == 2000
+
+
+@pytest.mark.parametrize("method", ["particle", "ukf", "grid"])
+def test_remaining_life_has_the_contracts_shape(http: httpx2.Client, method: str) -> None:
+    post_life(http)
+    said = http.get(f"{BASE}/remaining-useful-life", params={"method": method}).json()
+    assert (said["method"], said["as_of_cycles"], said["runs_used"], said["status"]) == (method, 7000, 8, "predicted")
+    assert said["criterion"]["quantity"] == "mean_cof"
+    assert said["criterion"]["fraction"] == 0.5
+    assert said["criterion"]["pressure_bar"] is None
+    assert said["criterion"]["threshold_mean_cof"] == pytest.approx(0.5 * said["criterion"]["initial_mean_cof"])
+    assert list(said["remaining_cycles"]) == list(said["end_of_life_cycles"]) == QUANTILES
+    values = list(said["remaining_cycles"].values())
+    assert values == sorted(values)
+    assert said["end_of_life_cycles"]["0.5"] == pytest.approx(7000 + said["remaining_cycles"]["0.5"])
+    assert 0 < said["current"]["health"] < 1
+    assert said["current"]["health"] == pytest.approx((said["current"]["fraction_of_initial"] - 0.5) / 0.5)
+    assert said["horizon_cycles"] == 1_000_000
+    assert said["model"] == {"name": "baseline", "effects": []}
+    at_five_bar = http.get(f"{BASE}/remaining-useful-life", params={"method": method, "pressure_bar": 5}).json()
+    assert at_five_bar["criterion"]["pressure_bar"] == 5
+    assert at_five_bar["status"] in ("predicted", "may_never_reach")
+    unknown = http.get(f"{BASE}/remaining-useful-life", params={"method": method, "pressure_bar": 9})
+    assert unknown.status_code == 404
+
+
+def test_at_cycles_says_what_would_have_been_said_then(http: httpx2.Client) -> None:
+    post_life(http, last=3)
+    then = http.get(f"{BASE}/remaining-useful-life").json()
+    for cycles in (4000, 5000):
+        http.post(f"{BASE}/runs", json=stationary(cycles))
+    for at in (3000, 3999.5):
+        asked = http.get(f"{BASE}/remaining-useful-life", params={"at_cycles": at}).json()
+        assert asked | {"revision": 0} == then | {"revision": 0}
+    early = http.get(f"{BASE}/remaining-useful-life", params={"at_cycles": 0}).json()
+    assert (early["status"], early["runs_used"]) == ("insufficient_data", 1)
+    assert set(early["remaining_cycles"].values()) == {None}
+
+
+def test_a_clutch_of_which_nothing_is_known(http: httpx2.Client) -> None:
+    http.post("/v1/clutches", json=CLUTCH)
+    said = http.get(f"{BASE}/remaining-useful-life").json()
+    assert (said["status"], said["as_of_cycles"], said["runs_used"]) == ("insufficient_data", None, 0)
+    assert list(said["remaining_cycles"]) == QUANTILES
+
+
+def test_the_other_answers_and_their_csv_twins(http: httpx2.Client) -> None:
+    post_life(http, last=4)
+    degradation = http.get(f"{BASE}/degradation").json()["items"]
+    assert {item["quantity"] for item in degradation} == PARAMETERS | {"mean_cof"}
+    cof = degradation[0]
+    assert (cof["quantity"], cof["pressure_bar"], cof["measured"]["cycles"]) == (
+        "mean_cof",
+        None,
+        [0, 1000, 2000, 3000, 4000],
+    )
+    assert set(cof["coefficients"]) == {"initial", "change", "scale_cycles", "exponent"}
+    assert cof["coefficients"]["change"]["value"] < 0
+    stribeck = http.get(f"{BASE}/stribeck").json()["items"]
+    assert [item["cycles"] for item in stribeck] == [0, 1000, 2000, 3000, 4000]
+    assert stribeck[0]["pressure_laws"]["static_torque_nm"]["slope_per_bar"] > 0
+    assert http.get(f"{BASE}/loops").json() == {"items": [], "next": None}
+    assert {row["quantity"] for row in http.get(f"{BASE}/series").json()["items"]} > PARAMETERS | {"remaining_cycles"}
+    for name, rows in (("degradation", 36), ("stribeck", 35), ("loops", 0), ("runs", 5), ("remaining-useful-life", 7)):
+        answer = http.get(f"{BASE}/{name}.csv")
+        assert answer.headers["content-type"] == "text/csv; charset=utf-8"
+        assert len(list(csv.DictReader(io.StringIO(answer.text)))) == rows
+    series = list(csv.DictReader(io.StringIO(http.get(f"{BASE}/series.csv?quantity=mean_cof").text)))
+    assert len(series) == 5 * 7 + 5
+    body = stationary(2000)
+    assert http.get(f"{BASE}/runs/stationary-2000").json()["channels"] == body["channels"]
+
+
+def test_lists_page_and_are_worst_first(http: httpx2.Client) -> None:
+    post_life(http, last=4)
+    http.post("/v1/clutches", json={"clutch_id": "fresh"})
+    http.post("/v1/clutches", json={"clutch_id": "worn"})
+    for index, wear in enumerate((0.0, 0.3, 0.5, 0.6, 0.65)):
+        http.post("/v1/clutches/worn/runs", json=stationary(1000 * index, wear=wear))
+    page = http.get("/v1/clutches").json()
+    assert [item["clutch_id"] for item in page["items"]] == ["worn", "bench3-017", "fresh"]
+    assert page["items"][1]["summary"]["remaining_cycles"]["0.5"] > 0
+    assert page["next"] is None
+    seen, cursor = [], {}
+    while True:
+        page = http.get(f"{BASE}/runs", params={"limit": 2} | cursor).json()
+        seen += [item["run_id"] for item in page["items"]]
+        if page["next"] is None:
+            break
+        cursor = {"cursor": page["next"]}
+    assert seen == [f"stationary-{1000 * index}" for index in range(5)]
+
+
+def test_etags_change_when_and_only_when_the_content_does(http: httpx2.Client) -> None:
+    post_life(http, last=3)
+    names = ["", "/remaining-useful-life", "/degradation", "/stribeck", "/loops", "/runs", "/series", "/series.csv"]
+    tags = {}
+    for name in [*names, "/runs/stationary-0"]:
+        answer = http.get(BASE + name)
+        tags[name] = answer.headers["etag"]
+        assert answer.headers["cache-control"] == "no-cache"
+        again = http.get(BASE + name, headers={"If-None-Match": tags[name]})
+        assert (again.status_code, again.content, again.headers["etag"]) == (304, b"", tags[name])
+        assert not tags[name].startswith("W/")
+    http.post(f"{BASE}/runs", json=stationary(3000, run_id="stationary-3000"))  # a repeat: nothing changes
+    for name, tag in tags.items():
+        assert http.get(BASE + name, headers={"If-None-Match": f'"other", {tag}'}).status_code == 304
+    http.post(f"{BASE}/runs", json=stationary(4000))
+    for name in names:
+        changed = http.get(BASE + name, headers={"If-None-Match": tags[name]}).status_code
+        assert changed == (304 if name == "/loops" else 200)
+    assert (
+        http.get(f"{BASE}/runs/stationary-0", headers={"If-None-Match": tags["/runs/stationary-0"]}).status_code == 304
+    )
+
+
+def test_health_and_description(http: httpx2.Client) -> None:
+    assert http.get("/livez").json()["status"] == "alive"
+    assert http.get("/readyz").json()["status"] == "ready"
+    described = http.get("/openapi.json").json()
+    assert "/v1/clutches/{clutch_id}/remaining-useful-life" in described["paths"]
+    assert http.get("/", follow_redirects=True).status_code == 200
+    for address, status in (("/nothing", 404), ("/v1/clutches/x/runs/y/z", 404)):
+        answer = http.get(address)
+        assert (answer.status_code, answer.headers["content-type"]) == (status, "application/problem+json")
+    wrong = http.delete(BASE)
+    assert (wrong.status_code, wrong.headers["content-type"]) == (405, "application/problem+json")

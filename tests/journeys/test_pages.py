@@ -1,0 +1,37 @@
+"""Pages in a real browser: drawn, without errors, without asking any other host."""
+
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, sync_playwright
+
+from tests.browser import find
+from tests.support import Server
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def browser() -> Iterator[Browser]:
+    """A headless Chromium."""
+    with sync_playwright() as playwright:
+        found = playwright.chromium.launch(
+            executable_path=find(),
+            args=["--no-sandbox", "--disable-background-networking", "--disable-component-update", "--disable-sync"],
+        )
+        yield found
+        found.close()
+
+
+def test_the_api_describes_itself_without_the_internet(server: Server, browser: Browser) -> None:
+    page = browser.new_page()
+    asked: list[str] = []
+    said: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.on("console", lambda message: said.append(f"{message.type}: {message.text}"))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.goto(f"{server.url}/docs")
+    page.get_by_text("/v1/clutches/{clutch_id}/remaining-useful-life", exact=True).wait_for()
+    assert page.get_by_role("heading", name="Clutchlife").is_visible()
+    assert [url for url in asked if not url.startswith((server.url, "data:"))] == []
+    assert [line for line in said if line.startswith(("error", "Refused"))] == []

@@ -1,0 +1,84 @@
+"""`make real`: post the real measurements to a service and print, as Markdown, what it says of them."""
+
+import statistics
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import httpx2
+
+from tests.real import loaders
+from tests.support import serving
+
+
+def screw_drives(http: httpx2.Client) -> None:
+    """Each drive and direction as a stationary run."""
+    print("### Two screw drives at steady speeds\n")
+    print("| run | points | M_s [mNm] | M̄_c | V_S [rad/s] | C_v [mNm] | RMSE [mNm] | MSE [%] | status |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    for name, run in loaders.screw_drive_runs().items():
+        record = {"clutch_id": name, "geometry": {"mean_radius_mm": 1000}}
+        http.post("/v1/clutches", json=record).raise_for_status()
+        answer = http.post(f"/v1/clutches/{name}/runs", json=run)
+        answer.raise_for_status()
+        fit = answer.json()["fits"][0]
+        told = fit["parameters"], fit["standard_errors"]
+        m_s, m_c, v_s, c_v = (
+            f"{values[0] * scale:.3g} ± {values[1] * scale:.2g}"
+            for values, scale in zip(zip(*(each.values() for each in told), strict=True), (1e3, 1, 1, 1e3), strict=True)
+        )
+        errors = f"{fit['rmse_nm'] * 1e3:.3f} | {fit['mse_percent']:.1f}"
+        print(f"| {name} | {fit['points']} | {m_s} | {m_c} | {v_s} | {c_v} | {errors} | {fit['status']} |")
+
+
+def traction(http: httpx2.Client) -> None:
+    """200 sweeps of one contact, and what is said of its remaining life."""
+    http.post("/v1/clutches", json=loaders.TRACTION_CLUTCH).raise_for_status()
+    fits = []
+    for run in loaders.traction_runs():
+        answer = http.post("/v1/clutches/traction/runs", json=run)
+        answer.raise_for_status()
+        fits += answer.json()["fits"]
+    print("\n### 200 traction sweeps, down and up\n")
+    print("| | 5 % | median | 95 % |\n|---|---|---|---|")
+    for title, values in (
+        ("percentage MSE", [fit["mse_percent"] for fit in fits]),
+        ("RMSE [Nm]", [fit["rmse_nm"] for fit in fits]),
+        ("mean coefficient of traction", [fit["mean_cof"] for fit in fits]),
+    ):
+        cuts = statistics.quantiles(values, n=20)
+        print(f"| {title} | {cuts[0]:.3g} | {cuts[9]:.3g} | {cuts[18]:.3g} |")
+    print(f"\n{sum(fit['acceptable'] for fit in fits)} of {len(fits)} fits are acceptable (MSE below 5 %).\n")
+    print("| after sweep | method | status | P(reached within 10⁶) | remaining, 5 % | median | 95 % |")
+    print("|---|---|---|---|---|---|---|")
+    for at in (20, 50, 100, 200):
+        for method in ("particle", "ukf", "grid"):
+            params: dict[str, Any] = {"method": method, "at_cycles": at}
+            said = http.get("/v1/clutches/traction/remaining-useful-life", params=params).json()
+            low, median, high = (_cycles(said["remaining_cycles"][q]) for q in ("0.05", "0.5", "0.95"))
+            probability = f"{said['probability_of_reaching']:.2f}"
+            print(f"| {at} | {method} | {said['status']} | {probability} | {low} | {median} | {high} |")
+
+
+def _cycles(value: float | None) -> str:
+    return "beyond" if value is None else f"{value:.3g}"
+
+
+def main() -> int:
+    """Post and print, where the files are."""
+    if not loaders.FOLDER.is_dir():
+        print(f"the real measurements are not at {loaders.FOLDER}", file=sys.stderr)
+        return 1
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        serving(Path(folder) / "real.db") as server,
+        httpx2.Client(base_url=server.url, timeout=60) as http,
+    ):
+        screw_drives(http)
+        traction(http)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,192 @@
+"""What must not come in does not: each gets the contract's status, a message with channel, row and value, and no trace."""
+
+import json
+import sqlite3
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from tests.support import stationary
+
+RUNS = "/v1/clutches/c1/runs"
+
+
+def content(path: Path) -> list[str]:
+    """Everything in the database, as text."""
+    with sqlite3.connect(path) as connection:
+        found = list(connection.iterdump())
+    connection.close()
+    return found
+
+
+@pytest.fixture
+def known(client: TestClient) -> dict[str, Any]:
+    """A run that is there already."""
+    body = stationary(0, run_id="known")
+    assert client.post(RUNS, json=body).status_code == 201
+    return body
+
+
+def spoiled(channel: str, index: int, value: Any) -> dict[str, Any]:
+    """A good run with one value replaced."""
+    body = stationary(1000, run_id="new")
+    body["channels"][channel][index] = value
+    return body
+
+
+CASES = [
+    (spoiled("torque_nm", 17, float("nan")), "/channels/torque_nm/17", 18, "nan", "not_finite"),
+    (spoiled("torque_nm", 3, float("inf")), "/channels/torque_nm/3", 4, "inf", "not_finite"),
+    (spoiled("speed_rpm", 5, -20.0), "/channels/speed_rpm/5", 6, "-20.0", "negative"),
+    (spoiled("pressure_bar", 0, -5.0), "/channels/pressure_bar/0", 1, "-5.0", "negative"),
+    (spoiled("pressure_bar", 9, "5"), "/channels/pressure_bar/9", 10, "'5'", "not_a_number"),
+    (spoiled("torque_nm", 9, None), "/channels/torque_nm/9", 10, "None", "not_a_number"),
+    (spoiled("torque_nm", 9, True), "/channels/torque_nm/9", 10, "True", "not_a_number"),
+    (spoiled("torque_nm", 9, [1.0]), "/channels/torque_nm/9", 10, "[1.0]", "not_a_number"),
+    (spoiled("torque_nm", 9, 10**400), "/channels/torque_nm/9", 10, None, None),
+    (spoiled("speed_rpm", 9, 1e9), "/channels/speed_rpm/9", 10, "1000000000.0", "out_of_range"),
+    (stationary(-1), "/cycles", None, "-1", "greater_than_equal"),
+    (stationary(0) | {"cycles": "7"}, "/cycles", None, "'7'", "float_type"),
+    (stationary(0) | {"cycles": float("nan")}, "/cycles", None, "nan", "finite_number"),
+    (stationary(0) | {"colour": 1}, "/colour", None, "1", "extra_forbidden"),
+    (stationary(0) | {"kind": "dyno"}, "/kind", None, None, "union_tag_invalid"),
+    (stationary(0) | {"run_id": "a/b"}, "/run_id", None, "'a/b'", "string_pattern_mismatch"),
+    (stationary(0) | {"channels": {}}, "/channels/pressure_bar", None, "", "missing"),
+    (stationary(0) | {"channels": 5}, "/channels", None, "5", None),
+    (stationary(0) | {"started_at": "2026-11-02T08:00:00"}, "/started_at", None, None, "timezone_aware"),
+    (stationary(0, pressures=(5.0,), speeds=(500,)), "/channels/torque_nm/0", 1, None, "too_few_points"),
+    (stationary(0, speeds=(500,)), "/channels/speed_rpm/0", 1, "500", "speeds_all_equal"),
+    (stationary(0, pressures=(0.0,)), "/channels/pressure_bar/0", 1, "0", "unloaded"),
+    ({"kind": "maintenance", "cycles": 0, "event": "party"}, "/event", None, "'party'", "literal_error"),
+    ({"kind": "duty_cycles", "cycles": 0}, "/duty", None, "", "missing"),
+]
+
+
+@pytest.mark.parametrize(("body", "pointer", "row", "value", "code"), CASES, ids=lambda each: str(each)[:40])
+def test_a_wrong_run_is_refused_and_leaves_no_trace(
+    client: TestClient, known: dict[str, Any], tmp_path: Path, body: dict[str, Any], pointer: str, row: int | None,
+    value: str | None, code: str | None,
+) -> None:  # fmt: skip
+    assert known
+    before = content(tmp_path / "clutchlife.db")
+    answer = client.post(RUNS, content=json.dumps(body), headers={"Content-Type": "application/json"})
+    assert answer.status_code == 422
+    assert answer.headers["content-type"] == "application/problem+json"
+    problem = answer.json()
+    assert set(problem) >= {"type", "title", "status", "detail", "errors"}
+    first = problem["errors"][0]
+    assert (first["pointer"], first["row"]) == (pointer, row)
+    assert value is None or first["value"] == value
+    assert code is None or first["code"] == code
+    assert pointer.split("/")[-2 if row else -1] in first["message"]
+    assert content(tmp_path / "clutchlife.db") == before
+
+
+def test_torque_all_zero_is_refused(client: TestClient) -> None:
+    body = stationary(0)
+    body["channels"]["torque_nm"] = [0.0] * len(body["channels"]["torque_nm"])
+    problem = client.post(RUNS, json=body).json()
+    assert (problem["status"], problem["errors"][0]["code"]) == (422, "torque_all_zero")
+
+
+@pytest.mark.parametrize("channel", ["pressure_bar", "speed_rpm", "torque_nm"])
+def test_ragged_and_empty_channels_are_named(client: TestClient, channel: str) -> None:
+    body = stationary(0)
+    body["channels"][channel].pop()
+    found = client.post(RUNS, json=body).json()["errors"]
+    assert [(each["pointer"], each["code"], each["row"]) for each in found] == [(f"/channels/{channel}", "ragged", 280)]
+    body["channels"][channel] = []
+    assert client.post(RUNS, json=body).json()["errors"][0]["code"] == "empty"
+
+
+def test_a_million_errors_are_counted_and_fifty_shown(client: TestClient) -> None:
+    body = stationary(0)
+    body["channels"]["torque_nm"] = [None] * 100_000
+    problem = client.post(RUNS, json=body).json()
+    assert len(problem["errors"]) == 50
+    assert problem["total_errors"] == 100_002  # and two channels that are shorter
+
+
+def test_an_unknown_clutch_is_404(client: TestClient) -> None:
+    assert client.post("/v1/clutches/nobody/runs", json=stationary(0)).status_code == 404
+    for name in ("remaining-useful-life", "degradation", "stribeck", "loops", "runs", "series"):
+        answer = client.get(f"/v1/clutches/nobody/{name}")
+        assert (answer.status_code, answer.headers["content-type"]) == (404, "application/problem+json")
+
+
+def test_the_same_run_twice_is_one_run(client: TestClient, known: dict[str, Any], tmp_path: Path) -> None:
+    before = content(tmp_path / "clutchlife.db")
+    first = client.get(f"{RUNS}/known").json()
+    answer = client.post(RUNS, json=known)
+    assert answer.status_code == 200
+    assert answer.json()["duplicate"] is True
+    del first["channels"]
+    assert answer.json() | {"duplicate": False} == first
+    assert content(tmp_path / "clutchlife.db") == before
+
+
+def test_other_content_under_a_known_name_is_a_conflict(
+    client: TestClient, known: dict[str, Any], tmp_path: Path
+) -> None:
+    before = content(tmp_path / "clutchlife.db")
+    assert client.post(RUNS, json=known | {"cycles": 1}).status_code == 409
+    assert client.post("/v1/clutches", json={"clutch_id": "c1", "fluid": "water"}).status_code == 409
+    assert content(tmp_path / "clutchlife.db") == before
+
+
+@pytest.mark.parametrize(
+    ("body", "status"),
+    [(b"", 422), (b"[1", 422), (b"null", 422), (b"\xff\xfe", 422), (b"[" * 100_000, 422), (b"1" * 2**20 + b"1", 413)],
+    ids=["empty", "cut off", "null", "not utf-8", "deep", "large"],
+)
+def test_what_is_no_run_at_all(client: TestClient, body: bytes, status: int) -> None:
+    answer = client.post(RUNS, content=body, headers={"Content-Type": "application/json"})
+    assert (answer.status_code, answer.headers["content-type"]) == (status, "application/problem+json")
+
+
+def test_a_large_body_of_unknown_length_is_413(client: TestClient) -> None:
+    chunks = (b" " * 65536 for _ in range(64))
+    answer = client.post(RUNS, content=chunks, headers={"Content-Type": "application/json"})
+    assert answer.status_code == 413
+
+
+def test_a_form_is_not_taken(client: TestClient) -> None:
+    """A page in a browser can send forms and plain text across sites unasked, JSON it cannot."""
+    answer = client.post(RUNS, content=json.dumps(stationary(0)), headers={"Content-Type": "text/plain"})
+    assert answer.status_code == 415
+
+
+@pytest.mark.parametrize(
+    "query",
+    ["method=magic", "pressure_bar=nan", "pressure_bar=-1", "at_cycles=x", "at_cycles=inf", "at_cycles=-1"],
+)
+def test_bad_questions_are_422(client: TestClient, query: str) -> None:
+    assert client.get(f"/v1/clutches/c1/remaining-useful-life?{query}").status_code == 422
+
+
+def test_a_bad_cursor_is_422(client: TestClient) -> None:
+    for cursor in ("%ff", "e30", "WzFd", "!!!!"):
+        assert client.get(f"{RUNS}?cursor={cursor}").status_code == 422
+
+
+@pytest.mark.parametrize(
+    "record",
+    [
+        {"clutch_id": ""},
+        {"clutch_id": "a b"},
+        {"clutch_id": "c2", "geometry": {"inner_diameter_mm": 133, "outer_diameter_mm": 99}},
+        {"clutch_id": "c2", "geometry": {"friction_faces": 0}},
+        {"clutch_id": "c2", "geometry": {"friction_faces": 2.5}},
+        {"clutch_id": "c2", "end_of_life": {"cof_fraction": 1.0}},
+        {"clutch_id": "c2", "oil": {"kinematic_viscosity_40c_cst": 5}},
+        {"clutch_id": "c2", "geometry": {"mean_radius_mm": -1}},
+        {"clutch_id": "c2", "surprise": 1},
+        {},
+    ],
+    ids=str,
+)
+def test_a_wrong_clutch_is_422(client: TestClient, record: dict[str, Any]) -> None:
+    assert client.post("/v1/clutches", json=record).status_code == 422
+    assert len(client.get("/v1/clutches").json()["items"]) == 1

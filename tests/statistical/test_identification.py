@@ -1,0 +1,176 @@
+"""The identification against other optimisers, and what its uncertainties promise against what they hold."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from scipy.optimize import Bounds, least_squares, minimize
+
+from models.arrays import FloatArray
+from models.identification import FitStatus, StribeckFit, fit_curves, mean_torque
+from models.runs import Curve
+from models.stribeck import PARAMETER_NAMES
+from tests.models.stribeck_curves import VELOCITY, clutch, curve, eq3, hard_curve
+
+pytestmark = pytest.mark.statistical
+
+SEED = 20131107
+#: Residual sums are compared as shares of the sum of squared torques, noise of 1 % being 1e-4. The identification gives
+#: some away knowingly: M_s is held at 1e-6 of the torque, V_S within 1e-5 and 100 times the speeds, and it ends on a
+#: parabola of width 2e-4. Together that was 6e-13 at worst; a local optimum that is missed costs 1e-6 and more.
+GIVEN_AWAY = 1e-10
+#: 1,000 intervals of 90 % hold the truth in 90 % of cases with a standard deviation of 0.95 %: three of them.
+CURVES, COVERAGE, WITHIN = 1000, 0.90, 0.03
+
+
+@pytest.fixture(autouse=True)
+def _print_seed() -> None:
+    print(f"seed {SEED}")
+
+
+def _residuals(x: FloatArray, speed: FloatArray, torque: FloatArray) -> FloatArray:
+    return eq3(x, speed) - torque
+
+
+def _jacobian(x: FloatArray, speed: FloatArray, _torque: FloatArray) -> FloatArray:
+    e = np.exp(-x[2] / speed)
+    return np.stack([1 + (x[1] - 1) * e, x[0] * e, -x[0] * (x[1] - 1) * e / speed, speed**0.3], axis=1)
+
+
+def _starts(speed: FloatArray, torque: FloatArray, rng: np.random.Generator) -> list[FloatArray]:
+    level = max(float(np.abs(torque).mean()), 1e-3)
+    sensible = np.array([level, 0.8, float(np.median(speed)), 0.1 * level])
+    spread = np.exp(rng.normal(0.0, [0.5, 0.7, 1.5, 1.0], size=(3, 4)))
+    return [sensible, *(sensible * spread)]
+
+
+def _folded(one: Curve) -> tuple[FloatArray, FloatArray]:
+    return np.abs(one.velocity), one.torque * np.sign(one.velocity)
+
+
+def _sum_of_squares(fit: StribeckFit) -> float:
+    return fit.rmse**2 * fit.points
+
+
+def _multistart(one: Curve, rng: np.random.Generator) -> float:
+    speed, torque = _folded(one)
+    best = np.inf
+    for start in _starts(speed, torque, rng):
+        found = least_squares(
+            _residuals, start, jac=_jacobian, bounds=(0, np.inf), args=(speed, torque), x_scale="jac", max_nfev=200
+        )
+        best = min(best, 2 * found.cost)
+    return best
+
+
+def _interior_point(one: Curve, rng: np.random.Generator) -> float:
+    speed, torque = _folded(one)
+    scale = max(float((torque**2).sum()), 1e-9)
+
+    def objective(x: FloatArray) -> float:
+        return float((_residuals(x, speed, torque) ** 2).sum()) / scale
+
+    def slope(x: FloatArray) -> FloatArray:
+        return 2 * _jacobian(x, speed, torque).T @ _residuals(x, speed, torque) / scale
+
+    found = minimize(
+        objective,
+        _starts(speed, torque, rng)[0],
+        jac=slope,
+        hess=lambda x: 2 * _jacobian(x, speed, torque).T @ _jacobian(x, speed, torque) / scale,
+        method="trust-constr",
+        bounds=Bounds(0, np.inf, keep_feasible=True),
+        options={"maxiter": 150},
+    )
+    return objective(np.maximum(found.x, 0.0)) * scale
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning", "ignore::RuntimeWarning")  # the witnesses warn on degenerate curves
+@pytest.mark.parametrize(("witness", "curves"), [(_multistart, 500), (_interior_point, 50)])
+def test_never_a_worse_optimum_than_a_local_optimiser(witness, curves) -> None:  # type: ignore[no-untyped-def]
+    """Four starts of bounded least squares; the paper's own interior point method from one start on a subset."""
+    rng = np.random.default_rng(SEED)
+    tests = [hard_curve(rng) for _ in range(curves)]
+    fits = fit_curves(tests)
+    gaps = np.array(
+        [
+            (_sum_of_squares(fit) - witness(one, rng)) / max(float((one.torque**2).sum()), 1e-9)
+            for one, fit in zip(tests, fits, strict=True)
+        ]
+    )
+    short = np.mean(gaps < -1e-6)
+    print(f"worst gap {gaps.max():.1e} of the sum of squares, the witness falls short in {short:.0%}")
+    assert gaps.max() <= GIVEN_AWAY
+    assert short > 0.02, "the curves are too easy: a local optimiser would pass this test as well"
+
+
+def _simulated(noise: float, seed: int = SEED) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """True parameters [CURVES, 4], true torque and noisy torque [CURVES, 40]; noise is a share of the torque."""
+    rng = np.random.default_rng(seed)
+    truth = clutch(rng.uniform(4, 7, CURVES), rng.uniform(0, 1, CURVES), rng)
+    torque = eq3(truth, VELOCITY)
+    return truth, torque, torque * (1 + noise * rng.standard_normal(torque.shape))
+
+
+def _coverage(fits: Sequence[StribeckFit], truth: FloatArray, shrink: float = 1.0) -> FloatArray:
+    """[5]: the share of intervals, estimate ± 1.645 standard errors, that hold each parameter and the mean torque."""
+    estimate = np.array([fit.parameters.as_array() for fit in fits])
+    width = 1.645 * shrink * np.array([fit.standard_errors for fit in fits])
+    means = np.array([mean_torque(fit, VELOCITY) for fit in fits])
+    miss = np.abs(means[:, 0] - eq3(truth, VELOCITY).mean(axis=1))
+    held = np.column_stack([np.abs(estimate - truth) <= width, miss <= 1.645 * shrink * means[:, 1]])
+    share = held.mean(axis=0)
+    names = (*PARAMETER_NAMES, "mean_torque")
+    print({name: round(100 * float(value), 1) for name, value in zip(names, share, strict=True)})
+    return np.asarray(share)
+
+
+def test_the_error_of_eq_5_is_where_noise_alone_puts_it() -> None:
+    """Mean of eq. 5 over 1,000 curves: noise variance (n - 4)/n over the variance of torque; 36 degrees of freedom a
+    curve leave the ratio a deviation of 0.75 %, so 2.5 % is over three of them."""
+    _, torque, noisy = _simulated(0.01)
+    fits = fit_curves([curve(VELOCITY, row) for row in noisy])
+    expected = 100 * (0.01**2 * torque**2).mean(axis=1) * (36 / 40) / noisy.var(axis=1)
+    found = np.array([fit.mse_percent for fit in fits])
+    print(f"mean mse {found.mean():.3f} %, expected {expected.mean():.3f} %")
+    assert np.mean(found / expected) == pytest.approx(1.0, abs=0.025)
+    assert np.mean([fit.status is FitStatus.UNDETERMINED for fit in fits]) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("proportional", "constant"), [(0.003, 0.0), (0.01, 0.0), (0.02, 0.0), (0.0, 0.2), (0.007, 0.15)]
+)
+def test_intervals_hold_the_truth_as_often_as_they_say(proportional: float, constant: float) -> None:
+    """Noise as a share of the torque, in Nm, and both."""
+    truth, torque, noisy = _simulated(proportional)
+    noisy += constant * np.random.default_rng(SEED + 1).standard_normal(torque.shape)
+    share = _coverage(fit_curves([curve(VELOCITY, row) for row in noisy]), truth)
+    assert np.abs(share - COVERAGE).max() <= WITHIN
+
+
+def test_intervals_with_known_deviations_hold_the_truth() -> None:
+    """Torque noise of 0.05 to 0.5 Nm that differs from point to point, and is told."""
+    truth, torque, _ = _simulated(0.0)
+    rng = np.random.default_rng(SEED)
+    sd = np.exp(rng.uniform(np.log(0.05), np.log(0.5), torque.shape))
+    noisy = torque + sd * rng.standard_normal(torque.shape)
+    fits = fit_curves([curve(VELOCITY, y, s) for y, s in zip(noisy, sd, strict=True)])
+    assert np.abs(_coverage(fits, truth) - COVERAGE).max() <= WITHIN
+
+
+def test_deviations_given_too_small_are_not_believed() -> None:
+    truth, torque, noisy = _simulated(0.01)
+    fits = fit_curves([curve(VELOCITY, y, 0.002 * t) for y, t in zip(noisy, torque, strict=True)])
+    assert np.abs(_coverage(fits, truth) - COVERAGE).max() <= WITHIN
+    assert all("exceed the given torque_sd" in fit.message for fit in fits)
+
+
+def test_the_coverage_check_catches_half_a_covariance_and_a_wrong_model() -> None:
+    """Negative controls: a covariance halved, and data with a viscous exponent of 0.5 instead of 0.3."""
+    truth, _, noisy = _simulated(0.01)
+    fits = fit_curves([curve(VELOCITY, row) for row in noisy])
+    halved = _coverage(fits, truth, shrink=np.sqrt(0.5))
+    assert (halved < COVERAGE - WITHIN).all()
+    bent = noisy + truth[:, 3:] * (VELOCITY**0.5 - VELOCITY**0.3)
+    wrong = _coverage(fit_curves([curve(VELOCITY, row) for row in bent]), truth)
+    assert (wrong[:4] < COVERAGE - WITHIN).all()

@@ -1,0 +1,102 @@
+"""Rows to store, each recognisable by its number."""
+
+import sqlite3
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import Connection
+
+from storage import channels, clutches, runs
+from storage.clutches import ClutchRow
+from storage.fits import FitRow
+from storage.runs import NewRun
+
+
+def clutch_row(clutch_id: str = "bench3-017", *, rank: float = 0.0) -> ClutchRow:
+    return ClutchRow(
+        clutch_id=clutch_id,
+        record={"clutch_id": clutch_id, "geometry": {"inner_diameter_mm": 99}, "fluid": "Öl"},
+        content_sha256="ab" * 32,
+        created_at="2026-11-02T08:00:00+00:00",
+        revision=0,
+        rank=rank,
+        summary={"health": None},
+    )
+
+
+def new_run(number: int = 0, *, clutch_id: str = "bench3-017", cycles: float | None = None) -> NewRun:
+    return NewRun(
+        clutch_id=clutch_id,
+        run_id=f"run-{number:04d}",
+        kind="stationary_stribeck",
+        cycles=1000.0 * number if cycles is None else cycles,
+        started_at=None if number % 2 else "2026-11-02T08:00:00+01:00",
+        received_at="2026-11-02T09:00:00+00:00",
+        content_sha256=f"{number:064x}",
+        details={"origin": "file", "duty": None},
+        receipt={"run_id": f"run-{number:04d}", "mean_cof": 0.1 + 0.2},
+        code_version="0.1.0",
+    )
+
+
+def columns(number: int, length: int = 40) -> dict[str, NDArray[np.float64]]:
+    rng = np.random.default_rng(number)
+    return {name: rng.standard_normal(length) for name in ("torque_nm", "pressure_bar", "speed_rpm")}
+
+
+def fit_row(pressure: float, *, mse_percent: float | None = 1.7) -> FitRow:
+    return FitRow(
+        pressure=pressure,
+        mean_pressure=pressure + 12.5,
+        static_torque=25.1,
+        coulomb_ratio=0.8,
+        stribeck_velocity=1.2,
+        viscous_coefficient=-0.3,
+        covariance=tuple(float(i) / 7 for i in range(16)),
+        status="at_bound",
+        undetermined=("stribeck_velocity",),
+        noise=0.1,
+        mse_percent=mse_percent,
+        rmse=0.11,
+        points=40,
+        speeds=39,
+        mean_cof=0.12,
+        mean_cof_sd=0.001,
+        message="the Stribeck velocity lies at its bound",
+        code_version="0.1.0",
+    )
+
+
+def store_run(connection: Connection, number: int, *, length: int = 40) -> int:
+    """One accepted run as the workflow writes it: the run, its channels and the clutch's revision."""
+    run_key = runs.insert(connection, new_run(number))
+    channels.write(connection, run_key, columns(number, length))
+    clutches.bump_revision(connection, "bench3-017")
+    return run_key
+
+
+@contextmanager
+def child(script: str, *arguments: object) -> Iterator[tuple["subprocess.Popen[str]", IO[str], IO[str]]]:
+    """A process that runs `script`, what it reads and what it says; killed at the end at the latest."""
+    command = [sys.executable, "-c", script, *map(str, arguments)]
+    root = Path(__file__).parents[2]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=root) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        try:
+            yield process, process.stdin, process.stdout
+        finally:
+            process.kill()
+
+
+def integrity(path: Path) -> list[str]:
+    """What SQLite itself finds wrong with a file: `["ok"]` where nothing."""
+    with closing(sqlite3.connect(path)) as connection:
+        found = [row[0] for row in connection.execute("PRAGMA integrity_check")]
+        return found + [str(row) for row in connection.execute("PRAGMA foreign_key_check")]

@@ -1,0 +1,118 @@
+"""From an empty file to the tables, once, whoever comes first; and never backwards."""
+
+import sqlite3
+from contextlib import ExitStack, closing
+from pathlib import Path
+
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
+
+from storage import clutches
+from storage.database import Database, open_database
+from storage.errors import DatabaseTooNew, StorageUnavailable
+from storage.migrations import upgrade as migrations
+from storage.tables import metadata
+from tests.storage.samples import child, clutch_row, integrity
+
+STARTER = """
+import sys
+import storage.database
+storage.database.preferred_journal_mode = lambda _: sys.argv[1]
+print("loaded", flush=True)
+for line in sys.stdin:
+    database = storage.database.open_database(f"sqlite:///{line.strip()}")
+    print(database.ready(), flush=True)
+    database.close()
+"""
+
+
+def test_the_migrated_schema_is_that_of_the_tables(database: Database) -> None:
+    with database.reading() as connection:
+        context = MigrationContext.configure(
+            connection, opts={"compare_type": True, "compare_server_default": True, "render_as_batch": True}
+        )
+        assert compare_metadata(context, metadata) == []
+
+
+def test_a_column_that_no_step_makes_would_be_noticed(database: Database) -> None:
+    with database.writing() as connection:
+        connection.exec_driver_sql("ALTER TABLE clutch ADD COLUMN forgotten TEXT")
+        connection.exec_driver_sql("DROP INDEX run_in_order")
+        assert len(compare_metadata(MigrationContext.configure(connection), metadata)) == 2
+
+
+def test_keys_of_the_migrated_tables_are_those_of_the_metadata(database: Database) -> None:
+    """What the comparison above does not look at."""
+    with closing(sqlite3.connect(database.path)) as connection:
+        for table in metadata.sorted_tables:
+            info = connection.execute(f"PRAGMA table_info({table.name})").fetchall()
+            keyed = [name for _, name in sorted((row[5], row[1]) for row in info if row[5])]
+            assert keyed == [column.name for column in table.primary_key]
+            assert [row[1] for row in info] == [column.name for column in table.columns]
+            assert [bool(row[3]) for row in info] == [not column.nullable for column in table.columns]
+
+
+def test_a_second_start_changes_nothing(database: Database) -> None:
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+    before = database.path.read_bytes()
+    with closing(open_database(f"sqlite:///{database.path}")) as again, again.reading() as connection:
+        assert clutches.get(connection, "bench3-017") == clutch_row()
+        assert migrations.current(connection) == migrations.head()
+    assert database.path.read_bytes() == before
+
+
+def test_steps_are_one_line_and_named_after_their_files() -> None:
+    steps = list(ScriptDirectory.from_config(migrations._config()).walk_revisions())
+    assert [Path(step.path).stem for step in steps] == [step.revision for step in steps]
+    assert all(step.doc and len(step.revision) <= 32 for step in steps)
+    assert {path.stem for path in Path(migrations.__file__).parent.glob("versions/s*.py")} == {
+        s.revision for s in steps
+    }
+
+
+def test_a_newer_database_is_refused_and_left_alone(database: Database) -> None:
+    with database.writing() as connection:
+        connection.exec_driver_sql("UPDATE alembic_version SET version_num = 's9999_from_the_future'")
+    before = database.path.read_bytes()
+    with pytest.raises(DatabaseTooNew, match=r"s9999_from_the_future, .* knows up to s\d{4}_"):
+        open_database(f"sqlite:///{database.path}")
+    assert database.path.read_bytes() == before
+    assert not database.ready()
+
+
+def test_a_step_that_fails_leaves_the_file_empty(tmp_path: Path) -> None:
+    path = tmp_path / "foreign.db"
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute("CREATE TABLE prediction (of_a_ball TEXT)")  # what the step cannot make again
+    with pytest.raises(Exception, match="table prediction already exists"):
+        open_database(f"sqlite:///{path}")
+    with closing(sqlite3.connect(path)) as connection:
+        assert connection.execute("SELECT name FROM sqlite_master").fetchall() == [("prediction",)]
+
+
+def test_a_step_that_breaks_references_is_undone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def breaking(connection: object) -> None:
+        migrations.upgrade(connection)  # type: ignore[arg-type]
+        connection.exec_driver_sql("INSERT INTO prediction VALUES ('nobody', 'q', 0, 0, '{}', '')")  # type: ignore[attr-defined]
+
+    monkeypatch.setattr("storage.database.upgrade", breaking)
+    with pytest.raises(StorageUnavailable, match="refer to nothing"):
+        open_database(f"sqlite:///{tmp_path}/a.db")
+    monkeypatch.undo()
+    with closing(open_database(f"sqlite:///{tmp_path}/a.db")) as database:
+        assert integrity(database.path) == ["ok"]
+
+
+def test_processes_that_start_at_once_all_succeed(tmp_path: Path, journal_mode: str) -> None:
+    with ExitStack() as stack:
+        starters = [stack.enter_context(child(STARTER, journal_mode)) for _ in range(3)]
+        for _, _, says in starters:
+            assert says.readline() == "loaded\n"
+        for number in range(6):
+            for _, hears, _ in starters:
+                print(f"{tmp_path}/{number}.db", file=hears, flush=True)
+            assert [says.readline() for _, _, says in starters] == ["True\n"] * 3
+    assert integrity(tmp_path / "0.db") == ["ok"]
