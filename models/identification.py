@@ -108,9 +108,17 @@ def fit_curves(curves: Sequence[Curve]) -> tuple[StribeckFit, ...]:
 
 def mean_torque(fit: StribeckFit, velocities: FloatArray) -> tuple[float, float]:
     """Mean of the fitted curve over velocities [m] m/s, and its standard deviation by the delta method [Nm]."""
-    direction = gradient(velocities, fit.parameters).mean(axis=0)
-    variance = float(direction @ fit.covariance @ direction)
-    return float(torque(velocities, fit.parameters).mean()), math.sqrt(max(variance, 0.0))
+    mean, deviation = mean_torques([fit], velocities)[0].tolist()
+    return mean, deviation
+
+
+def mean_torques(fits: Sequence[StribeckFit], velocities: FloatArray) -> FloatArray:
+    """`mean_torque` of several fits at once, [n, 2]."""
+    stacked = np.stack([fit.parameters.as_array() for fit in fits], axis=1)[:, :, None]
+    parameters = StribeckParameters.from_array(stacked)
+    direction = gradient(velocities, parameters).mean(axis=1)
+    variance = np.einsum("ni,nij,nj->n", direction, np.stack([fit.covariance for fit in fits]), direction)
+    return np.stack([torque(velocities, parameters).mean(axis=1), np.sqrt(np.maximum(variance, 0.0))], axis=1)
 
 
 def _fold(curve: Curve) -> _Folded:

@@ -230,8 +230,8 @@ def minimise(problem: Problem) -> tuple[Profile, Profile]:
         points, f = (
             array[:, 0] for array in _bracket(problem, vertex, half[:, 0], np.linspace(-1.0, 1.0, POINTS) ** 3)
         )
-    lowest, vertex, _ = _narrow(points, f)
-    found = profile(problem, np.hstack([lowest, vertex, _tie(problem, scan, f.min(axis=1))]))
+    bottom, vertex, _ = _narrow(points, f)
+    found = profile(problem, np.hstack([bottom, vertex, _tie(problem, scan, f.min(axis=1))]))
     best = found.residual.argmin(axis=1)[:, None]
     tied = found.residual[:, 2:] <= found.residual.min(axis=1, keepdims=True) + _tolerance(problem)[:, None]
     best = np.where(tied, 2, best)

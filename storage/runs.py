@@ -3,7 +3,7 @@
 from dataclasses import dataclass, fields
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Row, bindparam, or_, select, tuple_, update
+from sqlalchemy import Connection, Row, bindparam, func, or_, select, tuple_, update
 
 from storage.json_text import Json, to_object, to_text
 from storage.tables import run
@@ -34,7 +34,7 @@ class RunRow(NewRun):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunInOrder:
-    """As much of a run as tracking needs."""
+    """As much of a run as tracking needs; a stationary test has the range of its speeds, maintenance its event."""
 
     run_key: int
     run_id: str
@@ -42,7 +42,9 @@ class RunInOrder:
     cycles: float
     started_at: str | None
     received_at: str
-    details: Json
+    lowest_speed: float | None
+    highest_speed: float | None
+    event: str | None
 
 
 _insert = sa.insert(run)
@@ -57,8 +59,14 @@ _ordered = (
 _ordered_after = _ordered.where(
     tuple_(run.c.cycles, run.c.run_id) > tuple_(bindparam("after_cycles"), bindparam("after_id"))
 )
+_LIGHT = tuple(field.name for field in fields(RunInOrder))
 _light = (
-    select(run.c.run_key, run.c.run_id, run.c.kind, run.c.cycles, run.c.started_at, run.c.received_at, run.c.details)
+    select(
+        *(run.c[name] for name in _LIGHT[:6]),
+        func.json_extract(run.c.details, "$.speed_range[0]"),
+        func.json_extract(run.c.details, "$.speed_range[1]"),
+        func.json_extract(run.c.details, "$.event"),
+    )
     .where(_of_clutch)
     .order_by(run.c.cycles, run.c.run_id)
 )
@@ -98,10 +106,8 @@ def page(
 
 def in_order(connection: Connection, clutch_id: str) -> list[RunInOrder]:
     """All runs of a clutch in order, without their receipts."""
-    return [
-        RunInOrder(**found._asdict() | {"details": to_object(found.details)})
-        for found in connection.execute(_light, {"of_clutch": clutch_id})
-    ]
+    found = connection.execute(_light, {"of_clutch": clutch_id})
+    return [RunInOrder(**dict(zip(_LIGHT, values, strict=True))) for values in found]
 
 
 def set_results(connection: Connection, run_key: int, details: Json, receipt: Json, code_version: str) -> None:

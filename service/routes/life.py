@@ -57,7 +57,12 @@ def degradation(request: Request, context: Reader, clutch_id: str) -> Response:
 def stribeck(request: Request, context: Reader, clutch_id: str, limit: Limit = 100, cursor: Cursor = None) -> Response:
     """The Stribeck curves of the stationary tests by cycles, and the pressure laws through them (fig. 9)."""
     return answer(
-        request, page(*answers.stribeck_page(context.database, clutch_id, limit=limit, after=from_cursor(cursor)))
+        request,
+        page(
+            *answers.stribeck_page(
+                context.database, context.remembered, clutch_id, limit=limit, after=from_cursor(cursor)
+            )
+        ),
     )
 
 
@@ -124,7 +129,9 @@ def stribeck_csv(
     request: Request, context: Reader, clutch_id: str, limit: Limit = 1000, cursor: Cursor = None
 ) -> Response:
     """The fits, a row a test and pressure."""
-    items, _ = answers.stribeck_page(context.database, clutch_id, limit=limit, after=from_cursor(cursor))
+    items, _ = answers.stribeck_page(
+        context.database, context.remembered, clutch_id, limit=limit, after=from_cursor(cursor)
+    )
     rows = [_fit_row(item, fit) for item in items for fit in item["fits"]]
     return table(request, tuple(rows[0]) if rows else ("run_id", "cycles"), rows)
 
@@ -133,12 +140,8 @@ def _fit_row(item: dict[str, Any], fit: dict[str, Any]) -> dict[str, Any]:
     flat: dict[str, Any] = {
         name: value for name, value in fit.items() if name not in ("parameters", "standard_errors", "undetermined")
     }
-    return (
-        {"run_id": item["run_id"], "cycles": item["cycles"]}
-        | flat
-        | fit["parameters"]
-        | {f"{name}_se": value for name, value in fit["standard_errors"].items()}
-    )
+    errors = {f"{name}_se": value for name, value in fit["standard_errors"].items()}
+    return {"run_id": item["run_id"], "cycles": item["cycles"], **flat, **fit["parameters"], **errors}
 
 
 @twins.get("/loops.csv", response_class=Response, responses=READING)

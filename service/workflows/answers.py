@@ -3,18 +3,20 @@
 from collections.abc import Iterator
 from typing import Any
 
-from models.pressure import fit_pressure_laws
-
+from models.pressure import LinearLaw, PressureLaws, fit_pressure_laws
+from service.formats.units import PASCALS_PER_BAR
 from service.schemas.base import whole
 from service.workflows import stored, views
+from service.workflows.analysis import LevelFit
 from service.workflows.foretold import unknown
 from service.workflows.history import ALL_PRESSURES, MEAN_COF
 from service.workflows.receipts import PARAMETER_UNITS
 from service.workflows.views import Remembered
-from storage import channels, fits, predictions, runs
+from storage import channels, predictions, runs
 from storage.clutches import ClutchRow
 from storage.database import Database
 from storage.predictions import PredictionRow
+from storage.runs import RunRow
 
 Place = tuple[float, str]
 
@@ -85,8 +87,7 @@ def run_page(database: Database, clutch_id: str, *, limit: int, after: Place | N
     with database.reading() as connection:
         stored.clutch(connection, clutch_id)
         rows = runs.page(connection, clutch_id, limit=limit + 1, after=after)
-    more = (rows[limit - 1].cycles, rows[limit - 1].run_id) if len(rows) > limit else None
-    return [row.receipt for row in rows[:limit]], more
+    return _page([row.receipt for row in rows[:limit]], rows, limit)
 
 
 def one_run(database: Database, clutch_id: str, run_id: str) -> dict[str, Any]:
@@ -98,26 +99,46 @@ def one_run(database: Database, clutch_id: str, run_id: str) -> dict[str, Any]:
 
 
 def stribeck_page(
-    database: Database, clutch_id: str, *, limit: int, after: Place | None
+    database: Database, remembered: Remembered, clutch_id: str, *, limit: int, after: Place | None
 ) -> tuple[list[Any], Place | None]:
     """Stationary tests by cycles: their fits and the pressure laws through them."""
     with database.reading() as connection:
-        stored.clutch(connection, clutch_id)
-        rows = runs.page(connection, clutch_id, limit=limit + 1, after=after, kind="stationary_stribeck")
-        found = fits.of_clutch(connection, clutch_id)
-    items = []
-    for row in rows[:limit]:
-        laws = fit_pressure_laws([stored.level_fit(each).fit for each in found.get(row.run_key, ())])
-        items.append(
-            {
-                "run_id": row.run_id,
-                "cycles": whole(row.cycles),
-                "fits": row.receipt["fits"],
-                "pressure_laws": None if laws is None else laws,
-            }
-        )
-    more = (rows[limit - 1].cycles, rows[limit - 1].run_id) if len(rows) > limit else None
-    return items, more
+        row = stored.clutch(connection, clutch_id)
+        key = (clutch_id, row.revision, "stribeck", limit, after)
+        found: tuple[list[Any], Place | None] | None = remembered.find(key)
+        if found is None:
+            rows = runs.page(connection, clutch_id, limit=limit + 1, after=after, kind="stationary_stribeck")
+            levels = stored.levels(connection, clutch_id)
+    if found is None:
+        found = _page([_stribeck_item(each, levels.get(each.run_id, [])) for each in rows[:limit]], rows, limit)
+        remembered.keep(key, found)
+    return found
+
+
+def _page(items: list[Any], rows: list[RunRow], limit: int) -> tuple[list[Any], Place | None]:
+    return items, (rows[limit - 1].cycles, rows[limit - 1].run_id) if len(rows) > limit else None
+
+
+def _stribeck_item(row: RunRow, levels: list[LevelFit]) -> dict[str, Any]:
+    laws = fit_pressure_laws([level.fit for level in levels])
+    return {
+        "run_id": row.run_id,
+        "cycles": whole(row.cycles),
+        "fits": row.receipt["fits"],
+        "pressure_laws": None if laws is None else _laws(laws),
+    }
+
+
+def _laws(laws: PressureLaws) -> dict[str, Any]:
+    """The pressure laws in bar, by public name."""
+    found: dict[str, Any] = {}
+    for name, (public, _) in PARAMETER_UNITS.items():
+        law = getattr(laws, name)
+        if isinstance(law, LinearLaw):
+            found[public] = {"intercept": law.intercept, "slope_per_bar": law.slope * PASCALS_PER_BAR}
+        else:
+            found[public] = {"asymptote": law.asymptote, "excess": law.excess, "decay_bar": law.decay / PASCALS_PER_BAR}
+    return found
 
 
 def loop_page(database: Database, clutch_id: str) -> list[dict[str, Any]]:

@@ -6,10 +6,9 @@ after it is the new reference.
 """
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-
-import numpy as np
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
@@ -29,8 +28,8 @@ ByPressure = Mapping[float, Value]
 class Event:
     """A run as the history sees it.
 
-    `moment` is when it was made [s]. A stationary test has the range of its speeds [rad/s], and mean COF with its deviation by pressure [Pa] where its
-    curves can say it.
+    `moment` is when it was made [s]. A stationary test has the range of its speeds [rad/s], and mean COF with its
+    deviation by pressure [Pa] where its curves can say it.
     """
 
     run_id: str
@@ -123,10 +122,17 @@ def nearest(level: float, values: ByPressure) -> Value | None:
 
 def _pooled(reference: ByPressure, values: ByPressure) -> Value | None:
     """Mean over the reference pressures; for a pressure that is missing the rest stands, scaled as in the reference."""
-    matched = {level: value for level in reference if (value := nearest(level, values)) is not None}
+    if values.keys() == reference.keys():
+        matched = dict(values)
+    else:
+        matched = {level: value for level in reference if (value := nearest(level, values)) is not None}
     if not matched:
         return None
-    scale = np.mean([reference[level][0] for level in reference]) / np.mean([reference[level][0] for level in matched])
-    mean = float(np.mean([value for value, _ in matched.values()]) * scale)
-    deviation = float(np.sqrt(sum(sd**2 for _, sd in matched.values())) / len(matched) * scale)
+    scale = _mean(reference, reference) / _mean(reference, matched)
+    mean = _mean(matched, matched) * scale
+    deviation = math.sqrt(sum(sd**2 for _, sd in matched.values())) / len(matched) * scale
     return mean, deviation
+
+
+def _mean(values: ByPressure, levels: ByPressure) -> float:
+    return math.fsum(values[level][0] for level in levels) / len(levels)

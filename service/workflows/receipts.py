@@ -4,9 +4,11 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from models.arrays import FloatArray
 from models.clutch import Geometry
-from models.identification import StribeckFit, mean_torque
+from models.identification import StribeckFit, mean_torques
 from service.formats.incoming import IncomingRun
 from service.formats.units import PASCALS_PER_BAR
 from service.schemas.base import whole
@@ -26,21 +28,18 @@ PARAMETER_UNITS = {
 FEWEST_SPEEDS = 4
 
 
-def mean_cof(level: LevelFit, velocities: FloatArray, geometry: Geometry) -> tuple[float, float] | None:
-    """Mean COF over the protocol's velocities [m] m/s and its deviation; None where the level cannot say it."""
-    if level.speeds < FEWEST_SPEEDS:
-        return None
-    torque, deviation = mean_torque(level.fit, velocities)
-    per_cof = geometry.torque_per_cof(level.mean_pressure)
-    cof, cof_sd = torque / per_cof, deviation / per_cof
-    usable = math.isfinite(cof) and math.isfinite(cof_sd) and 0 < cof_sd < cof
-    return (cof, cof_sd) if usable else None
-
-
 def mean_cofs(levels: Sequence[LevelFit], velocities: FloatArray, geometry: Geometry) -> dict[float, Value]:
-    """Mean COF and its deviation by pressure [Pa], for the levels that can say it."""
-    found = {level.fit.pressure: mean_cof(level, velocities, geometry) for level in levels}
-    return {pressure: value for pressure, value in found.items() if value is not None}
+    """Mean COF over the protocol's velocities [m] m/s and its deviation by pressure [Pa], where a level can say it."""
+    telling = [level for level in levels if level.speeds >= FEWEST_SPEEDS]
+    if not telling:
+        return {}
+    per_cof = np.array([geometry.torque_per_cof(level.mean_pressure) for level in telling])
+    values = (mean_torques([level.fit for level in telling], velocities) / per_cof[:, None]).tolist()
+    return {
+        level.fit.pressure: (cof, sd)
+        for level, (cof, sd) in zip(telling, values, strict=True)
+        if math.isfinite(cof) and 0 < sd < cof
+    }
 
 
 def fit_receipt(fit: StribeckFit, cof: Value | None) -> dict[str, Any]:

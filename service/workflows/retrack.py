@@ -11,7 +11,7 @@ from models.tracking.ukf import UkfState
 from service.settings import CODE_VERSION
 from service.workflows import stored
 from service.workflows.foretold import unknown
-from service.workflows.history import ALL_PRESSURES, Event, Life, lives
+from service.workflows.history import ALL_PRESSURES, Event, Life, Series, lives
 from service.workflows.tracks import Prediction, States, Tracked, follow
 from storage import clutches, filter_states, predictions
 from storage.clutches import ClutchRow
@@ -28,37 +28,37 @@ _CARRIED: dict[str, type[ParticleState] | type[UkfState]] = {"particle": Particl
 
 def retrack(connection: Connection, clutch: ClutchRow, events: Sequence[Event], *, newest: Event | None = None) -> None:
     """Track anew what the ordered history asks for: one step where `newest` comes last, else all of it."""
+    if not events:
+        return
     fraction = stored.record(clutch).end_of_life.cof_fraction
     found = lives(events)
-    states = None if newest is None else _carried(connection, clutch.clutch_id, found[-1], newest)
-    walks: list[tuple[Life, States, int]]
+    series = found[-1].pooled()
+    states = None if newest is None else _carried(connection, clutch.clutch_id, found[-1], series, newest)
+    walks: list[tuple[Life, Series, States, int]]
     if states is None:
         predictions.clear(connection, clutch.clutch_id)
-        walks = [(life, {}, 0) for life in found]
+        walks = [(life, life.pooled(), {}, 0) for life in found]
     else:
-        walks = [(found[-1], states, len(found[-1].events) - 1)]
+        walks = [(found[-1], series, states, len(found[-1].events) - 1)]
     said: dict[tuple[float, str], Prediction] = {}
     last: States = {}
-    for life, start, first_event in walks:
-        last = start
-        for states_then, foretold in follow(clutch.clutch_id, life, fraction, start, first_event=first_event):
+    for life, measured, start, first_event in walks:
+        for states_then, foretold in follow(clutch.clutch_id, life, measured, fraction, start, first_event=first_event):
             last = states_then
             said |= {(each.cycles, each.method): each for each in foretold}
     _write(connection, clutch.clutch_id, list(said.values()), last)
-    if events:
-        cycles = events[-1].cycles
-        summary, rank = _summarise(said[cycles, "particle"].payload)
-        clutches.set_summary(connection, clutch.clutch_id, rank, summary | {"runs": len(events)})
+    summary, rank = _summarise(said[events[-1].cycles, "particle"].payload)
+    clutches.set_summary(connection, clutch.clutch_id, rank, summary | {"runs": len(events)})
 
 
-def _carried(connection: Connection, clutch_id: str, life: Life, newest: Event) -> States | None:
+def _carried(connection: Connection, clutch_id: str, life: Life, series: Series, newest: Event) -> States | None:
     """The stored states from before `newest`, or None where one step on from them would not give the whole truth."""
     last = life.events[-1]
     is_test = newest.speed_range is not None
     if newest.rebuild or (newest is not last and (is_test or newest.cycles < last.cycles)):
         return None
     index = life.events.index(newest)
-    before = sum(1 for event in life.pooled().events if event != index)
+    before = sum(1 for event in series.events if event != index)
     rows = {method: row for (method, _), row in filter_states.get(connection, clutch_id).items()}
     if rows.keys() != (_CARRIED.keys() if before else set()):
         return None

@@ -84,17 +84,17 @@ def levels(connection: Connection, clutch_id: str) -> dict[str, list[LevelFit]]:
     }
 
 
-def event(row: RunRow | RunInOrder, cofs: ByPressure) -> Event:
+def event(row: RunInOrder, cofs: ByPressure) -> Event:
     """A stored run as the history sees it."""
-    speed_range = row.details.get("speed_range")
+    low, high = row.lowest_speed, row.highest_speed
     return Event(
         run_id=row.run_id,
         kind=row.kind,
         cycles=row.cycles,
         moment=moment(row.started_at, row.received_at),
-        speed_range=None if speed_range is None else (speed_range[0], speed_range[1]),
+        speed_range=None if low is None or high is None else (low, high),
         cofs=cofs,
-        rebuild=row.details.get("event") == "rebuild",
+        rebuild=row.event == "rebuild",
     )
 
 

@@ -52,13 +52,12 @@ States = dict[str, Tracked]
 
 
 def follow(
-    clutch_id: str, life: Life, fraction: float, states: States, *, first_event: int = 0
+    clutch_id: str, life: Life, series: Series, fraction: float, states: States, *, first_event: int = 0
 ) -> Iterator[tuple[States, list[Prediction]]]:
-    """Walk a life's events from `first_event` on; after each, the states by method and what is predicted.
+    """Walk a life's events from `first_event` on; after each, the states by method and what is predicted of the series.
 
     `states` are those before `first_event`. A life that says too little yields `insufficient_data`.
     """
-    series = life.pooled()
     for index in range(first_event, len(life.events)):
         runs = series.until(index)
         cycles = life.events[index].cycles

@@ -93,7 +93,7 @@ def test_runs_are_in_order_of_cycles_then_id_whatever_order_they_came_in(databas
     with database.reading() as connection:
         light = runs.in_order(connection, CLUTCH)
         assert [row.run_id for row in light] == expected
-        assert light[0].details == new_run().details
+        assert (light[0].lowest_speed, light[0].highest_speed, light[0].event) == (None, None, None)
         assert light[-1].cycles == 7000.5
         seen: list[str] = []
         after = None

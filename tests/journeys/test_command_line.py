@@ -1,0 +1,137 @@
+"""The command line, as a rig's engineer uses it."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from tests.support import Server, serving, stationary
+
+
+def clutchlife(*arguments: str | Path, code: int = 0, **environment: str) -> str:
+    """Run a command and return what it printed."""
+    called = [sys.executable, "-m", "service.cli.main", *map(str, arguments)]
+    done = subprocess.run(called, capture_output=True, text=True, env=os.environ | environment, check=False)
+    assert done.returncode == code, done.stderr + done.stdout
+    return done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A simulated campaign as files."""
+    folder = tmp_path_factory.mktemp("campaign")
+    said = clutchlife("simulate", "--seed", "7", "--out", folder)
+    assert "simulated" in said
+    return folder
+
+
+def test_a_campaign_is_simulated_the_same_each_time(campaign: Path, tmp_path: Path) -> None:
+    clutchlife("simulate", "--seed", "7", "--out", tmp_path / "again")
+    names = sorted(path.name for path in campaign.iterdir())
+    assert names == sorted(path.name for path in (tmp_path / "again").iterdir())
+    for name in names:
+        assert (campaign / name).read_bytes() == (tmp_path / "again" / name).read_bytes()
+        assert json.loads((campaign / name).read_bytes())["origin"] == "simulated"
+
+
+def test_a_campaign_is_pushed_exported_and_pushed_again(campaign: Path, server: Server, tmp_path: Path) -> None:
+    runs = len(list(campaign.iterdir())) - 1
+    push = ("push", campaign, "--clutch", "sim-7", "--url", server.url, "--spool", tmp_path / "spool")
+    assert f"{runs} stored, 0 known already, 0 refused" in clutchlife(*push)
+    assert f"0 stored, {runs} known already, 0 refused" in clutchlife(*push)
+    address = "/v1/clutches/sim-7/remaining-useful-life"
+    first = httpx2.get(server.url + address).json()
+    assert (first["status"], first["origin"]) == ("reached", "simulated")
+    clutchlife("export", "sim-7", "--out", tmp_path / "export", "--url", server.url)
+    exported = json.loads((tmp_path / "export" / "results" / "remaining-useful-life-particle.json").read_bytes())
+    assert exported == first
+    with serving(tmp_path / "second.db") as second:
+        said = clutchlife(
+            "push", tmp_path / "export", "--clutch", "sim-7", "--url", second.url, "--spool", tmp_path / "spool"
+        )
+        assert f"{runs} stored" in said
+        assert httpx2.get(second.url + address).json() == first
+
+
+def test_push_waits_in_the_spool_while_the_service_is_away(tmp_path: Path) -> None:
+    run, spool = tmp_path / "run.json", tmp_path / "spool"
+    run.write_text(json.dumps(stationary(0, run_id="r0")))
+    with serving(tmp_path / "clutchlife.db") as server:
+        httpx2.post(f"{server.url}/v1/clutches", json={"clutch_id": "c1"})
+        push = ("push", run, "--clutch", "c1", "--url", server.url, "--spool", spool, "--patience", "0.5")
+        server.stop()
+        assert "1 runs wait" in clutchlife(*push, code=75)
+        run.write_text(json.dumps(stationary(1000, run_id="r1")))
+        server.start()
+        assert "2 stored, 0 known already, 0 refused" in clutchlife(*push)
+        assert list(spool.rglob("*.json")) == []
+        run.write_text(json.dumps(stationary(-1, run_id="r2")))
+        assert "greater than or equal to 0" in clutchlife(*push, code=65)
+        assert "refused" in str(next(iter(spool.rglob("*.problem"))))
+        assert "no clutch is known" in clutchlife(
+            "push", run, "--clutch", "x", "--url", server.url, "--spool", spool, code=65
+        )
+    assert "is not there" in clutchlife("push", tmp_path / "nothing", "--clutch", "c1", code=65)
+
+
+def test_replay_gives_the_same_again_and_backup_a_copy(campaign: Path, tmp_path: Path) -> None:
+    database = tmp_path / "clutchlife.db"
+    url = f"sqlite:///{database}"
+    with serving(database) as server:
+        clutchlife("push", campaign, "--clutch", "sim-7", "--url", server.url, "--spool", tmp_path / "spool")
+        before = results(server.url)
+        clutchlife("backup", tmp_path / "copy.db", "--database", url)
+        clutchlife("backup", tmp_path / "copy.db", "--database", url, code=1)
+        clutchlife("replay", "--database", url)
+        assert results(server.url) == before
+    with serving(tmp_path / "copy.db") as copy:
+        assert results(copy.url) == before
+    assert "no clutch is known" in clutchlife("replay", "nobody", "--database", url, code=1)
+
+
+def results(url: str) -> list[object]:
+    """Everything that is said of the clutch, but for the revision."""
+    base = f"{url}/v1/clutches/sim-7"
+    names = (
+        "remaining-useful-life?method=ukf",
+        "remaining-useful-life?at_cycles=5000",
+        "degradation",
+        "series",
+        "runs",
+    )
+    return [httpx2.get(f"{base}/{name}").json() | {"revision": 0} for name in names]
+
+
+def test_keys_open_and_close_the_service(server: Server) -> None:
+    database = f"sqlite:///{server.database}"
+    keys = {
+        scope: clutchlife("key", "create", "--scope", scope, "--database", database).strip()
+        for scope in ("read", "ingest", "admin")
+    }
+    assert "scope must be one of" in clutchlife("key", "create", "--scope", "all", "--database", database, code=64)
+
+    def ask(method: str, key: str | None) -> int:
+        headers = {} if key is None else {"Authorization": f"Bearer {key}"}
+        body = {"clutch_id": "c1"} if method == "POST" else None
+        return httpx2.request(method, f"{server.url}/v1/clutches", headers=headers, json=body).status_code
+
+    assert [ask("GET", None), ask("GET", "wrong"), ask("GET", keys["read"])] == [401, 401, 200]
+    assert [ask("POST", keys["read"]), ask("POST", keys["ingest"]), ask("POST", keys["admin"])] == [403, 201, 200]
+    assert httpx2.get(f"{server.url}/readyz").status_code == 200
+    key_id = keys["read"].split("_")[1]
+    assert key_id in clutchlife("key", "list", "--database", database)
+    clutchlife("key", "revoke", key_id, "--database", database)
+    assert ask("GET", keys["read"]) == 401
+
+
+def test_the_demo_shows_a_life() -> None:
+    said = clutchlife("demo", "--exit")
+    rows = [line.split() for line in said.splitlines() if line[:7].strip().isdigit()]
+    assert len(rows) > 8
+    assert "simulated clutch" in said
+    assert "The truth: it halved at" in said
+    assert rows[-1][-2] == "reached"

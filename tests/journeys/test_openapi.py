@@ -1,0 +1,49 @@
+"""The service against its own description: whatever the description allows or forbids, the answers keep to it."""
+
+from collections.abc import Iterator
+
+import httpx2
+import pytest
+import schemathesis
+from hypothesis import HealthCheck, given, settings
+from schemathesis import GenerationMode, checks
+from schemathesis.schemas import APIOperation
+
+from service.app import create_app
+from service.settings import Settings
+from tests.support import Server, serving, stationary
+
+SCHEMA = schemathesis.openapi.from_dict(create_app(Settings()).openapi())
+OPERATIONS = [found.ok() for found in SCHEMA.get_all_operations()]
+#: What JSON schema cannot say (equal lengths, a curve in the data, a clutch that is there) is refused all the same.
+EXCLUDED = [checks.positive_data_acceptance]
+
+
+@pytest.fixture(scope="module")
+def api(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A service that knows one clutch with three tests."""
+    with serving(tmp_path_factory.mktemp("api") / "clutchlife.db") as server:
+        httpx2.post(f"{server.url}/v1/clutches", json={"clutch_id": "c1"})
+        for cycles in (0, 1000, 2000):
+            httpx2.post(f"{server.url}/v1/clutches/c1/runs", json=stationary(cycles, run_id=f"r{cycles}"))
+        yield server
+
+
+#: Where nothing but a path is sent, nothing wrong can be sent.
+CASES = [(operation, GenerationMode.POSITIVE) for operation in OPERATIONS] + [
+    (operation, GenerationMode.NEGATIVE) for operation in OPERATIONS if operation.body or operation.query
+]
+
+
+@pytest.mark.parametrize(("operation", "mode"), CASES, ids=lambda each: getattr(each, "label", None) or each.value)
+def test_every_answer_keeps_to_the_description(api: Server, operation: APIOperation, mode: GenerationMode) -> None:
+    """All of schemathesis' checks: documented statuses, types, schemas, wrong data refused, nothing unexpected."""
+
+    @settings(max_examples=40, derandomize=True, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+    @given(case=operation.as_strategy(generation_mode=mode))
+    def check(case: schemathesis.Case) -> None:
+        if "clutch_id" in case.path_parameters and mode is GenerationMode.POSITIVE:
+            case.path_parameters["clutch_id"] = "c1"
+        case.call_and_validate(base_url=api.url, excluded_checks=EXCLUDED)
+
+    check()

@@ -1,0 +1,68 @@
+"""The geometry against the reference's numbers, and torque to COF and back."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from models.clutch import Geometry
+
+RPM = 2 * math.pi / 60
+
+
+def test_the_reference_disc_has_a_mean_radius_of_58_mm():
+    """99 and 133 mm are diameters: their mean is 116 mm, and eq. 1 read literally would double every velocity."""
+    assert Geometry().mean_radius == pytest.approx(0.058, rel=1e-15)
+
+
+def test_1970_rpm_is_11_97_m_per_s():
+    velocity = Geometry().sliding_velocity(np.array([20.0, 1970.0, -1970.0]) * RPM)
+    np.testing.assert_allclose(velocity, [0.12147, 11.9652, -11.9652], rtol=1e-4)
+
+
+def test_lining_area_of_one_face():
+    """π/4 (0.133² - 0.099²) = 61.95 cm²."""
+    assert Geometry().lining_area == pytest.approx(61.95e-4, rel=1e-4)
+
+
+def test_an_override_replaces_the_mean_radius_everywhere():
+    geometry = Geometry(mean_radius_override=0.1)
+    assert geometry.sliding_velocity(np.array([2.0])).tolist() == [0.2]
+    assert geometry.cof(10.0, 5e5) == pytest.approx(Geometry().cof(10.0, 5e5) * 0.058 / 0.1)
+
+
+def test_torque_of_a_unit_cof():
+    """2 faces · 5 bar · 61.95 cm² · 58 mm = 359.3 Nm."""
+    assert Geometry().torque_per_cof(5e5) == pytest.approx(359.3, rel=1e-3)
+    assert Geometry(pressure_factor=0.5, friction_faces=4).torque_per_cof(5e5) == pytest.approx(359.3, rel=1e-3)
+
+
+@given(torque=st.floats(-1e4, 1e4), pressure=st.floats(1e3, 1e8), factor=st.floats(0.01, 10.0))
+def test_torque_and_cof_are_each_others_inverse(torque, pressure, factor):
+    geometry = Geometry(pressure_factor=factor)
+    assert geometry.torque(geometry.cof(torque, pressure), pressure) == pytest.approx(torque, rel=1e-12, abs=1e-300)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"inner_diameter": 0.0}, "inner_diameter must be finite and positive, got 0"),
+        ({"inner_diameter": math.nan}, "inner_diameter must be finite and positive"),
+        ({"outer_diameter": 0.099}, "outer_diameter must exceed inner_diameter 0.099, got 0.099"),
+        ({"outer_diameter": math.inf}, "outer_diameter must exceed"),
+        ({"friction_faces": 0}, "friction_faces must be at least 1, got 0"),
+        ({"pressure_factor": -1.0}, "pressure_factor must be finite and positive"),
+        ({"mean_radius_override": 0.0}, "mean_radius_override must be finite and positive"),
+    ],
+)
+def test_an_impossible_disc_is_refused(changes, message):
+    with pytest.raises(ValueError, match=message):
+        Geometry(**changes)
+
+
+@pytest.mark.parametrize("pressure", [0.0, -1e5, math.nan, math.inf])
+def test_a_cof_needs_a_pressure(pressure):
+    with pytest.raises(ValueError, match="pressure must be finite and positive"):
+        Geometry().cof(1.0, pressure)
