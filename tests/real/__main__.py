@@ -23,13 +23,19 @@ def screw_drives(http: httpx2.Client) -> None:
         answer = http.post(f"/v1/clutches/{name}/runs", json=run)
         answer.raise_for_status()
         fit = answer.json()["fits"][0]
-        told = fit["parameters"], fit["standard_errors"]
-        m_s, m_c, v_s, c_v = (
-            f"{values[0] * scale:.3g} ± {values[1] * scale:.2g}"
-            for values, scale in zip(zip(*(each.values() for each in told), strict=True), (1e3, 1, 1, 1e3), strict=True)
-        )
+        m_s, m_c, v_s, c_v = (_told(fit, name, scale) for name, scale in _SCALES.items())
         errors = f"{fit['rmse_nm'] * 1e3:.3f} | {fit['mse_percent']:.1f}"
         print(f"| {name} | {fit['points']} | {m_s} | {m_c} | {v_s} | {c_v} | {errors} | {fit['status']} |")
+
+
+#: Nm to mNm; at a mean radius of 1 m a velocity in m/s is a speed in rad/s.
+_SCALES = {"static_torque_nm": 1e3, "coulomb_ratio": 1.0, "stribeck_velocity_m_s": 1.0, "viscous_coefficient": 1e3}
+
+
+def _told(fit: dict[str, Any], name: str, scale: float) -> str:
+    if name in fit["undetermined"]:
+        return "undetermined"
+    return f"{fit['parameters'][name] * scale:.3g} ± {fit['standard_errors'][name] * scale:.2g}"
 
 
 def traction(http: httpx2.Client) -> None:
