@@ -1,6 +1,8 @@
 # make demo    a simulated clutch's life, posted run by run, with its prognosis      (ARGS=--exit to end by itself)
 # make test    all tests
 # make check   formatting, lint, types, layers
+# make lowest  the tests without a browser, on the oldest dependencies that pyproject.toml allows
+# make real    what is said of real measurements; make benchmark: how long things take; make picture: README's picture
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
@@ -10,7 +12,7 @@ ARGS ?=
 LOCK := --universal --python-version 3.11 --generate-hashes --no-emit-index-url --upgrade --quiet --exclude-newer "7 days" \
 	--custom-compile-command "make lock"
 
-.PHONY: demo test check benchmark real lock clean
+.PHONY: demo test check lowest benchmark real picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
@@ -26,6 +28,14 @@ check: $(VENV)/.tests
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# what the oldest releases deprecate among themselves is theirs; our own tests stay strict in `test`
+lowest: $(VENV)-lowest/.tests
+	$(VENV)-lowest/bin/python -m pytest -n 2 -W default::DeprecationWarning tests/models tests/service tests/storage \
+		tests/journeys/test_contract.py tests/journeys/test_command_line.py $(ARGS)
+
+picture: $(VENV)/.tests
+	$(BIN)/python -m tests.picture
+
 benchmark: $(VENV)/.tests
 	$(BIN)/python -m tests.benchmarks $(ARGS)
 
@@ -37,6 +47,12 @@ $(VENV)/.python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Clutchlife needs Python 3.11 or later, '$(PYTHON)' is $$($(PYTHON) --version). Name another: make PYTHON=..." >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' || { echo "'$(PYTHON)' cannot make virtual environments; on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
 	$(PYTHON) -m venv $(VENV)
+	@touch $@
+
+$(VENV)-lowest/.tests: pyproject.toml tests/requirements-lowest.txt | $(VENV)/.python
+	$(PYTHON) -m venv $(VENV)-lowest
+	$(VENV)-lowest/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r tests/requirements-lowest.txt
+	$(VENV)-lowest/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
 	@touch $@
 
 $(VENV)/.runs: $(VENV)/.python pyproject.toml docker/requirements.txt
@@ -51,6 +67,7 @@ $(VENV)/.tests: $(VENV)/.runs tests/requirements.txt
 lock:
 	uv pip compile $(LOCK) pyproject.toml -o docker/requirements.txt
 	uv pip compile $(LOCK) pyproject.toml --group test -o tests/requirements.txt
+	uv pip compile $(LOCK) --resolution lowest-direct pyproject.toml --group test -o tests/requirements-lowest.txt
 
 clean:
-	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) $(VENV)-lowest .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -69,7 +69,7 @@ def _life(service: Service, seed: int) -> None:
                 inside += _inside(said, end)
     truth_said = "it never halves" if end is None else f"it halved at {end:.0f} cycles"
     out.print(
-        f"The truth: {truth_said}. It lay inside the 90 % interval {sum(inside)} times out of {len(inside)}.\n"
+        f"The truth: {truth_said}.\nIt lay inside the 90 % interval {sum(inside)} times out of {len(inside)}.\n"
         "'-' means that too few tests are known yet, or that it may never come."
     )
 

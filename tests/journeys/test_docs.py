@@ -40,7 +40,7 @@ def test_commands_that_are_named_are_there(path: Path) -> None:
         called = [sys.executable, "-m", "service.cli.main", *command.split(), "--help"]
         done = subprocess.run(called, capture_output=True, text=True, check=False)
         assert done.returncode == 0, command
-    targets = set(re.findall(r"\bmake ([a-z]+)\b", text))
+    targets = set(re.findall(r"(?:`|^)make ([a-z]+)\b", text, flags=re.MULTILINE))
     rules = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), flags=re.MULTILINE))
     assert targets <= rules
     for link in re.findall(r"\]\(([^)#:]+)\)", text):
