@@ -34,17 +34,25 @@ class Plateaus:
     oil_temperature: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        rows = self.torque.shape
-        if len(rows) != 1 or rows[0] == 0:
-            raise ValueError(f"torque must be a column with at least one row, got shape {rows}")
-        for name in ("pressure", "speed", "torque", "torque_sd", "oil_temperature"):
-            column = getattr(self, name)
-            if column is None:
-                continue
-            if column.shape != rows:
-                raise ValueError(f"{name} must have the shape of torque {rows}, got {column.shape}")
-            if not np.isfinite(column).all():
-                raise ValueError(f"{name} must be finite")
+        _require_columns(self, ("pressure", "speed", "torque", "torque_sd", "oil_temperature"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Record:
+    """A sampled record: time [n] s, pressure [n] Pa, speed [n] rad/s, torque [n] Nm, perhaps oil_temperature [n] K.
+
+    Times are as the recorder gave them: they may jitter, lack samples or repeat; speeds and pressures may swing through
+    zero with their sensors' noise. Raises ValueError on unequal lengths, no rows or values that are not finite.
+    """
+
+    time: FloatArray
+    pressure: FloatArray
+    speed: FloatArray
+    torque: FloatArray
+    oil_temperature: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        _require_columns(self, ("time", "pressure", "speed", "torque", "oil_temperature"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +67,20 @@ class Curve:
     velocity: FloatArray
     torque: FloatArray
     torque_sd: FloatArray | None = None
+
+
+def _require_columns(columns: Plateaus | Record, names: tuple[str, ...]) -> None:
+    rows = columns.torque.shape
+    if len(rows) != 1 or rows[0] == 0:
+        raise ValueError(f"torque must be a column with at least one row, got shape {rows}")
+    for name in names:
+        column = getattr(columns, name)
+        if column is None:
+            continue
+        if column.shape != rows:
+            raise ValueError(f"{name} must have the shape of torque {rows}, got {column.shape}")
+        if not np.isfinite(column).all():
+            raise ValueError(f"{name} must be finite")
 
 
 def pressure_levels(pressure: FloatArray) -> FloatArray:
