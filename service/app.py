@@ -7,6 +7,7 @@ from fastapi import FastAPI
 from fastapi_offline import FastAPIOffline
 
 from service import problems
+from service.metrics import Counting, Metrics
 from service.middleware import BodyLimit, SafeHeaders
 from service.routes import clutches, health, life, runs
 from service.routes.context import Context
@@ -23,10 +24,12 @@ its mean coefficient of friction has halved are foretold with their uncertainty.
 def create_app(settings: Settings) -> FastAPI:
     """The service on one database, which is opened (and migrated) when it starts and closed when it stops."""
 
+    metrics = Metrics()
+
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         database = open_database(settings.database)
-        app.state.context = Context(database=database, settings=settings, remembered=Remembered())
+        app.state.context = Context(database=database, settings=settings, remembered=Remembered(), metrics=metrics)
         try:
             yield
         finally:
@@ -46,4 +49,5 @@ def create_app(settings: Settings) -> FastAPI:
         app.include_router(twin)
     app.add_middleware(BodyLimit, most=settings.most_body_bytes)
     app.add_middleware(SafeHeaders)
+    app.add_middleware(Counting, metrics=metrics)
     return app

@@ -8,6 +8,7 @@ from typing import Annotated
 from fastapi import Depends, Query, Request
 
 from models.prognosis import HORIZON
+from service.metrics import Metrics
 from service.security import Caller, Scope, authorise
 from service.settings import Settings
 from service.workflows.views import Remembered
@@ -21,6 +22,7 @@ class Context:
     database: Database
     settings: Settings
     remembered: Remembered
+    metrics: Metrics
 
     def now(self) -> str:
         """The time, UTC, ISO 8601."""

@@ -3,7 +3,9 @@
 from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse, RedirectResponse, Response
 
-from service.routes.context import context_of
+from service.metrics import MEDIA_TYPE
+from service.problems import described
+from service.routes.context import Reader, context_of
 from service.settings import CODE_VERSION
 
 router = APIRouter(tags=["health"])
@@ -22,6 +24,12 @@ def readyz(request: Request) -> Response:
     ready = database.ready()
     content = {"status": "ready" if ready else "not ready", "journal_mode": database.journal_mode}
     return JSONResponse(content, status_code=200 if ready else 503)
+
+
+@router.get("/metrics", response_class=Response, responses=described())
+def metrics(context: Reader) -> Response:
+    """Metrics for Prometheus: requests by route, and every clutch's runs, health and remaining cycles."""
+    return Response(content=context.metrics.exposition(context.database), media_type=MEDIA_TYPE)
 
 
 @router.get("/", include_in_schema=False)
