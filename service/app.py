@@ -29,7 +29,7 @@ def create_app(settings: Settings) -> FastAPI:
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         database = open_database(settings.database)
-        app.state.context = Context(database=database, settings=settings, remembered=Remembered(), metrics=metrics)
+        app.state.context = Context(database=database, remembered=Remembered(), metrics=metrics)
         try:
             yield
         finally:

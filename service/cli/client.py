@@ -8,6 +8,8 @@ from typing import Any
 import httpx2
 
 JSON = {"Content-Type": "application/json"}
+#: What passes by itself: a gateway without its service, a busy service, a slow one.
+_PASSING = (502, 503, 504)
 #: Seconds between tries: doubled from the first to the last.
 FIRST_WAIT, LAST_WAIT = 0.25, 15.0
 
@@ -34,11 +36,11 @@ class Service:
     on_wait: Callable[[str, float], None] = lambda _reason, _seconds: None
 
     def post(self, path: str, body: bytes) -> dict[str, Any]:
-        """The answer to a JSON body; ServiceAwayError, or RefusedError on 4xx."""
+        """The answer to a JSON body; ServiceAwayError, or RefusedError where it will not be taken."""
         return self._answer("POST", path, content=body, headers=JSON)
 
     def get(self, path: str, **params: Any) -> dict[str, Any]:
-        """The answer to a question; ServiceAwayError, or RefusedError on 4xx."""
+        """The answer to a question; ServiceAwayError, or RefusedError where there is none."""
         return self._answer("GET", path, params=params)
 
     def _answer(self, method: str, path: str, **request: Any) -> dict[str, Any]:
@@ -46,13 +48,15 @@ class Service:
         while True:
             try:
                 response = self.http.request(method, path, **request)
+            except httpx2.UnsupportedProtocol as error:
+                raise RefusedError(0, {"detail": f"{self.http.base_url}: {error}"}) from error
             except httpx2.TransportError as error:
                 reason = f"no answer ({type(error).__name__})"
             else:
                 if response.status_code < 400:
                     found: dict[str, Any] = response.json()
                     return found
-                if response.status_code < 500:
+                if response.status_code not in _PASSING:
                     raise RefusedError(response.status_code, _problem(response))
                 reason = f"it says {response.status_code}"
                 wait = max(wait, float(response.headers.get("Retry-After", 0)))

@@ -9,7 +9,7 @@ import typer
 from rich.progress import Progress
 
 from service.cli.client import RefusedError, Service, ServiceAwayError, connect
-from service.cli.options import EX_DATAERR, EX_TEMPFAIL, URL, Key, Patience, Url, err, fail, out
+from service.cli.options import EX_DATAERR, EX_TEMPFAIL, URL, Key, Patience, Url, err, fail, out, told
 from service.formats import run_files
 from service.schemas.clutch import ClutchIn
 from service.workflows.tracks import METHODS
@@ -25,27 +25,28 @@ def export(
     patience: Patience = 10.0,
 ) -> None:
     """Write a clutch's record, its runs with their raw channels, and all results."""
-    results = out_folder / "results"
-    results.mkdir(parents=True, exist_ok=True)
-    with connect(url, key=key) as http, Progress(console=err, transient=True) as progress:
-        service = Service(http=http, patience=patience)
-        task = progress.add_task("exporting", total=None)
-        try:
-            found = service.get(f"/v1/clutches/{clutch}")
-            record = {name: value for name, value in found.items() if name in ClutchIn.model_fields}
-            run_files.write(out_folder / run_files.CLUTCH_FILE, record)
-            count = 0
-            for receipt in _pages(service, f"/v1/clutches/{clutch}/runs"):
-                run = service.get(f"/v1/clutches/{clutch}/runs/{receipt['run_id']}")
-                run_files.write(out_folder / f"{count:05d}-{_safe(receipt['run_id'])}.json", _as_sent(run))
-                count += 1
-                progress.advance(task)
-            _results(service, clutch, results)
-        except ServiceAwayError as error:
-            fail(str(error), EX_TEMPFAIL)
-        except RefusedError as error:
-            fail(str(error), EX_DATAERR)
-    out.print(f"{count} runs of {clutch} in {out_folder}, results in {results}", markup=False, soft_wrap=True)
+    with told():
+        results = out_folder / "results"
+        results.mkdir(parents=True, exist_ok=True)
+        with connect(url, key=key) as http, Progress(console=err, transient=True) as progress:
+            service = Service(http=http, patience=patience)
+            task = progress.add_task("exporting", total=None)
+            try:
+                found = service.get(f"/v1/clutches/{clutch}")
+                record = {name: value for name, value in found.items() if name in ClutchIn.model_fields}
+                run_files.write(out_folder / run_files.CLUTCH_FILE, record)
+                count = 0
+                for receipt in _pages(service, f"/v1/clutches/{clutch}/runs"):
+                    run = service.get(f"/v1/clutches/{clutch}/runs/{receipt['run_id']}")
+                    run_files.write(out_folder / f"{count:05d}-{_safe(receipt['run_id'])}.json", _as_sent(run))
+                    count += 1
+                    progress.advance(task)
+                _results(service, clutch, results)
+            except ServiceAwayError as error:
+                fail(str(error), EX_TEMPFAIL)
+            except RefusedError as error:
+                fail(str(error), EX_DATAERR)
+        out.print(f"{count} runs of {clutch} in {out_folder}, results in {results}", markup=False, soft_wrap=True)
 
 
 def _as_sent(run: dict[str, Any]) -> dict[str, Any]:

@@ -1,11 +1,12 @@
 """`clutchlife key`: make, list and revoke keys; works on the database, so it needs the machine that holds it."""
 
+from contextlib import closing
 from datetime import UTC, datetime
 from typing import Annotated
 
 import typer
 
-from service.cli.options import DATABASE, EX_USAGE, Database, fail, out
+from service.cli.options import DATABASE, EX_USAGE, Database, existing, fail, out, told
 from service.security import SCOPES, make_key
 from storage import keys
 from storage.database import open_database
@@ -27,20 +28,16 @@ def create(
     if scope not in SCOPES:
         fail(f"scope must be one of {', '.join(SCOPES)}, got {scope!r}", EX_USAGE)
     secret, row = make_key(scope, note, created_at=_now())
-    opened = open_database(database)
-    with opened.writing() as connection:
+    with told(), closing(open_database(database)) as opened, opened.writing() as connection:
         keys.insert(connection, row)
-    opened.close()
     out.print(secret, markup=False, soft_wrap=True)
 
 
 @app.command(name="list")
 def list_keys(database: Database = DATABASE) -> None:
     """All keys: name, scope, when made, when revoked."""
-    opened = open_database(database)
-    with opened.reading() as connection:
+    with existing(database) as opened, opened.reading() as connection:
         found = keys.all_keys(connection)
-    opened.close()
     for row in found:
         state = f"revoked {row.revoked_at}" if row.revoked_at else "active"
         out.print(f"{row.key_id}  {row.scope:<6}  {row.created_at}  {state}  {row.note}", markup=False)
@@ -49,9 +46,7 @@ def list_keys(database: Database = DATABASE) -> None:
 @app.command()
 def revoke(key_id: str, database: Database = DATABASE) -> None:
     """End a key by its name (the eight digits after `clutchlife_`)."""
-    opened = open_database(database)
-    with opened.writing() as connection:
+    with existing(database) as opened, opened.writing() as connection:
         done = keys.revoke(connection, key_id, _now())
-    opened.close()
     if not done:
         fail(f"no active key is known as {key_id!r}")

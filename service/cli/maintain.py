@@ -6,11 +6,8 @@ from typing import Annotated
 import typer
 from rich.progress import Progress
 
-from service.cli.options import DATABASE, Database, err, fail, out
-from service.errors import NotFoundError
+from service.cli.options import DATABASE, Database, err, existing, out
 from service.workflows.replay import clutch_ids, replay_clutch
-from storage.database import open_database
-from storage.errors import StorageError
 
 
 def replay(
@@ -18,28 +15,17 @@ def replay(
     database: Database = DATABASE,
 ) -> None:
     """Recompute all results from the raw runs, with the code that is installed now."""
-    opened = open_database(database)
-    try:
+    with existing(database) as opened, Progress(console=err, transient=True) as progress:
         wanted = clutch_ids_given or clutch_ids(opened)
-        with Progress(console=err, transient=True) as progress:
-            task = progress.add_task("replaying", total=len(wanted))
-            for clutch_id in wanted:
-                runs = replay_clutch(opened, clutch_id)
-                out.print(f"{clutch_id}: {runs} runs", markup=False)
-                progress.advance(task)
-    except (NotFoundError, StorageError) as error:
-        fail(str(error))
-    finally:
-        opened.close()
+        task = progress.add_task("replaying", total=len(wanted))
+        for clutch_id in wanted:
+            runs = replay_clutch(opened, clutch_id)
+            out.print(f"{clutch_id}: {runs} runs", markup=False)
+            progress.advance(task)
 
 
 def backup(path: Path, database: Database = DATABASE) -> None:
     """A consistent copy of the database at PATH, while the service runs."""
-    opened = open_database(database)
-    try:
+    with existing(database) as opened:
         opened.backup(path)
-    except (FileExistsError, StorageError) as error:
-        fail(str(error))
-    finally:
-        opened.close()
     out.print(str(path), markup=False)

@@ -9,7 +9,20 @@ import typer
 from rich.progress import Progress
 
 from service.cli.client import RefusedError, Service, ServiceAwayError, connect
-from service.cli.options import EX_DATAERR, EX_TEMPFAIL, SPOOL, URL, Key, Patience, SpoolFolder, Url, err, fail, out
+from service.cli.options import (
+    EX_DATAERR,
+    EX_TEMPFAIL,
+    SPOOL,
+    URL,
+    Key,
+    Patience,
+    SpoolFolder,
+    Url,
+    err,
+    fail,
+    out,
+    told,
+)
 from service.cli.spool import Spool
 from service.formats import run_files
 
@@ -21,6 +34,7 @@ class Sent:
     stored: int = 0
     known: int = 0
     refused: int = 0
+    failed: int = 0
 
 
 def push(
@@ -32,34 +46,40 @@ def push(
     patience: Patience = 60.0,
 ) -> None:
     """Send run files. What the service cannot take now waits in the spool and is sent first next time."""
-    try:
-        files = run_files.find(paths)
-    except FileNotFoundError as error:
-        fail(str(error), EX_DATAERR)
-    waiting = Spool.of(spool, url, clutch)
-    for file in files:
-        waiting.add(file.read_bytes())
-    with connect(url, key=key) as http, Progress(console=err, transient=True) as progress:
-        task = progress.add_task("sending", total=len(list(waiting.waiting())))
-
-        def say(reason: str, seconds: float) -> None:
-            progress.update(task, description=f"{reason}; again in {seconds:.0f} s")
-
-        service = Service(http=http, patience=patience, on_wait=say)
-        sent = Sent()
+    with told():
         try:
-            _register(service, clutch, paths)
-            for entry in waiting.waiting():
-                _send(service, clutch, waiting, entry, sent)
-                progress.update(task, description="sending", advance=1)
-        except ServiceAwayError as error:
-            left = len(list(waiting.waiting()))
-            fail(f"{error}; {left} runs wait in {waiting.folder}: push again to send them", EX_TEMPFAIL)
-        except RefusedError as error:
+            files = run_files.find(paths)
+        except FileNotFoundError as error:
             fail(str(error), EX_DATAERR)
-    out.print(f"{sent.stored} stored, {sent.known} known already, {sent.refused} refused")
-    if sent.refused:
-        fail(f"what was refused, and why, is in {waiting.folder / 'refused'}", EX_DATAERR)
+        waiting = Spool.of(spool, url, clutch)
+        for file in files:
+            waiting.add(file.read_bytes())
+        with connect(url, key=key) as http, Progress(console=err, transient=True) as progress:
+            task = progress.add_task("sending", total=len(list(waiting.waiting())))
+
+            def say(reason: str, seconds: float) -> None:
+                progress.update(task, description=f"{reason}; again in {seconds:.0f} s")
+
+            service = Service(http=http, patience=patience, on_wait=say)
+            sent = Sent()
+            try:
+                _register(service, clutch, paths)
+                for entry in waiting.waiting():
+                    _send(service, clutch, waiting, entry, sent)
+                    progress.update(task, description="sending", advance=1)
+            except ServiceAwayError as error:
+                left = len(list(waiting.waiting()))
+                fail(f"{error}; {left} runs wait in {waiting.folder}: push again to send them", EX_TEMPFAIL)
+            except RefusedError as error:
+                fail(str(error), EX_DATAERR)
+        out.print(f"{sent.stored} stored, {sent.known} known already, {sent.refused} refused")
+        if sent.failed:
+            fail(
+                f"the service failed on {sent.failed} runs, which wait in {waiting.folder}: its log says why",
+                EX_TEMPFAIL,
+            )
+        if sent.refused:
+            fail(f"what was refused, and why, is in {waiting.folder / 'refused'}", EX_DATAERR)
 
 
 def _register(service: Service, clutch_id: str, paths: list[Path]) -> None:
@@ -68,7 +88,10 @@ def _register(service: Service, clutch_id: str, paths: list[Path]) -> None:
     if record is None:
         service.get(f"/v1/clutches/{clutch_id}")
         return
-    body = json.loads(record.read_bytes()) | {"clutch_id": clutch_id}
+    body = json.loads(record.read_bytes())
+    if not isinstance(body, dict):
+        raise ValueError(f"{record} must hold a JSON object")  # noqa: TRY004  (a wrong file, not a wrong call)
+    body["clutch_id"] = clutch_id
     service.post("/v1/clutches", json.dumps(body).encode())
 
 
@@ -76,8 +99,12 @@ def _send(service: Service, clutch_id: str, waiting: Spool, entry: Path, sent: S
     try:
         receipt = service.post(f"/v1/clutches/{clutch_id}/runs", entry.read_bytes())
     except RefusedError as error:
-        if error.status in (401, 403, 404):
+        if error.status in (0, 401, 403, 404):
             raise
+        if error.status >= 500:
+            sent.failed += 1
+            err.print(f"failed, {error}: {entry} stays in the spool", markup=False, soft_wrap=True)
+            return
         sent.refused += 1
         aside = waiting.refused(entry, error.problem)
         err.print(f"refused, {error}: {aside}", markup=False, soft_wrap=True)

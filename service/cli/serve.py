@@ -1,17 +1,17 @@
 """`clutchlife serve`: the service."""
 
+from contextlib import closing
 from typing import Annotated
 
 import typer
 import uvicorn
 
 from service.app import create_app
-from service.cli.options import DATABASE, EX_USAGE, Database, err, fail
+from service.cli.options import DATABASE, EX_USAGE, Database, err, fail, told
 from service.security import is_loopback
 from service.settings import Settings
 from storage import keys
 from storage.database import open_database
-from storage.errors import StorageError
 
 LOOPBACK = "127.0.0.1"
 
@@ -23,14 +23,12 @@ def serve(
     log_level: Annotated[str, typer.Option(help="critical, error, warning, info or debug")] = "info",
 ) -> None:
     """Run the service."""
-    try:
+    if log_level not in uvicorn.config.LOG_LEVELS:
+        fail(f"log-level must be one of {', '.join(uvicorn.config.LOG_LEVELS)}, got {log_level!r}", EX_USAGE)
+    with told():
         settings = Settings.from_environment(database)
-        opened = open_database(settings.database)
-        with opened.reading() as connection:
+        with closing(open_database(settings.database)) as opened, opened.reading() as connection:
             has_keys = keys.any_active(connection)
-        opened.close()
-    except (ValueError, StorageError) as error:
-        fail(str(error), EX_USAGE)
     if not has_keys and not is_loopback(host):
         err.print(
             f"clutchlife: no keys are configured, so the service listens at {LOOPBACK} and not at {host}. "

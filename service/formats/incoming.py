@@ -9,13 +9,17 @@ from typing import Any
 import numpy as np
 
 from models.arrays import FloatArray
-from models.runs import Plateaus
+from models.runs import Plateaus, pressure_levels
 from service.errors import FieldError, InvalidError
 from service.formats.units import CHANNELS
 from service.schemas.base import whole
 
 #: Below this a plateau counts as unloaded: it says nothing of the lining's friction.
 UNLOADED = 0.05e5
+#: No mean torque is known better than to this share of the torque: a smaller deviation counts as this.
+SHARPEST = 1e-4
+#: More pressure levels than any protocol has: a continuous pressure is no stationary test.
+MOST_LEVELS = 100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,11 +77,13 @@ def stationary_plateaus(channels: Mapping[str, FloatArray]) -> Plateaus:
     loaded = channels["pressure_bar"] * CHANNELS["pressure_bar"].factor >= UNLOADED
     si = {name: CHANNELS[name].to_si(values[loaded]) for name, values in channels.items()}
     deviation = si.get("torque_sd_nm")
+    if deviation is not None:
+        deviation = np.maximum(deviation, SHARPEST * float(np.sqrt(np.mean(si["torque_nm"] ** 2))))
     return Plateaus(
         pressure=si["pressure_bar"],
         speed=si["speed_rpm"],
         torque=si["torque_nm"],
-        torque_sd=deviation if deviation is not None and bool((deviation > 0).all()) else None,
+        torque_sd=deviation if deviation is not None and bool((channels["torque_sd_nm"] > 0).all()) else None,
         oil_temperature=si.get("oil_temperature_c"),
     )
 
@@ -89,6 +95,8 @@ def _require_curve(channels: Mapping[str, FloatArray]) -> None:
         _refuse("torque_nm", torque, "too_few_points", "a Stribeck curve needs more than one point")
     if not (pressure * CHANNELS["pressure_bar"].factor >= UNLOADED).any():
         _refuse("pressure_bar", pressure, "unloaded", "at least one plateau must be loaded with 0.05 bar or more")
+    if np.unique(pressure_levels(pressure * CHANNELS["pressure_bar"].factor)).size > MOST_LEVELS:
+        _refuse("pressure_bar", pressure, "too_many_levels", f"a test may have at most {MOST_LEVELS} pressure levels")
     if (speed == speed[0]).all():
         _refuse("speed_rpm", speed, "speeds_all_equal", "a Stribeck curve needs more than one speed")
     if not torque.any():

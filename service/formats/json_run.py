@@ -49,6 +49,7 @@ def _field_error(loc: tuple[int | str, ...], code: str, rule: str, value: object
     place = loc[1:] if loc and loc[0] in _KINDS else loc
     if code.startswith("union_tag"):
         place = (*place, "kind")
+        value = value.get("kind", "") if isinstance(value, dict) else value
     pointer = "".join(f"/{str(part).replace('~', '~0').replace('/', '~1')}" for part in place)
     name = ".".join(str(part) for part in place) or "the body"
     shown = "" if code in ("missing", "json_invalid") else repr(value)[:_SHOWN]

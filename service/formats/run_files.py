@@ -12,6 +12,8 @@ from models.runs import Plateaus
 from service.formats.units import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
 
 CLUTCH_FILE = "clutch.json"
+#: What claims more cycles than this is no run.
+MOST_CYCLES = 1e15
 
 
 def simulated_clutch_body(clutch_id: str) -> dict[str, Any]:
@@ -88,7 +90,7 @@ def _cycles(path: Path) -> float:
     """The cycles that a run file tells, for ordering alone; what is no run comes last and is refused by the service."""
     try:
         body = json.loads(path.read_bytes())
-    except ValueError:
+    except (ValueError, RecursionError):
         return math.inf
     cycles = body.get("cycles") if isinstance(body, dict) else None
-    return float(cycles) if isinstance(cycles, int | float) else math.inf
+    return float(cycles) if isinstance(cycles, int | float) and abs(cycles) < MOST_CYCLES else math.inf

@@ -8,9 +8,9 @@ from typing import Annotated
 from fastapi import Depends, Query, Request
 
 from models.prognosis import HORIZON
+from service.errors import FieldError, InvalidError
 from service.metrics import Metrics
 from service.security import Caller, Scope, authorise
-from service.settings import Settings
 from service.workflows.views import Remembered
 from storage.database import Database
 
@@ -20,7 +20,6 @@ class Context:
     """The service's parts, made when it starts and closed when it stops."""
 
     database: Database
-    settings: Settings
     remembered: Remembered
     metrics: Metrics
 
@@ -50,16 +49,36 @@ def allowed(scope: Scope) -> Callable[[Request], Context]:
 
     def check(request: Request) -> Context:
         context = context_of(request)
+        _refuse_unknown_arguments(request)
         authorise(context.database, caller_of(request), scope)
         return context
 
     return check
 
 
+def _refuse_unknown_arguments(request: Request) -> None:
+    """A mistyped argument must not be answered as if it had not been there."""
+    route = request.scope["route"]
+    known = {field.alias for field in route.dependant.query_params}
+    unknown = [name for name in request.query_params if name not in known]
+    if unknown:
+        errors = [
+            FieldError(
+                pointer=f"/query/{name}",
+                code="extra_forbidden",
+                message=f"{name} is no argument here; there are: {', '.join(sorted(known)) or 'none'}",
+                value=request.query_params[name][:80],
+            )
+            for name in unknown
+        ]
+        raise InvalidError(errors[0].message, errors=errors)
+
+
 Reader = Annotated[Context, Depends(allowed("read"))]
 Ingester = Annotated[Context, Depends(allowed("ingest"))]
 
 Limit = Annotated[int, Query(ge=1, le=1000, description="Items a page")]
+Whole = Annotated[int, Query(ge=1, le=1_000_000, description="Items a page; left out, all of them")]
 Cursor = Annotated[str | None, Query(max_length=600, description="Where an earlier page ended: its `next`")]
 PressureBar = Annotated[
     float | None,

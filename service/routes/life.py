@@ -7,10 +7,11 @@ from fastapi import APIRouter, Request
 from fastapi.responses import Response
 
 from service.problems import READING
-from service.responses import answer, from_cursor, page, table
-from service.routes.context import AtCycles, Cursor, Limit, PressureBar, Reader
+from service.responses import answer, from_cursor, page, sliced, table
+from service.routes.context import AtCycles, Cursor, Limit, PressureBar, Reader, Whole
 from service.schemas.life import (
     Degradation,
+    EngagementOut,
     LoopItem,
     LoopPage,
     Method,
@@ -66,16 +67,31 @@ def stribeck(request: Request, context: Reader, clutch_id: str, limit: Limit = 1
     )
 
 
+@router.get("/engagement", response_model=EngagementOut, responses=READING)
+def engagement(request: Request, context: Reader, clutch_id: str, at_cycles: AtCycles = None) -> Response:
+    """A simulated engagement of the tracked clutch: the pressure profile of fig. 3 against the motor's 20 Nm."""
+    return answer(request, answers.engaged(context.database, context.remembered, clutch_id, at_cycles=at_cycles))
+
+
 @router.get("/loops", response_model=LoopPage, responses=READING)
-def loops(request: Request, context: Reader, clutch_id: str) -> Response:
+def loops(
+    request: Request, context: Reader, clutch_id: str, limit: Whole = 1_000_000, cursor: Cursor = None
+) -> Response:
     """Friction loops of the dynamic tests by cycles and pressure."""
-    return answer(request, page(answers.loop_page(context.database, clutch_id), None))
+    return answer(request, sliced(answers.loop_page(context.database, clutch_id), limit, from_cursor(cursor)))
 
 
 @router.get("/series", response_model=SeriesPage, responses=READING)
-def series(request: Request, context: Reader, clutch_id: str, quantity: str | None = None) -> Response:
+def series(
+    request: Request,
+    context: Reader,
+    clutch_id: str,
+    quantity: str | None = None,
+    limit: Whole = 1_000_000,
+    cursor: Cursor = None,
+) -> Response:
     """Flat rows for dashboards and spreadsheets: every fitted quantity, then what was foretold."""
-    return answer(request, page(_series(context.database, clutch_id, quantity), None))
+    return answer(request, sliced(_series(context.database, clutch_id, quantity), limit, from_cursor(cursor)))
 
 
 def _series(database: Database, clutch_id: str, quantity: str | None) -> list[dict[str, Any]]:

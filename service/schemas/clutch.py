@@ -11,20 +11,25 @@ from service.schemas.life import Current
 Name = Annotated[str, StringConstraints(min_length=1, max_length=200)]
 
 
+#: A ring narrower than this is a slip of the pen.
+_LEAST_WIDTH_MM = 0.1
+
+
 class GeometryIn(Schema):
     """The friction disc, lengths in mm."""
 
-    inner_diameter_mm: Annotated[PositiveNumber, Field(le=1e5)] = 99.0
-    outer_diameter_mm: Annotated[PositiveNumber, Field(le=1e5)] = 133.0
+    inner_diameter_mm: Annotated[PositiveNumber, Field(ge=0.1, le=1e5)] = 99.0
+    outer_diameter_mm: Annotated[PositiveNumber, Field(ge=0.1, le=1e5)] = 133.0
     friction_faces: Annotated[int, Field(ge=1, le=1000, strict=True)] = 2
-    mean_radius_mm: Annotated[PositiveNumber, Field(le=1e5)] | None = None
+    mean_radius_mm: Annotated[PositiveNumber, Field(ge=0.1, le=1e5)] | None = None
     pressure_factor: Annotated[PositiveNumber, Field(ge=1e-6, le=1e6)] = 1.0
 
     @model_validator(mode="after")
     def _has_width(self) -> Self:
-        if self.outer_diameter_mm <= self.inner_diameter_mm:
+        if self.outer_diameter_mm < self.inner_diameter_mm + _LEAST_WIDTH_MM:
             raise ValueError(
-                f"outer_diameter_mm must exceed inner_diameter_mm {self.inner_diameter_mm}, got {self.outer_diameter_mm}"
+                f"outer_diameter_mm must exceed inner_diameter_mm {self.inner_diameter_mm} by {_LEAST_WIDTH_MM} or more, "
+                f"got {self.outer_diameter_mm}"
             )
         return self
 

@@ -147,6 +147,33 @@ class StribeckPage(Answer):
     next: str | None
 
 
+class EngagementChannels(Answer):
+    """The trace, a column each."""
+
+    time_s: list[float]
+    pressure_bar: list[float]
+    speed_rpm: list[float]
+    torque_nm: list[float]
+    motor_torque_nm: list[float]
+
+
+class EngagementOut(Answer):
+    """A simulated engagement of the tracked clutch; `duration_s` from contact to standstill, null where it slips on."""
+
+    clutch_id: str
+    origin: Origin
+    simulated: Literal[True]
+    at_cycles: float
+    model: ModelName
+    initial_speed_rpm: float
+    maximum_pressure_bar: float
+    motor_torque_limit_nm: float
+    engaged: bool
+    duration_s: float | None
+    energy_kj: float
+    channels: EngagementChannels
+
+
 class LoopItem(Answer):
     """A friction loop of one dynamic test at one pressure."""
 

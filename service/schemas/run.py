@@ -42,7 +42,7 @@ class RunBase(Schema):
 
     run_id: Identifier | None = None
     cycles: Cycles
-    started_at: AwareDatetime | None = None
+    started_at: Annotated[AwareDatetime, Field(strict=True)] | None = None
     origin: Origin = "measured"
 
 

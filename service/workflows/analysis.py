@@ -1,17 +1,28 @@
 """A run's own results, before its history is looked at: curves fitted, oddities noticed."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from models.arrays import FloatArray
 from models.clutch import Geometry
-from models.identification import FitStatus, StribeckFit, fit_curves
+from models.identification import FitStatus, StribeckFit, fit_curves, mean_torques
+from models.protocol import protocol_speeds
 from models.runs import Plateaus, curves_by_pressure
 from service.formats.incoming import UNLOADED, IncomingRun, stationary_plateaus
 from service.formats.units import PASCALS_PER_BAR
 
-#: The warning of a run whose cycles lie before those of a run that came earlier.
-LATE = "late_arrival"
+#: Warnings that hang on what was known when the run arrived: cycles before those of an earlier run, other pressures.
+LATE, OTHER_PRESSURES = "late_arrival", "other_pressures"
+NOTICED_ON_ARRIVAL = (LATE, OTHER_PRESSURES)
+
+
+#: Four parameters cannot be told from fewer distinct speeds, and a mean over the protocol would be an extrapolation.
+FEWEST_SPEEDS = 4
+#: A level whose pressures lie further apart than this share is worth a warning.
+WIDE_LEVEL = 0.06
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,6 +31,10 @@ class Warned:
 
     code: str
     message: str
+
+
+#: A value and its deviation.
+Value = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,13 +72,44 @@ def _analyse_stationary(run: IncomingRun, plateaus: Plateaus, geometry: Geometry
         LevelFit(fit=fit, mean_pressure=curve.mean_pressure, speeds=int(np.unique(curve.velocity).size))
         for fit, curve in zip(fits, curves, strict=True)
     )
-    warnings = [*_row_warnings(run, plateaus), *(warned for fit in fits for warned in _fit_warnings(fit))]
-    speed_range = (float(plateaus.speed.min()), float(plateaus.speed.max()))
-    return Analysis(
-        fits=levels,
-        speed_range=speed_range if speed_range[0] < speed_range[1] else None,
-        warnings=tuple(warnings),
+    low, high = float(plateaus.speed.min()), float(plateaus.speed.max())
+    telling = low < high and mean_cofs(levels, geometry.sliding_velocity(protocol_speeds(low, high)), geometry)
+    warnings = [
+        *_row_warnings(run, plateaus),
+        *(warned for level in levels for warned in _level_warnings(level, plateaus)),
+        *(warned for fit in fits for warned in _fit_warnings(fit)),
+    ]
+    if not telling:
+        message = "no pressure of this test says a mean COF: it sets no reference and no track uses it"
+        warnings.append(Warned(code="no_mean_cof", message=message))
+    return Analysis(fits=levels, speed_range=(low, high) if telling else None, warnings=tuple(warnings))
+
+
+def mean_cofs(levels: Sequence[LevelFit], velocities: FloatArray, geometry: Geometry) -> dict[float, Value]:
+    """Mean COF over the protocol's velocities [m] m/s and its deviation by pressure [Pa], where a level can say it."""
+    telling = [level for level in levels if level.speeds >= FEWEST_SPEEDS]
+    if not telling:
+        return {}
+    per_cof = np.array([geometry.torque_per_cof(level.mean_pressure) for level in telling])
+    values = (mean_torques([level.fit for level in telling], velocities) / per_cof[:, None]).tolist()
+    return {
+        level.fit.pressure: (cof, sd)
+        for level, (cof, sd) in zip(telling, values, strict=True)
+        if math.isfinite(cof) and 0 < sd < cof
+    }
+
+
+def _level_warnings(level: LevelFit, plateaus: Plateaus) -> list[Warned]:
+    """A level over whose rows the pressure varies widely may be several that ran together."""
+    near = np.abs(plateaus.pressure - level.fit.pressure) <= WIDE_LEVEL * level.fit.pressure
+    rows = int(np.count_nonzero(near))
+    if rows >= level.fit.points:
+        return []
+    message = (
+        f"at {level.fit.pressure / PASCALS_PER_BAR:g} bar: measured pressures scatter by more than {100 * WIDE_LEVEL:g} % "
+        "within what was taken for one level; several may have run together"
     )
+    return [Warned(code="wide_level", message=message)]
 
 
 def _row_warnings(run: IncomingRun, plateaus: Plateaus) -> list[Warned]:

@@ -3,17 +3,19 @@
 from collections.abc import Iterator
 from typing import Any
 
+from sqlalchemy import Connection
+
 from models.pressure import LinearLaw, PressureLaws, fit_pressure_laws
 from service.formats.units import PASCALS_PER_BAR
 from service.schemas.base import whole
 from service.workflows import stored, views
 from service.workflows.analysis import LevelFit
-from service.workflows.foretold import unknown
+from service.workflows.engagement import engagement
 from service.workflows.history import ALL_PRESSURES, MEAN_COF
 from service.workflows.receipts import PARAMETER_UNITS
+from service.workflows.tracks import CARRIED
 from service.workflows.views import Remembered
 from storage import channels, predictions, runs
-from storage.clutches import ClutchRow
 from storage.database import Database
 from storage.predictions import PredictionRow
 from storage.runs import RunRow
@@ -36,36 +38,25 @@ def remaining_life(
     """
     with database.reading() as connection:
         row = stored.clutch(connection, clutch_id)
-        found = predictions.at(connection, clutch_id, method, ALL_PRESSURES, at_cycles)
+        key = (clutch_id, row.revision, method, pressure_bar, at_cycles)
+        said = _stored(connection, clutch_id, method, at_cycles) if pressure_bar is None else None
+        said = remembered.find(key) if said is None else said
+        events = stored.events(connection, clutch_id) if said is None else []
     record = stored.record(row)
-    if pressure_bar is not None:
-        said = _at_pressure(database, remembered, row, method, pressure_bar, at_cycles)
-    elif found is None:
-        said = unknown(None, ALL_PRESSURES, record.end_of_life.cof_fraction)
-    else:
-        said = found.payload
+    if said is None:
+        fraction = record.end_of_life.cof_fraction
+        said = views.foretell(
+            clutch_id, events, fraction, method=method, pressure_bar=pressure_bar, at_cycles=at_cycles
+        )
+        remembered.keep(key, said)
     return {"clutch_id": clutch_id, "method": method, "revision": row.revision, "origin": record.origin} | said
 
 
-def _at_pressure(
-    database: Database,
-    remembered: Remembered,
-    row: ClutchRow,
-    method: str,
-    pressure_bar: float,
-    at_cycles: float | None,
-) -> dict[str, Any]:
-    key = (row.clutch_id, row.revision, method, pressure_bar, at_cycles)
-    said: dict[str, Any] | None = remembered.find(key)
-    if said is None:
-        with database.reading() as connection:
-            events = stored.events(connection, row.clutch_id)
-        fraction = stored.record(row).end_of_life.cof_fraction
-        said = views.at_pressure(
-            row.clutch_id, events, fraction, method=method, pressure_bar=pressure_bar, at_cycles=at_cycles
-        )
-        remembered.keep(key, said)
-    return said
+def _stored(connection: Connection, clutch_id: str, method: str, at_cycles: float | None) -> dict[str, Any] | None:
+    """What was foretold over all pressures, where it is stored: the exact filter's past is not, once it has changed."""
+    found = predictions.at(connection, clutch_id, method, ALL_PRESSURES, at_cycles)
+    last = predictions.at(connection, clutch_id, CARRIED[0], ALL_PRESSURES, at_cycles)
+    return found.payload if found is not None and last is not None and found.cycles == last.cycles else None
 
 
 def degradation(database: Database, remembered: Remembered, clutch_id: str) -> dict[str, Any]:
@@ -80,6 +71,21 @@ def degradation(database: Database, remembered: Remembered, clutch_id: str) -> d
         items = views.degradation(clutch_id, events, levels)
         remembered.keep(key, items)
     return {"clutch_id": clutch_id, "revision": row.revision, "items": items, "next": None}
+
+
+def engaged(database: Database, remembered: Remembered, clutch_id: str, *, at_cycles: float | None) -> dict[str, Any]:
+    """The engagement that the tracked clutch would give at `at_cycles`, or now."""
+    with database.reading() as connection:
+        row = stored.clutch(connection, clutch_id)
+        key = (clutch_id, row.revision, "engagement", at_cycles)
+        said: dict[str, Any] | None = remembered.find(key)
+        if said is None:
+            events, levels = stored.events(connection, clutch_id), stored.levels(connection, clutch_id)
+    record = stored.record(row)
+    if said is None:
+        said = engagement(clutch_id, events, levels, record.geometry.to_model(), at_cycles=at_cycles)
+        remembered.keep(key, said)
+    return {"clutch_id": clutch_id, "origin": record.origin, "simulated": True} | said
 
 
 def run_page(database: Database, clutch_id: str, *, limit: int, after: Place | None) -> tuple[list[Any], Place | None]:

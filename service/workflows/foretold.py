@@ -30,7 +30,7 @@ def foretold(
     passage: FirstPassage, runs: int, origin: float, cycles: float, pressure: float, fraction: float, *, enough: bool
 ) -> dict[str, Any]:
     """What is said of a first passage, its cycles counted from `origin`; without `enough` tests only where it stands."""
-    mean, deviation = passage.current
+    mean, deviation = max(0.0, passage.current[0]), passage.current[1]
     left = mean / passage.initial if passage.initial > 0 else None
     known = {
         "runs_used": runs,

@@ -15,12 +15,12 @@ from models.clutch import Geometry
 from models.protocol import protocol_speeds
 from models.runs import LEVEL_GAP, LEVEL_GAP_SHARE
 from models.tracking.protocol import Measurement
+from service.workflows.analysis import Value
 
 MEAN_COF = "mean_cof"
 #: The mean over the reference pressures stands under this pressure.
 ALL_PRESSURES = 0.0
 
-Value = tuple[float, float]
 ByPressure = Mapping[float, Value]
 
 
@@ -130,7 +130,7 @@ def _pooled(reference: ByPressure, values: ByPressure) -> Value | None:
         return None
     scale = _mean(reference, reference) / _mean(reference, matched)
     mean = _mean(matched, matched) * scale
-    deviation = math.sqrt(sum(sd**2 for _, sd in matched.values())) / len(matched) * scale
+    deviation = math.hypot(*(sd for _, sd in matched.values())) / len(matched) * scale
     return mean, deviation
 
 

@@ -10,10 +10,10 @@ from service.errors import ConflictError
 from service.formats.incoming import IncomingRun
 from service.settings import CODE_VERSION
 from service.workflows import stored
-from service.workflows.analysis import LATE, Analysis, Warned, analyse
-from service.workflows.history import ByPressure, Event, lives, order, reference_velocities
-from service.workflows.receipts import fit_receipt, mean_cofs, receipt
-from service.workflows.replay import refresh_cofs
+from service.workflows.analysis import LATE, OTHER_PRESSURES, Analysis, Warned, analyse, mean_cofs
+from service.workflows.history import ByPressure, Event, lives, nearest, order, reference_velocities
+from service.workflows.receipts import bar, fit_receipt, receipt
+from service.workflows.refresh import refresh_cofs
 from service.workflows.retrack import retrack
 from storage import channels, clutches, fits, runs
 from storage.clutches import ClutchRow
@@ -62,13 +62,12 @@ def _store(
     event = _event(run, analysis, received_at)
     cofs = _cofs(order([*before, event]), event, analysis, geometry)
     event = _event(run, analysis, received_at, cofs)
-    late = _late(before, event)
     answer = receipt(
         clutch.clutch_id,
         run,
         received_at=received_at,
         fits=[fit_receipt(level.fit, cofs.get(level.fit.pressure)) for level in analysis.fits],
-        warnings=[*analysis.warnings, *late],
+        warnings=[*analysis.warnings, *_late(before, event), *_absent(order([*before, event]), event)],
     )
     run_key = runs.insert(
         connection,
@@ -88,10 +87,12 @@ def _store(
     channels.write(connection, run_key, run.channels)
     fits.write(connection, run_key, stored.fit_rows(analysis.fits, cofs))
     clutches.bump_revision(connection, clutch.clutch_id)
-    if late or event.rebuild:  # the reference test may be another one now, and with it the protocol of all means
+    events = order([*before, event])
+    if event is not events[-1] and (event.rebuild or event.speed_range is not None):
+        # the reference test may be another one now, and with it the protocol of all means
         retrack(connection, clutch, refresh_cofs(connection, clutch.clutch_id, geometry))
     else:
-        retrack(connection, clutch, order([*before, event]), newest=event)
+        retrack(connection, clutch, events, newest=event)
     return answer
 
 
@@ -113,6 +114,16 @@ def _cofs(events: Sequence[Event], event: Event, analysis: Analysis, geometry: G
     if life.speed_range is None:
         return {}
     return mean_cofs(analysis.fits, reference_velocities(life.speed_range, geometry), geometry)
+
+
+def _absent(events: Sequence[Event], new: Event) -> list[Warned]:
+    """A test none of whose pressures the reference test had cannot be compared with it."""
+    life = next(life for life in lives(events) if new in life.events)
+    if not new.cofs or any(nearest(level, new.cofs) is not None for level in life.reference):
+        return []
+    measured = ", ".join(f"{bar(level):g}" for level in sorted(life.reference))
+    message = f"none of its pressures is one of the first stationary test's ({measured} bar): no track uses it"
+    return [Warned(code=OTHER_PRESSURES, message=message)]
 
 
 def _late(before: Sequence[Event], new: Event) -> list[Warned]:

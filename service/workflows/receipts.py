@@ -1,21 +1,14 @@
 """Receipts: what the service made of a run, in the public names and units."""
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
-from models.arrays import FloatArray
-from models.clutch import Geometry
-from models.identification import StribeckFit, mean_torques
+from models.identification import StribeckFit
 from service.formats.incoming import IncomingRun
 from service.formats.units import PASCALS_PER_BAR
 from service.schemas.base import whole
 from service.settings import CODE_VERSION
-from service.workflows.analysis import LevelFit, Warned
-
-Value = tuple[float, float]
+from service.workflows.analysis import Value, Warned
 
 PARAMETER_UNITS = {
     "static_torque": ("static_torque_nm", "Nm"),
@@ -23,23 +16,6 @@ PARAMETER_UNITS = {
     "stribeck_velocity": ("stribeck_velocity_m_s", "m/s"),
     "viscous_coefficient": ("viscous_coefficient", "Nm/(m/s)^0.3"),
 }
-
-#: Four parameters cannot be told from fewer distinct speeds, and a mean over the protocol would be an extrapolation.
-FEWEST_SPEEDS = 4
-
-
-def mean_cofs(levels: Sequence[LevelFit], velocities: FloatArray, geometry: Geometry) -> dict[float, Value]:
-    """Mean COF over the protocol's velocities [m] m/s and its deviation by pressure [Pa], where a level can say it."""
-    telling = [level for level in levels if level.speeds >= FEWEST_SPEEDS]
-    if not telling:
-        return {}
-    per_cof = np.array([geometry.torque_per_cof(level.mean_pressure) for level in telling])
-    values = (mean_torques([level.fit for level in telling], velocities) / per_cof[:, None]).tolist()
-    return {
-        level.fit.pressure: (cof, sd)
-        for level, (cof, sd) in zip(telling, values, strict=True)
-        if math.isfinite(cof) and 0 < sd < cof
-    }
 
 
 def fit_receipt(fit: StribeckFit, cof: Value | None) -> dict[str, Any]:

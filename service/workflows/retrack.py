@@ -12,7 +12,7 @@ from service.settings import CODE_VERSION
 from service.workflows import stored
 from service.workflows.foretold import unknown
 from service.workflows.history import ALL_PRESSURES, Event, Life, Series, lives
-from service.workflows.tracks import Prediction, States, Tracked, follow
+from service.workflows.tracks import CARRIED, Prediction, States, Tracked, follow
 from storage import clutches, filter_states, predictions
 from storage.clutches import ClutchRow
 from storage.filter_states import FilterStateRow
@@ -22,8 +22,7 @@ from storage.predictions import PredictionRow
 SUMMARY = ("status", "as_of_cycles", "current", "remaining_cycles")
 #: A clutch of which nothing can be said comes after all others.
 RANK_UNKNOWN = 2 * HORIZON
-#: The exact filter is laid anew over the whole history at each step: only these carry a state from run to run.
-_CARRIED: dict[str, type[ParticleState] | type[UkfState]] = {"particle": ParticleState, "ukf": UkfState}
+_STATES: dict[str, type[ParticleState] | type[UkfState]] = {"particle": ParticleState, "ukf": UkfState}
 
 
 def retrack(connection: Connection, clutch: ClutchRow, events: Sequence[Event], *, newest: Event | None = None) -> None:
@@ -55,16 +54,16 @@ def _carried(connection: Connection, clutch_id: str, life: Life, series: Series,
     """The stored states from before `newest`, or None where one step on from them would not give the whole truth."""
     last = life.events[-1]
     is_test = newest.speed_range is not None
-    if newest.rebuild or (newest is not last and (is_test or newest.cycles < last.cycles)):
+    if newest.rebuild or newest not in life.events or (newest is not last and (is_test or newest.cycles < last.cycles)):
         return None
     index = life.events.index(newest)
     before = sum(1 for event in series.events if event != index)
     rows = {method: row for (method, _), row in filter_states.get(connection, clutch_id).items()}
-    if rows.keys() != (_CARRIED.keys() if before else set()):
+    if rows.keys() != (set(CARRIED) if before else set()):
         return None
     if any(row.runs != before or row.code_version != CODE_VERSION for row in rows.values()):
         return None
-    return {m: Tracked(runs=row.runs, state=_CARRIED[m].from_arrays(dict(row.arrays))) for m, row in rows.items()}
+    return {m: Tracked(runs=row.runs, state=_STATES[m].from_arrays(dict(row.arrays))) for m, row in rows.items()}
 
 
 def _write(connection: Connection, clutch_id: str, said: Sequence[Prediction], states: States) -> None:
@@ -89,7 +88,7 @@ def _write(connection: Connection, clutch_id: str, said: Sequence[Prediction], s
             code_version=CODE_VERSION,
         )
         for method, tracked in states.items()
-        if method in _CARRIED
+        if method in CARRIED
     ]
     filter_states.put(connection, clutch_id, carried)
 

@@ -14,8 +14,8 @@ from service.errors import NotFoundError
 from service.formats.incoming import IncomingRun
 from service.schemas.clutch import ClutchIn
 from service.settings import CODE_VERSION
-from service.workflows.analysis import Analysis, LevelFit
-from service.workflows.history import ByPressure, Event, Value, order
+from service.workflows.analysis import Analysis, LevelFit, Value
+from service.workflows.history import ByPressure, Event, order
 from storage import clutches, fits, runs
 from storage.clutches import ClutchRow
 from storage.fits import FitRow

@@ -29,6 +29,9 @@ _DRAWS = 1000
 _GRID = Grid()
 _TRACKERS: Mapping[str, Tracker[Any]] = {tracker.name: tracker for tracker in (Particle(), Ukf(), _GRID)}
 METHODS = tuple(_TRACKERS)
+#: The exact filter is laid anew over the whole history at each step: these carry a state from run to run. When a life is
+#: tracked anew, only these say again what they would have said all along; the exact one is worked out when asked.
+CARRIED = tuple(method for method in METHODS if method != _GRID.name)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,8 +64,9 @@ def follow(
     for index in range(first_event, len(life.events)):
         runs = series.until(index)
         cycles = life.events[index].cycles
+        methods = METHODS if index == len(life.events) - 1 else CARRIED
         if runs:
-            states = {method: advance(clutch_id, method, series, states.get(method), runs) for method in METHODS}
+            states = {method: advance(clutch_id, method, series, states.get(method), runs) for method in methods}
         yield (
             states,
             [
@@ -71,7 +75,7 @@ def follow(
                     method=method,
                     payload=predict(clutch_id, method, series, states.get(method), life.origin, cycles, fraction),
                 )
-                for method in METHODS
+                for method in methods
             ],
         )
 

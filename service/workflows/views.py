@@ -13,9 +13,9 @@ from typing import Any
 from models.stribeck import PARAMETER_NAMES
 from service.errors import NotFoundError
 from service.formats.units import PASCALS_PER_BAR
-from service.workflows.analysis import LevelFit
+from service.workflows.analysis import LevelFit, Value
 from service.workflows.foretold import unknown
-from service.workflows.history import Event, Life, Series, Value, lives, nearest
+from service.workflows.history import ALL_PRESSURES, Event, Life, Series, lives, nearest
 from service.workflows.receipts import bar
 from service.workflows.tracks import advance, predict
 from service.workflows.trajectories import item
@@ -44,24 +44,24 @@ class Remembered:
                 self._answers.popitem(last=False)
 
 
-def at_pressure(
+def foretell(
     clutch_id: str,
     events: Sequence[Event],
     fraction: float,
     *,
     method: str,
-    pressure_bar: float,
+    pressure_bar: float | None,
     at_cycles: float | None,
 ) -> dict[str, Any]:
-    """What is said at one pressure of the reference test; NotFoundError where that test did not measure it."""
+    """What is said at one pressure of the reference test, or over all; NotFoundError where it did not measure that one."""
     found = lives(events)
-    level = _level(found[-1] if found else None, pressure_bar)
+    level = ALL_PRESSURES if pressure_bar is None else _level(found[-1] if found else None, pressure_bar)
     happened = [event for event in events if at_cycles is None or event.cycles <= at_cycles]
     if not happened:
         return unknown(None, level, fraction)
     life = lives(happened)[-1]
     cycles = happened[-1].cycles
-    series = life.at(level)
+    series = life.pooled() if pressure_bar is None else life.at(level)
     if not series.measurements:
         return unknown(cycles, level, fraction)
     tracked = advance(clutch_id, method, series, None, len(series.measurements))
@@ -89,14 +89,21 @@ def degradation(
     if not found or not found[-1].reference:
         return []
     life = found[-1]
-    tests = [fits.get(event.run_id, ()) for event in life.events]
+    tests = tests_of(life, fits)
     series = [life.pooled(), *(life.at(level) for level in life.reference)]
-    for column, name in enumerate(PARAMETER_NAMES):
-        series += _parameter_series(life, tests, name, column)
+    for name in PARAMETER_NAMES:
+        series += parameter_series(life, tests, name)
     return [item(clutch_id, each, life.origin) for each in series if each.measurements]
 
 
-def _parameter_series(life: Life, tests: Sequence[Sequence[LevelFit]], name: str, column: int) -> list[Series]:
+def tests_of(life: Life, fits: Mapping[str, Sequence[LevelFit]]) -> list[Sequence[LevelFit]]:
+    """The levels of each of a life's events, none where it is no test."""
+    return [fits.get(event.run_id, ()) for event in life.events]
+
+
+def parameter_series(life: Life, tests: Sequence[Sequence[LevelFit]], name: str) -> list[Series]:
+    """One Stribeck parameter at every reference pressure, by the fits that determine it."""
+    column = PARAMETER_NAMES.index(name)
     values = [_parameter(levels, name, column) for levels in tests]
     return [life.series(name, level, [nearest(level, each) for each in values]) for level in life.reference]
 

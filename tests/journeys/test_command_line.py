@@ -93,6 +93,30 @@ def test_replay_gives_the_same_again_and_backup_a_copy(campaign: Path, tmp_path:
     assert "no clutch is known" in clutchlife("replay", "nobody", "--database", url, code=1)
 
 
+def test_wrong_arguments_are_told_in_a_line(tmp_path: Path) -> None:
+    """No traceback, and no new database where the address was mistyped."""
+    absent = f"sqlite:///{tmp_path / 'mistyped.db'}"
+    (tmp_path / "file").write_text("not a folder")
+    calls: list[tuple[str | Path, ...]] = [
+        ("backup", tmp_path / "copy.db", "--database", absent),
+        ("key", "list", "--database", absent),
+        ("replay", "--database", "postgres://somewhere"),
+        ("key", "create", "--scope", "read", "--database", "sqlite:////no/such/folder/x.db"),
+        ("serve", "--log-level", "loud", "--database", absent),
+        ("simulate", "--out", tmp_path / "file"),
+        ("export", "c1", "--out", tmp_path / "file"),
+        ("push", tmp_path / "file", "--clutch", "c1", "--url", "http://[::1", "--spool", tmp_path / "spool"),
+        ("push", tmp_path / "file", "--clutch", "c1", "--url", "nowhere", "--spool", tmp_path / "spool"),
+    ]
+    for call in calls:
+        called = [sys.executable, "-m", "service.cli.main", *map(str, call)]
+        done = subprocess.run(called, capture_output=True, text=True, check=False)
+        assert done.returncode in (1, 64, 65), (call, done.stderr)
+        assert "Traceback" not in done.stderr, call
+        assert "clutchlife: " in done.stderr, call
+    assert not (tmp_path / "mistyped.db").exists()
+
+
 def results(url: str) -> list[object]:
     """Everything that is said of the clutch, but for the revision."""
     base = f"{url}/v1/clutches/sim-7"

@@ -59,6 +59,14 @@ CASES = [
     (stationary(0, pressures=(5.0,), speeds=(500,)), "/channels/torque_nm/0", 1, None, "too_few_points"),
     (stationary(0, speeds=(500,)), "/channels/speed_rpm/0", 1, "500", "speeds_all_equal"),
     (stationary(0, pressures=(0.0,)), "/channels/pressure_bar/0", 1, "0", "unloaded"),
+    (stationary(0) | {"started_at": 5}, "/started_at", None, "5", None),
+    (
+        stationary(0, pressures=tuple(4 + 0.5 * i for i in range(101))),
+        "/channels/pressure_bar/0",
+        1,
+        None,
+        "too_many_levels",
+    ),
     ({"kind": "maintenance", "cycles": 0, "event": "party"}, "/event", None, "'party'", "literal_error"),
     ({"kind": "duty_cycles", "cycles": 0}, "/duty", None, "", "missing"),
 ]
@@ -160,14 +168,22 @@ def test_a_form_is_not_taken(client: TestClient) -> None:
 
 @pytest.mark.parametrize(
     "query",
-    ["method=magic", "pressure_bar=nan", "pressure_bar=-1", "at_cycles=x", "at_cycles=inf", "at_cycles=-1"],
+    [
+        "presure_bar=5",
+        "method=magic",
+        "pressure_bar=nan",
+        "pressure_bar=-1",
+        "at_cycles=x",
+        "at_cycles=inf",
+        "at_cycles=-1",
+    ],
 )
 def test_bad_questions_are_422(client: TestClient, query: str) -> None:
     assert client.get(f"/v1/clutches/c1/remaining-useful-life?{query}").status_code == 422
 
 
 def test_a_bad_cursor_is_422(client: TestClient) -> None:
-    for cursor in ("%ff", "e30", "WzFd", "!!!!"):
+    for cursor in ("%ff", "e30", "WzFd", "!!!!", "WzEsIlx1ZDgwMCJd", "W05hTiwiYSJd", "WzFlOTk5LCJhIl0"):
         assert client.get(f"{RUNS}?cursor={cursor}").status_code == 422
 
 
@@ -177,6 +193,8 @@ def test_a_bad_cursor_is_422(client: TestClient) -> None:
         {"clutch_id": ""},
         {"clutch_id": "a b"},
         {"clutch_id": "c2", "geometry": {"inner_diameter_mm": 133, "outer_diameter_mm": 99}},
+        {"clutch_id": "c2", "geometry": {"inner_diameter_mm": 1e-50, "outer_diameter_mm": 2e-50}},
+        {"clutch_id": "c2", "geometry": {"inner_diameter_mm": 133, "outer_diameter_mm": 133.00000000000003}},
         {"clutch_id": "c2", "geometry": {"friction_faces": 0}},
         {"clutch_id": "c2", "geometry": {"friction_faces": 2.5}},
         {"clutch_id": "c2", "end_of_life": {"cof_fraction": 1.0}},
