@@ -52,9 +52,8 @@ def shares(course: Callable[[float], float], seed: int) -> tuple[list[float], li
 
 def test_the_table_of_where_it_fails() -> None:
     """One eq. 6 is held; what is not one eq. 6 is not, and the documentation says so instead of this test hiding it."""
-    print(
-        f"\nseed 900, {LIVES} lives a law\n\n| law | holds the truth at 20/40/60/80 % of life | begins after it |\n|---|---|---|"
-    )
+    print(f"\nseed 900, {LIVES} lives a law\n\n| law | holds the truth at 20/40/60/80 % of life | begins after it |")
+    print("|---|---|---|")
     found = {}
     for name, course in LAWS.items():
         held, late = found[name] = shares(course, 900)
