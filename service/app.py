@@ -9,7 +9,7 @@ from fastapi_offline import FastAPIOffline
 from service import problems
 from service.metrics import Counting, Metrics
 from service.middleware import BodyLimit, SafeHeaders
-from service.routes import clutches, health, life, runs
+from service.routes import clutches, files, health, life, runs
 from service.routes.context import Context
 from service.settings import CODE_VERSION, Settings
 from service.workflows.views import Remembered
@@ -43,11 +43,11 @@ def create_app(settings: Settings) -> FastAPI:
         redoc_url=None,
     )
     problems.install(app)
-    for part in (health, clutches, runs, life):
+    for part in (health, clutches, files, runs, life):
         app.include_router(part.router)
     for twin in (runs.twins, life.twins):
         app.include_router(twin)
-    app.add_middleware(BodyLimit, most=settings.most_body_bytes)
+    app.add_middleware(BodyLimit, most=settings.most_body_bytes, most_file=settings.most_file_bytes)
     app.add_middleware(SafeHeaders)
     app.add_middleware(Counting, metrics=metrics)
     return app

@@ -8,19 +8,21 @@ from service.problems import problem
 
 
 class BodyLimit:
-    """Refuses a body over `most` bytes with 413: by its announced length at once, else as soon as it has grown so far."""
+    """Refuses a body over `most` bytes (a file over `most_file`) with 413, announced or grown so far."""
 
-    def __init__(self, app: ASGIApp, most: int) -> None:
+    def __init__(self, app: ASGIApp, most: int, most_file: int) -> None:
         self.app = app
         self.most = most
+        self.most_file = most_file
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
+        most = self.most_file if scope["path"].endswith("/runs/file") else self.most
         announced = dict(scope["headers"]).get(b"content-length", b"0")
-        if announced.isdigit() and int(announced) > self.most:
-            await self._refuse(scope, receive, send)
+        if announced.isdigit() and int(announced) > most:
+            await self._refuse(most, scope, receive, send)
             return
         taken = 0
 
@@ -28,20 +30,20 @@ class BodyLimit:
             nonlocal taken
             message = await receive()
             taken += len(message.get("body", b""))
-            if taken > self.most:
-                raise TooLargeError(self._detail)
+            if taken > most:
+                raise TooLargeError(_detail(most))
             return message
 
         await self.app(scope, counted, send)
 
-    @property
-    def _detail(self) -> str:
-        return f"a request may hold at most {self.most} bytes"
-
-    async def _refuse(self, scope: Scope, receive: Receive, send: Send) -> None:
-        response = problem(TooLargeError.status, TooLargeError.slug, TooLargeError.title, self._detail)
+    async def _refuse(self, most: int, scope: Scope, receive: Receive, send: Send) -> None:
+        response = problem(TooLargeError.status, TooLargeError.slug, TooLargeError.title, _detail(most))
         response.headers["Connection"] = "close"
         await response(scope, receive, send)
+
+
+def _detail(most: int) -> str:
+    return f"a request may hold at most {most} bytes here"
 
 
 class SafeHeaders:

@@ -27,6 +27,7 @@ class Caller:
     authorization: str | None
     address: str | None
     host: str | None
+    origin: str | None
 
 
 def make_key(scope: Scope, note: str, *, created_at: str) -> tuple[str, KeyRow]:
@@ -63,9 +64,14 @@ def _require_loopback(caller: Caller) -> None:
     if caller.address is not None and not is_loopback(caller.address):
         raise ForbiddenError(f"no keys are configured: only this machine may ask, not {caller.address}")
     host = (caller.host or "").strip()
-    name = host[1:].partition("]")[0] if host.startswith("[") else host.partition(":")[0]
-    if not is_loopback(name):
+    if not is_loopback(_name(host)):
         raise ForbiddenError(f"no keys are configured: the service answers as localhost only, not as {host[:80]!r}")
+    if caller.origin is not None and caller.origin.partition("://")[2] != host:
+        raise ForbiddenError(f"no keys are configured: a page of {caller.origin[:80]!r} may not ask")
+
+
+def _name(host: str) -> str:
+    return host[1:].partition("]")[0] if host.startswith("[") else host.partition(":")[0]
 
 
 def is_loopback(name: str) -> bool:

@@ -17,6 +17,7 @@ class Settings:
 
     database: str = DEFAULT_DATABASE
     most_body_bytes: int = 64 * 2**20
+    most_file_bytes: int = 2**30
 
     @classmethod
     def from_environment(cls, database: str | None = None) -> "Settings":

@@ -1,8 +1,9 @@
 """The other side of the wire: a client that waits for a service that is away, and tells what it refused."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import httpx2
@@ -39,15 +40,23 @@ class Service:
         """The answer to a JSON body; ServiceAwayError, or RefusedError where it will not be taken."""
         return self._answer("POST", path, content=body, headers=JSON)
 
+    def post_file(self, path: str, file: Path, asked: Mapping[str, str]) -> dict[str, Any]:
+        """The answer to a run's file."""
+        return self._answer("POST", path, params=dict(asked), file=file)
+
     def get(self, path: str, **params: Any) -> dict[str, Any]:
         """The answer to a question; ServiceAwayError, or RefusedError where there is none."""
         return self._answer("GET", path, params=params)
 
-    def _answer(self, method: str, path: str, **request: Any) -> dict[str, Any]:
+    def _answer(self, method: str, path: str, *, file: Path | None = None, **request: Any) -> dict[str, Any]:
         deadline, wait = time.monotonic() + self.patience, FIRST_WAIT
         while True:
             try:
-                response = self.http.request(method, path, **request)
+                if file is None:
+                    response = self.http.request(method, path, **request)
+                else:
+                    with file.open("rb") as content:
+                        response = self.http.request(method, path, content=content, **request)
             except httpx2.UnsupportedProtocol as error:
                 raise RefusedError(0, {"detail": f"{self.http.base_url}: {error}"}) from error
             except httpx2.TransportError as error:

@@ -15,11 +15,8 @@ from typing import Annotated, Any
 import typer
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from models.rig import campaign
-from models.rig.campaign import RunKind
 from service.cli.client import Service, ServiceAwayError, connect
 from service.cli.options import Seed, fail, out
-from service.formats import run_files
 
 _PORT = 8000
 #: The demo ends a little after the end of life.
@@ -49,9 +46,12 @@ def demo(
 
 
 def _life(service: Service, seed: int) -> None:
+    from models.rig import campaign  # what only this command needs is loaded by it alone
+    from service.formats import simulated
+
     clutch_id, truth = f"sim-{seed}", campaign.simulated_clutch(seed)
     end = truth.end_of_life()
-    service.post("/v1/clutches", json.dumps(run_files.simulated_clutch_body(clutch_id)).encode())
+    service.post("/v1/clutches", json.dumps(simulated.simulated_clutch_body(clutch_id)).encode())
     out.print(f"\nA simulated clutch, {clutch_id}: 7 pressures x 40 speeds a test, 1 % noise.")
     out.print("Duty cycles that remain until its mean COF has halved:\n")
     out.print(_HEADER, style="bold")
@@ -60,10 +60,10 @@ def _life(service: Service, seed: int) -> None:
         task = progress.add_task("run-in", total=end)
         for run in campaign.simulate(seed, stop_fraction=_STOP):
             progress.update(task, description=f"{run.kind.value.replace('_', ' ')}, {run.cycles} cycles")
-            body = json.dumps(run_files.simulated_body(run)).encode()
+            body = json.dumps(simulated.simulated_body(run)).encode()
             service.post(f"/v1/clutches/{clutch_id}/runs", body)
             progress.update(task, completed=run.cycles)
-            if run.kind is RunKind.STATIONARY_STRIBECK:
+            if run.plateaus is not None:
                 said = service.get(f"/v1/clutches/{clutch_id}/remaining-useful-life")
                 progress.console.print(_row(said, end), markup=False)
                 inside += _inside(said, end)

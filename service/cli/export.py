@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import typer
 from rich.progress import Progress
@@ -12,7 +12,7 @@ from service.cli.client import RefusedError, Service, ServiceAwayError, connect
 from service.cli.options import EX_DATAERR, EX_TEMPFAIL, URL, Key, Patience, Url, err, fail, out, told
 from service.formats import run_files
 from service.schemas.clutch import ClutchIn
-from service.workflows.tracks import METHODS
+from service.schemas.life import Method
 
 _SENT = ("run_id", "kind", "cycles", "started_at", "origin", "duty", "event", "note", "channels")
 
@@ -69,7 +69,7 @@ def _pages(service: Service, path: str, **params: Any) -> Iterator[dict[str, Any
 
 def _results(service: Service, clutch: str, folder: Path) -> None:
     base = f"/v1/clutches/{clutch}"
-    for method in METHODS:
+    for method in get_args(Method):
         _write(
             folder / f"remaining-useful-life-{method}.json", service.get(f"{base}/remaining-useful-life", method=method)
         )

@@ -7,7 +7,6 @@ import typer
 from rich.progress import Progress
 
 from service.cli.options import DATABASE, Database, err, existing, out
-from service.workflows.replay import clutch_ids, replay_clutch
 
 
 def replay(
@@ -15,6 +14,8 @@ def replay(
     database: Database = DATABASE,
 ) -> None:
     """Recompute all results from the raw runs, with the code that is installed now."""
+    from service.workflows.replay import clutch_ids, replay_clutch  # loaded by the one command that needs it
+
     with existing(database) as opened, Progress(console=err, transient=True) as progress:
         wanted = clutch_ids_given or clutch_ids(opened)
         task = progress.add_task("replaying", total=len(wanted))

@@ -12,6 +12,7 @@ from service.cli.client import RefusedError, Service, ServiceAwayError, connect
 from service.cli.options import (
     EX_DATAERR,
     EX_TEMPFAIL,
+    EX_USAGE,
     SPOOL,
     URL,
     Key,
@@ -44,8 +45,14 @@ def push(
     key: Key = None,
     spool: SpoolFolder = SPOOL,
     patience: Patience = 60.0,
+    kind: Annotated[str | None, typer.Option(help="For files that are not JSON: the kind of run")] = None,
+    cycles: Annotated[float | None, typer.Option(help="For files that are not JSON: duty cycles since new")] = None,
+    channel_map: Annotated[str | None, typer.Option("--map", help="Channels by name: torque_nm:Mz,speed_rpm:n")] = None,
 ) -> None:
-    """Send run files. What the service cannot take now waits in the spool and is sent first next time."""
+    """Send run files: JSON, or CSV, TDMS, MDF4 and Parquet with --kind and --cycles.
+
+    What the service cannot take now waits in the spool and is sent first next time.
+    """
     with told():
         try:
             files = run_files.find(paths)
@@ -53,7 +60,13 @@ def push(
             fail(str(error), EX_DATAERR)
         waiting = Spool.of(spool, url, clutch)
         for file in files:
-            waiting.add(file.read_bytes())
+            if file.suffix == ".json":
+                waiting.add(file.read_bytes())
+            elif kind is None or cycles is None:
+                fail(f"{file} is no JSON file: say --kind and --cycles", EX_USAGE)
+            else:
+                asked = {"kind": kind, "cycles": repr(cycles), "filename": file.name}
+                waiting.add_file(file, asked | ({} if channel_map is None else {"map": channel_map}))
         with connect(url, key=key) as http, Progress(console=err, transient=True) as progress:
             task = progress.add_task("sending", total=len(list(waiting.waiting())))
 
@@ -97,7 +110,11 @@ def _register(service: Service, clutch_id: str, paths: list[Path]) -> None:
 
 def _send(service: Service, clutch_id: str, waiting: Spool, entry: Path, sent: Sent) -> None:
     try:
-        receipt = service.post(f"/v1/clutches/{clutch_id}/runs", entry.read_bytes())
+        asked = waiting.asked(entry)
+        if asked is None:
+            receipt = service.post(f"/v1/clutches/{clutch_id}/runs", entry.read_bytes())
+        else:
+            receipt = service.post_file(f"/v1/clutches/{clutch_id}/runs/file", entry, asked)
     except RefusedError as error:
         if error.status in (0, 401, 403, 404):
             raise

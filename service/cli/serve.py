@@ -6,7 +6,6 @@ from typing import Annotated
 import typer
 import uvicorn
 
-from service.app import create_app
 from service.cli.options import DATABASE, EX_USAGE, Database, err, fail, told
 from service.security import is_loopback
 from service.settings import Settings
@@ -36,6 +35,8 @@ def serve(
             soft_wrap=True,
         )
         host = LOOPBACK
+    from service.app import create_app  # what only this command needs is loaded by it alone
+
     uvicorn.run(
         create_app(settings),
         host=host,

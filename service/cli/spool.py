@@ -6,12 +6,14 @@ under `refused/` with its answer.
 """
 
 import hashlib
+import io
 import json
 import os
-from collections.abc import Iterator
+import shutil
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 
 def default_folder() -> Path:
@@ -35,16 +37,38 @@ class Spool:
         return spool
 
     def add(self, body: bytes) -> Path:
-        """Keep a body; the same body is kept once. Entries keep the order in which they came."""
-        digest = hashlib.sha256(body).hexdigest()[:24]
-        known = next(self.folder.glob(f"*-{digest}.json"), None)
+        """Keep a JSON body; the same body is kept once. Entries keep the order in which they came."""
+        return self._keep(hashlib.sha256(body).hexdigest()[:24], ".json", io.BytesIO(body))
+
+    def add_file(self, path: Path, asked: Mapping[str, str]) -> Path:
+        """Keep a run's file and what is to be said beside it."""
+        with path.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256")
+            digest.update(json.dumps(dict(asked), sort_keys=True).encode())
+            file.seek(0)
+            kept = self._keep(digest.hexdigest()[:24], ".run", file)
+        said = kept.with_suffix(".asked")
+        if not said.exists():
+            said.write_text(json.dumps(dict(asked)), encoding="utf-8")
+        return kept
+
+    def asked(self, path: Path) -> dict[str, str] | None:
+        """What is to be said beside a file; None for a JSON body."""
+        said = path.with_suffix(".asked")
+        if path.suffix == ".json":
+            return None
+        found: dict[str, str] = json.loads(said.read_text(encoding="utf-8"))
+        return found
+
+    def _keep(self, digest: str, suffix: str, source: BinaryIO) -> Path:
+        known = next(self.folder.glob(f"*-{digest}{suffix}"), None)
         if known is not None:
             return known
         last = max((int(path.name.partition("-")[0]) for path in self._entries()), default=0)
-        path = self.folder / f"{last + 1:08d}-{digest}.json"
+        path = self.folder / f"{last + 1:08d}-{digest}{suffix}"
         partial = path.with_suffix(".part")
         with partial.open("wb") as file:
-            file.write(body)
+            shutil.copyfileobj(source, file)
             file.flush()
             os.fsync(file.fileno())
         partial.replace(path)
@@ -55,11 +79,12 @@ class Spool:
         yield from sorted(self._entries())
 
     def _entries(self) -> list[Path]:
-        return list(self.folder.glob("[0-9]*-*.json"))
+        return [path for path in self.folder.glob("[0-9]*-*") if path.suffix in (".json", ".run")]
 
     def done(self, path: Path) -> None:
         """The service has it."""
-        path.unlink()
+        path.unlink(missing_ok=True)
+        path.with_suffix(".asked").unlink(missing_ok=True)
 
     def refused(self, path: Path, problem: dict[str, Any]) -> Path:
         """The service will not have it: aside, with its answer beside it."""
@@ -67,4 +92,7 @@ class Spool:
         aside.mkdir(exist_ok=True)
         answer = aside / f"{path.stem}.problem"
         answer.write_text(json.dumps(problem, indent=1, ensure_ascii=False), encoding="utf-8")
+        said = path.with_suffix(".asked")
+        if said.exists():
+            said.replace(aside / said.name)
         return path.replace(aside / path.name)

@@ -1,7 +1,7 @@
 """Columns of numbers as they were sent -> checked 64-bit columns, or errors that name channel, row and value."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,12 +13,17 @@ from service.formats.units import CHANNELS, SAMPLED_LEAST
 _SHOWN = 80
 
 
-class _Errors:
-    """Collects errors; keeps the first MOST_ERRORS and counts the rest."""
+#: Row of a column, from 0 -> line of the file that it stands on, from 1.
+LineOf = Callable[[int], int]
 
-    def __init__(self) -> None:
+
+class _Errors:
+    """Collects errors; keeps the first MOST_ERRORS and counts the rest. Rows of a file are named with their line."""
+
+    def __init__(self, line_of: LineOf | None = None) -> None:
         self.kept: list[FieldError] = []
         self.total = 0
+        self._line_of = line_of
 
     def add(self, error: FieldError) -> None:
         self.total += 1
@@ -26,14 +31,18 @@ class _Errors:
             self.kept.append(error)
 
     def add_row(self, name: str, index: int, value: object, code: str, rule: str) -> None:
+        if len(self.kept) >= MOST_ERRORS:
+            self.total += 1
+            return
         shown = repr(value)[:_SHOWN] if isinstance(value, str | list | dict) else str(value)[:_SHOWN]
+        place = f"{name}[{index}]" + (f" (line {self._line_of(index)})" if self._line_of else "")
         self.add(
             FieldError(
                 pointer=f"/channels/{name}/{index}",
                 row=index + 1,
                 value=shown,
                 code=code,
-                message=f"{name}[{index}] {rule}, got {shown}",
+                message=f"{place} {rule}, got {shown}",
             )
         )
 
@@ -45,9 +54,31 @@ def check_columns(columns: Mapping[str, Sequence[Any]]) -> dict[str, FloatArray]
     range. The error lists at most 50 places and says how many there are in all.
     """
     errors = _Errors()
-    sampled = "time_s" in columns
-    rows = max((len(values) for values in columns.values()), default=0)
+    _check_lengths(columns, errors)
     checked = {}
+    for name, values in columns.items():
+        column = _numbers(name, values, errors)
+        if column is not None:
+            _check_range(name, column, errors, sampled="time_s" in columns)
+            checked[name] = column
+    _raise_any(errors)
+    return checked
+
+
+def check_arrays(columns: Mapping[str, FloatArray], *, line_of: LineOf | None = None) -> None:
+    """Columns [n] by public channel name, in the channels' units, held to the rules of `check_columns`.
+
+    Raises InvalidError as that does; with `line_of` the messages name the line of the file too.
+    """
+    errors = _Errors(line_of)
+    _check_lengths(columns, errors)
+    for name, column in columns.items():
+        _check_range(name, column, errors, sampled="time_s" in columns)
+    _raise_any(errors)
+
+
+def _check_lengths(columns: Mapping[str, Sequence[Any] | FloatArray], errors: _Errors) -> None:
+    rows = max((len(values) for values in columns.values()), default=0)
     for name, values in columns.items():
         if len(values) == 0:
             errors.add(FieldError(pointer=f"/channels/{name}", code="empty", message=f"{name} must not be empty"))
@@ -62,13 +93,11 @@ def check_columns(columns: Mapping[str, Sequence[Any]]) -> dict[str, FloatArray]
                     message=f"{name} {rule}",
                 )
             )
-        column = _numbers(name, values, errors)
-        if column is not None:
-            _check_range(name, column, errors, sampled=sampled)
-            checked[name] = column
+
+
+def _raise_any(errors: _Errors) -> None:
     if errors.total:
         raise InvalidError(_summary(errors), errors=errors.kept, total=errors.total)
-    return checked
 
 
 def _summary(errors: _Errors) -> str:
@@ -95,7 +124,9 @@ def _check_range(name: str, column: FloatArray, errors: _Errors, *, sampled: boo
     channel = CHANNELS[name]
     least = SAMPLED_LEAST.get(name, channel.least) if sampled else channel.least
     good = (column >= least) & (column <= channel.most)
-    for index in np.flatnonzero(~good):
+    wrong = np.flatnonzero(~good)
+    errors.total += max(0, wrong.size - MOST_ERRORS)
+    for index in wrong[:MOST_ERRORS]:
         value = float(column[index])
         if not math.isfinite(value):
             errors.add_row(name, int(index), value, "not_finite", "must be finite")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from models.arrays import FloatArray
-from models.runs import Plateaus, pressure_levels
+from models.runs import Plateaus, Record, pressure_levels
 from service.errors import FieldError, InvalidError
 from service.formats.units import CHANNELS
 from service.schemas.base import whole
@@ -70,6 +70,18 @@ def name_run(
     if kind == "stationary_stribeck" and "time_s" not in channels:
         _require_curve(channels)
     return run
+
+
+def sampled_record(channels: Mapping[str, FloatArray]) -> Record:
+    """A sampled record in SI units."""
+    si = {name: CHANNELS[name].to_si(values) for name, values in channels.items()}
+    return Record(
+        time=si["time_s"],
+        pressure=si["pressure_bar"],
+        speed=si["speed_rpm"],
+        torque=si["torque_nm"],
+        oil_temperature=si.get("oil_temperature_c"),
+    )
 
 
 def stationary_plateaus(channels: Mapping[str, FloatArray]) -> Plateaus:

@@ -41,6 +41,7 @@ def caller_of(request: Request) -> Caller:
         authorization=request.headers.get("authorization"),
         address=None if request.client is None else request.client.host,
         host=request.headers.get("host"),
+        origin=request.headers.get("origin"),
     )
 
 

@@ -3,7 +3,7 @@
 from typing import Literal
 
 from service.schemas.base import Answer, Origin
-from service.schemas.run import Fit
+from service.schemas.run import Fit, Loop
 
 Method = Literal["particle", "ukf", "grid"]
 Quantiles = dict[str, float | None]
@@ -174,15 +174,11 @@ class EngagementOut(Answer):
     channels: EngagementChannels
 
 
-class LoopItem(Answer):
+class LoopItem(Loop):
     """A friction loop of one dynamic test at one pressure."""
 
     run_id: str
     cycles: float
-    pressure_bar: float
-    loop_area_nm_m_s: float
-    attractor_nm_s: float
-    attractor_sd_nm_s: float
 
 
 class LoopPage(Answer):

@@ -116,12 +116,21 @@ class Fit(Answer):
 
 
 class Loop(Answer):
-    """A friction loop at one pressure (eq. 8)."""
+    """A friction loop at one pressure (eq. 8): positive where torque is higher in acceleration; null: it cannot be told."""
 
     pressure_bar: float
-    loop_area_nm_m_s: float
-    attractor_nm_s: float
-    attractor_sd_nm_s: float
+    loop_area_nm_m_s: float | None
+    loop_area_sd_nm_m_s: float | None
+    attractor_nm_s: float | None
+    attractor_sd_nm_s: float | None
+    film_time_s: float | None
+    film_time_sd_s: float | None
+    frequency_hz: float | None
+    periods: int
+    direction: str
+    better_law: str | None
+    status: str
+    message: str
 
 
 class Receipt(Answer):

@@ -9,9 +9,11 @@ import numpy as np
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.identification import FitStatus, StribeckFit, fit_curves, mean_torques
+from models.plateaus import cut_plateaus
 from models.protocol import protocol_speeds
 from models.runs import Plateaus, curves_by_pressure
-from service.formats.incoming import UNLOADED, IncomingRun, stationary_plateaus
+from service.errors import FieldError, InvalidError
+from service.formats.incoming import UNLOADED, IncomingRun, sampled_record, stationary_plateaus
 from service.formats.units import PASCALS_PER_BAR
 
 #: Warnings that hang on what was known when the run arrived: cycles before those of an earlier run, other pressures.
@@ -56,26 +58,37 @@ class Analysis:
 
 
 def analyse(run: IncomingRun, geometry: Geometry) -> Analysis:
-    """Fit a stationary test's curves; other kinds are kept as they are."""
-    if run.kind == "stationary_stribeck" and "time_s" not in run.channels:
-        return _analyse_stationary(run, stationary_plateaus(run.channels), geometry)
-    if run.kind in ("stationary_stribeck", "dynamic_stribeck"):
-        message = "sampled records are stored and not evaluated by this version; a replay by a later one evaluates them"
-        return Analysis(warnings=(Warned(code="not_evaluated", message=message),))
-    return Analysis()
+    """Fit a stationary test's curves, from its plateaus or from its sampled record; other kinds are kept as they are.
+
+    Raises InvalidError where a sampled record holds no steady plateau.
+    """
+    if run.kind != "stationary_stribeck":
+        return Analysis()
+    if "time_s" not in run.channels:
+        plateaus = stationary_plateaus(run.channels)
+        return _analyse_stationary(plateaus, geometry, _row_warnings(run, plateaus))
+    try:
+        cut = cut_plateaus(sampled_record(run.channels))
+    except ValueError as error:
+        message = f"time_s, pressure_bar, speed_rpm, torque_nm: {error}"
+        errors = [FieldError(pointer="/channels/torque_nm", code="no_plateau", message=message)]
+        raise InvalidError(message, errors=errors) from None
+    notes = [Warned(code=code, message=message) for code, message in cut.notes]
+    return _analyse_stationary(cut.plateaus, geometry, notes)
 
 
-def _analyse_stationary(run: IncomingRun, plateaus: Plateaus, geometry: Geometry) -> Analysis:
+def _analyse_stationary(plateaus: Plateaus, geometry: Geometry, noticed: Sequence[Warned]) -> Analysis:
     curves = curves_by_pressure(plateaus, geometry)
     fits = fit_curves(curves)
     levels = tuple(
         LevelFit(fit=fit, mean_pressure=curve.mean_pressure, speeds=int(np.unique(curve.velocity).size))
         for fit, curve in zip(fits, curves, strict=True)
     )
-    low, high = float(plateaus.speed.min()), float(plateaus.speed.max())
+    speed = np.abs(plateaus.speed)
+    low, high = float(speed.min()), float(speed.max())
     telling = low < high and mean_cofs(levels, geometry.sliding_velocity(protocol_speeds(low, high)), geometry)
     warnings = [
-        *_row_warnings(run, plateaus),
+        *noticed,
         *(warned for level in levels for warned in _level_warnings(level, plateaus)),
         *(warned for fit in fits for warned in _fit_warnings(fit)),
     ]

@@ -12,6 +12,7 @@ from service.settings import CODE_VERSION
 from service.workflows import stored
 from service.workflows.analysis import LATE, OTHER_PRESSURES, Analysis, Warned, analyse, mean_cofs
 from service.workflows.history import ByPressure, Event, lives, nearest, order, reference_velocities
+from service.workflows.loops import DYNAMIC, loops_of, refresh_loops
 from service.workflows.receipts import bar, fit_receipt, receipt
 from service.workflows.refresh import refresh_cofs
 from service.workflows.retrack import retrack
@@ -62,12 +63,17 @@ def _store(
     event = _event(run, analysis, received_at)
     cofs = _cofs(order([*before, event]), event, analysis, geometry)
     event = _event(run, analysis, received_at, cofs)
+    ordered = order([*before, event])
+    loops = (
+        loops_of(connection, clutch.clutch_id, ordered, event, run.channels, geometry) if run.kind == DYNAMIC else []
+    )
     answer = receipt(
         clutch.clutch_id,
         run,
         received_at=received_at,
         fits=[fit_receipt(level.fit, cofs.get(level.fit.pressure)) for level in analysis.fits],
-        warnings=[*analysis.warnings, *_late(before, event), *_absent(order([*before, event]), event)],
+        warnings=[*analysis.warnings, *_late(before, event), *_absent(ordered, event)],
+        loops=loops,
     )
     run_key = runs.insert(
         connection,
@@ -87,12 +93,13 @@ def _store(
     channels.write(connection, run_key, run.channels)
     fits.write(connection, run_key, stored.fit_rows(analysis.fits, cofs))
     clutches.bump_revision(connection, clutch.clutch_id)
-    events = order([*before, event])
-    if event is not events[-1] and (event.rebuild or event.speed_range is not None):
+    if event is not ordered[-1] and (event.rebuild or event.speed_range is not None):
         # the reference test may be another one now, and with it the protocol of all means
         retrack(connection, clutch, refresh_cofs(connection, clutch.clutch_id, geometry))
     else:
-        retrack(connection, clutch, events, newest=event)
+        retrack(connection, clutch, ordered, newest=event)
+    if event.speed_range is not None:
+        refresh_loops(connection, clutch.clutch_id, ordered, geometry, since=event)
     return answer
 
 

@@ -49,6 +49,7 @@ def receipt(
     *,
     received_at: str,
     fits: Sequence[dict[str, Any]],
+    loops: Sequence[dict[str, Any]] = (),
     warnings: Sequence[Warned],
 ) -> dict[str, Any]:
     """The receipt of a run."""
@@ -64,7 +65,7 @@ def receipt(
         "duplicate": False,
         "warnings": [{"code": each.code, "message": each.message} for each in warnings],
         "fits": list(fits),
-        "loops": [],
+        "loops": list(loops),
         "duty": run.details.get("duty"),
         "event": run.details.get("event"),
         "note": run.details.get("note"),

@@ -9,6 +9,7 @@ from service.settings import CODE_VERSION
 from service.workflows import stored
 from service.workflows.analysis import NOTICED_ON_ARRIVAL, Analysis, Warned, analyse
 from service.workflows.history import ALL_PRESSURES
+from service.workflows.loops import refresh_loops
 from service.workflows.receipts import fit_receipt, receipt
 from service.workflows.refresh import refresh_cofs
 from service.workflows.retrack import retrack
@@ -40,7 +41,9 @@ def replay_clutch(database: Database, clutch_id: str) -> int:
             fits.write(connection, row.run_key, stored.fit_rows(analysis.fits, {}))
             answer = _receipt(row, incoming, analysis)
             runs.set_results(connection, row.run_key, stored.details(incoming, analysis), answer, CODE_VERSION)
-        retrack(connection, clutch, refresh_cofs(connection, clutch_id, geometry))
+        events = refresh_cofs(connection, clutch_id, geometry)
+        retrack(connection, clutch, events)
+        refresh_loops(connection, clutch_id, events, geometry)
         if _results(connection, clutch_id) != before:
             clutches.bump_revision(connection, clutch_id)
         return len(rows)

@@ -23,7 +23,7 @@ from models.tracking.particle import Particle
 from models.tracking.prior import weak
 from models.tracking.protocol import Measurement
 from models.tracking.ukf import Ukf
-from service.formats.run_files import simulated_body
+from service.formats.simulated import simulated_body
 from tests.support import serving
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import httpx2
 
-from tests.real import loaders
+from tests.real import lag, loaders
 from tests.support import serving
 
 
@@ -83,6 +83,8 @@ def main() -> int:
     ):
         screw_drives(http)
         traction(http)
+    print("\n## Lag: loops and transients\n")
+    lag.main()
     return 0
 
 

@@ -1,0 +1,273 @@
+"""Whole periods of a record whose speed swings periodically: where each pressure stands, and the swing itself.
+
+A dynamic Stribeck test holds the pressure and swings the speed, 15 s at 0.1 Hz a pressure: one and a half periods. A
+loop closes after whole periods only, so half a period must be left out; the *last* whole periods are kept, for the
+first half holds the start. The swing is fitted by
+
+    v(t) = v_0 + Σ_h a_h cos hθ + b_h sin hθ,    θ = 2π f (t - t_0),    h = 1 ... 4
+
+with f free (Gauss-Newton on all of the level's samples, outliers left out), so that nothing is asked of the clock's
+evenness, of the rate, or of a period being a whole number of samples.
+
+Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3.4.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from models.arrays import FloatArray
+from models.runs import LEVEL_GAP, LEVEL_GAP_SHARE
+
+#: Harmonics of the speed.
+SPEED_HARMONICS = 4
+#: A sample further off a fit than this many deviations, and than this share of the largest value, is an outlier.
+OUTLIER = 6.0
+OUTLIER_SHARE = 0.005
+_NEIGHBOURS = 5
+#: A period counts as whole where this share of it was sampled: a fit of harmonics bridges the rest.
+WHOLE = 0.99
+#: A speed that misses its fit by more than this share of its swing (rms) does not swing periodically.
+PERIODIC = 0.15
+#: The pressure is looked at in medians over this long [s]; a level lasts so many of them or more.
+_BLOCK = 0.25
+_LEAST_BLOCKS = 8
+#: Standing still for longer than this share of the record, before or after, is not part of the swing.
+_REST_SHARE = 0.1
+_SWING_SHARE, _MOST_SHARE = 0.02, 0.05
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stretch:
+    """Consecutive rows [start, stop) at one pressure [Pa] (their median)."""
+
+    pressure: float
+    start: int
+    stop: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cycle:
+    """A fitted swing: frequency [Hz], origin t_0 [s], mean v_0, cosine and sine [h], in the unit of what was fitted.
+
+    `covariance` [2h, 2h] is that of (cosine, sine) with f free; `noise` the deviation of a sample; the whole periods
+    are those of start <= t < stop [s]; `outliers` samples were left out.
+    """
+
+    frequency: float
+    origin: float
+    mean: float
+    cosine: FloatArray
+    sine: FloatArray
+    covariance: FloatArray
+    noise: float
+    periods: int
+    start: float
+    stop: float
+    outliers: int
+
+    @property
+    def amplitude(self) -> float:
+        """Of the first harmonic."""
+        return math.hypot(float(self.cosine[0]), float(self.sine[0]))
+
+    def phase(self, time: FloatArray) -> FloatArray:
+        """θ [n] rad at time [n] s."""
+        return 2 * math.pi * self.frequency * (time - self.origin)
+
+    def value(self, phase: FloatArray) -> FloatArray:
+        """v [n] at phase [n] rad."""
+        basis = harmonics(phase, self.cosine.size)
+        return np.asarray(self.mean + basis @ np.concatenate([self.cosine, self.sine]), dtype=np.float64)
+
+    def gradient(self, phase: FloatArray) -> FloatArray:
+        """dv/dθ [n] at phase [n] rad; dv/dt is 2πf times that."""
+        order = np.arange(1, self.cosine.size + 1)
+        basis = harmonics(phase, self.cosine.size)
+        return np.asarray(basis @ np.concatenate([order * self.sine, -order * self.cosine]), dtype=np.float64)
+
+
+def harmonics(phase: FloatArray, count: int) -> FloatArray:
+    """cos hθ and sin hθ for h = 1 ... count: [n, 2 count], cosines first."""
+    turn = np.exp(1j * phase)
+    powers = np.empty((phase.size, count), dtype=np.complex128)
+    power = np.ones_like(turn)
+    for h in range(count):
+        power = power * turn
+        powers[:, h] = power
+    return np.concatenate([powers.real, powers.imag], axis=1)
+
+
+def sample_interval(time: FloatArray) -> float:
+    """The usual distance of two samples [s], 0 for a single one."""
+    return float(np.median(np.diff(time))) if time.size > 1 else 0.0
+
+
+def pressure_stretches(time: FloatArray, pressure: FloatArray) -> Iterator[Stretch]:
+    """The stretches of time [n] s, ascending, in which pressure [n] Pa stands still, in their order.
+
+    Medians over a quarter of a second that stay within LEVEL_GAP of the stretch's own median belong together; ramps
+    between levels leave stretches that are too short (under 2 s) to count.
+    """
+    smooth = median_filter(pressure, size=min(5, pressure.size), mode="nearest")
+    block = np.floor((time - time[0]) / max(_BLOCK, 5 * sample_interval(time))).astype(np.int64)
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(block)) + 1, [time.size]])
+    medians = np.array([np.median(smooth[a:b]) for a, b in itertools.pairwise(edges)])
+    first = 0
+    for i in range(1, medians.size + 1):
+        level = float(np.median(medians[first:i]))
+        allowed = max(LEVEL_GAP, LEVEL_GAP_SHARE * abs(level))
+        if i < medians.size and abs(medians[i] - level) <= allowed:
+            continue
+        if i - first >= _LEAST_BLOCKS:
+            near = np.abs(smooth - level) <= allowed
+            lowest, highest = edges[max(first - 1, 0)], edges[min(i + 1, medians.size)]
+            inside_start, inside_stop = edges[first + 1], edges[i - 1]
+            before = np.flatnonzero(~near[lowest:inside_start])
+            after = np.flatnonzero(~near[inside_stop:highest])
+            start = int(lowest + before[-1] + 1) if before.size else int(lowest)
+            stop = int(inside_stop + after[0]) if after.size else int(highest)
+            yield Stretch(pressure=float(np.median(pressure[start:stop])), start=start, stop=stop)
+        first = i
+
+
+def fit_cycle(time: FloatArray, value: FloatArray, count: int = SPEED_HARMONICS) -> Cycle | str:
+    """The swing of value [n] over time [n] s (ascending), and its last whole periods; a sentence where there is none.
+
+    `count` harmonics: 4 for a motor told to follow a sine, more for motions with corners.
+    """
+    moving = _without_rest(time, value)
+    t, y = time[moving], value[moving]
+    if t.size < 4 * (2 * count + 2) or t[-1] <= t[0]:
+        return f"The speed moves for {t.size} samples only: too few for a period."
+    if not (np.ptp(y) > 0 and np.isfinite(np.ptp(y))):
+        return "The speed does not move."
+    frequency = _coarse_frequency(t, y)
+    fitted: Cycle | str = "The speed does not swing periodically."
+    for harmonic in (1, count):
+        fitted = _refine(t, y, frequency, harmonic)
+        if isinstance(fitted, str):
+            return fitted
+        frequency = fitted.frequency
+    return fitted
+
+
+def _without_rest(time: FloatArray, value: FloatArray) -> slice:
+    """Without standing still before and after, where that lasts."""
+    smooth = median_filter(value, size=min(3, value.size), mode="nearest")
+    swing = float(np.ptp(smooth))
+    least = min(_SWING_SHARE * swing + 4 * float(np.median(np.abs(value - smooth))), _MOST_SHARE * swing)
+    duration = time[-1] - time[0]
+    moved = np.flatnonzero(np.abs(smooth - smooth[0]) > least)
+    start = int(moved[0]) if moved.size and time[moved[0]] - time[0] > _REST_SHARE * duration else 0
+    moved = np.flatnonzero(np.abs(smooth - smooth[-1]) > least)
+    stop = int(moved[-1]) + 1 if moved.size and time[-1] - time[moved[-1]] > _REST_SHARE * duration else time.size
+    return slice(start, stop) if stop > start else slice(0, time.size)
+
+
+def _coarse_frequency(time: FloatArray, value: FloatArray) -> float:
+    """The periodogram's highest frequency, then the best sine about it: within a twentieth of 1/duration."""
+    duration = float(time[-1] - time[0])
+    points = int(min(4096, max(64, time.size)))
+    grid = np.linspace(0.0, duration, points)
+    y = np.interp(grid, time - time[0], median_filter(value, size=5, mode="nearest"))
+    power = np.abs(np.fft.rfft(y - y.mean(), 4 * points)) ** 2
+    frequencies = np.fft.rfftfreq(4 * points, grid[1])
+    peak = float(frequencies[np.argmax(np.where(frequencies >= 0.5 / duration, power, 0.0))])
+    step = max(1, points // 1024) if peak * duration < 100 else 1
+    candidates = np.linspace(peak - 0.8 / duration, peak + 0.8 / duration, 65)
+    candidates = candidates[candidates > 0.4 / duration]
+    misses = [_sine_miss(grid[::step], y[::step], float(f)) for f in candidates]
+    return float(candidates[int(np.argmin(misses))])
+
+
+def _sine_miss(time: FloatArray, value: FloatArray, frequency: float) -> float:
+    basis = np.column_stack([np.ones_like(time), harmonics(2 * math.pi * frequency * time, 1)])
+    gram = basis.T @ basis
+    projected = basis.T @ value
+    return -float(projected @ np.linalg.solve(gram + 1e-12 * time.size * np.eye(3), projected))
+
+
+def inliers(residual: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
+    """[n]: value [n], ordered in time, that is near the fit *or* near its neighbours' median: a spike is neither.
+
+    Near is within OUTLIER deviations (from the median absolute one), or within OUTLIER_SHARE of the largest value. What
+    a fit only bends around (a cusp) stays in.
+    """
+    share = OUTLIER_SHARE * float(np.abs(value).max())
+    near = np.zeros(value.size, dtype=np.bool_)
+    for off in (residual, value - median_filter(value, size=min(_NEIGHBOURS, value.size), mode="nearest")):
+        distance = np.abs(off - np.median(off))
+        near |= distance <= max(OUTLIER * 1.4826 * float(np.median(distance)), share)
+    return near
+
+
+def _refine(time: FloatArray, value: FloatArray, frequency: float, count: int) -> Cycle | str:
+    """Gauss-Newton on frequency, mean and `count` harmonics; outliers judged anew in the first steps."""
+    origin, duration = 0.5 * float(time[0] + time[-1]), float(time[-1] - time[0])
+    order = np.arange(1, count + 1)
+    keep = np.ones(time.size, dtype=np.bool_)
+    coefficients: FloatArray = np.zeros(2 * count + 1)
+    inverse: FloatArray = np.zeros((0, 0))
+    residual: FloatArray = value
+    for step in range(25):
+        basis = harmonics(2 * math.pi * frequency * (time - origin), count)
+        design = np.column_stack([np.ones_like(time), basis])
+        kept = design[keep]
+        coefficients = np.asarray(np.linalg.lstsq(kept.T @ kept, kept.T @ value[keep], rcond=None)[0], dtype=np.float64)
+        cosine, sine = coefficients[1 : count + 1], coefficients[count + 1 :]
+        slope = basis @ np.concatenate([order * sine, -order * cosine])
+        by_frequency = 2 * math.pi * (time - origin) / duration * slope  # per cycle over the record
+        residual = np.asarray(value - design @ coefficients, dtype=np.float64)
+        full = np.column_stack([design, by_frequency])[keep]
+        inverse = np.asarray(np.linalg.pinv(full.T @ full, hermitian=True), dtype=np.float64)
+        move = float((inverse @ (full.T @ residual[keep]))[-1])
+        frequency += float(np.clip(move, -0.2, 0.2)) / duration
+        if not 0.2 / duration < frequency < 0.5 / max(sample_interval(time), 1e-12):
+            return "The speed does not swing periodically."
+        if step < 4:
+            keep = inliers(residual, value)
+        elif abs(move) < 1e-12:
+            break
+    amplitude = float(np.hypot(coefficients[1], coefficients[1 + count]))
+    noise = math.sqrt(float((residual[keep] ** 2).sum()) / max(int(keep.sum()) - 2 * count - 2, 1))
+    if not noise < PERIODIC * amplitude or keep.sum() < 0.8 * time.size:
+        return f"The speed does not swing periodically: it misses its best fit by {noise / amplitude:.0%} of its swing."
+    return _cycle(time, frequency, origin, coefficients, inverse[1:-1, 1:-1] * noise**2, noise, int((~keep).sum()))
+
+
+def _cycle(
+    time: FloatArray,
+    frequency: float,
+    origin: float,
+    coefficients: FloatArray,
+    covariance: FloatArray,
+    noise: float,
+    outliers: int,
+) -> Cycle | str:
+    """Count the whole periods."""
+    interval = sample_interval(time)
+    sampled = (float(time[-1] - time[0]) + interval) * frequency
+    periods = math.floor(sampled + 1 - WHOLE)
+    if periods < 1:
+        return f"No whole period: {sampled:.2f} periods of {1 / frequency:.4g} s were recorded."
+    count = coefficients.size // 2
+    stop = float(time[-1]) + 0.5 * interval
+    return Cycle(
+        frequency=frequency,
+        origin=origin,
+        mean=float(coefficients[0]),
+        cosine=coefficients[1 : count + 1],
+        sine=coefficients[count + 1 :],
+        covariance=covariance,
+        noise=noise,
+        periods=periods,
+        start=stop - periods / frequency,
+        stop=stop,
+        outliers=outliers,
+    )

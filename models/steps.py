@@ -1,0 +1,222 @@
+"""The dwells of a stationary test, found in its speed and pressure without knowing its protocol.
+
+The record is averaged over blocks of some 10 ms. A block is steady where the means of 0.2 s after it and of 0.2 s before
+it agree within six deviations of their difference, in speed and in pressure; runs of steady blocks are dwells, widened
+again up to where speed or pressure leaves the level.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from models.cleaning import Note
+from models.runs import Record
+
+#: A block [s].
+BLOCK = 0.01
+#: The windows before and after that are compared [s], at least this many blocks.
+WINDOW, FEWEST_BLOCKS = 0.2, 4
+#: Deviations that make a step of a difference of windows; those that make a block leave its level.
+STEP, LEAVE = 6.0, 5.0
+#: Changes smaller than the first share of the highest speed or pressure are never steps, larger than the second always.
+RESOLUTION, PLAIN = 5e-4, 0.02
+#: No lining is loaded below this share of the highest pressure, and nothing slides below this share of the highest speed.
+NO_PRESSURE, STANDSTILL = 0.02, 1e-3
+#: A dwell ends at a gap in the record longer than this [s] and than so many blocks.
+GAP, GAP_BLOCKS = 0.25, 6
+#: Speed or pressure that changes by more than this share over a dwell is a slow ramp.
+RAMP = 0.01
+#: Pieces of a dwell whose means are compared for that.
+PIECES = 6
+#: Blocks below which a dwell is not worth a mean.
+SHORTEST = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Blocks:
+    """Means over `size` samples each: time [m] s, pressure, speed, torque, oil_temperature; scatter [m] Nm², the
+    variance of torque within a block; gap [m]: samples are missing for long before or in this block.
+    """
+
+    size: int
+    duration: float
+    time: FloatArray
+    pressure: FloatArray
+    speed: FloatArray
+    torque: FloatArray
+    scatter: FloatArray
+    oil_temperature: FloatArray | None
+    gap: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Dwell:
+    """Blocks start:stop lie on one level."""
+
+    start: int
+    stop: int
+
+
+def average(record: Record, period: float) -> Blocks:
+    """Means over blocks of some 10 ms of a record in order; a remainder at its end is left out."""
+    size = max(1, round(BLOCK / period))
+    count = record.time.size // size
+    share = np.full(size, 1.0 / size)
+
+    def mean(channel: FloatArray) -> FloatArray:
+        return np.asarray(channel[: count * size].reshape(count, size) @ share, dtype=np.float64)
+
+    torque = mean(record.torque)
+    off = record.torque[: count * size].reshape(count, size) - torque[:, np.newaxis]
+    late = np.flatnonzero(np.diff(record.time) > max(GAP, GAP_BLOCKS * size * period)) + 1
+    gap: NDArray[np.bool_] = np.zeros(count, dtype=np.bool_)
+    gap[np.minimum(late // size, count - 1)] = True
+    return Blocks(
+        size=size,
+        duration=size * period,
+        time=mean(record.time),
+        pressure=mean(record.pressure),
+        speed=mean(record.speed),
+        torque=torque,
+        scatter=np.einsum("ij,ij->i", off, off) / size,
+        oil_temperature=None if record.oil_temperature is None else mean(record.oil_temperature),
+        gap=gap,
+    )
+
+
+def find_dwells(blocks: Blocks) -> tuple[list[Dwell], list[Note]]:
+    """The dwells under pressure and in motion, in the order of time, and notes on those that were left out."""
+    if blocks.time.size < SHORTEST:
+        return [], []
+    window = max(FEWEST_BLOCKS, round(WINDOW / blocks.duration))
+    pressure, speed = _Channel(blocks.pressure, window), _Channel(blocks.speed, window)
+    active = (np.abs(blocks.pressure) > NO_PRESSURE * pressure.highest) & (
+        np.abs(blocks.speed) > STANDSTILL * speed.highest
+    )
+    steady = ~blocks.gap
+    for channel in (pressure, speed):
+        channel.judge(active)
+        steady &= channel.steady
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], steady, [False]]).astype(np.int8)))
+    cores = [(int(a), int(b)) for a, b in edges.reshape(-1, 2) if b - a >= 2]
+    cores = _merged(cores, blocks, (pressure, speed))
+    return _sorted_out(_widened(cores, blocks, (pressure, speed)), blocks, pressure, speed)
+
+
+class _Channel:
+    """Speed or pressure [m], and where it is steady."""
+
+    def __init__(self, values: FloatArray, window: int) -> None:
+        self.values = values
+        self.highest = float(np.quantile(np.abs(values), 0.995))
+        self.steady: NDArray[np.bool_] = np.ones(values.size, dtype=np.bool_)
+        self.threshold = RESOLUTION * self.highest
+        self.window = window
+
+    def judge(self, active: NDArray[np.bool_]) -> None:
+        """Steady where the windows after and before agree; the ends of the record are as what lies next to them."""
+        size = self.values.size
+        window = min(self.window, size // 2)
+        total = np.concatenate([[0.0], np.cumsum(self.values - self.values.mean())])
+        apart = np.abs(total[2 * window :] - 2 * total[window : size - window + 1] + total[: size - 2 * window + 1])
+        apart = (apart / window)[np.clip(np.arange(size) - window, 0, size - 2 * window)]
+        # A quarter of a normal variable's absolute values lies below 0.3186 deviations: ramps do not reach that far down.
+        deviation = float(np.quantile(apart[active] if active.any() else apart, 0.25)) / 0.3186
+        self.threshold = max(self.threshold, min(STEP * deviation, PLAIN * self.highest))
+        self.steady = apart <= self.threshold
+
+    def level(self, core: tuple[int, int]) -> tuple[float, float]:
+        """The level of a core and how far a block may lie off it."""
+        part = self.values[slice(*core)]
+        return float(np.median(part)), max(LEAVE * float(part.std()), self.threshold)
+
+
+def _merged(cores: list[tuple[int, int]], blocks: Blocks, channels: tuple[_Channel, ...]) -> list[tuple[int, int]]:
+    """Neighbours on the same level, with nothing that leaves it between them, are one."""
+    merged: list[tuple[int, int]] = []
+    for core in cores:
+        if merged and not blocks.gap[merged[-1][1] : core[0]].any():
+            last = merged[-1]
+            same = True
+            for channel in channels:
+                (one, wide), (other, narrow) = channel.level(last), channel.level(core)
+                between = np.abs(channel.values[last[1] : core[0]] - 0.5 * (one + other))
+                same &= abs(one - other) <= channel.threshold
+                same &= bool((between <= max(wide, narrow) + 0.5 * abs(one - other)).all())
+            if same:
+                merged[-1] = (last[0], core[1])
+                continue
+        merged.append(core)
+    return merged
+
+
+def _widened(cores: list[tuple[int, int]], blocks: Blocks, channels: tuple[_Channel, ...]) -> list[Dwell]:
+    """Up to where a channel begins to leave the level, or samples are missing."""
+    dwells = []
+    for row, (start, stop) in enumerate(cores):
+        first = cores[row - 1][1] if row else 0
+        last = cores[row + 1][0] if row + 1 < len(cores) else blocks.time.size
+        back, on = start - first, last - stop
+        for channel in channels:
+            level, tolerance = channel.level((start, stop))
+            off = np.where(blocks.gap[first:last], np.inf, np.abs(channel.values[first:last] - level))
+            back = min(back, _reach(off[: start - first][::-1], tolerance))
+            on = min(on, _reach(off[stop - first :], tolerance))
+        dwells.append(Dwell(start=start - back, stop=stop + on))
+    return dwells
+
+
+def _reach(off: FloatArray, tolerance: float) -> int:
+    """How many blocks lie on the level: a ramp takes as long to the tolerance as from there to twice that."""
+    out = np.flatnonzero(off > tolerance)
+    if out.size == 0:
+        return off.size
+    far = np.flatnonzero(off[out[0] :] > 2 * tolerance)
+    return max(int(out[0]) - 1 - (int(far[0]) if far.size else 0), 0)
+
+
+def _sorted_out(
+    found: list[Dwell], blocks: Blocks, pressure: _Channel, speed: _Channel
+) -> tuple[list[Dwell], list[Note]]:
+    kept: list[Dwell] = []
+    left: dict[str, list[float]] = {"no_pressure": [], "standstill": [], "dwell_too_short": [], "not_steady": []}
+    for dwell in found:
+        where = slice(dwell.start, dwell.stop)
+        if float(blocks.pressure[where].mean()) <= NO_PRESSURE * pressure.highest:
+            reason = "no_pressure"
+        elif abs(float(blocks.speed[where].mean())) <= STANDSTILL * speed.highest:
+            reason = "standstill"
+        elif dwell.stop - dwell.start < SHORTEST:
+            reason = "dwell_too_short"
+        elif _ramps(speed, where) or _ramps(pressure, where):
+            reason = "not_steady"
+        else:
+            kept.append(dwell)
+            continue
+        left[reason].append(float(blocks.time[dwell.start]))
+    return kept, [
+        (code, _SENTENCES[code].format(n=len(at), at=listed(np.array(at)))) for code, at in left.items() if at
+    ]
+
+
+_SENTENCES = {
+    "no_pressure": "{n} stretches without pressure left out, from {at} s.",
+    "standstill": "{n} stretches at standstill left out, from {at} s.",
+    "dwell_too_short": "{n} dwells of fewer than 8 averages left out, from {at} s.",
+    "not_steady": "{n} stretches left out whose speed or pressure changes slowly throughout, from {at} s.",
+}
+
+
+def _ramps(channel: _Channel, where: slice) -> bool:
+    part = channel.values[where]
+    pieces = min(PIECES, part.size // 2)
+    means = part[: part.size // pieces * pieces].reshape(pieces, -1).mean(axis=1)
+    noise = LEAVE * float(np.diff(part).std()) * np.sqrt(pieces / part.size)
+    return bool(np.ptp(means) > max(2 * channel.threshold, noise, RAMP * abs(float(part.mean()))))
+
+
+def listed(times: FloatArray) -> str:
+    """The first five of some times [s], for a note."""
+    return ", ".join(f"{one:.2f}" for one in times[:5]) + (", ..." if len(times) > 5 else "")

@@ -1,0 +1,207 @@
+"""Loops and lag in the measured files, and the figure of trap 7: rows, and Markdown tables of them.
+
+Nothing here is a wet clutch. The files show that the arithmetic of eq. 8 and of the attractor law runs on measurements,
+and how far either describes them.
+"""
+
+import itertools
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from models.lag import attractor_area, attractor_torque, film_time_at, squeeze_film_torque
+from models.loop_area import TORQUE_HARMONICS, loop_area
+from models.periods import Cycle, fit_cycle
+from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
+from models.stribeck import StribeckParameters
+from tests.real.loaders import FOLDER, TRACTION_SWEEPS
+
+MICRO_LOOPS = FOLDER / "micro_friction_loops" / "test_data_2.csv"
+VELOCITY_STEP = FOLDER / "friction_velocity_steps" / "velstep3_TR2_exp013_sepiolite.csv"
+
+#: Of the simulated loops: the test's sine (section 2.3.4), the attractor and the film time at 5 bar.
+FREQUENCY, ATTRACTOR, FILM_TIME = 0.1, 200.0, 0.05
+
+Row = dict[str, Any]
+
+
+def table(rows: Iterable[Row]) -> str:
+    """A Markdown table, its head the rows' keys."""
+    rows = list(rows)
+    told = [" | ".join(f"{v:.4g}" if isinstance(v, float) else str(v) for v in row.values()) for row in rows]
+    return "\n".join(f"| {line} |" for line in (" | ".join(rows[0]), " | ".join("---" for _ in rows[0]), *told))
+
+
+def loop_signs() -> list[Row]:
+    """The figure "GMS loops are negative where the curve rises, positive with the squeeze film"; simulated.
+
+    For the nominal simulated clutch when fresh, and one whose curve rises throughout: pressure [bar], whether S rises
+    over most of the swing, the area [Nm m/s] by the attractor law, its closed form, and that with a squeezed film.
+    """
+    clutch = SimulatedClutch()
+    fine = np.linspace(-10.0, 10.0, 40_001)
+    swing = clutch.geometry.mean_radius * 1000 * 2 * math.pi / 60
+    v = swing * (1 + np.sin(2 * math.pi * FREQUENCY * fine))
+    turning = swing * 2 * math.pi * FREQUENCY * np.cos(2 * math.pi * FREQUENCY * fine)
+    period = slice(20_000, None)
+    rows = []
+    for pressure in PROTOCOL_PRESSURES.tolist():
+        nominal = clutch.parameters(pressure, 0.0)
+        for name, curve in (("nominal", nominal), ("rising", replace(nominal, coulomb_ratio=1.0))):
+            law = attractor_torque(fine, v, curve, ATTRACTOR)
+            film = squeeze_film_torque(fine, v, curve, film_time_at(pressure, FILM_TIME))
+            rows.append(
+                {
+                    "pressure [bar]": pressure / 1e5,
+                    "curve": name,
+                    "∮M dv, attractor": float(np.trapezoid(law[period], v[period])),
+                    "-(1/C)∮SS'v̇²dt": attractor_area(v[20_000:-1], turning[20_000:-1], 1 / FREQUENCY, curve, ATTRACTOR),
+                    "∮M dv, squeeze film": float(np.trapezoid(film[period], v[period])),
+                }
+            )
+    return rows
+
+
+def micro_loops() -> list[Row]:
+    """The 50 cycles of 4 s, in tens: eq. 8 ∮F dv [N mm/s] and the work ∮F dx [mJ], with deviations.
+
+    The motion's cycle is fitted to the position; the raw trapezoid sums over the same cycles are the witness. Friction
+    is given against the motion: its sign is turned. The speed reverses, so no law of lag is fitted.
+    """
+    time, normal, position, friction = np.loadtxt(MICRO_LOOPS, delimiter=",", skiprows=1).T
+    loaded = np.flatnonzero(normal > 0.9 * np.median(normal))
+    rows_loaded = slice(int(loaded[0]), int(loaded[-1]) + 1)
+    time, position, force = time[rows_loaded], position[rows_loaded], -friction[rows_loaded] / 1e6
+    period = _position(time, position).periods
+    length = 1 / _position(time, position).frequency
+    rows = []
+    for first in range(0, period - 9, 10):
+        inside = (time >= time[0] + first * length) & (time < time[0] + (first + 10) * length)
+        t, x, f = time[inside], position[inside], force[inside]
+        place = _position(t, x)
+        work, lag = loop_area(place, t, f), loop_area(_speed_of(place), t, f)
+        v = np.gradient(x, t)
+        rows.append(
+            {
+                "cycles": f"{first + 1} to {first + 10}",
+                "∮F dv [N mm/s]": lag.area,
+                "its deviation": lag.area_sd,
+                "∮F dx [mJ]": work.area,
+                "deviation of that": work.area_sd,
+                "∮F dv by trapezoids": float(np.trapezoid(f, v)) / 10,
+                "∮F dx by trapezoids": float(np.trapezoid(f, x)) / 10,
+            }
+        )
+    return rows
+
+
+def _position(time: np.ndarray, position: np.ndarray) -> Cycle:
+    cycle = fit_cycle(time, position, TORQUE_HARMONICS)
+    if isinstance(cycle, str):
+        raise TypeError(cycle)
+    return cycle
+
+
+def _speed_of(place: Cycle) -> Cycle:
+    """The cycle of dx/dt from that of x."""
+    order = 2 * math.pi * place.frequency * np.arange(1, place.cosine.size + 1)
+    turn = np.block(
+        [[np.zeros((order.size, order.size)), np.diag(order)], [-np.diag(order), np.zeros((order.size,) * 2)]]
+    )
+    return replace(
+        place,
+        mean=0.0,
+        cosine=order * place.sine,
+        sine=-order * place.cosine,
+        covariance=turn @ place.covariance @ turn.T,
+    )
+
+
+def velocity_step() -> list[Row]:
+    """Friction after the step from 0.2 to 2 µm/s, fitted by the attractor law over windows of growing length.
+
+    dμ/dt = C (1 - μ/S) with S the new level, fitted along with C [1/s] and the level before; if the law were right, C
+    would not depend on the window and the misfit would be the noise (the deviation within a second before the step).
+    """
+    time, displacement, friction, _ = np.loadtxt(VELOCITY_STEP, delimiter=",", skiprows=1).T
+    speed = (displacement[10:] - displacement[:-10]) / (time[10:] - time[:-10])
+    onset = int(np.flatnonzero(speed > 1.0)[0])
+    clock = time - time[onset]
+    noise = float(np.std(np.diff(friction[onset - 500 : onset]))) / math.sqrt(2)
+    rows = []
+    for window in (5.0, 20.0, 60.0, 180.0):
+        inside = (clock >= 0) & (clock <= window)
+        t, measured = clock[inside], friction[inside]
+
+        def miss(x: np.ndarray, t: np.ndarray = t, measured: np.ndarray = measured) -> np.ndarray:
+            level = StribeckParameters(
+                static_torque=float(x[1]), coulomb_ratio=1.0, stribeck_velocity=1.0, viscous_coefficient=0.0
+            )
+            return attractor_torque(t, np.ones_like(t), level, math.exp(x[0]), start=float(x[2])) - measured
+
+        fit = least_squares(miss, [math.log(0.05), float(measured[-1]), float(measured[0])], x_scale=[1.0, 0.1, 0.1])
+        sd = math.sqrt(np.linalg.inv(fit.jac.T @ fit.jac)[0, 0] * 2 * fit.cost / (t.size - 3))
+        c, rms = math.exp(fit.x[0]), math.sqrt(2 * fit.cost / t.size)
+        rows.append(
+            {
+                "window [s]": window,
+                "points": t.size,
+                "C [1/s]": c,
+                "± (white noise)": c * sd,
+                "S/C [s]": float(fit.x[1]) / c,
+                "new level": float(fit.x[1]),
+                "misfit over noise": rms / noise,
+            }
+        )
+    return rows
+
+
+def traction_branches() -> list[Row]:
+    """Sweeps in fifths: the mean difference of the up branch from the down branch [-], and ∮μ dv [mm/s], per sweep.
+
+    Branches are laid over one another at equal sliding speed, 0.5 to 4 mm/s; v falls at first, then rises. The area is
+    positive where traction is higher while the speed rises.
+    """
+    columns = np.genfromtxt(TRACTION_SWEEPS, delimiter=",", names=True, usecols=(0, 5, 7), dtype=None, encoding="utf-8")
+    grid = np.linspace(0.5, 4.0, 36)
+    found = []
+    for sweep, group in itertools.groupby(columns, key=lambda row: int(row[0])):
+        rows = np.array([(abs(row[1]), row[2]) for row in group])
+        turn = int(np.argmin(rows[:, 0]))
+        down, up = (part[np.argsort(part[:, 0], kind="stable")] for part in (rows[: turn + 1], rows[turn:]))
+        off = np.interp(grid, up[:, 0], up[:, 1]) - np.interp(grid, down[:, 0], down[:, 1])
+        scatter = float(np.std(np.diff(off)) / math.sqrt(2 * grid.size))
+        found.append((sweep, float(off.mean()), scatter, float(np.trapezoid(off, grid))))
+    rows_found = []
+    for part in np.array_split(np.array(found), 5):
+        count = math.sqrt(len(part))
+        rows_found.append(
+            {
+                "sweeps": f"{int(part[0, 0])} to {int(part[-1, 0])}",
+                "up - down [-]": float(part[:, 1].mean()),
+                "±": float(part[:, 1].std(ddof=1)) / count,
+                "within a sweep ±": float(part[:, 2].mean()),
+                "∮μ dv [mm/s]": float(part[:, 3].mean()),
+                "its deviation": float(part[:, 3].std(ddof=1)) / count,
+            }
+        )
+    return rows_found
+
+
+def main() -> None:
+    """All of them, as Markdown."""
+    for title, rows in (
+        ("GMS loops are negative where the curve rises, positive with the squeeze film (simulated)", loop_signs()),
+        ("Reciprocating contact: loops and areas", micro_loops()),
+        ("Friction after a step of speed", velocity_step()),
+        ("Traction sweeps: up against down", traction_branches()),
+    ):
+        print(f"### {title}\n\n{table(rows)}\n")
+
+
+if __name__ == "__main__":
+    main()
