@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 import uvicorn
+from threadpoolctl import threadpool_limits
 
 from service.cli.options import DATABASE, EX_USAGE, Database, err, fail, told
 from service.security import is_loopback
@@ -37,6 +38,8 @@ def serve(
         host = LOOPBACK
     from service.app import create_app  # what only this command needs is loaded by it alone
 
+    # the arrays are small: BLAS threads that wait for each other cost more than they bring
+    threadpool_limits(limits=1, user_api="blas")
     uvicorn.run(
         create_app(settings),
         host=host,
