@@ -21,6 +21,7 @@ from scipy.optimize import brentq
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.degradation import Degradation, value
+from models.pressure import AsymptoticLaw, LinearLaw
 from models.protocol import REFERENCE_SPEEDS
 from models.stribeck import StribeckParameters, torque
 
@@ -32,33 +33,15 @@ HORIZON = 1_000_000.0
 _BRACKETS = np.concatenate([[0.0], np.geomspace(1.0, HORIZON, 240)])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Linear:
-    """α + β p: `offset` in the parameter's unit, `per_pressure` in that unit per Pa."""
-
-    offset: float
-    per_pressure: float
-
-    def __call__(self, pressure: FloatArray) -> FloatArray:
-        """At pressure [...] Pa, shape kept."""
-        return self.offset + self.per_pressure * pressure
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Asymptotic:
-    """c_∞ + a e^{-p/p_0}: `floor` c_∞ [-], `amplitude` a [-], `decay` p_0 [Pa]."""
-
-    floor: float
-    amplitude: float
-    decay: float
-
-    def __call__(self, pressure: FloatArray) -> FloatArray:
-        """At pressure [...] Pa, shape kept."""
-        return self.floor + self.amplitude * np.exp(-pressure / self.decay)
-
-
 def _share(change: float, scale: float, exponent: float) -> Degradation:
     return Degradation(initial=1.0, change=change, scale=scale, exponent=exponent)
+
+
+#: The nominal clutch's laws over pressure.
+_M_S = LinearLaw(intercept=1.0, slope=4.8e-5)
+_RATIO = AsymptoticLaw(asymptote=0.60, excess=4.2, decay=1.62e5)
+_V_S = LinearLaw(intercept=0.2, slope=0.96e-5)
+_C_V = LinearLaw(intercept=0.1, slope=0.24e-5)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,10 +53,10 @@ class SimulatedClutch:
     """
 
     geometry: Geometry = field(default_factory=Geometry)
-    static_torque: Linear = Linear(offset=1.0, per_pressure=4.8e-5)
-    coulomb_ratio: Asymptotic = Asymptotic(floor=0.60, amplitude=4.2, decay=1.62e5)
-    stribeck_velocity: Linear = Linear(offset=0.2, per_pressure=0.96e-5)
-    viscous_coefficient: Linear = Linear(offset=0.1, per_pressure=0.24e-5)
+    static_torque: LinearLaw = _M_S
+    coulomb_ratio: AsymptoticLaw = _RATIO
+    stribeck_velocity: LinearLaw = _V_S
+    viscous_coefficient: LinearLaw = _C_V
     static_torque_course: Degradation = field(default_factory=lambda: _share(-0.66, 3700.0, 0.55))
     coulomb_ratio_course: Degradation = field(default_factory=lambda: _share(-0.56, 4000.0, 0.80))
     stribeck_velocity_course: Degradation = field(default_factory=lambda: _share(-0.94, 2200.0, 1.00))
@@ -133,9 +116,9 @@ def draw(rng: np.random.Generator) -> SimulatedClutch:
     def factor(deviation: float) -> float:
         return math.exp(deviation * float(rng.standard_normal()))
 
-    def scaled(law: Linear, deviation: float) -> Linear:
+    def scaled(law: LinearLaw, deviation: float) -> LinearLaw:
         by = factor(deviation)
-        return Linear(offset=law.offset * by, per_pressure=law.per_pressure * by)
+        return LinearLaw(intercept=law.intercept * by, slope=law.slope * by)
 
     rate = factor(0.15)
 
@@ -143,10 +126,10 @@ def draw(rng: np.random.Generator) -> SimulatedClutch:
         change = max(float(of.change) * factor(0.04), -0.99)  # a share that stays above nothing
         return _share(change, float(of.scale) * rate * factor(0.08), float(of.exponent) * factor(0.05))
 
-    def ratio(law: Asymptotic) -> Asymptotic:
-        floor = law.floor * factor(0.05)
+    def ratio(law: AsymptoticLaw) -> AsymptoticLaw:
+        floor = law.asymptote * factor(0.05)
         most = (0.995 - floor) * math.exp(float(PROTOCOL_PRESSURES[0]) / law.decay)
-        return Asymptotic(floor=floor, amplitude=min(law.amplitude * factor(0.05), most), decay=law.decay)
+        return AsymptoticLaw(asymptote=floor, excess=min(law.excess * factor(0.05), most), decay=law.decay)
 
     return SimulatedClutch(
         static_torque=scaled(nominal.static_torque, 0.08),

@@ -25,8 +25,9 @@ from scipy.special import ndtri
 
 from models.arrays import FloatArray
 from models.tracking.linear import History, basis, conditional, evidence, pointwise, resolved, tabulated
+from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
-from models.tracking.protocol import Measurement, Posterior
+from models.tracking.protocol import Posterior
 from models.tracking.sampling import correlated_pair, spread_points, systematic, thinned
 
 #: The prior's range in deviations to either side.

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.arrays import FloatArray
+from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
-from models.tracking.protocol import Measurement
 
 #: Values are told apart to this share of the prior's deviations. Where a series is free of noise its likelihood grows
 #: without bound as the scatter vanishes, and differences of sums weighted by 1/s² would be rounding alone.

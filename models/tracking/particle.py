@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.tracking.linear import History, basis, conditional, evidence, pointwise, resolved
+from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
-from models.tracking.protocol import Measurement, Posterior
+from models.tracking.protocol import Posterior
 from models.tracking.sampling import correlated_pair, spread_normals, systematic
 
 #: Resample below this share of effective particles; let no single step bring them below the second share.

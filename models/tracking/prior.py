@@ -6,14 +6,11 @@ prior learned from other clutches of the same material can take the place of the
 
 import math
 from dataclasses import astuple, dataclass, fields
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from models.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from models.tracking.protocol import Measurement
+from models.tracking.measurement import Measurement
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +60,7 @@ class Prior:
         )
 
 
-def weak(first: "Measurement", *, falling: bool) -> Prior:
+def weak(first: Measurement, *, falling: bool) -> Prior:
     """A prior that knows little more than the size of the quantity, taken from its first measurement.
 
     With the size a = √(value² + variance): ξ0 is within some 50 % of a, for the first run need not be at ζ = 0. The

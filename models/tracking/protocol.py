@@ -13,27 +13,8 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.degradation import Degradation
+from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Measurement:
-    """One fitted value of the quantity at progress ζ >= 0 (cycles), with the variance >= 0 of its fit.
-
-    Raises ValueError where a number is not finite or negative where it must not be.
-    """
-
-    progress: float
-    value: float
-    variance: float
-
-    def __post_init__(self) -> None:
-        for name in ("progress", "value", "variance"):
-            number = getattr(self, name)
-            if not math.isfinite(number):
-                raise ValueError(f"{name} must be finite, got {number}")
-            if name != "value" and number < 0:
-                raise ValueError(f"{name} must not be negative, got {number}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -24,8 +24,9 @@ from models.arrays import FloatArray
 from models.degradation import progress_fraction
 from models.tracking.grid import Grid
 from models.tracking.linear import History, resolved
+from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
-from models.tracking.protocol import Measurement, Posterior
+from models.tracking.protocol import Posterior
 from models.tracking.sampling import spread_normals
 
 #: Process noise of a step, and the least variance along any axis, in units of the prior's variance.

@@ -14,7 +14,7 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.protocol import protocol_speeds
 from models.runs import LEVEL_GAP, LEVEL_GAP_SHARE
-from models.tracking.protocol import Measurement
+from models.tracking.measurement import Measurement
 from service.workflows.analysis import Value
 
 MEAN_COF = "mean_cof"

@@ -19,9 +19,9 @@ from models.rig import campaign
 from models.runs import Curve, curves_by_pressure
 from models.stribeck import StribeckParameters, gradient, torque
 from models.tracking.grid import Grid
+from models.tracking.measurement import Measurement
 from models.tracking.particle import Particle
 from models.tracking.prior import weak
-from models.tracking.protocol import Measurement
 from models.tracking.ukf import Ukf
 from service.formats.simulated import simulated_body
 from tests.support import serving

@@ -34,17 +34,15 @@ def by_hand(clutch, pressure, cycles, velocity):
     def aged(course):
         return 1 + course.change - course.change / (1 + cycles / course.scale) ** course.exponent
 
-    m_s = (clutch.static_torque.offset + clutch.static_torque.per_pressure * pressure) * aged(
-        clutch.static_torque_course
-    )
-    fresh_ratio = clutch.coulomb_ratio.floor + clutch.coulomb_ratio.amplitude / math.exp(
+    m_s = (clutch.static_torque.intercept + clutch.static_torque.slope * pressure) * aged(clutch.static_torque_course)
+    fresh_ratio = clutch.coulomb_ratio.asymptote + clutch.coulomb_ratio.excess / math.exp(
         pressure / clutch.coulomb_ratio.decay
     )
     m_c = m_s * fresh_ratio * aged(clutch.coulomb_ratio_course)
     law, course = clutch.stribeck_velocity, clutch.stribeck_velocity_course
-    share = math.exp(-(law.offset + law.per_pressure * pressure) * aged(course) / velocity)
+    share = math.exp(-(law.intercept + law.slope * pressure) * aged(course) / velocity)
     law, course = clutch.viscous_coefficient, clutch.viscous_coefficient_course
-    viscous = (law.offset + law.per_pressure * pressure) * aged(course) * velocity**0.3
+    viscous = (law.intercept + law.slope * pressure) * aged(course) * velocity**0.3
     return m_s * (1 - share) + m_c * share + viscous
 
 

@@ -12,9 +12,10 @@ from models.degradation import Degradation, value
 from models.prognosis import first_passage
 from models.tracking import linear
 from models.tracking.grid import Grid, GridState
+from models.tracking.measurement import Measurement
 from models.tracking.particle import Particle, ParticleState
 from models.tracking.prior import Prior, weak
-from models.tracking.protocol import Measurement, Posterior
+from models.tracking.protocol import Posterior
 from models.tracking.ukf import Ukf, UkfState
 
 FILTERS = [(Grid(), GridState), (Particle(particles=300), ParticleState), (Ukf(), UkfState)]

@@ -9,8 +9,8 @@ from scipy.stats import multivariate_normal
 
 from models.degradation import Degradation, progress_fraction, value
 from models.tracking import linear, sampling
+from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior, weak
-from models.tracking.protocol import Measurement
 
 PROGRESS = np.linspace(0.0, 12_000.0, 13)
 VALUES = value(PROGRESS, Degradation(initial=0.134, change=-0.1, scale=5_000.0, exponent=0.7))

@@ -10,8 +10,9 @@ import numpy as np
 from models.degradation import Degradation, first_passage, value
 from models.prognosis import ends_of_life, weighted_quantiles
 from models.tracking import linear, sampling
+from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior, weak
-from models.tracking.protocol import Measurement, Posterior
+from models.tracking.protocol import Posterior
 
 LEVELS = np.array([0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95])
 STAGES = (0.2, 0.4, 0.6, 0.8)

@@ -13,8 +13,8 @@ import pytest
 from models.prognosis import first_passage
 from models.rig.truth import draw
 from models.tracking.grid import Grid
+from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
-from models.tracking.protocol import Measurement
 
 STAGES = (0.2, 0.4, 0.6, 0.8)
 TESTS, LIVES, SCATTER = 25, 60, 0.003

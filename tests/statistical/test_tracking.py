@@ -10,9 +10,10 @@ import pytest
 from models.degradation import Degradation, value
 from models.prognosis import weighted_quantiles
 from models.tracking.grid import Grid
+from models.tracking.measurement import Measurement
 from models.tracking.particle import Particle
 from models.tracking.prior import Prior, weak
-from models.tracking.protocol import Measurement, Posterior
+from models.tracking.protocol import Posterior
 from models.tracking.ukf import Ukf
 from tests.statistical.lives import (
     LEVELS,

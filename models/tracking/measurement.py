@@ -1,0 +1,24 @@
+"""What goes into a filter: the fitted value of a quantity, with the variance of its fit."""
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measurement:
+    """One fitted value of the quantity at progress ζ >= 0 (cycles), with the variance >= 0 of its fit.
+
+    Raises ValueError where a number is not finite or negative where it must not be.
+    """
+
+    progress: float
+    value: float
+    variance: float
+
+    def __post_init__(self) -> None:
+        for name in ("progress", "value", "variance"):
+            number = getattr(self, name)
+            if not math.isfinite(number):
+                raise ValueError(f"{name} must be finite, got {number}")
+            if name != "value" and number < 0:
+                raise ValueError(f"{name} must not be negative, got {number}")
