@@ -9,7 +9,7 @@ BIN := $(VENV)/bin
 ARGS ?=
 
 # versions age a week before they are locked; no index is named
-LOCK := --universal --python-version 3.11 --generate-hashes --no-emit-index-url --upgrade --quiet --exclude-newer "7 days" \
+LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --exclude-newer "7 days" \
 	--custom-compile-command "make lock"
 
 .PHONY: demo test check lowest benchmark real picture lock clean

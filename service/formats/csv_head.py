@@ -112,8 +112,9 @@ def read_head(block: bytes, limits: Limits) -> Layout:
     for text, end in _lines(block):
         line += 1
         if not text.strip():
-            pass
-        elif text.strip().lower().startswith("sep=") and len(text.strip()) <= len("sep=") + 1:
+            start = end
+            continue
+        if text.strip().lower().startswith("sep=") and len(text.strip()) <= len("sep=") + 1:
             separator = text.strip()[4:] or "\t"
         elif is_comment(text, separator):
             comment = text.lstrip("#%/; \t")

@@ -26,7 +26,6 @@ class ByteSource(Protocol):
 
     def read(self, size: int, /) -> bytes:
         """At most `size` bytes; none at the end."""
-        ...
 
 
 _GZIP = b"\x1f\x8b"
