@@ -57,10 +57,14 @@ def allowed(scope: Scope) -> Callable[[Request], Context]:
     return check
 
 
+#: Tables and short lists are told whole, and take what a list may be asked.
+_OF_LISTS = {"limit", "cursor"}
+
+
 def _refuse_unknown_arguments(request: Request) -> None:
     """A mistyped argument must not be answered as if it had not been there."""
     route = request.scope["route"]
-    known = {field.alias for field in route.dependant.query_params}
+    known = {field.alias for field in route.dependant.query_params} | _OF_LISTS
     unknown = [name for name in request.query_params if name not in known]
     if unknown:
         errors = [

@@ -49,9 +49,12 @@ def remaining_useful_life(
 
 
 @router.get("/degradation", response_model=Degradation, responses=READING)
-def degradation(request: Request, context: Reader, clutch_id: str) -> Response:
+def degradation(
+    request: Request, context: Reader, clutch_id: str, limit: Whole = 1_000_000, cursor: Cursor = None
+) -> Response:
     """Eq. 6 for every Stribeck parameter and for mean COF: coefficients, measurements, trajectory with its 90 % band."""
-    return answer(request, answers.degradation(context.database, context.remembered, clutch_id))
+    said = answers.degradation(context.database, context.remembered, clutch_id)
+    return answer(request, said | sliced(said["items"], limit, from_cursor(cursor)))
 
 
 @router.get("/stribeck", response_model=StribeckPage, responses=READING)

@@ -149,6 +149,17 @@ def test_the_other_answers_and_their_csv_twins(http: httpx2.Client) -> None:
     assert [item["cycles"] for item in stribeck] == [0, 1000, 2000, 3000, 4000]
     assert stribeck[0]["pressure_laws"]["static_torque_nm"]["slope_per_bar"] > 0
     assert http.get(f"{BASE}/loops").json() == {"items": [], "next": None}
+    for name, whole in (("degradation", degradation), ("series", http.get(f"{BASE}/series").json()["items"])):
+        seen: list[dict[str, Any]] = []
+        params: dict[str, Any] = {"limit": 7}
+        while True:
+            page = http.get(f"{BASE}/{name}", params=params).json()
+            seen += page["items"]
+            assert len(page["items"]) <= 7
+            if page["next"] is None:
+                break
+            params["cursor"] = page["next"]
+        assert seen == whole
     assert {row["quantity"] for row in http.get(f"{BASE}/series").json()["items"]} > PARAMETERS | {"remaining_cycles"}
     for name, rows in (("degradation", 36), ("stribeck", 35), ("loops", 0), ("runs", 5), ("remaining-useful-life", 7)):
         answer = http.get(f"{BASE}/{name}.csv")
