@@ -5,6 +5,7 @@ from typing import Any
 
 from sqlalchemy import Connection
 
+from models.fit_uncertainty import Z90
 from models.pressure import LinearLaw, PressureLaws, fit_pressure_laws
 from service.formats.units import PASCALS_PER_BAR
 from service.schemas.base import whole
@@ -181,19 +182,15 @@ def _fit_rows(receipt: dict[str, Any], fit: dict[str, Any]) -> Iterator[dict[str
             "unit": unit,
             "pressure_bar": fit["pressure_bar"],
             "value": value,
-            "lower": None if value is None else value - _NINETY * sd,
-            "upper": None if value is None else value + _NINETY * sd,
+            "lower": None if value is None else value - Z90 * sd,
+            "upper": None if value is None else value + Z90 * sd,
         }
-
-
-#: Half the width of a normal's 90 % interval in deviations.
-_NINETY = 1.6448536269514722
 
 
 def _foretold_rows(row: PredictionRow) -> Iterator[dict[str, Any]]:
     current, remaining = row.payload["current"], row.payload["remaining_cycles"]
     mean, sd = current["mean_cof"], current["mean_cof_sd"]
-    bounds = (None, None) if mean is None else (mean - _NINETY * sd, mean + _NINETY * sd)
+    bounds = (None, None) if mean is None else (mean - Z90 * sd, mean + Z90 * sd)
     values = (
         (MEAN_COF, "1", mean, *bounds),
         ("health", "1", current["health"], None, None),
