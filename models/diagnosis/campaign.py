@@ -1,0 +1,105 @@
+"""A campaign as the diagnosis sees it: everything that one life of a clutch has sent, in SI units, ordered by cycles.
+
+Cycles count from the beginning of the life (new, or the last rebuild). Moments are seconds on one clock (since 1970) where
+the rig said when a run was started, else None. A stationary run is its steady plateaus in the order in which they were
+made; where a raw record was sent, the record is kept beside them as evidence of what happens within a dwell.
+"""
+
+import math
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from models.clutch import Geometry
+from models.runs import Plateaus, Record
+
+
+class EventKind(StrEnum):
+    """What maintenance did."""
+
+    OIL_CHANGE = "oil_change"
+    REST = "rest"
+    SENSOR_ZERO = "sensor_zero"
+    REBUILD = "rebuild"
+    OTHER = "other"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Oil:
+    """Kinematic viscosity [m²/s] at 40 °C and at 100 °C; the defaults are the reference's ATF, 56 and 9.3 cSt.
+
+    Raises ValueError unless viscosity_40 > viscosity_100 > 0.
+    """
+
+    viscosity_40: float = 56e-6
+    viscosity_100: float = 9.3e-6
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.viscosity_40) and 0 < self.viscosity_100 < self.viscosity_40):
+            raise ValueError(
+                f"viscosities must satisfy 0 < at 100 °C < at 40 °C, got {self.viscosity_100} and {self.viscosity_40}"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StationaryRun:
+    """A stationary test after `cycles` >= 0: its plateaus in the order they were made, and the raw record if one was sent.
+
+    `time` [n] s is the middle of each plateau on the test's own clock where it is known.
+    """
+
+    run_id: str
+    cycles: float
+    plateaus: Plateaus
+    moment: float | None = None
+    time: tuple[float, ...] | None = None
+    record: Record | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DynamicRun:
+    """A dynamic test after `cycles` >= 0: the record as it was sampled, one or several pressures."""
+
+    run_id: str
+    cycles: float
+    record: Record
+    moment: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DutyRun:
+    """A block of duty that ends at `cycles`: engagements, energy of each [J], initial speed [rad/s], pressure [Pa].
+
+    What the rig did not say is None; `record` is one engagement's trace if it was sent.
+    """
+
+    run_id: str
+    cycles: float
+    engagements: float
+    energy: float | None = None
+    initial_speed: float | None = None
+    maximum_pressure: float | None = None
+    moment: float | None = None
+    record: Record | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MaintenanceEvent:
+    """What was done to clutch or rig at `cycles`."""
+
+    run_id: str
+    cycles: float
+    event: EventKind
+    moment: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Campaign:
+    """One life of a clutch, each kind of run ordered by cycles, at equal cycles by moment."""
+
+    geometry: Geometry = field(default_factory=Geometry)
+    oil: Oil = field(default_factory=Oil)
+    cof_fraction: float = 0.5
+    stationary: tuple[StationaryRun, ...] = ()
+    dynamic: tuple[DynamicRun, ...] = ()
+    duty: tuple[DutyRun, ...] = ()
+    maintenance: tuple[MaintenanceEvent, ...] = ()
