@@ -1,68 +1,35 @@
-"""A whole simulated campaign in the rig's order (fig. 2): run-in, then duty blocks with a stationary test after each.
+"""A whole simulated campaign in the rig's order (fig. 2): run-in, then duty blocks with the tests after each.
 
-Run-in of 200 engagements before cycle 0, a stationary test at 0, then at 500, 1000, 2000, 3000, ... duty cycles, until
-the true mean COF has fallen below `stop_fraction` of its initial value or `most_tests` tests are made. All of it is
-simulated, and every run id says so. When a run was made is not known here; that is for whoever sends it.
+Run-in of 200 engagements before cycle 0, tests at 0, then at 500, 1000, 2000, 3000, ... duty cycles, until the true mean
+COF has fallen below `stop_fraction` of its initial value or `most_tests` stationary tests are made. What the tests are is
+a `Programme`. All of it is simulated, and every run id says so. When a run was made is not known here; that is for
+whoever sends it.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3.
 """
 
 import itertools
-from collections.abc import Iterator
-from dataclasses import dataclass
-from enum import StrEnum
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from models.protocol import RPM
+from models.rig.engagement import Drive, engage
+from models.rig.programme import CYCLE_ENERGY, QUICK, Ageing, Programme
+from models.rig.sampled import DynamicTest, engagement_record, sampled_test
+from models.rig.simulated_runs import DutyBlock, RunKind, SimulatedRun
 from models.rig.stationary import Sensor, stationary_test
 from models.rig.truth import SimulatedClutch, draw
-from models.runs import Plateaus
+from models.runs import Record
 
-_CLUTCH, _TEST = 0, 1  # the streams of one seed: the clutch, and each test by its cycles
+#: The streams of one seed: the clutch, and by cycles the stationary test, the dynamic test and the engagement.
+_CLUTCH, _TEST, _DYNAMIC, _ENGAGEMENT = 0, 1, 2, 3
 
-
-class RunKind(StrEnum):
-    """What the simulated rig did."""
-
-    RUN_IN = "run_in"
-    DUTY_CYCLES = "duty_cycles"
-    STATIONARY_STRIBECK = "stationary_stribeck"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DutyBlock:
-    """Engagements in a row: how many, energy of each [J], initial speed [rad/s], maximum pressure [Pa]."""
-
-    cycles: int
-    energy_per_cycle: float
-    initial_speed: float
-    maximum_pressure: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SimulatedRun:
-    """One simulated run; `cycles` = duty cycles accumulated at its end. A test has plateaus, the rest a duty block."""
-
-    run_id: str
-    kind: RunKind
-    cycles: int
-    plateaus: Plateaus | None = None
-    duty: DutyBlock | None = None
-
-    def __post_init__(self) -> None:
-        if not self.run_id.startswith("sim-"):
-            raise ValueError(f"run_id of a simulated run must start with sim-, got {self.run_id}")
-        is_test = self.kind is RunKind.STATIONARY_STRIBECK
-        if (self.plateaus is not None) != is_test or (self.duty is None) != is_test:
-            raise ValueError(
-                f"a {self.kind} run must carry {'plateaus' if is_test else 'a duty block'} and nothing else"
-            )
-
-
-#: 1200 rpm and 2000 rpm, both to 8 bar (sections 2.3.1, 2.3.2). The energies go as ω² and are assumed: none is printed.
+#: 1200 rpm and 2000 rpm, both to 8 bar (sections 2.3.1, 2.3.2). The energies go as ω² and are assumed, none is printed:
+#: they stand where no engagement is integrated.
 RUN_IN = DutyBlock(cycles=200, energy_per_cycle=6.5e3, initial_speed=1200 * RPM, maximum_pressure=8.0e5)
-_DUTY_ENERGY, _DUTY_SPEED, _DUTY_PRESSURE = 18.0e3, 2000 * RPM, 8.0e5
+_LIFE_TEST = DutyBlock(cycles=1, energy_per_cycle=18.0e3, initial_speed=2000 * RPM, maximum_pressure=8.0e5)
 
 
 def simulated_clutch(seed: int) -> SimulatedClutch:
@@ -75,6 +42,7 @@ def simulate(
     *,
     clutch: SimulatedClutch | None = None,
     sensor: Sensor | None = None,
+    programme: Programme = QUICK,
     stop_fraction: float = 0.45,
     most_tests: int = 40,
 ) -> Iterator[SimulatedRun]:
@@ -90,34 +58,95 @@ def simulate(
     if most_tests < 1:
         raise ValueError(f"most_tests must be at least 1, got {most_tests}")
     clutch = simulated_clutch(seed) if clutch is None else clutch
-    return _runs(seed, clutch, Sensor() if sensor is None else sensor, stop_fraction, most_tests)
+    rig = _Rig(seed=seed, clutch=clutch, sensor=Sensor() if sensor is None else sensor, programme=programme)
+    return rig.runs(stop_fraction, most_tests)
 
 
-def _runs(
-    seed: int, clutch: SimulatedClutch, sensor: Sensor, stop_fraction: float, most_tests: int
-) -> Iterator[SimulatedRun]:
-    yield SimulatedRun(run_id=f"sim-{seed}-run-in-00000", kind=RunKind.RUN_IN, cycles=0, duty=RUN_IN)
-    stop = stop_fraction * clutch.mean_cof(0.0)
-    before = 0
-    for cycles in itertools.islice(cycles_of_tests(), most_tests):
-        if cycles > before:
-            yield _duty_run(seed, before, cycles)
-        plateaus = stationary_test(clutch, cycles, _generator(seed, _TEST, cycles), sensor)
-        run_id = f"sim-{seed}-stationary-{cycles:05d}"
-        yield SimulatedRun(run_id=run_id, kind=RunKind.STATIONARY_STRIBECK, cycles=cycles, plateaus=plateaus)
-        if clutch.mean_cof(cycles) < stop:
-            return
-        before = cycles
+def end_of_life(course: Iterable[tuple[float, float]], clutch: SimulatedClutch, fraction: float = 0.5) -> float | None:
+    """Duty cycles at which a simulated clutch truly came to `fraction` of its mean COF; None: not in this campaign.
+
+    `course`: wear and cycles at the end of each of its runs, in their order; between two, wear goes with the cycles.
+    """
+    wear, cycles = np.array([(0.0, 0.0), *course]).T
+    worn = clutch.end_of_life(fraction)
+    return None if worn is None or worn > wear[-1] else float(np.interp(worn, wear, cycles))
 
 
-def _duty_run(seed: int, before: int, cycles: int) -> SimulatedRun:
-    block = DutyBlock(
-        cycles=cycles - before,
-        energy_per_cycle=_DUTY_ENERGY,
-        initial_speed=_DUTY_SPEED,
-        maximum_pressure=_DUTY_PRESSURE,
-    )
-    return SimulatedRun(run_id=f"sim-{seed}-duty-{cycles:05d}", kind=RunKind.DUTY_CYCLES, cycles=cycles, duty=block)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Rig:
+    """One clutch on the rig, with what its campaign is made of."""
+
+    seed: int
+    clutch: SimulatedClutch
+    sensor: Sensor
+    programme: Programme
+
+    def runs(self, stop_fraction: float, most_tests: int) -> Iterator[SimulatedRun]:
+        """Fig. 2."""
+        duty, record = self._engaged(RUN_IN, 0, 0.0)
+        run_id = f"sim-{self.seed}-run-in-00000"
+        yield SimulatedRun(run_id=run_id, kind=RunKind.RUN_IN, cycles=0, duty=duty, record=record)
+        stop = stop_fraction * self.clutch.mean_cof(0.0)
+        before, wear = 0, 0.0
+        for cycles in itertools.islice(cycles_of_tests(), most_tests):
+            if cycles > before:
+                block = self._duty_run(before, cycles, wear)
+                yield block
+                wear = block.wear
+            failed = self.clutch.mean_cof(wear) < stop
+            for test in self._tests(cycles, wear):
+                yield test
+                wear = test.wear
+            if failed:
+                return
+            before = cycles
+
+    def _duty_run(self, before: int, cycles: int, wear: float) -> SimulatedRun:
+        duty, record = self._engaged(replace(_LIFE_TEST, cycles=cycles - before), cycles, wear)
+        run_id = f"sim-{self.seed}-duty-{cycles:05d}"
+        run = SimulatedRun(run_id=run_id, kind=RunKind.DUTY_CYCLES, cycles=cycles, duty=duty, record=record)
+        if self.programme.ageing is Ageing.CYCLES:
+            return replace(run, wear=wear + duty.cycles)
+        return self._aged(run, wear)
+
+    def _engaged(self, block: DutyBlock, cycles: int, wear: float) -> tuple[DutyBlock, Record | None]:
+        """The block with its energy by an engagement of the clutch as it is at the block's start, and that one's record."""
+        if not self.programme.engagements:
+            return block, None
+        drive = Drive(speed=block.initial_speed)
+        trace = engage(self.clutch.capacity(wear), self.clutch.geometry.mean_radius, drive=drive)
+        record = engagement_record(trace, _generator(self.seed, _ENGAGEMENT, cycles), self.sensor)
+        return replace(block, energy_per_cycle=trace.energy), record
+
+    def _tests(self, cycles: int, wear: float) -> Iterator[SimulatedRun]:
+        """The stationary test, and the dynamic one where there is one."""
+        rng, raw = _generator(self.seed, _TEST, cycles), self.programme.raw
+        test = SimulatedRun(
+            run_id=f"sim-{self.seed}-stationary-{cycles:05d}",
+            kind=RunKind.STATIONARY_STRIBECK,
+            cycles=cycles,
+            plateaus=None if raw else stationary_test(self.clutch, wear, rng, self.sensor),
+            record=sampled_test(self.clutch, wear, raw, rng, self.sensor) if raw else None,
+        )
+        test = self._aged(test, wear)
+        yield test
+        if self.programme.dynamic is not None:
+            yield self._dynamic_run(cycles, test.wear, self.programme.dynamic)
+
+    def _dynamic_run(self, cycles: int, wear: float, test: DynamicTest) -> SimulatedRun:
+        rng = _generator(self.seed, _DYNAMIC, cycles)
+        run = SimulatedRun(
+            run_id=f"sim-{self.seed}-dynamic-{cycles:05d}",
+            kind=RunKind.DYNAMIC_STRIBECK,
+            cycles=cycles,
+            record=sampled_test(self.clutch, wear, test, rng, self.sensor),
+        )
+        return self._aged(run, wear)
+
+    def _aged(self, run: SimulatedRun, wear: float) -> SimulatedRun:
+        """The run with its wear at its end; where cycles age the clutch a test does not."""
+        by_energy = self.programme.ageing is Ageing.ENERGY
+        return replace(run, wear=wear + run.dissipated() / CYCLE_ENERGY if by_energy else wear)
 
 
 def cycles_of_tests() -> Iterator[int]:

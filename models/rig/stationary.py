@@ -70,19 +70,19 @@ def stationary_test(
     return Plateaus(
         pressure=np.repeat(PROTOCOL_PRESSURES, REFERENCE_SPEEDS.size),
         speed=np.tile(REFERENCE_SPEEDS, PROTOCOL_PRESSURES.size),
-        torque=_rounded(measured, sensor.torque_counts),
-        oil_temperature=_oil_temperature(true.size, rng, sensor),
+        torque=rounded(measured, sensor.torque_counts),
+        oil_temperature=oil_temperature(np.arange(0.0, PLATEAU_DURATION * true.size, PLATEAU_DURATION), rng, sensor),
     )
 
 
-def _oil_temperature(rows: int, rng: np.random.Generator, sensor: Sensor) -> FloatArray:
-    """Oil temperature [rows] K: a swing of the thermostat, within 80 to 90 °C."""
+def oil_temperature(time: FloatArray, rng: np.random.Generator, sensor: Sensor) -> FloatArray:
+    """Oil temperature [n] K at time [n] s: a swing of the thermostat, within 80 to 90 °C, in the recorder's counts."""
     amplitude, period = rng.uniform(0.4, 1.0) * OIL_SWING, rng.uniform(600.0, 1500.0)
     phase = rng.uniform(0.0, 2 * math.pi)
-    time = PLATEAU_DURATION * np.arange(rows)
     swing = amplitude * np.sin(2 * math.pi * time / period + phase)
-    return OIL_TEMPERATURE + _rounded(swing, sensor.temperature_counts)
+    return OIL_TEMPERATURE + rounded(swing, sensor.temperature_counts)
 
 
-def _rounded(values: FloatArray, counts: float) -> FloatArray:
+def rounded(values: FloatArray, counts: float) -> FloatArray:
+    """Values [n] to the nearest of a recorder's counts [1/unit]; as they are where counts is 0."""
     return np.asarray(values if counts == 0 else np.round(values * counts) / counts, dtype=np.float64)

@@ -4,7 +4,8 @@ Stribeck curve of eq. 3, its parameters over pressure in the shapes of fig. 9,
 
     M_s, V_S, C_v = α + β p          M̄_c = c_∞ + a e^{-p/p_0}
 
-and each of them over life multiplied by its own eq. 6 with ξ0 = 1, so that Δ is a share of the fresh value.
+and each of them over life multiplied by its own eq. 6 with ξ0 = 1, so that Δ is a share of the fresh value. How torque
+lags that curve while speed changes is in `models.rig.hysteresis`.
 
 The reference's figures carry no numbers that survive, so the nominal ones are made: 25 Nm fresh at 5 bar and 1000 rpm,
 the signs and shapes of figs. 6, 7, 9 and 10, and a mean coefficient of friction (COF) halved near 15,000 duty cycles.
@@ -13,7 +14,7 @@ Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, eqs. 2, 3 and 6,
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -23,6 +24,8 @@ from models.clutch import Geometry
 from models.degradation import Degradation, value
 from models.pressure import AsymptoticLaw, LinearLaw
 from models.protocol import REFERENCE_SPEEDS
+from models.rig.engagement import Capacity
+from models.rig.hysteresis import FrictionLag
 from models.stribeck import StribeckParameters, torque
 
 #: The protocol's pressures (section 2.3.3): 4 to 7 bar by 0.5 bar [7] Pa; its 40 speeds are REFERENCE_SPEEDS.
@@ -61,6 +64,7 @@ class SimulatedClutch:
     coulomb_ratio_course: Degradation = field(default_factory=lambda: _share(-0.56, 4000.0, 0.80))
     stribeck_velocity_course: Degradation = field(default_factory=lambda: _share(-0.94, 2200.0, 1.00))
     viscous_coefficient_course: Degradation = field(default_factory=lambda: _share(1.00, 6500.0, 0.90))
+    lag: FrictionLag = field(default_factory=FrictionLag)
 
     def parameters(self, pressure: float | FloatArray, cycles: float | FloatArray) -> StribeckParameters:
         """The true parameters at pressure > 0 [Pa] after cycles >= 0; arrays broadcast. Raises ValueError outside."""
@@ -75,6 +79,20 @@ class SimulatedClutch:
             stribeck_velocity=self.stribeck_velocity(p) * value(zeta, self.stribeck_velocity_course),
             viscous_coefficient=self.viscous_coefficient(p) * value(zeta, self.viscous_coefficient_course),
         )
+
+    def moving_torque(self, time: FloatArray, velocity: FloatArray, pressure: FloatArray, cycles: float) -> FloatArray:
+        """True torque [n] Nm, lag and all, at time [n] s (ascending), velocity [n] m/s and pressure [n] > 0 Pa."""
+        return self.lag.torque(time, velocity, pressure, self.parameters(pressure, cycles), cycles)
+
+    def capacity(self, cycles: float) -> Capacity:
+        """What the clutch can transfer after cycles >= 0; below the protocol's lowest pressure it goes with pressure."""
+        lowest = float(PROTOCOL_PRESSURES[0])
+
+        def transferred(pressure: float, velocity: float) -> float:
+            known = max(pressure, lowest)
+            return float(torque(np.array(velocity), self.parameters(known, cycles))) * pressure / known
+
+        return transferred
 
     def mean_cofs(self, cycles: FloatArray) -> FloatArray:
         """True mean COF [m] after cycles [m]: the mean over the protocol's 7 pressures and 40 speeds."""
@@ -140,4 +158,5 @@ def draw(rng: np.random.Generator) -> SimulatedClutch:
         coulomb_ratio_course=course(nominal.coulomb_ratio_course),
         stribeck_velocity_course=course(nominal.stribeck_velocity_course),
         viscous_coefficient_course=course(nominal.viscous_coefficient_course),
+        lag=replace(nominal.lag, film_time=nominal.lag.film_time * factor(0.10), scale=nominal.lag.scale * rate),
     )

@@ -49,7 +49,7 @@ def push(
     cycles: Annotated[float | None, typer.Option(help="For files that are not JSON: duty cycles since new")] = None,
     channel_map: Annotated[str | None, typer.Option("--map", help="Channels by name: torque_nm:Mz,speed_rpm:n")] = None,
 ) -> None:
-    """Send run files: JSON, or CSV, TDMS, MDF4 and Parquet with --kind and --cycles.
+    """Send run files: JSON, or CSV, TDMS, MDF4 and Parquet, of which a runs.json beside them or --kind and --cycles tell.
 
     What the service cannot take now waits in the spool and is sent first next time.
     """
@@ -58,15 +58,15 @@ def push(
             files = run_files.find(paths)
         except FileNotFoundError as error:
             fail(str(error), EX_DATAERR)
+        for file in run_files.unlisted(paths):
+            err.print(f"{file} is not listed in {run_files.MANIFEST} and not sent", markup=False, soft_wrap=True)
         waiting = Spool.of(spool, url, clutch)
-        for file in files:
-            if file.suffix == ".json":
-                waiting.add(file.read_bytes())
-            elif kind is None or cycles is None:
-                fail(f"{file} is no JSON file: say --kind and --cycles", EX_USAGE)
+        for found in files:
+            if found.path.suffix == ".json":
+                waiting.add(found.path.read_bytes())
             else:
-                asked = {"kind": kind, "cycles": repr(cycles), "filename": file.name}
-                waiting.add_file(file, asked | ({} if channel_map is None else {"map": channel_map}))
+                asked = _asked(found, kind, cycles)
+                waiting.add_file(found.path, ({} if channel_map is None else {"map": channel_map}) | asked)
         with connect(url, key=key) as http, Progress(console=err, transient=True) as progress:
             task = progress.add_task("sending", total=len(list(waiting.waiting())))
 
@@ -93,6 +93,16 @@ def push(
             )
         if sent.refused:
             fail(f"what was refused, and why, is in {waiting.folder / 'refused'}", EX_DATAERR)
+
+
+def _asked(found: run_files.FoundRun, kind: str | None, cycles: float | None) -> dict[str, str]:
+    """What is said beside a record: by its manifest, else by the options."""
+    if found.asked is not None:
+        return dict(found.asked)
+    if kind is None or cycles is None:
+        told = f"say --kind and --cycles, or list it in a {run_files.MANIFEST} beside it"
+        fail(f"{found.path} is no JSON file: {told}", EX_USAGE)
+    return {"kind": kind, "cycles": repr(cycles), "filename": found.path.name}
 
 
 def _register(service: Service, clutch_id: str, paths: list[Path]) -> None:

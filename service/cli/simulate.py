@@ -1,35 +1,92 @@
 """`clutchlife simulate`: a simulated campaign, a file a run."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
-from rich.progress import Progress
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from service.cli.options import Seed, err, out, told
 from service.formats import run_files
+
+if TYPE_CHECKING:
+    from models.rig.programme import Programme
+    from models.rig.simulated_runs import SimulatedRun
+    from service.formats.record_files import RecordFormat
+
+#: Where the campaign ends, as a share of the mean COF when new.
+_STOP = 0.45
 
 
 def simulate(
     out_folder: Annotated[Path, typer.Option("--out", help="The folder to write to")],
     seed: Seed = 7,
+    form: Annotated[
+        Literal["json", "csv", "tdms", "mdf4"], typer.Option("--format", help="Of the tests' files")
+    ] = "json",
+    raw: Annotated[bool, typer.Option("--raw", help="Stationary tests as sampled records")] = False,
+    raw_rate: Annotated[float, typer.Option(min=10, max=2000, help="Of raw records [Hz]")] = 100.0,
+    dynamic: Annotated[bool, typer.Option(help="With dynamic tests")] = True,
+    ageing: Annotated[Literal["cycles", "energy"], typer.Option(help="What ages the clutch")] = "cycles",
+    tests: Annotated[int, typer.Option(min=1, help="End after so many stationary tests, if not before")] = 40,
 ) -> None:
-    """Simulate a clutch's life on the rig and write it, a file a run; `clutchlife push` sends it."""
+    """Simulate a clutch's life on the rig and write it, a file a run; `clutchlife push` sends it.
+
+    Run-in and duty blocks are JSON whatever the format. Tests in another one are listed in runs.json, which push reads.
+    """
     from models.rig import campaign  # what only this command needs is loaded by it alone
-    from service.formats import simulated
+    from service.formats import record_files, simulated
 
     with told():
+        record_format = record_files.RecordFormat(form)
+        record_files.require_writer(record_format)
+        programme = _programme(raw_rate if raw else None, dynamic, ageing)
         out_folder.mkdir(parents=True, exist_ok=True)
-        clutch_id = f"sim-{seed}"
+        clutch, clutch_id = campaign.simulated_clutch(seed), f"sim-{seed}"
         run_files.write(out_folder / run_files.CLUTCH_FILE, simulated.simulated_clutch_body(clutch_id))
-        written = 0
-        with Progress(console=err, transient=True) as progress:
-            task = progress.add_task("simulating", total=None)
-            for run in campaign.simulate(seed):
-                run_files.write(out_folder / f"{run.run_id}.json", simulated.simulated_body(run))
-                written += 1
-                progress.update(task, description=f"simulating, {run.cycles} cycles", advance=1)
-        end = campaign.simulated_clutch(seed).end_of_life()
-        truth = "never" if end is None else f"after {end:.0f} cycles"
-        out.print(f"{written} simulated runs of the simulated clutch {clutch_id} in {out_folder}", soft_wrap=True)
-        out.print(f"the truth: its mean COF has halved {truth}")
+        course: list[tuple[float, float]] = []
+        listed: list[dict[str, Any]] = []
+        with _progress() as progress:
+            task = progress.add_task("run-in", total=clutch.end_of_life(_STOP))
+            runs = campaign.simulate(seed, clutch=clutch, programme=programme, stop_fraction=_STOP, most_tests=tests)
+            for run in runs:
+                said = f"{run.kind.value.replace('_', ' ')}, {run.cycles} cycles"
+                progress.update(task, description=said, completed=run.wear)
+                listed += _write(out_folder, run, record_format)
+                course.append((run.wear, run.cycles))
+        if listed:
+            run_files.write(out_folder / run_files.MANIFEST, listed)
+        end = campaign.end_of_life(course, clutch)
+        truth = "has not halved in this campaign" if end is None else f"has halved after {end:.0f} cycles"
+        out.print(f"{len(course)} simulated runs of the simulated clutch {clutch_id} in {out_folder}", soft_wrap=True)
+        out.print(f"the truth: its mean COF {truth}")
+
+
+def _programme(raw_rate: float | None, dynamic: bool, ageing: str) -> "Programme":
+    """All of fig. 2, but for what is left out."""
+    from models.rig.programme import Ageing, Programme
+    from models.rig.sampled import DynamicTest, RawTest
+
+    return Programme(
+        dynamic=DynamicTest() if dynamic else None,
+        raw=None if raw_rate is None else RawTest(rate=raw_rate),
+        engagements=True,
+        ageing=Ageing(ageing),
+    )
+
+
+def _write(folder: Path, run: "SimulatedRun", record_format: "RecordFormat") -> list[dict[str, Any]]:
+    """One run into one file; what the manifest has to say of it, if it is no JSON."""
+    from service.formats import record_files, simulated
+
+    if record_format is record_files.RecordFormat.JSON or run.duty is not None:
+        run_files.write(folder / f"{run.run_id}.json", simulated.simulated_body(run))
+        return []
+    head, name = simulated.simulated_head(run), f"{run.run_id}{record_format.suffix}"
+    record_files.write_record(folder / name, record_format, simulated.simulated_channels(run), head)
+    return [{"file": name} | head]
+
+
+def _progress() -> Progress:
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    return Progress(*columns, console=err, transient=True)

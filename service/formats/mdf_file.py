@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from asammdf import MDF
+from asammdf.blocks import v4_constants as v4c
 
 from models.arrays import FloatArray
 from service.errors import FieldError, InvalidError
@@ -75,11 +76,20 @@ def _column(file: Any, each: Taken, found: _Found) -> FloatArray:
 
 
 def _master(file: Any, found: list[_Found]) -> dict[str, FloatArray]:
-    """`time_s` of the groups that were taken, which must have one time; nothing where they have none."""
+    """`time_s` of the groups that were taken, which must have one time; nothing where they have none.
+
+    A master that is an angle, a distance or an index is no time.
+    """
     groups = sorted({each.group for each in found})
-    times = [np.array(file.get_master(group), dtype=np.float64) for group in groups if group in file.masters_db]
+    timed = [group for group in groups if group in file.masters_db and _is_time(file, group)]
+    times = [np.array(file.get_master(group), dtype=np.float64) for group in timed]
     if not times:
         return {}
     if len(times) < len(groups) or any(not np.array_equal(times[0], time) for time in times[1:]):
         raise InvalidError("all channels that are taken must be sampled by one clock, got groups whose times differ")
     return {"time_s": times[0]}
+
+
+def _is_time(file: Any, group: int) -> bool:
+    master = file.groups[group].channels[file.masters_db[group]]
+    return master.sync_type not in (v4c.SYNC_TYPE_ANGLE, v4c.SYNC_TYPE_DISTANCE, v4c.SYNC_TYPE_INDEX)

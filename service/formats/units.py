@@ -22,8 +22,12 @@ class Channel:
     most: float
 
     def to_si(self, values: FloatArray) -> FloatArray:
-        """Values [n] in the channel's unit to SI [n]."""
-        return values * self.factor + self.offset
+        """Values [n] in the channel's unit to SI [n]; the same array where that is the unit."""
+        if self.factor == 1.0 and self.offset == 0.0:
+            return values
+        converted = values * self.factor
+        converted += self.offset
+        return converted
 
 
 CHANNELS = {

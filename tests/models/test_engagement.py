@@ -5,21 +5,8 @@ import pytest
 
 from models.rig.campaign import simulated_clutch
 from models.rig.engagement import Drive, PressureProfile, engage
-from models.rig.truth import SimulatedClutch
-from models.stribeck import torque
 
 RADIUS = 0.058
-
-
-def capacity_of(clutch: SimulatedClutch, cycles: float):  # type: ignore[no-untyped-def]
-    """The simulated clutch's torque; below 4 bar it goes with pressure."""
-
-    def capacity(pressure: float, velocity: float) -> float:
-        known = max(pressure, 4.0e5)
-        at = clutch.parameters(known, cycles)
-        return float(torque(np.array(velocity), at)) * pressure / known
-
-    return capacity
 
 
 def test_a_constant_torque_stops_the_shaft_as_in_the_textbook() -> None:
@@ -34,14 +21,14 @@ def test_a_constant_torque_stops_the_shaft_as_in_the_textbook() -> None:
 
 
 def test_nothing_is_transferred_before_the_discs_touch() -> None:
-    found = engage(capacity_of(simulated_clutch(1), 0.0), RADIUS)
+    found = engage(simulated_clutch(1).capacity(0.0), RADIUS)
     filling = found.time < PressureProfile().contact
     assert found.torque[filling].max() < 1.0
     assert found.speed[filling].min() > 0.99 * Drive().speed
 
 
 def test_the_motor_gives_no_more_than_its_limit_and_a_standing_clutch_carries_what_it_gives() -> None:
-    found = engage(capacity_of(simulated_clutch(1), 0.0), RADIUS)
+    found = engage(simulated_clutch(1).capacity(0.0), RADIUS)
     assert found.motor_torque.max() <= 20.0
     assert found.speed[-1] == 0.0
     assert found.torque[-1] == found.motor_torque[-1] == 20.0
@@ -50,7 +37,7 @@ def test_the_motor_gives_no_more_than_its_limit_and_a_standing_clutch_carries_wh
 @pytest.mark.parametrize("seed", range(5))
 def test_engagements_grow_longer_as_friction_falls(seed: int) -> None:
     clutch = simulated_clutch(seed)
-    durations = [engage(capacity_of(clutch, cycles), RADIUS).duration for cycles in (0.0, 1000.0, 3000.0)]
+    durations = [engage(clutch.capacity(cycles), RADIUS).duration for cycles in (0.0, 1000.0, 3000.0)]
     told = [duration for duration in durations if duration is not None]
     assert len(told) >= 2
     assert told == sorted(told)

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from models.clutch import Geometry
-from models.rig.campaign import RunKind, SimulatedRun, simulate, simulated_clutch
+from models.rig.campaign import simulate, simulated_clutch
+from models.rig.simulated_runs import RunKind, SimulatedRun
 from models.rig.stationary import NOISELESS, Sensor, stationary_test
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch, draw
 from models.runs import curves_by_pressure

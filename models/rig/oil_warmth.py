@@ -1,0 +1,36 @@
+"""What the oil's temperature does to a simulated clutch's torque, for campaigns in which it is to be found.
+
+By Hersey's similarity, friction hangs on speed times viscosity: warmer, thinner oil acts as a lower speed would.
+
+    M(v, p, T) = M_measured · S(v ν(T)/ν₀, p, ζ) / S(v, p, ζ),      ν(T)/ν₀ = exp(B/(T - C) - B/(T₀ - C))
+
+with Vogel's viscosity. The rig's own torque does not know of the temperature that it records: this adds it.
+
+Source: M. D. Hersey, J. Wash. Acad. Sci. 4 (1914) 542-552; H. Vogel, Phys. Z. 22 (1921) 645-646. The constants are made,
+so that viscosity falls by some 22 % from 80 to 90 °C.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from models.rig.stationary import OIL_TEMPERATURE
+from models.rig.truth import SimulatedClutch
+from models.runs import Plateaus
+from models.stribeck import torque
+
+#: Vogel's B and C [K].
+_B, _C = 880.0, 170.0
+
+
+def warmed(plateaus: Plateaus, clutch: SimulatedClutch, wear: float, strength: float = 1.0) -> Plateaus:
+    """A simulated test's plateaus as its oil's temperature makes them; `wear` is the ζ at which it was made.
+
+    `strength` [-] is the power of the viscosity's ratio. Raises ValueError where no oil temperature was recorded.
+    """
+    if plateaus.oil_temperature is None:
+        raise ValueError("plateaus must have an oil_temperature, got None")
+    thinner = np.exp(strength * (_B / (plateaus.oil_temperature - _C) - _B / (OIL_TEMPERATURE - _C)))
+    velocity = clutch.geometry.sliding_velocity(plateaus.speed)
+    at = clutch.parameters(plateaus.pressure, wear)
+    return replace(plateaus, torque=plateaus.torque * torque(velocity * thinner, at) / torque(velocity, at))

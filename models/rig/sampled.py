@@ -1,0 +1,100 @@
+"""The sampled records of the simulated rig: the dynamic Stribeck test, the raw stationary test, one engagement.
+
+**Dynamic** (section 2.3.4): a sinusoidal speed, 0.1 Hz, offset and amplitude 1000 rpm, for 15 s at each pressure; it swings
+on while the pressure goes to the next. **Raw stationary** (section 2.3.3): 7 x 40 dwells of 5 s,
+speed and pressure approaching each exponentially as their controllers let them. In both, torque comes from the clutch's
+moving torque, so that the transient after a step is that of its lag. The rates and controllers are assumed.
+
+Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, sections 2.3.3 and 2.3.4.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.protocol import REFERENCE_SPEEDS, RPM
+from models.rig.engagement import Engagement
+from models.rig.recorder import Recorder
+from models.rig.stationary import PLATEAU_DURATION, Sensor
+from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
+from models.runs import Record
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DynamicTest:
+    """`frequency` [Hz], `offset` and `amplitude` [rad/s] of speed, `duration` at a pressure and `step` to the next [s],
+    `rate` [Hz]; all pressures of the protocol, ascending. Raises ValueError unless all are positive and the speed never
+    falls below zero.
+    """
+
+    frequency: float = 0.1
+    offset: float = 1000 * RPM
+    amplitude: float = 1000 * RPM
+    duration: float = 15.0
+    step: float = 0.1
+    rate: float = 100.0
+    recorder: Recorder = field(default_factory=Recorder)
+
+    def __post_init__(self) -> None:
+        for name in ("frequency", "offset", "amplitude", "duration", "step", "rate"):
+            _require_positive(name, getattr(self, name))
+        if self.amplitude > self.offset:
+            raise ValueError(f"amplitude must not exceed offset {self.offset}, got {self.amplitude}")
+
+    def course(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Time [n] s, pressure [n] Pa and speed [n] rad/s as they are commanded."""
+        block, last = self.duration + self.step, PROTOCOL_PRESSURES.size - 1
+        time = np.arange(math.floor((block * last + self.duration) * self.rate)) / self.rate
+        turn = np.minimum((time / block).astype(np.int64), last)
+        passed = np.clip((time - turn * block - self.duration) / self.step, 0.0, 1.0)
+        pressure = np.interp(turn + passed, np.arange(last + 1), PROTOCOL_PRESSURES)
+        return time, pressure, self.offset + self.amplitude * np.sin(2 * math.pi * self.frequency * time)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RawTest:
+    """`rate` [Hz] of the raw stationary record; `controller` [s] is the time in which speed and pressure come to 1/e of
+    a step, `dwell` [s] what a plateau lasts. Raises ValueError unless all are positive."""
+
+    rate: float = 1000.0
+    controller: float = 0.1
+    dwell: float = PLATEAU_DURATION
+    recorder: Recorder = field(
+        default_factory=lambda: Recorder(torque_noise=0.25, memory=0.02, speed_noise=1.0 * RPM, pressure_noise=1000.0)
+    )
+
+    def __post_init__(self) -> None:
+        for name in ("rate", "controller", "dwell"):
+            _require_positive(name, getattr(self, name))
+
+    def course(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Time [n] s, pressure [n] Pa and speed [n] rad/s as the controllers bring them about."""
+        pressure = np.repeat(PROTOCOL_PRESSURES, REFERENCE_SPEEDS.size)
+        speed = np.tile(REFERENCE_SPEEDS, PROTOCOL_PRESSURES.size)
+        time = np.arange(math.floor(self.dwell * speed.size * self.rate)) / self.rate
+        step = np.minimum((time / self.dwell).astype(np.int64), speed.size - 1)
+        left = np.exp(-(time - step * self.dwell) / self.controller)
+        before = np.maximum(step - 1, 0)
+        pressure, speed = (level[step] + (level[before] - level[step]) * left for level in (pressure, speed))
+        return time, pressure, speed
+
+
+def sampled_test(
+    clutch: SimulatedClutch, cycles: float, test: DynamicTest | RawTest, rng: np.random.Generator, sensor: Sensor
+) -> Record:
+    """The record of a dynamic test or of a raw stationary one, after cycles >= 0."""
+    time, pressure, speed = test.course()
+    torque = clutch.moving_torque(time, clutch.geometry.sliding_velocity(speed), pressure, cycles)
+    return test.recorder.record(time, pressure, speed, torque, rng, sensor)
+
+
+def engagement_record(trace: Engagement, rng: np.random.Generator, sensor: Sensor) -> Record:
+    """What the recorder makes of one engagement."""
+    return Recorder().record(trace.time, trace.pressure, trace.speed, trace.torque, rng, sensor)
+
+
+def _require_positive(name: str, value: float) -> None:
+    if not (math.isfinite(value) and value > 0):
+        raise ValueError(f"{name} must be finite and positive, got {value}")

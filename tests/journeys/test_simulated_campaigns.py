@@ -1,0 +1,37 @@
+"""Simulated campaigns go through the whole way in every format: simulate, push, receipts."""
+
+from pathlib import Path
+from typing import Any
+
+import httpx2
+
+from tests.journeys.test_command_line import clutchlife
+from tests.support import Server
+
+
+def test_campaigns_of_records_are_pushed_without_a_word_on_kind_and_cycles(server: Server, tmp_path: Path) -> None:
+    for form in ("csv", "tdms", "mdf4"):
+        folder = tmp_path / form
+        assert "3 simulated runs" in clutchlife("simulate", "--out", folder, "--format", form, "--tests", "1")
+        push = ("push", folder, "--clutch", form, "--url", server.url, "--spool", tmp_path / "spool")
+        assert "3 stored, 0 known already, 0 refused" in clutchlife(*push)
+        assert "0 stored, 3 known already, 0 refused" in clutchlife(*push)
+        items = httpx2.get(f"{server.url}/v1/clutches/{form}/runs").json()["items"]
+        runs: dict[str, dict[str, Any]] = {run["kind"]: run for run in items}
+        assert set(runs) == {"run_in", "stationary_stribeck", "dynamic_stribeck"}
+        assert {(run["origin"], run["cycles"]) for run in items} == {("simulated", 0)}
+        assert len(runs["stationary_stribeck"]["fits"]) == 7
+        loops = runs["dynamic_stribeck"]["loops"]
+        assert [loop["pressure_bar"] for loop in loops] == [4, 4.5, 5, 5.5, 6, 6.5, 7]
+        assert {loop["direction"] for loop in loops} == {"higher_accelerating"}
+        assert runs["run_in"]["duty"]["energy_per_cycle_kj"] > 0
+
+
+def test_a_record_that_no_manifest_lists_is_named(server: Server, tmp_path: Path) -> None:
+    folder = tmp_path / "csv"
+    clutchlife("simulate", "--seed", "7", "--out", folder, "--format", "csv", "--tests", "1", "--no-dynamic")
+    (folder / "lonely.csv").write_text("torque_nm\n1\n", encoding="utf-8")
+    push = ("push", folder, "--clutch", "sim-7", "--url", server.url, "--spool", tmp_path / "spool")
+    said = clutchlife(*push)
+    assert "lonely.csv is not listed in runs.json and not sent" in said
+    assert "2 stored" in said
