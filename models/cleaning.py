@@ -83,8 +83,7 @@ def _in_order(record: Record) -> tuple[Record, float, list[Note]]:
         record = _rows(record, np.argsort(time, kind="stable"))
         time, steps = record.time, np.diff(record.time)
     repeated = int(np.count_nonzero(steps == 0))
-    near = np.abs(steps - period) < 0.5 * period
-    regular = steps[near]
+    regular = steps[(steps > 0.5 * period) & (steps < 1.5 * period)]
     if regular.size:
         period = float(regular.mean())
         scatter = float(regular.std()) / period

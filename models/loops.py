@@ -8,6 +8,7 @@ better is said where the likelihoods tell; neither is thereby true.
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, sections 2.3.4 and 3.2.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
@@ -16,11 +17,10 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
-from models.lag_fit import ATTRACTOR, SQUEEZE_FILM, LagFit, LagStatus, fit_lag
+from models.lag_fit import ATTRACTOR, SQUEEZE_FILM, LagFit, LagStatus, StationaryCurve, fit_lag
 from models.loop_area import LEAST_SAMPLES, Area, Direction, Samples, area_of, clean_samples
 from models.periods import Cycle, fit_cycle, pressure_stretches
 from models.runs import LEVEL_GAP, LEVEL_GAP_SHARE, Record, pressure_levels
-from models.stribeck import StribeckParameters
 from models.stribeck import torque as stationary_torque
 
 #: A speed whose lowest is below minus this share of its swing reverses.
@@ -64,19 +64,20 @@ class Loop:
     attractor_interval: tuple[float, float | None] | None = None
     film_time: float | None = None
     film_time_sd: float | None = None
-    film_time_interval: tuple[float, float] | None = None
+    film_time_interval: tuple[float, float | None] | None = None
     better_law: str | None = None
     status: LoopStatus
     message: str
 
 
 def evaluate_loops(
-    record: Record, geometry: Geometry, stationary: Mapping[float, StribeckParameters] | None
+    record: Record, geometry: Geometry, stationary: Mapping[float, StationaryCurve] | None
 ) -> tuple[Loop, ...]:
     """A loop for each stretch of constant pressure, in the record's order; empty where the pressure never stands.
 
-    `stationary` maps pressure levels [Pa] to the state's stationary curves: the nearest within a level's width is
-    taken; without one there is area and direction and no lag. Times that fall are put in order.
+    `stationary` maps pressure levels [Pa] to the state's stationary curves, whose covariance becomes part of what is said
+    of the lag: the nearest within a level's width is taken; without one there is area and direction and no lag. Times that
+    fall are put in order.
     """
     order = np.argsort(record.time, kind="stable")
     time, pressure = record.time[order], record.pressure[order]
@@ -90,7 +91,7 @@ def evaluate_loops(
     return tuple(loops)
 
 
-def _nearest(stationary: Mapping[float, StribeckParameters] | None, pressure: float) -> StribeckParameters | None:
+def _nearest(stationary: Mapping[float, StationaryCurve] | None, pressure: float) -> StationaryCurve | None:
     if not stationary:
         return None
     level = min(stationary, key=lambda known: abs(known - pressure))
@@ -103,7 +104,7 @@ def _loop(
     time: FloatArray,
     velocity: FloatArray,
     torque: FloatArray,
-    curve: StribeckParameters | None,
+    curve: StationaryCurve | None,
 ) -> Loop:
     if np.median(velocity) < 0:  # the same swing from the other side: the model is odd, the area keeps
         velocity, torque = -velocity, -torque
@@ -145,12 +146,11 @@ def _loop(
 
 
 def _lags(
-    cycle: Cycle, samples: Samples, curve: StribeckParameters | None
+    cycle: Cycle, samples: Samples, curve: StationaryCurve | None
 ) -> tuple[LoopStatus, tuple[LagFit, LagFit] | None]:
     turn = cycle.value(np.linspace(0.0, 2 * np.pi, 361))
-    if curve is None or float(stationary_torque(np.maximum(turn, 0.0), curve).min()) < _LEAST_SHARE * float(
-        np.abs(samples.torque).max()
-    ):
+    least = _LEAST_SHARE * float(np.abs(samples.torque).max())
+    if curve is None or float(stationary_torque(np.maximum(turn, 0.0), curve.parameters).min()) < least:
         return LoopStatus.NO_CURVE, None
     if float(turn.min()) < -REVERSES * cycle.amplitude:
         return LoopStatus.REVERSES, None
@@ -167,9 +167,9 @@ def _inverted(fit: LagFit) -> tuple[float, float | None] | None:
     return 1 / high, 1 / low if low > 0 else None
 
 
-def _positive(fit: LagFit) -> tuple[float, float] | None:
+def _positive(fit: LagFit) -> tuple[float, float | None] | None:
     low, high = fit.interval
-    return (max(low, 0.0), high) if high > 0 else None
+    return (max(low, 0.0), high if math.isfinite(high) else None) if high > 0 else None
 
 
 def _better(attractor: LagFit, film: LagFit) -> str | None:

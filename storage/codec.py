@@ -2,7 +2,8 @@
 
 `shuffle-zlib` keeps one column. The eight bytes of every little-endian float are dealt onto eight planes, so that signs
 and exponents, which hardly change from sample to sample, lie together and deflate well; a plane of mere noise (the low
-bytes of a measured mantissa) would cost time and gain nothing, and is kept as it is.
+bytes of a measured mantissa) would cost time and gain nothing, and is kept as it is. In a plane where nothing repeats but
+neighbours only those are looked for, which is twice as fast; what inflates it is the same.
 
     crc32 of the rest (4 bytes) | bytes of each plane (8 x 4 bytes) | the planes, least significant byte first
 
@@ -32,6 +33,8 @@ _NUMBER = struct.Struct("<I")
 #: A longer plane is deflated only where its middle 16 KiB shrink below 95 %.
 _PROBE = 1 << 14
 _WORTH_IT = 0.95
+#: Runs of equal bytes alone are looked for where that makes the probe no longer than by this.
+_NO_LONGER = 1.02
 
 
 def encode(column: NDArray[np.float64]) -> bytes:
@@ -91,12 +94,21 @@ def _little_endian(array: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _deflate(plane: memoryview) -> bytes | memoryview:
+    strategy = zlib.Z_DEFAULT_STRATEGY
     if len(plane) > _PROBE:
         middle = (len(plane) - _PROBE) // 2
-        if len(zlib.compress(plane[middle : middle + _PROBE], 1)) >= _WORTH_IT * _PROBE:
+        probe = plane[middle : middle + _PROBE]
+        whole, runs = len(_compressed(probe, strategy)), len(_compressed(probe, zlib.Z_RLE))
+        if min(whole, runs) >= _WORTH_IT * _PROBE:
             return plane
-    deflated = zlib.compress(plane, 1)
+        strategy = zlib.Z_RLE if runs <= _NO_LONGER * whole else strategy
+    deflated = _compressed(plane, strategy)
     return deflated if len(deflated) < len(plane) else plane
+
+
+def _compressed(plane: memoryview, strategy: int) -> bytes:
+    deflater = zlib.compressobj(level=1, strategy=strategy)
+    return deflater.compress(plane) + deflater.flush()
 
 
 def _inflate(stored: memoryview, length: int) -> NDArray[np.uint8]:
@@ -113,8 +125,10 @@ def _inflate(stored: memoryview, length: int) -> NDArray[np.uint8]:
 
 
 def _sealed(*parts: bytes | memoryview) -> bytes:
-    body = b"".join(parts)
-    return _NUMBER.pack(zlib.crc32(body)) + body
+    check = 0
+    for part in parts:
+        check = zlib.crc32(part, check)
+    return b"".join((_NUMBER.pack(check), *parts))
 
 
 def _unsealed(data: bytes, *, at_least: int) -> memoryview:

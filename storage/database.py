@@ -8,6 +8,7 @@ https://www.sqlite.org/wal.html (the WAL-reset bug, mended in 3.51.3).
 """
 
 import math
+import shutil
 import sqlite3
 import threading
 import time
@@ -24,6 +25,8 @@ from storage.migrations.upgrade import current, head, upgrade
 
 #: Seconds that a writer waits for the lock before it gives up.
 LOCK_TIMEOUT = 10.0
+#: Bytes that must be free on the disk: less, and a run of any size may no longer be taken.
+LEAST_FREE = 16 << 20
 #: Seconds between two attempts to change the journal mode.
 _MODE_RETRY = 0.02
 
@@ -86,11 +89,12 @@ class Database:
             self._writers_turn.release()
 
     def ready(self) -> bool:
-        """Whether the file is still there and answers at the code's revision. Cheap; writes nothing."""
+        """Whether the file is still there, answers at the code's revision, and could be written. Writes nothing to stay."""
         try:
             with self.reading() as connection:
-                return self.path.exists() and current(connection) == head()
-        except StorageError:
+                answers = self.path.exists() and current(connection) == head()
+            return answers and shutil.disk_usage(self.path.parent).free >= LEAST_FREE and _writable(self.path)
+        except (StorageError, OSError):
             return False
 
     def backup(self, path: Path) -> None:
@@ -107,6 +111,19 @@ class Database:
     def _refuse_closed(self) -> None:
         if self._closed:
             raise StorageUnavailable(f"the database {self.path} has been closed")
+
+
+def _writable(path: Path) -> bool:
+    """Whether a transaction may begin to write the first page; it is taken back. One that another writer holds up, may."""
+    try:
+        address = f"{path.resolve().as_uri()}?mode=rw"
+        with closing(sqlite3.connect(address, uri=True, timeout=0.0, isolation_level=None)) as connection:
+            connection.execute("BEGIN IMMEDIATE")
+            connection.execute(f"PRAGMA user_version={connection.execute('PRAGMA user_version').fetchone()[0]}")
+            connection.execute("ROLLBACK")
+    except sqlite3.Error as error:
+        return getattr(error, "sqlite_errorcode", 0) & 0xFF == sqlite3.SQLITE_BUSY
+    return True
 
 
 def path_of(url: str) -> Path:

@@ -1,13 +1,16 @@
 """CSV -> columns: whole blocks of digits by `decimals`, and line by line where a block is not so plain.
 
-A block that `decimals` refuses is read once more with care: that path skips comments and blank lines, takes quotes apart,
-and names line, column and value of what is wrong. So tidy files of millions of rows are fast, and all files are told apart.
+A block that `decimals` refuses is tidied first: comments and blank lines skipped, quotes taken apart, columns that are not
+taken left out. What it refuses then is read cell by cell, and line, column and value of what is wrong are named. So files
+of millions of rows are fast, tidy or not, and all files are told apart; what takes longer than the limit is refused.
 """
 
 import csv
+import time
 from array import array
 from bisect import bisect_right
 from dataclasses import dataclass, field
+from operator import itemgetter
 
 import numpy as np
 
@@ -23,6 +26,8 @@ from service.formats.sniffing import ByteSource
 _SHOWN = 80
 _MOST_PASSES = 16
 _KEPT = 1 << 18
+#: What a line of numbers begins with, and what separates the cells of one that was tidied.
+_NUMERIC, _INNER = frozenset("0123456789+-."), ";"
 
 
 @dataclass(slots=True)
@@ -83,10 +88,15 @@ class _Table:
         self._at = [each.index for each in taken]
         self._grown = _Growing(len(taken), limits)
         self._decimal = ""
+        self._seconds = limits.seconds
+        self._end = time.monotonic() + limits.seconds
         self.lines = _Lines(layout.line)
 
     def add(self, block: bytes) -> None:
-        """The next block of whole lines."""
+        """The next block of whole lines. Raises InvalidError where reading has taken too long."""
+        if time.monotonic() > self._end:
+            message = f"the CSV file cannot be read: it took longer than {self._seconds} s"
+            raise InvalidError(message, errors=[FieldError(pointer="", code="too_slow", message=message)])
         rows = self._plain(block)
         self._grown.add(self._careful(block) if rows is None else rows[:, self._at])
 
@@ -106,6 +116,10 @@ class _Table:
             if quotes != 2 * width * block.count(b"\n"):
                 return None
             block = block.replace(b'"', b"")
+        return self._parsed(block, separator, width)
+
+    def _parsed(self, block: bytes, separator: bytes, width: int) -> FloatArray | None:
+        """Lines of `width` numbers, blanks around them and separators after them taken off; None where it is not so."""
         if b" " in block:
             for space in (b" " + separator, separator + b" ", b" \n", b"\n "):
                 block = _without(block, space, space.strip(b" "))
@@ -127,16 +141,43 @@ class _Table:
         return rows
 
     def _careful(self, block: bytes) -> FloatArray:
-        """The columns taken of a block, line by line. Raises InvalidError with every line of it that is wrong."""
+        """The columns taken of a block that is not so plain. Raises InvalidError with every line of it that is wrong."""
+        lines: list[str] = []
+        for line in text_of(block).split("\n")[:-1]:
+            if line[:1] not in _NUMERIC and (not line.strip() or is_comment(line, self._layout.separator)):
+                self.lines.skip(self._grown.rows + len(lines))
+            else:
+                lines.append(line)
+        rows = self._tidied(lines)
+        return self._cell_by_cell(lines) if rows is None else rows
+
+    def _tidied(self, lines: list[str]) -> FloatArray | None:
+        """The columns taken [rows, taken] of lines that hold numbers there; None where they do not."""
+        separator, width = self._layout.separator, len(self._layout.headers)
+        if any('"' in line for line in lines):
+            try:
+                rows = list(csv.reader(lines, delimiter=separator, skipinitialspace=True))
+            except csv.Error:
+                return None
+        else:
+            rows = [line.split(separator) for line in lines]
+        if set(map(len, rows)) != {width}:
+            rows = [row if any(row[width:]) else row[:width] for row in rows]
+        if len(rows) != len(lines) or set(map(len, rows)) != {width}:
+            return None
+        if len(self._at) == 1:
+            text = "\n".join([row[self._at[0]] for row in rows])
+        else:
+            text = "\n".join(map(_INNER.join, map(itemgetter(*self._at), rows)))
+        return self._parsed(text.encode() + b"\n", _INNER.encode(), len(self._at))
+
+    def _cell_by_cell(self, lines: list[str]) -> FloatArray:
         rows: list[list[float]] = []
         errors: list[FieldError] = []
         wrong = 0
         separator, width = self._layout.separator, len(self._layout.headers)
-        for line in text_of(block).split("\n")[:-1]:
+        for line in lines:
             row = self._grown.rows + len(rows)
-            if not line.strip() or is_comment(line, separator):
-                self.lines.skip(row)
-                continue
             try:
                 cells = cells_of(line, separator)
             except csv.Error:

@@ -1,7 +1,7 @@
-"""Whether the service lives, whether it can work, and the way in for a person."""
+"""Whether the service lives, whether it can work, and its metrics."""
 
 from fastapi import APIRouter, Request
-from fastapi.responses import JSONResponse, RedirectResponse, Response
+from fastapi.responses import JSONResponse, Response
 
 from service.metrics import MEDIA_TYPE
 from service.problems import described
@@ -31,8 +31,3 @@ def metrics(context: Reader) -> Response:
     """Metrics for Prometheus: requests by route, and every clutch's runs, health and remaining cycles."""
     return Response(content=context.metrics.exposition(context.database), media_type=MEDIA_TYPE)
 
-
-@router.get("/", include_in_schema=False)
-async def root() -> Response:
-    """To the description of the API."""
-    return RedirectResponse("/docs")

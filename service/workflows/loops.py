@@ -7,9 +7,11 @@ from sqlalchemy import Connection
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
+from models.lag_fit import StationaryCurve
 from models.loops import Loop, evaluate_loops
 from service.formats.incoming import sampled_record
 from service.workflows import stored
+from service.workflows.analysis import FEWEST_SPEEDS
 from service.workflows.history import Event, lives
 from service.workflows.receipts import bar
 from storage import channels, runs
@@ -25,10 +27,18 @@ def loops_of(
     columns: Mapping[str, FloatArray],
     geometry: Geometry,
 ) -> list[dict[str, Any]]:
-    """A dynamic test's loops as its receipt shows them, with the lag against its stationary test's curves."""
+    """A dynamic test's loops as its receipt shows them, with the lag against its stationary test's curves.
+
+    A curve of which some parameter is undetermined is one all the same: what its covariance leaves open makes the lag
+    less certain, or unresolved.
+    """
     test = stationary_test_of(events, event)
     levels = [] if test is None else stored.levels(connection, clutch_id).get(test.run_id, [])
-    curves = {level.fit.pressure: level.fit.parameters for level in levels if not level.fit.undetermined}
+    curves = {
+        level.fit.pressure: StationaryCurve(parameters=level.fit.parameters, covariance=level.fit.covariance)
+        for level in levels
+        if level.speeds >= FEWEST_SPEEDS
+    }
     return [loop_receipt(loop) for loop in evaluate_loops(sampled_record(columns), geometry, curves or None)]
 
 

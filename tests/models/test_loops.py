@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from models.lag_fit import StationaryCurve
 from models.loop_area import Direction, loop_area
 from models.loops import LoopStatus, evaluate_loops
 from models.periods import fit_cycle, pressure_stretches
@@ -16,6 +17,7 @@ from tests.models.dynamic_records import FALLING, GEOMETRY, SWING, attractor, cu
 from tests.real.lag import MICRO_LOOPS, micro_loops
 
 AMPLITUDE = GEOMETRY.mean_radius * SWING
+EXACT = StationaryCurve(parameters=FALLING)
 OMEGA = 2 * math.pi * 0.1
 LAG = 0.04  # Nm s²/m
 
@@ -177,7 +179,7 @@ def test_standing_before_and_after_is_left_out():
 def test_a_reversing_speed_has_area_and_no_law():
     swing = record([lagging], [5e5])
     back = replace(swing, speed=swing.speed - SWING)
-    loop = only(evaluate_loops(back, GEOMETRY, {5e5: FALLING}))
+    loop = only(evaluate_loops(back, GEOMETRY, {5e5: EXACT}))
     assert loop.status is LoopStatus.REVERSES
     assert loop.area == pytest.approx(closed_form(), rel=1e-6)
     assert loop.attractor is None
@@ -185,8 +187,8 @@ def test_a_reversing_speed_has_area_and_no_law():
 
 def test_curve_of_another_pressure_is_not_taken():
     swing = record([attractor(FALLING, 100.0)], [5e5])
-    assert only(evaluate_loops(swing, GEOMETRY, {5.5e5: FALLING})).status is LoopStatus.NO_CURVE
-    assert only(evaluate_loops(swing, GEOMETRY, {5.05e5: FALLING})).status is LoopStatus.DETERMINED
+    assert only(evaluate_loops(swing, GEOMETRY, {5.5e5: EXACT})).status is LoopStatus.NO_CURVE
+    assert only(evaluate_loops(swing, GEOMETRY, {5.05e5: EXACT})).status is LoopStatus.DETERMINED
 
 
 def test_a_bent_swing():
@@ -211,14 +213,14 @@ def test_a_bent_swing():
 def test_the_other_sense_of_rotation_is_the_same_loop():
     swing = record([attractor(FALLING, 100.0)], [5e5])
     turned = replace(swing, speed=-swing.speed, torque=-swing.torque)
-    here, there = (only(evaluate_loops(one, GEOMETRY, {5e5: FALLING})) for one in (swing, turned))
+    here, there = (only(evaluate_loops(one, GEOMETRY, {5e5: EXACT})) for one in (swing, turned))
     assert there.area == pytest.approx(here.area, rel=1e-9)
     assert there.attractor == pytest.approx(here.attractor, rel=1e-9)
 
 
 def test_a_curve_of_no_torque_is_none():
     nothing = replace(FALLING, static_torque=0.0, viscous_coefficient=0.0)
-    loop = only(evaluate_loops(record([lagging], [5e5]), GEOMETRY, {5e5: nothing}))
+    loop = only(evaluate_loops(record([lagging], [5e5]), GEOMETRY, {5e5: StationaryCurve(parameters=nothing)}))
     assert loop.status is LoopStatus.NO_CURVE
 
 
@@ -287,7 +289,7 @@ def test_any_record_has_an_answer(rows, kind, seed):
     pressure = 5e5 + (1e5 * rng.integers(0, 3, rows) if kind == "steps" else 0.0 * time)
     torque = scale * 20 * rng.standard_normal(rows)
     for loop in evaluate_loops(
-        Record(time=time, pressure=pressure, speed=speed, torque=torque), GEOMETRY, {5e5: FALLING}
+        Record(time=time, pressure=pressure, speed=speed, torque=torque), GEOMETRY, {5e5: EXACT}
     ):
         assert loop.message
         assert (loop.area is None) == (loop.status is LoopStatus.NO_PERIOD)

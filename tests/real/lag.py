@@ -6,13 +6,14 @@ and how far either describes them.
 
 import itertools
 import math
-from collections.abc import Iterable
-from dataclasses import replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 
+from models.arrays import FloatArray
 from models.lag import attractor_area, attractor_torque, film_time_at, squeeze_film_torque
 from models.loop_area import TORQUE_HARMONICS, loop_area
 from models.periods import Cycle, fit_cycle
@@ -72,22 +73,14 @@ def micro_loops() -> list[Row]:
     The motion's cycle is fitted to the position; the raw trapezoid sums over the same cycles are the witness. Friction
     is given against the motion: its sign is turned. The speed reverses, so no law of lag is fitted.
     """
-    time, normal, position, friction = np.loadtxt(MICRO_LOOPS, delimiter=",", skiprows=1).T
-    loaded = np.flatnonzero(normal > 0.9 * np.median(normal))
-    rows_loaded = slice(int(loaded[0]), int(loaded[-1]) + 1)
-    time, position, force = time[rows_loaded], position[rows_loaded], -friction[rows_loaded] / 1e6
-    period = _position(time, position).periods
-    length = 1 / _position(time, position).frequency
     rows = []
-    for first in range(0, period - 9, 10):
-        inside = (time >= time[0] + first * length) & (time < time[0] + (first + 10) * length)
-        t, x, f = time[inside], position[inside], force[inside]
+    for name, t, x, f in _tens():
         place = _position(t, x)
         work, lag = loop_area(place, t, f), loop_area(_speed_of(place), t, f)
         v = np.gradient(x, t)
         rows.append(
             {
-                "cycles": f"{first + 1} to {first + 10}",
+                "cycles": name,
                 "∮F dv [N mm/s]": lag.area,
                 "its deviation": lag.area_sd,
                 "∮F dx [mJ]": work.area,
@@ -97,6 +90,33 @@ def micro_loops() -> list[Row]:
             }
         )
     return rows
+
+
+def loop_courses() -> list[tuple[str, FloatArray, FloatArray]]:
+    """The mean course of ten cycles: which, speed [200] mm/s and force [200] N over a turn, closed."""
+    courses = []
+    for name, t, x, f in _tens():
+        place = _position(t, x)
+        turn = np.linspace(0.0, 2 * math.pi, 201)
+        part = np.digitize(np.mod(place.phase(t), 2 * math.pi), turn[1:-1])
+        force = np.bincount(part, weights=f, minlength=200) / np.maximum(np.bincount(part, minlength=200), 1)
+        middle = 0.5 * (turn[1:] + turn[:-1])
+        speed = 2 * math.pi * place.frequency * place.gradient(middle)
+        courses.append((name, np.append(speed, speed[0]), np.append(force, force[0])))
+    return courses
+
+
+def _tens() -> Iterator[tuple[str, FloatArray, FloatArray, FloatArray]]:
+    """Ten cycles at a time: which, time [n] s, position [n] mm, force along the motion [n] N."""
+    time, normal, position, friction = np.loadtxt(MICRO_LOOPS, delimiter=",", skiprows=1).T
+    loaded = np.flatnonzero(normal > 0.9 * np.median(normal))
+    rows_loaded = slice(int(loaded[0]), int(loaded[-1]) + 1)
+    time, position, force = time[rows_loaded], position[rows_loaded], -friction[rows_loaded] / 1e6
+    whole = _position(time, position)
+    length = 1 / whole.frequency
+    for first in range(0, whole.periods - 9, 10):
+        inside = (time >= time[0] + first * length) & (time < time[0] + (first + 10) * length)
+        yield f"{first + 1} to {first + 10}", time[inside], position[inside], force[inside]
 
 
 def _position(time: np.ndarray, position: np.ndarray) -> Cycle:
@@ -121,7 +141,22 @@ def _speed_of(place: Cycle) -> Cycle:
     )
 
 
-def velocity_step() -> list[Row]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StepFit:
+    """The attractor law on `window` s after the step: time, measured and fitted friction [n], C [1/s] with its deviation
+    by white noise, the new level, the residual's deviation over the noise."""
+
+    window: float
+    time: FloatArray
+    measured: FloatArray
+    fitted: FloatArray
+    attractor: float
+    attractor_sd: float
+    level: float
+    misfit: float
+
+
+def step_fits() -> list[StepFit]:
     """Friction after the step from 0.2 to 2 µm/s, fitted by the attractor law over windows of growing length.
 
     dμ/dt = C (1 - μ/S) with S the new level, fitted along with C [1/s] and the level before; if the law were right, C
@@ -132,64 +167,91 @@ def velocity_step() -> list[Row]:
     onset = int(np.flatnonzero(speed > 1.0)[0])
     clock = time - time[onset]
     noise = float(np.std(np.diff(friction[onset - 500 : onset]))) / math.sqrt(2)
-    rows = []
-    for window in (5.0, 20.0, 60.0, 180.0):
-        inside = (clock >= 0) & (clock <= window)
-        t, measured = clock[inside], friction[inside]
+    return [_step_fit(clock, friction, noise, window) for window in (5.0, 20.0, 60.0, 180.0)]
 
-        def miss(x: np.ndarray, t: np.ndarray = t, measured: np.ndarray = measured) -> np.ndarray:
-            level = StribeckParameters(
-                static_torque=float(x[1]), coulomb_ratio=1.0, stribeck_velocity=1.0, viscous_coefficient=0.0
-            )
-            return attractor_torque(t, np.ones_like(t), level, math.exp(x[0]), start=float(x[2])) - measured
 
-        fit = least_squares(miss, [math.log(0.05), float(measured[-1]), float(measured[0])], x_scale=[1.0, 0.1, 0.1])
-        sd = math.sqrt(np.linalg.inv(fit.jac.T @ fit.jac)[0, 0] * 2 * fit.cost / (t.size - 3))
-        c, rms = math.exp(fit.x[0]), math.sqrt(2 * fit.cost / t.size)
-        rows.append(
-            {
-                "window [s]": window,
-                "points": t.size,
-                "C [1/s]": c,
-                "± (white noise)": c * sd,
-                "S/C [s]": float(fit.x[1]) / c,
-                "new level": float(fit.x[1]),
-                "misfit over noise": rms / noise,
-            }
+def _step_fit(clock: FloatArray, friction: FloatArray, noise: float, window: float) -> StepFit:
+    inside = (clock >= 0) & (clock <= window)
+    t, measured = clock[inside], friction[inside]
+
+    def law(x: FloatArray) -> FloatArray:
+        level = StribeckParameters(
+            static_torque=float(x[1]), coulomb_ratio=1.0, stribeck_velocity=1.0, viscous_coefficient=0.0
         )
-    return rows
+        return attractor_torque(t, np.ones_like(t), level, math.exp(x[0]), start=float(x[2]))
+
+    start = [math.log(0.05), float(measured[-1]), float(measured[0])]
+    fit = least_squares(lambda x: law(x) - measured, start, x_scale=[1.0, 0.1, 0.1])
+    sd = math.sqrt(np.linalg.inv(fit.jac.T @ fit.jac)[0, 0] * 2 * fit.cost / (t.size - 3))
+    return StepFit(
+        window=window,
+        time=t,
+        measured=measured,
+        fitted=law(fit.x),
+        attractor=math.exp(fit.x[0]),
+        attractor_sd=math.exp(fit.x[0]) * sd,
+        level=float(fit.x[1]),
+        misfit=math.sqrt(2 * fit.cost / t.size) / noise,
+    )
+
+
+def velocity_step() -> list[Row]:
+    """`step_fits` as rows."""
+    return [
+        {
+            "window [s]": fit.window,
+            "points": fit.time.size,
+            "C [1/s]": fit.attractor,
+            "± (white noise)": fit.attractor_sd,
+            "S/C [s]": fit.level / fit.attractor,
+            "new level": fit.level,
+            "misfit over noise": fit.misfit,
+        }
+        for fit in step_fits()
+    ]
+
+
+def branches_of() -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Sliding speed [36] mm/s, and traction [sweeps, 36] while it falls and while it rises.
+
+    Branches are laid over one another at equal sliding speed, 0.5 to 4 mm/s; v falls at first, then rises.
+    """
+    columns = np.genfromtxt(TRACTION_SWEEPS, delimiter=",", names=True, usecols=(0, 5, 7), dtype=None, encoding="utf-8")
+    grid = np.linspace(0.5, 4.0, 36)
+    found = []
+    for _, group in itertools.groupby(columns, key=lambda row: int(row[0])):
+        rows = np.array([(abs(row[1]), row[2]) for row in group])
+        turn = int(np.argmin(rows[:, 0]))
+        parts = [part[np.argsort(part[:, 0], kind="stable")] for part in (rows[: turn + 1], rows[turn:])]
+        found.append([np.interp(grid, part[:, 0], part[:, 1]) for part in parts])
+    both = np.array(found)
+    return grid, both[:, 0], both[:, 1]
 
 
 def traction_branches() -> list[Row]:
     """Sweeps in fifths: the mean difference of the up branch from the down branch [-], and ∮μ dv [mm/s], per sweep.
 
-    Branches are laid over one another at equal sliding speed, 0.5 to 4 mm/s; v falls at first, then rises. The area is
-    positive where traction is higher while the speed rises.
+    The area is positive where traction is higher while the speed rises.
     """
-    columns = np.genfromtxt(TRACTION_SWEEPS, delimiter=",", names=True, usecols=(0, 5, 7), dtype=None, encoding="utf-8")
-    grid = np.linspace(0.5, 4.0, 36)
-    found = []
-    for sweep, group in itertools.groupby(columns, key=lambda row: int(row[0])):
-        rows = np.array([(abs(row[1]), row[2]) for row in group])
-        turn = int(np.argmin(rows[:, 0]))
-        down, up = (part[np.argsort(part[:, 0], kind="stable")] for part in (rows[: turn + 1], rows[turn:]))
-        off = np.interp(grid, up[:, 0], up[:, 1]) - np.interp(grid, down[:, 0], down[:, 1])
-        scatter = float(np.std(np.diff(off)) / math.sqrt(2 * grid.size))
-        found.append((sweep, float(off.mean()), scatter, float(np.trapezoid(off, grid))))
-    rows_found = []
-    for part in np.array_split(np.array(found), 5):
-        count = math.sqrt(len(part))
-        rows_found.append(
+    grid, down, up = branches_of()
+    off = up - down
+    scatter = np.diff(off, axis=1).std(axis=1) / math.sqrt(2 * grid.size)
+    area = np.trapezoid(off, grid, axis=1)
+    rows: list[Row] = []
+    for part in np.array_split(np.arange(off.shape[0]), 5):
+        count = math.sqrt(part.size)
+        mean = off[part].mean(axis=1)
+        rows.append(
             {
-                "sweeps": f"{int(part[0, 0])} to {int(part[-1, 0])}",
-                "up - down [-]": float(part[:, 1].mean()),
-                "±": float(part[:, 1].std(ddof=1)) / count,
-                "within a sweep ±": float(part[:, 2].mean()),
-                "∮μ dv [mm/s]": float(part[:, 3].mean()),
-                "its deviation": float(part[:, 3].std(ddof=1)) / count,
+                "sweeps": f"{part[0] + 1} to {part[-1] + 1}",
+                "up - down [-]": float(mean.mean()),
+                "±": float(mean.std(ddof=1)) / count,
+                "within a sweep ±": float(scatter[part].mean()),
+                "∮μ dv [mm/s]": float(area[part].mean()),
+                "its deviation": float(area[part].std(ddof=1)) / count,
             }
         )
-    return rows_found
+    return rows
 
 
 def main() -> None:

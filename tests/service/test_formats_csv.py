@@ -3,7 +3,9 @@
 import gzip
 import io
 import re
+import time
 import tracemalloc
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -238,3 +240,52 @@ def test_no_bytes_raise_anything_else(tmp_path_factory: pytest.TempPathFactory, 
             read_file(file, filename="any.csv")
         except ServiceError as error:
             assert error.status in (413, 422)  # noqa: PT017
+
+
+def untidy(columns: dict[str, FloatArray]) -> dict[str, tuple[str, str | None]]:
+    """The same columns as no reader of plain numbers takes them, each with the map that it needs."""
+    rows = [[repr(value) for value in row] for row in zip(*(each.tolist() for each in columns.values()), strict=True)]
+    head, needed = ",".join(columns), ",".join(f"{name}:{name}" for name in columns)
+    german = [";".join(row).replace(".", ",") for row in rows]
+    return {
+        "decimal commas in quotes": (head + "\n" + "\n".join(_quoted(row) for row in rows), None),
+        "quotes here and there": (head + "\n" + "\n".join(f'"{row[0]}",' + ",".join(row[1:]) for row in rows), None),
+        "comments": (head + "\n" + "\n".join(",".join(row) + "\n# ok\n" for row in rows), None),
+        "a column of words": ("when," + head + "\n" + "\n".join("8:00," + ",".join(row) for row in rows), needed),
+        "and decimal commas": (
+            f"Datum;{head.replace(',', ';')}\n" + "\n".join("2.11.;" + row for row in german),
+            needed,
+        ),
+    }
+
+
+def _quoted(row: list[str]) -> str:
+    return ",".join(f'"{cell}"' for cell in row).replace(".", ",")
+
+
+@pytest.mark.parametrize("kind", sorted(untidy(record(1))))
+def test_untidy_files_are_the_same_columns_and_not_slow(tmp_path: Path, kind: str) -> None:
+    """Three to five times a plain file, measured; ten are allowed here, twenty is what cell by cell takes."""
+    columns = record(40_000)
+    text, needed = untidy(columns)[kind]
+    plain = csv_text(columns, number="%r")
+    same(read(tmp_path, text + "\n", needed), columns)
+    taken = min(_seconds(lambda: read(tmp_path, text + "\n", needed)) for _ in range(3))
+    assert taken < 10 * min(_seconds(lambda: read(tmp_path, plain)) for _ in range(3))
+
+
+def _seconds(work: Callable[[], object]) -> float:
+    begun = time.process_time()
+    work()
+    return time.process_time() - begun
+
+
+def test_one_column_of_many_words(tmp_path: Path) -> None:
+    assert read(tmp_path, "a,M [Nm]\nx,1.5\ny,2.5\n", "torque_nm:M")["torque_nm"].tolist() == [1.5, 2.5]
+
+
+def test_reading_has_its_time(tmp_path: Path) -> None:
+    (tmp_path / "posted").write_text(csv_text(record(30_000)), encoding="utf-8")
+    with pytest.raises(InvalidError, match="longer than 0 s") as caught:
+        read_file(tmp_path / "posted", filename="run.csv", limits=replace(LIMITS, seconds=0))
+    assert caught.value.errors[0].code == "too_slow"

@@ -5,17 +5,21 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from models.identification import fit_curves
 from models.lag import attractor_torque, squeeze_film_torque
-from models.lag_fit import ATTRACTOR, NINETY, SQUEEZE_FILM, fit_lag
+from models.lag_fit import ATTRACTOR, NINETY, SQUEEZE_FILM, Law, StationaryCurve, fit_lag
 from models.loop_area import area_of, clean_samples
 from models.periods import fit_cycle
+from models.runs import Curve
+from models.stribeck import StribeckParameters
+from models.stribeck import torque as curve_torque
 from tests.models.dynamic_records import FALLING, GEOMETRY, RISING, SWING, velocity
 
 pytestmark = pytest.mark.statistical
 
 SEED = 20130816
 #: 1,000 intervals of 90 % hold the truth in 90 % of cases with a standard deviation of 0.95 %: three of them.
-RECORDS, COVERAGE, WITHIN = 1000, 0.90, 0.03
+COVERAGE, WITHIN = 0.90, 0.03
 #: `tests/models/test_lag.py` holds the two laws themselves against a stiff integrator.
 FINE = np.linspace(-10.0, 15.1, 25_101)
 PERIOD = slice(15_000, 25_001)
@@ -37,25 +41,33 @@ def _dirty(torque: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np
     return time, velocity(time) + noise, measured
 
 
-def _records(law) -> Iterator[tuple]:
-    rng = np.random.default_rng(SEED)
-    for i in range(RECORDS):
+def _made(law: Law, parameters: StribeckParameters, value: float) -> np.ndarray:
+    return (attractor_torque if law is ATTRACTOR else squeeze_film_torque)(FINE, velocity(FINE), parameters, value)
+
+
+def _loops(law: Law, records: int, rng: np.random.Generator) -> Iterator[tuple]:
+    """The lag, the true curve, the samples and the swing of records of both curves by turns."""
+    for i in range(records):
         parameters = (FALLING, RISING)[i % 2]
         value = float(np.exp(rng.uniform(*np.log([50.0, 500.0] if law is ATTRACTOR else [0.02, 0.3]))))
-        respond = attractor_torque if law is ATTRACTOR else squeeze_film_torque
-        torque = respond(FINE, velocity(FINE), parameters, value)
-        time, speed, measured = _dirty(torque, rng)
+        time, speed, measured = _dirty(_made(law, parameters, value), rng)
         cycle = fit_cycle(time, speed)
-        samples = clean_samples(cycle, time, measured)
+        yield value, parameters, clean_samples(cycle, time, measured), cycle
+
+
+def _records(law: Law, records: int) -> Iterator[tuple]:
+    for value, parameters, samples, cycle in _loops(law, records, np.random.default_rng(SEED)):
+        torque = _made(law, parameters, value)
         area = float(np.trapezoid(torque[PERIOD], velocity(FINE)[PERIOD]))
-        yield value, area, area_of(cycle, samples), fit_lag(law, cycle, samples.phase, samples.torque, parameters)
+        curve = StationaryCurve(parameters=parameters)
+        yield value, area, area_of(cycle, samples), fit_lag(law, cycle, samples.phase, samples.torque, curve)
 
 
-@pytest.mark.parametrize("law", [ATTRACTOR, SQUEEZE_FILM], ids=lambda law: law.name)
-def test_intervals_hold_what_they_promise(law):
+@pytest.mark.parametrize(("law", "records"), [(ATTRACTOR, 1000), (SQUEEZE_FILM, 2000)], ids=["attractor", "film"])
+def test_intervals_hold_what_they_promise(law, records):
     """C over 50 to 500 Nm/s (the interval of 1/C, open where C is only bounded), τ_1 over 0.02 to 0.3 s, the area."""
     held, held_area, halved, low, high = 0, 0, 0, 0, 0
-    for value, true_area, area, fit in _records(law):
+    for value, true_area, area, fit in _records(law, records):
         truth = 1 / value if law is ATTRACTOR else value
         centre, half = np.mean(fit.interval), np.ptp(fit.interval) / 2
         held += abs(truth - centre) <= half
@@ -63,10 +75,41 @@ def test_intervals_hold_what_they_promise(law):
         high += truth > centre + half
         halved += abs(truth - centre) <= half / 2
         held_area += abs(area.area - true_area) <= NINETY * area.area_sd
-    print(f"{law.name}: {held} of {RECORDS}, below {low}, above {high}; area {held_area}; halved {halved}")
-    # the film time's interval is a little too wide (93 %), for what reason is not known: it may be, and not narrower
-    most = COVERAGE + (WITHIN if law is ATTRACTOR else 2 * WITHIN)
-    assert COVERAGE - WITHIN <= held / RECORDS <= most
-    assert abs(held_area / RECORDS - COVERAGE) <= WITHIN
+    print(f"{law.name}: {held} of {records}, below {low}, above {high}; area {held_area}; halved {halved}")
+    assert abs(held / records - COVERAGE) <= WITHIN
+    assert abs(held_area / records - COVERAGE) <= WITHIN
     # the control: intervals of half the width hold 59 % if noise is normal, and must not pass
-    assert halved / RECORDS < COVERAGE - 5 * WITHIN
+    assert halved / records < COVERAGE - 5 * WITHIN
+
+
+@pytest.mark.parametrize("law", [ATTRACTOR, SQUEEZE_FILM], ids=["attractor", "film"])
+def test_intervals_hold_what_they_promise_with_curves_that_were_fitted(law):
+    """The curve is that of a stationary test of 40 speeds with 0.3 to 1 % noise, not the true one.
+
+    Where all parameters of the curve are determined the interval holds 90 %; where some are not, their deviations are
+    made wide, and the interval holds more. The control takes the fitted curve for exact.
+    """
+    rng = np.random.default_rng([SEED, 2])
+    speeds = GEOMETRY.sliding_velocity(np.arange(20.0, 1971.0, 50.0) * np.pi / 30)
+    held: dict[str, list[bool]] = {"determined": [], "undetermined": [], "taken for exact": []}
+    for number, (value, law_of, samples, cycle) in enumerate(_loops(law, 1000, rng)):
+        truth = 1 / value if law is ATTRACTOR else value
+        noise = np.exp(rng.uniform(*np.log([0.003, 0.01]))) * rng.standard_normal(speeds.size)
+        stationary = Curve(
+            pressure=5e5, mean_pressure=5e5, velocity=speeds, torque=curve_torque(speeds, law_of) * (1 + noise)
+        )
+        (fitted,) = fit_curves([stationary])
+        curve = StationaryCurve(parameters=fitted.parameters, covariance=fitted.covariance)
+        low, high = fit_lag(law, cycle, samples.phase, samples.torque, curve).interval
+        held["undetermined" if fitted.undetermined else "determined"].append(low <= truth <= high)
+        if number < 300:
+            exact = StationaryCurve(parameters=fitted.parameters)
+            low, high = fit_lag(law, cycle, samples.phase, samples.torque, exact).interval
+            held["taken for exact"].append(low <= truth <= high)
+    share = {name: float(np.mean(found)) for name, found in held.items()}
+    print(law.name, {name: (len(found), round(share[name], 3)) for name, found in held.items()})
+    # the film time's interval is a little too wide (93.2 %): it may be, and not narrower
+    most = COVERAGE + (WITHIN if law is ATTRACTOR else 2 * WITHIN)
+    assert COVERAGE - WITHIN <= share["determined"] <= most
+    assert share["undetermined"] >= COVERAGE - WITHIN
+    assert share["taken for exact"] < COVERAGE - WITHIN

@@ -145,3 +145,13 @@ def test_an_index_that_does_not_fit_its_bytes_is_noticed(index: bytes) -> None:
 def test_the_stored_bytes_are_little_endian_wherever_they_were_written() -> None:
     """A column of one value keeps its eight planes plain: the value's own bytes, least significant first."""
     assert encode(np.array([-1.5]))[-8:] == struct.pack("<d", -1.5)
+
+
+def test_a_plane_in_which_only_neighbours_repeat_is_read_back() -> None:
+    """Long enough for its deflater to be chosen by a probe: noise, steps, a clock and constants, each bit for bit."""
+    rng = np.random.default_rng(1)
+    noise = np.round(20 + 0.25 * rng.standard_normal(100_000), 4)
+    for column in (noise, np.repeat(noise[:1000], 100), np.round(np.arange(100_000) / 1000, 3), np.zeros(100_000)):
+        kept = encode(column)
+        assert decode(kept, CODEC, column.size).tobytes() == column.tobytes()
+        assert len(kept) < column.nbytes

@@ -1,15 +1,18 @@
 """Opening, refusing, and what the store says where the file cannot be used."""
 
 import sqlite3
+import time
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import OperationalError
 
 from storage import clutches
-from storage.database import Database, open_database, preferred_journal_mode
+from storage.database import LEAST_FREE, Database, open_database, preferred_journal_mode
 from storage.errors import StorageUnavailable
 from tests.storage.samples import clutch_row, store_run
 
@@ -165,6 +168,43 @@ def test_ready_while_the_file_is_there_and_open(database: Database) -> None:
     assert database.ready()
     database.close()
     assert not database.ready()
+
+
+def test_not_ready_on_a_full_disk(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("storage.database.shutil.disk_usage", lambda _: SimpleNamespace(free=LEAST_FREE - 1))
+    assert not database.ready()
+    monkeypatch.setattr("storage.database.shutil.disk_usage", lambda _: SimpleNamespace(free=LEAST_FREE))
+    assert database.ready()
+
+
+def test_not_ready_where_nothing_can_be_written(
+    tmp_path: Path, journal_mode: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SQLite itself refuses to write what it was told to open for reading, as it does on a disk that is read-only."""
+    connect = sqlite3.connect
+
+    def read_only(address: str, **how: Any) -> sqlite3.Connection:
+        assert address.endswith("?mode=rw")
+        return connect(address.replace("?mode=rw", "?mode=ro"), **how)
+
+    with closing(open_database(f"sqlite:///{tmp_path}/a.db")) as database:
+        assert database.journal_mode == journal_mode
+        assert database.ready()
+        with monkeypatch.context() as patch:
+            patch.setattr("storage.database.sqlite3.connect", read_only)
+            assert not database.ready()
+        assert database.ready()
+
+
+def test_ready_writes_nothing_and_waits_for_nobody(database: Database) -> None:
+    before = (database.path.read_bytes(), sorted(path.name for path in database.path.parent.iterdir()))
+    for _ in range(20):
+        assert database.ready()
+    assert (database.path.read_bytes(), sorted(path.name for path in database.path.parent.iterdir())) == before
+    with database.writing():
+        begun = time.monotonic()
+        assert database.ready(), "who writes now can write"
+        assert time.monotonic() - begun < 1.0
 
 
 def test_a_closed_database_says_so(database: Database, tmp_path: Path) -> None:
