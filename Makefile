@@ -2,7 +2,11 @@
 # make test    all tests
 # make check   formatting, lint, types, layers
 # make lowest  the tests without a browser, on the oldest dependencies that pyproject.toml allows
-# make real    what is said of real measurements; make benchmark: how long things take; make picture: README's picture
+# make score   how good the prognosis is, on simulated lives: the tables of docs/prognosis.md  (SEED= SIZE= PARTS= ARGS=--write)
+# make rivals  the same beside other packages, in an environment of their own                (SEED= SIZE=)
+# make blind   hides effects and wants them found: the table of docs/diagnosis.md      (SEED= SIZE=small|full ONLY= ARGS=)
+# make real    what is said of real measurements; make benchmark: how long things take; make picture: README's pictures;
+#              make figures: the figures of docs/
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
@@ -12,7 +16,7 @@ ARGS ?=
 LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --exclude-newer "7 days" \
 	--custom-compile-command "make lock"
 
-.PHONY: demo test check lowest benchmark real picture lock clean
+.PHONY: demo test check lowest benchmark real figures blind score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
@@ -35,12 +39,31 @@ lowest: $(VENV)-lowest/.tests
 
 picture: $(VENV)/.tests
 	$(BIN)/python -m tests.picture
+	$(BIN)/python -m tests.screenshots
 
 benchmark: $(VENV)/.tests
 	$(BIN)/python -m tests.benchmarks $(ARGS)
 
 real: $(VENV)/.tests
 	$(BIN)/python -m tests.real $(ARGS)
+
+figures: $(VENV)/.tests
+	$(BIN)/python -m tests.figures
+
+blind: $(VENV)/.tests
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.blind $(ARGS)
+
+score: $(VENV)/.tests
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.score $(PARTS) $(if $(SEED),--seed $(SEED)) $(if $(SIZE),--size $(SIZE)) $(ARGS)
+
+rivals: $(VENV)-rivals/.ready
+	OPENBLAS_NUM_THREADS=1 $(VENV)-rivals/bin/python -m tests.rivals $(if $(SEED),--seed $(SEED)) $(if $(SIZE),--size $(SIZE)) $(ARGS)
+
+$(VENV)-rivals/.ready: pyproject.toml | $(VENV)/.python
+	$(PYTHON) -m venv $(VENV)-rivals
+	$(VENV)-rivals/bin/python -m pip install --quiet --disable-pip-version-check "pip>=25.1"
+	$(VENV)-rivals/bin/python -m pip install --quiet --disable-pip-version-check --group rivals --editable .
+	@touch $@
 
 $(VENV)/.python:
 	@command -v $(PYTHON) >/dev/null || { echo "Clutchlife needs Python 3.11 or later; '$(PYTHON)' is not there. Name another: make PYTHON=..." >&2; exit 1; }
@@ -70,4 +93,4 @@ lock:
 	uv pip compile $(LOCK) --resolution lowest-direct pyproject.toml --group test -o tests/requirements-lowest.txt
 
 clean:
-	rm -rf $(VENV) $(VENV)-lowest .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) $(VENV)-lowest $(VENV)-rivals .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

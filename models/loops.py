@@ -19,8 +19,9 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.lag_fit import ATTRACTOR, SQUEEZE_FILM, LagFit, LagStatus, StationaryCurve, fit_lag
 from models.loop_area import LEAST_SAMPLES, Area, Direction, Samples, area_of, clean_samples
-from models.periods import Cycle, fit_cycle, pressure_stretches
+from models.periods import Cycle, fit_cycle
 from models.runs import LEVEL_GAP, LEVEL_GAP_SHARE, Record, pressure_levels
+from models.standing import pressure_stretches
 from models.stribeck import torque as stationary_torque
 
 #: A speed whose lowest is below minus this share of its swing reverses.

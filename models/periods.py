@@ -1,4 +1,4 @@
-"""Whole periods of a record whose speed swings periodically: where each pressure stands, and the swing itself.
+"""Whole periods of a record whose speed swings periodically.
 
 A dynamic Stribeck test holds the pressure and swings the speed, 15 s at 0.1 Hz a pressure: one and a half periods. A
 loop closes after whole periods only, so half a period must be left out; the *last* whole periods are kept, for the
@@ -12,9 +12,7 @@ evenness, of the rate, or of a period being a whole number of samples.
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3.4.
 """
 
-import itertools
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +20,6 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from models.arrays import FloatArray
-from models.runs import LEVEL_GAP, LEVEL_GAP_SHARE
 
 #: Harmonics of the speed.
 SPEED_HARMONICS = 4
@@ -34,21 +31,10 @@ _NEIGHBOURS = 5
 WHOLE = 0.99
 #: A speed that misses its fit by more than this share of its swing (rms) does not swing periodically.
 PERIODIC = 0.15
-#: The pressure is looked at in medians over this long [s]; a level lasts so many of them or more.
-_BLOCK = 0.25
-_LEAST_BLOCKS = 8
-#: Standing still for longer than this share of the record, before or after, is not part of the swing.
-_REST_SHARE = 0.1
+#: Standing still for longer than this share of the record, before or after, is not part of the swing; the lower share
+#: holds away from the swing's ends, where a sine does not linger.
+_REST_SHARE, _REST_INSIDE, _INSIDE = 0.1, 0.02, (0.1, 0.9)
 _SWING_SHARE, _MOST_SHARE = 0.02, 0.05
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Stretch:
-    """Consecutive rows [start, stop) at one pressure [Pa] (their median)."""
-
-    pressure: float
-    start: int
-    stop: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,34 +94,6 @@ def sample_interval(time: FloatArray) -> float:
     return float(np.median(np.diff(time))) if time.size > 1 else 0.0
 
 
-def pressure_stretches(time: FloatArray, pressure: FloatArray) -> Iterator[Stretch]:
-    """The stretches of time [n] s, ascending, in which pressure [n] Pa stands still, in their order.
-
-    Medians over a quarter of a second that stay within LEVEL_GAP of the stretch's own median belong together; ramps
-    between levels leave stretches that are too short (under 2 s) to count.
-    """
-    smooth = median_filter(pressure, size=min(5, pressure.size), mode="nearest")
-    block = np.floor((time - time[0]) / max(_BLOCK, 5 * sample_interval(time))).astype(np.int64)
-    edges = np.concatenate([[0], np.flatnonzero(np.diff(block)) + 1, [time.size]])
-    medians = np.array([np.median(smooth[a:b]) for a, b in itertools.pairwise(edges)])
-    first = 0
-    for i in range(1, medians.size + 1):
-        level = float(np.median(medians[first:i]))
-        allowed = max(LEVEL_GAP, LEVEL_GAP_SHARE * abs(level))
-        if i < medians.size and abs(medians[i] - level) <= allowed:
-            continue
-        if i - first >= _LEAST_BLOCKS:
-            near = np.abs(smooth - level) <= allowed
-            lowest, highest = edges[max(first - 1, 0)], edges[min(i + 1, medians.size)]
-            inside_start, inside_stop = edges[first + 1], edges[i - 1]
-            before = np.flatnonzero(~near[lowest:inside_start])
-            after = np.flatnonzero(~near[inside_stop:highest])
-            start = int(lowest + before[-1] + 1) if before.size else int(lowest)
-            stop = int(inside_stop + after[0]) if after.size else int(highest)
-            yield Stretch(pressure=float(np.median(pressure[start:stop])), start=start, stop=stop)
-        first = i
-
-
 def fit_cycle(time: FloatArray, value: FloatArray, count: int = SPEED_HARMONICS) -> Cycle | str:
     """The swing of value [n] over time [n] s (ascending), and its last whole periods; a sentence where there is none.
 
@@ -162,11 +120,15 @@ def _without_rest(time: FloatArray, value: FloatArray) -> slice:
     smooth = median_filter(value, size=min(3, value.size), mode="nearest")
     swing = float(np.ptp(smooth))
     least = min(_SWING_SHARE * swing + 4 * float(np.median(np.abs(value - smooth))), _MOST_SHARE * swing)
-    duration = time[-1] - time[0]
+    duration, lowest = time[-1] - time[0], float(smooth.min())
+    longest = []
+    for rest in (smooth[0], smooth[-1]):
+        inside = _INSIDE[0] * swing < rest - lowest < _INSIDE[1] * swing
+        longest.append((_REST_INSIDE if inside else _REST_SHARE) * duration)
     moved = np.flatnonzero(np.abs(smooth - smooth[0]) > least)
-    start = int(moved[0]) if moved.size and time[moved[0]] - time[0] > _REST_SHARE * duration else 0
+    start = int(moved[0]) if moved.size and time[moved[0]] - time[0] > longest[0] else 0
     moved = np.flatnonzero(np.abs(smooth - smooth[-1]) > least)
-    stop = int(moved[-1]) + 1 if moved.size and time[-1] - time[moved[-1]] > _REST_SHARE * duration else time.size
+    stop = int(moved[-1]) + 1 if moved.size and time[-1] - time[moved[-1]] > longest[1] else time.size
     return slice(start, stop) if stop > start else slice(0, time.size)
 
 

@@ -7,11 +7,14 @@ from fastapi import FastAPI
 from fastapi_offline import FastAPIOffline
 
 from service import problems
+from service.dashboard import assets
+from service.dashboard import routes as dashboard
 from service.metrics import Counting, Metrics
-from service.middleware import BodyLimit, SafeHeaders
-from service.routes import clutches, files, health, life, runs
+from service.middleware import BodyLimit, Heads, SafeHeaders
+from service.routes import clutches, diagnoses, files, fleet, health, life, runs
 from service.routes.context import Context
 from service.settings import CODE_VERSION, Settings
+from service.worker import Worker
 from service.workflows.views import Remembered
 from storage.database import open_database
 
@@ -29,10 +32,13 @@ def create_app(settings: Settings) -> FastAPI:
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         database = open_database(settings.database)
-        app.state.context = Context(database=database, remembered=Remembered(), metrics=metrics)
+        worker = Worker(database, settings)
         try:
+            worker.start()
+            app.state.context = Context(database=database, remembered=Remembered(), metrics=metrics, worker=worker)
             yield
         finally:
+            worker.close()
             database.close()
 
     app = FastAPIOffline(
@@ -43,10 +49,12 @@ def create_app(settings: Settings) -> FastAPI:
         redoc_url=None,
     )
     problems.install(app)
-    for part in (health, clutches, files, runs, life):
+    for part in (health, clutches, files, runs, life, diagnoses, fleet):
         app.include_router(part.router)
-    for twin in (runs.twins, life.twins):
+    for twin in (runs.twins, life.twins, fleet.twins):
         app.include_router(twin)
+    app.include_router(dashboard.router(assets.load()))
+    app.add_middleware(Heads)
     app.add_middleware(BodyLimit, most=settings.most_body_bytes, most_file=settings.most_file_bytes)
     app.add_middleware(SafeHeaders)
     app.add_middleware(Counting, metrics=metrics)

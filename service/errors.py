@@ -72,6 +72,14 @@ class UnsupportedMediaTypeError(ServiceError):
     title = "The body has a type that is not taken here"
 
 
+class BusyError(ServiceError):
+    """So much is waiting already that this is not taken now; the same again may be, a little later."""
+
+    status = 503
+    slug = "busy"
+    title = "Busy"
+
+
 class UnauthorizedError(ServiceError):
     """A key is needed and none that is known was sent."""
 

@@ -34,7 +34,8 @@ class RunRow(NewRun):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunInOrder:
-    """As much of a run as tracking needs; a stationary test has the range of its speeds, maintenance its event."""
+    """As much of a run as tracking needs; a stationary test has the range of its speeds, maintenance its event, a block of
+    duty what it says of itself (in the units it came in)."""
 
     run_key: int
     run_id: str
@@ -45,6 +46,10 @@ class RunInOrder:
     lowest_speed: float | None
     highest_speed: float | None
     event: str | None
+    duty_cycles: float | None = None
+    duty_energy_kj: float | None = None
+    duty_speed_rpm: float | None = None
+    duty_duration_s: float | None = None
 
 
 _insert = sa.insert(run)
@@ -66,10 +71,15 @@ _light = (
         func.json_extract(run.c.details, "$.speed_range[0]"),
         func.json_extract(run.c.details, "$.speed_range[1]"),
         func.json_extract(run.c.details, "$.event"),
+        func.json_extract(run.c.details, "$.duty.cycles"),
+        func.json_extract(run.c.details, "$.duty.energy_per_cycle_kj"),
+        func.json_extract(run.c.details, "$.duty.initial_speed_rpm"),
+        func.json_extract(run.c.details, "$.duty.engagement_duration_s"),
     )
     .where(_of_clutch)
     .order_by(run.c.cycles, run.c.run_id)
 )
+_rebuilds = _light.where(func.json_extract(run.c.details, "$.event") == "rebuild")
 _set_results = update(run).where(run.c.run_key == bindparam("wanted"))
 
 
@@ -107,6 +117,12 @@ def page(
 def in_order(connection: Connection, clutch_id: str) -> list[RunInOrder]:
     """All runs of a clutch in order, without their receipts."""
     found = connection.execute(_light, {"of_clutch": clutch_id})
+    return [RunInOrder(**dict(zip(_LIGHT, values, strict=True))) for values in found]
+
+
+def rebuilds(connection: Connection, clutch_id: str) -> list[RunInOrder]:
+    """The rebuilds of a clutch in order."""
+    found = connection.execute(_rebuilds, {"of_clutch": clutch_id})
     return [RunInOrder(**dict(zip(_LIGHT, values, strict=True))) for values in found]
 
 

@@ -109,6 +109,63 @@ filter_state = Table(
     Column("code_version", Text, nullable=False),
 )
 
+#: A diagnosis of the runs up to `last_run_key` that belong to the life that `life` names ("" or a rebuild's run_id).
+#: `report` is the public answer, `extension` what may be adopted, `problem` why there is none.
+diagnosis = Table(
+    "diagnosis",
+    metadata,
+    Column("diagnosis_key", Integer, primary_key=True),
+    Column("clutch_id", Text, ForeignKey("clutch.clutch_id"), nullable=False),
+    Column("diagnosis_id", Text, nullable=False),
+    Column("created_at", Text, nullable=False),
+    Column("finished_at", Text),
+    Column("status", Text, nullable=False),
+    Column("revision", Integer, nullable=False),
+    Column("last_run_key", Integer, nullable=False),
+    Column("life", Text, nullable=False),
+    Column("as_of_cycles", REAL),
+    Column("report", Text),
+    Column("extension", Text),
+    Column("problem", Text),
+    Column("code_version", Text, nullable=False),
+    UniqueConstraint("diagnosis_id", name="diagnosis_once"),
+    Index("diagnosis_in_order", "clutch_id", "diagnosis_key"),
+)
+
+#: The models that a clutch has been tracked under, by version; `diagnosis_id` null is the baseline.
+adopted_model = Table(
+    "adopted_model",
+    metadata,
+    Column("clutch_id", Text, ForeignKey("clutch.clutch_id"), primary_key=True),
+    Column("version", Integer, primary_key=True),
+    Column("diagnosis_id", Text, ForeignKey("diagnosis.diagnosis_id")),
+    Column("adopted_at", Text, nullable=False),
+)
+
+#: Mean COF under the adopted model, beside that of the fits, where the model takes an artefact off the measurement.
+corrected_cof = Table(
+    "corrected_cof",
+    metadata,
+    Column("run_key", Integer, ForeignKey("run.run_key"), primary_key=True),
+    Column("pressure", REAL, primary_key=True),
+    Column("mean_cof", REAL, nullable=False),
+    Column("mean_cof_sd", REAL, nullable=False),
+)
+
+#: What fleets of earlier lives say of the next, by version from 1 on. `fleet` names the kind of clutch (JSON), `left_out`
+#: the clutch that was not learned from, "" where all were; `members` are the clutches that taught it.
+fleet_prior = Table(
+    "fleet_prior",
+    metadata,
+    Column("fleet", Text, primary_key=True),
+    Column("version", Integer, primary_key=True),
+    Column("left_out", Text, primary_key=True),
+    Column("created_at", Text, nullable=False),
+    Column("members", Text, nullable=False),
+    Column("content", Text, nullable=False),
+    Column("code_version", Text, nullable=False),
+)
+
 access_key = Table(
     "access_key",
     metadata,

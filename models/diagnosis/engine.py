@@ -1,9 +1,45 @@
-"""The diagnosis of a campaign: baseline, alarm, candidates, set, closure, gain, advice."""
+"""The diagnosis of a campaign: baseline, alarm, candidates, verdict, and what follows from it."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
+from models.diagnosis.alarm import CONTRASTS_SHARE, EFFECTS_SHARE, Lead, lead, lines
+from models.diagnosis.baseline import frame_of
 from models.diagnosis.campaign import Campaign
-from models.diagnosis.report import Report
+from models.diagnosis.catalogue import CATALOGUE
+from models.diagnosis.design import Design, build_design
+from models.diagnosis.fitting import Fit, Priors, fit, priors_of
+from models.diagnosis.noise import estimate_noise, first_noise
+from models.diagnosis.projection import GAINS
+from models.diagnosis.raw import RawEvidence, raw_evidence
+from models.diagnosis.refitting import Hypothesis, at_gain, refitted
+from models.diagnosis.report import Report, Verdict
+from models.diagnosis.reporting import insufficient, report_of
+from models.diagnosis.selection import columns_of, linear_drop, screen, screen_pairs
+from models.diagnosis.starting import starting_laws
+from models.diagnosis.verdict import PAIR_PRICE, Judgement, judge
+from models.diagnosis.viewing import View, view_of
+from models.diagnosis.whitening import Noise
+
+#: So many single effects and pairs are refitted.
+SINGLES, PAIRS = 5, 4
+#: ... where the screen leaves them this close [nats] to the best, and this share of λ more.
+MARGIN, MARGIN_SHARE = 9.0, 0.2
+#: Fewer plateaus or speeds are no campaign.
+FEWEST_ROWS, FEWEST_SPEEDS = 24, 6
+#: Torques [Nm] outside are no clutch's.
+LEAST_TORQUE, MOST_TORQUE = 1e-6, 1e7
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Baseline:
+    """The pooled fit without effects, its noise, its priors, and what was noted on the way."""
+
+    noise: Noise
+    priors: Priors
+    fit: Fit
+    notes: tuple[str, ...]
 
 
 def diagnose(campaign: Campaign, *, rng: np.random.Generator, without: frozenset[str] = frozenset()) -> Report:
@@ -11,4 +47,109 @@ def diagnose(campaign: Campaign, *, rng: np.random.Generator, without: frozenset
 
     Effects whose slugs stand in `without` are taken out of the catalogue.
     """
-    raise NotImplementedError
+    design = build_design(campaign)
+    missing = missing_for_baseline(design)
+    if missing:
+        return insufficient(missing, design)
+    try:
+        with np.errstate(all="ignore"):
+            return _diagnosed(campaign, design, without, rng)
+    except (np.linalg.LinAlgError, ArithmeticError) as failure:
+        return insufficient(f"the pooled fit broke down on these numbers ({failure}).", design)
+
+
+def _diagnosed(campaign: Campaign, design: Design, without: frozenset[str], rng: np.random.Generator) -> Report:
+    baseline = fit_baseline(design)
+    if not np.isfinite(baseline.fit.cost):
+        return insufficient("no finite torque can be fitted to these numbers.", design)
+    effects = [effect for effect in CATALOGUE if effect.slug not in without]
+    columns = columns_of(effects, [effect.grid(design.facts) for effect in effects])
+    view = view_of(design, baseline.noise, baseline.priors, baseline.fit, columns)
+    raw = tuple(each for each in raw_evidence(campaign) if each.effect not in without)
+    leads = alarms(design, baseline, view, rng)
+    noise, hypotheses = baseline.noise, []
+    judgement = Judgement(verdict=Verdict.MODEL_ADEQUATE)
+    if any(each.raised for each in leads.values()):
+        noise, hypotheses = hypotheses_of(design, baseline, view, raw)
+        judgement = judge(design, noise, baseline.priors, hypotheses, rng)
+    return report_of(
+        campaign, design, noise, baseline.priors, view, with_lines(judgement, raw), hypotheses, raw, leads,
+        baseline.notes, rng,
+    )  # fmt: skip
+
+
+def missing_for_baseline(design: Design) -> str:
+    """What is missing for a pooled baseline, or nothing."""
+    if design.plateaus < FEWEST_ROWS:
+        return f"there are {design.plateaus} plateaus of stationary tests, and at least {FEWEST_ROWS} are needed."
+    steady = design.rows.velocity[: design.plateaus]
+    speeds = np.unique(np.round(steady / float(steady.max()), 3)).size
+    if speeds < FEWEST_SPEEDS:
+        return f"there are {speeds} distinct speeds, and at least {FEWEST_SPEEDS} are needed for a Stribeck curve."
+    usual, largest = float(np.median(np.abs(design.torque))), float(np.abs(design.torque).max())
+    if not (LEAST_TORQUE < usual and largest < MOST_TORQUE):
+        return f"torques of {usual:.3g} Nm in the median and {largest:.3g} Nm at most are no clutch's."
+    return ""
+
+
+def fit_baseline(design: Design) -> Baseline:
+    """The pooled fit, and the noise that its residuals show, in turns."""
+    notes = list(design.notes)
+    frame = frame_of(design)
+    start = starting_laws(design, frame)
+    priors = priors_of(design, start.theta, frame)
+    noise = first_noise(design)
+    fitted = fit(design, noise, start, priors, steps=10)
+    assumed = False
+    for _ in range(2):
+        noise, assumed = estimate_noise(design, fitted.residual, fitted.torque, noise)
+        fitted = fit(design, noise, fitted.laws, priors)
+    if assumed:
+        notes.append("Too few rows to tell noise: 1 % of the torque is assumed.")
+    if not design.facts.temperature_measured:
+        notes.append("No oil temperature was measured: nothing that it could imitate is named.")
+    return Baseline(noise=noise, priors=priors, fit=fitted, notes=tuple(notes))
+
+
+def alarms(design: Design, baseline: Baseline, view: View, rng: np.random.Generator) -> dict[str, Lead]:
+    """The three statistics of the alarm."""
+    one_sided = np.array([float(column.effect.positive) for column in view.columns])
+    return {
+        "effects": lead(view.projections, view.effects, one_sided, EFFECTS_SHARE, rng),
+        "contrasts": lead(view.projections, view.smooth, np.zeros(len(view.contrasts.axes)), CONTRASTS_SHARE, rng),
+        "lines": lines(design, baseline.noise, baseline.fit.residual)[0],
+    }
+
+
+def hypotheses_of(
+    design: Design, baseline: Baseline, view: View, raw: tuple[RawEvidence, ...]
+) -> tuple[Noise, list[Hypothesis]]:
+    """The best singles and pairs refitted, and the rest as screened, best first; the noise with the likely gains."""
+    singles = screen(view.columns, view.projections)
+    pairs = screen_pairs(view.columns, view.projections)[:PAIRS]
+    first = max((*singles[:1], *pairs[:1]), key=lambda each: each.evidence, default=None)
+    if first is None:
+        return baseline.noise, []
+    noise = at_gain(baseline.noise, float(GAINS[first.gain]))
+    projected = view.projections[first.gain]
+    null = fit(design, noise, baseline.fit.laws, baseline.priors)
+    margin = MARGIN + MARGIN_SHARE * max(linear_drop(view.columns, projected, first)[1], 0.0)
+    tried = [each for each in singles[:SINGLES] if each.evidence > singles[0].evidence - margin]
+    tried += [each for each in pairs if each.evidence > singles[0].evidence + PAIR_PRICE - 0.5 * MARGIN]
+    found = [
+        refitted(design, noise, baseline.priors, null, each, linear_drop(view.columns, projected, each))
+        for each in tried
+    ]
+    rest = [
+        Hypothesis(effects=each.effects, evidence=each.evidence, drop=0.0, fit=None)
+        for each in singles
+        if each not in tried
+    ]
+    seen = {each.effect: each.log_evidence for each in raw}
+    told = [each.seen_raw(seen) for each in (*found, *rest)]
+    return noise, sorted(told, key=lambda each: -each.evidence)
+
+
+def with_lines(judgement: Judgement, raw: tuple[RawEvidence, ...]) -> Judgement:
+    """The verdict with what raw records show beside it: vibrations are causes of their own."""
+    return judgement.joined(tuple(each.effect for each in raw if each.effect != "unsettled_dwell"))

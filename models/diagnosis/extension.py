@@ -3,15 +3,30 @@
 An *artefact* (oil temperature, a shifted zero, an unsettled dwell ...) is in the measurement and not in the clutch: its
 torque is taken off every plateau before a curve is fitted. A *course* (running-in, oil change, accelerated wear ...) is in
 the clutch and not in eq. 6: its mean torque is taken off the measured course before eq. 6 is tracked, and put back when
-the threshold's first passage is looked for.
+the threshold's first passage is looked for. Where the cause is ambiguous, every alternative counts with its probability.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
+import numpy as np
+
 from models.arrays import FloatArray
-from models.diagnosis.campaign import Campaign, StationaryRun
+from models.clutch import Geometry
+from models.diagnosis.campaign import Campaign, Oil, StationaryRun
+from models.diagnosis.catalogue import BY_SLUG
+from models.diagnosis.design import Points, build_design
+from models.diagnosis.effect import Kind
+from models.diagnosis.effects.load_severity import LOGGED
+from models.diagnosis.facts import Facts, facts_of
+from models.diagnosis.fitting import Fit
+from models.diagnosis.laws import Frame, Laws, scene_of
+from models.runs import Plateaus
+
+#: Plateaus are handed on in parts of this many: a design takes no more of one run.
+_PART = 2000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,21 +43,75 @@ class Extension:
         """Torque [n] Nm that the artefacts add to each plateau of a run; zero where there are none.
 
         `campaign` gives what a run alone does not say (maintenance, moments of the other runs); it need not hold `run`.
+        Without oil temperature, what it would have done cannot be taken off and is not.
         """
-        raise NotImplementedError
+        count = run.plateaus.torque.size
+        found = np.zeros(count)
+        usable = np.flatnonzero((run.plateaus.pressure > 0) & (run.plateaus.speed != 0))
+        for rows in np.array_split(usable, max(1, math.ceil(usable.size / _PART))):
+            if rows.size:
+                found[rows] = self._on(run, rows, campaign)
+        return found
+
+    def _on(self, run: StationaryRun, rows: np.ndarray[Any, np.dtype[np.intp]], campaign: Campaign) -> FloatArray:
+        table = run.plateaus
+        part = Plateaus(
+            pressure=table.pressure[rows],
+            speed=table.speed[rows],
+            torque=table.torque[rows],
+            oil_temperature=None if table.oil_temperature is None else table.oil_temperature[rows],
+        )
+        clock = None if run.time is None else tuple(np.asarray(run.time)[rows].tolist())
+        alone = replace(campaign, stationary=(replace(run, plateaus=part, time=clock, record=None),), dynamic=())
+        points = build_design(alone).points
+        return points.sign * self._mean(points, self._facts(campaign), {Kind.ARTEFACT})[0]
 
     def course(self, cycles: FloatArray, pressure: FloatArray, velocity: FloatArray) -> FloatArray:
-        """Mean torque [m, k] Nm over velocity [v] m/s that the effects of use add at cycles [m] and pressure [k] Pa."""
-        raise NotImplementedError
+        """Mean torque [m, k] Nm over velocity [v] m/s > 0 that effects of use add at cycles [m] and pressure [k] Pa."""
+        return self._course(cycles, pressure, velocity)[0]
 
     def course_sd(self, cycles: FloatArray, pressure: FloatArray, velocity: FloatArray) -> FloatArray:
-        """Deviation [m, k] Nm of `course`, from the effect's amplitude and shape."""
-        raise NotImplementedError
+        """Deviation [m, k] Nm of `course`, from the effects' amplitudes and between alternatives."""
+        return self._course(cycles, pressure, velocity)[1]
+
+    def _course(self, cycles: FloatArray, pressure: FloatArray, velocity: FloatArray) -> tuple[FloatArray, FloatArray]:
+        shape = (cycles.size, pressure.size, velocity.size)
+        grid = np.broadcast_arrays(cycles[:, None, None], pressure[:, None], velocity)
+        if not self.content["courses"]:
+            return np.zeros(shape[:2]), np.zeros(shape[:2])
+        points = _steady_points(*(np.ravel(each) for each in grid))
+        mean, deviation = self._mean(points, facts_from(self.content["facts"]), {Kind.COURSE})
+        return mean.reshape(shape).mean(axis=2), deviation.reshape(shape).mean(axis=2)
+
+    def _facts(self, campaign: Campaign) -> Facts:
+        """The campaign's facts, with the temperature and the states that the diagnosis referred to."""
+        kept = facts_from(self.content["facts"])
+        return replace(facts_of(campaign), reference_temperature=kept.reference_temperature, states=kept.states)
+
+    def _mean(self, points: Points, facts: Facts, kinds: set[Kind]) -> tuple[FloatArray, FloatArray]:
+        """Weighted over the alternatives: change [P] Nm and its deviation [P] Nm."""
+        weights, means, variances = [], [], []
+        for alternative in self.content["alternatives"]:
+            scene = scene_of(_laws(alternative), points, facts)
+            mean, variance = np.zeros(points.run.size), np.zeros(points.run.size)
+            for each in alternative["effects"]:
+                effect = BY_SLUG[each["slug"]]
+                if effect.kind in kinds and not _counted(each):
+                    change = _finite(effect.change(scene, each["amplitude"], tuple(each["shape"])))
+                    relative = each["amplitude_sd"] / max(abs(each["amplitude"]), 1e-300)
+                    mean, variance = mean + change, variance + (change * relative) ** 2
+            weights.append(float(alternative["weight"]))
+            means.append(mean)
+            variances.append(variance)
+        weight = np.array(weights)[:, None] / sum(weights)
+        mean = (weight * means).sum(axis=0)
+        return mean, np.sqrt((weight * (np.array(variances) + (np.array(means) - mean) ** 2)).sum(axis=0))
 
     @property
     def severity_exponent(self) -> float | None:
-        """Where load severity was adopted: ζ grows by (energy/usual energy)^exponent a cycle; else None."""
-        raise NotImplementedError
+        """Where load severity was named: ζ grows by (energy/usual energy)^exponent a cycle; else None."""
+        found = self.content.get("severity_exponent")
+        return None if found is None else float(found)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON can carry it."""
@@ -52,3 +121,97 @@ class Extension:
     def from_dict(cls, stored: Mapping[str, Any]) -> "Extension":
         """The inverse of `to_dict`."""
         return cls(effects=tuple(stored["effects"]), content=stored["content"])
+
+
+def build_extension(
+    alternatives: Sequence[tuple[float, Fit, Sequence[float]]], facts: Facts, *, courses: bool
+) -> Extension:
+    """From what was fitted: the weight of each alternative, its fit, the deviations of its effects' amplitudes.
+
+    The most probable one names the effects. `courses`: whether effects of use are to be followed beyond the data; where
+    they did not help to foretell the last states from the first, a life is tracked without them.
+    """
+    stored = [_stored(weight, fit, deviations) for weight, fit, deviations in alternatives]
+    best = max(stored, key=lambda each: float(each["weight"]))
+    counted = [each["amplitude"] for each in best["effects"] if _counted(each)]
+    return Extension(
+        effects=tuple(each["slug"] for each in best["effects"]),
+        content={
+            "facts": facts_to(facts),
+            "alternatives": stored,
+            "courses": courses,
+            "severity_exponent": counted[0] if counted and courses else None,
+        },
+    )
+
+
+def _counted(effect: Mapping[str, Any]) -> bool:
+    """Whether an effect is in what ζ counts (`severity_exponent`), and not in a course."""
+    return bool(effect["slug"] == "load_severity" and effect["shape"][0] == LOGGED)
+
+
+def facts_to(facts: Facts) -> dict[str, Any]:
+    """Facts as JSON can carry them: arrays as lists, what is not a number as None."""
+    found: dict[str, Any] = {}
+    for each in fields(Facts):
+        value = getattr(facts, each.name)
+        if isinstance(value, Geometry | Oil):
+            found[each.name] = asdict(value)
+        elif isinstance(value, np.ndarray | tuple):
+            found[each.name] = [None if math.isnan(float(x)) else float(x) for x in value]
+        else:
+            found[each.name] = value
+    return found
+
+
+def facts_from(stored: Mapping[str, Any]) -> Facts:
+    """The inverse of `facts_to`."""
+    found: dict[str, Any] = dict(stored) | {"geometry": Geometry(**stored["geometry"]), "oil": Oil(**stored["oil"])}
+    for each in fields(Facts):
+        value = found[each.name]
+        if isinstance(value, list):
+            numbers = [math.nan if x is None else x for x in value]
+            found[each.name] = np.array(numbers, dtype=np.float64) if each.type is FloatArray else tuple(numbers)
+    return Facts(**found)
+
+
+def _stored(weight: float, fit: Fit, deviations: Sequence[float]) -> dict[str, Any]:
+    frame = {each.name: getattr(fit.laws.frame, each.name) for each in fields(Frame)}
+    effects = [
+        {"slug": one.effect.slug, "amplitude": one.amplitude, "amplitude_sd": sd, "shape": list(one.shape)}
+        for one, sd in zip(fit.effects, deviations, strict=True)
+    ]
+    frame["loop_pressures"] = fit.laws.frame.loop_pressures.tolist()
+    return {"weight": weight, "theta": fit.laws.theta.tolist(), "frame": frame, "effects": effects}
+
+
+def _laws(alternative: Mapping[str, Any]) -> Laws:
+    frame = alternative["frame"]
+    at = Frame(**(frame | {"loop_pressures": np.array(frame["loop_pressures"], dtype=np.float64)}))
+    return Laws(theta=np.array(alternative["theta"], dtype=np.float64), frame=at)
+
+
+def _steady_points(cycles: FloatArray, pressure: FloatArray, velocity: FloatArray) -> Points:
+    """Plateaus in thought: no temperature but the reference's, no clock, no neighbours."""
+    count = cycles.size
+    whole, none, zero = np.zeros(count, dtype=np.intp), np.full(count, -1, dtype=np.intp), np.zeros(count)
+    nan = np.full(count, np.nan)
+    return Points(
+        run=whole,
+        cycles=cycles,
+        pressure=pressure,
+        velocity=velocity,
+        sign=np.ones(count),
+        acceleration=zero,
+        temperature=nan,
+        clock=zero,
+        moment=nan,
+        angular_frequency=zero,
+        phase=zero,
+        loop=none,
+        previous=none,
+    )
+
+
+def _finite(change: FloatArray) -> FloatArray:
+    return np.asarray(np.nan_to_num(change, nan=0.0, posinf=0.0, neginf=0.0))

@@ -62,8 +62,9 @@ class Misfit:
 class Gain:
     """What the extension gains on runs held out by state and by pressure; rmse [Nm], log score [nats].
 
-    `reduction_sd` [%] is the paired uncertainty of `reduction_percent`. MSE is eq. 5's percentage. `remaining` tells
-    whether the extension also helps to foretell the last states from the first ones: log score gained there [nats].
+    `reduction_sd` [%] is the paired uncertainty of `reduction_percent`. `excess` [Nm] is the error beyond noise. MSE is
+    eq. 5's percentage. `remaining` tells whether the extension also helps to foretell the last states from the first ones:
+    log score gained there [nats].
     """
 
     held_out_runs: tuple[str, ...]
@@ -71,6 +72,8 @@ class Gain:
     rmse_after: float
     reduction_percent: float
     reduction_sd: float
+    excess_before: float
+    excess_after: float
     mse_percent_before: float
     mse_percent_after: float
     log_score_gain: float
@@ -81,9 +84,10 @@ class Gain:
 class Advice:
     """A test that would decide between two effects (or between an effect and none, then `other` is "baseline").
 
-    `nats` is what it is expected to bring.
+    `key` names the test for machines (`models.diagnosis.advice.TESTS`), `nats` is what it is expected to bring.
     """
 
+    key: str
     test: str
     effect: str
     other: str

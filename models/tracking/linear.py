@@ -1,60 +1,28 @@
-"""The closed form that grid and particle share: eq. 6 is linear in ξ0 and Δ once φ, ε and the scatter s are given.
+"""The closed form that the filters share: all is linear once φ, ε, the scatter s and the size q are given.
 
-With y_t = ξ0 + Δ b_t + e_t, b_t = 1 - (1 + ζ_t/φ)^-ε and e_t ~ N(0, v_t + s²), normal priors on ξ0 and Δ lead to a
-normal posterior and to the probability of the data with both integrated out. A few weighted sums over the measurements
-are all that either needs, with weights r_t = 1/(v_t + s²) and y_t taken from the prior mean of ξ0.
+With y_t = ξ0 + Δ b_t + Σ_k w_k Z_tk + e_t, b_t = 1 - (1 + ζ_t/φ)^-ε and e_t ~ N(0, d_t), d_t = v_t + s², normal priors
+on ξ0, Δ and w (the discrepancy and the steps, `models.tracking.discrepancy`) lead to a normal posterior and to the
+probability of the data with all of them integrated out. For a spoiled run d_t has a further W². A few weighted sums
+over the measurements are all that is needed, with weights r_t = 1/d_t and y_t taken from the prior mean of ξ0. The
+further terms go first: with M = I + σZᵀRZσ = LLᵀ and N = L⁻¹ σZᵀR (1, y, b), each sum loses the product of its columns
+of N.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.tracking.measurement import Measurement
+from models.tracking.discrepancy import column_sds, columns
+from models.tracking.history import History
 from models.tracking.prior import Prior
-
-#: Values are told apart to this share of the prior's deviations. Where a series is free of noise its likelihood grows
-#: without bound as the scatter vanishes, and differences of sums weighted by 1/s² would be rounding alone.
-RESOLUTION = 1e-6
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class History:
-    """The measurements so far, in the order they came: progress, value, variance, each [t]."""
-
-    progress: FloatArray
-    value: FloatArray
-    variance: FloatArray
-
-    @classmethod
-    def of(cls, measurements: Sequence[Measurement]) -> "History":
-        """The columns of a sequence of measurements, possibly empty."""
-        rows = np.array([(m.progress, m.value, m.variance) for m in measurements], dtype=np.float64).reshape(-1, 3)
-        return cls(progress=rows[:, 0].copy(), value=rows[:, 1].copy(), variance=rows[:, 2].copy())
-
-    def append(self, measurement: Measurement) -> "History":
-        """A history with one more measurement."""
-        return History(
-            progress=np.append(self.progress, measurement.progress),
-            value=np.append(self.value, measurement.value),
-            variance=np.append(self.variance, measurement.variance),
-        )
-
-    def to_arrays(self) -> dict[str, FloatArray]:
-        """The columns by name."""
-        return {"progress": self.progress, "value": self.value, "variance": self.variance}
-
-    @classmethod
-    def from_arrays(cls, arrays: dict[str, FloatArray]) -> "History":
-        """The inverse of `to_arrays`."""
-        return cls(progress=arrays["progress"], value=arrays["value"], variance=arrays["variance"])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sums:
-    """Weighted sums over the measurements: Σr, Σrb, Σrb², Σry, Σrby, Σry², and Σ log r; shapes broadcast."""
+    """Weighted sums over the measurements: Σr, Σrb, Σrb², Σry, Σrby, Σry², and Σ log r - log|M|; shapes broadcast."""
 
     r: FloatArray
     rb: FloatArray
@@ -67,7 +35,7 @@ class Sums:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Conditional:
-    """The normal posterior of (ξ0, Δ) given φ, ε and s: means, variances and covariance, equal shapes."""
+    """The normal posterior of (ξ0, Δ) given φ, ε, s and q: means, variances and covariance, equal shapes."""
 
     initial: FloatArray
     change: FloatArray
@@ -76,18 +44,34 @@ class Conditional:
     covariance: FloatArray
 
 
-def resolved(measurement: Measurement, prior: Prior) -> Measurement:
-    """The measurement with the variance of its resolution added, as every filter takes it in."""
-    resolution = RESOLUTION * math.hypot(prior.initial_sd, prior.change_sd)
-    return replace(measurement, variance=measurement.variance + resolution**2)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Points:
+    """Where the closed form is taken: log φ, log ε, log s and q, each [n], and which runs are spoiled [t, n] (0, 1)."""
+
+    log_scale: FloatArray
+    log_exponent: FloatArray
+    log_scatter: FloatArray
+    size: FloatArray
+    spoiled: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Terms:
+    """What is left of the further terms of the points `where` [j]: their prior deviations σ [j, p], L [j, p, p] and N
+    [j, p, 3] of the columns (1, y, b)."""
+
+    where: NDArray[np.intp]
+    sd: FloatArray
+    root: FloatArray
+    cross: FloatArray
 
 
 def evidence(sums: Sums, prior: Prior) -> FloatArray:
-    """Log probability of the data given φ, ε and s, with ξ0 and Δ integrated out.
+    """Log probability of the data given φ, ε, s and q, with ξ0, Δ and the further terms integrated out.
 
-    -½ [Σ log(2π/r) + log|A| + log(σ0² σΔ²) + Σ r z² - cᵀ A⁻¹ c], where z = y - E[ξ0] - E[Δ] b, c = (Σrz, Σrbz) and A
-    is the posterior precision. By elimination, so that the nearly singular A of a curve that has saturated keeps its
-    digits.
+    -½ [Σ log(2π/r) + log|M| + log|A| + log(σ0² σΔ²) + Σ r z² - cᵀ A⁻¹ c], where z = y - E[ξ0] - E[Δ] b, c = (Σrz, Σrbz)
+    and A is the posterior precision. By elimination, so that the nearly singular A of a curve that has saturated keeps
+    its digits.
     """
     a00, _, c0, pivot, d1 = _eliminate(sums, prior)
     mean = prior.change_mean
@@ -98,7 +82,7 @@ def evidence(sums: Sums, prior: Prior) -> FloatArray:
 
 
 def conditional(sums: Sums, prior: Prior) -> Conditional:
-    """The posterior of (ξ0, Δ) given φ, ε and s."""
+    """The posterior of (ξ0, Δ) given φ, ε, s and q."""
     a00, a01, c0, pivot, d1 = _eliminate(sums, prior)
     change_variance = 1.0 / pivot
     slope = a01 / a00
@@ -130,15 +114,23 @@ def basis(progress: FloatArray, log_scale: FloatArray, log_exponent: FloatArray)
     return np.asarray(1.0 - np.exp(-np.exp(log_exponent) * np.log(1.0 + progress * np.exp(-log_scale))))
 
 
-def pointwise(
-    history: History, prior: Prior, log_scale: FloatArray, log_exponent: FloatArray, log_scatter: FloatArray
-) -> Sums:
-    """The sums at points [n] of (log φ, log ε, log s); each [n]."""
-    b = basis(history.progress[:, None], log_scale, log_exponent)
-    r = 1.0 / (history.variance[:, None] + np.exp(2.0 * log_scatter))
+def log_spoiled(prior: Prior, spoiled: FloatArray) -> FloatArray:
+    """Log prior probability of which runs are spoiled, along the first axis of [t, ...]."""
+    count = spoiled.sum(axis=0)
+    if prior.spoiled_share == 0.0:
+        return np.where(count > 0, -np.inf, 0.0)
+    sound = spoiled.shape[0] - count
+    return np.asarray(count * math.log(prior.spoiled_share) + sound * math.log1p(-prior.spoiled_share))
+
+
+def pointwise(history: History, prior: Prior, points: Points) -> tuple[Sums, Terms]:
+    """The sums at n points, each [n], and what is left of the further terms."""
+    b = basis(history.progress[:, None], points.log_scale, points.log_exponent)
+    further = (prior.spoiled_size * prior.size) ** 2
+    r = 1.0 / (history.variance[:, None] + further * points.spoiled + np.exp(2.0 * points.log_scatter))
     y = history.value - prior.initial_mean
     rb = r * b
-    return Sums(
+    sums = Sums(
         r=r.sum(axis=0),
         rb=rb.sum(axis=0),
         rbb=np.einsum("tn,tn->n", rb, b),
@@ -147,21 +139,112 @@ def pointwise(
         ryy=y**2 @ r,
         log_r=np.log(r / (2.0 * np.pi)).sum(axis=0),
     )
+    z = columns(history)
+    sd = column_sds(prior, points.size, history.steps.size)
+    where = np.flatnonzero(sd.any(axis=1))
+    if where.size == 0:
+        return sums, Terms(where=where, sd=sd[:0], root=np.zeros((0, 0, 0)), cross=np.zeros((0, 0, 3)))
+    r, rb, sd = r[:, where].T, rb[:, where].T, sd[where]
+    squares = (z[:, :, None] * z[:, None, :]).reshape(y.size, z.shape[1] ** 2)
+    gram = (r @ squares).reshape(where.size, sd.shape[1], sd.shape[1])
+    cross = np.stack([r @ z, (r * y) @ z, rb @ z], axis=2)
+    terms = _reduced(gram, cross, sd, where)
+    return _without(sums, terms), terms
 
 
-def tabulated(history: History, prior: Prior, table: FloatArray, log_scatter: FloatArray, blur: float = 0.0) -> Sums:
-    """The sums on a table of scatter levels [l] by cells [g], from the cells' table b [t, g], by matrix products.
+def tabulated(
+    history: History,
+    prior: Prior,
+    table: FloatArray,
+    log_scatter: FloatArray,
+    size: FloatArray,
+    spoiled: FloatArray,
+    blur: FloatArray | float = 0.0,
+) -> Sums:
+    """The sums of k kinds by scatter levels by cells, by matrix products; [k, l, g], those without b [k, l, 1].
 
-    Sums with b have the shape [l, g], those without [l, 1]. `blur` is a further deviation of every measurement.
+    `table` holds b, [t, g] or [k, t, g]; a kind has its own levels log_scatter [k, l], size q [k] and spoiled runs
+    [t, k]. `blur` is a further deviation of every measurement, one or [k].
     """
-    r = 1.0 / (history.variance + blur**2 + np.exp(2.0 * log_scatter)[:, None])
+    further = (prior.spoiled_size * prior.size) ** 2
+    fixed = history.variance + further * spoiled.T + (np.zeros(size.size) + blur)[:, None] ** 2
+    r = 1.0 / (fixed[:, None, :] + np.exp(2.0 * log_scatter)[:, :, None])
     y = history.value - prior.initial_mean
-    return Sums(
-        r=r.sum(axis=1, keepdims=True),
+    sums = Sums(
+        r=r.sum(axis=2)[:, :, None],
         rb=r @ table,
         rbb=r @ table**2,
-        ry=(r @ y)[:, None],
+        ry=(r @ y)[:, :, None],
         rby=(r * y) @ table,
-        ryy=(r @ y**2)[:, None],
-        log_r=np.log(r / (2.0 * np.pi)).sum(axis=1, keepdims=True),
+        ryy=(r @ y**2)[:, :, None],
+        log_r=np.log(r / (2.0 * np.pi)).sum(axis=2)[:, :, None],
     )
+    z = columns(history)
+    sd = column_sds(prior, size, history.steps.size)
+    where = np.flatnonzero(sd.any(axis=1))
+    if where.size == 0:
+        return sums
+    sd = sd[where, None, :]
+    weighted = (r[where, :, None, :] * z.T) * sd[..., None]
+    levels, terms = r.shape[1], z.shape[1]
+    flat = weighted.reshape(where.size, levels * terms, y.size)
+    of_b = (flat @ (table if table.ndim == 2 else table[where])).reshape(where.size, levels, terms, -1)
+    root = np.linalg.cholesky(np.eye(terms) + (weighted @ z) * sd[:, :, None, :])
+    inverse = np.linalg.inv(root)
+    n_1, n_y = (inverse @ weighted.sum(axis=3)[..., None])[..., 0], (inverse @ (weighted @ y)[..., None])[..., 0]
+    n_b = inverse @ of_b
+    lost = {
+        "r": np.square(n_1).sum(axis=2)[:, :, None],
+        "rb": np.einsum("klp,klpg->klg", n_1, n_b),
+        "rbb": np.einsum("klpg,klpg->klg", n_b, n_b),
+        "ry": (n_1 * n_y).sum(axis=2)[:, :, None],
+        "rby": np.einsum("klp,klpg->klg", n_y, n_b),
+        "ryy": np.square(n_y).sum(axis=2)[:, :, None],
+        "log_r": 2.0 * np.log(np.diagonal(root, axis1=2, axis2=3)).sum(axis=2)[:, :, None],
+    }
+    return _less(sums, lost, where)
+
+
+def drawn_terms(terms: Terms, off_initial: FloatArray, change: FloatArray, normals: FloatArray) -> FloatArray:
+    """Draws of the further terms given ξ0 (less its prior mean) and Δ, each [n], from normals [n, p]; [n, p].
+
+    w = σ L⁻ᵀ (N_y - ξ0 N_1 - Δ N_b + z); zero where there are none.
+    """
+    found = np.zeros_like(normals)
+    if terms.where.size:
+        at = terms.where
+        n = terms.cross
+        right = n[:, :, 1] - off_initial[at, None] * n[:, :, 0] - change[at, None] * n[:, :, 2] + normals[at]
+        found[at] = terms.sd * np.linalg.solve(np.swapaxes(terms.root, 1, 2), right[:, :, None])[:, :, 0]
+    return found
+
+
+def _reduced(gram: FloatArray, cross: FloatArray, sd: FloatArray, where: NDArray[np.intp]) -> Terms:
+    root = np.asarray(
+        np.linalg.cholesky(np.eye(sd.shape[1]) + gram * sd[:, :, None] * sd[:, None, :]), dtype=np.float64
+    )
+    left = np.asarray(np.linalg.solve(root, cross * sd[:, :, None]), dtype=np.float64)
+    return Terms(where=where, sd=sd, root=root, cross=left)
+
+
+def _without(sums: Sums, terms: Terms) -> Sums:
+    n_1, n_y, n_b = np.moveaxis(terms.cross, 2, 0)
+    lost = {
+        "r": np.square(n_1).sum(axis=1),
+        "rb": (n_1 * n_b).sum(axis=1),
+        "rbb": np.square(n_b).sum(axis=1),
+        "ry": (n_1 * n_y).sum(axis=1),
+        "rby": (n_y * n_b).sum(axis=1),
+        "ryy": np.square(n_y).sum(axis=1),
+        "log_r": 2.0 * np.log(np.diagonal(terms.root, axis1=1, axis2=2)).sum(axis=1),
+    }
+    return _less(sums, lost, terms.where)
+
+
+def _less(sums: Sums, lost: dict[str, FloatArray], where: NDArray[np.intp]) -> Sums:
+    found = {}
+    for name, loss in lost.items():
+        column = getattr(sums, name)
+        column[where] -= loss
+        found[name] = column
+    return Sums(**found)

@@ -8,15 +8,17 @@ from dataclasses import dataclass
 class Measurement:
     """One fitted value of the quantity at progress ζ >= 0 (cycles), with the variance >= 0 of its fit.
 
-    Raises ValueError where a number is not finite or negative where it must not be.
+    `epoch` >= 0 counts the events so far that may have shifted the level (an oil change, a zeroed sensor): measurements
+    of one epoch share a level. Raises ValueError where a number is not finite or negative where it must not be.
     """
 
     progress: float
     value: float
     variance: float
+    epoch: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("progress", "value", "variance"):
+        for name in ("progress", "value", "variance", "epoch"):
             number = getattr(self, name)
             if not math.isfinite(number):
                 raise ValueError(f"{name} must be finite, got {number}")

@@ -1,54 +1,69 @@
 """A particle filter for eq. 6 that marginalises what is linear and keeps its particles apart.
 
-Particles carry (log φ, log ε, log s); given these, ξ0 and Δ follow a Kalman update in closed form (Rao-Blackwell),
-and a particle's weight grows by the predictive probability of each measurement. The coefficients do not move, so
+Particles carry (log φ, log ε, log s), the size q of the discrepancy and, of every run, whether it was spoiled; given
+these, all else is linear and integrated out in closed form (Rao-Blackwell). The coefficients do not move, so
 resampling alone would soon leave copies of one particle. After it every particle takes Metropolis-Hastings steps that
 leave the exact marginal posterior over the whole history as it is (iterated batch importance sampling), until nine in
 ten have moved.
 
-A measurement that would starve the cloud at once is let in by degrees: first with a large further variance, which is
-then taken away in steps, with resampling and moves in between. Each step is a posterior too, so nothing is
-approximated.
+A measurement that would starve the cloud at once is let in by degrees: the cloud passes through targets that lie
+between the old posterior and the new one, their logarithms mixed (1 - β) : β, with resampling and moves in between.
+The last target is the posterior itself, so nothing is approximated.
 
-Source: N. Chopin, "A sequential particle filter method for static models", Biometrika 89 (2002) 539-552.
+Sources: N. Chopin, "A sequential particle filter method for static models", Biometrika 89 (2002) 539-552; P. Del Moral,
+A. Doucet, A. Jasra, "Sequential Monte Carlo samplers", J. R. Statist. Soc. B 68 (2006) 411-436.
 """
 
-import math
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from models.arrays import FloatArray
-from models.tracking.linear import History, basis, conditional, evidence, pointwise, resolved
+from models.tracking.discrepancy import PAST, SIZES, drawn, log_size_weight
+from models.tracking.history import History
+from models.tracking.linear import Points, conditional, drawn_terms, evidence, log_spoiled, pointwise
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
 from models.tracking.protocol import Posterior
-from models.tracking.sampling import correlated_pair, spread_normals, systematic
+from models.tracking.sampling import correlated_pair, spread_normals, spread_points, systematic
 
 #: Resample below this share of effective particles; let no single step bring them below the second share.
 HEALTHY, STARVED = 0.5, 0.25
 #: Steps of a move: at most so many, until this share of particles has moved since resampling.
 MOVES, MOVED = 8, 0.9
-#: Degrees by which a measurement may be let in, and the ratio of one further variance to the next that is tried.
-DEGREES, RATIO = 30, 0.5
+#: In a step, how often another size is tried, and how often another belief about one run.
+RESIZED, TURNED = 0.25, 0.1
+#: Degrees by which a measurement may be let in, and halvings in the search for each.
+DEGREES, HALVINGS = 30, 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cloud:
-    """n particles: points [n, 3] of (log φ, log ε, log s), log_weight [n], log_target [n] (log prior plus evidence),
-    and the normal of (ξ0, Δ) of each: mean [n, 2], covariance [n, 3] (variance of ξ0, covariance, variance of Δ)."""
+    """n particles: points [n, 3] of (log φ, log ε, log s), size [n] an index into SIZES, spoiled [n, t] (0, 1),
+    log_weight [n] and log_target [n] (log prior plus evidence)."""
 
     points: FloatArray
+    size: FloatArray
+    spoiled: FloatArray
     log_weight: FloatArray
     log_target: FloatArray
-    mean: FloatArray
-    covariance: FloatArray
 
     def taken(self, index: NDArray[np.intp]) -> "Cloud":
         """The particles at `index`, with equal weights."""
         cloud = Cloud(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
-        return replace(cloud, log_weight=np.zeros(self.log_weight.size))
+        return replace(cloud, log_weight=np.zeros(index.size))
+
+    def placed(self) -> Points:
+        """The particles as points of the closed form."""
+        return Points(
+            log_scale=self.points[:, 0],
+            log_exponent=self.points[:, 1],
+            log_scatter=self.points[:, 2],
+            size=SIZES[self.size.astype(np.intp)],
+            spoiled=self.spoiled.T,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,144 +105,159 @@ class Particle:
         """Particles spread evenly over the prior, the same every time."""
         centre = np.array([prior.log_scale_mean, prior.log_exponent_mean, prior.log_scatter_mean])
         spread = np.array([prior.log_scale_sd, prior.log_exponent_sd, prior.log_scatter_sd])
-        points = centre + spread * spread_normals(self.particles, np.full(3, 0.5))
-        nothing = History.of(())
-        cloud = _cloud(nothing, prior, points)
-        return ParticleState(prior=prior, history=nothing, cloud=cloud)
+        even = spread_points(self.particles, np.full(4, 0.5))
+        sizes = np.searchsorted(np.cumsum(np.exp(log_size_weight(prior)))[:-1], even[:, 3], side="right")
+        cloud = Cloud(
+            points=centre + spread * ndtri(even[:, :3]),
+            size=sizes.astype(np.float64),
+            spoiled=np.zeros((self.particles, 0)),
+            log_weight=np.zeros(self.particles),
+            log_target=np.zeros(self.particles),
+        )
+        nothing = History.of((), prior)
+        return ParticleState(
+            prior=prior, history=nothing, cloud=replace(cloud, log_target=_log_target(nothing, prior, cloud))
+        )
 
     def update(self, state: ParticleState, measurement: Measurement, rng: np.random.Generator) -> ParticleState:
         """The posterior with one more measurement."""
-        prior, history, cloud = state.prior, state.history, state.cloud
-        measurement = resolved(measurement, prior)
-        further = math.inf
-        for degree in range(DEGREES):
-            forecast = _Forecast.of(cloud, measurement)
-            before = forecast.log_density(further)
-            further = 0.0 if degree == DEGREES - 1 else _next_degree(forecast, cloud.log_weight - before, further)
-            log_weight = cloud.log_weight + forecast.log_density(further) - before
+        bridge = _Bridge(state.prior, state.history, state.history.append(measurement, state.prior))
+        cloud, before, after = bridge.entered(state.cloud, rng)
+        held, degree = 1.0, 0.0
+        for attempt in range(DEGREES):
+            gap = after - before
+            start = cloud.log_weight - held * gap
+            degree = 1.0 if attempt == DEGREES - 1 else _next_degree(start, gap, degree)
+            log_weight = start + degree * gap
             cloud = replace(cloud, log_weight=log_weight - log_weight.max())
-            if further > 0.0 or _effective(cloud.log_weight) < HEALTHY * self.particles:
-                cloud = self._renewed(cloud, prior, history, measurement, further, rng)
-            if further == 0.0:
+            if degree < 1.0 or _effective(cloud.log_weight) < HEALTHY * self.particles:
+                cloud, before, after = self._renewed(bridge, cloud, before, after, degree, rng)
+            if degree == 1.0:
                 break
-        return ParticleState(prior=prior, history=history.append(measurement), cloud=_learnt(cloud, measurement))
+            held = degree
+        return ParticleState(prior=state.prior, history=bridge.after, cloud=replace(cloud, log_target=after))
 
     def _renewed(
         self,
+        bridge: "_Bridge",
         cloud: Cloud,
-        prior: Prior,
-        history: History,
-        measurement: Measurement,
-        further: float,
+        before: FloatArray,
+        after: FloatArray,
+        degree: float,
         rng: np.random.Generator,
-    ) -> Cloud:
-        """Resampled, and moved by steps of a random walk shaped like the cloud; the target includes `measurement`."""
+    ) -> tuple[Cloud, FloatArray, FloatArray]:
+        """Resampled, and moved by steps of a random walk shaped like the cloud; with both targets of each particle."""
         weight = _weights(cloud.log_weight)
         off = cloud.points - weight @ cloud.points
         shape = _root((weight * off.T) @ off)
-        cloud = cloud.taken(systematic(weight, weight.size, float(rng.random())))
-        target = cloud.log_target + _Forecast.of(cloud, measurement).log_density(further)
+        index = systematic(weight, weight.size, float(rng.random()))
+        cloud, before, after = cloud.taken(index), before[index], after[index]
         moved = np.zeros(weight.size, dtype=bool)
         for _ in range(self.moves):
-            stride = rng.uniform(0.2, 1.6, size=(weight.size, 1))
-            step = stride * rng.standard_normal(cloud.points.shape) @ shape.T
-            proposed = _cloud(history, prior, cloud.points + step)
-            offered = proposed.log_target + _Forecast.of(proposed, measurement).log_density(further)
-            accepted = np.log(rng.random(weight.size)) < offered - target
+            proposed = _proposed(cloud, shape, rng)
+            offered_after = _log_target(bridge.after, bridge.prior, proposed)
+            offered_before = before if degree == 1.0 else bridge.log_before(proposed)
+            gain = degree * (offered_after - after)
+            if degree < 1.0:
+                gain += (1.0 - degree) * (offered_before - before)
+            accepted = np.log(rng.random(weight.size)) < gain
             cloud = _merged(cloud, proposed, accepted)
-            target = np.where(accepted, offered, target)
+            after = np.where(accepted, offered_after, after)
+            before = np.where(accepted, offered_before, before)
             moved |= accepted
             if moved.mean() >= MOVED:
                 break
-        return cloud
+        return cloud, before, after
 
     def posterior(self, state: ParticleState, size: int, rng: np.random.Generator) -> Posterior:
         """`size` draws of equal weight: systematic over the particles, with evenly spread draws of (ξ0, Δ)."""
         cloud, offset = state.cloud, rng.random(3)
         index = systematic(_weights(cloud.log_weight), size, float(offset[2]))
-        variance = cloud.covariance[index]
-        pair = cloud.mean[index] + correlated_pair(
-            spread_normals(size, offset[:2]), variance[:, 0], variance[:, 2], variance[:, 1]
+        points = cloud.taken(index).placed()
+        sums, terms = pointwise(state.history, state.prior, points)
+        given = conditional(sums, state.prior)
+        pair = correlated_pair(
+            spread_normals(size, offset[:2]), given.initial_variance, given.change_variance, given.covariance
         )
-        scale, exponent, scatter = np.exp(cloud.points[index]).T
+        initial, change = given.initial + pair[:, 0], given.change + pair[:, 1]
+        normals = rng.standard_normal((size, PAST + state.history.steps.size))
+        further = drawn_terms(terms, initial - state.prior.initial_mean, change, normals)
         return Posterior(
             weight=np.full(size, 1.0 / size),
-            initial=pair[:, 0],
-            change=pair[:, 1],
-            scale=scale,
-            exponent=exponent,
-            scatter=scatter,
+            initial=initial,
+            change=change,
+            scale=np.exp(points.log_scale),
+            exponent=np.exp(points.log_exponent),
+            scatter=np.exp(points.log_scatter),
+            discrepancy=drawn(state.history, state.prior, points.size, further, rng),
         )
 
 
 @dataclass(frozen=True, slots=True)
-class _Forecast:
-    """What each particle expects of a measurement: `off` [n] by how much it is wrong, with `variance` [n]."""
+class _Bridge:
+    """From the posterior of one history to that of the next, which has one measurement more."""
 
-    off: FloatArray
-    variance: FloatArray
+    prior: Prior
+    before: History
+    after: History
 
-    @classmethod
-    def of(cls, cloud: Cloud, measurement: Measurement) -> "_Forecast":
-        b = basis(np.asarray(measurement.progress), cloud.points[:, 0], cloud.points[:, 1])
-        initial, both, change = cloud.covariance.T
-        variance = initial + b * (2.0 * both + b * change) + measurement.variance + np.exp(2.0 * cloud.points[:, 2])
-        return cls(measurement.value - cloud.mean[:, 0] - cloud.mean[:, 1] * b, variance)
+    def entered(self, cloud: Cloud, rng: np.random.Generator) -> tuple[Cloud, FloatArray, FloatArray]:
+        """The particles with a belief about the new run, drawn from its posterior given the rest of each; and their log
+        targets before (with the prior of that belief) and after."""
+        count = cloud.size.size
+        as_sound = replace(cloud, spoiled=np.column_stack([cloud.spoiled, np.zeros(count)]))
+        as_spoiled = replace(cloud, spoiled=np.column_stack([cloud.spoiled, np.ones(count)]))
+        sound, spoiled = (_log_target(self.after, self.prior, each) for each in (as_sound, as_spoiled))
+        total = np.logaddexp(sound, spoiled)
+        turned = np.log(rng.random(total.size)) < spoiled - total
+        entered = _merged(as_sound, as_spoiled, turned)
+        after = np.where(turned, spoiled, sound)
+        before = cloud.log_target + _log_prior_of_last(self.prior, entered)
+        return replace(entered, log_weight=cloud.log_weight + total - cloud.log_target), before, after
 
-    def log_density(self, further: float) -> FloatArray:
-        """Log predictive density, where the measurement has a `further` variance; an infinite one says nothing."""
-        if math.isinf(further):
-            return np.zeros_like(self.off)
-        variance = self.variance + further
-        return np.asarray(-0.5 * (np.log(2.0 * np.pi * variance) + self.off**2 / variance))
-
-
-def _next_degree(forecast: _Forecast, base: FloatArray, further: float) -> float:
-    """The smallest further variance, 0 if possible, that does not starve the cloud; `base` are weights without it."""
-    enough = STARVED * base.size
-    if _effective(base + forecast.log_density(0.0)) >= enough:
-        return 0.0
-    top = further * RATIO
-    if math.isinf(further):
-        top = float((forecast.variance + forecast.off**2).max())
-        while _effective(base + forecast.log_density(top)) < enough and math.isfinite(top / RATIO):
-            top /= RATIO
-    best = top
-    for _ in range(80):
-        if _effective(base + forecast.log_density(top)) < enough:
-            break
-        best, top = top, top * RATIO
-    return best
+    def log_before(self, cloud: Cloud) -> FloatArray:
+        """The target before the new run, with the prior of what is believed of it."""
+        without = replace(cloud, spoiled=cloud.spoiled[:, :-1])
+        return _log_target(self.before, self.prior, without) + _log_prior_of_last(self.prior, cloud)
 
 
-def _cloud(history: History, prior: Prior, points: FloatArray) -> Cloud:
-    """Particles at points [n, 3] with what the history says of each, equally weighted."""
-    sums = pointwise(history, prior, *points.T)
-    given = conditional(sums, prior)
-    return Cloud(
-        points=points,
-        log_weight=np.zeros(points.shape[0]),
-        log_target=evidence(sums, prior) + prior.log_density(*points.T),
-        mean=np.stack([given.initial, given.change], axis=1),
-        covariance=np.stack([given.initial_variance, given.covariance, given.change_variance], axis=1),
-    )
+def _log_prior_of_last(prior: Prior, cloud: Cloud) -> FloatArray:
+    return log_spoiled(prior, cloud.spoiled[:, -1:].T)
 
 
-def _learnt(cloud: Cloud, measurement: Measurement) -> Cloud:
-    """The Kalman update of (ξ0, Δ) on every particle, and its probability added to the target."""
-    forecast = _Forecast.of(cloud, measurement)
-    b = basis(np.asarray(measurement.progress), cloud.points[:, 0], cloud.points[:, 1])
-    initial, both, change = cloud.covariance.T
-    seen = np.stack([initial + both * b, both + change * b], axis=1)
-    gain = seen / forecast.variance[:, None]
-    first, second = seen.T
-    drop = np.stack([gain[:, 0] * first, gain[:, 0] * second, gain[:, 1] * second], axis=1)
-    return replace(
-        cloud,
-        log_target=cloud.log_target + forecast.log_density(0.0),
-        mean=cloud.mean + gain * forecast.off[:, None],
-        covariance=cloud.covariance - drop,
-    )
+def _log_target(history: History, prior: Prior, cloud: Cloud) -> FloatArray:
+    """Log posterior density of every particle, up to a constant."""
+    placed = cloud.placed()
+    flat = prior.log_density(*cloud.points.T) + log_size_weight(prior)[cloud.size.astype(np.intp)]
+    return evidence(pointwise(history, prior, placed)[0], prior) + flat + log_spoiled(prior, placed.spoiled)
+
+
+def _proposed(cloud: Cloud, shape: FloatArray, rng: np.random.Generator) -> Cloud:
+    """A step of every particle, as likely as the step back: in its points always, in its size and its beliefs at
+    times."""
+    count, runs = cloud.spoiled.shape
+    stride = rng.uniform(0.2, 1.6, size=(count, 1))
+    points = cloud.points + stride * rng.standard_normal(cloud.points.shape) @ shape.T
+    step = np.where(rng.random(count) < RESIZED, rng.choice([-1.0, 1.0], size=count), 0.0)
+    size = cloud.size + step
+    spoiled = cloud.spoiled.copy()
+    turned = np.flatnonzero(rng.random(count) < TURNED)
+    run = rng.integers(runs, size=turned.size)
+    spoiled[turned, run] = 1.0 - spoiled[turned, run]
+    inside = (size >= 0) & (size < SIZES.size)
+    return replace(cloud, points=points, size=np.where(inside, size, cloud.size), spoiled=spoiled)
+
+
+def _next_degree(start: FloatArray, gap: FloatArray, degree: float) -> float:
+    """The largest β, 1 if possible, at which weights start + β · gap do not starve the cloud."""
+    enough = STARVED * start.size
+    if _effective(start + gap) >= enough:
+        return 1.0
+    low, high = degree, 1.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _effective(start + middle * gap) >= enough else (low, middle)
+    return low if low > degree else degree + (1.0 - degree) * 2.0**-HALVINGS
 
 
 def _merged(old: Cloud, new: Cloud, accepted: NDArray[np.bool_]) -> Cloud:

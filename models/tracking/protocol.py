@@ -10,9 +10,11 @@ from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.degradation import Degradation
+from models.degradation import Degradation, value
+from models.tracking.discrepancy import Discrepancy
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
 
@@ -21,7 +23,8 @@ from models.tracking.prior import Prior
 class Posterior:
     """A weighted sample of eq. 6's coefficients, all arrays [n]; weight >= 0 sums to one.
 
-    `scatter` is the deviation from run to run, in the unit of the quantity.
+    `scatter` is the deviation from run to run, in the unit of the quantity; `discrepancy` what each draw does beside
+    eq. 6, if anything.
     """
 
     weight: FloatArray
@@ -30,11 +33,29 @@ class Posterior:
     scale: FloatArray
     exponent: FloatArray
     scatter: FloatArray
+    discrepancy: Discrepancy | None = None
 
     @property
     def degradation(self) -> Degradation:
         """The sample as coefficients of eq. 6, each [n]."""
         return Degradation(initial=self.initial, change=self.change, scale=self.scale, exponent=self.exponent)
+
+    def values(self, progress: FloatArray) -> FloatArray:
+        """ξ at progress ζ >= 0 [k] of every draw, discrepancy and all; [k, n]."""
+        law = value(progress[:, None], self.degradation)
+        return law if self.discrepancy is None else np.asarray(law + self.discrepancy(progress))
+
+    def taken(self, index: NDArray[np.intp], weight: FloatArray) -> "Posterior":
+        """The draws at `index`, with new weights."""
+        return Posterior(
+            weight=weight,
+            initial=self.initial[index],
+            change=self.change[index],
+            scale=self.scale[index],
+            exponent=self.exponent[index],
+            scatter=self.scatter[index],
+            discrepancy=None if self.discrepancy is None else self.discrepancy.taken(index),
+        )
 
     def moments(self, sample: FloatArray) -> tuple[float, float]:
         """Weighted mean and deviation of a function of the coefficients, evaluated at the sample [n]."""

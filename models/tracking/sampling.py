@@ -23,15 +23,7 @@ def systematic(weight: FloatArray, size: int, offset: float) -> NDArray[np.intp]
 
 def thinned(sample: Posterior, size: int, offset: float) -> Posterior:
     """A weighted sample reduced to `size` draws of equal weight."""
-    kept = systematic(sample.weight, size, offset)
-    return Posterior(
-        weight=np.full(size, 1.0 / size),
-        initial=sample.initial[kept],
-        change=sample.change[kept],
-        scale=sample.scale[kept],
-        exponent=sample.exponent[kept],
-        scatter=sample.scatter[kept],
-    )
+    return sample.taken(systematic(sample.weight, size, offset), np.full(size, 1.0 / size))
 
 
 def spread_points(size: int, offset: FloatArray) -> FloatArray:

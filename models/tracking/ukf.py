@@ -1,79 +1,90 @@
-"""An unscented Kalman filter for eq. 6, filterpy's, in (ξ0, Δ, log φ, log ε).
+"""Unscented Kalman filters for eq. 6, filterpy's, one for each size q of the discrepancy, weighed by their innovations.
 
-The state is kept in deviations from the prior mean, in units of the prior's deviations, so that the covariance starts
-as the identity whatever the quantity's unit; in logarithms φ and ε cannot leave their domain. Nothing moves between
-runs, so a prediction adds only a trace of process noise, which keeps the covariance from collapsing on a bent ridge.
-
-The scatter between runs is learnt from the innovations: of an innovation with y²/S = κ, the share g = s²/S is
-scatter, and E[e²] = s² (1 + g (κ - 1)) is averaged into s² with the weight of one observation (the step of an
-expectation-maximisation).
+The state is (ξ0, ξ at a reference progress, log τ, log ε, δ, T δ', step): in logarithms φ = τε and ε cannot leave their
+domain, and with ξ at the reference in place of Δ the ridge of the posterior is nearly straight. All are in deviations
+from the prior mean, in units of the prior's deviations, so that the numbers are near 1 whatever the quantity's unit.
+The law does not move between runs; δ is an integrated random walk, and an event lets the level step.
 
 The prior is far too wide for sigma points: φ spans decades within them, and a filter started there does not recover.
-The first few measurements are therefore taken together, and the normal that has the mean and covariance of their
-exact posterior is where the filter starts. Even so, a normal in four dimensions is a rough picture of a bent ridge:
-this is the well-known rival, not the reference.
+So the first measurements are taken together, and the normals that have the means and covariances of their exact
+posterior, one for each size, are where the filters start. They start so again when the innovations say that they are
+lost, when progress has doubled (the law bends, and the reference moves along), or when a run comes out of order.
+
+A run may be spoiled: each update is that of a sound run and of a spoiled one, mixed by how probable either is. The
+scatter between runs is learnt from the innovations: of an innovation with y²/S = κ, the share g = s²/S is scatter, and
+E[e²] = s² (1 + g (κ - 1)) is averaged into s² with the weight of one observation (the step of an
+expectation-maximisation). A normal on a bent ridge is still a rough picture: the other filters are the reference.
 """
 
 import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 
 from models.arrays import FloatArray
 from models.degradation import progress_fraction
+from models.tracking.discrepancy import PAST, SIZES, at_end, drawn
 from models.tracking.grid import Grid
-from models.tracking.linear import History, resolved
+from models.tracking.history import History
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
 from models.tracking.protocol import Posterior
-from models.tracking.sampling import spread_normals
+from models.tracking.sampling import spread_normals, systematic
+from models.tracking.sigma import DIMENSION, DOMAIN, Normal, Way, definite, scaled, stepped, unscaled
 
-#: Process noise of a step, and the least variance along any axis, in units of the prior's variance.
-PROCESS, FLOOR = 1e-7, 1e-10
-#: Deviations from the prior mean that the state may reach.
-DOMAIN = 5.0
-#: An innovation counts at most as one of this many deviations when the scatter is learnt.
-OUTLIER = 6.0
-#: The grid that starts the filter, and the draws from it whose moments are taken.
-STARTER, DRAWS = Grid(nodes=17, rows=17, levels=9), 800
-#: Sigma points at ±√4 deviations with no weight on the centre: all weights positive, so S and P stay positive
-#: definite.
-SIGMA = {"n": 4, "alpha": 1.0, "beta": 0.0, "kappa": 0.0}
+#: The running mean of squared innovations forgets at this rate, and above the second number the filter is lost.
+FORGET, LOST = 0.3, 4.0
+#: The filters start anew when progress has grown by this factor.
+GROWN = 2.0
+#: The grid that starts the filter, the draws from it whose moments are taken, and the share of them below which a size
+#: is left out.
+STARTER, DRAWS, FEW = Grid(nodes=13, rows=13, levels=7), 1_000, 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UkfState:
-    """mean [4] and covariance [4, 4] in units of the prior; scatter_variance in the quantity's unit squared, and how
-    many observations it is worth; history, the measurements that were taken together at the start."""
+    """One filter for each of k sizes q: size [k], log_weight [k], mean [k, 7], covariance [k, 7, 7] in units of the
+    prior, and scatter [k, 2]: its variance in the quantity's unit squared and how many observations it is worth.
+
+    `history` is everything measured, `reference` the progress at which the filters started, `surprise` the running mean
+    of squared innovations.
+    """
 
     prior: Prior
     history: History
+    reference: float
+    surprise: float
+    size: FloatArray
+    log_weight: FloatArray
     mean: FloatArray
     covariance: FloatArray
-    scatter_variance: float
-    scatter_weight: float
+    scatter: FloatArray
+
+    def normal(self, kind: int) -> Normal:
+        """One of the filters."""
+        return Normal(
+            size=float(self.size[kind]),
+            mean=self.mean[kind],
+            covariance=self.covariance[kind],
+            scatter=self.scatter[kind],
+        )
 
     def to_arrays(self) -> dict[str, FloatArray]:
         """The state as named arrays; `from_arrays` gives it back exactly."""
-        return self.history.to_arrays() | {
-            "prior": self.prior.to_array(),
-            "mean": self.mean,
-            "covariance": self.covariance,
-            "scatter": np.array([self.scatter_variance, self.scatter_weight]),
-        }
+        named = {name: getattr(self, name) for name in ("size", "log_weight", "mean", "covariance", "scatter")}
+        lone = {"prior": self.prior.to_array(), "place": np.array([self.reference, self.surprise])}
+        return self.history.to_arrays() | lone | named
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, FloatArray]) -> "UkfState":
         """The inverse of `to_arrays`."""
-        variance, weight = arrays["scatter"]
+        reference, surprise = arrays["place"].tolist()
         return cls(
             prior=Prior.from_array(arrays["prior"]),
             history=History.from_arrays(arrays),
-            mean=arrays["mean"],
-            covariance=arrays["covariance"],
-            scatter_variance=float(variance),
-            scatter_weight=float(weight),
+            reference=reference,
+            surprise=surprise,
+            **{name: arrays[name] for name in ("size", "log_weight", "mean", "covariance", "scatter")},
         )
 
 
@@ -81,7 +92,7 @@ class UkfState:
 class Ukf:
     """The filter, started from the first `together` measurements; nothing in its updates is left to chance."""
 
-    together: int = 10
+    together: int = 8
 
     @property
     def name(self) -> str:
@@ -89,98 +100,123 @@ class Ukf:
         return "ukf"
 
     def start(self, prior: Prior) -> UkfState:
-        """The prior itself, with its median scatter, worth as many observations as its width allows."""
-        return UkfState(
-            prior=prior,
-            history=History.of(()),
-            mean=np.zeros(4),
-            covariance=np.eye(4),
-            scatter_variance=math.exp(2.0 * prior.log_scatter_mean),
-            scatter_weight=max(1.0, 0.5 / prior.log_scatter_sd**2),
-        )
+        """The prior itself, as far as normals can say it."""
+        return _started(prior, History.of((), prior))
 
     def update(self, state: UkfState, measurement: Measurement, rng: np.random.Generator | None = None) -> UkfState:  # noqa: ARG002
-        """The state after one more measurement: predict (nothing moves), update, symmetrise, keep to the domain."""
-        measurement = resolved(measurement, state.prior)
-        if state.history.progress.size < self.together:
-            return _started(state.prior, state.history.append(measurement))
-        centre, unit = _units(state.prior)
-
-        def expected(point: FloatArray) -> FloatArray:
-            initial, change, log_scale, log_exponent = centre + unit * np.clip(point, -2 * DOMAIN, 2 * DOMAIN)
-            share = progress_fraction(measurement.progress, math.exp(log_scale), math.exp(log_exponent))
-            return np.array([(initial + change * float(share)) / unit[0]])
-
-        noise = (measurement.variance + state.scatter_variance) / unit[0] ** 2
-        ukf = UnscentedKalmanFilter(
-            dim_x=4, dim_z=1, dt=1.0, hx=expected, fx=_unmoved, points=MerweScaledSigmaPoints(**SIGMA)
+        """The state after one more measurement: predict, update, symmetrise, keep to the domain; or start anew."""
+        before, prior = state.history, state.prior
+        history = before.append(measurement, prior)
+        backwards = measurement.progress < before.span or measurement.epoch < before.epoch.max(initial=0.0)
+        if history.value.size <= self.together or backwards or measurement.progress > GROWN * state.reference:
+            return _started(prior, history)
+        way = Way(
+            reference=state.reference,
+            before=before.span,
+            after=history.span,
+            events=history.steps.size - before.steps.size,
+            progress=measurement.progress,
+            value=measurement.value,
+            variance=float(history.variance[-1]),
         )
-        ukf.x, ukf.P = state.mean.copy(), state.covariance.copy()
-        ukf.Q, ukf.R = PROCESS * np.eye(4), np.array([[noise]])
-        ukf.predict()
-        ukf.update(np.array([measurement.value / unit[0]]))
-        learnt = _scatter_learnt(state, float(ukf.y[0]), float(ukf.S[0, 0]))
-        return replace(learnt, mean=np.clip(ukf.x, -DOMAIN, DOMAIN), covariance=_definite(ukf.P))
+        parts = [stepped(prior, state.normal(kind), way) for kind in range(state.size.size)]
+        log_weight = state.log_weight + np.array([part.log_likelihood for part in parts])
+        weight = _weights(log_weight)
+        surprise = float(weight @ [part.surprise for part in parts])
+        surprise = (1.0 - FORGET) * state.surprise + FORGET * surprise
+        if surprise > LOST:
+            return _started(prior, history)
+        return replace(
+            state,
+            history=history,
+            surprise=surprise,
+            log_weight=log_weight - log_weight.max(),
+            mean=np.stack([part.mean for part in parts]),
+            covariance=np.stack([part.covariance for part in parts]),
+            scatter=np.stack([part.scatter for part in parts]),
+        )
 
     def posterior(self, state: UkfState, size: int, rng: np.random.Generator) -> Posterior:
-        """`size` evenly spread draws of equal weight from the normal; the scatter is a point estimate."""
-        centre, unit = _units(state.prior)
+        """`size` evenly spread draws of equal weight from the normals; the scatter is a point estimate of each."""
+        prior, history = state.prior, state.history
+        kind = systematic(_weights(state.log_weight), size, float(rng.random()))
+        normals = spread_normals(size, rng.random(5))
+        normals = np.column_stack([normals, rng.standard_normal((size, DIMENSION - 5))])
         root = np.linalg.cholesky(state.covariance)
-        points = state.mean + spread_normals(size, rng.random(4)) @ root.T
-        initial, change, log_scale, log_exponent = (centre + unit * np.clip(points, -2 * DOMAIN, 2 * DOMAIN)).T
+        point = state.mean[kind] + np.einsum("nij,nj->ni", root[kind], normals)
+        initial, at_reference, log_scale, log_exponent, *beside = unscaled(prior, point).T
+        scale, exponent = np.exp(log_scale), np.exp(log_exponent)
+        change = (at_reference - initial) / progress_fraction(state.reference, scale, exponent)
+        ends = np.stack([beside[0], beside[1] * history.span / state.reference])
+        sizes = state.size[kind]
+        course = np.where(sizes[:, None] > 0.0, (np.linalg.pinv(at_end()) @ ends).T, 0.0)
+        heights = np.zeros((size, history.steps.size))
+        heights[:, -1:] = beside[2][:, None]
         return Posterior(
             weight=np.full(size, 1.0 / size),
             initial=initial,
             change=change,
-            scale=np.exp(log_scale),
-            exponent=np.exp(log_exponent),
-            scatter=np.full(size, math.sqrt(state.scatter_variance)),
+            scale=scale,
+            exponent=exponent,
+            scatter=np.sqrt(state.scatter[kind, 0]),
+            discrepancy=drawn(history, prior, sizes, np.concatenate([course, heights], axis=1), rng),
         )
 
 
 def _started(prior: Prior, history: History) -> UkfState:
-    """The normal with the moments of the exact posterior of a few measurements, from evenly spread draws."""
-    exact = STARTER.laid_over(prior, history)
-    draws = STARTER.posterior(exact, DRAWS, np.random.default_rng(0))
-    centre, unit = _units(prior)
-    points = np.stack([draws.initial, draws.change, np.log(draws.scale), np.log(draws.exponent)], axis=1)
-    points = (points - centre) / unit
-    mean = draws.weight @ points
-    off = points - mean
+    """The normals with the moments of the exact posterior, by size, from evenly spread draws."""
+    draws = STARTER.posterior(STARTER.laid_over(prior, history), DRAWS, np.random.default_rng(0))
+    reference = history.span
+    size, course, step = _beside(draws)
+    points = scaled(
+        prior,
+        np.column_stack(
+            [
+                draws.initial,
+                draws.initial + draws.change * progress_fraction(reference, draws.scale, draws.exponent),
+                np.log(draws.scale),
+                np.log(draws.exponent),
+                course,
+                step,
+            ]
+        ),
+    )
+    kinds = np.abs(size[:, None] - SIZES).argmin(axis=1)
+    shares = np.bincount(kinds, weights=draws.weight, minlength=SIZES.size)
+    kept = np.flatnonzero((shares > FEW) & (np.bincount(kinds, minlength=SIZES.size) > 3 * DIMENSION))
+    moments = [_moments(points[kinds == kind], draws.weight[kinds == kind]) for kind in kept]
+    log_scatter = np.log(draws.scatter)
+    variance = [math.exp(2.0 * np.average(log_scatter[kinds == k], weights=draws.weight[kinds == k])) for k in kept]
+    worth = max(1.0, 0.5 / prior.log_scatter_sd**2) + history.value.size
     return UkfState(
         prior=prior,
         history=history,
-        mean=np.clip(mean, -DOMAIN, DOMAIN),
-        covariance=_definite((draws.weight * off.T) @ off),
-        scatter_variance=math.exp(2.0 * float(draws.weight @ np.log(draws.scatter))),
-        scatter_weight=max(1.0, 0.5 / prior.log_scatter_sd**2) + history.progress.size,
+        reference=reference,
+        surprise=1.0,
+        size=SIZES[kept],
+        log_weight=np.log(shares[kept] / shares[kept].max()),
+        mean=np.stack([mean for mean, _ in moments]),
+        covariance=np.stack([covariance for _, covariance in moments]),
+        scatter=np.array([(each, worth) for each in variance]),
     )
 
 
-def _unmoved(point: FloatArray, _: float) -> FloatArray:
-    return point
+def _beside(draws: Posterior) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Of every draw q [n], (δ, T δ') at the end of what was measured [n, 2], and by how much the level has stepped."""
+    beside = draws.discrepancy
+    if beside is None:
+        none = np.zeros(draws.weight.size)
+        return none, np.zeros((none.size, 2)), none
+    return beside.size, beside.curvature[:, :PAST] @ at_end().T, beside.height.sum(axis=1)
 
 
-def _units(prior: Prior) -> tuple[FloatArray, FloatArray]:
-    centre = np.array([prior.initial_mean, prior.change_mean, prior.log_scale_mean, prior.log_exponent_mean])
-    return centre, np.array([prior.initial_sd, prior.change_sd, prior.log_scale_sd, prior.log_exponent_sd])
+def _moments(points: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
+    share = weight / weight.sum()
+    mean = share @ points
+    off = points - mean
+    return np.clip(mean, -DOMAIN, DOMAIN), definite((share * off.T) @ off)
 
 
-def _scatter_learnt(state: UkfState, innovation: float, variance: float) -> UkfState:
-    """The scatter after an innovation with its predicted variance, both in units of the prior's deviation of ξ0."""
-    prior = state.prior
-    surprise = min(innovation**2 / variance, OUTLIER**2)
-    share = state.scatter_variance / (variance * prior.initial_sd**2)
-    learnt = state.scatter_variance * (1.0 + share * (surprise - 1.0) / (state.scatter_weight + 1.0))
-    low, high = (math.exp(2.0 * (prior.log_scatter_mean + k * prior.log_scatter_sd)) for k in (-DOMAIN, DOMAIN))
-    return replace(state, scatter_variance=min(max(learnt, low), high), scatter_weight=state.scatter_weight + 1.0)
-
-
-def _definite(covariance: FloatArray) -> FloatArray:
-    """Symmetrised, with no eigenvalue below FLOOR."""
-    symmetric = 0.5 * (covariance + covariance.T)
-    values, vectors = np.linalg.eigh(symmetric)
-    if values[0] >= FLOOR:
-        return np.asarray(symmetric)
-    lifted = vectors * np.maximum(values, FLOOR) @ vectors.T
-    return np.asarray(0.5 * (lifted + lifted.T))
+def _weights(log_weight: FloatArray) -> FloatArray:
+    weight = np.exp(log_weight - log_weight.max())
+    return np.asarray(weight / weight.sum())

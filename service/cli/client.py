@@ -36,9 +36,14 @@ class Service:
     patience: float = 60.0
     on_wait: Callable[[str, float], None] = lambda _reason, _seconds: None
 
-    def post(self, path: str, body: bytes) -> dict[str, Any]:
+    def post(self, path: str, body: bytes, *, prefer: str | None = None) -> dict[str, Any]:
         """The answer to a JSON body; ServiceAwayError, or RefusedError where it will not be taken."""
-        return self._answer("POST", path, content=body, headers=JSON)
+        headers = JSON if prefer is None else JSON | {"Prefer": prefer}
+        return self._answer("POST", path, content=body, headers=headers)
+
+    def put(self, path: str, body: bytes) -> dict[str, Any]:
+        """The same, for what takes the place of what was there."""
+        return self._answer("PUT", path, content=body, headers=JSON)
 
     def post_file(self, path: str, file: Path, asked: Mapping[str, str]) -> dict[str, Any]:
         """The answer to a run's file."""

@@ -1,6 +1,7 @@
 """`clutchlife demo`: a simulated life, posted run by run to a service of its own, with the prognosis as it sharpens."""
 
 import json
+import os
 import socket
 import subprocess
 import sys
@@ -9,6 +10,7 @@ import time
 import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,18 +18,25 @@ import typer
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from service.cli.client import Service, ServiceAwayError, connect
+from service.cli.diagnose import ask
+from service.cli.diagnosis_view import shown
 from service.cli.options import Seed, fail, out
 
 _PORT = 8000
 #: The demo ends a little after the end of life.
 _STOP = 0.49
 _START_SECONDS = 60.0
+HIDDEN_EFFECT = "oil_temperature"
+HIDDEN = "the oil's temperature, whose viscosity acts as another speed would"
 _HEADER = f"{'cycles':>7} {'mean COF':>16} {'of new':>7} {'remaining':>10} {'90 % interval':>17} {'truth':>7}"
 
 
 def demo(
     seed: Seed = 1,
     exit_at_end: Annotated[bool, typer.Option("--exit", help="End instead of leaving the service open")] = False,
+    browser: Annotated[
+        bool, typer.Option(help="Open the dashboard in a browser at the end, where there is one")
+    ] = True,
 ) -> None:
     """Simulate a clutch's life, send it to a service run by run, and watch its remaining life being foretold."""
     with tempfile.TemporaryDirectory(prefix="clutchlife-demo-") as folder, _service(Path(folder)) as (url, process):
@@ -36,9 +45,12 @@ def demo(
             _life(Service(http=http), seed)
         if exit_at_end:
             return
-        out.print(f"\nThe service stays open at {url} until Ctrl-C.", markup=False)
-        if sys.stdout.isatty():
-            webbrowser.open(url)
+        page = f"{url}/clutches/sim-{seed}"
+        out.print(
+            f"\nThe dashboard stays open at {page} until Ctrl-C; all clutches: {url}", markup=False, soft_wrap=True
+        )
+        if browser and sys.stdout.isatty() and "CI" not in os.environ:
+            webbrowser.open(page)
         try:
             process.wait()
         except KeyboardInterrupt:
@@ -47,12 +59,14 @@ def demo(
 
 def _life(service: Service, seed: int) -> None:
     from models.rig import campaign  # what only this command needs is loaded by it alone
+    from models.rig.oil_warmth import warmed
     from service.formats import simulated
 
     clutch_id, truth = f"sim-{seed}", campaign.simulated_clutch(seed)
     end = truth.end_of_life()
     service.post("/v1/clutches", json.dumps(simulated.simulated_clutch_body(clutch_id)).encode())
     out.print(f"\nA simulated clutch, {clutch_id}: 7 pressures x 40 speeds a test, 1 % noise.")
+    out.print(f"Hidden in its torque: {HIDDEN}, which the service is not told of.", markup=False)
     out.print("Duty cycles that remain until its mean COF has halved:\n")
     out.print(_HEADER, style="bold")
     inside: list[bool] = []
@@ -60,6 +74,8 @@ def _life(service: Service, seed: int) -> None:
         task = progress.add_task("run-in", total=end)
         for run in campaign.simulate(seed, stop_fraction=_STOP):
             progress.update(task, description=f"{run.kind.value.replace('_', ' ')}, {run.cycles} cycles")
+            if run.plateaus is not None:
+                run = replace(run, plateaus=warmed(run.plateaus, truth, run.wear))
             body = json.dumps(simulated.simulated_body(run)).encode()
             service.post(f"/v1/clutches/{clutch_id}/runs", body)
             progress.update(task, completed=run.cycles)
@@ -72,6 +88,28 @@ def _life(service: Service, seed: int) -> None:
         f"The truth: {truth_said}.\nIt lay inside the 90 % interval {sum(inside)} times out of {len(inside)}.\n"
         "'-' means that too few tests are known yet, or that it may never come."
     )
+    _diagnosed(service, clutch_id, end)
+
+
+def _diagnosed(service: Service, clutch_id: str, end: float | None) -> None:
+    """The diagnosis of the life that was posted, and what it would have changed halfway."""
+    out.print("\nWhat does the simulation get wrong?\n", style="bold")
+    halfway = {} if end is None else {"at_cycles": round(end / 2)}
+    before = service.get(f"/v1/clutches/{clutch_id}/remaining-useful-life", **halfway)
+    with _progress() as progress:
+        progress.add_task("diagnosing", total=None)
+        report = ask(service, clutch_id, adopt=True)
+    if report["status"] != "finished":
+        fail(f"the diagnosis failed: {report['problem']}")
+    for part in shown(report):
+        out.print(part)
+    after = service.get(f"/v1/clutches/{clutch_id}/remaining-useful-life", **halfway)
+    found = HIDDEN_EFFECT in report["causes"]
+    out.print(f"\nHidden was {HIDDEN_EFFECT}: {'found' if found else 'not named'}.", style="bold", markup=False)
+    if end is not None:
+        out.print(f"Halfway, under either model:\n{'':8} {_HEADER}")
+        for name, said in (("before", before), ("after", after)):
+            out.print(f"{name:8} {_row(said, end)}", markup=False)
 
 
 def _row(said: dict[str, Any], end: float | None) -> str:

@@ -75,6 +75,9 @@ def _results(service: Service, clutch: str, folder: Path) -> None:
         )
     for name in ("degradation", "loops", "series"):
         _write(folder / f"{name}.json", service.get(f"{base}/{name}"))
+    diagnoses = [each["diagnosis_id"] for each in _pages(service, f"{base}/diagnoses")]
+    _write(folder / "diagnoses.json", [service.get(f"{base}/diagnoses/{each}") for each in diagnoses])
+    _write(folder / "model.json", service.get(f"{base}/model"))
     _write(folder / "runs.json", list(_pages(service, f"{base}/runs")))
     _write(folder / "stribeck.json", list(_pages(service, f"{base}/stribeck")))
 

@@ -2,7 +2,7 @@
 
 import typer
 
-from service.cli import demo, export, keys, maintain, push, serve, simulate
+from service.cli import demo, diagnose, export, fleet, keys, maintain, push, score, serve, simulate
 
 app = typer.Typer(
     name="clutchlife",
@@ -15,10 +15,14 @@ app.command()(serve.serve)
 app.command()(demo.demo)
 app.command()(simulate.simulate)
 app.command()(push.push)
+app.command()(diagnose.diagnose)
+app.command()(diagnose.model)
 app.command()(export.export)
+app.command()(score.score)
 app.command()(maintain.replay)
 app.command()(maintain.backup)
 app.add_typer(keys.app, name="key")
+app.add_typer(fleet.app, name="fleet")
 
 
 if __name__ == "__main__":

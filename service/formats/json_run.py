@@ -23,7 +23,9 @@ def read_run(body: bytes) -> IncomingRun:
     columns = {} if channels is None else channels.model_dump(exclude_none=True)
     details: dict[str, Any] = {}
     if isinstance(run, DutyRunIn):
-        details["duty"] = run.duty.model_dump()
+        # a field that came later must not change the hash of what was sent before it
+        unsaid = {"engagement_duration_s"} if run.duty.engagement_duration_s is None else None
+        details["duty"] = run.duty.model_dump(exclude=unsaid)
     if isinstance(run, MaintenanceRunIn):
         details |= {"event": run.event, "note": run.note}
     return name_run(

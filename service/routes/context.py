@@ -11,6 +11,7 @@ from models.prognosis import HORIZON
 from service.errors import FieldError, InvalidError
 from service.metrics import Metrics
 from service.security import Caller, Scope, authorise
+from service.worker import Worker
 from service.workflows.views import Remembered
 from storage.database import Database
 
@@ -22,6 +23,7 @@ class Context:
     database: Database
     remembered: Remembered
     metrics: Metrics
+    worker: Worker
 
     def now(self) -> str:
         """The time, UTC, ISO 8601."""

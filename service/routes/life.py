@@ -9,6 +9,7 @@ from fastapi.responses import Response
 from service.problems import READING
 from service.responses import answer, from_cursor, page, sliced, table
 from service.routes.context import AtCycles, Cursor, Limit, PressureBar, Reader, Whole
+from service.schemas.fleet import Scores
 from service.schemas.life import (
     Degradation,
     EngagementOut,
@@ -19,8 +20,10 @@ from service.schemas.life import (
     SeriesItem,
     SeriesPage,
     StribeckPage,
+    Surfaces,
 )
-from service.workflows import answers
+from service.workflows import answers, scores
+from service.workflows.surfaces import flat as flat_surfaces
 from storage.database import Database
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["remaining life"])
@@ -74,6 +77,26 @@ def stribeck(request: Request, context: Reader, clutch_id: str, limit: Limit = 1
 def engagement(request: Request, context: Reader, clutch_id: str, at_cycles: AtCycles = None) -> Response:
     """A simulated engagement of the tracked clutch: the pressure profile of fig. 3 against the motor's 20 Nm."""
     return answer(request, answers.engaged(context.database, context.remembered, clutch_id, at_cycles=at_cycles))
+
+
+@router.get("/surfaces", response_model=Surfaces, responses=READING)
+def surfaces(request: Request, context: Reader, clutch_id: str) -> Response:
+    """The tracked Stribeck parameters over pressure and cycles (figs. 10, 11), and torque over speed besides."""
+    return answer(request, answers.surface(context.database, context.remembered, clutch_id))
+
+
+@router.get("/scores", response_model=Scores, responses=READING)
+def clutch_scores(
+    request: Request,
+    context: Reader,
+    clutch_id: str,
+    method: Method = "particle",
+    limit: Whole = 1_000_000,
+    cursor: Cursor = None,
+) -> Response:
+    """How right the predictions were of those of its lives that came to their end."""
+    said = scores.of_clutch(context.database, context.remembered, clutch_id, method=method)
+    return answer(request, said | sliced(said["items"], limit, from_cursor(cursor)))
 
 
 @router.get("/loops", response_model=LoopPage, responses=READING)
@@ -161,6 +184,21 @@ def _fit_row(item: dict[str, Any], fit: dict[str, Any]) -> dict[str, Any]:
     }
     errors = {f"{name}_se": value for name, value in fit["standard_errors"].items()}
     return {"run_id": item["run_id"], "cycles": item["cycles"], **flat, **fit["parameters"], **errors}
+
+
+@twins.get("/surfaces.csv", response_class=Response, responses=READING)
+def surfaces_csv(request: Request, context: Reader, clutch_id: str) -> Response:
+    """The surfaces, a row a count of cycles, a pressure and a speed."""
+    rows = flat_surfaces(answers.surface(context.database, context.remembered, clutch_id))
+    return table(request, tuple(rows[0]), rows)
+
+
+@twins.get("/scores.csv", response_class=Response, responses=READING)
+def clutch_scores_csv(request: Request, context: Reader, clutch_id: str, method: Method = "particle") -> Response:
+    """The scored predictions, a row each."""
+    items = scores.of_clutch(context.database, context.remembered, clutch_id, method=method)["items"]
+    rows = [row for item in items for row in scores.flat(item)]
+    return table(request, tuple(rows[0]) if rows else ("end_of_life_cycles", "cycles"), rows)
 
 
 @twins.get("/loops.csv", response_class=Response, responses=READING)

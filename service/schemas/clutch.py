@@ -1,12 +1,13 @@
 """The clutch record: geometry, oil, end of life. Everything but the name has the reference's clutch as default."""
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
 from models.clutch import Geometry
-from service.schemas.base import Answer, Identifier, Origin, PositiveNumber, Schema
-from service.schemas.life import Current
+from models.severity import Severity, SeverityBasis
+from service.schemas.base import Answer, Identifier, NotNegativeNumber, Origin, PositiveNumber, Schema
+from service.schemas.life import Current, ModelName
 
 Name = Annotated[str, StringConstraints(min_length=1, max_length=200)]
 
@@ -66,6 +67,17 @@ class EndOfLifeIn(Schema):
     cof_fraction: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False, strict=True)] = 0.5
 
 
+class SeverityIn(Schema):
+    """What eq. 6 counts: duty cycles, or their sliding distance or dissipated energy to the power of `exponent`."""
+
+    basis: Literal["cycles", "sliding_distance", "dissipated_energy"] = "cycles"
+    exponent: Annotated[NotNegativeNumber, Field(le=10)] = 1.0
+
+    def to_model(self) -> Severity:
+        """As the models take it."""
+        return Severity(basis=SeverityBasis(self.basis), exponent=self.exponent)
+
+
 class ClutchIn(Schema):
     """A clutch as it is registered."""
 
@@ -76,6 +88,7 @@ class ClutchIn(Schema):
     friction_material: Name = "paper"
     reaction_plate: Name = "steel"
     fluid: Name = "ATF"
+    severity: SeverityIn = SeverityIn()
     origin: Origin = "measured"
 
 
@@ -86,6 +99,32 @@ class ClutchSummary(Answer):
     as_of_cycles: float | None
     current: Current
     remaining_cycles: dict[str, float | None]
+    model: ModelName
+
+
+class LastRun(Answer):
+    """The run that was made last; `at` is when, UTC, ISO 8601."""
+
+    run_id: str
+    kind: str
+    cycles: float
+    at: str
+
+
+class Recent(Answer):
+    """The latest past: the last run, and mean COF of the present life as a short line of at most 32 values."""
+
+    last_run: LastRun
+    mean_cof: list[float]
+
+
+class LatestDiagnosis(Answer):
+    """The newest finished diagnosis; `adopted` where the model adopted last came from it."""
+
+    diagnosis_id: str
+    verdict: str | None
+    causes: list[str]
+    adopted: bool
 
 
 class ClutchOut(Answer):
@@ -98,11 +137,14 @@ class ClutchOut(Answer):
     friction_material: str
     reaction_plate: str
     fluid: str
+    severity: SeverityIn
     origin: Origin
     created_at: str
     revision: int
     runs: int
     summary: ClutchSummary | None
+    recent: Recent | None
+    diagnosis: LatestDiagnosis | None
 
 
 class ClutchPage(Answer):

@@ -3,7 +3,7 @@
 from typing import Literal
 
 from service.schemas.base import Answer, Origin
-from service.schemas.run import Fit, Loop
+from service.schemas.run import Fit, Loop, Warned
 
 Method = Literal["particle", "ukf", "grid"]
 Quantiles = dict[str, float | None]
@@ -35,6 +35,21 @@ class ModelName(Answer):
     effects: list[str]
 
 
+class PriorName(Answer):
+    """What was believed before the clutch was measured; a fleet's prior has a version and clutches that taught it."""
+
+    name: Literal["weak", "fleet"]
+    version: int | None
+    clutches: int
+
+
+class SeverityName(Answer):
+    """What eq. 6 counts."""
+
+    basis: Literal["cycles", "sliding_distance", "dissipated_energy"]
+    exponent: float
+
+
 class RemainingLife(Answer):
     """The duty cycles that remain until mean COF has fallen to the criterion's fraction of its initial value."""
 
@@ -51,6 +66,9 @@ class RemainingLife(Answer):
     probability_of_reaching: float | None
     horizon_cycles: float
     model: ModelName
+    prior: PriorName
+    severity: SeverityName
+    warnings: list[Warned]
     origin: Origin
 
 
@@ -98,13 +116,57 @@ class DegradationItem(Answer):
     trajectory: Trajectory
 
 
+class Disagreement(Answer):
+    """Rebuilt less direct, in deviations: of the value now, and of the median end of life; null beyond the horizon."""
+
+    now_sd: float | None
+    end_of_life_sd: float | None
+
+
+class Rebuilt(Answer):
+    """Mean COF rebuilt from the Stribeck parameters' own tracks, beside the direct track of mean COF."""
+
+    trajectory: Trajectory
+    end_of_life_cycles: Quantiles
+    disagreement: Disagreement
+
+
 class Degradation(Answer):
-    """Eq. 6 for every Stribeck parameter and for mean COF."""
+    """Eq. 6 for every Stribeck parameter and for mean COF; `rebuilt` is null where too little is known."""
 
     clutch_id: str
     revision: int
     items: list[DegradationItem]
+    rebuilt: Rebuilt | None
+    warnings: list[Warned]
+    model: ModelName
+    prior: PriorName
+    severity: SeverityName
     next: str | None
+
+
+class SurfaceParameters(Answer):
+    """Each Stribeck parameter by cycles and pressure."""
+
+    static_torque_nm: list[list[float]]
+    coulomb_ratio: list[list[float]]
+    stribeck_velocity_m_s: list[list[float]]
+    viscous_coefficient: list[list[float]]
+
+
+class Surfaces(Answer):
+    """Tracked Stribeck parameters by cycles and pressure (figs. 10, 11), and torque by cycles, pressure and speed."""
+
+    clutch_id: str
+    revision: int
+    cycles: list[float]
+    pressure_bar: list[float]
+    speed_rpm: list[float]
+    parameters: SurfaceParameters
+    torque_nm: list[list[list[float]]]
+    model: ModelName
+    prior: PriorName
+    severity: SeverityName
 
 
 class LinearLaw(Answer):

@@ -34,6 +34,7 @@ class Duty(Schema):
     cycles: Annotated[PositiveNumber, Field(le=1e12)]
     energy_per_cycle_kj: NotNegativeNumber | None = None
     initial_speed_rpm: NotNegativeNumber | None = None
+    engagement_duration_s: NotNegativeNumber | None = None
     maximum_pressure_bar: NotNegativeNumber | None = None
 
 

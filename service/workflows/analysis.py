@@ -77,20 +77,24 @@ def analyse(run: IncomingRun, geometry: Geometry) -> Analysis:
     return _analyse_stationary(cut.plateaus, geometry, notes)
 
 
-def _analyse_stationary(plateaus: Plateaus, geometry: Geometry, noticed: Sequence[Warned]) -> Analysis:
+def levels_of(plateaus: Plateaus, geometry: Geometry) -> tuple[LevelFit, ...]:
+    """The curves of a stationary test fitted, pressures ascending."""
     curves = curves_by_pressure(plateaus, geometry)
-    fits = fit_curves(curves)
-    levels = tuple(
+    return tuple(
         LevelFit(fit=fit, mean_pressure=curve.mean_pressure, speeds=int(np.unique(curve.velocity).size))
-        for fit, curve in zip(fits, curves, strict=True)
+        for fit, curve in zip(fit_curves(curves), curves, strict=True)
     )
+
+
+def _analyse_stationary(plateaus: Plateaus, geometry: Geometry, noticed: Sequence[Warned]) -> Analysis:
+    levels = levels_of(plateaus, geometry)
     speed = np.abs(plateaus.speed)
     low, high = float(speed.min()), float(speed.max())
     telling = low < high and mean_cofs(levels, geometry.sliding_velocity(protocol_speeds(low, high)), geometry)
     warnings = [
         *noticed,
         *(warned for level in levels for warned in _level_warnings(level, plateaus)),
-        *(warned for fit in fits for warned in _fit_warnings(fit)),
+        *(warned for level in levels for warned in _fit_warnings(level.fit)),
     ]
     if not telling:
         message = "no pressure of this test says a mean COF: it sets no reference and no track uses it"

@@ -11,10 +11,11 @@ from service.formats.units import PASCALS_PER_BAR
 from service.schemas.base import whole
 from service.workflows import stored, views
 from service.workflows.analysis import LevelFit
+from service.workflows.basis import ALL_PRESSURES, MEAN_COF, basis_of
 from service.workflows.engagement import engagement
-from service.workflows.history import ALL_PRESSURES, MEAN_COF
+from service.workflows.foretold import named
 from service.workflows.receipts import PARAMETER_UNITS
-from service.workflows.tracks import CARRIED
+from service.workflows.surfaces import surfaces
 from service.workflows.views import Remembered
 from storage import channels, predictions, runs
 from storage.database import Database
@@ -42,36 +43,54 @@ def remaining_life(
         key = (clutch_id, row.revision, method, pressure_bar, at_cycles)
         said = _stored(connection, clutch_id, method, at_cycles) if pressure_bar is None else None
         said = remembered.find(key) if said is None else said
-        events = stored.events(connection, clutch_id) if said is None else []
+        if said is None:
+            events, basis = stored.events(connection, clutch_id), basis_of(connection, row)
     record = stored.record(row)
     if said is None:
         fraction = record.end_of_life.cof_fraction
         said = views.foretell(
-            clutch_id, events, fraction, method=method, pressure_bar=pressure_bar, at_cycles=at_cycles
+            clutch_id, events, basis, fraction, method=method, pressure_bar=pressure_bar, at_cycles=at_cycles
         )
         remembered.keep(key, said)
     return {"clutch_id": clutch_id, "method": method, "revision": row.revision, "origin": record.origin} | said
 
 
 def _stored(connection: Connection, clutch_id: str, method: str, at_cycles: float | None) -> dict[str, Any] | None:
-    """What was foretold over all pressures, where it is stored: the exact filter's past is not, once it has changed."""
+    """What was foretold over all pressures, where it is stored: what the exact filter says is worked out when asked for."""
     found = predictions.at(connection, clutch_id, method, ALL_PRESSURES, at_cycles)
-    last = predictions.at(connection, clutch_id, CARRIED[0], ALL_PRESSURES, at_cycles)
-    return found.payload if found is not None and last is not None and found.cycles == last.cycles else None
+    return None if found is None else found.payload
 
 
 def degradation(database: Database, remembered: Remembered, clutch_id: str) -> dict[str, Any]:
-    """Eq. 6 for every Stribeck parameter and for mean COF."""
+    """Eq. 6 for every Stribeck parameter and for mean COF, and mean COF rebuilt from the parameters."""
     with database.reading() as connection:
         row = stored.clutch(connection, clutch_id)
         key = (clutch_id, row.revision, "degradation")
-        items = remembered.find(key)
-        if items is None:
+        said: dict[str, Any] | None = remembered.find(key)
+        if said is None:
             events, levels = stored.events(connection, clutch_id), stored.levels(connection, clutch_id)
-    if items is None:
-        items = views.degradation(clutch_id, events, levels)
-        remembered.keep(key, items)
-    return {"clutch_id": clutch_id, "revision": row.revision, "items": items, "next": None}
+            basis = basis_of(connection, row)
+    if said is None:
+        record = stored.record(row)
+        geometry, fraction = record.geometry.to_model(), record.end_of_life.cof_fraction
+        said = views.degradation(clutch_id, events, basis, levels, geometry, fraction) | named(basis)
+        remembered.keep(key, said)
+    return {"clutch_id": clutch_id, "revision": row.revision} | said | {"next": None}
+
+
+def surface(database: Database, remembered: Remembered, clutch_id: str) -> dict[str, Any]:
+    """The tracked Stribeck parameters over pressure and cycles, and torque over speed besides."""
+    with database.reading() as connection:
+        row = stored.clutch(connection, clutch_id)
+        key = (clutch_id, row.revision, "surfaces")
+        said: dict[str, Any] | None = remembered.find(key)
+        if said is None:
+            events, levels = stored.events(connection, clutch_id), stored.levels(connection, clutch_id)
+            basis = basis_of(connection, row)
+    if said is None:
+        said = surfaces(clutch_id, events, basis, levels, stored.record(row).geometry.to_model()) | named(basis)
+        remembered.keep(key, said)
+    return {"clutch_id": clutch_id, "revision": row.revision} | said
 
 
 def engaged(database: Database, remembered: Remembered, clutch_id: str, *, at_cycles: float | None) -> dict[str, Any]:
@@ -82,9 +101,10 @@ def engaged(database: Database, remembered: Remembered, clutch_id: str, *, at_cy
         said: dict[str, Any] | None = remembered.find(key)
         if said is None:
             events, levels = stored.events(connection, clutch_id), stored.levels(connection, clutch_id)
+            basis = basis_of(connection, row)
     record = stored.record(row)
     if said is None:
-        said = engagement(clutch_id, events, levels, record.geometry.to_model(), at_cycles=at_cycles)
+        said = engagement(clutch_id, events, basis, levels, record.geometry.to_model(), at_cycles=at_cycles)
         remembered.keep(key, said)
     return {"clutch_id": clutch_id, "origin": record.origin, "simulated": True} | said
 

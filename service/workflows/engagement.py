@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from models.clutch import Geometry
-from models.degradation import value
 from models.pressure import PressureLaws, fit_asymptotic, fit_linear
 from models.prognosis import weighted_quantiles
 from models.rig.engagement import Capacity, Drive, Engagement, PressureProfile, engage
@@ -15,7 +14,7 @@ from service.errors import NotFoundError
 from service.formats.units import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
 from service.schemas.base import whole
 from service.workflows.analysis import LevelFit
-from service.workflows.foretold import BASELINE
+from service.workflows.basis import Basis
 from service.workflows.history import Event, Life, Series, lives
 from service.workflows.trajectories import posterior_of
 from service.workflows.views import parameter_series, tests_of
@@ -27,6 +26,7 @@ _FEWEST_FOR_LAWS = 3
 def engagement(
     clutch_id: str,
     events: Sequence[Event],
+    basis: Basis,
     fits: Mapping[str, Sequence[LevelFit]],
     geometry: Geometry,
     *,
@@ -39,12 +39,12 @@ def engagement(
         raise NotFoundError("no stationary test is known by then: there is no clutch to engage")
     life = found[-1]
     cycles = happened[-1].cycles if at_cycles is None else at_cycles
-    parameters = _parameters(clutch_id, life, tests_of(life, fits), cycles - life.origin)
+    parameters = _parameters(clutch_id, life, basis, tests_of(life, fits), cycles)
     profile, drive = PressureProfile(), Drive()
     trace = engage(_capacity(parameters), geometry.mean_radius, profile=profile, drive=drive)
     return {
         "at_cycles": whole(cycles),
-        "model": BASELINE,
+        "model": dict(basis.model),
         "initial_speed_rpm": drive.speed / RADIANS_PER_SECOND_PER_RPM,
         "maximum_pressure_bar": profile.maximum / PASCALS_PER_BAR,
         "motor_torque_limit_nm": drive.limit,
@@ -56,23 +56,24 @@ def engagement(
 
 
 def _parameters(
-    clutch_id: str, life: Life, tests: Sequence[Sequence[LevelFit]], progress: float
+    clutch_id: str, life: Life, basis: Basis, tests: Sequence[Sequence[LevelFit]], cycles: float
 ) -> dict[float, StribeckParameters]:
-    """The tracked Stribeck parameters by pressure [Pa], each the median of its own eq. 6 at ζ = progress."""
+    """The tracked Stribeck parameters by pressure [Pa], each the median of its own eq. 6 at `cycles` since new."""
     at: dict[float, dict[str, float]] = {}
     for name in PARAMETER_NAMES:
-        for series in parameter_series(life, tests, name):
+        for series in parameter_series(life, basis, tests, name):
             if series.measurements:
-                at.setdefault(series.pressure, {})[name] = _median(clutch_id, series, progress)
+                at.setdefault(series.pressure, {})[name] = _median(clutch_id, series, basis, cycles)
     told = {level: values for level, values in at.items() if len(values) == len(PARAMETER_NAMES)}
     if not told:
         raise NotFoundError("no stationary test tells all four Stribeck parameters by then")
     return {level: StribeckParameters(**{n: max(v, 0.0) for n, v in values.items()}) for level, values in told.items()}
 
 
-def _median(clutch_id: str, series: Series, progress: float) -> float:
-    posterior = posterior_of(clutch_id, series)
-    return float(weighted_quantiles(value(progress, posterior.degradation), posterior.weight, (0.5,))[0])
+def _median(clutch_id: str, series: Series, basis: Basis, cycles: float) -> float:
+    posterior = posterior_of(clutch_id, series, basis)
+    values = posterior.values(np.array([float(series.scale.progress(cycles))]))[0]
+    return float(weighted_quantiles(values, posterior.weight, (0.5,))[0])
 
 
 def _capacity(parameters: Mapping[float, StribeckParameters]) -> Capacity:

@@ -2,7 +2,7 @@
 
 Runs may have arrived in any order; the history is ordered by cycles, and at equal cycles by when the runs were started
 (or received, where the rig did not say). A rebuild starts a new life: cycles count from it, and the first stationary test
-after it is the new reference.
+after it is the new reference. Any other maintenance begins an epoch: it may have shifted the level of what is measured.
 """
 
 import itertools
@@ -10,16 +10,16 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.protocol import protocol_speeds
 from models.runs import LEVEL_GAP, LEVEL_GAP_SHARE
+from models.severity import Block
 from models.tracking.measurement import Measurement
 from service.workflows.analysis import Value
-
-MEAN_COF = "mean_cof"
-#: The mean over the reference pressures stands under this pressure.
-ALL_PRESSURES = 0.0
+from service.workflows.basis import ALL_PRESSURES, MEAN_COF, Basis, Scale
 
 ByPressure = Mapping[float, Value]
 
@@ -29,7 +29,8 @@ class Event:
     """A run as the history sees it.
 
     `moment` is when it was made [s]. A stationary test has the range of its speeds [rad/s], and mean COF with its
-    deviation by pressure [Pa] where its curves can say it.
+    deviation by pressure [Pa] where its curves can say it; `duty` is the block that ends with the run, `shift` an event
+    that may have shifted the level.
     """
 
     run_id: str
@@ -39,16 +40,22 @@ class Event:
     speed_range: Value | None = None
     cofs: ByPressure = field(default_factory=dict)
     rebuild: bool = False
+    shift: bool = False
+    duty: Block | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Series:
-    """One quantity at one pressure: measurements by cycles since the life's origin, and which event each came from."""
+    """One quantity at one pressure: measurements by progress ζ, and which event each came from.
+
+    `scale` leads from cycles since new to ζ and back; an adopted model's course is off the measurements.
+    """
 
     quantity: str
     pressure: float
     measurements: tuple[Measurement, ...]
     events: tuple[int, ...]
+    scale: Scale
 
     def until(self, event: int) -> int:
         """How many measurements were there when `event` had happened."""
@@ -72,26 +79,41 @@ class Life:
         """Mean COF by pressure of the first stationary test that says one."""
         return next((event.cofs for event in self.events if event.cofs), {})
 
-    def pooled(self) -> Series:
+    def until(self, event: int) -> "Life":
+        """The life as it was when `event` had happened."""
+        return Life(origin=self.origin, events=self.events[: event + 1])
+
+    def scale(self, basis: Basis) -> Scale:
+        """ζ over cycles since new, by the duty of this life."""
+        return basis.scale(self.origin, [event.duty for event in self.events if event.duty is not None])
+
+    def pooled(self, basis: Basis) -> Series:
         """Mean COF over the pressures of the reference test."""
         reference = self.reference
-        return self.series(MEAN_COF, ALL_PRESSURES, [_pooled(reference, event.cofs) for event in self.events])
+        return self.series(basis, MEAN_COF, ALL_PRESSURES, [_pooled(reference, event.cofs) for event in self.events])
 
-    def at(self, level: float) -> Series:
+    def at(self, basis: Basis, level: float) -> Series:
         """Mean COF at one pressure level of the reference test."""
-        return self.series(MEAN_COF, level, [nearest(level, event.cofs) for event in self.events])
+        return self.series(basis, MEAN_COF, level, [nearest(level, event.cofs) for event in self.events])
 
-    def series(self, quantity: str, pressure: float, values: Sequence[Value | None]) -> Series:
+    def series(self, basis: Basis, quantity: str, pressure: float, values: Sequence[Value | None]) -> Series:
         """The series of a quantity from its value at every event, None where it has none."""
         kept = [(index, value) for index, value in enumerate(values) if value is not None]
+        scale = self.scale(basis)
+        cycles = np.array([self.events[index].cycles for index, _ in kept])
+        course = basis.offset(quantity, pressure, cycles)
+        epochs = list(itertools.accumulate(int(event.shift) for event in self.events))
         return Series(
             quantity=quantity,
             pressure=pressure,
             measurements=tuple(
-                Measurement(progress=self.events[index].cycles - self.origin, value=value[0], variance=value[1] ** 2)
-                for index, value in kept
+                Measurement(progress=zeta, value=value - off, variance=sd**2, epoch=epochs[index])
+                for (index, (value, sd)), zeta, off in zip(
+                    kept, scale.progress(cycles).tolist(), course.tolist(), strict=True
+                )
             ),
             events=tuple(index for index, _ in kept),
+            scale=scale,
         )
 
 

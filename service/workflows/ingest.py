@@ -6,17 +6,18 @@ from typing import Any
 from sqlalchemy import Connection
 
 from models.clutch import Geometry
+from models.severity import Block
 from service.errors import ConflictError
 from service.formats.incoming import IncomingRun
 from service.settings import CODE_VERSION
 from service.workflows import stored
+from service.workflows.adoption import correct_newest, retrack_all
 from service.workflows.analysis import LATE, OTHER_PRESSURES, Analysis, Warned, analyse, mean_cofs
 from service.workflows.history import ByPressure, Event, lives, nearest, order, reference_velocities
 from service.workflows.loops import DYNAMIC, loops_of, refresh_loops
 from service.workflows.receipts import bar, fit_receipt, receipt
-from service.workflows.refresh import refresh_cofs
 from service.workflows.retrack import retrack
-from storage import channels, clutches, fits, runs
+from storage import adopted_models, channels, clutches, fits, runs
 from storage.clutches import ClutchRow
 from storage.database import Database
 from storage.runs import NewRun, RunRow
@@ -93,14 +94,26 @@ def _store(
     channels.write(connection, run_key, run.channels)
     fits.write(connection, run_key, stored.fit_rows(analysis.fits, cofs))
     clutches.bump_revision(connection, clutch.clutch_id)
-    if event is not ordered[-1] and (event.rebuild or event.speed_range is not None):
-        # the reference test may be another one now, and with it the protocol of all means
-        retrack(connection, clutch, refresh_cofs(connection, clutch.clutch_id, geometry))
+    if _changes_the_past(connection, clutch.clutch_id, ordered, event):
+        retrack_all(connection, clutch)
     else:
-        retrack(connection, clutch, ordered, newest=event)
+        newest = correct_newest(connection, clutch, ordered, event)
+        retrack(connection, clutch, [newest if each is event else each for each in ordered], newest=newest)
     if event.speed_range is not None:
         refresh_loops(connection, clutch.clutch_id, ordered, geometry, since=event)
     return answer
+
+
+def _changes_the_past(connection: Connection, clutch_id: str, ordered: Sequence[Event], event: Event) -> bool:
+    """Whether what was said of earlier or later tests no longer holds.
+
+    A late test or rebuild may make another test the reference, and with it the protocol of all means; under an adopted
+    model any late run may bear on the corrections of those after it, and a rebuild ends the model.
+    """
+    late = event is not ordered[-1]
+    if adopted_models.current(connection, clutch_id) is not None and (late or event.rebuild):
+        return True
+    return late and (event.rebuild or event.speed_range is not None)
 
 
 def _event(run: IncomingRun, analysis: Analysis, received_at: str, cofs: ByPressure | None = None) -> Event:
@@ -112,7 +125,15 @@ def _event(run: IncomingRun, analysis: Analysis, received_at: str, cofs: ByPress
         speed_range=analysis.speed_range,
         cofs=cofs or {},
         rebuild=run.details.get("event") == "rebuild",
+        shift=run.details.get("event") not in (None, "rebuild"),
+        duty=_duty(run),
     )
+
+
+def _duty(run: IncomingRun) -> Block | None:
+    said = run.details.get("duty") or {}
+    names = ("cycles", "energy_per_cycle_kj", "initial_speed_rpm", "engagement_duration_s")
+    return stored.duty_block(run.cycles, *(said.get(name) for name in names))
 
 
 def _cofs(events: Sequence[Event], event: Event, analysis: Analysis, geometry: Geometry) -> ByPressure:

@@ -2,29 +2,35 @@
 
 import hashlib
 import json
+from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
+
+from sqlalchemy import Connection
 
 from service.errors import ConflictError
 from service.schemas.clutch import ClutchIn
 from service.workflows import stored
+from service.workflows.adopted import BASELINE
 from service.workflows.retrack import RANK_UNKNOWN, SUMMARY
-from storage import clutches
+from storage import clutches, verdicts
 from storage.clutches import ClutchRow
 from storage.database import Database
+from storage.verdicts import VerdictRow
 
 
 def register(database: Database, clutch: ClutchIn, *, created_at: str) -> tuple[dict[str, Any], bool]:
     """Register a clutch; returns it and whether it is new. Raises ConflictError where it is known with other content."""
     record = clutch.model_dump(mode="json")
-    content = hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()
+    content = _content(record)
     with database.reading() as connection:
         known = clutches.get(connection, clutch.clutch_id)
         if known is not None:
-            return _known(known, content), False
+            return _known(connection, known, content), False
     with database.writing() as connection:
         known = clutches.get(connection, clutch.clutch_id)
         if known is not None:
-            return _known(known, content), False
+            return _known(connection, known, content), False
         row = ClutchRow(
             clutch_id=clutch.clutch_id,
             record=record,
@@ -38,18 +44,23 @@ def register(database: Database, clutch: ClutchIn, *, created_at: str) -> tuple[
         return describe(row), True
 
 
-def _known(row: ClutchRow, content: str) -> dict[str, Any]:
-    if row.content_sha256 != content:
+def _content(record: dict[str, Any]) -> str:
+    """A record's hash, with the defaults of fields that came after it filled in."""
+    return hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()
+
+
+def _known(connection: Connection, row: ClutchRow, content: str) -> dict[str, Any]:
+    if _content(stored.record(row).model_dump(mode="json")) != content:
         raise ConflictError(
             f"clutch {row.clutch_id!r} is known with another record; records are not changed by posting"
         )
-    return describe(row)
+    return _described(connection, [row])[0]
 
 
 def look_up(database: Database, clutch_id: str) -> dict[str, Any]:
     """A clutch; raises NotFoundError."""
     with database.reading() as connection:
-        return describe(stored.clutch(connection, clutch_id))
+        return _described(connection, [stored.clutch(connection, clutch_id)])[0]
 
 
 def page(
@@ -58,16 +69,28 @@ def page(
     """Clutches with the fewest remaining cycles first, and where the next page starts."""
     with database.reading() as connection:
         rows = clutches.page(connection, limit=limit + 1, after=after)
-        items = [describe(row) for row in rows[:limit]]
+        items = _described(connection, rows[:limit])
     more = (rows[limit - 1].rank, rows[limit - 1].clutch_id) if len(rows) > limit else None
     return items, more
 
 
-def describe(row: ClutchRow) -> dict[str, Any]:
+def _described(connection: Connection, rows: Sequence[ClutchRow]) -> list[dict[str, Any]]:
+    """Clutches as they go out."""
+    said = verdicts.newest(connection, [row.clutch_id for row in rows])
+    return [describe(row, said.get(row.clutch_id)) for row in rows]
+
+
+#: What summaries did not say that were stored before models could be adopted.
+_BEFORE = {"model": dict(BASELINE)}
+
+
+def describe(row: ClutchRow, verdict: VerdictRow | None = None) -> dict[str, Any]:
     """A clutch as it goes out."""
-    return dict(row.record) | {
+    return stored.record(row).model_dump(mode="json") | {
         "created_at": row.created_at,
         "revision": row.revision,
         "runs": row.summary.get("runs", 0),
-        "summary": {name: row.summary[name] for name in SUMMARY} if row.summary else None,
+        "summary": {name: (_BEFORE | row.summary)[name] for name in SUMMARY} if row.summary else None,
+        "recent": row.summary.get("recent"),
+        "diagnosis": None if verdict is None else asdict(verdict) | {"causes": list(verdict.causes)},
     }

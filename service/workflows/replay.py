@@ -7,12 +7,11 @@ from sqlalchemy import Connection
 from service.formats.incoming import IncomingRun
 from service.settings import CODE_VERSION
 from service.workflows import stored
+from service.workflows.adoption import retrack_all
 from service.workflows.analysis import NOTICED_ON_ARRIVAL, Analysis, Warned, analyse
-from service.workflows.history import ALL_PRESSURES
+from service.workflows.basis import ALL_PRESSURES
 from service.workflows.loops import refresh_loops
 from service.workflows.receipts import fit_receipt, receipt
-from service.workflows.refresh import refresh_cofs
-from service.workflows.retrack import retrack
 from service.workflows.tracks import CARRIED
 from storage import channels, clutches, fits, predictions, runs
 from storage.database import Database
@@ -33,7 +32,7 @@ def replay_clutch(database: Database, clutch_id: str) -> int:
     with database.writing() as connection:
         clutch = stored.clutch(connection, clutch_id)
         geometry = stored.record(clutch).geometry.to_model()
-        before = _results(connection, clutch_id)
+        before = results(connection, clutch_id)
         rows = stored.run_rows(connection, clutch_id)
         for row in rows:
             incoming = stored.incoming(row, channels.read(connection, row.run_key))
@@ -41,15 +40,14 @@ def replay_clutch(database: Database, clutch_id: str) -> int:
             fits.write(connection, row.run_key, stored.fit_rows(analysis.fits, {}))
             answer = _receipt(row, incoming, analysis)
             runs.set_results(connection, row.run_key, stored.details(incoming, analysis), answer, CODE_VERSION)
-        events = refresh_cofs(connection, clutch_id, geometry)
-        retrack(connection, clutch, events)
+        events = retrack_all(connection, clutch)
         refresh_loops(connection, clutch_id, events, geometry)
-        if _results(connection, clutch_id) != before:
+        if results(connection, clutch_id) != before:
             clutches.bump_revision(connection, clutch_id)
         return len(rows)
 
 
-def _results(connection: Connection, clutch_id: str) -> list[Any]:
+def results(connection: Connection, clutch_id: str) -> list[Any]:
     """All that is said of a clutch."""
     said = [predictions.history(connection, clutch_id, method, ALL_PRESSURES) for method in CARRIED]
     return [[row.receipt for row in stored.run_rows(connection, clutch_id)], said]

@@ -9,14 +9,16 @@ from sqlalchemy import Connection
 
 from models.arrays import FloatArray
 from models.identification import ACCEPTABLE_MSE, FitStatus, StribeckFit
+from models.severity import Block
 from models.stribeck import StribeckParameters
 from service.errors import NotFoundError
 from service.formats.incoming import IncomingRun
+from service.formats.units import RADIANS_PER_SECOND_PER_RPM
 from service.schemas.clutch import ClutchIn
 from service.settings import CODE_VERSION
 from service.workflows.analysis import Analysis, LevelFit, Value
 from service.workflows.history import ByPressure, Event, order
-from storage import clutches, fits, runs
+from storage import adopted_models, clutches, fits, runs
 from storage.clutches import ClutchRow
 from storage.fits import FitRow
 from storage.runs import RunInOrder, RunRow
@@ -71,8 +73,8 @@ def incoming(row: RunRow, columns: Mapping[str, FloatArray]) -> IncomingRun:
 
 
 def events(connection: Connection, clutch_id: str) -> list[Event]:
-    """All runs of a clutch as its history sees them, ordered."""
-    cofs = fits.cofs_of_clutch(connection, clutch_id)
+    """All runs of a clutch as its history sees them, ordered; mean COF as the model in force corrects it."""
+    cofs = fits.cofs_of_clutch(connection, clutch_id) | adopted_models.corrected_cofs(connection, clutch_id)
     return order([event(row, cofs.get(row.run_key, {})) for row in runs.in_order(connection, clutch_id)])
 
 
@@ -95,6 +97,27 @@ def event(row: RunInOrder, cofs: ByPressure) -> Event:
         speed_range=None if low is None or high is None else (low, high),
         cofs=cofs,
         rebuild=row.event == "rebuild",
+        shift=row.event not in (None, "rebuild"),
+        duty=duty_block(row.cycles, row.duty_cycles, row.duty_energy_kj, row.duty_speed_rpm, row.duty_duration_s),
+    )
+
+
+def duty_block(
+    end: float,
+    cycles: float | None,
+    energy_kj: float | None,
+    speed_rpm: float | None,
+    duration_s: float | None,
+) -> Block | None:
+    """A block of duty in SI units, None where a run is none."""
+    if cycles is None:
+        return None
+    return Block(
+        end=end,
+        cycles=cycles,
+        energy=None if energy_kj is None else 1000.0 * energy_kj,
+        speed=None if speed_rpm is None else speed_rpm * RADIANS_PER_SECOND_PER_RPM,
+        duration=duration_s,
     )
 
 

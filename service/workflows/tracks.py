@@ -2,7 +2,8 @@
 
 A run that comes last in order of cycles carries the stored filter states one step on; any other run makes the life be
 tracked anew from its first test. Both ways give the same answer: the random numbers of a step depend on clutch, series
-and step alone.
+and step alone. Where a fleet's prior stands beside the weak one a filter runs under both, and its draws are put together
+as the data have it (`models.fleet`).
 """
 
 import zlib
@@ -12,14 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from models.prognosis import first_passage
+from models.prognosis import HORIZON, Offset, first_passage
 from models.tracking.grid import Grid, GridState
 from models.tracking.particle import Particle, ParticleState
-from models.tracking.prior import weak
+from models.tracking.prior import Prior
 from models.tracking.protocol import Posterior, Tracker
 from models.tracking.ukf import Ukf, UkfState
+from service.workflows.basis import WEAK, Basis
 from service.workflows.foretold import foretold, unknown
 from service.workflows.history import Life, Series
+from service.workflows.surprise import off_track
 
 FilterState = ParticleState | UkfState | GridState
 
@@ -29,8 +32,8 @@ _DRAWS = 1000
 _GRID = Grid()
 _TRACKERS: Mapping[str, Tracker[Any]] = {tracker.name: tracker for tracker in (Particle(), Ukf(), _GRID)}
 METHODS = tuple(_TRACKERS)
-#: The exact filter is laid anew over the whole history at each step: these carry a state from run to run. When a life is
-#: tracked anew, only these say again what they would have said all along; the exact one is worked out when asked.
+#: The exact filter is laid anew over the whole history at each step, and worked out when it is asked for: these carry a
+#: state from run to run, and what they say is stored with each.
 CARRIED = tuple(method for method in METHODS if method != _GRID.name)
 
 
@@ -45,59 +48,93 @@ class Prediction:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tracked:
-    """A filter's state after `runs` measurements of a series."""
+    """A filter's states after `runs` measurements of a series, by what was believed before the first."""
 
     runs: int
-    state: FilterState
+    states: Mapping[str, FilterState]
 
 
 States = dict[str, Tracked]
 
 
 def follow(
-    clutch_id: str, life: Life, series: Series, fraction: float, states: States, *, first_event: int = 0
+    clutch_id: str, life: Life, basis: Basis, fraction: float, states: States, *, first_event: int = 0
 ) -> Iterator[tuple[States, list[Prediction]]]:
     """Walk a life's events from `first_event` on; after each, the states by method and what is predicted of the series.
 
     `states` are those before `first_event`. A life that says too little yields `insufficient_data`.
     """
+    whole = life.pooled(basis)
     for index in range(first_event, len(life.events)):
+        series = whole if basis.counts_cycles else life.until(index).pooled(basis)
         runs = series.until(index)
         cycles = life.events[index].cycles
-        methods = METHODS if index == len(life.events) - 1 else CARRIED
         if runs:
-            states = {method: advance(clutch_id, method, series, states.get(method), runs) for method in methods}
+            states = {method: advance(clutch_id, method, series, basis, states.get(method), runs) for method in CARRIED}
         yield (
             states,
             [
                 Prediction(
                     cycles=cycles,
                     method=method,
-                    payload=predict(clutch_id, method, series, states.get(method), life.origin, cycles, fraction),
+                    payload=predict(clutch_id, method, series, basis, states.get(method), cycles, fraction),
                 )
-                for method in methods
+                for method in CARRIED
             ],
         )
 
 
-def advance(clutch_id: str, method: str, series: Series, tracked: Tracked | None, runs: int) -> Tracked:
-    """Carry one filter on until it has taken in the first `runs` measurements of the series."""
+def advance(clutch_id: str, method: str, series: Series, basis: Basis, tracked: Tracked | None, runs: int) -> Tracked:
+    """Carry one filter on until it has taken in the first `runs` measurements of the series.
+
+    A state that was made of other measurements or other beliefs is of no use: then it starts anew.
+    """
+    beliefs = basis.beliefs(series.quantity, series.measurements[0], series.scale)
+    if tracked is not None and not _continues(tracked, series, beliefs):
+        tracked = None
     if tracked is not None and tracked.runs == runs:
         return tracked
-    prior = weak(series.measurements[0], falling=True)
     if method == _GRID.name:
-        return Tracked(runs=runs, state=_GRID.from_history(prior, series.measurements[:runs]))
+        seen = series.measurements[:runs]
+        return Tracked(runs=runs, states={name: _GRID.from_history(prior, seen) for name, prior in beliefs.items()})
     tracker = _TRACKERS[method]
-    state = tracker.start(prior) if tracked is None else tracked.state
+    states = {name: tracker.start(prior) for name, prior in beliefs.items()} if tracked is None else tracked.states
     for step in range(0 if tracked is None else tracked.runs, runs):
-        state = tracker.update(state, series.measurements[step], step_rng(clutch_id, method, series, step))
-    return Tracked(runs=runs, state=state)
+        states = {
+            name: tracker.update(
+                state, series.measurements[step], step_rng(clutch_id, _purpose(method, name), series, step)
+            )
+            for name, state in states.items()
+        }
+    return Tracked(runs=runs, states=states)
 
 
-def draws(clutch_id: str, method: str, series: Series, tracked: Tracked, size: int = _DRAWS) -> Posterior:
+def _continues(tracked: Tracked, series: Series, beliefs: Mapping[str, Prior]) -> bool:
+    """Whether the states are those of the series' first measurements under these beliefs."""
+    if tracked.states.keys() != beliefs.keys() or any(tracked.states[name].prior != p for name, p in beliefs.items()):
+        return False
+    seen = series.measurements[: tracked.runs]
+    for state in tracked.states.values():
+        history = state.history
+        known = zip(seen, history.progress.tolist(), history.value.tolist(), history.epoch.tolist(), strict=False)
+        if any((m.progress, m.value, m.epoch) != (zeta, value, epoch) for m, zeta, value, epoch in known):
+            return False
+    return True
+
+
+def draws(clutch_id: str, method: str, series: Series, basis: Basis, tracked: Tracked, size: int = _DRAWS) -> Posterior:
     """A weighted sample of eq. 6's coefficients after `tracked.runs` measurements; the same each time."""
     tracker = _TRACKERS[method]
-    return tracker.posterior(tracked.state, size, step_rng(clutch_id, f"{method}-posterior", series, tracked.runs))
+    found = {}
+    for name, state in tracked.states.items():
+        rng = step_rng(clutch_id, f"{_purpose(method, name)}-posterior", series, tracked.runs)
+        found[name] = tracker.posterior(state, size, rng)
+    return basis.together(found, series.measurements[0], series.scale)
+
+
+def _purpose(method: str, belief: str) -> str:
+    """What a step's random numbers are for."""
+    return method if belief == WEAK else f"{method}-{belief}"
 
 
 def step_rng(clutch_id: str, purpose: str, series: Series, step: int) -> np.random.Generator:
@@ -107,11 +144,33 @@ def step_rng(clutch_id: str, purpose: str, series: Series, step: int) -> np.rand
 
 
 def predict(
-    clutch_id: str, method: str, series: Series, tracked: Tracked | None, origin: float, cycles: float, fraction: float
+    clutch_id: str,
+    method: str,
+    series: Series,
+    basis: Basis,
+    tracked: Tracked | None,
+    cycles: float,
+    fraction: float,
 ) -> dict[str, Any]:
     """What is said at `cycles` of a series, in the public shape."""
     if tracked is None:
-        return unknown(cycles, series.pressure, fraction)
-    passage = first_passage(draws(clutch_id, method, series, tracked), fraction=fraction, as_of=cycles - origin)
-    enough = len({each.progress for each in series.measurements[: tracked.runs]}) >= FEWEST_TESTS
-    return foretold(passage, tracked.runs, origin, cycles, series.pressure, fraction, enough=enough)
+        return unknown(basis, cycles, series.pressure, fraction)
+    posterior = draws(clutch_id, method, series, basis, tracked)
+    passage = first_passage(
+        posterior,
+        fraction=fraction,
+        as_of=float(series.scale.progress(cycles)),
+        horizon=float(series.scale.progress(series.scale.origin + HORIZON)),
+        offset=offset_of(series, basis),
+    )
+    seen = series.measurements[: tracked.runs]
+    enough = len({each.progress for each in seen}) >= FEWEST_TESTS
+    warnings = off_track(posterior, seen, basis.beliefs(series.quantity, seen[0], series.scale)[WEAK])
+    return foretold(passage, basis, series, cycles, fraction, runs=tracked.runs, enough=enough, warnings=warnings)
+
+
+def offset_of(series: Series, basis: Basis) -> Offset | None:
+    """The adopted model's course over ζ, None where there is none."""
+    if basis.course is None:
+        return None
+    return lambda progress: basis.offset(series.quantity, series.pressure, series.scale.cycles(progress))

@@ -4,13 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from models.degradation import value
 from models.prognosis import weighted_quantiles
 from models.tracking.grid import Grid
-from models.tracking.prior import weak
 from models.tracking.protocol import Posterior
 from service.schemas.base import whole
-from service.workflows.history import ALL_PRESSURES, MEAN_COF, Series
+from service.workflows.basis import ALL_PRESSURES, MEAN_COF, Basis
+from service.workflows.history import Series
 from service.workflows.receipts import PARAMETER_UNITS, bar
 from service.workflows.tracks import step_rng
 
@@ -20,20 +19,27 @@ _BAND = (0.05, 0.5, 0.95)
 _GRID = Grid(nodes=13, rows=13, levels=7)
 
 
-def posterior_of(clutch_id: str, series: Series) -> Posterior:
+def posterior_of(clutch_id: str, series: Series, basis: Basis) -> Posterior:
     """A weighted sample of a series' eq. 6 by the exact filter; the same each time."""
-    prior = weak(series.measurements[0], falling=series.quantity == MEAN_COF)
-    state = _GRID.from_history(prior, series.measurements)
-    return _GRID.posterior(state, _DRAWS, step_rng(clutch_id, "trajectory", series, len(series.measurements)))
+    first = series.measurements[0]
+    found = {}
+    for name, prior in basis.beliefs(series.quantity, first, series.scale).items():
+        state = _GRID.from_history(prior, series.measurements)
+        rng = step_rng(clutch_id, f"trajectory-{name}", series, len(series.measurements))
+        found[name] = _GRID.posterior(state, _DRAWS, rng)
+    return basis.together(found, first, series.scale)
 
 
-def item(clutch_id: str, series: Series, origin: float) -> dict[str, Any]:
-    """One quantity at one pressure, by the exact filter."""
+def item(series: Series, posterior: Posterior, basis: Basis) -> dict[str, Any]:
+    """One quantity at one pressure, by the exact filter; the adopted model's course is put back on."""
     public, unit = (MEAN_COF, "1") if series.quantity == MEAN_COF else PARAMETER_UNITS[series.quantity]
-    posterior = posterior_of(clutch_id, series)
-    zeta = np.linspace(0.0, max(1.0, series.measurements[-1].progress) * _AHEAD, _POINTS)
-    values = value(zeta[:, None], posterior.degradation)
+    origin, last = series.scale.origin, float(series.scale.cycles(series.measurements[-1].progress))
+    cycles = origin + np.linspace(0.0, max(1.0, last - origin) * _AHEAD, _POINTS)
+    course = basis.offset(series.quantity, series.pressure, cycles)
+    values = posterior.values(series.scale.progress(cycles)) + course[:, None]
     band = np.array([weighted_quantiles(row, posterior.weight, _BAND) for row in values])
+    tested = series.scale.cycles(np.array([each.progress for each in series.measurements]))
+    off = basis.offset(series.quantity, series.pressure, tested)
     samples = {
         "initial": posterior.initial,
         "change": posterior.change,
@@ -48,12 +54,12 @@ def item(clutch_id: str, series: Series, origin: float) -> dict[str, Any]:
             name: dict(zip(("value", "sd"), posterior.moments(sample), strict=True)) for name, sample in samples.items()
         },
         "measured": {
-            "cycles": [whole(each.progress + origin) for each in series.measurements],
-            "value": [each.value for each in series.measurements],
+            "cycles": [whole(each) for each in tested.tolist()],
+            "value": [each.value + more for each, more in zip(series.measurements, off.tolist(), strict=True)],
             "sd": [each.variance**0.5 for each in series.measurements],
         },
         "trajectory": {
-            "cycles": (zeta + origin).tolist(),
+            "cycles": cycles.tolist(),
             "lower": band[:, 0].tolist(),
             "median": band[:, 1].tolist(),
             "upper": band[:, 2].tolist(),

@@ -10,15 +10,18 @@ from collections import OrderedDict
 from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
 
+from models.clutch import Geometry
 from models.stribeck import PARAMETER_NAMES
 from service.errors import NotFoundError
 from service.formats.units import PASCALS_PER_BAR
 from service.workflows.analysis import LevelFit, Value
+from service.workflows.basis import ALL_PRESSURES, Basis
 from service.workflows.foretold import unknown
-from service.workflows.history import ALL_PRESSURES, Event, Life, Series, lives, nearest
+from service.workflows.history import Event, Life, Series, lives, nearest
+from service.workflows.rebuilt import Track, disagreements, rebuilt
 from service.workflows.receipts import bar
 from service.workflows.tracks import advance, predict
-from service.workflows.trajectories import item
+from service.workflows.trajectories import item, posterior_of
 
 
 class Remembered:
@@ -47,6 +50,7 @@ class Remembered:
 def foretell(
     clutch_id: str,
     events: Sequence[Event],
+    basis: Basis,
     fraction: float,
     *,
     method: str,
@@ -58,14 +62,14 @@ def foretell(
     level = ALL_PRESSURES if pressure_bar is None else _level(found[-1] if found else None, pressure_bar)
     happened = [event for event in events if at_cycles is None or event.cycles <= at_cycles]
     if not happened:
-        return unknown(None, level, fraction)
+        return unknown(basis, None, level, fraction)
     life = lives(happened)[-1]
     cycles = happened[-1].cycles
-    series = life.pooled() if pressure_bar is None else life.at(level)
+    series = life.pooled(basis) if pressure_bar is None else life.at(basis, level)
     if not series.measurements:
-        return unknown(cycles, level, fraction)
-    tracked = advance(clutch_id, method, series, None, len(series.measurements))
-    return predict(clutch_id, method, series, tracked, life.origin, cycles, fraction)
+        return unknown(basis, cycles, level, fraction)
+    tracked = advance(clutch_id, method, series, basis, None, len(series.measurements))
+    return predict(clutch_id, method, series, basis, tracked, cycles, fraction)
 
 
 def _level(life: Life | None, pressure_bar: float) -> float:
@@ -79,21 +83,46 @@ def _level(life: Life | None, pressure_bar: float) -> float:
 
 
 def degradation(
-    clutch_id: str, events: Sequence[Event], fits: Mapping[str, Sequence[LevelFit]]
-) -> list[dict[str, Any]]:
-    """Eq. 6 for mean COF and the four Stribeck parameters, together and at every reference pressure, in the present life.
+    clutch_id: str,
+    events: Sequence[Event],
+    basis: Basis,
+    fits: Mapping[str, Sequence[LevelFit]],
+    geometry: Geometry,
+    fraction: float,
+) -> dict[str, Any]:
+    """Eq. 6 for mean COF and the four Stribeck parameters, together and at every reference pressure, in the present life;
+    and mean COF rebuilt from the parameters.
 
     `fits` are the levels of each test by run_id.
     """
     found = lives(events)
     if not found or not found[-1].reference:
-        return []
+        return {"items": [], "rebuilt": None, "warnings": []}
     life = found[-1]
     tests = tests_of(life, fits)
-    series = [life.pooled(), *(life.at(level) for level in life.reference)]
-    for name in PARAMETER_NAMES:
-        series += parameter_series(life, tests, name)
-    return [item(clutch_id, each, life.origin) for each in series if each.measurements]
+    direct = [life.pooled(basis), *(life.at(basis, level) for level in life.reference)]
+    tracked = [(each, posterior_of(clutch_id, each, basis)) for each in direct if each.measurements]
+    parameters = parameter_tracks(clutch_id, life, basis, tests)
+    again = rebuilt(
+        clutch_id, life, basis, tests, parameters, {each[0].pressure: each for each in tracked}, geometry, fraction
+    )
+    return {
+        "items": [item(series, posterior, basis) for series, posterior in (*tracked, *parameters.values())],
+        "rebuilt": again,
+        "warnings": [{"code": each.code, "message": each.message} for each in disagreements(again)],
+    }
+
+
+def parameter_tracks(
+    clutch_id: str, life: Life, basis: Basis, tests: Sequence[Sequence[LevelFit]]
+) -> dict[tuple[str, float], Track]:
+    """Every Stribeck parameter's own eq. 6 at every reference pressure where it is known, by name and pressure [Pa]."""
+    return {
+        (name, series.pressure): (series, posterior_of(clutch_id, series, basis))
+        for name in PARAMETER_NAMES
+        for series in parameter_series(life, basis, tests, name)
+        if series.measurements
+    }
 
 
 def tests_of(life: Life, fits: Mapping[str, Sequence[LevelFit]]) -> list[Sequence[LevelFit]]:
@@ -101,11 +130,11 @@ def tests_of(life: Life, fits: Mapping[str, Sequence[LevelFit]]) -> list[Sequenc
     return [fits.get(event.run_id, ()) for event in life.events]
 
 
-def parameter_series(life: Life, tests: Sequence[Sequence[LevelFit]], name: str) -> list[Series]:
+def parameter_series(life: Life, basis: Basis, tests: Sequence[Sequence[LevelFit]], name: str) -> list[Series]:
     """One Stribeck parameter at every reference pressure, by the fits that determine it."""
     column = PARAMETER_NAMES.index(name)
     values = [_parameter(levels, name, column) for levels in tests]
-    return [life.series(name, level, [nearest(level, each) for each in values]) for level in life.reference]
+    return [life.series(basis, name, level, [nearest(level, each) for each in values]) for level in life.reference]
 
 
 def _parameter(levels: Sequence[LevelFit], name: str, column: int) -> dict[float, Value]:

@@ -24,6 +24,8 @@ from models.tracking.particle import Particle
 from models.tracking.prior import weak
 from models.tracking.ukf import Ukf
 from service.formats.simulated import simulated_body
+from tests.benchmarks.pages import pages
+from tests.benchmarks.records import records
 from tests.support import serving
 
 
@@ -147,3 +149,5 @@ if __name__ == "__main__":
     service()
     identification()
     tracking()
+    records()
+    pages()

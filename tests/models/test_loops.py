@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from models.lag_fit import StationaryCurve
 from models.loop_area import Direction, loop_area
 from models.loops import LoopStatus, evaluate_loops
-from models.periods import fit_cycle, pressure_stretches
+from models.periods import fit_cycle
 from models.runs import Record
+from models.standing import pressure_stretches
 from tests.models.dynamic_records import FALLING, GEOMETRY, SWING, attractor, curve, record, velocity
 from tests.real.lag import MICRO_LOOPS, micro_loops
 

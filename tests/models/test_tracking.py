@@ -8,46 +8,29 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from models.degradation import Degradation, value
 from models.prognosis import first_passage
 from models.tracking import linear
-from models.tracking.grid import Grid, GridState
+from models.tracking.discrepancy import log_size_weight
+from models.tracking.grid import Grid
+from models.tracking.history import History
 from models.tracking.measurement import Measurement
-from models.tracking.particle import Particle, ParticleState
-from models.tracking.prior import Prior, weak
-from models.tracking.protocol import Posterior
-from models.tracking.ukf import Ukf, UkfState
-
-FILTERS = [(Grid(), GridState), (Particle(particles=300), ParticleState), (Ukf(), UkfState)]
-NAMES = [tracker.name for tracker, _ in FILTERS]
-TYPICAL = Degradation(initial=0.134, change=-0.1, scale=5_000.0, exponent=0.7)
-
-
-def series(d: Degradation, progress: np.ndarray, noise: float, seed: int = 0) -> list[Measurement]:
-    rng = np.random.default_rng(seed)
-    values = value(progress, d) + noise * rng.standard_normal(progress.size)
-    return [
-        Measurement(progress=float(z), value=float(y), variance=1e-8) for z, y in zip(progress, values, strict=True)
-    ]
-
-
-def measured(progress: list[float], values: list[float]) -> list[Measurement]:
-    return [Measurement(progress=z, value=y, variance=0.0) for z, y in zip(progress, values, strict=True)]
-
-
-def followed(tracker: Any, prior: Prior, measurements: list[Measurement], seed: int = 0) -> Any:
-    rng, state = np.random.default_rng(seed), tracker.start(prior)
-    for measurement in measurements:
-        state = tracker.update(state, measurement, rng)
-    return state
-
-
-def same(a: Any, b: Any) -> bool:
-    return all(np.array_equal(x, b.to_arrays()[name]) for name, x in a.to_arrays().items())
-
-
-CAMPAIGN = series(TYPICAL, np.linspace(0.0, 12_000.0, 13), 4e-4)
-PRIOR = weak(CAMPAIGN[0], falling=True)
+from models.tracking.particle import Particle
+from models.tracking.prior import weak
+from models.tracking.sigma import scatter_learnt
+from models.tracking.ukf import Ukf
+from tests.models.tracked_series import (
+    CAMPAIGN,
+    COLUMNS,
+    FILTERS,
+    NAMES,
+    PLAIN,
+    PRIOR,
+    TYPICAL,
+    followed,
+    measured,
+    same,
+    series,
+)
 
 WEIRD = {
     "one": measured([0.0], [0.13]),
@@ -72,10 +55,11 @@ def test_any_series_leaves_finite_numbers(tracker: Any, state_type: Any, falling
     prior = weak(measurements[0], falling=falling)
     state = followed(tracker, prior, measurements)
     posterior = tracker.posterior(state, 400, np.random.default_rng(1))
-    for name in Posterior.__slots__:
+    for name in COLUMNS:
         column = getattr(posterior, name)
         assert column.shape == (400,)
         assert np.isfinite(column).all(), name
+    assert np.isfinite(posterior.values(np.array([0.0, 1e3, 1e6]))).all()
     assert posterior.weight.sum() == pytest.approx(1.0)
     assert min(posterior.scale.min(), posterior.exponent.min(), posterior.scatter.min()) > 0.0
     first_passage(posterior, fraction=0.5, as_of=measurements[-1].progress)
@@ -87,7 +71,9 @@ def test_a_seed_gives_the_same_answer_twice(tracker: Any, state_type: Any) -> No
     first, second = (followed(tracker, PRIOR, CAMPAIGN, seed=5) for _ in range(2))
     assert same(first, second)
     draws = [tracker.posterior(first, 500, np.random.default_rng(2)) for _ in range(2)]
-    assert all(np.array_equal(getattr(draws[0], n), getattr(draws[1], n)) for n in Posterior.__slots__)
+    assert all(np.array_equal(getattr(draws[0], n), getattr(draws[1], n)) for n in COLUMNS)
+    places = np.array([0.0, 6e3, 5e4])
+    assert np.array_equal(draws[0].values(places), draws[1].values(places))
     assert isinstance(first, state_type)
 
 
@@ -151,10 +137,17 @@ def test_every_draw_carries_its_exact_density() -> None:
 
 def test_the_marginal_of_log_scale_against_plain_quadrature() -> None:
     """ε and s held nearly fixed by their prior, the posterior of log φ is a one-dimensional integral."""
-    prior = replace(PRIOR, log_exponent_sd=1e-3, log_scatter_sd=1e-3, log_exponent_mean=-0.36, log_scatter_mean=-7.8)
+    prior = replace(PLAIN, log_exponent_sd=1e-3, log_scatter_sd=1e-3, log_exponent_mean=-0.36, log_scatter_mean=-7.8)
     log_scale = np.linspace(7.5, 9.5, 4_001)
-    history = linear.History.of(CAMPAIGN)
-    sums = linear.pointwise(history, prior, log_scale, np.full(4_001, -0.36), np.full(4_001, -7.8))
+    history = History.of(CAMPAIGN, prior)
+    points = linear.Points(
+        log_scale=log_scale,
+        log_exponent=np.full(4_001, -0.36),
+        log_scatter=np.full(4_001, -7.8),
+        size=np.zeros(4_001),
+        spoiled=np.zeros((len(CAMPAIGN), 4_001)),
+    )
+    sums, _ = linear.pointwise(history, prior, points)
     density = linear.evidence(sums, prior) - 0.5 * ((log_scale - prior.log_scale_mean) / prior.log_scale_sd) ** 2
     density = np.exp(density - density.max())
     density /= trapezoid(density, log_scale)
@@ -190,28 +183,55 @@ def test_particles_stay_apart_because_they_move() -> None:
 
 
 def test_a_measurement_let_in_by_degrees_still_counts_once() -> None:
-    """After a starving measurement the closed form on every particle is that of the whole history, taken at once."""
+    """After starving measurements every particle's target is that of the whole history, taken at once."""
     state = followed(Particle(particles=200), PRIOR, measured([0.0, 1e3, 7e3, 15e3], [0.13, 0.115, 0.085, 0.068]))
-    sums = linear.pointwise(state.history, PRIOR, *state.cloud.points.T)
-    target = linear.evidence(sums, PRIOR) + PRIOR.log_density(*state.cloud.points.T)
+    placed = state.cloud.placed()
+    target = linear.evidence(linear.pointwise(state.history, PRIOR, placed)[0], PRIOR)
+    target += PRIOR.log_density(*state.cloud.points.T) + linear.log_spoiled(PRIOR, placed.spoiled)
+    target += log_size_weight(PRIOR)[state.cloud.size.astype(int)]
     np.testing.assert_allclose(state.cloud.log_target, target, rtol=1e-7, atol=1e-7)
-    np.testing.assert_allclose(state.cloud.mean[:, 1], linear.conditional(sums, PRIOR).change, rtol=1e-5, atol=1e-9)
 
 
 def test_the_ukf_stays_in_its_domain_and_definite() -> None:
     for measurements in WEIRD.values():
         state = followed(Ukf(), weak(measurements[0], falling=True), measurements)
-        assert np.abs(state.mean).max() <= 5.0
-        np.testing.assert_array_equal(state.covariance, state.covariance.T)
-        assert np.linalg.eigvalsh(state.covariance)[0] > 0.0
+        assert np.abs(state.mean).max() <= 6.0
+        np.testing.assert_array_equal(state.covariance, np.swapaxes(state.covariance, 1, 2))
+        assert np.linalg.eigvalsh(state.covariance).min() > 0.0
 
 
-def test_the_ukf_learns_a_larger_scatter() -> None:
-    quiet, loud = (
-        followed(Ukf(), PRIOR, series(TYPICAL, np.linspace(0.0, 2e4, 60), noise)).scatter_variance
-        for noise in (1e-4, 4e-3)
-    )
-    assert loud > 2.0 * quiet
+def test_the_ukf_learns_the_scatter_from_its_innovations() -> None:
+    """Innovations of a scatter three times as large as believed, beside fits as uncertain as that belief: after 600
+    the scatter is known to 15 % (their number alone leaves 6 %)."""
+    believed, truth, rng = 3e-4, 9e-4, np.random.default_rng(0)
+    scatter, unit = np.array([believed**2, 2.0]), PRIOR.initial_sd
+    for _ in range(600):
+        variance = (scatter[0] + believed**2) / unit**2
+        off = rng.normal(0.0, math.hypot(truth, believed)) / unit
+        scatter = scatter_learnt(PRIOR, scatter, off**2 / variance, variance, 1.0)
+    assert math.sqrt(scatter[0]) == pytest.approx(truth, rel=0.15)
+    assert scatter[1] == 602.0
+
+
+def test_no_innovation_teaches_the_ukf_more_than_five_deviations_do() -> None:
+    start = np.array([9e-8, 20.0])
+    learnt = [
+        float(scatter_learnt(PRIOR, start, surprise, 1.1 * 9e-8 / PRIOR.initial_sd**2, 1.0)[0])
+        for surprise in (9.0, 25.0, 1e4)
+    ]
+    assert learnt[1] == learnt[2] > learnt[0] > 9e-8
+    assert scatter_learnt(PRIOR, start, 1e4, 1.0, 0.0)[0] == start[0]
+
+
+def test_a_lost_ukf_starts_anew_from_the_whole_history() -> None:
+    """After runs that the filter cannot explain (a life that all at once falls twice as fast) it is where the grid is."""
+    progress = np.concatenate([np.linspace(0.0, 9e3, 10), np.linspace(9.3e3, 1.6e4, 20)])
+    values = [0.13 - 2e-6 * z - 6e-6 * max(0.0, z - 9e3) for z in progress]
+    bent = [
+        Measurement(progress=float(z), value=float(y), variance=1e-8) for z, y in zip(progress, values, strict=True)
+    ]
+    assert followed(Ukf(), PRIOR, CAMPAIGN[:11]).reference == CAMPAIGN[7].progress
+    assert followed(Ukf(), PRIOR, bent).reference > 1e4
 
 
 def test_the_weak_prior_scales_with_the_quantity() -> None:
@@ -235,3 +255,21 @@ def test_lives_of_any_length_are_tractable(life: float) -> None:
     )
     true_end = d.scale * ((1.0 - 0.067 / 0.1) ** (-1.0 / 0.7) - 1.0)
     assert passage.end_of_life[0.5] == pytest.approx(true_end, rel=0.1)
+
+
+def test_the_weak_prior_is_what_it_says() -> None:
+    prior = weak(Measurement(progress=0.0, value=0.2, variance=0.0), falling=True)
+    assert (prior.initial_mean, prior.initial_sd) == (0.2, 0.1)
+    assert (prior.change_mean, prior.change_sd) == (pytest.approx(-0.12), pytest.approx(0.08))
+    assert (math.exp(prior.log_scale_mean), prior.log_scale_sd) == (pytest.approx(4_000.0), 2.3)
+    assert (math.exp(prior.log_exponent_mean), prior.log_exponent_sd) == (pytest.approx(0.8), 0.7)
+    assert (math.exp(prior.log_scatter_mean), prior.log_scatter_sd) == (pytest.approx(6e-4), 0.8)
+    rising = weak(Measurement(progress=0.0, value=0.2, variance=0.0), falling=False)
+    assert (rising.change_mean, rising.change_sd) == (0.0, pytest.approx(0.2))
+
+
+def test_values_are_told_apart_to_their_resolution_and_no_finer() -> None:
+    history = History.of(CAMPAIGN[:1], PRIOR)
+    resolution = 1e-6 * math.hypot(PRIOR.initial_sd, PRIOR.change_sd)
+    assert history.variance[0] == pytest.approx(1e-8 + resolution**2, rel=1e-12)
+    assert history.variance[0] > 1e-8

@@ -8,7 +8,7 @@ from typing import Any
 
 import httpx2
 
-from tests.real import lag, loaders
+from tests.real import diagnosis, lag, loaders
 from tests.support import serving
 
 
@@ -85,6 +85,8 @@ def main() -> int:
         traction(http)
     print("\n## Lag: loops and transients\n")
     lag.main()
+    print("\n## The diagnosis\n")
+    diagnosis.main()
     return 0
 
 

@@ -1,18 +1,24 @@
 """Simulated lives, brute-force posteriors and scores for the statistical tests of tracking and prognosis."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from models.degradation import Degradation, first_passage, value
 from models.prognosis import ends_of_life, weighted_quantiles
+from models.scoring import crps_of_sample
 from models.tracking import linear, sampling
+from models.tracking.discrepancy import PAST, SIZES, drawn, log_size_weight
+from models.tracking.history import History
+from models.tracking.linear import Points
 from models.tracking.measurement import Measurement
+from models.tracking.particle import ParticleState
 from models.tracking.prior import Prior, weak
 from models.tracking.protocol import Posterior
+from tests import dense
 
 LEVELS = np.array([0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95])
 STAGES = (0.2, 0.4, 0.6, 0.8)
@@ -28,9 +34,12 @@ class Life:
     scatter: float
     end: float
 
-    def measured(self, share: float, runs: int, rng: np.random.Generator) -> list[Measurement]:
+    def measured(self, share: float, runs: int, rng: np.random.Generator, spoiled: float = 0.0) -> list[Measurement]:
+        """Runs up to a share of life; of each, with the probability `spoiled`, the gain is off by 10 %."""
         progress = np.linspace(0.0, share * self.end, runs)
         values = value(progress, self.truth) + self.scatter * rng.standard_normal(runs)
+        if spoiled > 0.0:
+            values *= np.where(rng.random(runs) < spoiled, 1.0 + 0.1 * rng.choice([-1.0, 1.0], runs), 1.0)
         return [
             Measurement(progress=float(z), value=float(y), variance=0.0) for z, y in zip(progress, values, strict=True)
         ]
@@ -80,60 +89,122 @@ def followed(tracker: Any, prior: Prior, measurements: list[Measurement], rng: n
     return state
 
 
-def brute(
-    prior: Prior, measurements: list[Measurement], points: np.ndarray, log_proposal: np.ndarray | float
+def sampled(
+    prior: Prior, measurements: list[Measurement], points: Points, log_weight: np.ndarray, count: int
 ) -> Posterior:
-    """Importance sampling: points [n, 3] of (log φ, log ε, log s) with their own density, weighted by the target's."""
-    history = linear.History.of(measurements)
-    parts = [
-        linear.pointwise(history, prior, *chunk.T)
-        for chunk in np.array_split(points, max(1, points.shape[0] // 20_000))
-    ]
-    log_weight = (
-        np.concatenate([linear.evidence(sums, prior) for sums in parts]) + prior.log_density(*points.T) - log_proposal
-    )
-    given = [linear.conditional(sums, prior) for sums in parts]
-    column = {name: np.concatenate([getattr(g, name) for g in given]) for name in linear.Conditional.__slots__}
+    """`count` draws of equal weight out of weighted points, with their linear terms drawn given each."""
     weight = np.exp(log_weight - log_weight.max())
-    normals = np.random.default_rng(1).standard_normal((points.shape[0], 2))
+    index = sampling.systematic(weight, count, 0.5)
+    kept = Points(
+        **{name: getattr(points, name)[..., index] for name in Points.__slots__},
+    )
+    history = History.of(measurements, prior)
+    rng = np.random.default_rng(1)
+    sums, terms = linear.pointwise(history, prior, kept)
+    given = linear.conditional(sums, prior)
     pair = sampling.correlated_pair(
-        normals, column["initial_variance"], column["change_variance"], column["covariance"]
+        rng.standard_normal((count, 2)), given.initial_variance, given.change_variance, given.covariance
     )
+    initial, change = given.initial + pair[:, 0], given.change + pair[:, 1]
+    normals = rng.standard_normal((count, PAST + history.steps.size))
+    further = linear.drawn_terms(terms, initial - prior.initial_mean, change, normals)
     return Posterior(
-        weight=weight / weight.sum(),
-        initial=column["initial"] + pair[:, 0],
-        change=column["change"] + pair[:, 1],
-        scale=np.exp(points[:, 0]),
-        exponent=np.exp(points[:, 1]),
-        scatter=np.exp(points[:, 2]),
+        weight=np.full(count, 1.0 / count),
+        initial=initial,
+        change=change,
+        scale=np.exp(kept.log_scale),
+        exponent=np.exp(kept.log_exponent),
+        scatter=np.exp(kept.log_scatter),
+        discrepancy=drawn(history, prior, kept.size, further, rng),
     )
 
 
-def from_prior(prior: Prior, measurements: list[Measurement], count: int, rng: np.random.Generator) -> Posterior:
+def weighted(
+    prior: Prior, measurements: list[Measurement], points: Points, log_proposal: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Log weights [n] of points by the density written out in full, over their own; and how many they count for."""
+    log_likelihood = np.concatenate(
+        [
+            dense.log_likelihood(
+                prior, measurements, Points(**{k: getattr(points, k)[..., c] for k in Points.__slots__})
+            )
+            for c in np.array_split(np.arange(points.size.size), max(1, points.size.size // 2_000))
+        ]
+    )
+    log_weight = log_likelihood + log_prior(prior, points) - log_proposal
+    weight = np.exp(log_weight - log_weight.max())
+    return log_weight, float(weight.sum() ** 2 / np.square(weight).sum())
+
+
+def log_prior(prior: Prior, points: Points) -> np.ndarray:
+    """Log prior density of points [n], without the constant of the normals."""
+    count, share = points.spoiled.sum(axis=0), max(prior.spoiled_share, 1e-300)
+    chance = count * math.log(share) + (points.spoiled.shape[0] - count) * math.log1p(-prior.spoiled_share)
+    size = log_size_weight(prior)[np.abs(points.size[:, None] - SIZES).argmin(axis=1)]
+    return prior.log_density(points.log_scale, points.log_exponent, points.log_scatter) + size + chance
+
+
+def from_prior(
+    prior: Prior, measurements: list[Measurement], count: int, rng: np.random.Generator
+) -> tuple[Posterior, float]:
+    """The exact posterior by `count` draws of the prior, for few measurements; and how many they count for."""
     spread = np.array([prior.log_scale_sd, prior.log_exponent_sd, prior.log_scatter_sd])
     centre = np.array([prior.log_scale_mean, prior.log_exponent_mean, prior.log_scatter_mean])
-    points = centre + spread * rng.standard_normal((count, 3))
-    return brute(prior, measurements, points, prior.log_density(*points.T))
+    normals = centre + spread * rng.standard_normal((count, 3))
+    points = Points(
+        log_scale=normals[:, 0],
+        log_exponent=normals[:, 1],
+        log_scatter=normals[:, 2],
+        size=rng.choice(SIZES, size=count, p=np.exp(log_size_weight(prior))),
+        spoiled=(rng.random((len(measurements), count)) < prior.spoiled_share).astype(float),
+    )
+    log_weight, effective_count = weighted(prior, measurements, points, log_prior(prior, points))
+    return sampled(prior, measurements, points, log_weight, 4_000), effective_count
 
 
-def dense(prior: Prior, measurements: list[Measurement], rng: np.random.Generator) -> Posterior:
-    """A lattice over the prior's whole range, fine enough for a late posterior (0.01 in log φ), drawn from as it is."""
-    history = linear.History.of(measurements)
-    log_rate = np.linspace(-4.0, 4.0, 1_841) * prior.log_scale_sd + prior.log_scale_mean
-    log_exponent = np.linspace(-4.0, 4.0, 225) * prior.log_exponent_sd + prior.log_exponent_mean
-    log_scatter = np.linspace(-4.0, 4.0, 81) * prior.log_scatter_sd + prior.log_scatter_mean
-    rows = []
-    for row in log_exponent:
-        table = linear.basis(history.progress[:, None], log_rate - prior.log_exponent_mean + row, np.array(row))
-        flat = prior.log_density(log_rate - prior.log_exponent_mean + row, row, log_scatter[:, None])
-        rows.append(linear.evidence(linear.tabulated(history, prior, table, log_scatter), prior) + flat)
-    density = np.stack(rows)
-    cell = sampling.systematic(np.exp(density - density.max()).ravel(), 100_000, float(rng.random()))
-    e, s, u = np.unravel_index(cell, density.shape)
-    log_scale = log_rate[u] - prior.log_exponent_mean + log_exponent[e]
-    points = np.stack([log_scale, log_exponent[e], log_scatter[s]], axis=1)
-    equal = brute(prior, measurements, points, 0.0)
-    return replace(equal, weight=np.full(points.shape[0], 1.0 / points.shape[0]))
+def exact(
+    state: ParticleState, measurements: list[Measurement], count: int, rng: np.random.Generator
+) -> tuple[Posterior, float]:
+    """The exact posterior by importance sampling, late in life too; and how many draws it counts for.
+
+    A particle cloud says where to look, nothing more: points come from Student's t with 4 degrees around random
+    particles (a tenth of the cloud's covariance), sizes and sets of spoiled runs as often as among the particles, one
+    time in ten any size. Every point is weighted by the density written out in full over that of its proposal.
+    """
+    prior, cloud = state.prior, state.cloud
+    share = np.exp(cloud.log_weight - cloud.log_weight.max())
+    share /= share.sum()
+    turned = cloud.points @ TURN
+    root = np.linalg.cholesky(0.1 * np.cov(turned, rowvar=False, aweights=share) + 1e-12 * np.eye(3))
+    around = turned[rng.choice(share.size, size=count, p=share)]
+    tail = np.sqrt(4.0 / rng.chisquare(4.0, size=count))
+    proposed = around + tail[:, None] * rng.standard_normal((count, 3)) @ root.T
+    near = np.zeros(count)
+    for chunk in np.array_split(np.arange(count), max(1, count // 500)):
+        off = np.linalg.solve(root, (proposed[chunk, None, :] - turned).reshape(-1, 3).T)
+        distance = np.square(off).sum(axis=0).reshape(chunk.size, -1)
+        near[chunk] = np.log(((1.0 + distance / 4.0) ** -3.5) @ share)
+    sizes = 0.9 * np.bincount(cloud.size.astype(int), weights=share, minlength=SIZES.size) + 0.1 / SIZES.size
+    sets, which = np.unique(cloud.spoiled, axis=0, return_inverse=True)
+    chances = np.bincount(which.ravel(), weights=share)
+    chances = 0.9 * chances + 0.1 / chances.size
+    size, group = rng.choice(SIZES.size, size=count, p=sizes), rng.choice(chances.size, size=count, p=chances)
+    back = proposed @ np.linalg.inv(TURN)
+    points = Points(
+        log_scale=back[:, 0],
+        log_exponent=back[:, 1],
+        log_scatter=back[:, 2],
+        size=SIZES[size],
+        spoiled=sets[group].T,
+    )
+    log_weight, effective_count = weighted(
+        prior, measurements, points, near + np.log(sizes)[size] + np.log(chances)[group]
+    )
+    return sampled(prior, measurements, points, log_weight, 4_000), effective_count
+
+
+#: (log φ, log ε, log s) to (log τ, log ε, log s), where the ridge is nearly straight.
+TURN = np.array([[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def ends(posterior: Posterior) -> np.ndarray:
@@ -144,23 +215,25 @@ def effective(posterior: Posterior) -> float:
     return 1.0 / float(np.square(posterior.weight).sum())
 
 
-def misplaced(reference: Posterior, other: Posterior) -> np.ndarray:
-    """By how much the end-of-life quantiles of one sample miss their level under the other's distribution."""
-    sample = ends(reference)
-    found = weighted_quantiles(ends(other), other.weight, LEVELS)
-    below = np.array([reference.weight[sample < x * (1 - 1e-9)].sum() for x in found])
-    upto = np.array([reference.weight[sample <= x * (1 + 1e-9)].sum() for x in found])
+def misplaced(reference: Posterior, other: Posterior, of: Callable[[Posterior], np.ndarray] = ends) -> np.ndarray:
+    """By how much the quantiles of one sample, of the end of life if nothing else, miss their level under the other."""
+    sample = of(reference)
+    found = weighted_quantiles(of(other), other.weight, LEVELS)
+    slack = 1e-9 * np.abs(found)
+    below = np.array([reference.weight[sample < x - e].sum() for x, e in zip(found, slack, strict=True)])
+    upto = np.array([reference.weight[sample <= x + e].sum() for x, e in zip(found, slack, strict=True)])
     return np.where(below > LEVELS, below - LEVELS, np.where(upto < LEVELS, LEVELS - upto, 0.0))
 
 
 def crps(posterior: Posterior, truth: float) -> float:
-    """E|x - truth| - E|x - x'|/2 of the end of life, weighted."""
-    sample = ends(posterior)
-    order = np.argsort(sample)
-    x, w = sample[order], posterior.weight[order]
-    return float(w @ np.abs(x - truth) - 2.0 * np.sum(w * x * (np.cumsum(w) - 0.5 * w - 0.5)) / 2.0)
+    return crps_of_sample(ends(posterior), posterior.weight, truth)
+
+
+def interval(posterior: Posterior) -> tuple[float, float]:
+    low, high = weighted_quantiles(ends(posterior), posterior.weight, (0.05, 0.95))
+    return float(low), float(high)
 
 
 def covered(posterior: Posterior, truth: float) -> bool:
-    low, high = weighted_quantiles(ends(posterior), posterior.weight, (0.05, 0.95))
-    return bool(low <= truth <= high)
+    low, high = interval(posterior)
+    return low <= truth <= high

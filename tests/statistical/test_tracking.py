@@ -21,9 +21,9 @@ from tests.statistical.lives import (
     STAGES,
     covered,
     crps,
-    dense,
     effective,
     ends,
+    exact,
     followed,
     from_prior,
     lives,
@@ -34,46 +34,44 @@ from tests.statistical.lives import (
 pytestmark = pytest.mark.statistical
 
 
-def check_against(reference: Posterior, found: Posterior) -> None:
-    """Moments and quantiles within four Monte-Carlo deviations of the two samples together."""
-    error = math.sqrt(1.0 / effective(reference) + 1.0 / effective(found))
+def check_against(reference: Posterior, count: float, found: Posterior) -> None:
+    """The quantiles of each coefficient and of the end of life within four Monte-Carlo deviations of both samples. Draws
+    of equal weight were thinned out of weighted ones: they count for half."""
+    error = math.sqrt(1.0 / min(count, 4_000) + 1.0 / min(effective(found), 2_000.0))
     for name in ("initial", "change", "scale", "exponent", "scatter"):
-        samples = [
-            np.log(np.abs(getattr(p, name))) if name in ("scale", "exponent", "scatter") else getattr(p, name)
-            for p in (reference, found)
-        ]
-        (mean, sd), (other_mean, other_sd) = reference.moments(samples[0]), found.moments(samples[1])
-        assert abs(other_mean - mean) < 4.0 * error * sd, name
-        assert other_sd == pytest.approx(sd, rel=6.0 * error), name
+        assert misplaced(reference, found, lambda p, n=name: getattr(p, n)).max() < 4.0 * error * 0.5, name  # type: ignore[misc]
     assert misplaced(reference, found).max() < 4.0 * error * 0.5
 
 
-@pytest.mark.parametrize("runs", [1, 2, 3, 5])
+@pytest.mark.parametrize("runs", [1, 2, 3])
 def test_grid_against_prior_draws_early_in_life(runs: int) -> None:
-    """200,000 draws of the prior, of which the data leave at least 300 in effect."""
+    """100,000 draws of the prior, of which the data leave at least 300 in effect."""
     tested = 0
     for life, rng in typical(8, 100 + runs):
         measurements = life.measured(0.05 * runs, runs, rng)
-        reference = from_prior(PRIOR, measurements, 200_000, rng)
-        if effective(reference) < 300:
+        reference, count = from_prior(PRIOR, measurements, 100_000, rng)
+        if count < 300:
             continue
         grid = Grid()
-        check_against(reference, grid.posterior(grid.from_history(PRIOR, measurements), 4_000, rng))
+        check_against(reference, count, grid.posterior(grid.from_history(PRIOR, measurements), 4_000, rng))
         tested += 1
     print(f"{runs} runs: {tested} of 8 lives tested")
     assert tested >= 4
 
 
-def test_grid_against_a_dense_lattice_late_in_life() -> None:
-    """33 million nodes, of which a late posterior holds thousands: discreteness adds next to nothing to the error."""
+@pytest.mark.parametrize("spoiled", [0.0, 0.1])
+def test_filters_against_importance_sampling_late_in_life(spoiled: float) -> None:
+    """The density written out in full, at 60 runs; the proposal is no part of the answer."""
     for life, rng in typical(3, 200):
-        measurements = life.measured(0.9, 60, rng)
-        reference = dense(PRIOR, measurements, rng)
+        measurements = life.measured(0.9, 60, rng, spoiled)
+        state = followed(Particle(), PRIOR, measurements, rng)
+        reference, count = exact(state, measurements, 20_000, rng)
+        assert count > 300
         grid = Grid()
         found = grid.posterior(grid.from_history(PRIOR, measurements), 4_000, rng)
         a, b = (weighted_quantiles(ends(p), p.weight, LEVELS) for p in (reference, found))
-        print("dense", a.round(), "grid", b.round())
-        check_against(reference, found)
+        print(f"counts for {count:.0f}: exact", a.round(), "grid", b.round())
+        check_against(reference, count, found)
 
 
 def test_particle_agrees_with_grid() -> None:
@@ -136,11 +134,11 @@ def test_ukf_survives_a_thousand_random_lives() -> None:
         state = ukf.start(weak(measurements[0], falling=bool(rng.integers(2))))
         for measurement in measurements:
             state = ukf.update(state, measurement, rng)
-            assert np.linalg.eigvalsh(state.covariance)[0] > 0.0
-            assert np.abs(state.mean).max() <= 5.0
+            assert np.linalg.eigvalsh(state.covariance).min() > 0.0
+            assert np.abs(state.mean).max() <= 6.0
             updates += 1
         posterior = ukf.posterior(state, 100, rng)
-        assert all(np.isfinite(getattr(posterior, name)).all() for name in Posterior.__slots__)
+        assert np.isfinite(posterior.values(np.array([0.0, 1.0, 1e6]))).all()
     print(f"{updates} updates")
 
 
@@ -154,17 +152,17 @@ def test_grid_and_particle_survive_weird_lives(tracker: Any, count: int) -> None
         measurements = weird(rng)
         state = followed(tracker, weak(measurements[0], falling=True), measurements, rng)
         posterior = tracker.posterior(state, 100, rng)
-        assert all(np.isfinite(getattr(posterior, name)).all() for name in Posterior.__slots__)
+        assert np.isfinite(posterior.values(np.array([0.0, 1.0, 1e6]))).all()
         if tracker.name == "particle":
             assert np.unique(state.cloud.points, axis=0).shape[0] >= 0.4 * tracker.particles
 
 
-def coverage(count: int, seed: int, belief: Prior) -> dict[float, float]:
+def coverage(count: int, seed: int, belief: Prior, spoiled: float = 0.0) -> dict[float, float]:
     """How often the 90 % interval of the end of life holds the truth, at each stage of life."""
     grid = Grid()
     hits: dict[float, list[bool]] = {stage: [] for stage in STAGES}
     for life, rng in lives(count, seed):
-        measurements = life.measured(0.8, 25, rng)
+        measurements = life.measured(0.8, 25, rng, spoiled)
         for stage in STAGES:
             seen = measurements[: round(stage * 30) + 1]
             hits[stage].append(covered(grid.posterior(grid.from_history(belief, seen), 1_000, rng), life.end))
@@ -172,28 +170,35 @@ def coverage(count: int, seed: int, belief: Prior) -> dict[float, float]:
 
 
 def test_nine_in_ten_ends_of_life_lie_in_the_interval() -> None:
-    """600 lives leave a deviation of 1.2 points. Stopped at shares of the truth, unknown to the filter."""
-    found = coverage(600, 600, PRIOR)
+    """150 lives leave a deviation of 2.4 points; `make score` takes 1,000. Stopped at shares of the truth, unknown to
+    the filter. Lives that follow eq. 6 alone are held a little more often than nine times in ten, for the filter keeps a
+    tenth of its belief for those that do not."""
+    found = coverage(150, 600, PRIOR)
     print("coverage", found)
-    assert all(abs(share - 0.9) < 0.035 for share in found.values())
+    assert all(0.84 < share < 0.98 for share in found.values())
+
+
+def test_one_spoiled_run_in_ten_leaves_the_intervals_right() -> None:
+    """80 lives leave a deviation of 3.4 points."""
+    found = coverage(80, 602, PRIOR, spoiled=0.1)
+    print("coverage", found)
+    assert all(0.82 < share < 0.99 for share in found.values())
 
 
 def test_a_filter_sure_of_too_little_scatter_is_found_out() -> None:
     """The negative control: the scatter believed to be a fifth of what it is, and known for sure."""
     belief = replace(PRIOR, log_scatter_mean=PRIOR.log_scatter_mean - math.log(5.0), log_scatter_sd=0.01)
-    found = coverage(150, 601, belief)
+    found = coverage(60, 601, belief)
     print("coverage", found)
     assert max(found.values()) < 0.8
 
 
-def test_crps_relative_to_the_exact_posterior() -> None:
-    """On lives like the reference's, at 40 to 80 % of life, the prior taken from the first measurement.
-
-    The bound on the unscented filter guards against its getting worse; it is no claim: it is the poorest of the three.
-    """
+def test_crps_relative_to_the_grid() -> None:
+    """On lives like the reference's, at 40 to 80 % of life, the prior taken from the first measurement: 30 lives leave
+    about 5 % on a ratio; the exact posterior's own row is in `make score`."""
     scores: dict[str, list[float]] = {"grid": [], "particle": [], "ukf": []}
     held: dict[str, list[bool]] = {name: [] for name in scores}
-    for life, rng in typical(60, 700):
+    for life, rng in typical(30, 700):
         measurements = life.measured(0.8, 25, rng)
         prior = weak(measurements[0], falling=True)
         for stage in STAGES[1:]:
@@ -204,11 +209,8 @@ def test_crps_relative_to_the_exact_posterior() -> None:
                 held[tracker.name].append(covered(posterior, life.end))
     for name, column in scores.items():
         ratio = np.mean(column) / np.mean(scores["grid"])
-        print(
-            f"{name}: CRPS {np.mean(column):.4f} lives, median {np.median(column):.4f}, "
-            f"{ratio:.2f} of grid, coverage {np.mean(held[name]):.3f}"
-        )
-    assert np.mean(scores["ukf"]) < 2.5
+        print(f"{name}: CRPS {np.mean(column):.4f} lives, {ratio:.2f} of grid, coverage {np.mean(held[name]):.3f}")
+    assert np.mean(scores["particle"]) < 1.2 * np.mean(scores["grid"])
+    assert np.mean(scores["ukf"]) < 2.0 * np.mean(scores["grid"])
     assert np.mean(held["ukf"]) > 0.8
-    assert np.median(scores["particle"]) < 1.15 * np.median(scores["grid"])
-    assert np.mean(held["particle"]) == pytest.approx(np.mean(held["grid"]), abs=0.05)
+    assert np.mean(held["particle"]) == pytest.approx(np.mean(held["grid"]), abs=0.06)

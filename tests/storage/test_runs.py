@@ -207,3 +207,15 @@ def test_a_fit_has_sixteen_finite_covariances_and_a_run(database: Database) -> N
         fits.write(connection, key, [replace(fit_row(1e5), rmse=nan)])
     with pytest.raises(IntegrityError, match="FOREIGN KEY"), database.writing() as connection:
         fits.write(connection, 99, [fit_row(1e5)])
+
+
+def test_long_channels_are_encoded_side_by_side_and_keep_their_order(database: Database) -> None:
+    sent = columns(7, 50_000) | {"oil_temperature_c": np.zeros(50_000), "time_s": np.arange(50_000) / 1000}
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+        run_key = runs.insert(connection, new_run(0))
+        channels.write(connection, run_key, sent)
+    with database.reading() as connection:
+        kept = channels.read(connection, run_key)
+    assert list(kept) == list(sent)
+    assert all(kept[name].tobytes() == column.tobytes() for name, column in sent.items())

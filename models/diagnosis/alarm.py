@@ -1,0 +1,129 @@
+"""Is there anything beyond noise? The largest projected likelihood ratios against what chance makes of them.
+
+Statistics: the largest over the catalogue's changes and their shape grids, the largest over the smooth contrasts, and the
+highest line of a periodogram over the tests' clock. The first two are maxima of correlated standard normals, whose
+distribution is simulated and followed into its tail by the number of independent tests that would give the same; the
+third is a sum of exponentials. Each has its part of a total of about 1 % of false alarms.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+from scipy.special import ndtr, ndtri
+from scipy.stats import gamma
+
+from models.arrays import FloatArray
+from models.diagnosis.design import Design
+from models.diagnosis.projection import Projected
+from models.diagnosis.whitening import Noise, whitened
+
+#: False alarms allowed to each statistic.
+EFFECTS_SHARE, CONTRASTS_SHARE, LINES_SHARE = 0.006, 0.0025, 0.001
+_DRAWS = 400
+#: The periodogram's steps are half a cycle a test: it starts at two cycles, and a neighbourhood is so many steps.
+_FIRST_LINE, _NEIGHBOURS = 4, 61
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lead:
+    """A statistic: its value [nats], its threshold, its p-value, and which column it is of."""
+
+    value: float
+    threshold: float
+    p_value: float
+    index: int
+
+    @property
+    def raised(self) -> bool:
+        """Beyond what chance makes."""
+        return self.value > self.threshold
+
+
+def likelihood_ratios(projections: list[Projected], columns: slice, one_sided: FloatArray) -> FloatArray:
+    """[m] nats: the best amplitude of each change against none, the gains' scatter free under both."""
+    null = max(each.evidence for each in projections)
+    best = np.full(one_sided.size, -np.inf)
+    for each in projections:
+        z = _standard(each, columns)
+        z = np.where((one_sided > 0) & (z < 0), 0.0, z)
+        best = np.maximum(best, each.evidence + 0.5 * z * z)
+    return best - null
+
+
+def _standard(projected: Projected, columns: slice) -> FloatArray:
+    info = np.diag(projected.info)[columns]
+    visible = info > 1e-12 * max(float(info.max(initial=0.0)), 1e-300)
+    return np.where(visible, projected.score[columns] / np.sqrt(np.where(visible, info, 1.0)), 0.0)
+
+
+def lead(
+    projections: list[Projected], columns: slice, one_sided: FloatArray, share: float, rng: np.random.Generator
+) -> Lead:
+    """The largest ratio among `columns` and its threshold for `share` of false alarms."""
+    if one_sided.size == 0:
+        return Lead(value=0.0, threshold=np.inf, p_value=1.0, index=-1)
+    ratios = likelihood_ratios(projections, columns, one_sided)
+    index = int(np.argmax(ratios))
+    tests = _independent_tests(max(projections, key=lambda each: each.evidence), columns, rng)
+    value = max(float(ratios[index]), 0.0)
+    tail = 2 * ndtr(-np.sqrt(2 * value))
+    return Lead(
+        value=value,
+        threshold=0.5 * float(ndtri(-np.expm1(np.log1p(-share) / tests) / 2)) ** 2,
+        p_value=float(-np.expm1(tests * np.log1p(-min(tail, 1 - 1e-12)))),
+        index=index,
+    )
+
+
+def _independent_tests(projected: Projected, columns: slice, rng: np.random.Generator) -> float:
+    """How many independent standard normals have maxima like these correlated ones, in their upper tenth."""
+    info = projected.info[columns, columns]
+    scale = np.sqrt(np.maximum(np.diag(info), 1e-300))
+    keep = np.diag(info) > max(1e-12 * float(np.diag(info).max()), 0.0)
+    if not keep.any() or not np.isfinite(info).all():
+        return float(max(info.shape[0], 1))
+    correlation = (info / scale[:, None] / scale)[np.ix_(keep, keep)]
+    values, vectors = np.linalg.eigh(correlation)
+    strong = values > 1e-6 * values[-1]
+    root = vectors[:, strong] * np.sqrt(values[strong])
+    draws = np.abs(root @ rng.standard_normal((int(strong.sum()), _DRAWS))).max(axis=0)
+    quantiles = np.array([0.8, 0.9, 0.95])
+    tails = 2 * ndtr(-np.quantile(draws, quantiles))
+    counts = np.log(quantiles) / np.log1p(-tails)
+    return float(np.clip(counts.mean(), 1.0, keep.sum()))
+
+
+def lines(design: Design, noise: Noise, residual: FloatArray) -> tuple[Lead, float]:
+    """The highest line over the tests' clock, summed over the runs, and its period [plateaus]."""
+    nothing = Lead(value=0.0, threshold=np.inf, p_value=1.0, index=-1), 0.0
+    if design.plateaus < 64:
+        return nothing
+    white = whitened(np.column_stack([residual, design.torque]), design, noise)[: design.plateaus]
+    runs = []
+    for run in np.unique(design.rows.run[: design.plateaus]):
+        left, along = white[design.rows.run[: design.plateaus] == run].T
+        runs.append(left - along * float(along @ left) / max(float(along @ along), 1e-300))  # without the run's gain
+    length = max(run.size for run in runs)
+    kept = [run for run in runs if run.size > 0.5 * length]
+    if length < 32:
+        return nothing
+    frequencies = np.arange(_FIRST_LINE, length) / (2.0 * length)
+    power = np.zeros(frequencies.size)
+    for run in kept:
+        waves = np.abs(np.fft.rfft(run, 2 * length)) ** 2 / max(float(run.size), 1.0)
+        power += waves[_FIRST_LINE:length]
+    # a line stands out of its neighbourhood: noise that remembers otherwise than was thought does not
+    middle = float(gamma.ppf(0.5, len(kept)))
+    power /= np.maximum(median_filter(power, size=_NEIGHBOURS, mode="nearest") / middle, 1.0)
+    index = int(np.argmax(power))
+    tail = float(gamma.logsf(power[index], len(kept)))
+    tests = 1.5 * frequencies.size
+    threshold = float(gamma.isf(LINES_SHARE / tests, len(kept)))
+    found = Lead(
+        value=max(float(power[index]) - middle, 0.0),
+        threshold=threshold - middle,
+        p_value=float(min(1.0, tests * np.exp(tail))),
+        index=index,
+    )
+    return found, 1.0 / float(frequencies[index])

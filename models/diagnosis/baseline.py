@@ -1,0 +1,76 @@
+"""The pooled baseline: every run of a campaign predicted by one parameter vector.
+
+    prediction = S(v; p, ζ) at plateaus,   the GMS attractor's periodic torque behind S in loops
+
+with derivatives in closed form. `models.diagnosis.fitting` fits it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.design import Design
+from models.diagnosis.lagging import Lag, lag_of
+from models.diagnosis.laws import BLOCK, DRIFT, LOG_DECAY, RATIO, Frame, Laws, Scene, scene_of
+from models.diagnosis.loop_bins import PHASES
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prediction:
+    """Torque [N] Nm at the rows (folded), the scene at the points, and the loops' lag (None without loops)."""
+
+    torque: FloatArray
+    scene: Scene
+    lag: Lag | None
+
+    def change_at_rows(self, design: Design, change: FloatArray, *, before_lag: bool) -> FloatArray:
+        """A change [P] or [P, m] Nm at the points -> [N] or [N, m] at the rows; what changes the stationary curve goes
+        through the loops' lag first."""
+        return design.to_rows(self._lagged(design, change) if before_lag else change)
+
+    def _lagged(self, design: Design, change: FloatArray) -> FloatArray:
+        if self.lag is None:
+            return change
+        columns = change[design.plateaus :].reshape(design.loops, PHASES, -1)
+        return np.concatenate([change[: design.plateaus], self.lag.follow(columns).reshape(-1, *change.shape[1:])])
+
+    def jacobian(self, design: Design) -> FloatArray:
+        """∂torque/∂θ [N, θ.size]."""
+        scene, laws = self.scene, self.scene.laws
+        points = scene.points
+        _, slopes, by_decay = laws.with_gradient(points.pressure, points.cycles)
+        columns = np.zeros((points.run.size, laws.theta.size))
+        columns[:, :LOG_DECAY] = (scene.gradient[:, :, None] * slopes).reshape(points.run.size, 4 * BLOCK)
+        columns[:, LOG_DECAY] = scene.gradient[:, RATIO] * by_decay
+        columns = self._lagged(design, columns)
+        if self.lag is not None:
+            start = design.plateaus
+            _, weights = laws.log_attractor(points.pressure[start:], points.cycles[start:])
+            columns[start:, DRIFT:] = self.lag.by_log_attractor.reshape(-1, 1) * weights
+        return design.to_rows(columns)
+
+
+def frame_of(design: Design) -> Frame:
+    """The frame of a design's laws."""
+    pressures = np.unique(design.level)
+    return Frame(
+        lowest=float(pressures[0]),
+        highest=float(pressures[-1]),
+        last=float(design.facts.states[-1]),
+        loop_pressures=np.unique(design.level[design.plateaus :]),
+        reference_velocity=0.5 * float(design.rows.velocity.max()),
+    )
+
+
+def predict(design: Design, laws: Laws) -> Prediction:
+    """What the laws say of every row."""
+    scene = scene_of(laws, design.points, design.facts)
+    at_points, lag = scene.curve, None
+    if design.loops:
+        at = design.points.angular_frequency[design.plateaus :].reshape(design.loops, PHASES)
+        shape = (design.loops, PHASES)
+        start = design.plateaus
+        lag = lag_of(scene.curve[start:].reshape(shape), scene.attractor[start:].reshape(shape), at[:, 0])
+        at_points = np.concatenate([scene.curve[:start], lag.torque.ravel()])
+    return Prediction(torque=design.to_rows(at_points), scene=scene, lag=lag)

@@ -1,0 +1,255 @@
+"""The rows of a campaign that the baseline and the effects are fitted to.
+
+A *point* is where torque is predicted: a plateau of a stationary test, or one of PHASES evenly spaced phases of a loop. A
+*row* is what is compared with data: a plateau again, or one of BINS phase bins of a loop, the mean over the points (and
+over the samples) within. So a loop is a few rows however fast it was sampled, and sixty states stay cheap.
+
+Everything is folded to v >= 0 (the model is odd): `sign` says which way the clutch turned.
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from models.diagnosis.campaign import Campaign, StationaryRun
+from models.diagnosis.facts import Facts, facts_of
+from models.diagnosis.loop_bins import BINS, PHASES, BinnedLoop, binned_loops
+from models.runs import pressure_levels
+
+#: Time on one plateau [s] where nothing else is known (the reference's section 2.3.3).
+PLATEAU_DURATION = 5.0
+#: A run keeps at most this many plateaus (evenly taken), a campaign about this many rows (states evenly taken).
+MOST_PLATEAUS, MOST_ROWS = 2000, 40_000
+
+IntArray = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Points:
+    """Columns [n]: run (index into Design.runs), cycles, pressure [Pa], velocity [m/s] >= 0, sign ±1, acceleration
+    [m/s²] (of the folded velocity), temperature of the oil [K] (NaN where not measured), clock [s] since the test began,
+    moment [s] (NaN where unknown), angular_frequency [rad/s] (0 at plateaus), phase [rad], loop (index, -1 at plateaus)
+    and previous (the index of the plateau before it in the same run, -1 where there is none)."""
+
+    run: IntArray
+    cycles: FloatArray
+    pressure: FloatArray
+    velocity: FloatArray
+    sign: FloatArray
+    acceleration: FloatArray
+    temperature: FloatArray
+    clock: FloatArray
+    moment: FloatArray
+    angular_frequency: FloatArray
+    phase: FloatArray
+    loop: IntArray
+    previous: IntArray
+
+    @property
+    def steady(self) -> NDArray[np.bool_]:
+        """[n] whether it is a plateau."""
+        return self.loop < 0
+
+    def take(self, index: IntArray | NDArray[np.bool_]) -> "Points":
+        """Those points; `previous` is cut (-1), for its rows may be gone."""
+        columns = {each.name: getattr(self, each.name)[index] for each in fields(self)}
+        return Points(**{**columns, "previous": np.full(columns["run"].size, -1, dtype=np.intp)})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunInfo:
+    """A run that gave rows."""
+
+    run_id: str
+    cycles: float
+    dynamic: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Design:
+    """Points [P] (plateaus first, then PHASES points a loop), rows [N] (plateaus first, then the loops' bins), measured
+    torque [N] Nm (folded), `samples` [N] averaged in each row, `torque_sd` [N] Nm as sent (NaN where not), `level` [N]
+    Pa the pressure level, `curve` [N] an index that run and level share, `bins` [N - plateaus] which bin of the flat
+    (loop, bin) order each loop row is, `notes` what was left out."""
+
+    points: Points
+    rows: Points
+    torque: FloatArray
+    samples: FloatArray
+    torque_sd: FloatArray
+    level: FloatArray
+    curve: IntArray
+    bins: IntArray
+    plateaus: int
+    loops: int
+    runs: tuple[RunInfo, ...]
+    facts: Facts
+    notes: tuple[str, ...]
+
+    def to_rows(self, at_points: FloatArray) -> FloatArray:
+        """[P, ...] at points -> [N, ...] at rows: bins are the means of their points."""
+        loops = at_points[self.plateaus :]
+        if not self.loops:
+            return at_points
+        shape = (self.loops * BINS, PHASES // BINS, *at_points.shape[1:])
+        return np.concatenate([at_points[: self.plateaus], loops.reshape(shape).mean(axis=1)[self.bins]])
+
+
+def build_design(campaign: Campaign) -> Design:
+    """All rows of a campaign. Never raises on a campaign that checked itself; may have no rows."""
+    notes: list[str] = []
+    kept = _thinned(campaign, notes)
+    runs: list[RunInfo] = []
+    blocks: list[Points] = []
+    torques, deviations, samples = [], [], []
+    offset = 0
+    for run in kept.stationary:
+        points, torque, sd = _plateaus(run, kept, len(runs), offset, notes)
+        if torque.size:
+            runs.append(RunInfo(run_id=run.run_id, cycles=run.cycles, dynamic=False))
+            blocks.append(points)
+            torques.append(torque)
+            deviations.append(sd)
+            samples.append(np.ones_like(torque))
+            offset += torque.size
+    loops: list[BinnedLoop] = []
+    of_run: list[int] = []
+    for dynamic in kept.dynamic:
+        found, said = binned_loops(dynamic.record, kept.geometry)
+        notes.extend(f"{dynamic.run_id}: {sentence}" for sentence in said)
+        if found:
+            loops.extend(found)
+            of_run.extend([len(runs)] * len(found))
+            runs.append(RunInfo(run_id=dynamic.run_id, cycles=dynamic.cycles, dynamic=True))
+    moments = {run.run_id: run.moment for run in (*kept.stationary, *kept.dynamic)}
+    for number, (loop, index) in enumerate(zip(loops, of_run, strict=True)):
+        blocks.append(_loop_points(loop, index, number, runs[index].cycles, moments[runs[index].run_id]))
+    return _assembled(blocks, torques, deviations, samples, loops, runs, offset, kept, tuple(notes))
+
+
+def _assembled(
+    blocks: list[Points],
+    torques: list[FloatArray],
+    deviations: list[FloatArray],
+    samples: list[FloatArray],
+    loops: list[BinnedLoop],
+    runs: list[RunInfo],
+    plateaus: int,
+    campaign: Campaign,
+    notes: tuple[str, ...],
+) -> Design:
+    points = _joined(blocks)
+    filled = np.concatenate([loop.samples for loop in loops]) if loops else np.zeros(0)
+    bins = np.flatnonzero(filled > 0)
+    per_bin = PHASES // BINS
+    middle = plateaus + bins * per_bin + per_bin // 2
+    rows = points.take(np.concatenate([np.arange(plateaus), middle]).astype(np.intp))
+    if loops:
+        torques = [*torques, np.concatenate([loop.torque for loop in loops])[bins]]
+        samples = [*samples, filled[bins]]
+        deviations = [*deviations, np.full(bins.size, np.nan)]
+    level = pressure_levels(rows.pressure) if rows.run.size else np.zeros(0)
+    _, curve = np.unique(np.stack([rows.run, level]), axis=1, return_inverse=True)
+    return Design(
+        points=points,
+        rows=rows,
+        torque=np.concatenate(torques) if torques else np.zeros(0),
+        samples=np.concatenate(samples) if samples else np.zeros(0),
+        torque_sd=np.concatenate(deviations) if deviations else np.zeros(0),
+        level=level,
+        curve=np.asarray(curve, dtype=np.intp).reshape(-1),
+        bins=np.asarray(bins, dtype=np.intp),
+        plateaus=plateaus,
+        loops=len(loops),
+        runs=tuple(runs),
+        facts=facts_of(campaign),
+        notes=notes,
+    )
+
+
+def _thinned(campaign: Campaign, notes: list[str]) -> Campaign:
+    """The campaign with states left out evenly where it is too large; the first and the last stay."""
+    states = np.unique([run.cycles for run in (*campaign.stationary, *campaign.dynamic)])
+    size = sum(min(run.plateaus.torque.size, MOST_PLATEAUS) for run in campaign.stationary)
+    size += sum(8 * BINS for _ in campaign.dynamic)
+    if size <= MOST_ROWS or states.size < 3:
+        return campaign
+    count = max(2, int(states.size * MOST_ROWS / size))
+    keep = set(states[np.linspace(0, states.size - 1, count).round().astype(int)].tolist())
+    notes.append(f"{states.size - len(keep)} of {states.size} states were left out, evenly: the campaign is very large.")
+    return Campaign(
+        geometry=campaign.geometry,
+        oil=campaign.oil,
+        cof_fraction=campaign.cof_fraction,
+        stationary=tuple(run for run in campaign.stationary if run.cycles in keep),
+        dynamic=tuple(run for run in campaign.dynamic if run.cycles in keep),
+        duty=campaign.duty,
+        maintenance=campaign.maintenance,
+    )
+
+
+def _plateaus(
+    run: StationaryRun, campaign: Campaign, index: int, offset: int, notes: list[str]
+) -> tuple[Points, FloatArray, FloatArray]:
+    """Points, folded torque and torque_sd of a run's plateaus that have pressure; `offset` is its first row."""
+    table = run.plateaus
+    usable = np.flatnonzero((table.pressure > 0) & (table.speed != 0))
+    if usable.size < table.torque.size:
+        notes.append(f"{run.run_id}: {table.torque.size - usable.size} plateaus at rest or without pressure left out.")
+    if usable.size > MOST_PLATEAUS:
+        notes.append(f"{run.run_id}: {MOST_PLATEAUS} of {usable.size} plateaus taken, evenly.")
+        usable = usable[np.linspace(0, usable.size - 1, MOST_PLATEAUS).round().astype(int)]
+    velocity = campaign.geometry.sliding_velocity(table.speed[usable])
+    sign = np.copysign(1.0, velocity)
+    count = usable.size
+    clock = PLATEAU_DURATION * (usable + 0.5) if run.time is None else np.asarray(run.time, dtype=np.float64)[usable]
+    nan = np.full(count, np.nan)
+    moment = nan if run.moment is None else run.moment + clock
+    consecutive = np.concatenate([[-1], np.where(np.diff(usable) == 1, offset + np.arange(count - 1), -1)])
+    points = Points(
+        run=np.full(count, index, dtype=np.intp),
+        cycles=np.full(count, float(run.cycles)),
+        pressure=table.pressure[usable],
+        velocity=np.abs(velocity),
+        sign=sign,
+        acceleration=np.zeros(count),
+        temperature=nan if table.oil_temperature is None else table.oil_temperature[usable],
+        clock=clock,
+        moment=moment,
+        angular_frequency=np.zeros(count),
+        phase=np.zeros(count),
+        loop=np.full(count, -1, dtype=np.intp),
+        previous=consecutive[:count].astype(np.intp),
+    )
+    return points, sign * table.torque[usable], nan if table.torque_sd is None else table.torque_sd[usable]
+
+
+def _loop_points(loop: BinnedLoop, run: int, number: int, cycles: float, moment: float | None) -> Points:
+    count = loop.velocity.size
+    return Points(
+        run=np.full(count, run, dtype=np.intp),
+        cycles=np.full(count, float(cycles)),
+        pressure=np.full(count, loop.pressure),
+        velocity=loop.velocity,
+        sign=np.full(count, loop.sign),
+        acceleration=loop.acceleration,
+        temperature=np.full(count, loop.temperature),
+        clock=loop.clock,
+        moment=np.full(count, np.nan) if moment is None else moment + loop.clock,
+        angular_frequency=np.full(count, loop.angular_frequency),
+        phase=loop.phase,
+        loop=np.full(count, number, dtype=np.intp),
+        previous=np.full(count, -1, dtype=np.intp),
+    )
+
+
+def _joined(blocks: list[Points]) -> Points:
+    integers = {"run", "loop", "previous"}
+    columns = {}
+    for each in fields(Points):
+        parts = [getattr(block, each.name) for block in blocks]
+        kind = np.intp if each.name in integers else np.float64
+        columns[each.name] = np.concatenate(parts).astype(kind) if parts else np.zeros(0, dtype=kind)
+    return Points(**columns)

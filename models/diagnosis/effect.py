@@ -1,0 +1,101 @@
+"""What an effect of the catalogue is: one value that says what it is, what it needs and what it changes in torque.
+
+An effect changes the torque at every point of a scene (`models.diagnosis.laws.Scene`: the points and what the baseline
+says there) by an amount that one *amplitude*, in engineering units, scales, and *shapes* (a change point, a time
+constant, an exponent) bend. Amplitude 0 is no effect. Adding an effect is adding one file in `effects/` and its name in
+`catalogue.py`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TypeAlias
+
+from models.arrays import FloatArray
+from models.diagnosis.facts import Facts
+from models.diagnosis.laws import Scene
+
+#: Values of an effect's shape parameters, in the order of `Effect.shapes`.
+Shape: TypeAlias = tuple[float, ...]
+
+
+class Kind(StrEnum):
+    """ARTEFACT: in the measurement or the test's conditions; COURSE: in the clutch's life; LAG: in loops only;
+    VIBRATION: seen in raw records."""
+
+    ARTEFACT = "artefact"
+    COURSE = "course"
+    LAG = "lag"
+    VIBRATION = "vibration"
+
+
+class Family(StrEnum):
+    """Effects that resemble each other most."""
+
+    THERMAL = "thermal"
+    SENSOR = "sensor"
+    VISCOUS = "viscous"
+    DWELL = "dwell"
+    DYNAMIC = "dynamic"
+    VIBRATION = "vibration"
+    HISTORY = "history"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShapeParameter:
+    """A shape parameter: its name and unit, its bounds; `smooth` where the change may be differentiated in it (then it
+    is refined between grid values), else it is taken from the grid."""
+
+    name: str
+    unit: str
+    lowest: float
+    highest: float
+    smooth: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tried:
+    """One point of a shape grid and the log of its prior weight (weights need not sum to one)."""
+
+    shape: Shape
+    log_weight: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effect:
+    """An effect of the catalogue.
+
+    slug and title are public; physics is a sentence; formula the change of torque; source where it is from.
+    channels: what must have been measured or sent for it to be judged (public names). amplitude, unit: the name and unit
+    of the amplitude; prior_sd: its prior deviation in that unit (zero mean, either sign unless `positive`);
+    `scale` turns the SI amplitude into `unit`.
+    grid(facts) gives the shapes to be tried, none where the campaign cannot tell the effect.
+    change(scene, amplitude, shape) -> [P] Nm at the scene's points. before_lag: whether it changes the stationary curve,
+    which friction in loops then lags behind, or the measured torque itself.
+    tests: what parts it from its neighbours, slug -> a test in words ("baseline": from none).
+    """
+
+    slug: str
+    title: str
+    physics: str
+    formula: str
+    source: str
+    family: Family
+    kind: Kind
+    channels: tuple[str, ...]
+    amplitude: str
+    unit: str
+    prior_sd: float
+    positive: bool
+    scale: float
+    shapes: tuple[ShapeParameter, ...]
+    grid: Callable[[Facts], tuple[Tried, ...]]
+    change: Callable[[Scene, float, Shape], FloatArray]
+    before_lag: bool
+    tests: dict[str, str]
+
+
+def unit_change(effect: Effect, scene: Scene, shape: Shape) -> FloatArray:
+    """The change [P] Nm of a small amplitude, per unit: the column that a linear screen works with."""
+    step = 1e-3 * effect.prior_sd
+    return effect.change(scene, step, shape) / step

@@ -1,0 +1,53 @@
+"""Oil dragged around between and beside the discs: torque that grows with speed and does not care for pressure."""
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.facts import Facts
+from models.diagnosis.laws import Scene
+from models.diagnosis.viscosity import log_viscosity_ratio
+
+
+def _grid(facts: Facts) -> tuple[Tried, ...]:
+    thinning = (0.0, 1.0) if facts.temperature_measured else (0.0,)
+    courses = ((0.7, 0.0), (1.0, 0.0), (1.5, 0.0), (1.0, 0.5), (1.0, 2.0))
+    return tuple(Tried(shape=(power, rupture, t)) for power, rupture in courses for t in thinning)
+
+
+def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    power, rupture, thinning = shape
+    logs = log_viscosity_ratio(scene.points.temperature, scene.facts.reference_temperature, scene.facts.oil)
+    relative = scene.points.velocity / scene.laws.frame.reference_velocity
+    share = relative**power * (1.0 + rupture) / (1.0 + rupture * relative**2)
+    return np.asarray(amplitude * share * np.exp(thinning * logs), dtype=np.float64)
+
+
+EFFECT = Effect(
+    slug="hydrodynamic_drag",
+    title="Hydrodynamic drag beside the friction",
+    physics="Oil is sheared in grooves and gaps: a torque that grows with speed and viscosity, whatever the pressure.",
+    formula="a (v/v_0)^m (1 + r)/(1 + r (v/v_0)²) (ν(T)/ν_ref)^t, v_0 the middle of the speeds",
+    source="Kato et al., drag torque of disengaged wet clutches; Newtonian shear in an annular gap",
+    family=Family.VISCOUS,
+    kind=Kind.ARTEFACT,
+    channels=(),
+    amplitude="drag in mid speed",
+    unit="Nm",
+    prior_sd=0.5,
+    positive=True,
+    scale=1.0,
+    shapes=(
+        ShapeParameter(name="power m", unit="-", lowest=0.7, highest=2.0),
+        ShapeParameter(name="rupture of the film r", unit="-", lowest=0.0, highest=5.0),
+        ShapeParameter(name="viscosity's exponent t", unit="-", lowest=0.0, highest=1.0),
+    ),
+    grid=_grid,
+    change=_change,
+    before_lag=False,
+    tests={
+        "viscous_exponent": "a sweep with the clutch open, which shows the drag alone",
+        "interface_heating": "a sweep with the clutch open, where there is no frictional heat",
+        "baseline": "a sweep with the clutch open",
+    },
+)

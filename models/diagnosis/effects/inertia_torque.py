@@ -1,0 +1,42 @@
+"""Rotating mass between clutch and torque sensor."""
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.effect import Effect, Family, Kind, Shape, Tried
+from models.diagnosis.facts import Facts
+from models.diagnosis.laws import Scene
+
+
+def _grid(_facts: Facts) -> tuple[Tried, ...]:
+    return (Tried(shape=()),)
+
+
+def _change(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
+    return np.asarray(amplitude * scene.points.acceleration / scene.facts.geometry.mean_radius, dtype=np.float64)
+
+
+EFFECT = Effect(
+    slug="inertia_torque",
+    title="Inertia is in the measured torque",
+    physics="A mass between clutch and sensor turns with the shaft: the sensor feels what accelerates it.",
+    formula="J dω/dt",
+    source="Newton; on the reference's rig the sensor stands on the grounded side, on others it does not",
+    family=Family.DYNAMIC,
+    kind=Kind.LAG,
+    channels=("time_s",),
+    amplitude="moment of inertia",
+    unit="kg m²",
+    prior_sd=0.01,
+    positive=False,
+    scale=1.0,
+    shapes=(),
+    grid=_grid,
+    change=_change,
+    before_lag=False,
+    tests={
+        "squeeze_film": "loops at 0.5 Hz, or the same swing with the clutch open: inertia stays",
+        "channel_delay": "the same swing with the clutch open: inertia stays, a delay of no torque is nothing",
+        "baseline": "the same swing with the clutch open",
+    },
+)

@@ -1,0 +1,70 @@
+"""Harder engagements age the clutch faster: ζ is energy rather than a count."""
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.facts import Facts
+from models.diagnosis.laws import Scene
+
+#: Blocks whose energies differ by less tell no severity.
+_LEAST_SPREAD = 0.03
+LOGGED, UNLOGGED = 0.0, 1.0
+
+
+def _grid(facts: Facts) -> tuple[Tried, ...]:
+    if facts.duty_energies.size > 1 and np.ptp(np.log(facts.duty_energies)) > _LEAST_SPREAD:
+        return (Tried(shape=(LOGGED, 0.0)),)
+    if facts.states.size < 5 or facts.duty_energies.size:
+        return ()
+    inner = facts.states[1:-1].tolist()
+    return tuple(Tried(shape=(UNLOGGED, onset), log_weight=-float(np.log(len(inner)))) for onset in inner)
+
+
+def effective_cycles(cycles: FloatArray, facts: Facts, exponent: float) -> FloatArray:
+    """ζ [n] as it counts for ageing: each engagement by (energy/usual energy)^exponent, usual where nothing was said."""
+    ends = np.concatenate([[0.0], facts.duty_ends])
+    lengths = np.maximum(np.diff(ends), 0.0)
+    usual = float(np.median(facts.duty_energies))
+    weights = np.exp(np.clip(exponent * np.log(facts.duty_energies / usual), -3.0, 3.0))
+    grown = np.concatenate([[0.0], np.cumsum(lengths * weights)])
+    beyond = np.maximum(cycles - ends[-1], 0.0)
+    return np.asarray(np.interp(cycles, ends, grown) + beyond, dtype=np.float64)
+
+
+def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    cycles = scene.points.cycles
+    if shape[0] == LOGGED:
+        counted = effective_cycles(cycles, scene.facts, amplitude)
+    else:
+        counted = cycles + np.clip(amplitude, -0.9, 5.0) * np.maximum(cycles - shape[1], 0.0)
+    return scene.curve_at(cycles=counted) - scene.curve
+
+
+EFFECT = Effect(
+    slug="load_severity",
+    title="Some duty was harder than other",
+    physics="The rate of eq. 6's kinetics grows with the energy of an engagement: harder blocks age the clutch faster.",
+    formula="S(ζ_e) - S(ζ), ζ_e = Σ (E/E_usual)^m, or from an unlogged cycle on ζ_e = ζ + a (ζ - ζ_k)",
+    source="models.degradation: dD/dζ = -k Dⁿ with k by the load's severity",
+    family=Family.HISTORY,
+    kind=Kind.COURSE,
+    channels=("energy_per_cycle_kj",),
+    amplitude="severity exponent m",
+    unit="-",
+    prior_sd=0.7,
+    positive=True,
+    scale=1.0,
+    shapes=(
+        ShapeParameter(name="logged or not", unit="-", lowest=0.0, highest=1.0),
+        ShapeParameter(name="onset", unit="cycles", lowest=0.0, highest=float("inf")),
+    ),
+    grid=_grid,
+    change=_change,
+    before_lag=True,
+    tests={
+        "accelerated_wear": "a block at half the energy: severity slows the ageing, late wear does not care",
+        "oil_change": "the energy of each engagement, recorded",
+        "baseline": "a block at twice the energy with a test before and after",
+    },
+)

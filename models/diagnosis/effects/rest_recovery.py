@@ -1,0 +1,58 @@
+"""After a pause friction stands off its course and comes back with use."""
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.facts import Facts
+from models.diagnosis.laws import Scene
+
+
+def _grid(facts: Facts) -> tuple[Tried, ...]:
+    if not facts.rests or facts.states.size < 2:
+        return ()
+    gap = float(np.median(np.diff(facts.states)))
+    tried = [Tried(shape=(length, 0.0)) for length in (0.1 * gap, 0.5 * gap, 1.5 * gap)]
+    if np.isfinite(facts.rest_moments).any():
+        tried += [Tried(shape=(0.1 * gap, seconds)) for seconds in (150.0, 600.0)]
+    return tuple(tried)
+
+
+def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    length, seconds = shape
+    points = scene.points
+    share = np.zeros_like(points.cycles)
+    for rest, moment in zip(scene.facts.rests, scene.facts.rest_moments, strict=True):
+        since = points.cycles - rest
+        left = np.where(since >= 0, np.exp(-np.maximum(since, 0.0) / length), 0.0)
+        if seconds > 0 and np.isfinite(moment):
+            waited = np.where(np.isfinite(points.moment), points.moment - moment, points.clock)
+            left = left * np.exp(-np.clip(waited, 0.0, 50 * seconds) / seconds)
+        share = np.maximum(share, left)
+    return np.asarray(amplitude * scene.curve * share, dtype=np.float64)
+
+
+EFFECT = Effect(
+    slug="rest_recovery",
+    title="Friction recovered during a rest",
+    physics="While the clutch rests additives settle on the lining and oil drains: friction starts off its course and "
+    "comes back within some cycles or minutes of sliding.",
+    formula="a S e^{-(ζ - ζ_rest)/ζ_c}, with the clock also e^{-(t - t_rest)/τ}",
+    source="boundary films of friction modifiers re-form at rest",
+    family=Family.HISTORY,
+    kind=Kind.COURSE,
+    channels=("started_at",),
+    amplitude="recovery at the end of the rest",
+    unit="%",
+    prior_sd=0.04,
+    positive=False,
+    scale=100.0,
+    shapes=(
+        ShapeParameter(name="length ζ_c", unit="cycles", lowest=1.0, highest=float("inf")),
+        ShapeParameter(name="settling time τ", unit="s", lowest=0.0, highest=float("inf")),
+    ),
+    grid=_grid,
+    change=_change,
+    before_lag=True,
+    tests={"baseline": "the same sweep twice right after a rest of a day: the second is back on its course"},
+)

@@ -1,0 +1,42 @@
+"""Torque that swings with the shaft's angle; it stands in raw records and averages out of plateaus."""
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.effect import Effect, Family, Kind, Shape, Tried
+from models.diagnosis.facts import Facts
+from models.diagnosis.laws import Scene
+
+
+def _grid(_facts: Facts) -> tuple[Tried, ...]:
+    return ()  # judged on raw records (models.diagnosis.raw)
+
+
+def _change(scene: Scene, _amplitude: float, _shape: Shape) -> FloatArray:
+    return np.zeros_like(scene.curve)
+
+
+EFFECT = Effect(
+    slug="shaft_ripple",
+    title="Torque swings with the shaft's turns",
+    physics="Misalignment, run-out or a coupling: torque swings once or a few times a turn, at a frequency that follows "
+    "the speed.",
+    formula="a cos(k ∫ω dt + φ), k = 1, 2, ...",
+    source="order analysis of rotating machinery",
+    family=Family.VIBRATION,
+    kind=Kind.VIBRATION,
+    channels=("time_s",),
+    amplitude="amplitude of the ripple",
+    unit="Nm",
+    prior_sd=0.5,
+    positive=True,
+    scale=1.0,
+    shapes=(),
+    grid=_grid,
+    change=_change,
+    before_lag=False,
+    tests={
+        "stick_slip": "a raw record at two speeds: ripple follows the shaft, stick-slip keeps its frequency",
+        "baseline": "a raw record of one sweep at 200 Hz or more",
+    },
+)

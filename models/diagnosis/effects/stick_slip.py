@@ -1,0 +1,41 @@
+"""Self-excited vibration of the driveline at low speed; it stands in raw records."""
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.effect import Effect, Family, Kind, Shape, Tried
+from models.diagnosis.facts import Facts
+from models.diagnosis.laws import Scene
+
+
+def _grid(_facts: Facts) -> tuple[Tried, ...]:
+    return ()  # judged on raw records (models.diagnosis.raw)
+
+
+def _change(scene: Scene, _amplitude: float, _shape: Shape) -> FloatArray:
+    return np.zeros_like(scene.curve)
+
+
+EFFECT = Effect(
+    slug="stick_slip",
+    title="Stick-slip or shudder",
+    physics="Where friction falls with speed the driveline vibrates by itself, at its own frequency and at low speed.",
+    formula="a cos(2π f t + φ) with f that does not follow the speed",
+    source="Ompusunggu et al. 2013, section 3.1.1: positive slope is anti-shudder",
+    family=Family.VIBRATION,
+    kind=Kind.VIBRATION,
+    channels=("time_s",),
+    amplitude="amplitude of the vibration",
+    unit="Nm",
+    prior_sd=0.5,
+    positive=True,
+    scale=1.0,
+    shapes=(),
+    grid=_grid,
+    change=_change,
+    before_lag=False,
+    tests={
+        "shaft_ripple": "a raw record at two speeds: stick-slip keeps its frequency, ripple follows the shaft",
+        "baseline": "a raw record of one sweep at 200 Hz or more",
+    },
+)

@@ -1,0 +1,68 @@
+"""The torque sensor's zero moved: at once, along the test, or along the life."""
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.facts import Facts
+from models.diagnosis.laws import Scene
+
+#: Courses of the zero: one offset from a cycle on, along the test's clock (straight, or settling), along the life.
+STEP, CLOCK, SETTLING, LIFE = 0.0, 1.0, 2.0, 3.0
+_HOUR = 3600.0
+
+
+def _grid(facts: Facts) -> tuple[Tried, ...]:
+    zeroed = facts.sensor_zeros
+    tried = [Tried(shape=(STEP, -1.0), log_weight=-1.0), Tried(shape=(CLOCK, 0.0))]
+    tried += [Tried(shape=(SETTLING, tau), log_weight=-0.7) for tau in (120.0, 400.0)]
+    for low, onset, high in zip(facts.states[:-1], facts.between, facts.states[1:], strict=True):
+        logged = any(low <= cycles <= high for cycles in zeroed)
+        tried.append(Tried(shape=(STEP, onset), log_weight=0.0 if logged else -float(np.log(len(facts.between)))))
+    if facts.states.size > 2:
+        tried.append(Tried(shape=(LIFE, 0.0)))
+    return tuple(tried)
+
+
+def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    course, value = shape
+    clock, cycles = scene.points.clock, scene.points.cycles
+    if course == STEP:
+        share = np.where(cycles > value, 1.0, 0.0)
+    elif course == CLOCK:
+        share = clock / _HOUR * 2.0
+    elif course == SETTLING:
+        share = -np.expm1(-np.maximum(clock, 0.0) / value)
+    else:
+        share = (cycles - scene.facts.states[0]) / scene.facts.life
+    return np.asarray(amplitude * scene.points.sign * share, dtype=np.float64)
+
+
+EFFECT = Effect(
+    slug="torque_zero_shift",
+    title="The torque sensor's zero has shifted",
+    physics="The sensor's reading without load is not zero: from a cycle on, drifting with the test's clock (it warms), or "
+    "creeping along the life. It adds the same torque at every speed and pressure.",
+    formula="a · step(ζ > ζ_k), a · t/30 min, a (1 - e^{-t/τ}), or a · ζ/ζ_last, with the sensor's sign",
+    source="strain-gauge transducers: ISO 376, zero drift and creep",
+    family=Family.SENSOR,
+    kind=Kind.ARTEFACT,
+    channels=("oil_temperature_c",),
+    amplitude="zero shift",
+    unit="Nm",
+    prior_sd=0.5,
+    positive=False,
+    scale=1.0,
+    shapes=(
+        ShapeParameter(name="course", unit="-", lowest=0.0, highest=3.0),
+        ShapeParameter(name="onset or settling time", unit="cycles or s", lowest=-1.0, highest=float("inf")),
+    ),
+    grid=_grid,
+    change=_change,
+    before_lag=False,
+    tests={
+        "oil_temperature": "one sweep at 60 °C oil temperature, and an unloaded zero reading before and after it",
+        "pressure_offset": "an unloaded zero reading before and after each test",
+        "baseline": "an unloaded zero reading before and after each test",
+    },
+)

@@ -1,0 +1,96 @@
+"""What a campaign says beside its torques: states, maintenance, pauses, the energy of its duty, its oil and geometry."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.clutch import Geometry
+from models.diagnosis.campaign import Campaign, EventKind, Oil
+
+#: The oil temperature to which everything refers where none was measured: the middle of the reference's 80 to 90 °C [K].
+REFERENCE_TEMPERATURE = 273.15 + 85.0
+#: A gap between runs that is longer than this [s] and than so many usual gaps is a pause.
+LEAST_PAUSE = 8 * 3600.0
+PAUSE_RATIO = 4.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Facts:
+    """What effects ask beside the rows. Cycles and moments as in the campaign.
+
+    states [s]: the distinct cycles at which friction was tested, ascending; oil_changes, sensor_zeros and rests: cycles
+    of maintenance (a rest is also a long gap in the moments); rest_moments: when the pause ended, NaN where unknown.
+    duty_ends [d], duty_energies [d] J an engagement: blocks whose energy is known, ascending.
+    """
+
+    geometry: Geometry
+    oil: Oil
+    states: FloatArray
+    temperature_measured: bool
+    reference_temperature: float
+    oil_changes: tuple[float, ...]
+    sensor_zeros: tuple[float, ...]
+    rests: tuple[float, ...]
+    rest_moments: tuple[float, ...]
+    duty_ends: FloatArray
+    duty_energies: FloatArray
+
+    @property
+    def life(self) -> float:
+        """The cycles from the first to the last state, at least 1."""
+        return max(float(self.states[-1] - self.states[0]), 1.0) if self.states.size else 1.0
+
+    @property
+    def between(self) -> tuple[float, ...]:
+        """Cycles midway between neighbouring states, where something may have changed."""
+        return tuple((0.5 * (self.states[1:] + self.states[:-1])).tolist())
+
+
+def facts_of(campaign: Campaign) -> Facts:
+    """Read off the campaign."""
+    tests = [*campaign.stationary, *campaign.dynamic]
+    temperatures = [
+        channel
+        for channel in (
+            *(run.plateaus.oil_temperature for run in campaign.stationary),
+            *(run.record.oil_temperature for run in campaign.dynamic),
+        )
+        if channel is not None
+    ]
+    rests, moments = _pauses(campaign)
+    known = [duty for duty in campaign.duty if duty.energy is not None and duty.energy > 0]
+    return Facts(
+        geometry=campaign.geometry,
+        oil=campaign.oil,
+        states=np.unique(np.array([run.cycles for run in tests], dtype=np.float64)),
+        temperature_measured=bool(temperatures),
+        reference_temperature=float(np.median(np.concatenate(temperatures))) if temperatures else REFERENCE_TEMPERATURE,
+        oil_changes=_events(campaign, EventKind.OIL_CHANGE),
+        sensor_zeros=_events(campaign, EventKind.SENSOR_ZERO),
+        rests=rests,
+        rest_moments=moments,
+        duty_ends=np.array([duty.cycles for duty in known], dtype=np.float64),
+        duty_energies=np.array([duty.energy for duty in known], dtype=np.float64),
+    )
+
+
+def _events(campaign: Campaign, kind: EventKind) -> tuple[float, ...]:
+    return tuple(sorted({event.cycles for event in campaign.maintenance if event.event is kind}))
+
+
+def _pauses(campaign: Campaign) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Cycles and ends of the pauses: maintenance that calls itself rest, and gaps between the moments of the runs."""
+    found: dict[float, float] = {}
+    runs = [*campaign.stationary, *campaign.dynamic, *campaign.duty]
+    timed = sorted((run.moment, run.cycles) for run in runs if run.moment is not None)
+    if len(timed) >= 4:
+        gaps = np.diff(np.array([moment for moment, _ in timed]))
+        least = max(LEAST_PAUSE, PAUSE_RATIO * float(np.median(gaps)))
+        for gap, (before, _), (moment, cycles) in zip(gaps.tolist(), timed[:-1], timed[1:], strict=True):
+            if gap > least and np.isfinite(before):
+                found.setdefault(cycles, moment)
+    for event in campaign.maintenance:
+        if event.event is EventKind.REST and event.cycles not in found:
+            found[event.cycles] = float("nan") if event.moment is None else event.moment
+    return tuple(sorted(found)), tuple(found[cycles] for cycles in sorted(found))

@@ -1,0 +1,235 @@
+"""The pooled fit: Gauss-Newton with Levenberg's damping on whitened rows, weak priors as further rows.
+
+Effects may be fitted along: each brings its amplitude and its smooth shapes as further parameters.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from models.diagnosis.baseline import Prediction, predict
+from models.diagnosis.design import Design
+from models.diagnosis.effect import Effect, Shape
+from models.diagnosis.laws import ATTRACTOR, BLOCK, DRIFT, LOG_DECAY, RATIO, Frame, Laws
+from models.diagnosis.whitening import Noise, gains_of, whitened, without_gains
+
+#: How alike the two shares of one law are expected to drift [-].
+ALIKE_SD = 0.1
+_LARGEST_STEP = 1.5
+_SMALL = 0.01  # nats: when the cost falls by less the fit has converged
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Priors:
+    """Rows of prior on θ: (combination θ - mean)/sd, `rows` [q, θ.size] already divided by sd, `means` [q] too; `free`
+    [θ.size] which entries are fitted at all."""
+
+    rows: FloatArray
+    means: FloatArray
+    free: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fitted:
+    """An effect in a model: its amplitude and shape."""
+
+    effect: Effect
+    amplitude: float
+    shape: Shape
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fit:
+    """A fitted model: laws, prediction of the baseline part, torque [N] of all of it, residual [N] Nm (measured minus
+    torque), the effects in it, cost [nats] (half the whitened squares, priors included)."""
+
+    laws: Laws
+    prediction: Prediction
+    torque: FloatArray
+    residual: FloatArray
+    effects: tuple[Fitted, ...]
+    cost: float
+
+
+def priors_of(design: Design, start: FloatArray, frame: Frame) -> Priors:
+    """Weak priors around scales of the data, and what cannot be told at all held fast."""
+    size = start.size
+    level = max(float(np.median(np.abs(design.torque))), 1e-12)
+    fastest = float(design.rows.velocity.max())
+    sds, means = np.full(size, np.nan), start.copy()
+    spreads = {0: 10 * level, 1: 3.0, 2: 3 * fastest, 3: 10 * level}
+    for k, spread in spreads.items():
+        block = k * BLOCK
+        sds[block : block + BLOCK] = [spread, spread, 1.5, 1.5, 1.5, 0.7]
+        means[block + 2 : block + BLOCK] = [0.0, 0.0, np.log(0.5 * design.facts.life), np.log(0.8)]
+    sds[LOG_DECAY], means[LOG_DECAY] = 0.7, np.log(0.6 * frame.span)
+    sds[DRIFT:ATTRACTOR], means[DRIFT:ATTRACTOR] = (0.6, 0.2, 0.3), 0.0
+    sds[ATTRACTOR:], means[ATTRACTOR:] = 1.5, np.log(12 * level)
+    rows = np.diag(1 / sds)
+    alike = np.zeros((4, size))
+    for k in range(4):
+        alike[k, k * BLOCK + 2], alike[k, k * BLOCK + 3] = 1 / ALIKE_SD, -1 / ALIKE_SD
+    return Priors(
+        rows=np.concatenate([rows, alike]),
+        means=np.concatenate([means / sds, np.zeros(4)]),
+        free=_free(design, size),
+    )
+
+
+def _free(design: Design, size: int) -> NDArray[np.bool_]:
+    states, levels = design.facts.states.size, np.unique(design.level).size
+    loop_states = np.unique(design.rows.cycles[design.plateaus :]).size
+    free = np.ones(size, dtype=np.bool_)
+    for k in range(4):
+        block = k * BLOCK
+        free[block + 1] = levels > 1
+        free[block + 2 : block + 4] = states > 1, states > 1 and levels > 1
+        free[block + 4 : block + 6] = states > 2
+    free[LOG_DECAY] = levels > 2
+    free[DRIFT:ATTRACTOR] = loop_states > 1, loop_states > 2, loop_states > 1 and levels > 1
+    return free
+
+
+def effect_rows(design: Design, prediction: Prediction, fitted: Fitted) -> FloatArray:
+    """The change [N] Nm of an effect at the rows."""
+    change = fitted.effect.change(prediction.scene, fitted.amplitude, fitted.shape)
+    return prediction.change_at_rows(design, change, before_lag=fitted.effect.before_lag)
+
+
+def fit(
+    design: Design,
+    noise: Noise,
+    start: Laws,
+    priors: Priors,
+    effects: Sequence[Fitted] = (),
+    *,
+    steps: int = 30,
+) -> Fit:
+    """Minimise half the whitened squares from a start, effects included."""
+    state = _evaluated(design, noise, start, priors, tuple(effects))
+    damping, growth = 1e-3, 2.0
+    for _ in range(steps):
+        gram, gradient = _normal(design, noise, priors, state)
+        fallen = 0.0
+        for _ in range(8):
+            step = np.linalg.solve(gram + damping * np.diag(np.diag(gram)), gradient)
+            trial = _moved(state, priors, step)
+            if trial is not None:
+                candidate = _evaluated(design, noise, trial[0], priors, trial[1])
+                expected = float(step @ gradient - 0.5 * step @ (gram @ step))
+                fallen = state.cost - candidate.cost
+                if np.isfinite(candidate.cost) and fallen > 0:
+                    share = fallen / max(expected, 1e-12)
+                    damping *= max(1 / 5, 1 - (2 * min(share, 1.5) - 1) ** 3)
+                    growth = 2.0
+                    break
+            fallen = 0.0
+            damping, growth = damping * growth, growth * 2
+        if fallen <= 0:
+            break
+        state = candidate
+        if fallen < _SMALL:
+            break
+    return state
+
+
+def _evaluated(design: Design, noise: Noise, laws: Laws, priors: Priors, effects: tuple[Fitted, ...]) -> Fit:
+    with np.errstate(all="ignore"):
+        prediction = predict(design, laws)
+        torque = prediction.torque.copy()
+        for each in effects:
+            torque += effect_rows(design, prediction, each)
+        residual = design.torque - torque
+        if not np.isfinite(residual).all():
+            cost = float("inf")
+        else:
+            white = _white(residual[:, None], design, noise)
+            cost = 0.5 * float((white**2).sum()) + 0.5 * float(((priors.rows @ laws.theta - priors.means) ** 2).sum())
+            for each in effects:
+                cost += 0.5 * (each.amplitude / each.effect.prior_sd) ** 2
+    return Fit(laws=laws, prediction=prediction, torque=torque, residual=residual, effects=effects, cost=cost)
+
+
+def _white(columns: FloatArray, design: Design, noise: Noise) -> FloatArray:
+    """Gains are taken along the measured torque: it changes little and keeps the metric fixed while a fit moves."""
+    gains = gains_of(design, design.torque, noise)
+    return without_gains(whitened(columns, design, noise), gains, noise.run_gain, noise.curve_gain)
+
+
+def _normal(design: Design, noise: Noise, priors: Priors, state: Fit) -> tuple[FloatArray, FloatArray]:
+    """Gram matrix and gradient over the free θ and the effects' parameters."""
+    columns = [state.prediction.jacobian(design)[:, priors.free]]
+    columns += [effect_columns(design, state.prediction, each) for each in state.effects]
+    jacobian = np.concatenate(columns, axis=1)
+    white = _white(np.column_stack([jacobian, state.residual]), design, noise)
+    size = jacobian.shape[1]
+    count = int(priors.free.sum())
+    gram = white[:, :size].T @ white[:, :size]
+    gradient = white[:, :size].T @ white[:, size]
+    rows = priors.rows[:, priors.free]
+    gram[:count, :count] += rows.T @ rows
+    gradient[:count] -= rows.T @ (priors.rows @ state.laws.theta - priors.means)
+    at = count
+    for each in state.effects:
+        precisions = effect_precisions(each.effect)
+        diagonal = np.arange(at, at + precisions.size)
+        gram[diagonal, diagonal] += precisions
+        gradient[at] -= each.amplitude * precisions[0]
+        at += precisions.size
+    gram[np.diag_indices_from(gram)] += 1e-12 * np.abs(np.diag(gram)).max()
+    return gram, gradient
+
+
+def effect_precisions(effect: Effect) -> FloatArray:
+    """1/sd² of the priors on (amplitude, smooth shapes) [1 + s]."""
+    smooth = [0.5 * (shape.highest - shape.lowest) for shape in effect.shapes if shape.smooth]
+    return np.array([effect.prior_sd, *smooth]) ** -2.0
+
+
+def effect_columns(design: Design, prediction: Prediction, fitted: Fitted) -> FloatArray:
+    """∂change/∂(amplitude, smooth shapes) [N, 1 + s] at the rows, by central differences."""
+    effect, columns = fitted.effect, []
+    step = 1e-3 * effect.prior_sd
+    for delta_a, index in [(step, None), *((0.0, i) for i, shape in enumerate(effect.shapes) if shape.smooth)]:
+        ends, width = [], 0.0
+        for side in (1.0, -1.0):
+            shape = list(fitted.shape)
+            if index is not None:
+                delta = 1e-3 * (effect.shapes[index].highest - effect.shapes[index].lowest)
+                shape[index] += side * delta
+                width += delta
+            else:
+                width += delta_a
+            ends.append(effect.change(prediction.scene, fitted.amplitude + side * delta_a, tuple(shape)))
+        columns.append((ends[0] - ends[1]) / width)
+    return prediction.change_at_rows(design, np.stack(columns, axis=1), before_lag=effect.before_lag)
+
+
+def _moved(state: Fit, priors: Priors, step: FloatArray) -> tuple[Laws, tuple[Fitted, ...]] | None:
+    """The state after a step, shapes kept inside their bounds; logarithms move by a limited amount."""
+    if not np.isfinite(step).all():
+        return None
+    count = int(priors.free.sum())
+    move = np.zeros(state.laws.theta.size)
+    move[priors.free] = step[:count]
+    for k in range(4):
+        block = k * BLOCK
+        move[block + 2 : block + BLOCK] = np.clip(move[block + 2 : block + BLOCK], -_LARGEST_STEP, _LARGEST_STEP)
+    move[LOG_DECAY:] = np.clip(move[LOG_DECAY:], -_LARGEST_STEP, _LARGEST_STEP)
+    theta = state.laws.theta + move
+    for k in range(4):
+        theta[k * BLOCK + 4 : k * BLOCK + 6] = np.clip(theta[k * BLOCK + 4 : k * BLOCK + 6], -3.0, 25.0)
+    at, effects = count, []
+    for each in state.effects:
+        amplitude = each.amplitude + float(step[at])
+        at += 1
+        shape = list(each.shape)
+        for index, parameter in enumerate(each.effect.shapes):
+            if parameter.smooth:
+                shape[index] = float(np.clip(shape[index] + step[at], parameter.lowest, parameter.highest))
+                at += 1
+        effects.append(Fitted(effect=each.effect, amplitude=amplitude, shape=tuple(shape)))
+    return Laws(theta=theta, frame=state.laws.frame), tuple(effects)

@@ -1,0 +1,205 @@
+"""The baseline's laws: eq. 2-3 over the pressure laws of fig. 9 over eq. 6, one parameter vector for a whole campaign.
+
+With D(ζ) = 1 - (1 + ζ/φ)^-ε (eq. 6's share), one (φ, ε) for each Stribeck parameter, and P⁻, P⁺ the campaign's lowest and
+highest pressure,
+
+    parameter = u⁻ (1 + s⁻ D) w(p) + u⁺ (1 + s⁺ D) (1 - w(p))
+    w         = (P⁺ - p)/(P⁺ - P⁻)                               for M_s, V_S, C_v: straight lines in pressure
+    w         = (e^{-(p - P⁻)/p_0} - E)/(1 - E),  E = e^{-(P⁺ - P⁻)/p_0}      for M̄_c: c_∞ + a e^{-p/p_0}
+    log C          = κ(p) + d_1 x + d_2 x² + d_3 x (p - p̄)/(P⁺ - P⁻),       x = ζ/ζ_last
+
+(φ, ε) stand in θ as (log h, log ε) with h the half-life, D(h) = 1/2: φ = h/(2^{1/ε} - 1). Data tell h far better than φ.
+u⁻, u⁺ are the fresh values at the two ends of the pressures; intercept and slope (asymptote and excess) drift each by its
+own share: whether eq. 6 multiplies a law as a whole (s⁻ = s⁺) or not is left to the data. κ is free at every
+pressure of the loops and straight between them.
+
+Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, eqs. 2, 3, 6, figs. 9 and 10; the bilinear form and the
+course of C are this project's.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.design import Points
+from models.diagnosis.facts import Facts
+from models.stribeck import GAMMA
+
+#: The laws of eq. 6 over pressure, in the order of `models.stribeck.PARAMETER_NAMES`; each has six places in θ.
+BLOCK = 6
+#: θ: four blocks of (low end, high end, share low, share high, log h, log ε); log p_0;
+#: d_1, d_2, d_3; then κ at each pressure of the loops.
+LOG_DECAY = 4 * BLOCK
+DRIFT = LOG_DECAY + 1
+ATTRACTOR = DRIFT + 3
+RATIO = 1  # the place of M̄_c among the four
+_LEAST_VELOCITY = 1e-3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Frame:
+    """What the laws are relative to: the lowest and highest pressure [Pa], the last state [cycles], the pressures of the
+    loops [l] Pa, ascending, and a velocity [m/s] in the middle of what was measured."""
+
+    lowest: float
+    highest: float
+    last: float
+    loop_pressures: FloatArray
+    reference_velocity: float
+
+    @property
+    def span(self) -> float:
+        """Of the pressures [Pa], or the pressure itself where there is one only."""
+        return self.highest - self.lowest if self.highest > self.lowest else self.highest
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Laws:
+    """theta [ATTRACTOR + loop pressures] and the frame that it is in."""
+
+    theta: FloatArray
+    frame: Frame
+
+    def parameters(self, pressure: FloatArray, cycles: FloatArray) -> FloatArray:
+        """M_s, M̄_c, V_S, C_v [n, 4] at pressure [n] Pa and cycles [n]. V_S is kept above nothing, the rest is as fitted."""
+        return self.with_gradient(pressure, cycles)[0]
+
+    def with_gradient(self, pressure: FloatArray, cycles: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Parameters [n, 4], their derivatives by θ's blocks [n, 4, BLOCK], and that of M̄_c by log p_0 [n]."""
+        values = np.empty((pressure.size, 4))
+        slopes = np.empty((pressure.size, 4, BLOCK))
+        high = (pressure - self.frame.lowest) / self.frame.span
+        states, of_state = np.unique(cycles, return_inverse=True)  # few: eq. 6 is worked out once for each
+        fall, by_fall = falling_weight(high, self.frame.span, float(self.theta[LOG_DECAY]))
+        for k in range(4):
+            first, second, share_1, share_2, log_half, log_exponent = self.theta[k * BLOCK : (k + 1) * BLOCK].tolist()
+            weight_1, weight_2 = (fall, 1.0 - fall) if k == RATIO else (1.0 - high, high)
+            done, by_half, by_exponent = (part[of_state] for part in _progress(states, log_half, log_exponent))
+            lost = first * share_1 * weight_1 + second * share_2 * weight_2
+            values[:, k] = first * weight_1 + second * weight_2 + lost * done
+            slopes[:, k, 0] = weight_1 * (1.0 + share_1 * done)
+            slopes[:, k, 1] = weight_2 * (1.0 + share_2 * done)
+            slopes[:, k, 2] = first * weight_1 * done
+            slopes[:, k, 3] = second * weight_2 * done
+            slopes[:, k, 4] = lost * by_half
+            slopes[:, k, 5] = lost * by_exponent
+        ends = self.theta[RATIO * BLOCK : RATIO * BLOCK + 4]
+        done = _progress(states, *self.theta[RATIO * BLOCK + 4 : RATIO * BLOCK + 6].tolist())[0][of_state]
+        by_decay = by_fall * (ends[0] * (1.0 + ends[2] * done) - ends[1] * (1.0 + ends[3] * done))
+        stuck = values[:, 2] < _LEAST_VELOCITY
+        values[stuck, 2] = _LEAST_VELOCITY
+        slopes[stuck, 2] = 0.0
+        return values, slopes, by_decay
+
+    def by_pressure(self, pressure: FloatArray, cycles: FloatArray) -> FloatArray:
+        """d(M_s, M̄_c, V_S, C_v)/dp [n, 4] 1/Pa."""
+        step = 1e-4 * self.frame.span
+        ahead, behind = self.parameters(pressure + step, cycles), self.parameters(pressure - step, cycles)
+        return np.asarray((ahead - behind) / (2 * step), dtype=np.float64)
+
+    def log_attractor(self, pressure: FloatArray, cycles: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """log C [n] at pressure [n] Pa and cycles [n], and its derivatives by (d_1, d_2, d_3, κ...) [n, 3 + l]."""
+        levels = self.frame.loop_pressures
+        weights = np.stack([np.interp(pressure, levels, unit) for unit in np.eye(levels.size)], axis=-1)
+        x = cycles / max(self.frame.last, 1.0)
+        tilt = (pressure - 0.5 * (self.frame.lowest + self.frame.highest)) / self.frame.span
+        columns = np.concatenate([np.stack([x, x * x, x * tilt], axis=-1), weights], axis=-1)
+        return columns @ self.theta[DRIFT:], columns
+
+
+def falling_weight(high: FloatArray, span: float, log_decay: float) -> tuple[FloatArray, FloatArray]:
+    """w [n] of M̄_c's law and dw/dlog p_0 [n], at (p - P⁻)/(P⁺ - P⁻) = `high` [n] and log p_0 with p_0 in Pa."""
+    ratio = float(np.clip(span / np.exp(log_decay), 1e-3, 60.0))
+    last, here = np.exp(-ratio), np.exp(-ratio * high)
+    whole = 1.0 - last
+    by_decay = ((here * high - last) * whole + (here - last) * last) * ratio / whole**2
+    return (here - last) / whole, by_decay
+
+
+def _progress(cycles: FloatArray, log_half: float, log_exponent: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Eq. 6's share D [n], and dD/dlog h, dD/dlog ε [n]."""
+    exponent = np.exp(log_exponent)
+    doubling = np.expm1(np.log(2.0) / exponent)
+    ratio = cycles * doubling / np.exp(log_half)
+    stretched = np.log1p(ratio)
+    left = np.exp(-exponent * stretched)
+    by_half = -exponent * left * ratio / (1.0 + ratio)
+    along = np.log(2.0) / exponent * (1.0 + doubling) / doubling  # dlog φ/dlog ε
+    return -np.expm1(-exponent * stretched), by_half, exponent * left * stretched + along * by_half
+
+
+def curve(velocity: FloatArray, parameters: FloatArray) -> FloatArray:
+    """Eq. 3 [n] Nm at velocity [n] m/s > 0 with parameters [n, 4]; as models.stribeck.torque, but any sign of parameter."""
+    decay = np.exp(-np.minimum(parameters[:, 2] / velocity, 700.0))
+    return np.asarray(
+        parameters[:, 0] * (1.0 - decay + parameters[:, 1] * decay) + parameters[:, 3] * velocity**GAMMA,
+        dtype=np.float64,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """Points and what the baseline says there, all [P]: curve S [Nm]; parameters [P, 4] and gradient [P, 4] = ∂S by them;
+    decay e = exp(-V_S/v); by_velocity ∂S/∂v [Nm s/m]; attractor C [Nm/s] (NaN without loops)."""
+
+    points: Points
+    facts: Facts
+    laws: Laws
+    parameters: FloatArray
+    curve: FloatArray
+    gradient: FloatArray
+    decay: FloatArray
+    by_velocity: FloatArray
+    attractor: FloatArray
+
+    @property
+    def by_pressure(self) -> FloatArray:
+        """∂S/∂p [P] Nm/Pa along the laws."""
+        slopes = self.laws.by_pressure(self.points.pressure, self.points.cycles)
+        return np.asarray(np.einsum("nk,nk->n", self.gradient, slopes), dtype=np.float64)
+
+    @property
+    def viscous(self) -> FloatArray:
+        """The viscous part C_v v^γ [P] Nm."""
+        return np.asarray(self.parameters[:, 3] * self.points.velocity**GAMMA, dtype=np.float64)
+
+    def curve_at(
+        self, *, cycles: FloatArray | None = None, velocity: FloatArray | None = None, pressure: FloatArray | None = None
+    ) -> FloatArray:
+        """S [P] Nm with other cycles, velocity [m/s] > 0 or pressure [Pa] at the points."""
+        p = self.points.pressure if pressure is None else pressure
+        at = self.parameters
+        if cycles is not None or pressure is not None:
+            at = self.laws.parameters(p, self.points.cycles if cycles is None else cycles)
+        return curve(self.points.velocity if velocity is None else velocity, at)
+
+
+def gradient_of(velocity: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """∂S/∂(M_s, M̄_c, V_S, C_v) [n, 4] and e [n] at velocity [n] m/s > 0."""
+    decay = np.exp(-np.minimum(parameters[:, 2] / velocity, 700.0))
+    m_s, m_c = parameters[:, 0], parameters[:, 1]
+    columns = (1.0 - decay + m_c * decay, m_s * decay, -m_s * (m_c - 1.0) * decay / velocity, velocity**GAMMA)
+    return np.stack(columns, axis=-1), decay
+
+
+def scene_of(laws: Laws, points: Points, facts: Facts) -> Scene:
+    """What the laws say at the points."""
+    values = laws.parameters(points.pressure, points.cycles)
+    gradient, decay = gradient_of(points.velocity, values)
+    falling = gradient[:, 2] * values[:, 2] / points.velocity
+    by_velocity = -falling + GAMMA * values[:, 3] * points.velocity ** (GAMMA - 1.0)
+    attractor = np.full(points.run.size, np.nan)
+    if laws.frame.loop_pressures.size:
+        attractor = np.exp(laws.log_attractor(points.pressure, points.cycles)[0])
+    return Scene(
+        points=points,
+        facts=facts,
+        laws=laws,
+        parameters=values,
+        curve=curve(points.velocity, values),
+        gradient=gradient,
+        decay=decay,
+        by_velocity=np.asarray(by_velocity, dtype=np.float64),
+        attractor=attractor,
+    )

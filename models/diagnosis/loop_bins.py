@@ -1,0 +1,134 @@
+"""A dynamic record compressed: for each loop the mean torque in phase bins, and the swing at evenly spaced phases."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from models.arrays import FloatArray
+from models.clutch import Geometry
+from models.periods import SPEED_HARMONICS, Cycle, fit_cycle, harmonics, inliers
+from models.runs import Record
+from models.standing import Stretch, pressure_stretches
+
+#: Phases at which a loop is computed, and bins in which it is compared; a bin holds a whole number of phases.
+PHASES, BINS = 120, 60
+#: Rows slower than this share of the loop's highest speed are left out: sticking, or next to it.
+LEAST_SPEED = 0.004
+#: This share of a period passes before the loop is in its periodic state; all that follows is used, whole periods or not.
+START = 0.06
+#: A speed that falls below minus this share of its highest reverses.
+REVERSES = 0.03
+#: A loop with fewer filled bins is none.
+FEWEST_BINS = 24
+#: At most so many samples of a stretch are looked at, and so many for its swing (evenly taken).
+MOST_SAMPLES, SWING_SAMPLES = 4000, 400
+#: A swing is taken over from the stretch before where it misses by no more than this much worse.
+_AS_BEFORE = 1.3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BinnedLoop:
+    """One pressure of a dynamic test [Pa]. At PHASES phases: phase [rad], velocity [m/s] >= 0, acceleration [m/s²],
+    clock [s]. In BINS bins: torque [Nm] (folded) and how many samples it is the mean of, 0 where the bin is not used.
+    temperature [K], NaN where not measured; angular_frequency [rad/s]; sign ±1."""
+
+    pressure: float
+    sign: float
+    temperature: float
+    angular_frequency: float
+    phase: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    clock: FloatArray
+    torque: FloatArray
+    samples: FloatArray
+
+
+def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], list[str]]:
+    """The loops of a record that can be evaluated, and a sentence for each that cannot."""
+    order = np.argsort(record.time, kind="stable")
+    time, pressure = record.time[order], record.pressure[order]
+    velocity, torque = geometry.sliding_velocity(record.speed[order]), record.torque[order]
+    temperature = None if record.oil_temperature is None else record.oil_temperature[order]
+    found: list[BinnedLoop] = []
+    notes: list[str] = []
+    before: Cycle | None = None
+    for stretch in pressure_stretches(time, pressure):
+        if stretch.pressure <= 0:
+            continue
+        step = max(1, (stretch.stop - stretch.start) // MOST_SAMPLES)
+        rows = slice(stretch.start, stretch.stop, step)
+        sign = -1.0 if np.median(velocity[rows]) < 0 else 1.0
+        cycle = _swing(time[rows], sign * velocity[rows], before)
+        if isinstance(cycle, str):
+            notes.append(f"{stretch.pressure / 1e5:.3g} bar: {cycle}")
+            continue
+        before = cycle
+        mean = float("nan") if temperature is None else float(temperature[rows].mean())
+        loop = _binned(cycle, time[rows], sign * torque[rows], stretch.pressure, sign, mean, float(time[0]))
+        if isinstance(loop, str):
+            notes.append(f"{stretch.pressure / 1e5:.3g} bar: {loop}")
+        else:
+            found.append(loop)
+    return found, notes
+
+
+def _swing(time: FloatArray, velocity: FloatArray, before: Cycle | None) -> Cycle | str:
+    """The stretch's swing: that of the stretch before where its frequency fits here as well, else found anew."""
+    step = max(1, time.size // SWING_SAMPLES)
+    t, v = time[::step], velocity[::step]
+    if before is not None and t.size > 4 * SPEED_HARMONICS:
+        origin = 0.5 * float(t[0] + t[-1])
+        basis = harmonics(2 * math.pi * before.frequency * (t - origin), SPEED_HARMONICS)
+        design = np.column_stack([np.ones_like(t), basis])
+        found = np.linalg.lstsq(design, v, rcond=None)[0]
+        noise = float(np.sqrt(((v - design @ found) ** 2).mean()))
+        duration = float(time[-1] - time[0]) + float(time[-1] - time[0]) / max(time.size - 1, 1)
+        periods = math.floor(duration * before.frequency + 0.01)
+        if periods >= 1 and noise <= _AS_BEFORE * before.noise + 1e-3 * before.amplitude:
+            stop = float(time[0]) + duration
+            return replace(
+                before,
+                origin=origin,
+                mean=float(found[0]),
+                cosine=found[1 : SPEED_HARMONICS + 1],
+                sine=found[SPEED_HARMONICS + 1 :],
+                periods=periods,
+                start=stop - periods / before.frequency,
+                stop=stop,
+            )
+    return fit_cycle(t, v)
+
+
+def _binned(
+    cycle: Cycle, time: FloatArray, torque: FloatArray, pressure: float, sign: float, temperature: float, begin: float
+) -> BinnedLoop | str:
+    width = 2 * math.pi / PHASES
+    phase = width * (np.arange(PHASES) + 0.5)
+    fitted = cycle.value(phase)
+    fastest = float(fitted.max())
+    if not fastest > 0 or float(fitted.min()) < -REVERSES * fastest:
+        return "the speed changes sign; the loop was left out."
+    inside = (time >= time[0] + START / cycle.frequency) & (time < cycle.stop)
+    inside[inside] = inliers(torque[inside] - median_filter(torque[inside], size=5, mode="nearest"), torque[inside])
+    number = np.floor(np.mod(cycle.phase(time[inside]), 2 * math.pi) * (BINS / (2 * math.pi))).astype(np.intp) % BINS
+    count = np.bincount(number, minlength=BINS).astype(np.float64)
+    count[fitted.reshape(BINS, -1).min(axis=1) < LEAST_SPEED * fastest] = 0.0
+    if np.count_nonzero(count) < FEWEST_BINS:
+        return "too few samples lie in whole periods."
+    angular = 2 * math.pi * cycle.frequency
+    first = math.ceil((cycle.start - cycle.origin) * cycle.frequency)
+    return BinnedLoop(
+        pressure=pressure,
+        sign=sign,
+        temperature=temperature,
+        angular_frequency=angular,
+        phase=phase,
+        velocity=np.maximum(fitted, 0.25 * LEAST_SPEED * fastest),
+        acceleration=angular * cycle.gradient(phase),
+        clock=cycle.origin + (phase / (2 * math.pi) + first) / cycle.frequency - begin,
+        torque=np.bincount(number, weights=torque[inside], minlength=BINS) / np.maximum(count, 1.0),
+        samples=count,
+    )

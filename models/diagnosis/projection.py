@@ -1,0 +1,118 @@
+"""What is visible of a change of torque once the baseline, the noise and the gains have had their say.
+
+All columns (the baseline's sensitivities J, the changes g, the residual r) meet in one Gram matrix of whitened rows. For
+any scatter σ_g of the runs' gains it follows by a small correction (Woodbury), and projecting J off is one solve:
+
+    info = Gᵀ V⁻¹ (1 - P) G,     score = Gᵀ V⁻¹ (1 - P) r
+
+z = score/√info is standard normal where there is no effect; ½ info a² is λ, the expected log-likelihood ratio [nats] of
+an effect of amplitude a.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.baseline import Prediction
+from models.diagnosis.design import Design, IntArray
+from models.diagnosis.fitting import Fit, Priors, effect_columns, effect_precisions
+from models.diagnosis.whitening import Noise, by_curve, gains_of, whitened
+
+#: Scatter of the gain that is considered [-], and its prior: log-normal about a usual one.
+GAINS: FloatArray = np.geomspace(2e-4, 2e-2, 13)
+_USUAL, _SPREAD = 2.5e-3, 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gram:
+    """matrix [m, m] without gains, directions q [c, m] of the curves, squares [c], run_of_curve [c]; the first `base`
+    columns are the baseline's, the last is the residual."""
+
+    matrix: FloatArray
+    along: FloatArray
+    squares: FloatArray
+    run_of_curve: IntArray
+    base: int
+
+    def by_run(self) -> tuple[FloatArray, FloatArray]:
+        """Directions [r, m] and squares [r] of the runs' gains."""
+        member = np.zeros((int(self.run_of_curve.max()) + 1, self.run_of_curve.size))
+        member[self.run_of_curve, np.arange(self.run_of_curve.size)] = 1.0
+        return member @ self.along, member @ self.squares
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Projected:
+    """info [m, m], score [m] of the changes; `miss` rᵀV⁻¹(1 - P)r; `evidence` [nats] of the gains' scatter."""
+
+    info: FloatArray
+    score: FloatArray
+    miss: float
+    evidence: float
+
+
+def gram_of(design: Design, noise: Noise, priors: Priors, fit: Fit, changes: FloatArray) -> Gram:
+    """The Gram matrix of a fit (its effects belong to the baseline then) and changes [N, m] at the rows."""
+    own = [effect_columns(design, fit.prediction, each) for each in fit.effects]
+    jacobian = np.concatenate([fit.prediction.jacobian(design)[:, priors.free], *own], axis=1)
+    white = whitened(np.column_stack([jacobian, changes, fit.residual]), design, noise)
+    gains = gains_of(design, fit.torque, noise)
+    matrix = white.T @ white
+    free, base = int(priors.free.sum()), jacobian.shape[1]
+    rows = priors.rows[:, priors.free]
+    off = priors.means - priors.rows @ fit.laws.theta
+    matrix[:free, :free] += rows.T @ rows
+    matrix[:free, -1] += rows.T @ off
+    matrix[-1, :free] += rows.T @ off
+    matrix[-1, -1] += float(off @ off)
+    at = free
+    for each, columns in zip(fit.effects, own, strict=True):
+        precisions = effect_precisions(each.effect)
+        diagonal = np.arange(at, at + columns.shape[1])
+        matrix[diagonal, diagonal] += precisions
+        at += columns.shape[1]
+    return Gram(
+        matrix=matrix, along=by_curve(white, gains), squares=gains.squares, run_of_curve=gains.run_of_curve, base=base
+    )
+
+
+def project(gram: Gram, run_gain: float) -> Projected:
+    """With the runs' gains scattering by `run_gain`."""
+    along, squares = gram.by_run()
+    weight = run_gain**2 / (1 + run_gain**2 * squares)
+    full = gram.matrix - along.T @ (weight[:, None] * along)
+    base = gram.base
+    corner = full[:base, :base]
+    scale = 1 / np.sqrt(np.maximum(np.diag(corner), 1e-300))
+    factor = _factor(corner * scale[:, None] * scale)
+    half = np.linalg.solve(factor, full[:base, base:] * scale[:, None])
+    left = full[base:, base:] - half.T @ half
+    logdet = 2 * float(np.log(np.diag(factor)).sum() - np.log(scale).sum()) + float(np.log1p(run_gain**2 * squares).sum())
+    prior = -0.5 * (np.log(run_gain / _USUAL) / _SPREAD) ** 2
+    miss = float(left[-1, -1])
+    return Projected(
+        info=left[:-1, :-1], score=left[:-1, -1], miss=miss, evidence=-0.5 * (miss + logdet) + float(prior)
+    )
+
+
+def _factor(correlation: FloatArray) -> FloatArray:
+    """The Cholesky factor of a correlation matrix that may be singular to rounding."""
+    for jitter in (1e-11, 1e-8, 1e-5):
+        try:
+            return np.asarray(np.linalg.cholesky(correlation + jitter * np.eye(correlation.shape[0])))
+        except np.linalg.LinAlgError:
+            continue
+    values, vectors = np.linalg.eigh(correlation)
+    return np.asarray(np.linalg.cholesky((vectors * np.maximum(values, 1e-5)) @ vectors.T + 1e-7 * np.eye(values.size)))
+
+
+def change_columns(design: Design, prediction: Prediction, changes: list[tuple[FloatArray, bool]]) -> FloatArray:
+    """Changes at the points, each with whether it comes before the lag -> [N, m] at the rows."""
+    out = np.zeros((design.torque.size, len(changes)))
+    for before in (True, False):
+        chosen = [i for i, (_, flag) in enumerate(changes) if flag is before]
+        if chosen:
+            stacked = np.stack([changes[i][0] for i in chosen], axis=1)
+            out[:, chosen] = prediction.change_at_rows(design, stacked, before_lag=before)
+    return out

@@ -1,0 +1,208 @@
+"""The report: everything that a judgement says, in public terms."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from models.diagnosis.advice import advise
+from models.diagnosis.alarm import Lead
+from models.diagnosis.campaign import Campaign
+from models.diagnosis.catalogue import BY_SLUG
+from models.diagnosis.design import Design
+from models.diagnosis.extension import Extension, build_extension
+from models.diagnosis.fitting import Fit, Priors
+from models.diagnosis.gain import measure_gain
+from models.diagnosis.maps import loop_traces, residual_maps
+from models.diagnosis.raw import RawEvidence
+from models.diagnosis.refitting import Hypothesis
+from models.diagnosis.report import Candidate, Estimate, Gain, Misfit, Report, Verdict, Visible, Where
+from models.diagnosis.summary import Findings, summarise
+from models.diagnosis.verdict import Judgement
+from models.diagnosis.viewing import View, amplitude_deviations
+from models.diagnosis.whitening import Noise
+
+#: λ [nats] at which an effect is seen 90 % of the time.
+SEEN = 11.0
+#: Candidates with less than this probability are not listed.
+LEAST_PROBABILITY = 1e-3
+_LARGEST_DEVIATE = 1e9
+
+
+def report_of(
+    campaign: Campaign,
+    design: Design,
+    noise: Noise,
+    priors: Priors,
+    view: View,
+    judgement: Judgement,
+    hypotheses: Sequence[Hypothesis],
+    raw: Sequence[RawEvidence],
+    leads: dict[str, Lead],
+    notes: tuple[str, ...],
+    rng: np.random.Generator,
+) -> Report:
+    """Assemble it: candidates, misfits, gain, advice, maps, loops, extension, summary."""
+    fits = [each.fit for each in judgement.standing if each.fit is not None]
+    extended = fits[0] if fits else None
+    gain = None
+    if extended is not None and judgement.verdict in {Verdict.CAUSE_NAMED, Verdict.CAUSE_AMBIGUOUS}:
+        gain = measure_gain(design, noise, priors, view.fit, extended, rng)
+    candidates = _candidates(design, noise, priors, judgement, hypotheses, raw)
+    baseline = misfit_of(design, noise, view, leads)
+    after = misfit_of(design, noise, judgement.view, {}) if judgement.view is not None else None
+    advice = advise(campaign, design, noise, priors, fits) if fits else ()
+    visible = visible_of(view)
+    said = (*notes, *(f"{each.effect}: {each.note}." for each in raw))
+    findings = Findings(
+        verdict=judgement.verdict,
+        causes=judgement.causes,
+        candidates=candidates,
+        baseline=baseline,
+        extended=after,
+        gain=gain,
+        advice=advice,
+        visible=visible,
+        notes=said,
+        tests=len(design.runs),
+        states=int(design.facts.states.size),
+    )
+    return Report(
+        verdict=judgement.verdict,
+        causes=judgement.causes,
+        summary=summarise(findings),
+        candidates=candidates,
+        baseline=baseline,
+        extended=after,
+        gain=gain,
+        advice=advice,
+        visible=visible,
+        maps=residual_maps(design, noise, view.fit, extended),
+        loops=loop_traces(design, view.fit, extended),
+        extension=_extension(design, noise, priors, judgement, gain),
+        notes=said,
+        statistics=_statistics(leads, judgement),
+    )
+
+
+def insufficient(missing: str, design: Design) -> Report:
+    """Nothing can be judged."""
+    return Report(
+        verdict=Verdict.INSUFFICIENT_DATA,
+        causes=(),
+        summary=f"Too little data for a pooled baseline: {missing}",
+        candidates=(),
+        baseline=None,
+        extended=None,
+        gain=None,
+        advice=(),
+        visible=(),
+        maps=None,
+        loops=(),
+        extension=None,
+        notes=design.notes,
+        statistics={},
+    )
+
+
+def _candidates(
+    design: Design,
+    noise: Noise,
+    priors: Priors,
+    judgement: Judgement,
+    hypotheses: Sequence[Hypothesis],
+    raw: Sequence[RawEvidence],
+) -> tuple[Candidate, ...]:
+    seen = {each.effect: each for each in raw}
+    found = []
+    for slug, probability in judgement.probabilities.items():
+        if probability < LEAST_PROBABILITY and slug not in judgement.causes:
+            continue
+        first = next((each for each in hypotheses if slug in each.slugs), None)
+        if first is None or first.fit is None:
+            effect = BY_SLUG[slug]
+            estimate = seen[slug].estimate if slug in seen else _estimate(slug, 0.0, effect.prior_sd)
+            evidence = seen[slug].log_evidence if slug in seen else (first.evidence if first else 0.0)
+        else:
+            place = first.slugs.index(slug)
+            deviation = amplitude_deviations(design, noise, priors, first.fit)[place]
+            estimate = _estimate(slug, first.fit.effects[place].amplitude, deviation)
+            evidence = first.evidence
+        found.append(
+            Candidate(
+                effect=slug,
+                title=BY_SLUG[slug].title,
+                probability=probability,
+                log_evidence_gain=_finite(evidence),
+                estimate=estimate,
+            )
+        )
+    return tuple(found)
+
+
+def _estimate(slug: str, amplitude: float, deviation: float) -> Estimate:
+    effect = BY_SLUG[slug]
+    return Estimate(
+        name=effect.amplitude, value=_finite(amplitude * effect.scale), sd=_finite(deviation * effect.scale), unit=effect.unit
+    )
+
+
+def misfit_of(design: Design, noise: Noise, view: View, leads: dict[str, Lead]) -> Misfit:
+    """How well a fit does, and on which axes the rest lives, strongest first."""
+    expected, actual = float((noise.deviation**2).mean()), float((view.fit.residual**2).mean())
+    info = np.maximum(np.diag(view.likely.info)[view.smooth], 1e-300)
+    z = np.minimum(np.abs(view.likely.score[view.smooth] / np.sqrt(info)), _LARGEST_DEVIATE)
+    axes = np.array(view.contrasts.axes)
+    where = {}
+    for axis in dict.fromkeys(view.contrasts.axes):
+        mine = z[axes == axis]
+        strength = 0.5 * float(mine.max()) ** 2
+        where[axis] = Where(axis=axis, strength=strength, p_value=float(min(1.0, mine.size * np.exp(-strength))))
+    line = leads.get("lines")
+    if line is not None and line.raised:
+        strength = max(line.value, where["test_clock_s"].strength if "test_clock_s" in where else 0.0)
+        where["test_clock_s"] = Where(axis="test_clock_s", strength=strength, p_value=line.p_value)
+    return Misfit(
+        rmse=float(np.sqrt(actual)),
+        noise=float(np.sqrt(expected)),
+        unexplained_share=max(0.0, 1 - expected / actual) if actual > 0 else 0.0,
+        where=tuple(sorted(where.values(), key=lambda each: -each.strength)),
+    )
+
+
+def visible_of(view: View) -> tuple[Visible, ...]:
+    """The smallest amplitude of each effect that would have been seen, at the shape that shows best."""
+    info = np.diag(view.likely.info)
+    found: dict[str, Visible] = {}
+    for i, column in enumerate(view.columns):
+        if not info[i] > 0:
+            continue
+        amplitude = float(np.sqrt(2 * SEEN / info[i])) * column.effect.scale
+        slug = column.effect.slug
+        if np.isfinite(amplitude) and (slug not in found or amplitude < found[slug].amplitude):
+            found[slug] = Visible(effect=slug, amplitude=amplitude, unit=column.effect.unit)
+    return tuple(found.values())
+
+
+def _extension(design: Design, noise: Noise, priors: Priors, judgement: Judgement, gain: Gain | None) -> Extension | None:
+    fitted: list[tuple[float, Fit, list[float]]] = []
+    for each in judgement.standing:
+        if each.fit is not None:
+            weight = max(min(judgement.probabilities.get(slug, 0.0) for slug in each.slugs), 1e-6)
+            fitted.append((weight, each.fit, amplitude_deviations(design, noise, priors, each.fit)))
+    if not fitted:
+        return None
+    return build_extension(fitted, design.facts, courses=gain is not None and gain.remaining > 0)
+
+
+def _statistics(leads: dict[str, Lead], judgement: Judgement) -> dict[str, float]:
+    found = {}
+    for name, each in leads.items():
+        found[f"{name}_value"] = each.value
+        found[f"{name}_threshold"] = each.threshold
+        found[f"{name}_p_value"] = each.p_value
+    return {name: value for name, value in {**found, **judgement.statistics}.items() if np.isfinite(value)}
+
+
+def _finite(value: float) -> float:
+    return float(np.clip(np.nan_to_num(value), -1e300, 1e300))
+

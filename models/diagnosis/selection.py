@@ -1,0 +1,133 @@
+"""Which effect, or which two: marginal likelihood after a linear screen, the best refitted with everything else.
+
+    evidence = drop of the cost - ½ ln(1 + s² info) + ln prior of the shape,   summed over the shape grid
+
+with s the prior deviation of the amplitude; the gains' scatter is summed over as well. Every template is a little wrong,
+so evidence saturates (`models.diagnosis.verdict`).
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from scipy.special import log_ndtr, logsumexp
+
+from models.arrays import FloatArray
+from models.diagnosis.effect import Effect, Shape, Tried
+from models.diagnosis.projection import Projected
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """One point of an effect's grid: what was tried, and its log prior weight (normalised over the effect's grid)."""
+
+    effect: Effect
+    shape: Shape
+    log_weight: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Screened:
+    """One or two effects, judged linearly: evidence [nats] over none, the best shapes (and their places among the
+    columns), and the index of the gain scatter at which that is."""
+
+    effects: tuple[Effect, ...]
+    evidence: float
+    shapes: tuple[Shape, ...]
+    places: tuple[int, ...]
+    gain: int
+
+
+def linear_drop(columns: list[Column], projected: Projected, screened: Screened) -> tuple[FloatArray, float]:
+    """Amplitudes and the drop of the cost [nats] of a screened candidate at one scatter of the gains."""
+    places = list(screened.places)
+    precision = np.diag([columns[place].effect.prior_sd ** -2.0 for place in places])
+    score = projected.score[places]
+    amplitudes = np.linalg.solve(projected.info[np.ix_(places, places)] + precision, score)
+    return amplitudes, 0.5 * float(score @ amplitudes)
+
+
+def columns_of(effects: list[Effect], grids: list[tuple[Tried, ...]]) -> list[Column]:
+    """The flat list of all that is tried."""
+    found = []
+    for effect, grid in zip(effects, grids, strict=True):
+        if grid:
+            total = float(logsumexp([tried.log_weight for tried in grid]))
+            found += [Column(effect=effect, shape=t.shape, log_weight=t.log_weight - total) for t in grid]
+    return found
+
+
+def screen(columns: list[Column], projections: list[Projected]) -> list[Screened]:
+    """Every effect alone, best first."""
+    null = float(logsumexp([each.evidence for each in projections]))
+    sd = np.array([column.effect.prior_sd for column in columns])
+    positive = np.array([column.effect.positive for column in columns])
+    weight = np.array([column.log_weight for column in columns])
+    table = []
+    for each in projections:
+        info, score = np.diag(each.info)[: sd.size], each.score[: sd.size]
+        precision = np.maximum(info, 0.0) + sd**-2
+        mean = score / precision
+        gain = 0.5 * score * mean - 0.5 * np.log(precision * sd**2)
+        gain = gain + np.where(positive, np.log(2.0) + log_ndtr(mean * np.sqrt(precision)), 0.0)
+        table.append(each.evidence + gain + weight)
+    stacked = np.stack(table)
+    found = []
+    for effect in dict.fromkeys(column.effect.slug for column in columns):
+        mine = np.array([i for i, column in enumerate(columns) if column.effect.slug == effect])
+        k, i = np.unravel_index(int(np.argmax(stacked[:, mine])), (len(projections), mine.size))
+        best = int(mine[i])
+        found.append(
+            Screened(
+                effects=(columns[best].effect,),
+                evidence=float(logsumexp(stacked[:, mine])) - null,
+                shapes=(columns[best].shape,),
+                places=(best,),
+                gain=int(k),
+            )
+        )
+    return sorted(found, key=lambda each: -each.evidence)
+
+
+def screen_pairs(columns: list[Column], projections: list[Projected]) -> list[Screened]:
+    """Every two different effects, at the gain scatter that suits each pair best, best first."""
+    null = float(logsumexp([each.evidence for each in projections]))
+    slugs = [column.effect.slug for column in columns]
+    members = {slug: np.array([i for i, s in enumerate(slugs) if s == slug]) for slug in dict.fromkeys(slugs)}
+    sd = np.array([column.effect.prior_sd for column in columns])
+    weight = np.array([column.log_weight for column in columns])
+    positive = np.array([column.effect.positive for column in columns])
+    order = np.argsort([-each.evidence for each in projections])[:1].tolist()
+    likely = {int(k) for k in order} | {int(np.argmax([_best(each, sd) for each in projections]))}
+    best: dict[tuple[str, str], Screened] = {}
+    for k in sorted(likely):
+        each = projections[k]
+        scale = sd[:, None] * sd
+        unit = each.info[: sd.size, : sd.size] * scale
+        u = each.score[: sd.size] * sd
+        one = np.diag(unit) + 1.0
+        determinant = np.maximum(one[:, None] * one - unit**2, 1e-12)
+        drop = 0.5 * (u[:, None] ** 2 * one + u**2 * one[:, None] - 2 * u[:, None] * u * unit) / determinant
+        first = (u[:, None] * one - unit * u) / determinant
+        value = each.evidence + drop - 0.5 * np.log(determinant) + weight[:, None] + weight - null
+        wrong = (positive[:, None] & (first < 0)) | (positive & (first.T < 0)) | (np.abs(first) > 4) | (np.abs(first.T) > 4)
+        value = np.where(wrong, -np.inf, value)
+        for a, b in combinations(members, 2):
+            block = value[np.ix_(members[a], members[b])]
+            total = float(logsumexp(block)) if np.isfinite(block).any() else -np.inf
+            if not np.isfinite(total) or ((a, b) in best and best[a, b].evidence >= total):
+                continue
+            i, j = np.unravel_index(int(np.argmax(block)), block.shape)
+            p, q = int(members[a][i]), int(members[b][j])
+            best[a, b] = Screened(
+                effects=(columns[p].effect, columns[q].effect),
+                evidence=total,
+                shapes=(columns[p].shape, columns[q].shape),
+                places=(p, q),
+                gain=k,
+            )
+    return sorted(best.values(), key=lambda each: -each.evidence)
+
+
+def _best(projected: Projected, sd: FloatArray) -> float:
+    info, score = np.diag(projected.info)[: sd.size], projected.score[: sd.size]
+    return projected.evidence + float((0.5 * score**2 / (info + sd**-2)).max(initial=0.0))

@@ -1,0 +1,229 @@
+"""The paragraph that an engineer would sign: what was looked at, what is wrong, why this cause, what to do next."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from models.diagnosis.advice import WORTH
+from models.diagnosis.catalogue import BY_SLUG
+from models.diagnosis.report import Advice, Candidate, Estimate, Gain, Misfit, Verdict, Visible, Where
+
+#: Rivals that are spoken of and from which probability on, effects whose visible amplitude is told.
+_SPOKEN, _RIVAL, _TOLD = 3, 0.001, 3
+#: An effect beyond so many deviations of its prior is stronger than one would expect.
+_STRONG = 2.0
+#: Digits after the point at most.
+_DIGITS = 5
+
+_AXES = {
+    "pressure_bar": "pressure",
+    "speed_rpm": "speed",
+    "cycles": "cycles",
+    "test_clock_s": "the time since the test began",
+    "oil_temperature_c": "oil temperature",
+    "loop_phase": "the phase of the loops",
+    "acceleration": "the sign of the acceleration",
+    "frequency_hz": "frequency, in the raw records",
+    "noise": "the scatter itself",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Findings:
+    """What a report says, before its paragraph."""
+
+    verdict: Verdict
+    causes: tuple[str, ...]
+    candidates: tuple[Candidate, ...]
+    baseline: Misfit | None
+    extended: Misfit | None
+    gain: Gain | None
+    advice: tuple[Advice, ...]
+    visible: tuple[Visible, ...]
+    notes: tuple[str, ...]
+    tests: int
+    states: int
+
+
+def summarise(found: Findings) -> str:
+    """Sentences, in the order in which one would ask."""
+    tell = {
+        Verdict.MODEL_ADEQUATE: _adequate,
+        Verdict.CAUSE_NAMED: _named,
+        Verdict.CAUSE_AMBIGUOUS: _ambiguous,
+        Verdict.UNEXPLAINED_STRUCTURE: _unexplained,
+        Verdict.INSUFFICIENT_DATA: _insufficient,
+    }[found.verdict]
+    seen = f"{_count(found.tests, 'test')} at {_count(found.states, 'state')} of use were fitted at once."
+    parts = [seen, *tell(found), *_gained(found), *_next(found), *_noted(found.notes)]
+    return " ".join(part for part in parts if part)
+
+
+def _adequate(found: Findings) -> list[str]:
+    noise = "" if found.baseline is None else f" of {_number(found.baseline.noise)} Nm"
+    parts = [
+        f"Nothing stands out of the noise{noise} and the scatter from run to run: the model is adequate for these data."
+    ]
+    told = [each for each in found.visible if each.effect in BY_SLUG and _within_reach(each)]
+    if told:
+        parts.append(
+            f"They would have shown, nine times in ten: {'; '.join(_seen_from(each) for each in told[:_TOLD])}."
+        )
+    hidden = [each.effect for each in found.visible if each.effect in BY_SLUG and not _within_reach(each)]
+    if hidden:
+        parts.append(f"Even a strong effect would have stayed hidden behind the baseline for: {_listed(hidden)}.")
+    return parts
+
+
+def _within_reach(visible: Visible) -> bool:
+    effect = BY_SLUG[visible.effect]
+    return visible.amplitude <= _STRONG * effect.prior_sd * abs(effect.scale)
+
+
+def _seen_from(visible: Visible) -> str:
+    unit = "" if visible.unit in {"-", ""} else f" {visible.unit}"
+    return f"{_name(visible.effect)} ({BY_SLUG[visible.effect].amplitude}) from {_number(visible.amplitude)}{unit} on"
+
+
+def _named(found: Findings) -> list[str]:
+    chosen = [each for each in found.candidates if each.effect in found.causes]
+    several = len(found.causes) > 1
+    causes = " together with ".join(_name(slug) for slug in found.causes)
+    parts = [_misses(found), f"The cause{'s are' if several else ' is'} {causes}."]
+    parts += [f"{_physics(each.effect)} Here: {_estimate(each.estimate)}." for each in chosen]
+    rivals = [each for each in found.candidates if each.effect not in found.causes and each.probability > _RIVAL]
+    if rivals and chosen:
+        best = max(each.log_evidence_gain for each in chosen)
+        told = [f"{_name(each.effect)} by {_number(best - each.log_evidence_gain)} nats" for each in rivals[:_SPOKEN]]
+        parts.append(f"Refitted with everything else free, that explains the data better than {_and(told)}.")
+    return parts
+
+
+def _ambiguous(found: Findings) -> list[str]:
+    known = {each.effect: each for each in found.candidates}
+    told = []
+    for slug in found.causes:
+        if slug in known:
+            each = known[slug]
+            told.append(f"{_name(slug)} (probability {_probability(each.probability)}; {_estimate(each.estimate)})")
+        else:
+            told.append(f"{_name(slug)} (not measured, so it cannot be excluded)")
+    return [_misses(found), f"These data cannot tell which of these is the cause: {', '.join(told)}."]
+
+
+def _unexplained(found: Findings) -> list[str]:
+    return [
+        _misses(found),
+        "No effect of the catalogue accounts for it, alone or with another: either something beyond noise would be left, "
+        "or different parts of the data would ask for different sizes of the effect. So no cause is named.",
+    ]
+
+
+def _insufficient(_: Findings) -> list[str]:
+    return ["That is too little to judge the model by."]
+
+
+def _misses(found: Findings) -> str:
+    if found.baseline is None:
+        return ""
+    share = f"{_number(100 * found.baseline.unexplained_share)} % of the squared residual"
+    where = _axes(found.baseline.where)
+    return (
+        f"The baseline misses the data by {_number(found.baseline.rmse)} Nm where noise alone would make "
+        f"{_number(found.baseline.noise)} Nm; {share} is structure{where}."
+    )
+
+
+def _axes(where: Sequence[Where]) -> str:
+    told = [_AXES.get(each.axis, each.axis) for each in where[:2]]
+    return f", which lives on {' and '.join(told)}" if told else ""
+
+
+def _gained(found: Findings) -> list[str]:
+    gain = found.gain
+    if gain is None or found.verdict is Verdict.MODEL_ADEQUATE:
+        return []
+    change = f"{abs(gain.reduction_percent):.1f} ± {gain.reduction_sd:.1f} %"
+    way = "less" if gain.reduction_percent >= 0 else "more"
+    model = {
+        Verdict.CAUSE_AMBIGUOUS: "the model extended by the most probable of them",
+        Verdict.UNEXPLAINED_STRUCTURE: "the model with a smooth correction",
+    }.get(found.verdict, "the extended model")
+    told = (
+        f"On runs that were held out, {model} misses by {_number(gain.rmse_after)} Nm against "
+        f"{_number(gain.rmse_before)} Nm ({change} {way}), noise included; "
+        f"the part beyond noise is {_number(gain.excess_after)} Nm against {_number(gain.excess_before)} Nm."
+    )
+    ahead = (
+        "It also foretells the last states better from the first ones."
+        if gain.remaining > 0
+        else "It foretells the last states from the first ones no better: for remaining life it is no gain."
+    )
+    return [told, ahead]
+
+
+def _next(found: Findings) -> list[str]:
+    if not found.advice or found.verdict in {Verdict.MODEL_ADEQUATE, Verdict.UNEXPLAINED_STRUCTURE}:
+        return []
+    best = found.advice[0]
+    nats = f"about {_number(best.nats)} nats"
+    if best.other == "baseline":
+        return [f"To confirm it: {best.test}. That would add {nats} for or against it."]
+    pair = f"{_name(best.effect)} and {_name(best.other)}"
+    if best.nats < WORTH:
+        return [f"No single test would decide; the most telling is: {best.test} ({nats} between {pair})."]
+    return [f"What would decide: {best.test}. It would part {pair} by {nats}."]
+
+
+def _noted(notes: Sequence[str]) -> list[str]:
+    """Notes on the whole campaign, as sentences; those on single runs, which begin with its name, are counted."""
+    single = [note for note in notes if " " not in note.split(":")[0] and ":" in note and not _on_effect(note)]
+    told = [note if note.endswith(".") else f"{note}." for note in notes if note not in single]
+    told = [note[0].upper() + note[1:].replace("_", " ") if _on_effect(note) else note for note in told]
+    return [*told, f"{_count(len(single), 'note')} on single runs stand in the report."] if single else told
+
+
+def _on_effect(note: str) -> bool:
+    return note.split(":")[0] in BY_SLUG
+
+
+def _name(slug: str) -> str:
+    return slug.replace("_", " ")
+
+
+def _physics(slug: str) -> str:
+    return BY_SLUG[slug].physics if slug in BY_SLUG else ""
+
+
+def _listed(slugs: Sequence[str]) -> str:
+    return _and([_name(slug) for slug in slugs])
+
+
+def _and(parts: Sequence[str]) -> str:
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def _probability(value: float) -> str:
+    return "above 0.99" if value > 0.99 else "below 0.01" if value < 0.01 else f"{value:.2f}"
+
+
+def _estimate(estimate: Estimate) -> str:
+    """Value and deviation to the deviation's second digit."""
+    unit = "" if estimate.unit in {"-", ""} else f" {estimate.unit}"
+    if not estimate.sd > 0:
+        return f"{estimate.name} {_number(estimate.value)}{unit}"
+    digits = max(0, 1 - math.floor(math.log10(estimate.sd)))
+    if digits > _DIGITS:
+        return f"{estimate.name} {_number(estimate.value)} ± {_number(estimate.sd)}{unit}"
+    return f"{estimate.name} {estimate.value:.{digits}f} ± {estimate.sd:.{digits}f}{unit}"
+
+
+def _number(value: float) -> str:
+    """Three digits, without an exponent where that is readable."""
+    if 100 <= abs(value) < 1e6:
+        return f"{value:,.0f}"
+    return f"{value:.3g}" if value == 0 or 1e-3 <= abs(value) < 100 else f"{value:.1e}"

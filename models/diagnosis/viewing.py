@@ -1,0 +1,94 @@
+"""A fit and everything projected off it: the catalogue's changes, the smooth contrasts, blocks of the fit's own effects."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.contrasts import Contrasts, contrasts_of
+from models.diagnosis.design import Design
+from models.diagnosis.effect import unit_change
+from models.diagnosis.fitting import Fit, Priors, effect_rows
+from models.diagnosis.projection import GAINS, Gram, Projected, change_columns, gram_of, project
+from models.diagnosis.selection import Column
+from models.diagnosis.whitening import Noise
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """The columns of `projections`: the grid's first, then the contrasts, then the blocks of the fit's effects."""
+
+    fit: Fit
+    columns: list[Column]
+    contrasts: Contrasts
+    blocks: int
+    gram: Gram
+    projections: list[Projected]
+
+    @property
+    def effects(self) -> slice:
+        """The grid's columns."""
+        return slice(0, len(self.columns))
+
+    @property
+    def smooth(self) -> slice:
+        """The contrasts."""
+        return slice(len(self.columns), len(self.columns) + len(self.contrasts.axes))
+
+    @property
+    def inside(self) -> slice:
+        """The blocks."""
+        return slice(self.smooth.stop, self.smooth.stop + self.blocks)
+
+    @property
+    def likely(self) -> Projected:
+        """At the most likely scatter of the gains."""
+        return max(self.projections, key=lambda each: each.evidence)
+
+
+def view_of(design: Design, noise: Noise, priors: Priors, fitted: Fit, columns: list[Column]) -> View:
+    """Project the catalogue's columns, the contrasts and the effects' blocks off a fit."""
+    scene = fitted.prediction.scene
+    changes = change_columns(
+        design,
+        fitted.prediction,
+        [(unit_change(each.effect, scene, each.shape), each.effect.before_lag) for each in columns],
+    )
+    contrasts = contrasts_of(design, fitted.prediction)
+    blocks = blocks_of(design, fitted)
+    gram = gram_of(design, noise, priors, fitted, np.column_stack([changes, contrasts.columns, blocks]))
+    return View(
+        fit=fitted,
+        columns=columns,
+        contrasts=contrasts,
+        blocks=blocks.shape[1],
+        gram=gram,
+        projections=[project(gram, float(gain)) for gain in GAINS],
+    )
+
+
+def blocks_of(design: Design, fitted: Fit) -> FloatArray:
+    """Each effect's change [N, m] on one part of the rows: were the cause right, no part would want another amplitude.
+
+    Parts: dynamic tests, the upper half of pressures, of speeds, of life, of the test's clock, accelerating rows.
+    """
+    rows = design.rows
+    parts = [~rows.steady, rows.acceleration > 0]
+    parts += [values > np.median(values) for values in (rows.pressure, rows.velocity, rows.cycles, rows.clock)]
+    changes = [effect_rows(design, fitted.prediction, each) for each in fitted.effects]
+    columns = [np.where(part, change, 0.0) for change in changes for part in parts]
+    return np.stack(columns, axis=1) if columns else np.zeros((rows.run.size, 0))
+
+
+def amplitude_deviations(design: Design, noise: Noise, priors: Priors, fitted: Fit) -> list[float]:
+    """Standard deviations of the amplitudes of the fit's effects, everything else free."""
+    gram = gram_of(design, noise, priors, fitted, np.zeros((design.torque.size, 0)))
+    along, squares = gram.by_run()
+    along = along[:, : gram.base]
+    weight = noise.run_gain**2 / (1 + noise.run_gain**2 * squares)
+    corner = gram.matrix[: gram.base, : gram.base] - along.T @ (weight[:, None] * along)
+    scale = 1 / np.sqrt(np.maximum(np.diag(corner), 1e-300))
+    inverse = np.linalg.pinv(corner * scale[:, None] * scale, hermitian=True) * scale[:, None] * scale
+    sizes = [1 + sum(shape.smooth for shape in each.effect.shapes) for each in fitted.effects]
+    places = gram.base - sum(sizes) + np.concatenate([[0], np.cumsum(sizes)])[: len(sizes)].astype(int)
+    return [float(np.sqrt(max(inverse[place, place], 0.0))) for place in places]

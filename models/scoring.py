@@ -1,0 +1,113 @@
+"""How good a prognosis was, once the end of life is known.
+
+- CRPS: how far a predicted distribution is from what came, in cycles; the absolute error of a certain prediction
+  (Gneiting, Raftery 2007).
+- Coverage: the share of intervals that hold what came, nominally 0.9 for the 5 and 95 % quantiles; the interval's width
+  is the prediction's sharpness.
+- PIT: where in its predicted distribution each outcome lies; uniform where predictions are calibrated (Dawid 1984).
+- α-λ accuracy: whether at the share λ of life the predicted remaining life is within ±α of the true one (Saxena 2010).
+- Prognostic horizon: the remaining life from which on predictions stay within ±α of the whole life (Saxena 2010).
+
+Words after ISO 13381-1: a prognosis estimates the time to failure (here the cycles to the threshold, the end of life)
+and states a confidence; what is left of that time is the remaining useful life. A distribution is given by a weighted
+sample or by quantiles; an end of life beyond the horizon is scored as if it were at the horizon.
+
+Sources: T. Gneiting, A. E. Raftery, J. Am. Stat. Assoc. 102 (2007) 359; A. P. Dawid, J. R. Stat. Soc. A 147 (1984) 278;
+A. Saxena, J. Celaya, B. Saha, S. Saha, K. Goebel, Int. J. Prognostics and Health Management 1 (2010) 4; ISO 13381-1:2015.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from models.arrays import FloatArray
+
+
+def crps_of_sample(sample: FloatArray, weight: FloatArray, truth: float) -> float:
+    """E|x - truth| - E|x - x'|/2 of a finite sample [n] with weights [n] >= 0, in the unit of the sample.
+
+    >>> crps_of_sample(np.array([0.0, 2.0]), np.array([1.0, 1.0]), 1.0)
+    0.5
+    """
+    order = np.argsort(sample)
+    x, w = sample[order], weight[order] / weight.sum()
+    spread = 2.0 * float(np.sum(w * x * (np.cumsum(w) - 0.5 * w - 0.5)))
+    return float(w @ np.abs(x - truth) - spread)
+
+
+def crps_of_quantiles(levels: Sequence[float], quantiles: Sequence[float], truth: float) -> float:
+    """Twice the pinball loss, integrated over the levels: CRPS of a distribution known by its quantiles.
+
+    Each quantile stands for the levels that are nearer to it than to any other, the outermost for all up to 0 and 1.
+    Levels ascend within (0, 1), quantiles ascend. A prediction that is certain has CRPS |x - truth| whatever the levels.
+    """
+    tau, x = np.asarray(levels, dtype=np.float64), np.asarray(quantiles, dtype=np.float64)
+    if tau.size == 0 or tau.shape != x.shape or (np.diff(tau) <= 0).any() or tau[0] <= 0 or tau[-1] >= 1:
+        raise ValueError("levels must ascend within (0, 1), one for each quantile")
+    edges = np.concatenate([[0.0], 0.5 * (tau[1:] + tau[:-1]), [1.0]])
+    above = np.array([_pinball(low, high, q < truth) for (low, high), q in zip(pairwise(edges), x, strict=True)])
+    return float(2.0 * above @ np.abs(truth - x))
+
+
+def _pinball(low: float, high: float, under: bool) -> float:
+    """∫ τ dτ from low to high where the quantile is under the truth, ∫ (1 - τ) dτ where it is not."""
+    return 0.5 * (high**2 - low**2) if under else (high - low) - 0.5 * (high**2 - low**2)
+
+
+def covered(low: float | None, high: float | None, truth: float | None) -> bool:
+    """Whether an interval holds what came; None is beyond the horizon, for a bound as for the truth."""
+    lower, upper, came = (np.inf if each is None else each for each in (low, high, truth))
+    return bool(lower <= came <= upper)
+
+
+def coverage(held: Sequence[bool]) -> tuple[float, float]:
+    """The share of intervals that held, and its standard error; at least one."""
+    if not held:
+        raise ValueError("coverage needs at least one interval")
+    share = float(np.mean(held))
+    return share, float(np.sqrt(share * (1.0 - share) / len(held)))
+
+
+def pit_of_sample(sample: FloatArray, weight: FloatArray, truth: float) -> float:
+    """P(x < truth) + P(x = truth)/2 under a weighted sample [n]."""
+    share = weight / weight.sum()
+    return min(1.0, float(share[sample < truth].sum() + 0.5 * share[sample == truth].sum()))
+
+
+def pit_of_quantiles(levels: Sequence[float], quantiles: Sequence[float], truth: float) -> float:
+    """The level of the truth, linear between quantiles; outside of them, the middle of what is left."""
+    x = np.asarray(quantiles, dtype=np.float64)
+    if truth < x[0]:
+        return 0.5 * levels[0]
+    if truth > x[-1]:
+        return 0.5 * (1.0 + levels[-1])
+    return float(np.interp(truth, x, np.asarray(levels, dtype=np.float64)))
+
+
+def pit_histogram(pits: Sequence[float], bins: int = 10) -> FloatArray:
+    """The share of PIT values in equal bins of [0, 1]; [bins]."""
+    counts, _ = np.histogram(pits, bins=bins, range=(0.0, 1.0))
+    return np.asarray(counts / max(1, len(pits)))
+
+
+def alpha_lambda(predicted: float | None, at: float, end: float, alpha: float = 0.2) -> bool:
+    """Whether the remaining life predicted at progress `at` < end is within ±alpha of the true end - at."""
+    if not at < end:
+        raise ValueError(f"there is no life left at {at} of {end}")
+    return predicted is not None and abs(predicted - (end - at)) <= alpha * (end - at)
+
+
+def prognostic_horizon(
+    at: Sequence[float], predicted: Sequence[float | None], end: float, alpha: float = 0.1
+) -> float | None:
+    """The remaining life at the first prediction from which on all are within ±alpha · end of the true remaining life.
+
+    `predicted` are remaining lives at ascending progress `at` <= end. None where not even the last one is.
+    """
+    found = None
+    for progress, remaining in zip(reversed(at), reversed(predicted), strict=True):
+        if remaining is None or abs(remaining - (end - progress)) > alpha * end:
+            break
+        found = end - progress
+    return found

@@ -1,0 +1,64 @@
+"""What has been measured so far, as columns."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.tracking.measurement import Measurement
+from models.tracking.prior import Prior
+
+#: Values are told apart to this share of the prior's deviations. Where a series is free of noise its likelihood grows
+#: without bound as the scatter vanishes, and differences of sums weighted by 1/s² would be rounding alone.
+RESOLUTION = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class History:
+    """The measurements so far, in the order they came: progress, value, variance, epoch, each [t]."""
+
+    progress: FloatArray
+    value: FloatArray
+    variance: FloatArray
+    epoch: FloatArray
+
+    @classmethod
+    def of(cls, measurements: Sequence[Measurement], prior: Prior) -> "History":
+        """The columns of a sequence of measurements, possibly empty, with the variance of their resolution added."""
+        rows = np.array([(m.progress, m.value, m.variance, m.epoch) for m in measurements], dtype=np.float64).reshape(
+            -1, 4
+        )
+        resolution = RESOLUTION * math.hypot(prior.initial_sd, prior.change_sd)
+        return cls(
+            progress=rows[:, 0].copy(),
+            value=rows[:, 1].copy(),
+            variance=rows[:, 2] + resolution**2,
+            epoch=rows[:, 3].copy(),
+        )
+
+    def append(self, measurement: Measurement, prior: Prior) -> "History":
+        """A history with one more measurement."""
+        more = History.of([measurement], prior)
+        return History(**{f.name: np.append(getattr(self, f.name), getattr(more, f.name)) for f in fields(self)})
+
+    @property
+    def span(self) -> float:
+        """The largest progress measured, 1 where nothing has been beyond 0."""
+        return float(self.progress.max(initial=0.0)) or 1.0
+
+    @property
+    def steps(self) -> FloatArray:
+        """The progress at which each epoch after the first begins, as far as it was measured [e]."""
+        later = np.unique(self.epoch)[1:]
+        return np.array([self.progress[self.epoch >= each].min() for each in later], dtype=np.float64)
+
+    def to_arrays(self) -> dict[str, FloatArray]:
+        """The columns by name."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, FloatArray]) -> "History":
+        """The inverse of `to_arrays`."""
+        return cls(**{field.name: arrays[field.name] for field in fields(cls)})

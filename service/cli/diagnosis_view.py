@@ -1,0 +1,160 @@
+"""A diagnosis for a person at a terminal: verdict, paragraph, candidates, residual maps, gain, advice."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from rich.columns import Columns
+from rich.console import Group, RenderableType
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+_Table = list[list[float | None]]
+_VERDICTS = {
+    "model_adequate": ("The model is adequate", "green"),
+    "cause_named": ("The cause is named", "yellow"),
+    "cause_ambiguous": ("One of these causes", "yellow"),
+    "unexplained_structure": ("Something that is not in the catalogue", "red"),
+    "insufficient_data": ("Too little data", "cyan"),
+}
+#: What is less likely, and what comes after so many, is left to `--json`.
+_LEAST_PROBABILITY, _MOST_CANDIDATES = 0.005, 6
+#: A map is no wider than so many cells of two characters: finer axes are averaged.
+_MOST_CELLS = 15
+#: Shares of the largest residual from which a cell is marked, and its mark and colour for below and above.
+_MARKS = ((0.75, "##", 160, 27), (0.5, "++", 203, 69), (0.25, "+ ", 217, 153))
+
+
+def shown(report: Mapping[str, Any]) -> Iterator[RenderableType]:
+    """The parts of a finished report, each to be printed."""
+    words, colour = _VERDICTS[report["verdict"]]
+    causes = f": {', '.join(report['causes'])}" if report["causes"] else ""
+    yield Panel(Text(report["summary"]), title=Text(f"{words}{causes}", style=f"bold {colour}"), border_style=colour)
+    if report["candidates"]:
+        likely = [each for each in report["candidates"] if (each["probability"] or 0.0) >= _LEAST_PROBABILITY]
+        yield _candidates((likely or report["candidates"])[:_MOST_CANDIDATES])
+    if report["maps"] is not None:
+        yield _maps(report["maps"])
+    if report["baseline"]["where"]:
+        places = [f"{each['axis']} (p = {_number(each['p_value'], 2)})" for each in report["baseline"]["where"]]
+        yield Text(f"Structure that the baseline leaves lives on: {', '.join(places)}")
+    yield from _gain(report)
+    for each in report["advice"]:
+        yield Text(f"To tell {' from '.join(each['separates'])}: {each['test']} ({_number(each['nats'], 2)} nats)")
+    for note in report["notes"]:
+        yield Text(f"Note: {note}", style="dim")
+
+
+def _candidates(found: Sequence[Mapping[str, Any]]) -> Table:
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name, side in (("candidate", "left"), ("probability", "right"), ("evidence", "right"), ("estimate", "left")):
+        table.add_column(name, justify="right" if side == "right" else "left")
+    for each in found:
+        estimate = each["estimate"]
+        amount = f"{_number(estimate['value'])} ± {_number(estimate['sd'], 2)} {estimate['unit']} {estimate['name']}"
+        evidence = f"{_number(each['log_evidence_gain'])} nats"
+        table.add_row(Text(each["effect"]), _number(each["probability"]), evidence, Text(amount))
+    return table
+
+
+def _maps(found: Mapping[str, Any]) -> Group:
+    axes, drawn = found["axes"], []
+    tables = {when: _tables(found[when]) for when in ("before", "after")}
+    largest = [
+        max((abs(value) for line in tables["before"][place] for value in line if value is not None), default=0.0)
+        for place in (0, 1)
+    ]
+    for when, title in (("before", "Baseline"), ("after", "Extended")):
+        over = zip((("rpm", axes["speed_rpm"]), ("cycles", axes["cycles"])), tables[when], largest, strict=True)
+        grids = [
+            _grid(f"{title}: bar over {name}", axes["pressure_bar"], columns, table, most)
+            for (name, columns), table, most in over
+        ]
+        drawn.append(Group(*grids))
+    legend = Text("Mean residual, share of the baseline's largest ")
+    legend.append(f"({_number(largest[0], 2)} and {_number(largest[1], 2)} deviations): ")
+    for least, mark, above, below in reversed(_MARKS):
+        legend.append(mark, style=f"black on color({above})")
+        legend.append(_below(mark), style=f"black on color({below})")
+        legend.append(f" {100 * least:.0f} %  ")
+    return Group(Columns(drawn, padding=(0, 3)), legend)
+
+
+def _tables(residuals: Mapping[str, Any]) -> tuple[_Table, _Table]:
+    """Both maps with a row a pressure, thinned to what fits."""
+    by_pressure = [list(line) for line in zip(*residuals["pressure_cycles"], strict=True)]
+    return _thinned(residuals["speed_pressure"]), _thinned(by_pressure)
+
+
+def _thinned(table: _Table) -> _Table:
+    size = max(1, math.ceil(max(map(len, table), default=0) / _MOST_CELLS))
+    return [[_mean(line[start : start + size]) for start in range(0, len(line), size)] for line in table]
+
+
+def _grid(title: str, rows: Sequence[float], columns: Sequence[float], table: _Table, largest: float) -> Text:
+    """Residuals as coloured blocks that can be read without colours too, the highest row first."""
+    text = Text(f"{title}\n", style="bold")
+    for level, line in sorted(zip(rows, table, strict=True), key=lambda pair: -pair[0]):
+        text.append(f"{level:5.3g} ", style="not bold")
+        for value in line:
+            text.append_text(_cell(value, largest))
+        text.append("\n")
+    first, last = (f"{columns[0]:.0f}", f"{columns[-1]:.0f}") if columns else ("", "")
+    width = 2 * max(map(len, table), default=0)
+    text.append(" " * 6 + first + last.rjust(max(len(last) + 1, width - len(first))), style="not bold dim")
+    return text
+
+
+def _cell(value: float | None, largest: float) -> Text:
+    if value is None:
+        return Text("  ")
+    for share, mark, above, below in _MARKS:
+        if value >= share * largest > 0:
+            return Text(mark, style=f"not bold black on color({above})")
+        if -value >= share * largest > 0:
+            return Text(_below(mark), style=f"not bold black on color({below})")
+    return Text("· ", style="not bold dim")
+
+
+def _below(mark: str) -> str:
+    return mark.replace("+", "-").replace("#", "=")
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return sum(known) / len(known) if known else None
+
+
+def _gain(report: Mapping[str, Any]) -> Iterator[RenderableType]:
+    gain = report["gain"]
+    if gain["rmse_before_nm"] is not None:
+        spread = "" if gain["reduction_percent_sd"] is None else f" ± {_number(gain['reduction_percent_sd'], 2)}"
+        yield Text(
+            f"Held out ({len(gain['held_out_runs'])} runs): error {_number(gain['rmse_before_nm'])} Nm before, "
+            f"{_number(gain['rmse_after_nm'])} Nm after, {_number(gain['reduction_percent'])}{spread} % less; "
+            f"log score {_number(gain['log_score_gain'])} nats better"
+        )
+    life = gain["remaining_useful_life"]
+    for when, title in (("before", "baseline"), ("after", "extended")):
+        if life[when] and (when == "before" or report["adoptable"]):
+            yield Text(f"Remaining life, {title}: {_remaining(life[when])}")
+    if report["adopted"]:
+        yield Text("The extended model is adopted: tracking and remaining life use it from now on.", style="bold")
+
+
+def _remaining(said: Mapping[str, Any]) -> str:
+    if said["status"] in ("reached", "insufficient_data"):
+        return {"reached": "its end is reached", "insufficient_data": "too few tests to tell"}[said["status"]]
+    low, middle, high = (said["remaining_cycles"][quantile] for quantile in ("0.05", "0.5", "0.95"))
+    return f"{_cycles(middle)} cycles (90 %: {_cycles(low)} to {_cycles(high)})"
+
+
+def _cycles(value: float | None) -> str:
+    return "beyond the horizon" if value is None else f"{value:,.0f}"
+
+
+def _number(value: float | None, digits: int = 3) -> str:
+    if value is None:
+        return "-"
+    return f"{value:,.0f}" if 100 <= abs(value) < 1e6 else f"{value:.{digits}g}"

@@ -1,0 +1,46 @@
+// How every chart looks: axes, margins, type, what the plotting library may do.
+
+const FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", sans-serif';
+const COARSE = matchMedia("(pointer: coarse)");
+
+/** A chart's own layout on top of the house's. */
+export function base(c, layout, { height, compact, spatial }) {
+  const axis = { gridcolor: c.line, linecolor: c.edge, zeroline: false, ticks: "outside", tickcolor: c.edge, ticklen: 4, automargin: true, title: { standoff: 8 }, exponentformat: "none", separatethousands: true };
+  const common = {
+    height, autosize: true, paper_bgcolor: c.panel, plot_bgcolor: c.panel,
+    font: { family: FONT, size: compact ? 11 : 12.5, color: c.ink },
+    margin: { l: 56, r: 16, t: 12, b: 48 },
+    hoverlabel: { bgcolor: c.panel, bordercolor: c.edge, font: { color: c.ink, family: FONT, size: 12.5 } },
+    hovermode: "closest", separators: ".,", dragmode: COARSE.matches ? false : "zoom",
+    legend: { orientation: "h", y: -62 / Math.max(80, height - 110), yanchor: "top", x: 0, font: { size: compact ? 11 : 12 }, bgcolor: "rgba(0,0,0,0)" },
+  };
+  if (spatial) return { ...common, margin: { l: 0, r: 0, t: 0, b: 0 }, dragmode: "turntable", scene: scene(c, layout.scene, compact), ...without(layout, ["scene"]) };
+  const axes = {};
+  for (const name of new Set(["xaxis", "yaxis", ...Object.keys(layout).filter((key) => /^[xy]axis/.test(key))])) axes[name] = merged(axis, layout[name]);
+  return { ...common, ...layout, ...axes, legend: { ...common.legend, ...layout.legend }, margin: { ...common.margin, ...layout.margin } };
+}
+
+function scene(c, own, compact) {
+  const axis = { gridcolor: c.line, color: c.ink, backgroundcolor: c.panel, showbackground: false, zeroline: false, exponentformat: "none", separatethousands: true, tickfont: { size: compact ? 9 : 11 } };
+  return { aspectmode: "manual", aspectratio: { x: 1.35, y: 1.1, z: 0.8 }, camera: { eye: { x: 1.5, y: -1.6, z: 0.75 }, center: { x: 0, y: 0, z: -0.12 } },
+    ...own, xaxis: merged(axis, own.xaxis), yaxis: merged(axis, own.yaxis), zaxis: merged(axis, own.zaxis) };
+}
+
+const merged = (ours, own = {}) => ({ ...ours, ...own, title: { ...ours.title, ...own.title } });
+const without = (object, names) => Object.fromEntries(Object.entries(object).filter(([name]) => !names.includes(name)));
+
+/** What the plotting library may do: no logo, no tool bar, and nothing that leaves this host. */
+export const config = (spatial) => ({
+  responsive: true, displaylogo: false, displayModeBar: false, showTips: false, scrollZoom: false, staticPlot: spatial && COARSE.matches,
+  doubleClick: "reset", plotlyServerURL: "", topojsonURL: "",
+});
+
+/** Maintenance events as vertical lines with their name at the top. */
+export function eventMarks(events, c) {
+  return {
+    shapes: events.map(({ cycles }) => ({ type: "line", x0: cycles, x1: cycles, y0: 0, y1: 1, yref: "paper", line: { color: c.maintenance, width: 1.5, dash: "dot" } })),
+    annotations: events.map(({ cycles, event }) => ({
+      x: cycles, y: 1, yref: "paper", yanchor: "top", xanchor: "left", text: event.replaceAll("_", " "), showarrow: false, font: { size: 11, color: c.maintenance }, textangle: 90,
+    })),
+  };
+}

@@ -1,0 +1,48 @@
+// How a clutch stands, after NAMUR NE 107: one of five states, each with its own word, shape and colour.
+
+import { svg } from "./dom.js";
+
+/** Below this health (1 new, 0 end of life) a replacement should be planned. */
+const LOW_HEALTH = 0.2;
+
+export const STATES = {
+  failure: { order: 0, word: "Failure" },
+  out_of_specification: { order: 1, word: "Out of specification" },
+  maintenance: { order: 2, word: "Maintenance required" },
+  check: { order: 3, word: "Function check" },
+  normal: { order: 4, word: "Normal" },
+};
+
+export const VERDICTS = {
+  model_adequate: "Model adequate",
+  cause_named: "Cause named",
+  cause_ambiguous: "Cause ambiguous",
+  unexplained_structure: "Unexplained structure",
+  insufficient_data: "Too little data",
+};
+const DISAGREES = new Set(["cause_named", "cause_ambiguous", "unexplained_structure"]);
+
+/** The state's name and the sentence why. `verdict` is that of a diagnosis that nobody has acted on, or null. */
+export function stateOf(summary, verdict = null) {
+  if (summary === null || summary.status === "insufficient_data") return { name: "check", why: "fewer than three tests: no prognosis yet" };
+  if (summary.status === "reached") return { name: "failure", why: "end of life reached" };
+  if (DISAGREES.has(verdict)) return { name: "out_of_specification", why: "data and model disagree: see the diagnosis" };
+  const health = summary.current.health;
+  if (health !== null && health < LOW_HEALTH) return { name: "maintenance", why: "near the end of its life" };
+  if (summary.status === "may_never_reach") return { name: "normal", why: "may never reach end of life" };
+  return { name: "normal", why: "ageing as modelled" };
+}
+
+const SHAPES = {
+  failure: [["circle", { cx: 10, cy: 10, r: 9 }], ["path", { d: "M6.5 6.5l7 7m0-7l-7 7", class: "mark" }]],
+  out_of_specification: [["path", { d: "M10 1.2l9 16.3H1z" }], ["path", { d: "M10 7v5.2m0 2v1.4", class: "mark" }]],
+  maintenance: [["path", { d: "M10 .8L19.2 10 10 19.2.8 10z" }], ["path", { d: "M10 5.5V11m0 2.2v1.5", class: "mark" }]],
+  check: [["rect", { x: 1.5, y: 1.5, width: 17, height: 17, rx: 3 }], ["path", { d: "M7 7.8a3 3 0 1 1 4.4 2.6c-1 .5-1.4 1-1.4 2m0 2v.4", class: "mark" }]],
+  normal: [["circle", { cx: 10, cy: 10, r: 9 }], ["path", { d: "M5.8 10.3l2.9 2.9 5.5-6", class: "mark" }]],
+};
+
+/** The state's shape; the word stands beside it, so it is silent. */
+export function stateIcon(name) {
+  return svg("svg", { class: `icon state-${name}`, viewBox: "0 0 20 20", width: 20, height: 20, "aria-hidden": "true" },
+    SHAPES[name].map(([shape, attributes]) => svg(shape, attributes)));
+}

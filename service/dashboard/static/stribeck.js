@@ -1,0 +1,36 @@
+// Eq. 1 and 3 once more, for drawing: torque over speed from fitted parameters, and the measured points beside it.
+
+const GAMMA = 0.3;
+
+/** The mean radius, m: (d_i + d_o)/4, or what the clutch's record says. */
+export function meanRadius({ geometry }) {
+  const mm = geometry.mean_radius_mm ?? (geometry.inner_diameter_mm + geometry.outer_diameter_mm) / 4;
+  return mm / 1000;
+}
+
+/** Eq. 3: M_s (1 + (M̄_c − 1) exp(−V_S/v)) + C_v v^0.3, Nm at v ≥ 0 m/s. */
+export function torque(v, { static_torque_nm: mS, coulomb_ratio: mC, stribeck_velocity_m_s: vS, viscous_coefficient: cV }) {
+  const e = v > 0 ? Math.exp(-vS / v) : 0;
+  return mS * (1 + (mC - 1) * e) + cV * v ** GAMMA;
+}
+
+/** The fitted curve of one pressure between two speeds, rpm. */
+export function curveOf(fit, clutch, from, to, points = 80) {
+  const perRpm = (meanRadius(clutch) * 2 * Math.PI) / 60;
+  return Array.from({ length: points }, (_, index) => {
+    const speed = from + ((to - from) * index) / (points - 1);
+    return { speed, torque: torque(speed * perRpm, fit.parameters) };
+  });
+}
+
+const MOST = 400;
+
+/** The measured points near a pressure; a long raw record is thinned evenly. */
+export function measuredOf({ pressure_bar: p, speed_rpm: n, torque_nm: m }, pressure, gap = 0.25) {
+  const near = [];
+  for (let index = 0; index < n.length; index += 1) {
+    if (Math.abs(p[index] - pressure) <= gap) near.push({ speed: n[index], torque: m[index], pressure: p[index] });
+  }
+  const step = Math.ceil(near.length / MOST);
+  return step > 1 ? near.filter((_, index) => index % step === 0) : near;
+}

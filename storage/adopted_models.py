@@ -1,0 +1,78 @@
+"""The models a clutch has been tracked under, and the mean COFs that the one in force corrects."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+
+import sqlalchemy as sa
+from sqlalchemy import Connection, bindparam, delete, select
+
+from storage.tables import adopted_model, corrected_cof, run
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AdoptedRow:
+    """A version from 1 on; `diagnosis_id` None is a return to the baseline."""
+
+    version: int
+    diagnosis_id: str | None
+    adopted_at: str
+
+
+_of_clutch = adopted_model.c.clutch_id == bindparam("of_clutch")
+_versions = (
+    select(adopted_model.c.version, adopted_model.c.diagnosis_id, adopted_model.c.adopted_at)
+    .where(_of_clutch)
+    .order_by(adopted_model.c.version.desc())
+)
+_adopt = sa.insert(adopted_model)
+_cofs = (
+    select(corrected_cof.c.run_key, corrected_cof.c.pressure, corrected_cof.c.mean_cof, corrected_cof.c.mean_cof_sd)
+    .join(run, run.c.run_key == corrected_cof.c.run_key)
+    .where(run.c.clutch_id == bindparam("of_clutch"))
+    .order_by(corrected_cof.c.run_key, corrected_cof.c.pressure)
+)
+_write = sa.insert(corrected_cof)
+_clear_run = delete(corrected_cof).where(corrected_cof.c.run_key == bindparam("of_run"))
+_clear = delete(corrected_cof).where(
+    corrected_cof.c.run_key.in_(select(run.c.run_key).where(run.c.clutch_id == bindparam("of_clutch")))
+)
+
+
+def current(connection: Connection, clutch_id: str) -> AdoptedRow | None:
+    """The version in force, None before the first."""
+    found = connection.execute(_versions.limit(1), {"of_clutch": clutch_id}).first()
+    return None if found is None else AdoptedRow(**found._asdict())
+
+
+def versions(connection: Connection, clutch_id: str) -> list[AdoptedRow]:
+    """All versions, newest first."""
+    return [AdoptedRow(**found._asdict()) for found in connection.execute(_versions, {"of_clutch": clutch_id})]
+
+
+def adopt(connection: Connection, clutch_id: str, row: AdoptedRow) -> None:
+    """Store a version. Raises IntegrityError where it is there or its diagnosis unknown."""
+    connection.execute(_adopt, {"clutch_id": clutch_id} | asdict(row))
+
+
+def corrected_cofs(connection: Connection, clutch_id: str) -> dict[int, dict[float, tuple[float, float]]]:
+    """run_key -> pressure -> mean COF and its deviation under the model in force, where it corrects them."""
+    found: dict[int, dict[float, tuple[float, float]]] = {}
+    for run_key, pressure, mean, deviation in connection.execute(_cofs, {"of_clutch": clutch_id}):
+        found.setdefault(run_key, {})[pressure] = (mean, deviation)
+    return found
+
+
+def write_corrected(connection: Connection, run_key: int, cofs: Mapping[float, tuple[float, float]]) -> None:
+    """Store a run's corrected mean COFs by pressure in place of those it had."""
+    connection.execute(_clear_run, {"of_run": run_key})
+    rows = [
+        {"run_key": run_key, "pressure": pressure, "mean_cof": mean, "mean_cof_sd": deviation}
+        for pressure, (mean, deviation) in cofs.items()
+    ]
+    if rows:
+        connection.execute(_write, rows)
+
+
+def clear_corrected(connection: Connection, clutch_id: str) -> None:
+    """Drop all corrected mean COFs of a clutch."""
+    connection.execute(_clear, {"of_clutch": clutch_id})

@@ -1,0 +1,128 @@
+"""Diagnoses of a clutch: asked for, then finished or failed; newest first."""
+
+from dataclasses import dataclass, fields
+
+import sqlalchemy as sa
+from sqlalchemy import Connection, Row, bindparam, select, update
+
+from storage.json_text import Json, to_object, to_text
+from storage.tables import diagnosis, run
+
+RUNNING, FINISHED, FAILED = "running", "finished", "failed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewDiagnosis:
+    """A diagnosis as it is asked for, of the runs up to `last_run_key` (0 where there are none).
+
+    `life` is the run_id of the rebuild with which the diagnosed life began, "" for the first life.
+    """
+
+    clutch_id: str
+    diagnosis_id: str
+    created_at: str
+    revision: int
+    last_run_key: int
+    life: str
+    as_of_cycles: float | None
+    code_version: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DiagnosisRow(NewDiagnosis):
+    """A stored diagnosis: `report` once it is finished, `problem` where it failed, `extension` where one was found."""
+
+    diagnosis_key: int
+    status: str
+    finished_at: str | None
+    report: Json | None
+    extension: Json | None
+    problem: str | None
+
+
+_NEW = tuple(field.name for field in fields(NewDiagnosis))
+_insert = sa.insert(diagnosis)
+_of_clutch = diagnosis.c.clutch_id == bindparam("of_clutch")
+_one = select(diagnosis).where(_of_clutch, diagnosis.c.diagnosis_id == bindparam("wanted"))
+_newest = (
+    select(diagnosis)
+    .where(_of_clutch, diagnosis.c.diagnosis_key < bindparam("before"))
+    .order_by(diagnosis.c.diagnosis_key.desc())
+    .limit(bindparam("most"))
+)
+_same = (
+    select(diagnosis.c.diagnosis_id)
+    .where(_of_clutch, diagnosis.c.status == RUNNING, diagnosis.c.last_run_key == bindparam("up_to"))
+    .order_by(diagnosis.c.diagnosis_key)
+    .limit(1)
+)
+_end = (
+    update(diagnosis)
+    .where(diagnosis.c.diagnosis_id == bindparam("wanted"), diagnosis.c.status == RUNNING)
+    .values(
+        status=bindparam("new_status"),
+        finished_at=bindparam("at"),
+        report=bindparam("new_report"),
+        extension=bindparam("new_extension"),
+        problem=bindparam("new_problem"),
+    )
+)
+_end_all = (
+    update(diagnosis)
+    .where(diagnosis.c.status == RUNNING)
+    .values(status=FAILED, finished_at=bindparam("at"), problem=bindparam("new_problem"))
+)
+_last_run = select(sa.func.max(run.c.run_key)).where(run.c.clutch_id == bindparam("of_clutch"))
+
+
+def insert(connection: Connection, row: NewDiagnosis) -> None:
+    """Store a diagnosis that is running. Raises IntegrityError where its clutch is unknown or its id taken."""
+    connection.execute(_insert, {name: getattr(row, name) for name in _NEW} | {"status": RUNNING})
+
+
+def get(connection: Connection, clutch_id: str, diagnosis_id: str) -> DiagnosisRow | None:
+    """The diagnosis, or None."""
+    found = connection.execute(_one, {"of_clutch": clutch_id, "wanted": diagnosis_id}).first()
+    return None if found is None else _row(found)
+
+
+def page(connection: Connection, clutch_id: str, *, limit: int, before: float | None = None) -> list[DiagnosisRow]:
+    """At most `limit` diagnoses, newest first; `before` is the key of the last one already seen."""
+    values = {"of_clutch": clutch_id, "most": limit, "before": 2.0**62 if before is None else before}
+    return [_row(found) for found in connection.execute(_newest, values)]
+
+
+def running(connection: Connection, clutch_id: str, last_run_key: int) -> str | None:
+    """The id of the diagnosis of these very runs that is running, or None."""
+    found: str | None = connection.execute(_same, {"of_clutch": clutch_id, "up_to": last_run_key}).scalar()
+    return found
+
+
+def finish(connection: Connection, diagnosis_id: str, at: str, report: Json, extension: Json | None) -> bool:
+    """Store what a running diagnosis said; False where it is no longer running."""
+    values = {"new_status": FINISHED, "new_report": to_text(report), "new_problem": None}
+    values["new_extension"] = None if extension is None else to_text(extension)
+    return connection.execute(_end, values | {"wanted": diagnosis_id, "at": at}).rowcount == 1
+
+
+def fail(connection: Connection, diagnosis_id: str, at: str, problem: str) -> bool:
+    """Say why a running diagnosis has no report; False where it is no longer running."""
+    values = {"new_status": FAILED, "new_report": None, "new_extension": None, "new_problem": problem}
+    return connection.execute(_end, values | {"wanted": diagnosis_id, "at": at}).rowcount == 1
+
+
+def fail_all(connection: Connection, at: str, problem: str) -> int:
+    """Say of all running diagnoses why they have no report; returns how many there were."""
+    return connection.execute(_end_all, {"at": at, "new_problem": problem}).rowcount
+
+
+def last_run_key(connection: Connection, clutch_id: str) -> int:
+    """The key of the clutch's run that came last, 0 where there is none."""
+    return connection.execute(_last_run, {"of_clutch": clutch_id}).scalar() or 0
+
+
+def _row(found: Row[tuple[object, ...]]) -> DiagnosisRow:
+    values = found._asdict()
+    for name in ("report", "extension"):
+        values[name] = None if values[name] is None else to_object(values[name])
+    return DiagnosisRow(**values)

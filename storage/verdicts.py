@@ -1,0 +1,62 @@
+"""The newest finished diagnosis of each of some clutches, in short: what a list shows of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import sqlalchemy as sa
+from sqlalchemy import Connection, bindparam, select
+
+from storage.diagnoses import FINISHED
+from storage.json_text import to_object
+from storage.tables import adopted_model, diagnosis
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VerdictRow:
+    """A finished diagnosis' verdict and causes; `adopted` where the model adopted last came from it."""
+
+    diagnosis_id: str
+    verdict: str | None
+    causes: tuple[str, ...]
+    adopted: bool
+
+
+_later = diagnosis.alias("later")
+_newest = (
+    select(sa.func.max(_later.c.diagnosis_key))
+    .where(_later.c.clutch_id == diagnosis.c.clutch_id, _later.c.status == FINISHED)
+    .scalar_subquery()
+)
+_in_force = (
+    select(adopted_model.c.diagnosis_id)
+    .where(adopted_model.c.clutch_id == diagnosis.c.clutch_id)
+    .order_by(adopted_model.c.version.desc())
+    .limit(1)
+    .scalar_subquery()
+)
+_short = sa.func.json_object(
+    "verdict",
+    sa.func.json_extract(diagnosis.c.report, "$.verdict"),
+    "causes",
+    sa.func.json_extract(diagnosis.c.report, "$.causes"),
+)
+_verdicts = select(
+    diagnosis.c.clutch_id,
+    diagnosis.c.diagnosis_id,
+    _short.label("short"),
+    (_in_force == diagnosis.c.diagnosis_id).label("adopted"),
+).where(diagnosis.c.clutch_id.in_(bindparam("wanted", expanding=True)), diagnosis.c.diagnosis_key == _newest)
+
+
+def newest(connection: Connection, clutch_ids: Sequence[str]) -> dict[str, VerdictRow]:
+    """clutch_id -> its newest finished diagnosis, where it has one."""
+    found: dict[str, VerdictRow] = {}
+    for clutch_id, diagnosis_id, short, adopted in connection.execute(_verdicts, {"wanted": list(clutch_ids)}):
+        said = to_object(short)
+        found[clutch_id] = VerdictRow(
+            diagnosis_id=diagnosis_id,
+            verdict=said["verdict"],
+            causes=tuple(said["causes"] or ()),
+            adopted=bool(adopted),
+        )
+    return found

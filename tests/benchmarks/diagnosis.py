@@ -1,0 +1,94 @@
+"""`python -m tests.benchmarks.diagnosis`: how long a diagnosis takes, and how fast GETs are answered meanwhile."""
+
+import itertools
+import json
+import statistics
+import tempfile
+import time
+from pathlib import Path
+
+import httpx2
+
+from models.rig import campaign
+from models.rig.oil_warmth import warmed
+from models.rig.programme import QUICK, WHOLE, Programme
+from models.rig.simulated_runs import SimulatedRun
+from service.formats.simulated import simulated_body
+from tests.support import serving
+
+#: Seconds between two questions: a dashboard's, but far more often.
+_PAUSE = 0.01
+_ASKED = ("remaining-useful-life", "diagnoses", "model", "series", "")
+
+
+def post_life(http: httpx2.Client, clutch_id: str, states: int, programme: Programme) -> None:
+    """A simulated life of so many states, an effect of oil temperature in its stationary tests."""
+    clutch = campaign.simulated_clutch(1)
+    http.post("/v1/clutches", json={"clutch_id": clutch_id})
+    for run in campaign.simulate(1, programme=programme, stop_fraction=0.01, most_tests=states):
+        answer = http.post(f"/v1/clutches/{clutch_id}/runs", content=_body(run, clutch), headers=_JSON)
+        assert answer.status_code == 201, answer.text
+
+
+_JSON = {"Content-Type": "application/json"}
+
+
+def _body(run: SimulatedRun, clutch: campaign.SimulatedClutch) -> bytes:
+    body = simulated_body(run)
+    if run.plateaus is not None:
+        body["channels"]["torque_nm"] = warmed(run.plateaus, clutch, run.wear).torque.tolist()
+    return json.dumps(body).encode()
+
+
+def asked(http: httpx2.Client, clutch_id: str, until: str | None, seconds: float) -> tuple[list[float], float]:
+    """Times of GETs [ms] while the diagnosis `until` runs, or for so many seconds; and how long that was [s]."""
+    taken, began = [], time.perf_counter()
+    for name in itertools.cycle(_ASKED):
+        start = time.perf_counter()
+        answer = http.get(f"/v1/clutches/{clutch_id}/{name}".rstrip("/"))
+        taken.append(1e3 * (time.perf_counter() - start))
+        assert answer.status_code == 200
+        over = time.perf_counter() - began
+        if until is None and over > seconds:
+            break
+        if until is not None and len(taken) % 20 == 0 and http.get(until).json()["status"] != "running":
+            break
+        time.sleep(_PAUSE)
+    return taken, over
+
+
+def row(name: str, taken: list[float]) -> str:
+    """One line of the table: how many, median, 99 of 100, longest."""
+    return f"| {name} | {len(taken)} | {statistics.median(taken):.1f} | {_most(taken):.1f} | {max(taken):.1f} |"
+
+
+def _most(taken: list[float]) -> float:
+    return statistics.quantiles(taken, n=100)[-1]
+
+
+def main() -> None:
+    """Lives of two lengths, with and without a diagnosis that runs."""
+    lines = ["| GETs | asked | median, ms | 99 %, ms | longest, ms |", "|---|---|---|---|---|"]
+    times = []
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        serving(Path(folder) / "bench.db") as server,
+        httpx2.Client(base_url=server.url, timeout=120) as http,
+    ):
+        for name, states, programme in (("10 states with loops", 10, WHOLE), ("60 states", 60, QUICK)):
+            clutch_id = name.replace(" ", "-")
+            post_life(http, clutch_id, states, programme)
+            http.get(f"/v1/clutches/{clutch_id}/degradation")
+            lines.append(row(f"{name}, idle", asked(http, clutch_id, None, 5.0)[0]))
+            sent = http.post(f"/v1/clutches/{clutch_id}/diagnoses", json={}, headers={"Prefer": "wait=0"})
+            taken, over = asked(http, clutch_id, sent.headers["Location"], 0.0)
+            lines.append(row(f"{name}, while it is diagnosed", taken))
+            report = http.get(sent.headers["Location"]).json()
+            times.append(f"| {name} | {over:.1f} | {report['verdict']}: {', '.join(report['causes'])} |")
+    print("\n".join(lines))
+    print("\n| diagnosis, its process' start and remaining life included | s | verdict |\n|---|---|---|")
+    print("\n".join(times))
+
+
+if __name__ == "__main__":
+    main()

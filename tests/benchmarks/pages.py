@@ -1,0 +1,106 @@
+"""How long the pages take in a real browser: from the data's arrival until a person can use them."""
+
+import statistics
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import httpx2
+from playwright.sync_api import Browser, Page
+
+from storage import clutches
+from storage.database import open_database
+from tests.browser.driving import chromium
+from tests.browser.lives import demo
+from tests.support import serving
+
+CLUTCHES, REPEATS = 1000, 5
+_LAST = "performance.getEntriesByType('resource').filter((entry) => entry.name.includes({0!r})).at(-1).responseEnd"
+_FIRST = "performance.getEntriesByType('resource').find((entry) => entry.name.includes({0!r})).responseEnd"
+_MARK = "performance.getEntriesByName({0!r})[0].startTime"
+
+
+def pages() -> None:
+    """The fleet with 1,000 clutches; the clutch page on the demo's life."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "pages.db"
+        with serving(path) as server, httpx2.Client(base_url=server.url, timeout=120) as http, chromium() as browser:
+            demo(http)
+            _multiply(path, http)
+            size = len(http.get("/v1/clutches?limit=1000").content)
+            fleet = [_fleet(browser, server.url) for _ in range(REPEATS)]
+            clutch = [_clutch(browser, server.url) for _ in range(REPEATS)]
+    rows = {
+        f"fleet, {CLUTCHES} clutches ({size / 1000:.0f} kB): a full screen that answers, after the data arrived": _middle(
+            fleet, 0
+        ),
+        "the same, all rows drawn": _middle(fleet, 1),
+        "a full screen, from the address entered": _middle(fleet, 2),
+        "clutch page, the demo's life: first chart drawn after its data arrived": _middle(clutch, 0),
+        "the same, from the address entered, nothing cached": _middle(clutch, 1),
+        "the same, the files cached": _middle(clutch, 2),
+    }
+    print("\n### The pages, in Chromium\n\n| what | ms |\n|---|---|")
+    for name, taken in rows.items():
+        print(f"| {name} | {taken:.0f} |")
+
+
+def _middle(found: Sequence[tuple[float, ...]], place: int) -> float:
+    return statistics.median(each[place] for each in found)
+
+
+def _multiply(path: Path, http: httpx2.Client) -> None:
+    """The demo's summary under 999 more names, a little worse each."""
+    for index in range(CLUTCHES - 1):
+        http.post("/v1/clutches", json={"clutch_id": f"bench-{index:03}"}).raise_for_status()
+    database = open_database(f"sqlite:///{path}")
+    with database.writing() as connection:
+        row = clutches.get(connection, "sim-1")
+        assert row is not None
+        for index in range(CLUTCHES - 1):
+            remaining = {
+                q: (value or 0.0) + 7 * index
+                for q, value in {"0.05": 900, "0.25": 1000, "0.5": 1100, "0.75": 1200, "0.95": 1400}.items()
+            }
+            current = dict(row.summary["current"]) | {"health": index / CLUTCHES}
+            summary = dict(row.summary) | {"status": "predicted", "remaining_cycles": remaining, "current": current}
+            clutches.set_summary(connection, f"bench-{index:03}", remaining["0.5"], summary)
+    database.close()
+
+
+def _fleet(browser: Browser, url: str) -> tuple[float, float, float]:
+    """Milliseconds after the data until the screen is full and answers, and until all rows are there; from the start."""
+    page = browser.new_page()
+    page.goto(url)
+    _until(page, "fleet-complete")
+    assert page.locator("table.fleet tbody tr").count() == CLUTCHES
+    shown, complete = (page.evaluate(_MARK.format(mark)) for mark in ("fleet-shown", "fleet-complete"))
+    arrived = page.evaluate(_FIRST.format("/v1/clutches?"))
+    page.close()
+    return shown - arrived, complete - arrived, shown
+
+
+def _until(page: Page, mark: str) -> None:
+    """Wait for a mark; the page's policy lets no condition be evaluated inside it."""
+    while not page.evaluate(f"performance.getEntriesByName({mark!r}).length"):
+        page.wait_for_timeout(20)
+
+
+def _clutch(browser: Browser, url: str) -> tuple[float, float, float]:
+    """Milliseconds from the arrival of the first chart's data, from the start, and from the start with files cached."""
+    context = browser.new_context()
+    page = context.new_page()
+    taken: list[tuple[float, float]] = []
+    for _ in range(2):
+        page.goto(f"{url}/clutches/sim-1")
+        _until(page, "drawn fan")
+        drawn = page.evaluate(_MARK.format("drawn fan"))
+        arrived = page.evaluate(_LAST.format("quantity="))
+        taken.append((drawn - arrived, drawn))
+        page.goto("about:blank")
+    context.close()
+    return taken[0][0], taken[0][1], taken[1][1]
+
+
+if __name__ == "__main__":
+    pages()

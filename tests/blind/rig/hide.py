@@ -1,0 +1,66 @@
+"""A campaign with something hidden in it, drawn from a seed: plan, clutch, sensor, effects at a loudness, readings."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+
+import numpy as np
+
+from models.arrays import FloatArray
+from tests.blind.rig.clutch import Clutch, draw_clutch
+from tests.blind.rig.loudness import Ear, UnreachableError, listen
+from tests.blind.rig.makers import ALL
+from tests.blind.rig.plan import Plan, Wish, draw_plan
+from tests.blind.rig.sensor import Sensor, draw_sensor, measure
+from tests.blind.rig.world import Effect, read
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """What was measured [a site each], and the secret: the effects with their amplitudes. `seed` makes it again."""
+
+    seed: tuple[int, ...]
+    plan: Plan
+    clutch: Clutch
+    sensor: Sensor
+    effects: tuple[tuple[Effect, float], ...]
+    measured: list[FloatArray]
+
+    @property
+    def slugs(self) -> frozenset[str]:
+        return frozenset(effect.slug for effect, _ in self.effects)
+
+
+def combined(slugs: Sequence[str], **wanted: object) -> Wish:
+    """One protocol that grants what every effect needs, and what is wanted besides."""
+    wish = Wish()
+    for slug in slugs:
+        own = ALL[slug][1]
+        changed = {name: getattr(own, name) for name in Wish.__dataclass_fields__}
+        standard = {name: getattr(Wish(), name) for name in changed}
+        wish = replace(wish, **{n: x for n, x in changed.items() if x != standard[n]})
+    return replace(wish, **wanted)
+
+
+def hide(seed: Sequence[int], slugs: Sequence[str] = (), lam: float = 0.0, **wanted: object) -> Hidden:
+    """Hide effects by slug, each at loudness `lam` [nats] by itself; `wanted` overrides the wish. Same seed, same data.
+
+    Campaigns in which an effect cannot be as loud as that are drawn anew.
+    """
+    wish = combined(slugs, **wanted)
+    for attempt in count():
+        rng = np.random.default_rng([*seed, attempt])
+        plan = draw_plan(rng, wish)
+        clutch = draw_clutch(rng, plan.pressures, plan.life.span)
+        sensor = draw_sensor(rng)
+        made = [ALL[slug][0](rng, plan) for slug in slugs]
+        try:
+            ear: Ear | None = listen(plan, clutch, sensor) if slugs else None
+            effects = tuple((one, ear.amplitude_for(one, lam)) for one in made) if ear else ()
+        except UnreachableError:
+            if attempt == 30:
+                raise
+            continue
+        truth = read(plan, clutch, effects)
+        return Hidden(tuple(seed), plan, clutch, sensor, effects, measure(rng, plan, sensor, truth))
+    raise AssertionError("count() does not end")

@@ -1,0 +1,80 @@
+"""The advised test, made on the same rig with the same secret: its runs are measured and added to the campaign."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from models.arrays import FloatArray
+from tests.blind.rig.hide import Hidden
+from tests.blind.rig.plan import Life, Site, oil_course
+from tests.blind.rig.sensor import measure
+from tests.blind.rig.world import read
+
+#: What each advice asks for: states to come, energy of their duty, pause [s], oil [°C], pressures, order, loops [Hz].
+ASKED: dict[str, dict[str, float]] = {
+    "loops_0.5hz": {"frequency": 0.5},
+    "loops_1hz": {"frequency": 1.0},
+    "sweep_60c": {"oil": 60.0},
+    "sweep_100c": {"oil": 100.0},
+    "falling_speeds": {"falling": 1.0},
+    "light_sweep": {"pressure": 0.25},
+    "repeat": {},
+    "after_rest": {"rest": 12 * 3600.0},
+    "more_states": {"states": 3},
+    "half_energy": {"states": 2, "energy": 0.5},
+    "twice_energy": {"states": 2, "energy": 2.0},
+}
+
+
+def with_test(hidden: Hidden, key: str) -> Hidden:
+    """The campaign after the test of that key has been made too; raises KeyError for a test the rig does not know."""
+    asked = ASKED[key]
+    rng = np.random.default_rng([*hidden.seed, 99])
+    life = _lived_on(hidden.plan.life, asked)
+    new = np.arange(hidden.plan.life.cycles.size, life.cycles.size)
+    old = tuple(replace(site, life=life) for site in hidden.plan.sites)
+    site = _loops(rng, hidden, life, asked["frequency"]) if "frequency" in asked else _sweeps(rng, old[0], new, asked)
+    added = replace(hidden.plan, life=life, sites=(site,))
+    readings = measure(rng, added, hidden.sensor, read(added, hidden.clutch, hidden.effects))
+    plan = replace(hidden.plan, life=life, sites=(*old, site))
+    return replace(hidden, plan=plan, measured=[*hidden.measured, *readings])
+
+
+def _lived_on(life: Life, asked: dict[str, float]) -> Life:
+    states = int(asked.get("states", 1))
+    step = float(np.median(np.diff(life.cycles)[life.cycles.size // 2 - 1 :])) if "states" in asked else 0.0
+    cycles = life.cycles[-1] + step * (1 + np.arange(states))
+    pause = np.full(states, asked.get("rest", 600.0))
+    moment = life.moment[-1] + 3600 + np.cumsum(20 * step + pause + 2500 * np.ones(states))
+    energy = np.full(states, asked.get("energy", 1.0) * life.usual_energy)
+    return replace(
+        life,
+        cycles=np.append(life.cycles, cycles),
+        pause=np.append(life.pause, pause),
+        moment=np.append(life.moment, moment),
+        energy=np.append(life.energy, energy),
+    )
+
+
+def _sweeps(rng: np.random.Generator, last: Site, new: FloatArray, asked: dict[str, float]) -> Site:
+    """The stationary test in its own order, or with speeds falling, at each new state."""
+    rows = np.arange(last.bar.shape[1])
+    if "falling" in asked and last.kind == "stationary":
+        rows = np.lexsort((-last.rpm[-1], np.round(2 * last.bar[-1]) / 2))
+    bar = asked.get("pressure", 1.0) * np.repeat(last.bar[-1:, rows], new.size, axis=0)
+    rpm = np.repeat(last.rpm[-1:, rows], new.size, axis=0)
+    effort = bar[0] * rpm[0] / 6000
+    oil = np.stack([oil_course(rng, last.clock[0], effort) for _ in new]) + asked.get("oil", 85.0) - 85.0
+    return replace(last, state=new, bar=bar, rpm=rpm, clock=np.repeat(last.clock[-1:], new.size, axis=0), oil=oil)
+
+
+def _loops(rng: np.random.Generator, hidden: Hidden, life: Life, frequency: float) -> Site:
+    """Four periods at every pressure, a hundred samples a period."""
+    pressures = hidden.plan.pressures
+    time = np.arange(401) / (100 * frequency)
+    rpm = np.broadcast_to(1000 - 1000 * np.cos(2 * np.pi * frequency * time), (pressures.size, time.size))
+    clock = np.arange(pressures.size)[:, None] * (time[-1] + 3.0) + time
+    oil = np.full(clock.shape, 85.0 + rng.uniform(-2, 2))
+    state = np.full(pressures.size, life.cycles.size - 1)
+    bar = pressures[:, None] + np.zeros_like(time)
+    return Site("loop", state, bar, rpm, clock, oil, life, float(time[1]), None, frequency)

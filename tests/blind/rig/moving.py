@@ -1,0 +1,101 @@
+"""Hidden effects that need motion: delay, inertia, the squeezed film, ripple and stick-slip. Forms of their own."""
+
+import numpy as np
+from scipy.signal import lfilter
+
+from models.arrays import FloatArray
+from tests.blind.rig.clutch import Law
+from tests.blind.rig.plan import RPM, Plan, Site
+from tests.blind.rig.steady import lagged
+from tests.blind.rig.world import Effect
+
+
+def channel_delay(rng: np.random.Generator, _: Plan) -> Effect:
+    """Torque is written down late: by a pure delay, or by the low-pass of its amplifier."""
+    pure = rng.random() < 0.5
+
+    def reading(a: float, site: Site, torque: FloatArray) -> FloatArray:
+        if site.kind == "stationary":
+            return np.zeros_like(torque)
+        if not pure:
+            return lagged(torque, site.step, a) - torque
+        time = site.step * np.arange(torque.shape[1])
+        return np.stack([np.interp(time - a, time, row) for row in torque]) - torque
+
+    return Effect("channel_delay", 0.03, 0.8, reading=reading)
+
+
+def inertia_torque(rng: np.random.Generator, _: Plan) -> Effect:
+    """J dω/dt through the coupling, which rings a little after every change of acceleration."""
+    ring, damp = 2 * np.pi * rng.uniform(2.0, 6.0), rng.uniform(0.4, 0.8)
+
+    def reading(a: float, site: Site, torque: FloatArray) -> FloatArray:
+        if site.kind == "stationary":
+            return np.zeros_like(torque)
+        speeding = np.gradient(site.rpm * RPM, site.step, axis=1)
+        if site.kind == "raw":
+            return a * speeding
+        h = ring * site.step
+        recursion = [1 + 2 * damp * h + h**2, -(2 + 2 * damp * h), 1.0]
+        settled = speeding[:, :1]
+        return a * (settled + lfilter([h**2], recursion, speeding - settled, axis=1))
+
+    return Effect("inertia_torque", 0.01, 1.0, reading=reading)
+
+
+def squeeze_film(rng: np.random.Generator, _: Plan) -> Effect:
+    """The film's height follows dh/dt = (h_s(v) - h)/τ, faster where it is thick; contact and shear go with the height."""
+    order, shear, hasten = rng.uniform(0.5, 0.75), rng.uniform(0.2, 0.7), rng.uniform(0.5, 2.0)
+
+    def friction(a: float, site: Site, law: Law) -> FloatArray:
+        if site.kind == "stationary":
+            return np.zeros_like(site.v)
+        v = np.maximum(site.v, 1e-4)
+        rest = v**order
+        film = np.empty_like(rest)
+        film[:, 0] = rest[:, 0]
+        late = a * (site.bar[:, 0] / 5.0) ** 0.5
+        for k in range(1, rest.shape[1]):
+            now = film[:, k - 1]
+            film[:, k] = rest[:, k] + (now - rest[:, k]) * np.exp(-site.step / late * (0.2 + now**hasten))
+        w = film ** (1 / order)
+        dry = Law(law.static, law.ratio, law.stribeck, 0 * law.viscous)
+        sheared = law.viscous * v**0.3 * ((rest / film) ** shear - 1)
+        return dry.torque(v, film=w) - dry.torque(v) + sheared
+
+    return Effect("squeeze_film", 0.1, 20.0, friction)
+
+
+def shaft_ripple(rng: np.random.Generator, _: Plan) -> Effect:
+    """Once and twice a turn, in proportion to the load, its phase wandering slowly; a twist of the coupling at speed."""
+    second, phase, slip = rng.uniform(0.0, 0.5), rng.uniform(0, 2 * np.pi), rng.uniform(0.0, 0.02)
+
+    def reading(a: float, site: Site, torque: FloatArray) -> FloatArray:
+        if site.kind == "stationary":
+            return np.zeros_like(torque)
+        turn = np.cumsum(site.rpm * RPM, axis=1) * site.step + phase
+        turn = turn + np.cumsum(np.random.default_rng(5).standard_normal(turn.shape[1])) * slip
+        swell = 1 + 0.3 * np.tanh(site.rpm / 600)
+        return a * torque * swell * (np.sin(turn) + second * np.sin(2 * turn + 1))
+
+    return Effect("shaft_ripple", 0.003, 0.5, reading=reading, fast=True)
+
+
+def stick_slip(rng: np.random.Generator, _: Plan) -> Effect:
+    """Below some speed the drive train bursts into a limit cycle: a skewed wave that grows, saturates and breaks off."""
+    natural, below, grown = rng.uniform(7.0, 18.0), rng.uniform(100, 260), rng.uniform(0.1, 0.4)
+    seed = int(rng.integers(2**31))
+
+    def reading(a: float, site: Site, torque: FloatArray) -> FloatArray:
+        if site.kind == "stationary":
+            return np.zeros_like(torque)
+        dice = np.random.default_rng(seed)
+        slow = site.rpm < below
+        count = np.cumsum(slow, axis=1)
+        entered = count - np.maximum.accumulate(np.where(slow, 0, count), axis=1)
+        grow = -np.expm1(-entered * site.step / grown) * slow
+        phase = 2 * np.pi * (natural * site.step * np.arange(torque.shape[1]) + dice.random((torque.shape[0], 1)))
+        wave = np.sin(phase + 0.6 * np.sin(phase))
+        return a * grow * wave * (1 + 0.1 * dice.standard_normal((torque.shape[0], 1))) * (site.bar / 5)
+
+    return Effect("stick_slip", 0.1, 20.0, reading=reading, fast=True)

@@ -1,0 +1,70 @@
+"""What an ideal sensor would read: the stationary curve with what is hidden in it, followed by the attractor law (GMS)."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.arrays import FloatArray
+from tests.blind.rig.clutch import Clutch, Law
+from tests.blind.rig.plan import Plan, Site
+
+Friction = Callable[[float, Site, Law], FloatArray]
+Reading = Callable[[float, Site, FloatArray], FloatArray]
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Something hidden, its shape already drawn: torque that it adds to friction (which then lags) or to the reading.
+
+    `unit` is an amplitude of ordinary size, `most` the largest that makes sense; `axes` where its structure lives.
+    """
+
+    slug: str
+    unit: float
+    most: float
+    friction: Friction | None = None
+    reading: Reading | None = None
+    axes: frozenset[str] = frozenset()
+    fast: bool = False  # swings from sample to sample, so that no mean over samples shows it
+    moves_life: bool = False
+
+
+def follow(site: Site, curve: FloatArray, attractor: FloatArray) -> FloatArray:
+    """dM/dt = C (1 - M/S) from M = S: exact for S linear over a step's ∫C/S dt, in pieces short enough for the products."""
+    rate = attractor / np.maximum(curve, 1e-6)
+    x = 0.5 * (rate[:, 1:] + rate[:, :-1]) * site.step
+    keep = np.exp(-x)
+    ramp = -np.expm1(-x) / x  # mean of e^{-(x - u)} over the step
+    gain = curve[:, 1:] * (1 - ramp) + curve[:, :-1] * (ramp - keep)
+    told = np.empty_like(curve)
+    told[:, 0] = curve[:, 0]
+    piece = max(1, int(200 / max(float(x.max()), 1e-9)))
+    for a in range(0, x.shape[1], piece):
+        power = np.cumprod(keep[:, a : a + piece], axis=1)
+        told[:, a + 1 : a + 1 + piece] = power * (
+            told[:, a : a + 1] + np.cumsum(gain[:, a : a + piece] / power, axis=1)
+        )
+    return told
+
+
+def read(
+    plan: Plan, clutch: Clutch, effects: Sequence[tuple[Effect, float]] = (), only: Sequence[str] | None = None
+) -> list[FloatArray]:
+    """Torque [Nm] at every site of the plan, without noise; `only` names the kinds of sites that are wanted."""
+    readings = []
+    for site in plan.sites:
+        if only is not None and site.kind not in only:
+            continue
+        law = clutch.law(site.bar, site.cycles)
+        torque = law.torque(site.v)
+        for effect, amplitude in effects:
+            if effect.friction is not None:
+                torque = torque + effect.friction(amplitude, site, law)
+        if site.kind != "stationary":
+            torque = follow(site, torque, clutch.attractor(site.bar, site.cycles))
+        for effect, amplitude in effects:
+            if effect.reading is not None:
+                torque = torque + effect.reading(amplitude, site, torque)
+        readings.append(torque)
+    return readings

@@ -1,0 +1,215 @@
+"""The rows of the table: which trials each takes, and what is counted in them against which target."""
+
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from tests.blind.rig.makers import CATALOGUED, HISTORY, OUTSIDE
+from tests.blind.trials import Outcome, Trial
+
+Test = Callable[[Outcome], bool]
+LOUDNESSES = (10.0, 20.0, 50.0, 200.0, 1000.0)
+#: Effects that raise or lower the whole course of friction or do not show without raw records need no temperature.
+WARM = ("oil_temperature",)
+
+
+@dataclass(frozen=True)
+class Count:
+    """A counted line of the table: how often `met` among the outcomes that `among` lets in, and the target."""
+
+    title: str
+    prefix: str
+    met: Test
+    least: float | None = None
+    most: float | None = None
+    among: Test = lambda _: True
+
+    def of(self, outcomes: Iterable[Outcome]) -> tuple[int, int]:
+        found = [self.met(one) for one in outcomes if one.trial.row.startswith(self.prefix) and self.among(one)]
+        return sum(found), len(found)
+
+    def holds(self, hits: int, count: int) -> bool | None:
+        if count == 0 or (self.least is None and self.most is None):
+            return None
+        share = hits / count
+        return share >= (self.least or 0.0) and share <= (1.0 if self.most is None else self.most)
+
+    @property
+    def target(self) -> str:
+        if self.least is not None and self.most is not None:
+            return f"{100 * self.least:.0f} to {100 * self.most:.0f} %"
+        if self.least is not None:
+            return f"≥ {100 * self.least:.0f} %"
+        return f"≤ {100 * self.most:.0f} %" if self.most is not None else ""
+
+
+def wilson(hits: int, count: int, z: float = 1.96) -> tuple[float, float]:
+    """The 95 % interval of a share after Wilson (1927)."""
+    if count == 0:
+        return 0.0, 1.0
+    share, extra = hits / count, z * z / count
+    middle = (share + extra / 2) / (1 + extra)
+    half = z * np.sqrt(share * (1 - share) / count + extra / (4 * count)) / (1 + extra)
+    return float(max(middle - half, 0.0)), float(min(middle + half, 1.0))
+
+
+def _seeds(row: str, seed: int, count: int) -> Iterator[tuple[int, ...]]:
+    return ((seed, zlib.crc32(row.encode()), k) for k in range(count))
+
+
+def trials(seed: int, size: float = 1.0) -> list[Trial]:
+    """All trials of the table; `size` 1 is the whole, smaller takes that share of each row, at least one."""
+
+    def some(count: int) -> int:
+        return max(1, round(size * count))
+
+    made = [Trial("none", s) for s in _seeds("none", seed, some(400))]
+    for slug in CATALOGUED:
+        row = f"one/{slug}"
+        made += [Trial(row, s, (slug,), 20.0, follow=True) for s in _seeds(row, seed, some(40))]
+        row = f"twelve/{slug}"
+        made += [Trial(row, s, (slug,), 50.0, wanted={"states": 12}) for s in _seeds(row, seed, some(12))]
+        row = f"left/{slug}"
+        made += [Trial(row, s, (slug,), 50.0, frozenset({slug})) for s in _seeds(row, seed, some(12))]
+    for slug in (*CATALOGUED, *OUTSIDE):
+        for lam in LOUDNESSES:
+            row = f"loud/{lam:.0f}/{slug}"
+            made += [Trial(row, s, (slug,), lam) for s in _seeds(row, seed, some(8))]
+    for slug in OUTSIDE:
+        row = f"outside/{slug}"
+        made += [Trial(row, s, (slug,), 50.0) for s in _seeds(row, seed, some(20))]
+    made += _pairs(seed, some(100))
+    made += _special(seed, some(30))
+    return made
+
+
+def _pairs(seed: int, count: int) -> list[Trial]:
+    """Two effects of different families that do not undo each other's protocol."""
+    able = [pair for pair in combinations(CATALOGUED, 2) if not set(pair) <= HISTORY]
+    dice = np.random.default_rng([seed, 2])
+    drawn = [able[int(k)] for k in dice.integers(len(able), size=count)]
+    return [Trial("two", s, pair, 50.0) for s, pair in zip(_seeds("two", seed, count), drawn, strict=True)]
+
+
+def _special(seed: int, count: int) -> list[Trial]:
+    made = []
+    for lam in (50.0, 200.0):
+        row = f"blindfold/{lam:.0f}"
+        wanted = {"oil": False, "moments": True}
+        made += [Trial(row, s, WARM, lam, wanted=wanted) for s in _seeds(row, seed, count)]
+    for slug in ("oil_temperature", "oil_change"):
+        row = f"gain/{slug}"
+        made += [Trial(row, s, (slug,), 60.0) for s in _seeds(row, seed, count)]
+    row = "film"
+    made += [Trial(row, s, ("squeeze_film",), 2000.0, wanted={"full": True}) for s in _seeds(row, seed, count)]
+    for slug in ("unsettled_dwell", "shaft_ripple", "stick_slip"):
+        row = f"raw/{slug}"
+        wanted = {"raw": True, "loops": False, "rate": 100.0}
+        made += [Trial(row, s, (slug,), 20.0, wanted=wanted) for s in _seeds(row, seed, count // 3 or 1)]
+    row = "raw/none"
+    wanted = {"raw": True, "loops": False}
+    made += [Trial(row, s, wanted=wanted) for s in _seeds(row, seed, count)]
+    return made
+
+
+def _is(family: bool) -> Test:
+    return lambda one: one.detected and ((one.trial.slugs[0] in HISTORY) is family)
+
+
+def counts() -> list[Count]:
+    """The lines of the table in its order."""
+    lines = [
+        Count(
+            "no effect: any verdict but `model_adequate`",
+            "none",
+            lambda one: one.verdict != "model_adequate",
+            most=0.02,
+        ),
+        Count("one effect, λ = 20: detected", "one/", lambda one: one.detected, least=0.90),
+        Count(
+            "… true cause in the set, of those detected",
+            "one/",
+            lambda one: one.in_set,
+            0.97,
+            among=lambda o: o.detected,
+        ),
+        Count("… top candidate, outside the history family", "one/", lambda one: one.top, 0.95, among=_is(False)),
+        Count("… top candidate, history family", "one/", lambda one: one.top, 0.60, among=_is(True)),
+        Count("… named and wrong", "one/", lambda one: one.wrong, most=0.02),
+        Count("… ambiguous, and named rightly after the advised test", "one/", _resolved, 0.80, among=_ambiguous),
+        Count("… ambiguous without any advice", "one/", lambda one: not one.advice, among=_ambiguous),
+        Count("λ = 50, 12 states: top candidate", "twelve/", lambda one: one.top, 0.95),
+        Count("… named and wrong", "twelve/", lambda one: one.wrong, most=0.02),
+    ]
+    lines += [
+        Count(f"λ = {lam:.0f}: named and wrong", f"loud/{lam:.0f}/", lambda one: one.wrong, most=0.02)
+        for lam in LOUDNESSES
+    ]
+    lines += [
+        Count("outside the catalogue, λ = 50: `unexplained_structure`", "outside/", _unexplained, 0.80),
+        Count("… with the right axis first", "outside/", _right_axis, 0.80, among=_unexplained),
+        Count("… named", "outside/", lambda one: one.named, most=0.02),
+        Count("left out of the catalogue, λ = 50: not named as something else", "left/", lambda o: not o.named, 0.80),
+        Count("two effects, λ = 50 each: the exact pair", "two", lambda o: o.named and o.causes == o.truth, 0.75),
+        Count("… a wrong name", "two", lambda one: one.wrong, most=0.05),
+        Count("temperature effect without oil temperature: `torque_zero_shift` named", "blindfold/", _zero, most=0.0),
+        Count("… anything but `oil_temperature` named", "blindfold/", lambda one: one.wrong, most=0.02),
+        Count("squeeze film against the GMS baseline: named", "film", lambda o: o.named and o.causes == o.truth, 0.95),
+        Count(
+            "raw stationary records, λ = 20: detected", "raw/", lambda o: o.detected, 0.9, among=lambda o: bool(o.truth)
+        ),
+        Count("… named and wrong", "raw/", lambda one: one.wrong, most=0.02, among=lambda o: bool(o.truth)),
+        Count(
+            "… nothing hidden: any verdict but `model_adequate`",
+            "raw/none",
+            lambda o: o.verdict != "model_adequate",
+            most=0.02,
+        ),
+        Count("crashed", "", lambda one: one.verdict == "crashed", most=0.0),
+    ]
+    return lines
+
+
+def _unexplained(one: Outcome) -> bool:
+    return one.verdict == "unexplained_structure"
+
+
+def _right_axis(one: Outcome) -> bool:
+    return bool(one.where) and one.where[0] in one.axes
+
+
+def _ambiguous(one: Outcome) -> bool:
+    return one.verdict == "cause_ambiguous"
+
+
+def _resolved(one: Outcome) -> bool:
+    return one.advised is not None and one.advised.named and one.advised.causes == one.truth
+
+
+def _zero(one: Outcome) -> bool:
+    return one.named and "torque_zero_shift" in one.causes
+
+
+def calibration(outcomes: Sequence[Outcome]) -> list[tuple[str, int, int]]:
+    """Candidates by the probability they were given: label, how many were true, how many there were.
+
+    Single effects of the catalogue only, at every loudness; what was left out of the catalogue is left out here.
+    """
+    told = [
+        (share, slug in one.truth)
+        for one in outcomes
+        if len(one.truth) == 1 and one.truth <= CATALOGUED.keys() and not one.trial.without
+        for slug, share in one.candidates
+    ]
+    edges = ((0.05, 0.3), (0.3, 0.5), (0.5, 0.7), (0.7, 0.85), (0.85, 0.95), (0.95, 1.0001))
+    return [
+        (
+            f"{low:.2f} to {min(high, 1.0):.2f}",
+            sum(true for p, true in told if low <= p < high),
+            sum(low <= p < high for p, _ in told),
+        )
+        for low, high in edges
+    ]

@@ -1,0 +1,114 @@
+"""A small fixed sample of the blind table, for every change of the code; `make blind` makes the whole.
+
+Thresholds are binomial: where the diagnosis is just as good as its target, a test here fails by chance in less than one
+of a thousand samples (`CHANCE`). What the target is, stands beside each. A diagnosis that guesses must fail.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from tests.blind.trials import Outcome, Trial, judge
+
+pytestmark = pytest.mark.statistical
+
+CHANCE = 1e-3
+SEED = 20261
+FAMILIES = {
+    "thermal": "oil_temperature",
+    "sensor": "torque_zero_shift",
+    "viscous": "hydrodynamic_drag",
+    "dwell": "unsettled_dwell",
+    "dynamic": "squeeze_film",
+    "vibration": "shaft_ripple",
+    "history": "oil_change",
+}
+
+
+def least(count: int, share: float) -> int:
+    """Fewer than this of `count` come with a chance below CHANCE where the share is right."""
+    return int(binom.ppf(CHANCE, count, share))
+
+
+def most(count: int, share: float) -> int:
+    """More than this of `count` come with a chance below CHANCE where the share is right."""
+    return int(binom.isf(CHANCE, count, share))
+
+
+def judged(trials: list[Trial]) -> list[Outcome]:
+    print(f"seed {SEED}")
+    outcomes = [judge(trial) for trial in trials]
+    for one in outcomes:
+        print(one.trial, "->", one.verdict, sorted(one.causes), one.candidates[:3], one.where[:2], one.error)
+    assert not [one for one in outcomes if one.error]
+    return outcomes
+
+
+@pytest.fixture(scope="module")
+def nothing() -> list[Outcome]:
+    return judged([Trial("none", (SEED, 0, k)) for k in range(30)])
+
+
+@pytest.fixture(scope="module")
+def catalogued() -> list[Outcome]:
+    """Four campaigns a family, eight of the family whose target is low, λ = 50, 6 states."""
+    return judged(
+        [
+            Trial(family, (SEED, 1, k), (slug,), 50.0)
+            for family, slug in FAMILIES.items()
+            for k in range(8 if family == "history" else 4)
+        ]
+    )
+
+
+@pytest.fixture(scope="module")
+def uncatalogued() -> list[Outcome]:
+    slugs = ("speed_bump", "clock_wobble", "resonance")
+    return judged([Trial("outside", (SEED, 2, k), (slug,), 50.0) for slug in slugs for k in range(4)])
+
+
+def right(outcomes: list[Outcome]) -> int:
+    """How often the truth leads."""
+    return sum(one.detected and one.top for one in outcomes)
+
+
+def test_where_nothing_is_hidden_nothing_is_found(nothing: list[Outcome]) -> None:
+    """Target: an alarm in 2 % of the campaigns or less."""
+    assert sum(one.verdict != "model_adequate" for one in nothing) <= most(len(nothing), 0.02)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_what_is_hidden_is_found_in_each_family(catalogued: list[Outcome], family: str) -> None:
+    """Target: the truth leads in 95 % outside the history family, in 60 % inside."""
+    mine = [one for one in catalogued if one.trial.row == family]
+    enough = least(len(mine), 0.60 if family == "history" else 0.95)
+    assert enough > 0
+    assert right(mine) >= enough
+    assert sum(one.in_set for one in mine) >= least(len(mine), 0.95)
+
+
+def test_what_is_hidden_is_found_over_all(catalogued: list[Outcome]) -> None:
+    """Target as above over all families; a diagnosis whose answers are dealt out anew must fail."""
+    enough = least(len(catalogued), 0.90)
+    assert right(catalogued) >= enough
+    dealt = np.random.default_rng(3).permutation(len(catalogued))
+    permuted = [replace(one, trial=catalogued[k].trial) for one, k in zip(catalogued, dealt, strict=True)]
+    assert right(permuted) < enough
+
+
+def test_nothing_wrong_is_named(catalogued: list[Outcome], uncatalogued: list[Outcome]) -> None:
+    """Target: 2 % or less, effects from outside the catalogue included; permuted truths must fail."""
+    both = [*catalogued, *uncatalogued]
+    allowed = most(len(both), 0.02)
+    assert sum(one.wrong for one in both) <= allowed
+    permuted = [replace(one, trial=other.trial) for one, other in zip(both, [*both[4:], *both[:4]], strict=True)]
+    assert sum(one.wrong for one in permuted) > allowed
+
+
+def test_what_no_catalogue_has_is_called_unexplained(uncatalogued: list[Outcome]) -> None:
+    """Target: 80 %, and the right axis."""
+    open_ = [one for one in uncatalogued if one.verdict == "unexplained_structure"]
+    assert len(open_) >= least(len(uncatalogued), 0.80)
+    assert sum(one.where[:1] != () and one.where[0] in one.axes for one in open_) >= least(len(open_), 0.80)

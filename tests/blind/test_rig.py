@@ -1,0 +1,174 @@
+"""The rig that hides: independent of the catalogue, its lag, noise and loudness right by other ways of reckoning."""
+
+import ast
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.stats import chi2
+
+from tests.blind.rig.hide import hide
+from tests.blind.rig.loudness import LEAST_GAIN, UnreachableError, listen
+from tests.blind.rig.makers import ALL, CATALOGUED, OUTSIDE
+from tests.blind.rig.more import ASKED, with_test
+from tests.blind.rig.plan import RADIUS, RPM
+from tests.blind.rig.sensor import whiten
+from tests.blind.rig.told import campaign, runs
+from tests.blind.rig.world import Effect, follow, read
+
+FOLDER = Path(__file__).parent
+#: What the blind tests may take from the product: how data goes in, how reports come out, the one function under test.
+ALLOWED = {
+    "models.arrays",
+    "models.diagnosis",
+    "models.diagnosis.campaign",
+    "models.diagnosis.engine",
+    "models.diagnosis.report",
+    "models.plateaus",
+    "models.runs",
+}
+CONTRACT = {
+    "oil_temperature", "interface_heating", "viscous_exponent", "hydrodynamic_drag", "torque_zero_shift",
+    "pressure_offset", "unsettled_dwell", "channel_delay", "inertia_torque", "squeeze_film", "shaft_ripple",
+    "stick_slip", "running_in", "oil_change", "accelerated_wear", "load_severity", "rest_recovery",
+}  # fmt: skip
+
+
+def imported(source: str) -> set[str]:
+    """Modules of the product that a source imports, names taken from a package included."""
+    found = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            package = node.module in {"models", "models.diagnosis"}
+            found |= {f"{node.module}.{alias.name}" if package else node.module for alias in node.names}
+    return {name for name in found if name.split(".")[0] in {"models", "service", "storage"}}
+
+
+def test_nothing_of_the_catalogue_is_imported() -> None:
+    sources = [path for path in FOLDER.rglob("*.py") if not path.name.startswith("test_")]
+    assert len(sources) > 10
+    for path in sources:
+        assert imported(path.read_text()) <= ALLOWED, path
+    assert not imported("from models.diagnosis.effects.oil import X\nfrom models.diagnosis import baseline") <= ALLOWED
+
+
+def test_all_of_the_contract_can_be_hidden_and_more() -> None:
+    assert set(CATALOGUED) == CONTRACT
+    assert len(OUTSIDE) >= 6
+    assert not set(OUTSIDE) & CONTRACT
+
+
+def test_the_same_seed_hides_the_same() -> None:
+    one, again, other = (runs(hide((4, k), ("oil_change",), 20.0)) for k in (1, 1, 2))
+    assert one == again
+    assert one != other
+
+
+def test_the_lag_is_that_of_a_stiff_integrator() -> None:
+    hidden = hide((4, 3))
+    site = next(site for site in hidden.plan.sites if site.kind == "loop")
+    law = hidden.clutch.law(site.bar, site.cycles)
+    curve, attractor = law.torque(site.v), hidden.clutch.attractor(site.bar, site.cycles)
+    told = follow(site, curve, attractor)[0]
+    time = site.clock[0] - site.clock[0, 0]
+    s = lambda t: float(np.interp(t, time, curve[0]))  # noqa: E731
+    c = float(attractor[0, 0])
+    found = solve_ivp(
+        lambda t, m: c * (1 - m / s(t)), (0, time[-1]), [curve[0, 0]], t_eval=time, max_step=0.01, rtol=1e-8
+    )
+    np.testing.assert_allclose(told, found.y[0], rtol=2e-4)
+    assert np.abs(told - curve[0]).max() > 0.01  # it does lag
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_noise_is_what_the_sensor_says(seed: int) -> None:
+    hidden = hide((6, seed))
+    truth = read(hidden.plan, hidden.clutch)
+    error = [m - t for m, t in zip(hidden.measured, truth, strict=True)]
+    white = whiten(hidden.plan, hidden.sensor, truth, error)
+    low, high = chi2.ppf([1e-4, 1 - 1e-4], white.size)
+    assert low < white @ white < high + 0.01 * white.size  # rounding adds a little
+    assert abs(white[1:] @ white[:-1]) / white.size < 5 / np.sqrt(white.size)
+
+
+@pytest.mark.parametrize("slug", sorted(ALL))
+def test_an_effect_of_no_size_is_none_and_a_louder_one_is_larger(slug: str) -> None:
+    hidden = hide((8, 1), (slug,), 20.0)
+    effect, amplitude = hidden.effects[0]
+    ear = listen(hidden.plan, hidden.clutch, hidden.sensor)
+    for none, torque in zip(read(hidden.plan, hidden.clutch, [(effect, 1e-9)]), ear.base, strict=True):
+        np.testing.assert_allclose(none, torque, atol=1e-5)
+    assert ear.loudness(effect, amplitude) == pytest.approx(20.0, rel=0.021)
+    assert ear.loudness(effect, 1.5 * amplitude) > 25.0
+
+
+def test_means_over_samples_are_as_loud_as_the_samples() -> None:
+    hidden = hide((8, 2), ("interface_heating",), 20.0, states=3)
+    fine = listen(hidden.plan, hidden.clutch, replace(hidden.sensor, sample_memory=0.4), count=1)
+    thin = listen(hidden.plan, hidden.clutch, replace(hidden.sensor, sample_memory=0.4), count=5)
+    for amplitude in (0.002, 0.02):
+        one, other = (ear.loudness(hidden.effects[0][0], amplitude) for ear in (fine, thin))
+        assert other == pytest.approx(one, rel=0.03)
+
+
+def test_loudness_is_the_likelihood_ratio_left_after_a_refit() -> None:
+    """λ against generalised least squares on the dense covariance, on stationary tests alone."""
+    hidden = hide((5, 2), ("rest_recovery",), 30.0, loops=False)
+    plan, clutch, sensor = hidden.plan, hidden.clutch, hidden.sensor
+    ear = listen(plan, clutch, sensor)
+    site, base = plan.sites[0], ear.base[0]
+    delta = (read(plan, clutch, hidden.effects)[0] - base).ravel()
+    rows = np.arange(base.shape[1])
+    inverse = np.zeros((base.size, base.size))
+    for k in range(base.shape[0]):
+        sigma = sensor.sigma(site, base[k])
+        covariance = np.outer(sigma, sigma) * sensor.rho(site) ** np.abs(rows[:, None] - rows)
+        covariance += max(sensor.gain, LEAST_GAIN) ** 2 * np.outer(base[k], base[k])
+        block = slice(k * rows.size, (k + 1) * rows.size)
+        inverse[block, block] = np.linalg.inv(covariance)
+    jacobian = []
+    for i in range(clutch.theta.size - plan.pressures.size - 1):  # the attractor does not act on plateaus
+        up, down = (read(plan, clutch.nudged(i, h))[0].ravel() for h in (1e-4, -1e-4))
+        jacobian.append((up - down) / np.linalg.norm(up - down))
+    j = np.stack(jacobian, axis=1)
+    left = delta @ inverse @ delta - delta @ inverse @ j @ np.linalg.lstsq(j.T @ inverse @ j, j.T @ inverse @ delta)[0]
+    assert 0.5 * left == pytest.approx(30.0, rel=0.03)  # the search for the amplitude ends within 2 %
+    assert 0.5 * delta @ inverse @ delta > 1.1 * 0.5 * left  # the refit does take some of it
+
+
+def test_what_cannot_be_loud_says_so() -> None:
+    hidden = hide((5, 2))
+    ear = listen(hidden.plan, hidden.clutch, hidden.sensor)
+    whisper = Effect("whisper", 1e-6, 1e-5, reading=lambda a, _, torque: a + 0 * torque)
+    with pytest.raises(UnreachableError, match="whisper"):
+        ear.amplitude_for(whisper, 50.0)
+
+
+def test_the_campaign_holds_what_the_runs_say() -> None:
+    hidden = hide((5, 4), ("load_severity",), 20.0)
+    told, seen = runs(hidden), campaign(hidden)
+    first = next(run for run in told if run["kind"] == "stationary_stribeck")
+    np.testing.assert_allclose(seen.stationary[0].plateaus.pressure, 1e5 * np.array(first["channels"]["pressure_bar"]))
+    np.testing.assert_allclose(
+        seen.stationary[0].plateaus.speed * RADIUS, np.array(first["channels"]["speed_rpm"]) * RPM * RADIUS
+    )
+    assert [run.cycles for run in seen.stationary] == sorted(run.cycles for run in seen.stationary)
+    assert len(seen.duty) == len(seen.stationary) - 1
+    assert all(block.energy is not None and block.energy > 1e3 for block in seen.duty)
+    assert {run["cycles"] for run in told if run["kind"] == "dynamic_stribeck"} == {run.cycles for run in seen.dynamic}
+
+
+@pytest.mark.parametrize("key", sorted(ASKED))
+def test_an_advised_test_is_made_with_the_same_secret(key: str) -> None:
+    hidden = hide((5, 6), ("torque_zero_shift",), 20.0, states=4)
+    before, after = campaign(hidden), campaign(with_test(hidden, key))
+    old = {run.run_id for run in (*before.stationary, *before.dynamic)}
+    new = [run for run in (*after.stationary, *after.dynamic) if run.run_id not in old]
+    assert new
+    assert all(run.cycles >= before.stationary[-1].cycles for run in new)
+    for was, now in zip(before.stationary, after.stationary, strict=False):
+        np.testing.assert_array_equal(was.plateaus.torque, now.plateaus.torque)

@@ -1,0 +1,72 @@
+"""The table itself: one who knows the truth meets every target, one who is told the wrong truth does not."""
+
+from dataclasses import replace
+
+import pytest
+
+from tests.blind import __main__ as blind
+from tests.blind import table
+from tests.blind.rig.makers import CATALOGUED, OUTSIDE
+from tests.blind.rows import counts, trials, wilson
+from tests.blind.trials import Outcome, Trial
+
+
+def all_knowing(trial: Trial) -> Outcome:
+    """What a perfect diagnosis says."""
+    verdict, causes, where = "cause_named", frozenset(trial.slugs), ()
+    if not trial.slugs:
+        verdict = "model_adequate"
+    elif trial.without or not set(trial.slugs) <= CATALOGUED.keys():
+        verdict, causes, where = "unexplained_structure", frozenset(), ("cycles",)
+    elif "oil" in trial.wanted:
+        verdict, causes = "cause_ambiguous", causes | {"torque_zero_shift"}
+    candidates = tuple((slug, 0.9) for slug in sorted(causes, reverse=verdict == "cause_ambiguous"))
+    if verdict == "cause_ambiguous":
+        candidates = ((trial.slugs[0], 0.9), ("torque_zero_shift", 0.1))
+    return Outcome(trial, verdict, causes, candidates, where, frozenset(where), None, (), 0.5, {})
+
+
+def missed(outcomes: list[Outcome]) -> list[str]:
+    return [line.title for line in counts() if line.holds(*line.of(outcomes)) is False]
+
+
+def test_one_who_knows_meets_every_target_and_one_misled_does_not() -> None:
+    outcomes = [all_knowing(trial) for trial in trials(1, 0.1)]
+    assert missed(outcomes) == []
+    shifted = [*outcomes[41:], *outcomes[:41]]
+    misled = [replace(one, trial=other.trial) for one, other in zip(outcomes, shifted, strict=True)]
+    assert {"no effect: any verdict but `model_adequate`", "… named and wrong"} <= set(missed(misled))
+
+
+def test_every_effect_has_its_row_and_every_line_its_trials() -> None:
+    made = trials(1)
+    outcomes = [all_knowing(trial) for trial in made]
+    assert sum(trial.row == "none" for trial in made) == 400
+    rows = "\n".join(table.by_effect(outcomes))
+    assert all(f"| `{slug}` | 40 | 40/40 |" in rows for slug in CATALOGUED)
+    assert all(slug.replace("_", " ") in "\n".join(table.outside(outcomes)) for slug in OUTSIDE)
+    assert all(line.of(outcomes)[1] > 0 for line in counts() if "ambiguous" not in line.title)
+    assert len({trial.seed for trial in made}) == len(made)
+    assert {trial.seed for trial in made}.isdisjoint(trial.seed for trial in trials(2))
+
+
+def test_intervals_are_wilsons() -> None:
+    assert wilson(0, 10) == pytest.approx((0.0, 0.2775), abs=1e-4)  # Newcombe 1998, method 3
+    assert wilson(81, 263) == pytest.approx((0.2553, 0.3662), abs=1e-4)  # the same, table I
+
+
+def test_failures_say_how_to_repeat_them() -> None:
+    trial = Trial("one/oil_change", (1, 2, 3), ("oil_change",), 20.0)
+    wrong = replace(all_knowing(trial), causes=frozenset({"running_in"}))
+    assert "hide((1, 2, 3), ('oil_change',), 20.0)" in table.failures([wrong])[0]
+    assert table.failures([all_knowing(trial)]) == []
+
+
+def test_the_table_goes_between_its_markers_only(
+    tmp_path: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = tmp_path / "diagnosis.md"
+    page.write_text(f"before\n{blind.BEGIN}\nold\n{blind.END}\nafter\n")
+    monkeypatch.setattr(blind, "DOCUMENT", page)
+    blind.write(["| new |"])
+    assert page.read_text() == f"before\n{blind.BEGIN}\n\n| new |\n{blind.END}\nafter\n"

@@ -1,0 +1,122 @@
+"""One trial: hide, let the diagnosis look, note what it said beside what was true."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from models.diagnosis import engine
+from models.diagnosis.campaign import Campaign
+from models.diagnosis.report import Report
+from tests.blind.rig.hide import Hidden, hide
+from tests.blind.rig.more import with_test
+from tests.blind.rig.told import campaign
+
+Diagnose = Callable[..., Report]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What to hide and what to take out of the catalogue; `row` is the table's row, the seed makes it again."""
+
+    row: str
+    seed: tuple[int, ...]
+    slugs: tuple[str, ...] = ()
+    lam: float = 0.0
+    without: frozenset[str] = frozenset()
+    wanted: dict[str, Any] = field(default_factory=dict)
+    follow: bool = False  # make the advised test where the verdict is ambiguous
+
+    def hidden(self) -> Hidden:
+        return hide(self.seed, self.slugs, self.lam, **self.wanted)
+
+    def __str__(self) -> str:
+        more = "".join(f", {name}={value!r}" for name, value in self.wanted.items())
+        less = f"  without={sorted(self.without)}" if self.without else ""
+        return f"hide({self.seed}, {self.slugs}, {self.lam}{more}){less}"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What was said in a trial; `axes` are those of the truth, `where` those that the report names, strongest first."""
+
+    trial: Trial
+    verdict: str
+    causes: frozenset[str]
+    candidates: tuple[tuple[str, float], ...]
+    where: tuple[str, ...]
+    axes: frozenset[str]
+    gain: tuple[float, float, float] | None  # rmse before, after, noise
+    advice: tuple[str, ...]  # keys of the advised tests, best first
+    seconds: float  # of one core
+    statistics: dict[str, float]
+    error: str = ""
+    advised: "Outcome | None" = None  # what was said after the first advised test had been made
+
+    @property
+    def truth(self) -> frozenset[str]:
+        return frozenset(self.trial.slugs)
+
+    @property
+    def detected(self) -> bool:
+        return self.verdict not in {"model_adequate", "insufficient_data", "crashed"}
+
+    @property
+    def named(self) -> bool:
+        return self.verdict == "cause_named"
+
+    @property
+    def wrong(self) -> bool:
+        """Named, and something named that is not there."""
+        return self.named and not self.causes <= self.truth
+
+    @property
+    def in_set(self) -> bool:
+        """Something is reported, and all that is true stands in it."""
+        return self.verdict in {"cause_named", "cause_ambiguous"} and self.truth <= self.causes
+
+    @property
+    def top(self) -> bool:
+        return bool(self.candidates) and self.candidates[0][0] in self.truth
+
+
+def judge(trial: Trial, diagnose: Diagnose | None = None) -> Outcome:
+    """Hide, diagnose, and hold what was said beside what was true. A crash is an outcome, and never a good one."""
+    hidden = trial.hidden()
+    outcome = judged(trial, hidden, campaign(hidden), diagnose)
+    if trial.follow and outcome.verdict == "cause_ambiguous" and outcome.advice:
+        after = with_test(hidden, outcome.advice[0])
+        return replace(outcome, advised=judged(trial, after, campaign(after), diagnose))
+    return outcome
+
+
+def judged(trial: Trial, hidden: Hidden, seen: Campaign, diagnose: Diagnose | None = None) -> Outcome:
+    """The same where the campaign is at hand."""
+    look = diagnose or engine.diagnose
+    axes = frozenset().union(*(effect.axes for effect, _ in hidden.effects))
+    began = process_time()
+    try:
+        report = look(seen, rng=np.random.default_rng(11), without=trial.without)
+    except Exception as failure:  # noqa: BLE001 -- one crash must not end a night of trials; it fails its row instead
+        return Outcome(trial, "crashed", frozenset(), (), (), axes, None, (), 0.0, {}, repr(failure))
+    seconds = process_time() - began
+    where = sorted(report.baseline.where, key=lambda one: -one.strength) if report.baseline else []
+    gain = report.gain and (
+        report.gain.rmse_before,
+        report.gain.rmse_after,
+        report.baseline.noise if report.baseline else 0,
+    )
+    return Outcome(
+        trial=trial,
+        verdict=str(report.verdict),
+        causes=frozenset(report.causes),
+        candidates=tuple((one.effect, one.probability) for one in report.candidates),
+        where=tuple(one.axis for one in where),
+        axes=axes,
+        gain=gain,
+        advice=tuple(one.key for one in report.advice),
+        seconds=seconds,
+        statistics=dict(report.statistics),
+    )

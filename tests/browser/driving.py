@@ -1,0 +1,128 @@
+"""Driving a browser: launched the same way everywhere, and pages that note whatever they must not do."""
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx2
+from playwright.sync_api import Browser, BrowserType, Page, sync_playwright
+
+from tests.browser import find
+from tests.support import free_port
+
+#: Software rendering, so that 3D charts are drawn on a machine without a graphics card.
+ARGUMENTS = (
+    "--no-sandbox",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+)
+
+_LISTEN = """
+window.violations = [];
+document.addEventListener("securitypolicyviolation", (event) => {
+  window.violations.push(`${event.effectiveDirective} ${event.blockedURI} ${event.sourceFile}`);
+});
+"""
+
+
+def launched(kind: BrowserType, *, more: tuple[str, ...] = ()) -> Browser:
+    """A headless browser of that kind."""
+    return kind.launch(executable_path=find(), args=[*ARGUMENTS, *more])
+
+
+@contextmanager
+def chromium() -> Iterator[Browser]:
+    """A headless Chromium, closed at the end."""
+    with sync_playwright() as playwright:
+        found = launched(playwright.chromium)
+        yield found
+        found.close()
+
+
+class Watched:
+    """A page of the service, and what it asked for, said and violated."""
+
+    def __init__(self, browser: Browser, url: str, **context: Any) -> None:
+        self.url = url
+        self.context = browser.new_context(viewport=context.pop("viewport", {"width": 1360, "height": 900}), **context)
+        self.page = self.context.new_page()
+        self.asked: list[str] = []
+        self.said: list[str] = []
+        self.page.set_default_timeout(20_000)
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.on("console", lambda message: self.said.append(f"{message.type}: {message.text}"))
+        self.page.on("pageerror", lambda error: self.said.append(f"error: {error}"))
+        self.page.add_init_script(_LISTEN)
+
+    def open(self, path: str) -> Page:
+        """Go to a path of the service."""
+        self.page.goto(f"{self.url}{path}")
+        return self.page
+
+    def errors(self) -> list[str]:
+        """Console errors and uncaught exceptions."""
+        return [line for line in self.said if line.startswith("error")]
+
+    def abroad(self) -> list[str]:
+        """Requests that left the service's host."""
+        return [url for url in self.asked if not url.startswith((self.url, "data:", f"blob:{self.url}"))]
+
+    def violations(self) -> list[str]:
+        """Violations of the Content-Security-Policy since the page was loaded."""
+        found: list[str] = self.page.evaluate("window.violations")
+        return found
+
+    def close(self) -> None:
+        """Close the page; it must have behaved."""
+        found = (self.violations(), self.abroad(), self.errors())
+        self.context.close()
+        assert found == ([], [], [])
+
+
+_ENGINE = """
+import importlib, sys, uvicorn
+from models.diagnosis.extension import Extension
+from service.app import create_app
+from service.settings import Settings
+settings = Settings(database=sys.argv[1], engine=sys.argv[3])
+stand_in = importlib.import_module(sys.argv[3].partition(":")[0])
+for name, method in stand_in.METHODS.items():
+    setattr(Extension, name, method)
+uvicorn.run(create_app(settings), port=int(sys.argv[2]), log_level="warning")
+"""
+
+
+@contextmanager
+def serving_with_engine(database: Path, engine: str) -> Iterator[str]:
+    """A service whose diagnoses are made by a stand-in engine, which says what its extensions do there; its URL."""
+    port = free_port()
+    command = [sys.executable, "-c", _ENGINE, f"sqlite:///{database}", str(port), engine]
+    root = Path(__file__).parents[2]
+    process = subprocess.Popen(
+        command,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(root), os.environ.get("PYTHONPATH", "")])},
+        cwd=root,
+    )
+    url = f"http://127.0.0.1:{port}"
+    try:
+        deadline = time.monotonic() + 60
+        while time.monotonic() < deadline:
+            try:
+                if httpx2.get(f"{url}/readyz", timeout=5).status_code == 200:
+                    break
+            except httpx2.TransportError:
+                assert process.poll() is None, "the service ended before it was ready"
+                time.sleep(0.05)
+        yield url
+    finally:
+        process.terminate()
+        process.wait(timeout=30)

@@ -1,0 +1,54 @@
+"""The measurement model of tracking written out as one multivariate normal: slow, and apart from `models.tracking`."""
+
+import math
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+
+from models.tracking.linear import Points
+from models.tracking.measurement import Measurement
+from models.tracking.prior import Prior
+
+
+def integrated(progress: np.ndarray) -> np.ndarray:
+    """Covariance of δ with q · size = 1, by summing up its definition: curvature constant on sixths of the span,
+    independent between them, integrated twice over fine cells."""
+    edges = np.linspace(0.0, 1.0, 6_001)
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    courses = []
+    for stretch in range(6):
+        curvature = np.where(np.floor(6.0 * middles) == stretch, math.sqrt(18.0), 0.0)
+        slope = np.concatenate([[0.0], np.cumsum(curvature) / 6_000])
+        course = cumulative_trapezoid(slope, edges, initial=0.0)
+        courses.append(np.interp(progress / max(progress.max(), 1e-300), edges, course))
+    return np.array(courses).T @ np.array(courses)
+
+
+def normal(prior: Prior, measurements: list[Measurement], points: Points) -> tuple[np.ndarray, np.ndarray]:
+    """Mean [n, t] and covariance [n, t, t] of the measurements at n points, all linear terms integrated out."""
+    progress, variance, epoch = (np.array([getattr(m, name) for m in measurements], dtype=float) for name in NAMES)
+    growth = 1.0 + progress * np.exp(-points.log_scale)[:, None]
+    b = 1.0 - growth ** -np.exp(points.log_exponent)[:, None]
+    size = max(abs(prior.initial_mean), prior.initial_sd)
+    noise = variance + (1e-6 * math.hypot(prior.initial_sd, prior.change_sd)) ** 2
+    noise = noise + np.exp(2 * points.log_scatter)[:, None] + points.spoiled.T * (prior.spoiled_size * size) ** 2
+    covariance = prior.initial_sd**2 + prior.change_sd**2 * b[:, :, None] * b[:, None, :]
+    covariance += noise[:, :, None] * np.eye(progress.size)
+    covariance += (points.size * size)[:, None, None] ** 2 * integrated(progress)
+    for begun in np.unique(epoch)[1:]:
+        after = (epoch >= begun).astype(float)
+        covariance += (prior.step_size * size) ** 2 * np.outer(after, after)
+    return prior.initial_mean + prior.change_mean * b, covariance
+
+
+NAMES = ("progress", "variance", "epoch")
+
+
+def log_likelihood(prior: Prior, measurements: list[Measurement], points: Points) -> np.ndarray:
+    """Log probability of the measurements at n points [n]."""
+    mean, covariance = normal(prior, measurements, points)
+    value = np.array([m.value for m in measurements])
+    root = np.linalg.cholesky(covariance)
+    off = np.linalg.solve(root, (value - mean)[:, :, None])[:, :, 0]
+    log_determinant = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
+    return np.asarray(-0.5 * (np.square(off).sum(axis=1) + log_determinant + value.size * math.log(2.0 * math.pi)))

@@ -1,0 +1,96 @@
+"""axe-core's rules on every page and dialog, in light and dark, on a wide screen and on a phone."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import httpx2
+import pytest
+from axe_playwright_python.base import AXE_SCRIPT
+from playwright.sync_api import Browser, Page
+
+from tests.browser.driving import Watched, chromium, serving_with_engine
+from tests.browser.lives import worn
+
+pytestmark = pytest.mark.browser
+
+ENGINE = "tests.service.stand_in_engine:diagnose"
+PHONE = {"width": 390, "height": 844}
+WIDE = {"width": 1360, "height": 900}
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    with serving_with_engine(tmp_path_factory.mktemp("axe") / "clutchlife.db", ENGINE) as found:
+        with httpx2.Client(base_url=found, timeout=60) as http:
+            worn(http, "bench", last=4000)
+            http.post("/v1/clutches", json={"clutch_id": "waiting"})
+            http.post("/v1/clutches/bench/diagnoses", json={"adopt": False}).raise_for_status()
+        yield found
+
+
+def violations(page: Page) -> list[str]:
+    """What axe finds, a line an element."""
+    page.evaluate(AXE_SCRIPT)
+    found: dict[str, Any] = page.evaluate("axe.run({resultTypes: ['violations']})")
+    assert found["passes"] is not None
+    return [
+        f"{each['id']}: {node['html'][:160]} {node['failureSummary'][:300]}"
+        for each in found["violations"]
+        for node in each["nodes"]
+    ]
+
+
+@pytest.mark.parametrize(("scheme", "viewport"), [("light", WIDE), ("dark", PHONE)])
+def test_the_fleet(browser: Browser, url: str, scheme: str, viewport: dict[str, int]) -> None:
+    watched = Watched(browser, url, color_scheme=scheme, viewport=viewport)
+    page = watched.open("/")
+    page.locator("table.fleet tbody tr").first.wait_for()
+    assert violations(page) == []
+    # the rules themselves can fail
+    page.evaluate("document.body.append(Object.assign(document.createElement('img'), {src: '/assets/none'}))")
+    assert any(line.startswith("image-alt") for line in violations(page))
+    watched.context.close()
+
+
+@pytest.mark.parametrize(("scheme", "viewport"), [("light", PHONE), ("dark", WIDE)])
+def test_a_clutch_with_a_diagnosis_and_all_that_opens(
+    browser: Browser, url: str, scheme: str, viewport: dict[str, int]
+) -> None:
+    watched = Watched(browser, url, color_scheme=scheme, viewport=viewport)
+    page = watched.open("/clutches/bench")
+    page.locator("#chart-fan[data-drawn]").wait_for()
+    page.locator("#diagnosis .verdict").wait_for()
+    page.locator("#chart-fan summary").click()
+    page.locator("#chart-fan table").wait_for()
+    page.locator("#runs summary").first.click()
+    page.locator("#runs .facts").first.wait_for()
+    assert violations(page) == []
+    page.get_by_role("button", name="Adopt the extended model").click()
+    assert violations(page) == []
+    page.keyboard.press("Escape")
+    with page.expect_file_chooser() as chooser:
+        page.get_by_role("button", name="Send a run").click()
+    broken = {"name": "a.csv", "mimeType": "text/csv", "buffer": b"pressure_bar,speed_rpm,torque_nm\n5,20,x\n"}
+    chooser.value.set_files([broken])
+    dialog = page.get_by_role("dialog", name="Send a run")
+    dialog.get_by_label("Duty cycles since new").fill("9000")
+    page.keyboard.press("Enter")
+    dialog.get_by_text("Not stored.").wait_for()
+    assert violations(page) == []
+    assert page.evaluate("document.documentElement.scrollWidth") <= viewport["width"]
+    watched.context.close()
+
+
+def test_an_empty_clutch_and_an_unknown_one(browser: Browser, url: str) -> None:
+    watched = Watched(browser, url)
+    for path, title in (("waiting", "No run has arrived"), ("nobody", "No such clutch")):
+        page = watched.open(f"/clutches/{path}")
+        page.get_by_role("heading", name=title).wait_for()
+        assert violations(page) == []
+    watched.context.close()

@@ -1,0 +1,294 @@
+"""A clutch's page on the demo's life: every chart drawn, its table, its files, its report; live; runs sent by dropping."""
+
+import base64
+import csv
+import io
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx2
+import pytest
+from playwright.sync_api import Browser, Locator, Page, expect
+
+from tests.browser.driving import Watched, chromium, launched
+from tests.browser.lives import demo, loops, post
+from tests.browser.pixels import seen
+from tests.support import Server, serving, stationary
+
+pytestmark = pytest.mark.browser
+expect.set_options(timeout=20_000)
+
+CHARTS = {
+    "fan": "Mean COF against its threshold",
+    "foretold": "Remaining cycles, as foretold",
+    "cof": "Mean COF by pressure",
+    "stribeck": "Stribeck curves by state",
+    "surface": "Stribeck curves in 3D",
+    "static-torque-nm": "Static torque Ms",
+    "coulomb-ratio": "Coulomb ratio M̄c",
+    "stribeck-velocity-m-s": "Stribeck velocity VS",
+    "viscous-coefficient": "Viscous coefficient Cv",
+    "landscape": "A parameter over cycles and pressure",
+    "loop-curves": "Loops: torque over speed",
+    "loop-areas": "Loop area over cycles",
+}
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def life(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """The demo's life as sim-1, with two dynamic tests and an oil change beside what the simulation gives."""
+    with serving(tmp_path_factory.mktemp("life") / "clutchlife.db") as server:
+        with httpx2.Client(base_url=server.url, timeout=60) as http:
+            clutch_id = demo(http)
+            post(http, clutch_id, loops(0))
+            post(http, clutch_id, loops(5000))
+            note = "<img src=x onerror=alert(1)>"
+            post(http, clutch_id, {"kind": "maintenance", "cycles": 5000, "event": "oil_change", "note": note})
+        yield server
+
+
+@pytest.fixture(scope="module")
+def watched(browser: Browser, life: Server) -> Iterator[Watched]:
+    """A page on the demo's life that several tests look at, one after the other."""
+    found = Watched(browser, life.url)
+    yield found
+    found.close()
+
+
+def opened(watched: Watched) -> Page:
+    if watched.page.url.endswith("/clutches/sim-1"):
+        return watched.page
+    page = watched.open("/clutches/sim-1")
+    page.locator("#chart-fan[data-drawn]").wait_for()
+    page.locator("#runs .runs details").first.wait_for()
+    return page
+
+
+def drawn(page: Page, name: str) -> Locator:
+    """The chart, scrolled to and drawn."""
+    chart = page.locator(f"#chart-{name}")
+    chart.scroll_into_view_if_needed()
+    page.locator(f"#chart-{name}[data-drawn]").wait_for()
+    page.wait_for_timeout(100)
+    return chart
+
+
+def drop(page: Page, name: str, content: str) -> None:
+    """Drop a file on the page as a person would."""
+    data = base64.b64encode(content.encode()).decode()
+    page.evaluate(
+        """([name, data]) => {
+          const transfer = new DataTransfer();
+          transfer.items.add(new File([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], name));
+          for (const type of ["dragenter", "dragover", "drop"])
+            document.body.dispatchEvent(new DragEvent(type, {bubbles: true, cancelable: true, dataTransfer: transfer}));
+        }""",
+        [name, data],
+    )
+
+
+def test_every_chart_is_drawn(browser: Browser, watched: Watched) -> None:
+    page = opened(watched)
+    assert page.locator("figure.chart:visible h3").all_inner_texts() == list(CHARTS.values())
+    for name in CHARTS:
+        found = seen(browser, drawn(page, name).locator(".plot").screenshot())
+        assert found.is_chart, (name, found)
+        assert not found.is_dark, name
+    # the check itself can fail: what is no chart is not taken for one
+    assert not seen(browser, page.locator("#chart-fan figcaption .note").screenshot()).is_chart
+
+
+def test_dark_and_light_are_chosen_and_the_charts_follow(browser: Browser, watched: Watched) -> None:
+    page = opened(watched)
+    button = page.locator("#theme")
+    assert button.inner_text() == "Theme: system"
+    for theme, dark in (("light", False), ("dark", True), ("system", False)):
+        button.click()
+        assert button.inner_text() == f"Theme: {theme}"
+        for name in ("fan", "areas") if theme == "dark" else ("fan",):
+            chart = drawn(page, {"areas": "loop-areas"}.get(name, name))
+            page.wait_for_timeout(300)
+            found = seen(browser, chart.locator(".plot").screenshot())
+            assert (found.is_chart, found.is_dark) == (True, dark), (theme, name)
+    page.emulate_media(color_scheme="dark")
+    page.wait_for_timeout(300)
+    assert seen(browser, drawn(page, "fan").locator(".plot").screenshot()).is_dark
+    page.emulate_media(color_scheme="light")
+
+
+def test_a_violation_of_the_policy_would_be_noticed(watched: Watched) -> None:
+    page = opened(watched)
+    page.evaluate(
+        "document.head.append(Object.assign(document.createElement('script'), {textContent: 'window.ran = 1'}))"
+    )
+    assert page.evaluate("window.ran") is None
+    assert len(watched.violations()) == 1
+    page.evaluate("window.violations = []")
+    watched.said.clear()
+
+
+def test_what_the_page_says_is_what_the_service_says(watched: Watched) -> None:
+    page = opened(watched)
+    said = httpx2.get(f"{watched.url}/v1/clutches/sim-1/remaining-useful-life").json()
+    assert f"{round(100 * said['current']['health'])} %" in page.locator(".tiles").inner_text()
+    assert f"{said['as_of_cycles']:,}" in page.locator(".tiles").inner_text()
+    assert page.locator("h1 .tag").inner_text() == "simulated"
+    # a note is text, never markup
+    assert page.locator("#runs").get_by_text("<img src=x onerror=alert(1)>").is_visible()
+    warned = page.locator("#runs details").filter(has=page.locator(".warned")).first
+    warned.locator("summary").click()
+    warned.locator("table").wait_for()
+    assert warned.locator(".warnings li").count() >= 1
+
+
+def test_every_chart_has_a_table_a_png_and_a_csv(watched: Watched) -> None:
+    page = opened(watched)
+    for name in ("fan", "landscape"):
+        chart = drawn(page, name)
+        chart.locator("summary").click()
+        chart.locator("table tbody tr").nth(20).wait_for()
+        with page.expect_download() as png:
+            chart.get_by_role("button", name="PNG").click()
+        assert png.value.suggested_filename == f"sim-1-{name}.png"
+        head = Path(png.value.path()).read_bytes()
+        assert head.startswith(b"\x89PNG")
+        assert len(head) > 20_000
+    for chart in page.locator("figure.chart:visible").all():
+        assert chart.get_by_role("button", name="PNG").is_visible()
+        assert chart.get_by_role("button", name="CSV").is_visible()
+        assert chart.locator("summary").inner_text() == "Table"
+    with page.expect_download() as sheet:
+        page.locator("#chart-fan").get_by_role("button", name="CSV").click()
+    rows = list(csv.DictReader(io.StringIO(Path(sheet.value.path()).read_bytes().decode())))
+    pooled = httpx2.get(f"{watched.url}/v1/clutches/sim-1/degradation").json()["items"][0]["measured"]
+    measured = [float(row["mean COF"]) for row in rows if row["kind"] == "measured"]
+    assert measured == pooled["value"]
+
+
+def test_pressure_and_view_are_chosen_by_keyboard(watched: Watched) -> None:
+    page = opened(watched)
+    chart = page.locator("#chart-stribeck")
+    chart.scroll_into_view_if_needed()
+    select = chart.get_by_label("Pressure")
+    select.focus()
+    page.keyboard.press("ArrowDown")
+    expect(chart.locator(".note")).to_contain_text("At 5.5 bar")
+    assert page.evaluate("document.activeElement.tagName") == "SELECT"
+    expect(page.locator("#chart-static-torque-nm .controls select")).to_have_value("5.5")
+    surface = page.locator("#chart-surface")
+    surface.get_by_label("Torque over speed and").select_option("cycles")
+    expect(surface.locator(".note")).to_contain_text("over the life")
+    areas = page.locator("#chart-loop-areas summary")
+    areas.focus()
+    page.keyboard.press("Enter")
+    page.locator("#chart-loop-areas table tbody tr").first.wait_for()
+
+
+def test_a_run_posted_while_the_page_is_open_appears(browser: Browser, tmp_path: Path) -> None:
+    with serving(tmp_path / "clutchlife.db") as server, httpx2.Client(base_url=server.url, timeout=60) as http:
+        http.post("/v1/clutches", json={"clutch_id": "live"})
+        watched = Watched(browser, server.url)
+        page = watched.open("/clutches/live")
+        page.get_by_role("heading", name="No run has arrived").wait_for()
+        page.evaluate("window.same = true")
+        post(http, "live", stationary(0))
+        page.locator("#chart-fan[data-drawn]").wait_for()
+        expect(page.locator("#runs .runs details")).to_have_count(1)
+        assert page.locator("#chart-foretold").get_by_text("From the third stationary test on").is_visible()
+        page.locator("#chart-loop-curves").scroll_into_view_if_needed()
+        assert page.locator("#chart-loop-curves").get_by_text("No dynamic Stribeck test yet").is_visible()
+        for cycles in (1000, 2000):
+            post(http, "live", stationary(cycles))
+        expect(page.locator("#runs .runs details")).to_have_count(3)
+        page.locator("#chart-foretold").scroll_into_view_if_needed()
+        page.locator("#chart-foretold[data-drawn]").wait_for()
+        assert page.evaluate("window.same")
+        watched.close()
+
+
+def test_a_file_is_dropped_and_its_receipt_appears(browser: Browser, tmp_path: Path) -> None:
+    with serving(tmp_path / "clutchlife.db") as server:
+        watched = Watched(browser, server.url)
+        page = watched.open("/")
+        page.get_by_role("heading", name="No clutch is known yet").wait_for()
+        drop(page, "run-0.json", json.dumps(stationary(0)))
+        dialog = page.get_by_role("dialog", name="Send a run")
+        assert "Stationary Stribeck test at 0 cycles" in dialog.inner_text()
+        dialog.get_by_label("Clutch").fill("dropped")
+        dialog.get_by_role("button", name="Send").click()
+        dialog.get_by_text("Stored").wait_for()
+        assert dialog.locator("svg.curve circle").count() == 280
+        assert dialog.locator("svg.curve path").count() == 7
+        assert seen(browser, dialog.locator("svg.curve").screenshot()).is_chart
+        assert dialog.locator("table tbody tr").count() == 7
+        page.keyboard.press("Escape")
+        expect(dialog).to_have_count(0)
+        page.get_by_role("link", name="dropped").wait_for()
+        assert watched.errors() == [
+            "error: Failed to load resource: the server responded with a status of 404 (Not Found)"
+        ]
+        watched.said.clear()  # it asked whether the clutch is known
+        watched.close()
+
+
+def test_what_is_wrong_with_a_file_is_told_by_row(watched: Watched) -> None:
+    page = opened(watched)
+    runs = httpx2.get(f"{watched.url}/v1/clutches/sim-1").json()["runs"]
+    drop(page, "sweep.csv", "pressure_bar,speed_rpm,torque_nm\n5,20,21\n5,120,abc\n5,520,21.5\n5,1020,\n5,1970,20\n")
+    dialog = page.get_by_role("dialog", name="Send a run")
+    dialog.get_by_label("Duty cycles since new").fill("30000")
+    page.keyboard.press("Enter")
+    dialog.get_by_text("Not stored.").wait_for()
+    table = [row.split("\t") for row in dialog.locator("table tbody tr").all_inner_texts()]
+    assert [row[0] for row in table] == ["2", "4"]
+    assert table[0][1:3] == ["/channels/torque_nm/1", "abc"]
+    assert "must be a number" in table[0][3]
+    assert httpx2.get(f"{watched.url}/v1/clutches/sim-1").json()["runs"] == runs
+    dialog.get_by_role("button", name="Close").click()
+    assert [line for line in watched.errors() if "422" not in line] == []
+    watched.said.clear()
+
+
+def test_the_report_is_one_page_and_light(browser: Browser, life: Server) -> None:
+    watched = Watched(browser, life.url, color_scheme="dark")
+    page = opened(watched)
+    page.locator("#report img").nth(1).wait_for(state="attached")
+    pdf = page.pdf(prefer_css_page_size=True)
+    assert len(re.findall(rb"/Type\s*/Page[^s]", pdf)) == 1
+    page.emulate_media(media="print", color_scheme="dark")
+    assert not page.locator("main").is_visible()
+    report = page.locator("#report")
+    for part in ("sim-1", "Remaining cycles", "Threshold", "Diagnosis:", "The last tests"):
+        assert part in report.inner_text()
+    assert not seen(browser, report.screenshot()).is_dark
+    watched.close()
+
+
+def test_without_webgl_the_page_says_so_and_keeps_the_numbers(browser: Browser, life: Server) -> None:
+    other = launched(browser.browser_type, more=("--disable-3d-apis",))
+    watched = Watched(other, life.url)
+    page = opened(watched)
+    surface = page.locator("#chart-surface")
+    surface.scroll_into_view_if_needed()
+    surface.get_by_text("This browser does not draw in 3D").wait_for()
+    surface.locator("summary").click()
+    surface.locator("table tbody tr").nth(100).wait_for()
+    watched.close()
+    other.close()
+
+
+def test_an_unknown_clutch_is_said_to_be_unknown(browser: Browser, life: Server) -> None:
+    watched = Watched(browser, life.url)
+    page = watched.open("/clutches/nobody")
+    page.get_by_role("heading", name="No such clutch").wait_for()
+    assert all("404" in line for line in watched.errors())
+    watched.said.clear()
+    watched.close()

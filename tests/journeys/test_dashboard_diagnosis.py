@@ -1,0 +1,125 @@
+"""A diagnosis from the page: run, read, adopted after a question, taken back. The engine is a quick stand-in."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import httpx2
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.driving import Watched, chromium, serving_with_engine
+from tests.browser.lives import worn
+from tests.browser.pixels import seen
+
+pytestmark = pytest.mark.browser
+expect.set_options(timeout=30_000)
+
+ENGINE = "tests.service.stand_in_engine:diagnose"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture
+def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    with serving_with_engine(tmp_path_factory.mktemp("diagnosis") / "clutchlife.db", ENGINE) as found:
+        with httpx2.Client(base_url=found, timeout=60) as http:
+            worn(http, "bench", last=5000)
+        yield found
+
+
+def told(url: str, path: str) -> dict[str, Any]:
+    found: dict[str, Any] = httpx2.get(f"{url}/v1/clutches/bench{path}", timeout=60).json()
+    return found
+
+
+def test_a_diagnosis_is_run_adopted_and_taken_back(browser: Browser, url: str) -> None:
+    watched = Watched(browser, url)
+    page = watched.open("/clutches/bench")
+    section = page.locator("#diagnosis")
+    section.get_by_text("No diagnosis has been run yet").wait_for()
+    section.get_by_role("button", name="Run the diagnosis").click()
+    section.get_by_text("Cause named.").wait_for(timeout=60_000)
+    report = told(url, f"/diagnoses/{told(url, '/diagnoses')['items'][0]['diagnosis_id']}")
+    for part in (report["summary"], "Zero of the torque sensor", "17 % less error", "read the unloaded zero", "98 %"):
+        assert part in section.inner_text(), part
+    maps_are_drawn(browser, page)
+    expect(page.locator("#head .verdict")).to_contain_text("Out of specification")
+
+    adopt(page, agree=False)
+    assert told(url, "/remaining-useful-life")["model"]["name"] == "baseline"
+    adopt(page, agree=True)
+    expect(section).to_contain_text("This diagnosis is adopted")
+    assert told(url, "/remaining-useful-life")["model"]["effects"] == report["causes"]
+    expect(page.locator(".tiles")).to_contain_text("Torque zero shift")
+    expect(page.locator("#head .verdict")).not_to_contain_text("Out of specification")
+    page.evaluate("scrollTo(0, 0)")
+
+    section.get_by_role("button", name="Go back to the baseline").click()
+    dialog = page.get_by_role("dialog", name="Go back to the baseline?")
+    assert "no longer account for" in dialog.inner_text()
+    dialog.get_by_role("button", name="Go back").click()
+    section.get_by_role("button", name="Adopt the extended model").wait_for()
+    assert told(url, "/remaining-useful-life")["model"]["name"] == "baseline"
+    expect(page.locator(".tiles")).to_contain_text("without extension")
+
+    page.goto(f"{url}/")
+    row = page.locator("tr[data-clutch='bench']")
+    expect(row).to_contain_text("Out of specification")
+    expect(row.locator("td[data-label='Diagnosis']")).to_contain_text("Cause named")
+    watched.close()
+
+
+def adopt(page: Page, *, agree: bool) -> None:
+    page.get_by_role("button", name="Adopt the extended model").click()
+    dialog = page.get_by_role("dialog", name="Adopt")
+    said = dialog.inner_text()
+    for part in ("Torque zero shift", "computed anew", "The runs themselves are not touched", "Now", "Then"):
+        assert part in said, part
+    if agree:
+        dialog.get_by_role("button", name="Adopt it").click()
+    else:
+        page.keyboard.press("Escape")
+    expect(dialog).to_have_count(0)
+
+
+def maps_are_drawn(browser: Browser, page: Page) -> None:
+    for name in ("map-speed", "map-cycles", "diagnosis-loops"):
+        chart = page.locator(f"#chart-{name}")
+        chart.scroll_into_view_if_needed()
+        page.locator(f"#chart-{name}[data-drawn]").wait_for()
+        page.wait_for_timeout(200)
+        assert seen(browser, chart.locator(".plot").screenshot()).is_chart, name
+
+
+def test_a_failed_diagnosis_says_why(browser: Browser, url: str) -> None:
+    watched = Watched(browser, url)
+    page = watched.page
+    answer = told(url, "/diagnoses")
+    problem = {
+        "type": "about:blank",
+        "title": "Busy",
+        "status": 503,
+        "detail": "16 diagnoses wait already: ask again",
+        "errors": [],
+        "total_errors": 0,
+    }
+
+    def refuse(route: Any) -> None:
+        if route.request.method == "POST":
+            route.fulfill(status=503, json=problem, headers={"Retry-After": "1"})
+        else:
+            route.continue_()
+
+    page.route("**/diagnoses*", refuse)
+    watched.open("/clutches/bench")
+    page.get_by_role("button", name="Run the diagnosis").click()
+    page.locator("#diagnosis").get_by_text("16 diagnoses wait already").wait_for()
+    assert page.get_by_role("button", name="Run the diagnosis").is_enabled()
+    assert told(url, "/diagnoses") == answer
+    assert all("503" in line for line in watched.errors())
+    watched.said.clear()
+    watched.close()

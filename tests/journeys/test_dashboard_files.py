@@ -1,0 +1,85 @@
+"""The pages' files: what browsers may keep, what is compressed, what may run; and that no chart library is imported."""
+
+import gzip
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import httpx2
+import pytest
+
+from tests.support import serving
+
+PAGES = ("/", "/clutches/bench3-017")
+
+
+@pytest.fixture(scope="module")
+def http(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx2.Client]:
+    """A client of an empty service."""
+    with (
+        serving(tmp_path_factory.mktemp("files") / "clutchlife.db") as server,
+        httpx2.Client(base_url=server.url, timeout=60) as found,
+    ):
+        yield found
+
+
+def assets_of(http: httpx2.Client, path: str) -> list[str]:
+    return re.findall(r'(?:src|href)="(/assets/[^"]+)"', http.get(path).text)
+
+
+@pytest.mark.parametrize("path", PAGES)
+def test_a_page_names_its_files_by_their_content(http: httpx2.Client, path: str) -> None:
+    page = http.get(path)
+    assert page.headers["content-type"] == "text/html; charset=utf-8"
+    assert page.headers["cache-control"] == "no-cache"
+    assert http.get(path, headers={"If-None-Match": page.headers["etag"]}).status_code == 304
+    names = assets_of(http, path)
+    assert len(names) >= 4
+    for name in names:
+        answer = http.get(name)
+        assert answer.status_code == 200, name
+        assert "immutable" in answer.headers["cache-control"]
+        assert answer.headers["content-encoding"] == "gzip"
+        stale = re.sub("/assets/[0-9a-f]+/", "/assets/0000/", name)
+        assert http.get(stale).headers["cache-control"] == "no-store"
+
+
+def test_the_plotting_library_goes_out_compressed(http: httpx2.Client) -> None:
+    name = next(name for name in assets_of(http, PAGES[1]) if name.endswith("plotly.min.js"))
+    with http.stream("GET", name, headers={"Accept-Encoding": "gzip"}) as answer:
+        raw = b"".join(answer.iter_raw())
+    assert len(raw) < 1_700_000
+    text = gzip.decompress(raw).decode()
+    assert "plotly.js v" in text[:200]
+    assert "MIT license" in text[:400]
+    plain = http.get(name, headers={"Accept-Encoding": "identity"})
+    assert "content-encoding" not in plain.headers
+    assert plain.text == text
+    assert plain.headers["etag"] != answer.headers["etag"]
+
+
+def test_only_files_of_the_service_may_run(http: httpx2.Client) -> None:
+    for path in (*PAGES, "/v1/clutches", "/nowhere"):
+        policy = dict(
+            part.strip().split(" ", 1) for part in http.get(path).headers["content-security-policy"].split(";")
+        )
+        assert policy["script-src"] == "'self'"
+        assert policy["default-src"] == "'self'"
+        assert policy["frame-ancestors"] == "'none'"
+    # the description of the API starts from an inline script, and it alone may
+    assert "script-src 'self' 'unsafe-inline'" in http.get("/docs").headers["content-security-policy"]
+
+
+def test_what_is_no_asset_is_not_there(http: httpx2.Client) -> None:
+    folder = assets_of(http, "/")[0].rsplit("/", 1)[0]
+    for name in ("nothing.js", "fleet.html", "%2e%2e%2froutes.py", "..%2f..%2froutes.py"):
+        answer = http.get(f"{folder}/{name}")
+        assert answer.status_code == 404, name
+        assert answer.headers["content-type"] == "application/problem+json"
+
+
+def test_the_plotting_library_is_found_and_not_imported() -> None:
+    code = "import sys; from service.dashboard import assets; assets.load(); print('plotly' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"

@@ -1,0 +1,238 @@
+"""The fleet's page: empty, filling, worst first, live, by keyboard, with a service that goes away and comes back."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx2
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.driving import Watched, chromium
+from tests.browser.lives import post, worn
+from tests.support import Server, serving, stationary
+
+pytestmark = pytest.mark.browser
+expect.set_options(timeout=20_000)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A worn-out clutch, an ageing one, a new one and one without a run."""
+    with serving(tmp_path_factory.mktemp("fleet") / "clutchlife.db") as server:
+        with httpx2.Client(base_url=server.url, timeout=60) as http:
+            worn(http, "ageing", last=4000)
+            for name, last in (("worn-out", 19_000), ("new", 500)):
+                http.post("/v1/clutches", json={"clutch_id": name, "friction_material": "<i>carbon</i>"})
+                for cycles in range(0, last + 1, 500 if name == "new" else 1900):
+                    post(http, name, stationary(cycles, wear=cycles / 26_000))
+            http.post("/v1/clutches", json={"clutch_id": "waiting"})
+        yield server
+
+
+@pytest.fixture
+def watched(browser: Browser, fleet: Server) -> Iterator[Watched]:
+    found = Watched(browser, fleet.url)
+    yield found
+    found.close()
+
+
+def rows(page: Page) -> list[str]:
+    page.locator("table.fleet tbody tr").first.wait_for()
+    return page.locator("table.fleet tbody th a").all_inner_texts()
+
+
+def test_an_empty_service_says_what_to_do_and_fills_by_itself(browser: Browser, server: Server) -> None:
+    watched = Watched(browser, server.url)
+    watched.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    page = watched.open("/")
+    page.get_by_role("heading", name="No clutch is known yet").wait_for()
+    commands = "\n".join(page.locator("pre").all_inner_texts())
+    for part in ("clutchlife simulate", f"clutchlife push campaign --clutch sim-7 --url {server.url}", "curl "):
+        assert part in commands
+    page.get_by_role("button", name="Copy: clutchlife simulate").click()
+    page.get_by_text("copied", exact=True).wait_for()
+    assert page.evaluate("navigator.clipboard.readText()").startswith("clutchlife simulate")
+    page.evaluate("window.same = true")
+    httpx2.post(f"{server.url}/v1/clutches", json={"clutch_id": "first"})
+    page.get_by_role("link", name="first").wait_for()
+    assert page.evaluate("window.same")
+    page.get_by_role("link", name="first").click()
+    page.get_by_role("heading", name="No run has arrived for this clutch yet").wait_for()
+    assert f"--clutch first --url {server.url}" in page.locator("pre").first.inner_text()
+    watched.close()
+
+
+def test_the_worst_comes_first_with_all_that_is_asked_of_a_row(watched: Watched) -> None:
+    page = watched.open("/")
+    assert rows(page) == ["worn-out", "ageing", "new", "waiting"]
+    first = page.locator("tr[data-clutch='worn-out']")
+    assert first.locator(".state").inner_text().split("\n") == ["Failure", "end of life reached"]
+    ageing = page.locator("tr[data-clutch='ageing']")
+    said = httpx2.get(f"{watched.url}/v1/clutches/ageing").json()
+    assert f"{100 * said['summary']['current']['health']:.0f} %" in ageing.inner_text()
+    assert " to " in ageing.locator("td[data-label='Remaining']").inner_text()
+    for drawing in (".spark polyline", ".interval .median", ".health .fill"):
+        assert ageing.locator(drawing).count() == 1, drawing
+    assert "ago" in ageing.locator("time").inner_text() or "now" in ageing.locator("time").inner_text()
+    assert "Maintenance at 4,000 cycles" in ageing.inner_text()
+    assert "not asked" in ageing.inner_text()
+    # what comes from outside is text, never markup
+    assert "<i>carbon</i> on steel" in first.inner_text()
+
+
+def test_states_differ_in_word_shape_and_colour(watched: Watched) -> None:
+    page = watched.open("/")
+    rows(page)
+    found = page.eval_on_selector_all(
+        "table.fleet .state svg",
+        "icons => icons.map(i => [i.outerHTML, getComputedStyle(i).color, i.nextSibling.firstChild.textContent])",
+    )
+    by_word = {word: (shape, colour) for shape, colour, word in found}
+    assert set(by_word) == {"Failure", "Normal", "Function check"}
+    assert len({shape for shape, _ in by_word.values()}) == len({colour for _, colour in by_word.values()}) == 3
+
+
+def test_searching_and_filtering(watched: Watched) -> None:
+    page = watched.open("/")
+    rows(page)
+    page.get_by_label("Find").fill("carbon")
+    expect(page.locator("table.fleet tbody tr:visible")).to_have_count(2)
+    page.get_by_role("button", name="1 failure").click()
+    expect(page.locator("table.fleet tbody tr:visible")).to_have_count(1)
+    page.get_by_label("Find").fill("nobody")
+    page.get_by_text("No clutch fits").wait_for()
+    page.get_by_label("Find").fill("")
+    page.get_by_role("button", name="4 clutches").click()
+    expect(page.locator("table.fleet tbody tr:visible")).to_have_count(4)
+
+
+def test_by_keyboard_alone(watched: Watched) -> None:
+    page = watched.open("/")
+    rows(page)
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.textContent") == "To the clutches"
+    page.keyboard.press("Enter")
+    assert page.evaluate("document.activeElement.id") == "main"
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.id") == "find"
+    page.keyboard.press("Tab")
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")
+    expect(page.locator("table.fleet tbody tr:visible")).to_have_count(1)
+    assert page.evaluate("document.activeElement.dataset.state") == "failure"
+    for _ in range(10):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.tagName") == "A":
+            break
+    outline = page.evaluate("getComputedStyle(document.activeElement).outlineWidth")
+    assert float(outline.removesuffix("px")) >= 2
+    page.keyboard.press("Enter")
+    page.get_by_role("heading", name="worn-out").wait_for()
+
+
+@pytest.mark.parametrize("width", [320, 390, 1360, 2560])
+def test_no_width_scrolls_sideways(browser: Browser, fleet: Server, width: int) -> None:
+    watched = Watched(browser, fleet.url, viewport={"width": width, "height": 800})
+    page = watched.open("/")
+    rows(page)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    watched.close()
+
+
+def test_a_poll_without_news_costs_a_few_hundred_bytes(watched: Watched) -> None:
+    network = watched.context.new_cdp_session(watched.page)
+    network.send("Network.enable")
+    addresses: dict[str, tuple[str, int]] = {}
+    bytes_of: dict[str, float] = {}
+    network.on(
+        "Network.responseReceived",
+        lambda event: addresses.update({event["requestId"]: (event["response"]["url"], event["response"]["status"])}),
+    )
+    network.on(
+        "Network.loadingFinished", lambda event: bytes_of.update({event["requestId"]: event["encodedDataLength"]})
+    )
+    page = watched.open("/")
+    rows(page)
+    polls: list[tuple[int, float]] = []
+    while len(polls) < 3:
+        page.wait_for_timeout(500)
+        polls = [
+            (status, bytes_of[number])
+            for number, (url, status) in addresses.items()
+            if "/v1/clutches?" in url and number in bytes_of
+        ]
+    assert [status for status, _ in polls][:3] == [200, 304, 304]
+    first, *others = (size for _, size in polls)
+    print(f"\nbytes a poll: {first:.0f} with news, {[round(size) for size in others]} without")
+    assert first > 2000
+    assert all(size < 600 for size in others)
+
+
+def test_a_hidden_tab_asks_nothing(watched: Watched) -> None:
+    page = watched.page
+    page.add_init_script(
+        "window.away = false; Object.defineProperty(document, 'hidden', {get: () => window.away, configurable: true});"
+    )
+    watched.open("/")
+    rows(page)
+    page.evaluate("window.away = true; document.dispatchEvent(new Event('visibilitychange'))")
+    page.get_by_text("Paused, as of").wait_for()
+    before = len(watched.asked)
+    page.wait_for_timeout(4500)
+    assert len(watched.asked) == before
+    page.evaluate("window.away = false; document.dispatchEvent(new Event('visibilitychange'))")
+    page.get_by_text("Live, as of").wait_for()
+    assert before < len(watched.asked) <= before + 2
+
+
+def test_a_service_that_goes_away_and_comes_back(browser: Browser, tmp_path: Path) -> None:
+    with serving(tmp_path / "clutchlife.db") as server:
+        httpx2.post(f"{server.url}/v1/clutches", json={"clutch_id": "kept"})
+        watched = Watched(browser, server.url)
+        page = watched.open("/")
+        page.get_by_role("link", name="kept").wait_for()
+        server.stop()
+        page.get_by_text("No answer from the service; as of").wait_for()
+        assert page.get_by_role("link", name="kept").is_visible()
+        waits = page.locator(".asof").inner_text()
+        assert "next try in" in waits
+        server.start()
+        httpx2.post(f"{server.url}/v1/clutches", json={"clutch_id": "after"})
+        page.get_by_role("link", name="after").wait_for(timeout=60_000)  # it had backed off
+        page.get_by_text("Live, as of").wait_for()
+        assert watched.violations() == []
+        watched.context.close()
+
+
+def test_with_keys_the_page_asks_for_one(browser: Browser, tmp_path: Path) -> None:
+    from service import security
+    from storage import keys
+    from storage.database import open_database
+
+    with serving(tmp_path / "clutchlife.db") as server:
+        httpx2.post(f"{server.url}/v1/clutches", json={"clutch_id": "secret"})
+        text, row = security.make_key("read", "", created_at="2026-01-01T00:00:00Z")
+        database = open_database(f"sqlite:///{tmp_path / 'clutchlife.db'}")
+        with database.writing() as connection:
+            keys.insert(connection, row)
+        database.close()
+        watched = Watched(browser, server.url)
+        page = watched.open("/")
+        page.get_by_role("heading", name="This service asks for a key").wait_for()
+        assert "secret" not in page.content()
+        page.get_by_role("textbox", name="Key").fill("wrong")
+        page.get_by_role("button", name="Use this key").click()
+        page.get_by_text("the key is not known").wait_for()
+        page.get_by_role("textbox", name="Key").fill(text)
+        page.keyboard.press("Enter")
+        page.get_by_role("link", name="secret").click()
+        page.get_by_role("heading", name="No run has arrived").wait_for()
+        assert all(text not in url for url in watched.asked)
+        assert page.evaluate("localStorage.length") == 0
+        watched.context.close()

@@ -1,0 +1,126 @@
+"""The diagnosis by the real engine over a real socket: asked for by a person, by a script, of a service that dies."""
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from tests.support import Server, serving, stationary
+
+BASE = "/v1/clutches/c1"
+
+
+def post_tests(http: httpx2.Client, *cycles: float) -> None:
+    http.post("/v1/clutches", json={"clutch_id": "c1"})
+    for each in cycles:
+        assert http.post(f"{BASE}/runs", json=stationary(each, run_id=f"r{each:g}")).status_code == 201
+
+
+def finished(http: httpx2.Client, path: str) -> dict[str, object]:
+    deadline = time.monotonic() + 240
+    while time.monotonic() < deadline:
+        found: dict[str, object] = http.get(path).json()
+        if found["status"] != "running":
+            return found
+        time.sleep(0.2)
+    raise TimeoutError(path)
+
+
+def test_a_kill_during_a_diagnosis_leaves_a_sane_state(tmp_path: Path) -> None:
+    server = Server(tmp_path / "clutchlife.db")
+    server.start()
+    with httpx2.Client(base_url=server.url, timeout=60) as http:
+        post_tests(http, 0, 1000, 2000, 3000)
+        asked = http.post(f"{BASE}/diagnoses", json={"adopt": True}, headers={"Prefer": "wait=0"})
+        assert (asked.status_code, asked.json()["status"]) == (202, "running")
+        place = asked.headers["Location"]
+        time.sleep(0.5)
+        server.kill()
+    assert _children_end(server.database)
+    server.start()
+    try:
+        with httpx2.Client(base_url=server.url, timeout=300) as http:
+            found = http.get(place).json()
+            assert (found["status"], "ask again" in found["problem"]) == ("failed", True)
+            assert http.get(f"{BASE}/model").json()["model"]["name"] == "baseline"
+            post_tests(http, 4000)
+            again = http.post(f"{BASE}/diagnoses", json={}, headers={"Prefer": "wait=240"})
+            assert (again.status_code, again.json()["status"]) == (201, "finished"), again.json()["problem"]
+            assert [each["status"] for each in http.get(f"{BASE}/diagnoses").json()["items"]] == ["finished", "failed"]
+    finally:
+        assert server.stop() in (0, -15)
+
+
+def _children_end(database: Path) -> bool:
+    """Whether no process that works on the database is left, within a few seconds."""
+    deadline = time.monotonic() + 30
+    while time.monotonic() < deadline:
+        commands = [path.read_bytes() for path in Path("/proc").glob("[0-9]*/cmdline") if _readable(path)]
+        if not any(b"diagnosis_process" in each and str(database).encode() in each for each in commands):
+            return True
+        time.sleep(0.1)
+    return False
+
+
+def _readable(path: Path) -> bool:
+    try:
+        path.read_bytes()
+    except OSError:
+        return False
+    return True
+
+
+def test_a_stop_does_not_wait_for_a_diagnosis(tmp_path: Path) -> None:
+    with serving(tmp_path / "clutchlife.db") as server, httpx2.Client(base_url=server.url, timeout=60) as http:
+        post_tests(http, 0, 1000, 2000)
+        http.post(f"{BASE}/diagnoses", json={}, headers={"Prefer": "wait=0"})
+        began = time.monotonic()
+        assert server.stop() in (0, -15)
+        assert time.monotonic() - began < 15
+        assert _children_end(server.database)
+
+
+@pytest.fixture(scope="module")
+def commanded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """What `clutchlife diagnose` prints of four tests, for a person and as JSON; and what `export` writes."""
+    folder = tmp_path_factory.mktemp("commanded")
+    with serving(folder / "clutchlife.db") as server:
+        with httpx2.Client(base_url=server.url, timeout=60) as http:
+            post_tests(http, 0, 1000, 2000, 3000)
+        said = clutchlife("diagnose", "c1", "--url", server.url)
+        (folder / "report.json").write_text(clutchlife("diagnose", "c1", "--json", "--url", server.url))
+        (folder / "model.txt").write_text(clutchlife("model", "c1", "--baseline", "--url", server.url))
+        clutchlife("export", "c1", "--out", str(folder / "export"), "--url", server.url)
+        assert "no clutch is known" in clutchlife("diagnose", "nobody", "--url", server.url, code=65)
+        assert "not both" in clutchlife("model", "c1", "--baseline", "--adopt", "x", "--url", server.url, code=64)
+        assert "no diagnosis" in clutchlife("model", "c1", "--adopt", "x", "--url", server.url, code=65)
+    return folder, said
+
+
+def clutchlife(*arguments: str, code: int = 0) -> str:
+    done = subprocess.run(
+        [sys.executable, "-m", "service.cli.main", *arguments], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == code, done.stderr + done.stdout
+    return done.stdout if code == 0 else done.stderr
+
+
+def test_the_command_tells_a_person_what_json_tells_a_script(commanded: tuple[Path, str]) -> None:
+    folder, said = commanded
+    report = json.loads((folder / "report.json").read_text())
+    assert report["status"] == "finished"
+    assert " ".join(report["summary"].split())[:40] in " ".join(said.replace("│", " ").split())
+    assert "baseline" in (folder / "model.txt").read_text()
+
+
+def test_what_is_exported_holds_the_diagnoses(commanded: tuple[Path, str]) -> None:
+    folder, _ = commanded
+    diagnoses = json.loads((folder / "export" / "results" / "diagnoses.json").read_text())
+    report = json.loads((folder / "report.json").read_text())
+    assert len(diagnoses) == 2
+    assert diagnoses[0]["verdict"] == report["verdict"]
+    assert json.loads((folder / "export" / "results" / "model.json").read_text())["model"]["name"] == "baseline"

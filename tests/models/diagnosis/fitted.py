@@ -1,0 +1,45 @@
+"""Campaigns fitted once for the tests of what follows from a fit: a baseline, and one or several extended models."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.campaign import Campaign
+from models.diagnosis.catalogue import BY_SLUG
+from models.diagnosis.design import Design, build_design
+from models.diagnosis.effect import Shape
+from models.diagnosis.engine import Baseline, fit_baseline
+from models.diagnosis.fitting import Fit, Fitted, fit
+from tests.models.diagnosis.campaigns import Where
+
+
+@dataclass(frozen=True)
+class Study:
+    """A campaign, its design and its baseline."""
+
+    campaign: Campaign
+    design: Design
+    baseline: Baseline
+
+    def extended(self, *effects: tuple[str, float, Shape]) -> Fit:
+        """The baseline with effects (slug, first amplitude, shape) fitted along."""
+        start = [Fitted(effect=BY_SLUG[slug], amplitude=first, shape=shape) for slug, first, shape in effects]
+        return fit(self.design, self.baseline.noise, self.baseline.fit.laws, self.baseline.priors, start)
+
+
+def study(campaign: Campaign) -> Study:
+    design = build_design(campaign)
+    return Study(campaign, design, fit_baseline(design))
+
+
+def warmth(at: Where) -> FloatArray:
+    """Torque falls by 0.3 % of its viscous part a kelvin: no formula of viscosity."""
+    viscous = at.parameters.viscous_coefficient * at.velocity**0.3
+    return np.asarray(-0.03 * viscous * (at.temperature - 358.15), dtype=np.float64)
+
+
+def bump(at: Where) -> FloatArray:
+    """Three percent more torque about 3 m/s: outside of the catalogue."""
+    level = at.pressure / 4e5 * 20
+    return np.asarray(0.02 * level * np.exp(-0.5 * ((at.velocity - 3.0) / 0.8) ** 2), dtype=np.float64)

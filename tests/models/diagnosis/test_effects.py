@@ -1,0 +1,83 @@
+"""Every effect of the catalogue: what its change looks like, its units and its limits."""
+
+import numpy as np
+import pytest
+
+from models.diagnosis.baseline import frame_of, predict
+from models.diagnosis.campaign import Oil
+from models.diagnosis.catalogue import BY_SLUG, CATALOGUE
+from models.diagnosis.design import build_design
+from models.diagnosis.effect import Effect, Kind, unit_change
+from models.diagnosis.laws import Scene
+from models.diagnosis.starting import starting_laws
+from models.diagnosis.viscosity import viscosity
+from tests.models.diagnosis.campaigns import campaign
+
+SLUGS = (
+    "oil_temperature interface_heating viscous_exponent hydrodynamic_drag torque_zero_shift pressure_offset "
+    "unsettled_dwell channel_delay inertia_torque squeeze_film shaft_ripple stick_slip running_in oil_change "
+    "accelerated_wear load_severity rest_recovery"
+).split()
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    design = build_design(campaign(1))
+    return predict(design, starting_laws(design, frame_of(design))).scene
+
+
+def test_the_catalogue_is_the_contracts() -> None:
+    assert [effect.slug for effect in CATALOGUE] == SLUGS
+    assert all(set(effect.tests) <= {*SLUGS, "baseline"} for effect in CATALOGUE)
+
+
+@pytest.mark.parametrize("effect", CATALOGUE, ids=SLUGS)
+def test_no_amplitude_no_change_and_all_changes_are_finite(effect: Effect, scene: Scene) -> None:
+    for tried in effect.grid(scene.facts):
+        assert np.abs(effect.change(scene, 0.0, tried.shape)).max() < 1e-9
+        column = unit_change(effect, scene, tried.shape)
+        assert column.shape == scene.curve.shape
+        assert np.isfinite(column).all()
+        assert np.abs(column).max() > 0
+        doubled = effect.change(scene, 2e-3 * effect.prior_sd, tried.shape) / (2e-3 * effect.prior_sd)
+        assert np.abs(doubled - column).max() < 0.02 * np.abs(column).max()  # small amplitudes act in proportion
+
+
+def test_effects_of_loops_leave_plateaus_alone(scene: Scene) -> None:
+    for effect in CATALOGUE:
+        if effect.kind is Kind.LAG:
+            for tried in effect.grid(scene.facts):
+                assert np.abs(effect.change(scene, effect.prior_sd, tried.shape)[scene.points.steady]).max() == 0
+
+
+def test_units_of_a_few(scene: Scene) -> None:
+    steady = scene.points.steady
+    inertia = BY_SLUG["inertia_torque"].change(scene, 1.0, ())
+    np.testing.assert_allclose(inertia, scene.points.acceleration / 0.058)  # 1 kg m² feels dω/dt
+    drag = BY_SLUG["hydrodynamic_drag"].change(scene, 1.0, (1.0, 0.0, 0.0))
+    assert np.ptp(drag[steady] / scene.points.velocity[steady]) < 1e-12  # pressure is not in it
+    offset = BY_SLUG["pressure_offset"].change(scene, 1000.0, (0.0, 0.0))
+    higher = scene.curve_at(pressure=scene.points.pressure + 1000.0) - scene.curve
+    np.testing.assert_allclose(offset, higher, rtol=0.02, atol=1e-4)
+    zero = BY_SLUG["torque_zero_shift"].change(scene, 0.5, (0.0, 2000.0))
+    assert set(np.unique(zero)) == {0.0, 0.5}
+    assert (zero[scene.points.cycles > 2000.0] == 0.5).all()
+
+
+def test_a_delay_is_the_torque_of_a_moment_before(scene: Scene) -> None:
+    delayed = scene.curve + BY_SLUG["channel_delay"].change(scene, 0.05, ())
+    loop = np.flatnonzero(scene.points.loop == 0)
+    phase, late = scene.points.phase[loop], 0.05 * scene.points.angular_frequency[loop]
+    expected = np.interp(phase - late, phase, scene.curve[loop], period=2 * np.pi)
+    away = scene.points.velocity[loop] > 1.0  # the cusp at rest is no parabola
+    np.testing.assert_allclose(delayed[loop][away], expected[away], rtol=2e-4)
+
+
+def test_viscosity_meets_its_two_points_and_one_of_the_reference() -> None:
+    oil = Oil(viscosity_40=56e-6, viscosity_100=9.3e-6)
+    found = viscosity(np.array([313.15, 373.15, 353.15, 363.15]), oil)
+    np.testing.assert_allclose(found[:2], [56e-6, 9.3e-6], rtol=1e-9)
+    # log10 log10(ν + 0.7) = 8.2404 - 3.2040 log10 T, rounded coefficients: 1 % of ν
+    expected = 10 ** 10 ** (8.2404 - 3.2040 * np.log10([353.15, 363.15])) - 0.7
+    np.testing.assert_allclose(found[2:] * 1e6, expected, rtol=0.01)
+    assert 0.2 < 1 - found[3] / found[2] < 0.24  # 22 % over the reference's 80 to 90 °C

@@ -1,0 +1,143 @@
+"""The whole diagnosis on small campaigns: calm where nothing is, right where something loud is planted, honest else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.diagnosis.campaign import Campaign, MaintenanceEvent
+from models.diagnosis.campaign import EventKind as Event
+from models.diagnosis.engine import diagnose
+from models.diagnosis.report import Report, Verdict
+from models.runs import Plateaus
+from models.stribeck import StribeckParameters, torque
+from tests.models.diagnosis.campaigns import Planted, Where, campaign
+
+SEED = 5
+
+
+def changed(at: Where, **factors: float) -> np.ndarray:
+    """The change of the curve's torque where its parameters are multiplied."""
+    names = ("static_torque", "coulomb_ratio", "stribeck_velocity", "viscous_coefficient")
+    other = {name: np.asarray(getattr(at.parameters, name)) * factors.get(name, 1.0) for name in names}
+    return torque(at.velocity, StribeckParameters(**other)) - torque(at.velocity, at.parameters)
+
+
+def warm(at: Where) -> np.ndarray:
+    factor = np.exp(-0.03 * (at.temperature - 358.15))
+    return np.asarray(at.parameters.viscous_coefficient) * at.velocity**0.3 * (factor - 1)
+
+
+def late(at: Where) -> np.ndarray:
+    if at.dynamic:
+        return np.zeros_like(at.velocity)
+    true = torque(at.velocity, at.parameters)
+    return 0.15 * np.concatenate([[0.0], -np.diff(true)])
+
+
+PLANTED: dict[str, Planted] = {
+    "oil_temperature": warm,
+    "torque_zero_shift": lambda at: np.full_like(at.velocity, 0.6 if at.cycles > 4000 else 0.0),
+    "hydrodynamic_drag": lambda at: 0.06 * at.velocity,
+    "unsettled_dwell": late,
+    "inertia_torque": lambda at: 0.015 * at.acceleration / 0.058,
+    "oil_change": lambda at: changed(at, viscous_coefficient=1.25 if at.cycles > 4000 else 1.0),
+}
+
+
+def look(given: Campaign, **options: frozenset[str]) -> Report:
+    return diagnose(given, rng=np.random.default_rng(SEED), **options)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_where_nothing_is_planted_the_model_is_adequate(seed: int) -> None:
+    report = look(campaign(seed, gain=0.001 * seed))
+    assert report.verdict is Verdict.MODEL_ADEQUATE
+    assert not report.causes
+    assert report.extension is None
+    assert report.baseline is not None
+    assert report.baseline.rmse == pytest.approx(report.baseline.noise, rel=0.15)
+
+
+@pytest.mark.parametrize("slug", PLANTED)
+def test_what_is_planted_is_found(slug: str) -> None:
+    report = look(campaign(7, PLANTED[slug]))
+    assert report.verdict in {Verdict.CAUSE_NAMED, Verdict.CAUSE_AMBIGUOUS}
+    assert slug in report.causes
+    assert report.candidates[0].effect == slug
+    assert report.extension is not None
+    assert report.extended is not None
+    assert report.baseline is not None
+    assert report.extended.rmse < report.baseline.rmse
+
+
+def test_an_amplitude_is_what_was_planted() -> None:
+    estimate = look(campaign(7, PLANTED["torque_zero_shift"])).candidates[0].estimate
+    assert estimate.unit == "Nm"
+    assert abs(estimate.value - 0.6) < 4 * estimate.sd < 0.4
+
+
+def test_what_is_taken_out_of_the_catalogue_is_not_named() -> None:
+    report = look(campaign(7, PLANTED["unsettled_dwell"]), without=frozenset({"unsettled_dwell"}))
+    assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
+    assert not report.causes
+    assert all(each.effect != "unsettled_dwell" for each in report.candidates)
+
+
+def test_a_bump_in_speed_is_unexplained_and_on_speed() -> None:
+    def bump(at: Where) -> np.ndarray:
+        return 0.04 * torque(at.velocity, at.parameters) * np.exp(-0.5 * ((at.velocity - 6.0) / 0.7) ** 2)
+
+    report = look(campaign(7, bump))
+    assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
+    assert report.baseline is not None
+    assert report.baseline.where[0].axis == "speed_rpm"
+
+
+def test_without_oil_temperature_no_sensor_drift_is_named() -> None:
+    for slug in ("oil_temperature", "torque_zero_shift"):
+        report = look(campaign(7, PLANTED[slug], temperature=False))
+        assert report.verdict is not Verdict.MODEL_ADEQUATE
+        if {"torque_zero_shift", "pressure_offset"} & set(report.causes):
+            assert report.verdict is Verdict.CAUSE_AMBIGUOUS
+            assert "oil_temperature" in report.causes
+
+
+def test_one_state_is_enough_for_what_happens_within_a_test() -> None:
+    assert look(campaign(8, cycles=(0.0,))).verdict is Verdict.MODEL_ADEQUATE
+    report = look(campaign(8, PLANTED["inertia_torque"], cycles=(0.0,)))
+    assert "inertia_torque" in report.causes
+
+
+def test_the_same_generator_the_same_answer() -> None:
+    given = campaign(7, PLANTED["inertia_torque"], cycles=(0.0, 3000.0))
+    first, second = look(given), look(given)
+    assert first.statistics == second.statistics
+    assert first.summary == second.summary
+
+
+def test_too_little_data_says_what_is_missing() -> None:
+    assert look(Campaign()).verdict is Verdict.INSUFFICIENT_DATA
+    full = campaign(1, cycles=(0.0, 1000.0), loops=False)
+    few = tuple(
+        replace(
+            run,
+            plateaus=Plateaus(
+                pressure=run.plateaus.pressure, speed=np.full_like(run.plateaus.speed, 50.0), torque=run.plateaus.torque
+            ),
+        )
+        for run in full.stationary
+    )
+    report = look(replace(full, stationary=few))
+    assert report.verdict is Verdict.INSUFFICIENT_DATA
+    assert "speeds" in report.summary
+
+
+def test_a_logged_oil_change_is_preferred_to_an_unlogged_one() -> None:
+    given = campaign(7, PLANTED["oil_change"])
+    logged = replace(
+        given, maintenance=(MaintenanceEvent(run_id="oil", cycles=4500.0, event=Event.OIL_CHANGE),)
+    )
+    with_log = next(each for each in look(logged).candidates if each.effect == "oil_change")
+    without = next(each for each in look(given).candidates if each.effect == "oil_change")
+    assert with_log.log_evidence_gain > without.log_evidence_gain + 1.0

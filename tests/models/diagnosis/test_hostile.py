@@ -1,0 +1,106 @@
+"""Whatever a rig may send, a diagnosis is a report and never an exception."""
+
+import math
+
+import numpy as np
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, MaintenanceEvent, StationaryRun
+from models.diagnosis.engine import diagnose
+from models.diagnosis.report import Report, Verdict
+from models.runs import Plateaus, Record
+
+
+@st.composite
+def campaigns(draw: st.DrawFn) -> Campaign:
+    rng = np.random.default_rng(draw(st.integers(0, 10**6)))
+    scale = draw(st.sampled_from([1e-9, 1e-3, 1.0, 20.0, 1e6, 1e150]))
+    shape = draw(st.sampled_from(["flat", "noise", "falling", "zero", "signs", "repeated"]))
+    runs = draw(st.integers(0, 4))
+    temperature = draw(st.booleans())
+    stationary = tuple(
+        _stationary(rng, number, int(draw(st.integers(1, 60))), scale, shape, temperature) for number in range(runs)
+    )
+    dynamic = tuple(
+        _dynamic(rng, number, draw(st.sampled_from([4, 60, 900])), scale, shape)
+        for number in range(draw(st.integers(0, 2)))
+    )
+    duty = tuple(
+        DutyRun(run_id=f"u{k}", cycles=100.0 * k, engagements=100.0, energy=float(rng.choice([1.0, 1e4])))
+        for k in range(draw(st.integers(0, 3)))
+    )
+    events = tuple(
+        MaintenanceEvent(run_id=f"m{k}", cycles=float(rng.integers(0, 300)), event=kind, moment=None)
+        for k, kind in enumerate(draw(st.lists(st.sampled_from(list(EventKind)), max_size=3)))
+    )
+    return Campaign(stationary=stationary, dynamic=dynamic, duty=duty, maintenance=events)
+
+
+def _torque(rng: np.random.Generator, speed: np.ndarray, scale: float, shape: str) -> np.ndarray:
+    base = {
+        "flat": np.ones(speed.size),
+        "noise": rng.standard_normal(speed.size),
+        "falling": 2 - np.tanh(np.abs(speed) / 50),
+        "zero": np.zeros(speed.size),
+        "signs": np.sign(speed) * (1 + 0.1 * rng.standard_normal(speed.size)),
+        "repeated": np.round(rng.standard_normal(speed.size)),
+    }[shape]
+    return np.asarray(scale * base, dtype=np.float64)
+
+
+def _stationary(
+    rng: np.random.Generator, number: int, rows: int, scale: float, shape: str, temperature: bool
+) -> StationaryRun:
+    speed = rng.choice([-200.0, 0.0, 1e-6, 2.0, 50.0, 100.0, 205.0, 1e4], rows) if shape == "repeated" else (
+        np.linspace(2.0, 206.0, rows)
+    )
+    pressure = rng.choice([1e-3, 4e5, 5e5, 7e5, 1e9], rows) if shape == "noise" else np.full(rows, 5e5)
+    return StationaryRun(
+        run_id=f"s{number}",
+        cycles=float(rng.choice([0.0, 0.0, 100.0, 1e9])),
+        moment=None if number % 2 else float(rng.integers(0, 10**9)),
+        plateaus=Plateaus(
+            pressure=pressure,
+            speed=speed,
+            torque=_torque(rng, speed, scale, shape),
+            oil_temperature=np.full(rows, 350.0) + rng.standard_normal(rows) if temperature else None,
+        ),
+    )
+
+
+def _dynamic(rng: np.random.Generator, number: int, rows: int, scale: float, shape: str) -> DynamicRun:
+    time = np.sort(rng.uniform(0, 15, rows)) if shape == "noise" else np.linspace(0, 15, rows)
+    speed = 100 * (1 - np.cos(2 * math.pi * 0.1 * time)) if shape != "signs" else 100 * np.cos(time)
+    return DynamicRun(
+        run_id=f"d{number}",
+        cycles=float(rng.choice([0.0, 100.0])),
+        record=Record(
+            time=time,
+            pressure=np.full(rows, 5e5),
+            speed=speed,
+            torque=_torque(rng, speed, scale, shape),
+        ),
+    )
+
+
+def _finite(report: Report) -> bool:
+    numbers = [each.probability for each in report.candidates]
+    numbers += [x for each in report.candidates for x in (each.log_evidence_gain, each.estimate.value, each.estimate.sd)]
+    numbers += list(report.statistics.values())
+    if report.baseline is not None:
+        numbers += [report.baseline.rmse, report.baseline.noise, report.baseline.unexplained_share]
+    return all(math.isfinite(number) for number in numbers)
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(given_campaign=campaigns())
+@example(given_campaign=Campaign())
+def test_a_diagnosis_is_a_report(given_campaign: Campaign) -> None:
+    report = diagnose(given_campaign, rng=np.random.default_rng(0))
+    assert isinstance(report, Report)
+    assert report.summary
+    assert _finite(report)
+    assert all(0 <= each.probability <= 1 + 1e-9 for each in report.candidates)
+    if report.verdict in {Verdict.MODEL_ADEQUATE, Verdict.INSUFFICIENT_DATA, Verdict.UNEXPLAINED_STRUCTURE}:
+        assert not report.causes

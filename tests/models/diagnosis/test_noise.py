@@ -1,0 +1,57 @@
+"""Noise from within the data: right where it is white or remembers, and blind to what is smooth."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from models.diagnosis.design import Design, build_design
+from models.diagnosis.noise import estimate_noise, first_noise
+from models.diagnosis.whitening import Correlation, Noise, gains_of, whitened, without_gains
+from tests.models.diagnosis.campaigns import campaign
+
+SEED = 20
+
+
+@pytest.fixture(scope="module")
+def design() -> Design:
+    return build_design(campaign(1))
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.5])
+def test_noise_is_found_beside_something_smooth(design: Design, memory: float) -> None:
+    rng = np.random.default_rng(SEED)
+    white = rng.standard_normal(design.torque.size)
+    remembered = lfilter([np.sqrt(1 - memory**2)], [1.0, -memory], white)
+    smooth = 0.03 * design.torque * np.sin(design.rows.velocity / 3)
+    residual = smooth + 0.01 * design.torque * remembered / np.sqrt(design.samples)
+    noise, assumed = estimate_noise(design, residual, design.torque, first_noise(design))
+    steady = slice(0, design.plateaus)
+    share = np.median(noise.deviation[steady] / design.torque[steady])
+    assert not assumed
+    assert abs(share - 0.01) < 0.0012  # some 600 rows, and the memory's part is told from few
+    next_row = noise.plateaus.share * noise.plateaus.step
+    assert abs(next_row - memory) < 0.15
+
+
+def test_whitening_is_the_inverse_root_of_the_covariance(design: Design) -> None:
+    correlation = Correlation(share=0.7, step=0.6)
+    noise = Noise(
+        deviation=np.full(design.torque.size, 2.0),
+        plateaus=correlation,
+        loops=Correlation(),
+        run_gain=0.004,
+        curve_gain=0.002,
+    )
+    rows = np.flatnonzero(design.rows.run == 0)
+    distance = np.abs(np.subtract.outer(rows, rows))
+    covariance = 4.0 * np.where(distance == 0, 1.0, 0.7 * 0.6**distance)
+    torque = design.torque[rows]
+    covariance += 0.004**2 * np.outer(torque, torque)
+    same = np.equal.outer(design.curve[rows], design.curve[rows])
+    covariance += 0.002**2 * np.outer(torque, torque) * same
+    probe = np.zeros((design.torque.size, 2))
+    probe[rows] = np.random.default_rng(SEED).standard_normal((rows.size, 2))
+    white = without_gains(whitened(probe, design, noise), gains_of(design, design.torque, noise), 0.004, 0.002)
+    expected = probe[rows].T @ np.linalg.solve(covariance, probe[rows])
+    # the filter starts from a row's own past that is not known: a part in hundred
+    np.testing.assert_allclose(white.T @ white, expected, rtol=0.02, atol=0.02 * expected[0, 0])

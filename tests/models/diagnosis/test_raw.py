@@ -1,0 +1,72 @@
+"""Evidence out of raw records: found where it is, named for what it is, and silent where there is only noise."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from models.diagnosis.campaign import Campaign
+from models.diagnosis.raw import raw_evidence
+from tests.models.diagnosis.raw_campaigns import campaign, stepped, swinging, with_line, with_ripple
+
+
+def found(of: Campaign) -> dict[str, tuple[float, float]]:
+    return {each.effect: (each.estimate.value, each.estimate.sd) for each in raw_evidence(of)}
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.8, 0.95])
+def test_noise_that_remembers_is_no_evidence(memory: float) -> None:
+    print("seeds 0 to 7")
+    rngs = [np.random.default_rng(seed) for seed in range(8)]
+    assert [found(campaign([stepped(rng, memory=memory)], [swinging(rng, memory)])) for rng in rngs] == [{}] * 8
+
+
+def test_ripple_is_found_at_its_order_with_its_amplitude() -> None:
+    rng = np.random.default_rng(1)
+    evidence = raw_evidence(campaign([with_ripple(stepped(rng), 0.03, 2.0) for _ in range(2)], []))
+    assert [each.effect for each in evidence] == ["shaft_ripple"]
+    assert "2 times a revolution" in evidence[0].note
+    assert evidence[0].estimate.value == pytest.approx(0.03, rel=0.25)
+
+
+def test_ripple_is_found_in_dynamic_tests_alone() -> None:
+    rng = np.random.default_rng(2)
+    assert found(campaign([], [with_ripple(swinging(rng), 0.05, 1.0) for _ in range(3)])).keys() == {"shaft_ripple"}
+
+
+@pytest.mark.parametrize("record", [stepped, swinging])
+def test_stick_slip_is_a_line_at_low_speed_only(record: partial[object]) -> None:
+    rng = np.random.default_rng(3)
+    records = [with_line(record(rng), 0.15, 17.0, below=2.0) for _ in range(3)]
+    evidence = raw_evidence(campaign(*((records, []) if record is stepped else ([], records))))
+    assert [each.effect for each in evidence] == ["stick_slip"]
+    assert "17" in evidence[0].note
+
+
+def test_a_line_at_every_speed_is_neither() -> None:
+    rng = np.random.default_rng(4)
+    assert found(campaign([with_line(stepped(rng), 0.05, 30.0) for _ in range(2)], [])).keys() == {"fixed_line"}
+
+
+def test_both_at_once_are_told_apart() -> None:
+    rng = np.random.default_rng(5)
+    records = [with_line(with_ripple(stepped(rng), 0.05, 2.0), 0.2, 17.0, below=2.0) for _ in range(2)]
+    assert found(campaign(records, [])).keys() == {"shaft_ripple", "stick_slip"}
+
+
+def test_dwells_that_end_before_torque_settles() -> None:
+    slow = found(campaign([stepped(np.random.default_rng(6), settling=2.0)], []))
+    assert slow.keys() == {"unsettled_dwell"}
+    assert slow["unsettled_dwell"][0] == pytest.approx(2.0, rel=0.2)
+    assert found(campaign([stepped(np.random.default_rng(6), settling=0.3)], [])) == {}
+
+
+def test_records_that_hold_nothing_say_nothing() -> None:
+    rng = np.random.default_rng(7)
+    short = swinging(rng)
+    cut = type(short)(
+        time=short.time[:20], pressure=short.pressure[:20], speed=short.speed[:20], torque=short.torque[:20]
+    )
+    still = type(short)(time=short.time, pressure=short.pressure, speed=0 * short.speed, torque=0 * short.torque)
+    assert raw_evidence(campaign([cut, still], [cut, still])) == ()
+    assert raw_evidence(Campaign()) == ()

@@ -1,0 +1,53 @@
+"""`make score`: how good the prognosis is, on simulated lives whose end is known; the tables of docs/prognosis.md.
+
+SIZE scales the number of lives (1: at least 1,000 for coverage), SEED changes them; parts may be named. With --write the
+tables take their place in docs/prognosis.md.
+"""
+
+import argparse
+import re
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from tests.score import off_prior, on_prior
+from tests.score.fleets import fleets
+
+DOCS = Path(__file__).parents[2] / "docs" / "prognosis.md"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="make score")
+    parser.add_argument("parts", nargs="*")
+    parser.add_argument("--size", type=float, default=1.0)
+    parser.add_argument("--seed", type=int, default=2026)
+    parser.add_argument("--write", action="store_true")
+    chosen = parser.parse_args()
+
+    def lives(count: int) -> int:
+        return max(8, round(count * chosen.size))
+
+    seed = chosen.seed
+    parts: dict[str, Callable[[], str]] = {
+        "calibration": lambda: on_prior.calibration(lives(1_000), seed),
+        "exact": lambda: on_prior.beside_exact(lives(100), seed + 1),
+        "spoiled": lambda: on_prior.calibration(lives(1_000), seed + 2, spoiled=0.1),
+        "laws": lambda: off_prior.laws(lives(100), seed + 3),
+        "never": lambda: off_prior.never(lives(1_000), seed + 4),
+        "events": lambda: off_prior.after_event(lives(100), seed + 5),
+        "fleets": lambda: fleets(lives(40), seed + 6),
+    }
+    for name in chosen.parts or parts:
+        start = time.monotonic()
+        table = parts[name]()
+        print(f"\n### {name} ({time.monotonic() - start:.0f} s)\n\n{table}", flush=True)
+        if chosen.write:
+            block = f"<!-- score {name} -->\n{table}\n<!-- end -->"
+            text = DOCS.read_text()
+            DOCS.write_text(
+                re.sub(rf"<!-- score {name} -->.*?<!-- end -->", lambda _, b=block: b, text, flags=re.DOTALL)
+            )
+
+
+if __name__ == "__main__":
+    main()

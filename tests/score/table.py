@@ -1,0 +1,69 @@
+"""Scores of predictions by stage of life, and how they are written down."""
+
+from collections import defaultdict
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from models.scoring import crps_of_sample, pit_histogram, pit_of_sample
+from models.tracking.protocol import Posterior
+from tests.statistical.lives import ends, interval
+
+
+@dataclass(frozen=True)
+class Score:
+    """One prediction: CRPS and width of the 90 % interval as shares of the life, whether it held, whether it began
+    after the truth, and the truth's place in it."""
+
+    crps: float
+    width: float
+    held: bool
+    late: bool
+    pit: float
+
+
+def score(posterior: Posterior, end: float) -> Score:
+    sample, (low, high) = ends(posterior), interval(posterior)
+    return Score(
+        crps=crps_of_sample(sample, posterior.weight, end) / end,
+        width=(high - low) / end,
+        held=low <= end <= high,
+        late=low > end,
+        pit=pit_of_sample(sample, posterior.weight, end),
+    )
+
+
+@dataclass
+class Scores:
+    """Scores by who predicted and at what stage."""
+
+    kept: dict[tuple[str, float], list[Score]] = field(default_factory=lambda: defaultdict(list))
+
+    def add(self, name: str, stage: float, posterior: Posterior, end: float) -> None:
+        self.kept[name, stage].append(score(posterior, end))
+
+    def column(self, name: str, stage: float, what: str) -> np.ndarray:
+        return np.array([getattr(each, what) for each in self.kept[name, stage]], dtype=float)
+
+    def ratio(self, name: str, other: str, stages: tuple[float, ...], what: str = "crps") -> tuple[float, float]:
+        """The ratio of mean scores, and its standard error by the jackknife over lives."""
+        ours = np.sum([self.column(name, stage, what) for stage in stages], axis=0)
+        theirs = np.sum([self.column(other, stage, what) for stage in stages], axis=0)
+        left = (ours.sum() - ours) / (theirs.sum() - theirs)
+        return float(ours.sum() / theirs.sum()), float(left.std() * np.sqrt(max(ours.size - 1, 1)))
+
+    def typical_ratio(self, name: str, other: str, stage: float, what: str) -> float:
+        """The median of the ratios, life by life."""
+        return float(np.median(self.column(name, stage, what) / self.column(other, stage, what)))
+
+    def histogram(self, name: str, stages: tuple[float, ...]) -> str:
+        pits = np.concatenate([self.column(name, stage, "pit") for stage in stages])
+        return "/".join(f"{100 * share:.0f}" for share in pit_histogram(pits.tolist()))
+
+
+def percents(numbers: list[float]) -> str:
+    return "/".join(f"{100 * number:.0f}" for number in numbers)
+
+
+def shares(numbers: list[float]) -> str:
+    return " | ".join(f"{100 * number:.1f}" for number in numbers)

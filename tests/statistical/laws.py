@@ -1,0 +1,42 @@
+"""Laws of degradation that are not eq. 6, in the share x of life at which COF has halved; written apart from `models`."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from models.prognosis import first_passage
+from models.tracking.grid import Grid
+from models.tracking.measurement import Measurement
+from models.tracking.prior import weak
+from tests.statistical.lives import CAP
+
+STAGES = (0.2, 0.4, 0.6, 0.8)
+TESTS, SCATTER = 25, 0.003
+
+LAWS: dict[str, Callable[[float], float]] = {
+    "one eq. 6 (Δ = -0.75, ε = 0.8)": lambda x: 1 - 0.75 * (1 - (1 + 2.948 * x) ** -0.8),
+    "exponential to a floor": lambda x: 1 - 0.6 * (1 - math.exp(-1.792 * x)),
+    "logarithm": lambda x: 1 - 0.5 * math.log1p(20 * x) / math.log(21),
+    "straight line": lambda x: 1 - 0.5 * x,
+    "two stages": lambda x: 1 - 0.25 * (1 - math.exp(-8 * x)) - 0.25 * max(0.0, x - 0.3) / 0.7,
+}
+
+
+def followed(
+    course: Callable[[float], float], rng: np.random.Generator, end: float = 10_000.0
+) -> list[tuple[bool, bool, float]]:
+    """For each stage of a life: does the exact filter's interval hold the end, does it begin after it, how wide is it
+    in lives?"""
+    grid = Grid()
+    seen: list[Measurement] = []
+    told = []
+    for share in np.linspace(0.0, 0.8, TESTS).tolist():
+        cof = 0.1 * course(share) * (1 + SCATTER * rng.standard_normal())
+        seen.append(Measurement(progress=share * end, value=cof, variance=(0.001 * cof) ** 2))
+        if any(abs(share - stage) < 0.4 * 0.8 / (TESTS - 1) for stage in STAGES):
+            posterior = grid.posterior(grid.from_history(weak(seen[0], falling=True), seen), 1_000, rng)
+            found = first_passage(posterior, fraction=0.5, as_of=share * end).end_of_life
+            low, high = found[0.05] or math.inf, found[0.95] or math.inf
+            told.append((low <= end <= high, low > end, (min(high, CAP) - min(low, CAP)) / end))
+    return told

@@ -1,0 +1,24 @@
+"""Real sweeps of a contact that is no clutch: the diagnosis says that something is there, and names nothing."""
+
+import pytest
+
+from models.diagnosis.report import Verdict
+from tests.real import diagnosis, loaders
+
+pytestmark = [
+    pytest.mark.statistical,
+    pytest.mark.skipif(not loaders.FOLDER.is_dir(), reason=f"the measurements are not at {loaders.FOLDER}"),
+]
+
+
+@pytest.mark.parametrize("count", [6, 20, 60])
+def test_traction_sweeps_get_no_name(count):
+    report = diagnosis.said_of(count)
+    print(count, report.verdict, report.causes, report.summary)
+    assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
+    assert report.causes == ()
+    assert report.extension is None
+    # what is off is the curve's shape at the lowest speeds, and that the branches differ
+    assert report.baseline is not None
+    assert {each.axis for each in report.baseline.where[:2]} <= {"speed_rpm", "test_clock_s"}
+    assert report.baseline.where[0].p_value < 1e-6
