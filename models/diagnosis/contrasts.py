@@ -70,7 +70,7 @@ def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
             add(CYCLES, here * _cosine(s, speed) * steady)
     _add_clock(design, add, steady)
     if design.loops:
-        _add_loops(design, add, looping, lives, presses)
+        _add_loops(design, add, np.asarray(looping, dtype=np.float64), lives, presses)
     if np.isfinite(rows.temperature).any():
         warm = np.where(np.isfinite(rows.temperature), rows.temperature - design.facts.reference_temperature, 0.0) / 3.0
         for s in range(4):

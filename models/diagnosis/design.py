@@ -123,7 +123,7 @@ def build_design(campaign: Campaign) -> Design:
             loops.extend(found)
             of_run.extend([len(runs)] * len(found))
             runs.append(RunInfo(run_id=dynamic.run_id, cycles=dynamic.cycles, dynamic=True))
-    moments = {run.run_id: run.moment for run in (*kept.stationary, *kept.dynamic)}
+    moments = {run.run_id: run.moment for run in kept.dynamic}
     for number, (loop, index) in enumerate(zip(loops, of_run, strict=True)):
         blocks.append(_loop_points(loop, index, number, runs[index].cycles, moments[runs[index].run_id]))
     return _assembled(blocks, torques, deviations, samples, loops, runs, offset, kept, tuple(notes))
@@ -171,14 +171,16 @@ def _assembled(
 
 def _thinned(campaign: Campaign, notes: list[str]) -> Campaign:
     """The campaign with states left out evenly where it is too large; the first and the last stay."""
-    states = np.unique([run.cycles for run in (*campaign.stationary, *campaign.dynamic)])
+    states = np.unique([*(run.cycles for run in campaign.stationary), *(run.cycles for run in campaign.dynamic)])
     size = sum(min(run.plateaus.torque.size, MOST_PLATEAUS) for run in campaign.stationary)
     size += sum(8 * BINS for _ in campaign.dynamic)
     if size <= MOST_ROWS or states.size < 3:
         return campaign
     count = max(2, int(states.size * MOST_ROWS / size))
     keep = set(states[np.linspace(0, states.size - 1, count).round().astype(int)].tolist())
-    notes.append(f"{states.size - len(keep)} of {states.size} states were left out, evenly: the campaign is very large.")
+    notes.append(
+        f"{states.size - len(keep)} of {states.size} states were left out, evenly: the campaign is very large."
+    )
     return Campaign(
         geometry=campaign.geometry,
         oil=campaign.oil,
@@ -204,9 +206,10 @@ def _plateaus(
     velocity = campaign.geometry.sliding_velocity(table.speed[usable])
     sign = np.copysign(1.0, velocity)
     count = usable.size
-    clock = PLATEAU_DURATION * (usable + 0.5) if run.time is None else np.asarray(run.time, dtype=np.float64)[usable]
-    nan = np.full(count, np.nan)
-    moment = nan if run.moment is None else run.moment + clock
+    known = PLATEAU_DURATION * (np.arange(table.torque.size) + 0.5) if run.time is None else np.array(run.time)
+    clock = np.asarray(known[usable], dtype=np.float64)
+    nan: FloatArray = np.full(count, np.nan, dtype=np.float64)
+    moment = nan if run.moment is None else np.asarray(run.moment + clock, dtype=np.float64)
     consecutive = np.concatenate([[-1], np.where(np.diff(usable) == 1, offset + np.arange(count - 1), -1)])
     points = Points(
         run=np.full(count, index, dtype=np.intp),
@@ -246,10 +249,13 @@ def _loop_points(loop: BinnedLoop, run: int, number: int, cycles: float, moment:
 
 
 def _joined(blocks: list[Points]) -> Points:
-    integers = {"run", "loop", "previous"}
-    columns = {}
-    for each in fields(Points):
-        parts = [getattr(block, each.name) for block in blocks]
-        kind = np.intp if each.name in integers else np.float64
-        columns[each.name] = np.concatenate(parts).astype(kind) if parts else np.zeros(0, dtype=kind)
-    return Points(**columns)
+    def column(name: str) -> list[FloatArray]:
+        return [getattr(block, name) for block in blocks] or [np.zeros(0)]
+
+    integers = {name: np.concatenate(column(name)).astype(np.intp) for name in ("run", "loop", "previous")}
+    rest = {
+        each.name: np.concatenate(column(each.name)).astype(np.float64)
+        for each in fields(Points)
+        if each.name not in integers
+    }
+    return Points(**integers, **rest)  # type: ignore[arg-type] # names are the fields' own

@@ -7,8 +7,9 @@ import numpy as np
 from models.diagnosis.alarm import CONTRASTS_SHARE, EFFECTS_SHARE, Lead, lead, lines
 from models.diagnosis.baseline import frame_of
 from models.diagnosis.campaign import Campaign
-from models.diagnosis.catalogue import CATALOGUE
+from models.diagnosis.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.design import Design, build_design
+from models.diagnosis.effect import Kind
 from models.diagnosis.fitting import Fit, Priors, fit, priors_of
 from models.diagnosis.noise import estimate_noise, first_noise
 from models.diagnosis.projection import GAINS
@@ -18,7 +19,8 @@ from models.diagnosis.report import Report, Verdict
 from models.diagnosis.reporting import insufficient, report_of
 from models.diagnosis.selection import columns_of, linear_drop, screen, screen_pairs
 from models.diagnosis.starting import starting_laws
-from models.diagnosis.verdict import PAIR_PRICE, Judgement, judge
+from models.diagnosis.unmeasured import temperature_evidence
+from models.diagnosis.verdict import CLOSE, PAIR_PRICE, Judgement, judge
 from models.diagnosis.viewing import View, view_of
 from models.diagnosis.whitening import Noise
 
@@ -67,11 +69,14 @@ def _diagnosed(campaign: Campaign, design: Design, without: frozenset[str], rng:
     view = view_of(design, baseline.noise, baseline.priors, baseline.fit, columns)
     raw = tuple(each for each in raw_evidence(campaign) if each.effect not in without)
     leads = alarms(design, baseline, view, rng)
-    noise, hypotheses = baseline.noise, []
+    noise, hypotheses = baseline.noise, list[Hypothesis]()
     judgement = Judgement(verdict=Verdict.MODEL_ADEQUATE)
     if any(each.raised for each in leads.values()):
         noise, hypotheses = hypotheses_of(design, baseline, view, raw)
-        judgement = judge(design, noise, baseline.priors, hypotheses, rng)
+        unmeasured = -np.inf
+        if not design.facts.temperature_measured and "oil_temperature" not in without:
+            unmeasured = temperature_evidence(design, noise, baseline.priors, baseline.fit)
+        judgement = judge(design, noise, baseline.priors, hypotheses, unmeasured, rng)
     return report_of(
         campaign, design, noise, baseline.priors, view, with_lines(judgement, raw), hypotheses, raw, leads,
         baseline.notes, rng,
@@ -87,7 +92,7 @@ def missing_for_baseline(design: Design) -> str:
     if speeds < FEWEST_SPEEDS:
         return f"there are {speeds} distinct speeds, and at least {FEWEST_SPEEDS} are needed for a Stribeck curve."
     usual, largest = float(np.median(np.abs(design.torque))), float(np.abs(design.torque).max())
-    if not (LEAST_TORQUE < usual and largest < MOST_TORQUE):
+    if not (usual > LEAST_TORQUE and largest < MOST_TORQUE):
         return f"torques of {usual:.3g} Nm in the median and {largest:.3g} Nm at most are no clutch's."
     return ""
 
@@ -151,5 +156,8 @@ def hypotheses_of(
 
 
 def with_lines(judgement: Judgement, raw: tuple[RawEvidence, ...]) -> Judgement:
-    """The verdict with what raw records show beside it: vibrations are causes of their own."""
-    return judgement.joined(tuple(each.effect for each in raw if each.effect != "unsettled_dwell"))
+    """The verdict with what raw records show beside it: vibrations of the catalogue are causes of their own, where they
+    are more than what a wrong template may leave behind."""
+    least = CLOSE + 2 * judgement.statistics.get("tolerance", 0.0)
+    seen = [each for each in raw if each.effect in BY_SLUG and BY_SLUG[each.effect].kind is Kind.VIBRATION]
+    return judgement.joined(tuple(each.effect for each in seen if each.log_evidence > least))

@@ -98,6 +98,10 @@ class Extension:
                 effect = BY_SLUG[each["slug"]]
                 if effect.kind in kinds and not _counted(each):
                     change = _finite(effect.change(scene, each["amplitude"], tuple(each["shape"])))
+                    if effect.kind is Kind.COURSE:
+                        change = np.maximum(
+                            change, -scene.curve
+                        )  # followed far enough, friction ends; it does not turn
                     relative = each["amplitude_sd"] / max(abs(each["amplitude"]), 1e-300)
                     mean, variance = mean + change, variance + (change * relative) ** 2
             weights.append(float(alternative["weight"]))

@@ -1,18 +1,21 @@
 """What a campaign says beside its torques: states, maintenance, pauses, the energy of its duty, its oil and geometry."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
-from models.diagnosis.campaign import Campaign, EventKind, Oil
+from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, Oil, StationaryRun
 
 #: The oil temperature to which everything refers where none was measured: the middle of the reference's 80 to 90 °C [K].
 REFERENCE_TEMPERATURE = 273.15 + 85.0
 #: A gap between runs that is longer than this [s] and than so many usual gaps is a pause.
 LEAST_PAUSE = 8 * 3600.0
 PAUSE_RATIO = 4.0
+#: So many change points are tried: further ones between them would look the same.
+MOST_ONSETS = 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,14 +45,21 @@ class Facts:
         return max(float(self.states[-1] - self.states[0]), 1.0) if self.states.size else 1.0
 
     @property
-    def between(self) -> tuple[float, ...]:
-        """Cycles midway between neighbouring states, where something may have changed."""
-        return tuple((0.5 * (self.states[1:] + self.states[:-1])).tolist())
+    def onsets(self) -> tuple[tuple[float, float, float], ...]:
+        """Where something may have changed: (state before, cycles midway, state after); where there are more than
+        MOST_ONSETS, that many evenly, and those with an event in the log."""
+        gaps = list(itertools.pairwise(self.states.tolist()))
+        if len(gaps) > MOST_ONSETS:
+            evenly = {gaps[i] for i in np.linspace(0, len(gaps) - 1, MOST_ONSETS).round().astype(int)}
+            events = (*self.oil_changes, *self.sensor_zeros)
+            logged = {gap for gap in gaps if any(gap[0] <= cycles <= gap[1] for cycles in events)}
+            gaps = sorted(evenly | logged)
+        return tuple((low, 0.5 * (low + high), high) for low, high in gaps)
 
 
 def facts_of(campaign: Campaign) -> Facts:
     """Read off the campaign."""
-    tests = [*campaign.stationary, *campaign.dynamic]
+    tests: list[StationaryRun | DynamicRun] = [*campaign.stationary, *campaign.dynamic]
     temperatures = [
         channel
         for channel in (
@@ -82,7 +92,7 @@ def _events(campaign: Campaign, kind: EventKind) -> tuple[float, ...]:
 def _pauses(campaign: Campaign) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Cycles and ends of the pauses: maintenance that calls itself rest, and gaps between the moments of the runs."""
     found: dict[float, float] = {}
-    runs = [*campaign.stationary, *campaign.dynamic, *campaign.duty]
+    runs: list[StationaryRun | DynamicRun | DutyRun] = [*campaign.stationary, *campaign.dynamic, *campaign.duty]
     timed = sorted((run.moment, run.cycles) for run in runs if run.moment is not None)
     if len(timed) >= 4:
         gaps = np.diff(np.array([moment for moment, _ in timed]))

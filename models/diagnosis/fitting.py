@@ -13,7 +13,7 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline import Prediction, predict
 from models.diagnosis.design import Design
 from models.diagnosis.effect import Effect, Shape
-from models.diagnosis.laws import ATTRACTOR, BLOCK, DRIFT, LOG_DECAY, RATIO, Frame, Laws
+from models.diagnosis.laws import ATTRACTOR, BLOCK, DRIFT, LOG_DECAY, Frame, Laws
 from models.diagnosis.whitening import Noise, gains_of, whitened, without_gains
 
 #: How alike the two shares of one law are expected to drift [-].
@@ -115,7 +115,7 @@ def fit(
         gram, gradient = _normal(design, noise, priors, state)
         fallen = 0.0
         for _ in range(8):
-            step = np.linalg.solve(gram + damping * np.diag(np.diag(gram)), gradient)
+            step = np.asarray(np.linalg.solve(gram + damping * np.diag(np.diag(gram)), gradient), dtype=np.float64)
             trial = _moved(state, priors, step)
             if trial is not None:
                 candidate = _evaluated(design, noise, trial[0], priors, trial[1])

@@ -165,7 +165,11 @@ class Scene:
         return np.asarray(self.parameters[:, 3] * self.points.velocity**GAMMA, dtype=np.float64)
 
     def curve_at(
-        self, *, cycles: FloatArray | None = None, velocity: FloatArray | None = None, pressure: FloatArray | None = None
+        self,
+        *,
+        cycles: FloatArray | None = None,
+        velocity: FloatArray | None = None,
+        pressure: FloatArray | None = None,
     ) -> FloatArray:
         """S [P] Nm with other cycles, velocity [m/s] > 0 or pressure [Pa] at the points."""
         p = self.points.pressure if pressure is None else pressure

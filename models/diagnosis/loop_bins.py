@@ -10,14 +10,16 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.periods import SPEED_HARMONICS, Cycle, fit_cycle, harmonics, inliers
 from models.runs import Record
-from models.standing import Stretch, pressure_stretches
+from models.standing import pressure_stretches
 
 #: Phases at which a loop is computed, and bins in which it is compared; a bin holds a whole number of phases.
 PHASES, BINS = 120, 60
 #: Rows slower than this share of the loop's highest speed are left out: sticking, or next to it.
-LEAST_SPEED = 0.004
+LEAST_SPEED = 0.012
 #: This share of a period passes before the loop is in its periodic state; all that follows is used, whole periods or not.
 START = 0.06
+#: Slower than this share of the highest is as good as standing.
+SLOWEST = 1e-5
 #: A speed that falls below minus this share of its highest reverses.
 REVERSES = 0.03
 #: A loop with fewer filled bins is none.
@@ -93,8 +95,8 @@ def _swing(time: FloatArray, velocity: FloatArray, before: Cycle | None) -> Cycl
                 before,
                 origin=origin,
                 mean=float(found[0]),
-                cosine=found[1 : SPEED_HARMONICS + 1],
-                sine=found[SPEED_HARMONICS + 1 :],
+                cosine=np.asarray(found[1 : SPEED_HARMONICS + 1], dtype=np.float64),
+                sine=np.asarray(found[SPEED_HARMONICS + 1 :], dtype=np.float64),
                 periods=periods,
                 start=stop - periods / before.frequency,
                 stop=stop,
@@ -106,7 +108,7 @@ def _binned(
     cycle: Cycle, time: FloatArray, torque: FloatArray, pressure: float, sign: float, temperature: float, begin: float
 ) -> BinnedLoop | str:
     width = 2 * math.pi / PHASES
-    phase = width * (np.arange(PHASES) + 0.5)
+    phase = np.asarray(width * (np.arange(PHASES) + 0.5), dtype=np.float64)
     fitted = cycle.value(phase)
     fastest = float(fitted.max())
     if not fastest > 0 or float(fitted.min()) < -REVERSES * fastest:
@@ -126,9 +128,9 @@ def _binned(
         temperature=temperature,
         angular_frequency=angular,
         phase=phase,
-        velocity=np.maximum(fitted, 0.25 * LEAST_SPEED * fastest),
+        velocity=np.maximum(fitted, SLOWEST * fastest),
         acceleration=angular * cycle.gradient(phase),
-        clock=cycle.origin + (phase / (2 * math.pi) + first) / cycle.frequency - begin,
+        clock=np.asarray(cycle.origin + (phase / (2 * math.pi) + first) / cycle.frequency - begin, dtype=np.float64),
         torque=np.bincount(number, weights=torque[inside], minlength=BINS) / np.maximum(count, 1.0),
         samples=count,
     )

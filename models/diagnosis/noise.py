@@ -45,7 +45,9 @@ class _Piece:
 def first_noise(design: Design) -> Noise:
     """Before anything is fitted: the assumed share of the torque."""
     level = float(np.median(np.abs(design.torque)))
-    deviation = (ASSUMED * np.abs(design.torque) + 0.2 * ASSUMED * level + 1e-12) / np.sqrt(np.minimum(design.samples, 30))
+    deviation = (ASSUMED * np.abs(design.torque) + 0.2 * ASSUMED * level + 1e-12) / np.sqrt(
+        np.minimum(design.samples, 30)
+    )
     none = Correlation()
     return Noise(deviation=deviation, plateaus=none, loops=none, run_gain=USUAL_GAIN, curve_gain=0.0)
 
@@ -73,11 +75,13 @@ def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, bef
     return replace(before, deviation=deviation, plateaus=correlations[0], loops=correlations[1]), assumed
 
 
-def _isolated(design: Design, residual: FloatArray, deviation: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _isolated(
+    design: Design, residual: FloatArray, deviation: FloatArray
+) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Rows that stand off their neighbours on the same curve as well."""
     near = 0.5 * (np.roll(residual, 1) + np.roll(residual, -1))
     alone = (np.roll(design.curve, 1) == design.curve) & (np.roll(design.curve, -1) == design.curve)
-    return alone & (np.abs(residual - near) > _SPIKE * deviation)
+    return np.asarray(alone & (np.abs(residual - near) > _SPIKE * deviation), dtype=np.bool_)
 
 
 def _pieces(design: Design, part: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[_Piece]:
@@ -97,7 +101,9 @@ def _pieces(design: Design, part: np.ndarray[tuple[int], np.dtype[np.bool_]]) ->
             key = design.rows.phase[piece].tobytes()  # all zeros for plateaus: their number alone counts
             if key not in cache:
                 x = np.linspace(-1.0, 1.0, piece.size)
-                smooth_shapes = _swing(design.rows.phase[piece]) if looping else legvander(x, _DEGREE)
+                smooth_shapes = (
+                    _swing(design.rows.phase[piece]) if looping else np.asarray(legvander(x, _DEGREE), dtype=np.float64)
+                )
                 cache[key] = _contrasts(smooth_shapes)
             found.append(_Piece(rows=piece, contrasts=cache[key]))
     return found
@@ -127,7 +133,7 @@ def _variance(pieces: list[_Piece], residual: FloatArray, torque: FloatArray, sa
         cut = np.minimum(squares, 12.0 * fitted)
         found, _ = nnls(columns / fitted[:, None], cut / fitted)
         fitted = np.maximum(columns @ found, 1e-4 * usual)
-    return np.maximum(found[0] + found[1] * torque**2 / level, 1e-4 * usual) / samples
+    return np.asarray(np.maximum(found[0] + found[1] * torque**2 / level, 1e-4 * usual) / samples, dtype=np.float64)
 
 
 def _correlation(pieces: list[_Piece], unit: FloatArray) -> tuple[Correlation, float]:

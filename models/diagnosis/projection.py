@@ -71,6 +71,9 @@ def gram_of(design: Design, noise: Noise, priors: Priors, fit: Fit, changes: Flo
         precisions = effect_precisions(each.effect)
         diagonal = np.arange(at, at + columns.shape[1])
         matrix[diagonal, diagonal] += precisions
+        matrix[at, -1] -= precisions[0] * each.amplitude
+        matrix[-1, at] -= precisions[0] * each.amplitude
+        matrix[-1, -1] += precisions[0] * each.amplitude**2
         at += columns.shape[1]
     return Gram(
         matrix=matrix, along=by_curve(white, gains), squares=gains.squares, run_of_curve=gains.run_of_curve, base=base
@@ -88,7 +91,9 @@ def project(gram: Gram, run_gain: float) -> Projected:
     factor = _factor(corner * scale[:, None] * scale)
     half = np.linalg.solve(factor, full[:base, base:] * scale[:, None])
     left = full[base:, base:] - half.T @ half
-    logdet = 2 * float(np.log(np.diag(factor)).sum() - np.log(scale).sum()) + float(np.log1p(run_gain**2 * squares).sum())
+    logdet = 2 * float(np.log(np.diag(factor)).sum() - np.log(scale).sum()) + float(
+        np.log1p(run_gain**2 * squares).sum()
+    )
     prior = -0.5 * (np.log(run_gain / _USUAL) / _SPREAD) ** 2
     miss = float(left[-1, -1])
     return Projected(

@@ -33,10 +33,13 @@ ORDERS = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0)
 ORDER_WINDOW, LINE_WINDOW = 4.0, 1.0
 #: Shares of the windows, slowest first, in which stick-slip is looked for.
 SLOW_SHARES = (0.05, 0.1, 0.2, 0.4)
-#: Log likelihood ratio [nats] less price from which a line counts as evidence.
-SEEN = 6.0
+#: Log likelihood ratio [nats] less price from which a line counts as evidence: noise whose spectrum an autoregression does
+#: not quite meet makes 6 in one campaign of a hundred.
+SEEN = 10.0
 #: No window counts for more [nats]: one burst is no order.
 MOST_A_WINDOW = 25.0
+#: Fewer windows show no order: of one record (they tell what is usual beside it), of all records.
+FEWEST_OF_ONE, FEWEST_WINDOWS = 2, 4
 #: A dwell has not settled where its settling time is beyond this share of it.
 SETTLED_SHARE = 0.8
 #: Records analysed at most, evenly over life: each costs about half a second.
@@ -140,7 +143,7 @@ def _deviation(line: _Line) -> float:
 def _order(groups: list[Windows], line: _Line | None) -> _Line:
     """The best order; windows in which a fixed line would lie on it are left out."""
     best = _Line(gain=0.0, at=0.0, amplitude=0.0)
-    if not groups:
+    if sum(group.turns.size for group in groups) < FEWEST_WINDOWS:
         return best
     tried = amplitudes(groups[0])
     for order in ORDERS:
@@ -163,7 +166,7 @@ def _on_order(group: Windows, order: float, tried: FloatArray, line: _Line | Non
     if line is not None:
         inside &= np.abs(wanted * group.hertz - line.at) > 2 * guard * group.hertz
     rows = np.flatnonzero(inside)
-    if rows.size < 4:
+    if rows.size < FEWEST_OF_ONE:
         return np.zeros(tried.size)
     column = np.searchsorted(group.frequency, wanted[rows])
     z, gain = group.z[rows, column], group.gain[rows, column]

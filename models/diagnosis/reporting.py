@@ -48,8 +48,8 @@ def report_of(
     if extended is not None and judgement.verdict in {Verdict.CAUSE_NAMED, Verdict.CAUSE_AMBIGUOUS}:
         gain = measure_gain(design, noise, priors, view.fit, extended, rng)
     candidates = _candidates(design, noise, priors, judgement, hypotheses, raw)
-    baseline = misfit_of(design, noise, view, leads)
-    after = misfit_of(design, noise, judgement.view, {}) if judgement.view is not None else None
+    baseline = misfit_of(noise, view, leads)
+    after = misfit_of(noise, judgement.view, {}) if judgement.view is not None else None
     advice = advise(campaign, design, noise, priors, fits) if fits else ()
     visible = visible_of(view)
     said = (*notes, *(f"{each.effect}: {each.note}." for each in raw))
@@ -120,7 +120,7 @@ def _candidates(
         first = next((each for each in hypotheses if slug in each.slugs), None)
         if first is None or first.fit is None:
             effect = BY_SLUG[slug]
-            estimate = seen[slug].estimate if slug in seen else _estimate(slug, 0.0, effect.prior_sd)
+            estimate = _sound(seen[slug].estimate) if slug in seen else _estimate(slug, 0.0, effect.prior_sd)
             evidence = seen[slug].log_evidence if slug in seen else (first.evidence if first else 0.0)
         else:
             place = first.slugs.index(slug)
@@ -142,11 +142,18 @@ def _candidates(
 def _estimate(slug: str, amplitude: float, deviation: float) -> Estimate:
     effect = BY_SLUG[slug]
     return Estimate(
-        name=effect.amplitude, value=_finite(amplitude * effect.scale), sd=_finite(deviation * effect.scale), unit=effect.unit
+        name=effect.amplitude,
+        value=_finite(amplitude * effect.scale),
+        sd=_finite(deviation * effect.scale),
+        unit=effect.unit,
     )
 
 
-def misfit_of(design: Design, noise: Noise, view: View, leads: dict[str, Lead]) -> Misfit:
+def _sound(told: Estimate) -> Estimate:
+    return Estimate(name=told.name, value=_finite(told.value), sd=_finite(told.sd), unit=told.unit)
+
+
+def misfit_of(noise: Noise, view: View, leads: dict[str, Lead]) -> Misfit:
     """How well a fit does, and on which axes the rest lives, strongest first."""
     expected, actual = float((noise.deviation**2).mean()), float((view.fit.residual**2).mean())
     info = np.maximum(np.diag(view.likely.info)[view.smooth], 1e-300)
@@ -183,7 +190,9 @@ def visible_of(view: View) -> tuple[Visible, ...]:
     return tuple(found.values())
 
 
-def _extension(design: Design, noise: Noise, priors: Priors, judgement: Judgement, gain: Gain | None) -> Extension | None:
+def _extension(
+    design: Design, noise: Noise, priors: Priors, judgement: Judgement, gain: Gain | None
+) -> Extension | None:
     fitted: list[tuple[float, Fit, list[float]]] = []
     for each in judgement.standing:
         if each.fit is not None:
@@ -205,4 +214,3 @@ def _statistics(leads: dict[str, Lead], judgement: Judgement) -> dict[str, float
 
 def _finite(value: float) -> float:
     return float(np.clip(np.nan_to_num(value), -1e300, 1e300))
-

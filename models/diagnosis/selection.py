@@ -16,22 +16,27 @@ from models.arrays import FloatArray
 from models.diagnosis.effect import Effect, Shape, Tried
 from models.diagnosis.projection import Projected
 
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Column:
-    """One point of an effect's grid: what was tried, and its log prior weight (normalised over the effect's grid)."""
+    """One point of an effect's grid: what was tried, its log prior weight (normalised over the effect's grid), and that of
+    all points that differ from it in smooth shapes only."""
 
     effect: Effect
     shape: Shape
     log_weight: float
+    log_weight_around: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Screened:
     """One or two effects, judged linearly: evidence [nats] over none, the best shapes (and their places among the
-    columns), and the index of the gain scatter at which that is."""
+    columns), the index of the gain scatter at which that is, and what the best shapes' prior and the rest of the grid add
+    to the evidence of the best shapes [nats]."""
 
     effects: tuple[Effect, ...]
     evidence: float
+    shape_evidence: float
     shapes: tuple[Shape, ...]
     places: tuple[int, ...]
     gain: int
@@ -43,7 +48,7 @@ def linear_drop(columns: list[Column], projected: Projected, screened: Screened)
     precision = np.diag([columns[place].effect.prior_sd ** -2.0 for place in places])
     score = projected.score[places]
     amplitudes = np.linalg.solve(projected.info[np.ix_(places, places)] + precision, score)
-    return amplitudes, 0.5 * float(score @ amplitudes)
+    return np.asarray(amplitudes, dtype=np.float64), 0.5 * float(score @ amplitudes)
 
 
 def columns_of(effects: list[Effect], grids: list[tuple[Tried, ...]]) -> list[Column]:
@@ -52,8 +57,24 @@ def columns_of(effects: list[Effect], grids: list[tuple[Tried, ...]]) -> list[Co
     for effect, grid in zip(effects, grids, strict=True):
         if grid:
             total = float(logsumexp([tried.log_weight for tried in grid]))
-            found += [Column(effect=effect, shape=t.shape, log_weight=t.log_weight - total) for t in grid]
+            kinds: dict[Shape, list[float]] = {}
+            for tried in grid:
+                kinds.setdefault(_stiff(effect, tried.shape), []).append(tried.log_weight - total)
+            found += [
+                Column(
+                    effect=effect,
+                    shape=tried.shape,
+                    log_weight=tried.log_weight - total,
+                    log_weight_around=float(logsumexp(kinds[_stiff(effect, tried.shape)])),
+                )
+                for tried in grid
+            ]
     return found
+
+
+def _stiff(effect: Effect, shape: Shape) -> Shape:
+    """The shapes that a refit does not move."""
+    return tuple(value for value, parameter in zip(shape, effect.shapes, strict=True) if not parameter.smooth)
 
 
 def screen(columns: list[Column], projections: list[Projected]) -> list[Screened]:
@@ -80,6 +101,10 @@ def screen(columns: list[Column], projections: list[Projected]) -> list[Screened
             Screened(
                 effects=(columns[best].effect,),
                 evidence=float(logsumexp(stacked[:, mine])) - null,
+                shape_evidence=max(
+                    float(logsumexp(stacked[:, mine]) - logsumexp(stacked[:, best])) + columns[best].log_weight,
+                    columns[best].log_weight_around,
+                ),
                 shapes=(columns[best].shape,),
                 places=(best,),
                 gain=int(k),
@@ -109,7 +134,9 @@ def screen_pairs(columns: list[Column], projections: list[Projected]) -> list[Sc
         drop = 0.5 * (u[:, None] ** 2 * one + u**2 * one[:, None] - 2 * u[:, None] * u * unit) / determinant
         first = (u[:, None] * one - unit * u) / determinant
         value = each.evidence + drop - 0.5 * np.log(determinant) + weight[:, None] + weight - null
-        wrong = (positive[:, None] & (first < 0)) | (positive & (first.T < 0)) | (np.abs(first) > 4) | (np.abs(first.T) > 4)
+        wrong = (
+            (positive[:, None] & (first < 0)) | (positive & (first.T < 0)) | (np.abs(first) > 4) | (np.abs(first.T) > 4)
+        )
         value = np.where(wrong, -np.inf, value)
         for a, b in combinations(members, 2):
             block = value[np.ix_(members[a], members[b])]
@@ -121,6 +148,10 @@ def screen_pairs(columns: list[Column], projections: list[Projected]) -> list[Sc
             best[a, b] = Screened(
                 effects=(columns[p].effect, columns[q].effect),
                 evidence=total,
+                shape_evidence=max(
+                    total - float(value[p, q]) + columns[p].log_weight + columns[q].log_weight,
+                    columns[p].log_weight_around + columns[q].log_weight_around,
+                ),
                 shapes=(columns[p].shape, columns[q].shape),
                 places=(p, q),
                 gain=k,

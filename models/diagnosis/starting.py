@@ -33,10 +33,16 @@ def starting_laws(design: Design, frame: Frame) -> Laws:
             phi = scale * design.facts.life
             fall = falling_weight(high, frame.span, float(np.log(decay * frame.span)))[0]
             first, second = (fall, 1 - fall) if k == RATIO else (1 - high, high)
-            found, miss = _along(first, second, progress_fraction(cycles, phi, _EXPONENT), values[:, k], deviations[:, k])
+            found, miss = _along(
+                first, second, progress_fraction(cycles, phi, _EXPONENT), values[:, k], deviations[:, k]
+            )
             if miss < best:
                 best = miss
-                theta[k * BLOCK : (k + 1) * BLOCK] = [*found, np.log(phi * np.expm1(np.log(2.0) / _EXPONENT)), np.log(_EXPONENT)]
+                theta[k * BLOCK : (k + 1) * BLOCK] = [
+                    *found,
+                    np.log(phi * np.expm1(np.log(2.0) / _EXPONENT)),
+                    np.log(_EXPONENT),
+                ]
                 if k == RATIO:
                     theta[LOG_DECAY] = np.log(decay * frame.span)
     return Laws(theta=theta, frame=frame)
@@ -60,7 +66,9 @@ def _along(
     miss = float(np.log1p((off / (2 * usual)) ** 2).sum()) + off.size * float(np.log(usual))
     u_1, u_2, lost_1, lost_2 = found.tolist()
     least = 1e-2 * scale
-    shares = [float(np.clip(lost / (u if abs(u) > least else least), -1.2, 3.0)) for u, lost in ((u_1, lost_1), (u_2, lost_2))]
+    shares = [
+        float(np.clip(lost / (u if abs(u) > least else least), -1.2, 3.0)) for u, lost in ((u_1, lost_1), (u_2, lost_2))
+    ]
     return [u_1, u_2, *shares], miss
 
 

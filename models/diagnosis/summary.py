@@ -141,7 +141,7 @@ def _axes(where: Sequence[Where]) -> str:
 
 def _gained(found: Findings) -> list[str]:
     gain = found.gain
-    if gain is None or found.verdict is Verdict.MODEL_ADEQUATE:
+    if gain is None or found.verdict in {Verdict.MODEL_ADEQUATE, Verdict.INSUFFICIENT_DATA}:
         return []
     change = f"{abs(gain.reduction_percent):.1f} ± {gain.reduction_sd:.1f} %"
     way = "less" if gain.reduction_percent >= 0 else "more"
@@ -163,7 +163,7 @@ def _gained(found: Findings) -> list[str]:
 
 
 def _next(found: Findings) -> list[str]:
-    if not found.advice or found.verdict in {Verdict.MODEL_ADEQUATE, Verdict.UNEXPLAINED_STRUCTURE}:
+    if not found.advice or found.verdict not in {Verdict.CAUSE_NAMED, Verdict.CAUSE_AMBIGUOUS}:
         return []
     best = found.advice[0]
     nats = f"about {_number(best.nats)} nats"
@@ -226,4 +226,4 @@ def _number(value: float) -> str:
     """Three digits, without an exponent where that is readable."""
     if 100 <= abs(value) < 1e6:
         return f"{value:,.0f}"
-    return f"{value:.3g}" if value == 0 or 1e-3 <= abs(value) < 100 else f"{value:.1e}"
+    return f"{value:.3g}" if value == 0 or 1e-3 <= abs(value) < 100 else f"{value:.2e}"

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, MaintenanceEvent, StationaryRun
 from models.diagnosis.design import PLATEAU_DURATION
 from models.runs import Plateaus, Record, pressure_levels
@@ -77,7 +78,7 @@ def with_trial(campaign: Campaign, key: str) -> Campaign | None:
         return None if run is None else replace(campaign, dynamic=(*campaign.dynamic, run))
     if pattern is None:
         return None
-    step = float(np.median(np.diff(states[states.size // 2 :]))) if states.size > 3 else float(states[-1] - states[-2])
+    step = _distance(states) if trial.later else 0.0
     ahead = [last + step * (k + 1) for k in range(trial.later)] or [last]
     tests = tuple(_sweep(pattern, trial, cycles, f"trial-{k}") for k, cycles in enumerate(ahead))
     added = replace(campaign, stationary=(*campaign.stationary, *tests))
@@ -87,6 +88,11 @@ def with_trial(campaign: Campaign, key: str) -> Campaign | None:
         event = MaintenanceEvent(run_id="trial-rest", cycles=last, event=EventKind.REST, moment=tests[0].moment)
         added = replace(added, maintenance=(*campaign.maintenance, event))
     return added
+
+
+def _distance(states: FloatArray) -> float:
+    """The usual distance [cycles] of two states [s >= 2] late in life."""
+    return float(np.median(np.diff(states[max(0, min(states.size // 2, states.size - 2)) :])))
 
 
 def _sweep(pattern: StationaryRun, trial: Trial, cycles: float, run_id: str) -> StationaryRun:

@@ -30,6 +30,8 @@ PAIR_PRICE = 4.0
 LEFT_SHARE, PARTS_SHARE = 5e-3, 3e-3
 #: A line in raw records has paid for its search: it is there.
 VIBRATION_PROBABILITY = 0.98
+#: So many of the candidates that stand are closed at most.
+MOST_CLOSED = 4
 #: What oil temperature could imitate where it was not measured.
 LIKE_TEMPERATURE = frozenset({"torque_zero_shift", "pressure_offset"})
 
@@ -59,9 +61,15 @@ class Judgement:
 
 
 def judge(
-    design: Design, noise: Noise, priors: Priors, hypotheses: list[Hypothesis], rng: np.random.Generator
+    design: Design,
+    noise: Noise,
+    priors: Priors,
+    hypotheses: list[Hypothesis],
+    unmeasured: float,
+    rng: np.random.Generator,
 ) -> Judgement:
-    """The verdict on hypotheses, best first."""
+    """The verdict on hypotheses, best first; `unmeasured` is the evidence [nats] of an oil temperature that was not
+    measured (-inf where it was)."""
     usable = [each for each in hypotheses if finite(each)]
     singles = [each for each in usable if len(each.effects) == 1]
     if not singles:
@@ -72,27 +80,75 @@ def judge(
         best, pool = pairs[0], pairs
     slack = tolerance(best)
     near = tuple(each for each in pool if each.evidence >= best.evidence - CLOSE - between(best, each, singles))
-    assert best.fit is not None
-    view = view_of(design, noise, priors, best.fit, [])
+    closings = [close(design, noise, priors, each, rng) for each in near[:MOST_CLOSED]]
+    closed = [closing for closing in closings if closing.closed]
+    statistics = {"lambda": best.drop, "tolerance": slack, "closed": float(len(closed)), **closings[0].statistics}
+    probabilities = probabilities_of(hypotheses, slack)
+    view = closings[0].view
+    causes = tuple(dict.fromkeys(slug for each in near for slug in each.slugs))
+    imitated = unmeasured > max(best.evidence - CLOSE - slack, OVER_NOTHING)
+    if imitated:
+        probabilities = with_unmeasured(probabilities, unmeasured, best.evidence, slack)
+        causes = tuple(dict.fromkeys(("oil_temperature", *causes)))
+    elif best.evidence < OVER_NOTHING or not closed:
+        doubt = doubted(best, closings[0])
+        return Judgement(
+            verdict=Verdict.UNEXPLAINED_STRUCTURE,
+            view=view,
+            probabilities={slug: doubt * each for slug, each in probabilities.items()},
+            statistics=statistics,
+        )
+    elif unmeasured > -np.inf and LIKE_TEMPERATURE & set(causes):
+        imitated, causes = True, (*causes, "oil_temperature")
+    named = len(near) == 1 and not imitated
+    return Judgement(
+        verdict=Verdict.CAUSE_NAMED if named else Verdict.CAUSE_AMBIGUOUS,
+        causes=causes,
+        standing=near,
+        view=view,
+        probabilities=probabilities,
+        statistics=statistics,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Closing:
+    """Whether what a hypothesis leaves looks like noise and its amplitude is one everywhere, by how much it does not at most
+    [nats]; the view of its fit."""
+
+    closed: bool
+    excess: float
+    view: View
+    statistics: dict[str, float]
+
+
+def close(design: Design, noise: Noise, priors: Priors, hypothesis: Hypothesis, rng: np.random.Generator) -> Closing:
+    """Three tests on what is left: smooth contrasts, parts of the data, lines over the clock."""
+    if hypothesis.fit is None:
+        raise ValueError("a hypothesis must be fitted to be closed")
+    slack = tolerance(hypothesis)
+    view = view_of(design, noise, priors, hypothesis.fit, [])
     left = lead(view.projections, view.smooth, np.zeros(len(view.contrasts.axes)), LEFT_SHARE, rng)
     parts = lead(view.projections, view.inside, np.zeros(view.blocks), PARTS_SHARE, rng)
-    line, _ = lines(design, noise, best.fit.residual)
-    probabilities = probabilities_of(hypotheses, slack)
-    statistics = {"lambda": best.drop, "tolerance": slack}
+    line, _ = lines(design, noise, hypothesis.fit.residual)
+    statistics: dict[str, float] = {}
     for name, found in (("closure", left), ("parts", parts), ("left_lines", line)):
         statistics |= {f"{name}_value": found.value, f"{name}_p_value": found.p_value}
-    closed = all(each.value <= each.threshold + slack for each in (left, parts, line))
-    if best.evidence < OVER_NOTHING or not closed:
-        return Judgement(
-            verdict=Verdict.UNEXPLAINED_STRUCTURE, view=view, probabilities=probabilities, statistics=statistics
-        )
-    causes = tuple(dict.fromkeys(slug for each in near for slug in each.slugs))
-    verdict = Verdict.CAUSE_NAMED if len(near) == 1 else Verdict.CAUSE_AMBIGUOUS
-    if not design.facts.temperature_measured and LIKE_TEMPERATURE & set(causes):
-        verdict, causes = Verdict.CAUSE_AMBIGUOUS, tuple(dict.fromkeys((*causes, "oil_temperature")))
-    return Judgement(
-        verdict=verdict, causes=causes, standing=near, view=view, probabilities=probabilities, statistics=statistics
-    )
+    excess = max(each.value - each.threshold - slack for each in (left, parts, line))
+    return Closing(closed=excess <= 0, excess=excess, view=view, statistics=statistics)
+
+
+def doubted(best: Hypothesis, closing: Closing) -> float:
+    """The share of its probability that a candidate keeps where its case does not close: something else competes."""
+    cooled = closing.excess / (1.0 + 0.5 * tolerance(best))
+    return float(0.5 / (1.0 + np.exp(np.clip(cooled, 0.0, 500.0)))) if closing.excess > 0 else 1.0
+
+
+def with_unmeasured(probabilities: dict[str, float], unmeasured: float, best: float, slack: float) -> dict[str, float]:
+    """The probabilities with an unmeasured oil temperature among what competes."""
+    share = float(1 / (1 + np.exp(-np.clip((unmeasured - best) / (1.0 + 0.5 * slack), -500, 500))))
+    found = {slug: (1 - share) * each for slug, each in probabilities.items() if slug != "oil_temperature"}
+    return dict(sorted({**found, "oil_temperature": share}.items(), key=lambda item: -item[1]))
 
 
 def tolerance(hypothesis: Hypothesis) -> float:
@@ -117,4 +173,3 @@ def probabilities_of(hypotheses: list[Hypothesis], slack: float) -> dict[str, fl
         for slug in each.slugs:
             found[slug] = found.get(slug, 0.0) + weight
     return dict(sorted(found.items(), key=lambda item: -item[1]))
-

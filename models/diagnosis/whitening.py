@@ -7,6 +7,7 @@ predicted torque on the curve's (run's) rows. R is an ARMA(1, 1) process, whiten
 rank-one terms (Woodbury), whitened by shrinking along one direction.
 """
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,7 +52,7 @@ def _blocks(design: Design, noise: Noise) -> list[tuple[slice, Correlation]]:
     edges = np.concatenate([[0], np.flatnonzero(np.diff(owner)) + 1, [owner.size]])
     return [
         (slice(int(a), int(b)), noise.plateaus if a < design.plateaus else noise.loops)
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
+        for a, b in itertools.pairwise(edges)
         if b > a
     ]
 
@@ -96,7 +97,7 @@ def gains_of(design: Design, torque: FloatArray, noise: Noise) -> Gains:
     count = int(design.curve.max()) + 1
     run_of_curve = np.zeros(count, dtype=np.intp)
     run_of_curve[design.curve] = design.rows.run
-    squares = np.bincount(design.curve, weights=white * white, minlength=count)
+    squares = np.asarray(np.bincount(design.curve, weights=white * white, minlength=count), dtype=np.float64)
     return Gains(torque=white, curve=design.curve, run_of_curve=run_of_curve, squares=squares)
 
 
@@ -117,7 +118,7 @@ def without_gains(columns: FloatArray, gains: Gains, run_gain: float, curve_gain
     count = int(gains.run_of_curve.max()) + 1
     norm = np.bincount(runs, weights=left * left, minlength=count)
     along = np.stack([np.bincount(runs, weights=left * column, minlength=count) for column in out.T], axis=1)
-    factor = _shrink(run_gain**2 * norm) / np.maximum(norm, 1e-300)
+    factor = _shrink(np.asarray(run_gain**2 * norm, dtype=np.float64)) / np.maximum(norm, 1e-300)
     return np.asarray(out - left[:, None] * (factor[:, None] * along)[runs], dtype=np.float64)
 
 

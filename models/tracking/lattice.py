@@ -25,8 +25,9 @@ from models.tracking.spoiled import NODES, TEMPER, Nodes, Search
 #: The prior's range in deviations to either side.
 REACH = 4.0
 #: A node belongs to the mass where its log density is less than this below the highest: 4.2 deviations of a normal. A
-#: kind is dropped where its mass is by so much below that of the best.
-DEPTH, NEGLIGIBLE = 9.0, 10.0
+#: kind is dropped where its log mass is by so much below that of the best: on the first coarse lattice, which is
+#: blurred, and once the lattice has closed in.
+DEPTH, NEGLIGIBLE, SLIGHT = 9.0, 10.0, 6.0
 #: Blur of a coarse grid for each e-fold of τ between nodes, as a share of the observed change. A node off by half a
 #: step changes b by 0.18 at most, and most of that goes into ξ0 and Δ.
 BLUR = 0.03
@@ -57,6 +58,10 @@ class Kinds:
             spoiled=sets,
             log_weight=np.tile(weight[known], spoiled.shape[0]) + log_spoiled(prior, sets.T),
         )
+
+    def taken(self, index: NDArray[np.intp]) -> "Kinds":
+        """The kinds at `index`."""
+        return Kinds(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,8 +150,9 @@ def closed_in(prior: Prior, history: History, table: FloatArray | None) -> tuple
     blur = share * float((first.upper - first.lower).max()) / (FIRST - 1)
     kinds, density = _first(prior, history, first, table, blur)
     frame = _shrunk(first.taken(np.zeros(kinds.size.size, dtype=np.intp)), density)
-    kinds, frame = _weighty(kinds, frame.resized(rows, levels), density, first.cells(FIRST))
+    kinds, frame = _weighty(kinds, frame.resized(rows, levels), _log_mass(density, first.cells(FIRST)), NEGLIGIBLE)
     shares, left = np.full(kinds.size.size, share), np.ones(kinds.size.size, dtype=bool)
+    log_mass = np.zeros(kinds.size.size)
     for _ in range(CLOSINGS):
         now = np.flatnonzero(left)
         if now.size == 0:
@@ -154,14 +160,15 @@ def closed_in(prior: Prior, history: History, table: FloatArray | None) -> tuple
         wide = frame.taken(now)
         widest = (wide.upper - wide.lower).max(axis=1)
         blurs = shares[now] * widest / (nodes - 1)
-        some = Kinds(size=kinds.size[now], spoiled=kinds.spoiled[now], log_weight=kinds.log_weight[now])
-        closer = _shrunk(wide, log_density(prior, history, some, wide, tabled(wide, nodes, history.progress), blurs))
+        density = log_density(prior, history, kinds.taken(now), wide, tabled(wide, nodes, history.progress), blurs)
+        closer = _shrunk(wide, density)
+        log_mass[now] = _log_mass(density, wide.cells(nodes))
         settled = _shrinkage(wide, closer) > WORTHWHILE
         left[now] = ~(settled & (blurs < 0.5 * np.exp(closer.log_scatter.mean(axis=1))))
         shares[now] *= np.where(settled, 0.3, 1.0)
         for field in fields(Frame):
             getattr(frame, field.name)[now] = getattr(closer, field.name)
-    return kinds, frame
+    return _weighty(kinds, frame, np.where(left, log_mass.max(), log_mass), SLIGHT)
 
 
 def _first(prior: Prior, history: History, frame: Frame, table: FloatArray, blur: float) -> tuple[Kinds, FloatArray]:
@@ -207,13 +214,17 @@ def _chosen(prior: Prior, frame: Frame, table: FloatArray, log_mass: FloatArray,
     return at(drawn, log_share), at(best, 0.0)
 
 
-def _weighty(kinds: Kinds, frame: Frame, density: FloatArray, cells: FloatArray) -> tuple[Kinds, Frame]:
-    """The kinds whose mass counts."""
-    mass = (np.exp(density - density.max()) * cells[:, None, :, None]).sum(axis=(1, 2, 3))
-    kept = np.flatnonzero(mass > mass.max() * np.exp(-NEGLIGIBLE))
-    return Kinds(size=kinds.size[kept], spoiled=kinds.spoiled[kept], log_weight=kinds.log_weight[kept]), frame.taken(
-        kept
-    )
+def _log_mass(density: FloatArray, cells: FloatArray) -> FloatArray:
+    """The logarithm of the mass of each kind [k] on cells of volume [k, rows] or [1, rows]."""
+    top = density.max(axis=(1, 2, 3))
+    off = np.exp(density - top[:, None, None, None]).sum(axis=(1, 3))
+    return np.asarray(top + np.log((off * cells).sum(axis=1)))
+
+
+def _weighty(kinds: Kinds, frame: Frame, log_mass: FloatArray, depth: float) -> tuple[Kinds, Frame]:
+    """The kinds whose log mass [k] is not more than `depth` below the largest."""
+    kept = np.flatnonzero(log_mass > log_mass.max() - depth)
+    return kinds.taken(kept), frame.taken(kept)
 
 
 def _shrunk(frame: Frame, density: FloatArray) -> Frame:

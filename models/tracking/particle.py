@@ -23,7 +23,7 @@ from scipy.special import ndtri
 from models.arrays import FloatArray
 from models.tracking.discrepancy import PAST, SIZES, drawn, log_size_weight
 from models.tracking.history import History
-from models.tracking.linear import Points, conditional, drawn_terms, evidence, log_spoiled, pointwise
+from models.tracking.linear import Points, basis, conditional, drawn_terms, evidence, log_spoiled, pointwise
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
 from models.tracking.protocol import Posterior
@@ -33,6 +33,8 @@ from models.tracking.sampling import correlated_pair, spread_normals, spread_poi
 HEALTHY, STARVED = 0.5, 0.25
 #: Steps of a move: at most so many, until this share of particles has moved since resampling.
 MOVES, MOVED = 8, 0.9
+#: Where a smaller share of steps than the first is accepted, the next are shorter by the second.
+TIMID, SHORTER = 0.2, 0.5
 #: In a step, how often another size is tried, and how often another belief about one run.
 RESIZED, TURNED = 0.25, 0.1
 #: Degrees by which a measurement may be let in, and halvings in the search for each.
@@ -115,9 +117,8 @@ class Particle:
             log_target=np.zeros(self.particles),
         )
         nothing = History.of((), prior)
-        return ParticleState(
-            prior=prior, history=nothing, cloud=replace(cloud, log_target=_log_target(nothing, prior, cloud))
-        )
+        target = _log_target(nothing, prior, cloud, _table(nothing, cloud))
+        return ParticleState(prior=prior, history=nothing, cloud=replace(cloud, log_target=target))
 
     def update(self, state: ParticleState, measurement: Measurement, rng: np.random.Generator) -> ParticleState:
         """The posterior with one more measurement."""
@@ -152,11 +153,12 @@ class Particle:
         shape = _root((weight * off.T) @ off)
         index = systematic(weight, weight.size, float(rng.random()))
         cloud, before, after = cloud.taken(index), before[index], after[index]
-        moved = np.zeros(weight.size, dtype=bool)
+        moved, reach = np.zeros(weight.size, dtype=bool), 1.0
         for _ in range(self.moves):
-            proposed = _proposed(cloud, shape, rng)
-            offered_after = _log_target(bridge.after, bridge.prior, proposed)
-            offered_before = before if degree == 1.0 else bridge.log_before(proposed)
+            proposed = _proposed(cloud, reach * shape, rng)
+            table = _table(bridge.after, proposed)
+            offered_after = _log_target(bridge.after, bridge.prior, proposed, table)
+            offered_before = before if degree == 1.0 else bridge.log_before(proposed, table)
             gain = degree * (offered_after - after)
             if degree < 1.0:
                 gain += (1.0 - degree) * (offered_before - before)
@@ -165,6 +167,7 @@ class Particle:
             after = np.where(accepted, offered_after, after)
             before = np.where(accepted, offered_before, before)
             moved |= accepted
+            reach *= SHORTER if accepted.mean() < TIMID else 1.0
             if moved.mean() >= MOVED:
                 break
         return cloud, before, after
@@ -207,7 +210,8 @@ class _Bridge:
         count = cloud.size.size
         as_sound = replace(cloud, spoiled=np.column_stack([cloud.spoiled, np.zeros(count)]))
         as_spoiled = replace(cloud, spoiled=np.column_stack([cloud.spoiled, np.ones(count)]))
-        sound, spoiled = (_log_target(self.after, self.prior, each) for each in (as_sound, as_spoiled))
+        table = _table(self.after, cloud)
+        sound, spoiled = (_log_target(self.after, self.prior, each, table) for each in (as_sound, as_spoiled))
         total = np.logaddexp(sound, spoiled)
         turned = np.log(rng.random(total.size)) < spoiled - total
         entered = _merged(as_sound, as_spoiled, turned)
@@ -215,21 +219,26 @@ class _Bridge:
         before = cloud.log_target + _log_prior_of_last(self.prior, entered)
         return replace(entered, log_weight=cloud.log_weight + total - cloud.log_target), before, after
 
-    def log_before(self, cloud: Cloud) -> FloatArray:
-        """The target before the new run, with the prior of what is believed of it."""
+    def log_before(self, cloud: Cloud, table: FloatArray) -> FloatArray:
+        """The target before the new run, with the prior of what is believed of it; `table` is that of the runs after."""
         without = replace(cloud, spoiled=cloud.spoiled[:, :-1])
-        return _log_target(self.before, self.prior, without) + _log_prior_of_last(self.prior, cloud)
+        return _log_target(self.before, self.prior, without, table[:-1]) + _log_prior_of_last(self.prior, cloud)
 
 
 def _log_prior_of_last(prior: Prior, cloud: Cloud) -> FloatArray:
     return log_spoiled(prior, cloud.spoiled[:, -1:].T)
 
 
-def _log_target(history: History, prior: Prior, cloud: Cloud) -> FloatArray:
+def _table(history: History, cloud: Cloud) -> FloatArray:
+    """b of every run and particle, [t, n]."""
+    return basis(history.progress[:, None], cloud.points[:, 0], cloud.points[:, 1])
+
+
+def _log_target(history: History, prior: Prior, cloud: Cloud, table: FloatArray) -> FloatArray:
     """Log posterior density of every particle, up to a constant."""
     placed = cloud.placed()
     flat = prior.log_density(*cloud.points.T) + log_size_weight(prior)[cloud.size.astype(np.intp)]
-    return evidence(pointwise(history, prior, placed)[0], prior) + flat + log_spoiled(prior, placed.spoiled)
+    return evidence(pointwise(history, prior, placed, table)[0], prior) + flat + log_spoiled(prior, placed.spoiled)
 
 
 def _proposed(cloud: Cloud, shape: FloatArray, rng: np.random.Generator) -> Cloud:

@@ -52,7 +52,8 @@ class Way:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One filter's step: its state, how probable the measurement was, and the squared innovation in deviations."""
+    """One filter's step: its state, how probable the measurement was, and the squared innovation in deviations, those of
+    a sound and of a spoiled run mixed as the step is."""
 
     mean: FloatArray
     covariance: FloatArray
@@ -103,7 +104,7 @@ def stepped(prior: Prior, normal: Normal, way: Way) -> Step:
         covariance=definite(learnt),
         scatter=scatter_learnt(prior, normal.scatter, off**2 / variance, variance, float(share[0])),
         log_likelihood=math.log(max(total, 1e-300)),
-        surprise=min(off**2 / variance, OUTLIER**2),
+        surprise=min(float(share @ (off**2 / variances)), OUTLIER**2),
     )
 
 

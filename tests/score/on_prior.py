@@ -6,7 +6,7 @@ from models.tracking.grid import Grid
 from models.tracking.particle import Particle
 from models.tracking.ukf import Ukf
 from tests.score.table import Scores, shares
-from tests.statistical.lives import PRIOR, STAGES, exact, followed, lives
+from tests.statistical.lives import PRIOR, STAGES, at_stages, exact, lives
 
 RUNS, DRAWS = 25, 1_000
 FILTERS = (Grid(), Particle(), Ukf())
@@ -18,16 +18,7 @@ def calibration(count: int, seed: int, spoiled: float = 0.0) -> str:
     for life, rng in lives(count, seed):
         measurements = life.measured(0.8, RUNS, rng, spoiled)
         for tracker in FILTERS:
-            state = tracker.start(PRIOR)
-            seen = 0
-            for stage in STAGES:
-                runs = round(stage * 30) + 1
-                if isinstance(tracker, Grid):
-                    state = tracker.from_history(PRIOR, measurements[:runs])
-                else:
-                    for measurement in measurements[seen:runs]:
-                        state = tracker.update(state, measurement, rng)  # type: ignore[arg-type]
-                seen = runs
+            for stage, state in at_stages(tracker, PRIOR, measurements, rng):
                 scores.add(tracker.name, stage, tracker.posterior(state, DRAWS, rng), life.end)  # type: ignore[arg-type]
     lines = [
         f"{count} lives, seed {seed}"
@@ -50,14 +41,14 @@ def beside_exact(count: int, seed: int, spoiled: float = 0.0) -> str:
     scores, counts = Scores(), []
     for life, rng in lives(count, seed):
         measurements = life.measured(0.8, RUNS, rng, spoiled)
+        states = {tracker.name: dict(at_stages(tracker, PRIOR, measurements, rng)) for tracker in FILTERS}
         for stage in STAGES:
             seen = measurements[: round(stage * 30) + 1]
-            states = {tracker.name: followed(tracker, PRIOR, seen, rng) for tracker in FILTERS}
-            reference, effective = exact(states["particle"], seen, 5_000, rng)
+            reference, effective = exact(states["particle"][stage], seen, 5_000, rng)
             counts.append(effective)
             scores.add("exact", stage, reference, life.end)
             for tracker in FILTERS:
-                scores.add(tracker.name, stage, tracker.posterior(states[tracker.name], DRAWS, rng), life.end)
+                scores.add(tracker.name, stage, tracker.posterior(states[tracker.name][stage], DRAWS, rng), life.end)  # type: ignore[arg-type]
     lines = [
         f"{count} lives, seed {seed}; the exact sample counts for {np.median(counts):.0f} draws in the median, "
         f"{np.quantile(counts, 0.05):.0f} at the 5 % quantile\n",

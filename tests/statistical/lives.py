@@ -89,6 +89,23 @@ def followed(tracker: Any, prior: Prior, measurements: list[Measurement], rng: n
     return state
 
 
+def at_stages(
+    tracker: Any, prior: Prior, measurements: list[Measurement], rng: np.random.Generator
+) -> Iterator[tuple[float, Any]]:
+    """The states at the stages of a life whose 25 runs end at 80 % of it: the grid's laid at once, the others' on the
+    way."""
+    state, seen = tracker.start(prior), 0
+    for stage in STAGES:
+        runs = round(stage * 30) + 1
+        if tracker.name == "grid":
+            state = tracker.from_history(prior, measurements[:runs])
+        else:
+            for measurement in measurements[seen:runs]:
+                state = tracker.update(state, measurement, rng)
+        seen = runs
+        yield stage, state
+
+
 def sampled(
     prior: Prior, measurements: list[Measurement], points: Points, log_weight: np.ndarray, count: int
 ) -> Posterior:

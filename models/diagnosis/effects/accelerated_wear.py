@@ -11,7 +11,7 @@ from models.diagnosis.laws import Scene
 def _grid(facts: Facts) -> tuple[Tried, ...]:
     if facts.states.size < 4:
         return ()
-    onsets = sorted({*facts.states[1:-1].tolist(), *facts.between[1:]})
+    onsets = sorted({cycles for low, onset, _ in facts.onsets[1:] for cycles in (low, onset)})
     weight = -float(np.log(len(onsets)))
     return tuple(Tried(shape=(onset, power), log_weight=weight) for onset in onsets for power in (1.0, 2.0))
 

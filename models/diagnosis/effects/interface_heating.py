@@ -68,7 +68,7 @@ EFFECT = Effect(
     title="Frictional heat at the interface lowers the torque",
     physics="The interface is hotter than the oil by the power that it turns into heat; the boundary film and the oil "
     "there lose strength.",
-    formula="-S (1 - e^{-a w}), w the power |S| ω / 4 kW, saturating by s, behind a first-order lag τ; S or its viscous part",
+    formula="-S (1 - e^{-a w}), w the power |S| ω / 4 kW saturating by s and lagging by τ; S or its viscous part",
     source="Marklund and Larsson, Tribology Int. 41 (2008) 824: friction of wet clutches by interface temperature",
     family=Family.THERMAL,
     kind=Kind.ARTEFACT,

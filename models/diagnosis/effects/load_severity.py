@@ -17,7 +17,7 @@ def _grid(facts: Facts) -> tuple[Tried, ...]:
         return (Tried(shape=(LOGGED, 0.0)),)
     if facts.states.size < 5 or facts.duty_energies.size:
         return ()
-    inner = facts.states[1:-1].tolist()
+    inner = [low for low, _, _ in facts.onsets[1:]]
     return tuple(Tried(shape=(UNLOGGED, onset), log_weight=-float(np.log(len(inner)))) for onset in inner)
 
 

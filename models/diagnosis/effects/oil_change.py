@@ -13,9 +13,9 @@ _UNLOGGED = -2.0
 
 def _grid(facts: Facts) -> tuple[Tried, ...]:
     tried = []
-    for low, onset, high in zip(facts.states[:-1], facts.between, facts.states[1:], strict=True):
+    for low, onset, high in facts.onsets:
         logged = any(low <= cycles <= high for cycles in facts.oil_changes)
-        weight = 0.0 if logged else (_UNLOGGED if facts.oil_changes else 0.0) - float(np.log(len(facts.between)))
+        weight = 0.0 if logged else (_UNLOGGED if facts.oil_changes else 0.0) - float(np.log(len(facts.onsets)))
         tried += [Tried(shape=(onset, share, lost), log_weight=weight) for share in (-0.1, 0.1) for lost in (0.0, 0.5)]
     return tuple(tried)
 

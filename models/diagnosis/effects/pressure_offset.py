@@ -14,7 +14,9 @@ def _grid(facts: Facts) -> tuple[Tried, ...]:
     tried = [Tried(shape=(CONSTANT, 0.0))]
     if facts.states.size > 2:
         tried += [Tried(shape=(GROWING, power)) for power in (0.5, 1.0, 2.0)]
-        tried += [Tried(shape=(STEP, onset), log_weight=-float(np.log(len(facts.between)))) for onset in facts.between]
+        tried += [
+            Tried(shape=(STEP, onset), log_weight=-float(np.log(len(facts.onsets)))) for _, onset, _ in facts.onsets
+        ]
     return tuple(tried)
 
 

@@ -13,7 +13,10 @@ REFERENCE_PRESSURE = 5e5
 
 def _grid(_facts: Facts) -> tuple[Tried, ...]:
     return tuple(
-        Tried(shape=(power, thin, least)) for power in (0.0, 0.6) for thin in (0.3, 0.7, 1.2) for least in (0.01, 0.06, 0.25)
+        Tried(shape=(power, thin, least))
+        for power in (0.0, 0.6)
+        for thin in (0.3, 0.7, 1.2)
+        for least in (0.01, 0.06, 0.25)
     )
 
 

@@ -16,9 +16,9 @@ def _grid(facts: Facts) -> tuple[Tried, ...]:
     zeroed = facts.sensor_zeros
     tried = [Tried(shape=(STEP, -1.0), log_weight=-1.0), Tried(shape=(CLOCK, 0.0))]
     tried += [Tried(shape=(SETTLING, tau), log_weight=-0.7) for tau in (120.0, 400.0)]
-    for low, onset, high in zip(facts.states[:-1], facts.between, facts.states[1:], strict=True):
+    for low, onset, high in facts.onsets:
         logged = any(low <= cycles <= high for cycles in zeroed)
-        tried.append(Tried(shape=(STEP, onset), log_weight=0.0 if logged else -float(np.log(len(facts.between)))))
+        tried.append(Tried(shape=(STEP, onset), log_weight=0.0 if logged else -float(np.log(len(facts.onsets)))))
     if facts.states.size > 2:
         tried.append(Tried(shape=(LIFE, 0.0)))
     return tuple(tried)

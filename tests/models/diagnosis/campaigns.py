@@ -116,7 +116,9 @@ def _dynamic(
         if planted is not None:
             at = Where(velocity, full, state, oil, time + 15 * level, acceleration, one, dynamic=True)
             true = true + planted(at)
-        parts.append((time + 15 * level, full, speed, true * factor * (1 + noise * rng.standard_normal(time.size)), oil))
+        parts.append(
+            (time + 15 * level, full, speed, true * factor * (1 + noise * rng.standard_normal(time.size)), oil)
+        )
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
     record = Record(
         time=columns[0],

@@ -13,11 +13,25 @@ from models.diagnosis.starting import starting_laws
 from models.diagnosis.viscosity import viscosity
 from tests.models.diagnosis.campaigns import campaign
 
-SLUGS = (
-    "oil_temperature interface_heating viscous_exponent hydrodynamic_drag torque_zero_shift pressure_offset "
-    "unsettled_dwell channel_delay inertia_torque squeeze_film shaft_ripple stick_slip running_in oil_change "
-    "accelerated_wear load_severity rest_recovery"
-).split()
+SLUGS = [
+    "oil_temperature",
+    "interface_heating",
+    "viscous_exponent",
+    "hydrodynamic_drag",
+    "torque_zero_shift",
+    "pressure_offset",
+    "unsettled_dwell",
+    "channel_delay",
+    "inertia_torque",
+    "squeeze_film",
+    "shaft_ripple",
+    "stick_slip",
+    "running_in",
+    "oil_change",
+    "accelerated_wear",
+    "load_severity",
+    "rest_recovery",
+]
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +92,6 @@ def test_viscosity_meets_its_two_points_and_one_of_the_reference() -> None:
     found = viscosity(np.array([313.15, 373.15, 353.15, 363.15]), oil)
     np.testing.assert_allclose(found[:2], [56e-6, 9.3e-6], rtol=1e-9)
     # log10 log10(ν + 0.7) = 8.2404 - 3.2040 log10 T, rounded coefficients: 1 % of ν
-    expected = 10 ** 10 ** (8.2404 - 3.2040 * np.log10([353.15, 363.15])) - 0.7
+    expected = 10**10 ** (8.2404 - 3.2040 * np.log10([353.15, 363.15])) - 0.7
     np.testing.assert_allclose(found[2:] * 1e6, expected, rtol=0.01)
     assert 0.2 < 1 - found[3] / found[2] < 0.24  # 22 % over the reference's 80 to 90 °C

@@ -135,9 +135,7 @@ def test_too_little_data_says_what_is_missing() -> None:
 
 def test_a_logged_oil_change_is_preferred_to_an_unlogged_one() -> None:
     given = campaign(7, PLANTED["oil_change"])
-    logged = replace(
-        given, maintenance=(MaintenanceEvent(run_id="oil", cycles=4500.0, event=Event.OIL_CHANGE),)
-    )
+    logged = replace(given, maintenance=(MaintenanceEvent(run_id="oil", cycles=4500.0, event=Event.OIL_CHANGE),))
     with_log = next(each for each in look(logged).candidates if each.effect == "oil_change")
     without = next(each for each in look(given).candidates if each.effect == "oil_change")
     assert with_log.log_evidence_gain > without.log_evidence_gain + 1.0

@@ -1,0 +1,60 @@
+"""What an oil temperature that nobody measured could have done: any slow course, another one in every test.
+
+In a test of duration T the log of the viscosity may follow a_0 + Σ_k a_k cos(2πkt/T) + b_k sin(2πkt/T), k = 1 ... 4, with
+normal coefficients whose deviations fall with k; in loops it is one number a test. The viscous term follows it. That
+is many columns and no amplitude that could be told, so it is judged by its marginal likelihood alone,
+
+    evidence = ½ sᵀ (I + Λ⁻¹)⁻¹ s - ½ ln det(1 + Λ I)        (s the score, I the information, Λ the prior variances)
+
+averaged over how strongly temperature swings.
+"""
+
+import numpy as np
+from scipy.special import logsumexp
+
+from models.arrays import FloatArray
+from models.diagnosis.design import Design
+from models.diagnosis.fitting import Fit, Priors
+from models.diagnosis.projection import Projected, gram_of, project
+from models.diagnosis.whitening import Noise
+
+#: Deviation of ln ν in a test that swings by some 3 K, and the factors on it that are considered.
+USUAL, FACTORS = 0.06, (0.5, 1.5, 4.0)
+_WAVES = 4
+
+
+def temperature_evidence(design: Design, noise: Noise, priors: Priors, fitted: Fit) -> float:
+    """Evidence [nats] of unmeasured courses of oil temperature over none."""
+    columns, relative = _courses(design, fitted)
+    projected = project(gram_of(design, noise, priors, fitted, columns), noise.run_gain)
+    logs = [_marginal(projected, (factor * USUAL * relative) ** 2) for factor in FACTORS]
+    return float(logsumexp(logs) - np.log(len(FACTORS)))
+
+
+def _courses(design: Design, fitted: Fit) -> tuple[FloatArray, FloatArray]:
+    """Columns [N, m] of torque and their deviations [m] relative to the first of a run."""
+    viscous = fitted.prediction.change_at_rows(design, fitted.prediction.scene.viscous, before_lag=True)
+    columns, relative = [], []
+    for run in np.unique(design.rows.run):
+        here = design.rows.run == run
+        own = np.where(here, viscous, 0.0)
+        columns.append(own)
+        relative.append(1.0)
+        if not design.rows.steady[here].all():
+            continue
+        turn = 2 * np.pi * design.rows.clock / max(float(np.ptp(design.rows.clock[here])), 1e-9)
+        for k in range(1, _WAVES + 1):
+            columns += [own * np.cos(k * turn), own * np.sin(k * turn)]
+            relative += [1.0 / k, 1.0 / k]
+    return np.stack(columns, axis=1), np.array(relative)
+
+
+def _marginal(projected: Projected, variances: FloatArray) -> float:
+    """The formula above."""
+    root = np.sqrt(variances)
+    unit = root[:, None] * projected.info * root
+    score = root * projected.score
+    values, vectors = np.linalg.eigh(0.5 * (unit + unit.T))
+    values = np.maximum(values, 0.0)
+    along = vectors.T @ score
+    return float(0.5 * (along**2 / (1 + values)).sum() - 0.5 * np.log1p(values).sum())

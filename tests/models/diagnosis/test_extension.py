@@ -1,0 +1,175 @@
+"""What an adopted extension takes off measurements and adds to a life, against the effect's own change."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.diagnosis.campaign import Campaign, DutyRun, StationaryRun
+from models.diagnosis.catalogue import BY_SLUG
+from models.diagnosis.design import MOST_PLATEAUS
+from models.diagnosis.extension import Extension, build_extension, facts_from, facts_to
+from models.diagnosis.fitting import Fit, Fitted
+from models.diagnosis.viscosity import log_viscosity_ratio
+from models.runs import Plateaus
+from tests.models.diagnosis.campaigns import campaign
+from tests.models.diagnosis.fitted import Study, study, warmth
+
+CYCLES = np.array([0.0, 3000.0, 8000.0, 20000.0])
+PRESSURE = np.array([3e5, 6e5])
+VELOCITY = np.linspace(0.5, 12.0, 30)
+ONSET = 6000.0
+
+
+@pytest.fixture(scope="module")
+def warm() -> Study:
+    given = campaign(51, warmth, loops=False)
+    duty = (
+        DutyRun(run_id="a", cycles=3000.0, engagements=3000.0, energy=8e3),
+        DutyRun(run_id="b", cycles=15000.0, engagements=12000.0, energy=12e3),
+    )
+    return study(replace(given, duty=duty))
+
+
+def with_effect(given: Study, *effects: tuple[str, float, tuple[float, ...]]) -> Fit:
+    fitted = [Fitted(effect=BY_SLUG[slug], amplitude=a, shape=shape) for slug, a, shape in effects]
+    return replace(given.baseline.fit, effects=tuple(fitted))
+
+
+def extension_of(given: Study, *effects: tuple[str, float, tuple[float, ...]], courses: bool = True) -> Extension:
+    fit = with_effect(given, *effects)
+    return build_extension([(1.0, fit, [0.1 * abs(a) for _, a, _ in effects])], given.design.facts, courses=courses)
+
+
+TEMPERATURE = ("oil_temperature", 0.4, (0.0,))
+WEAR = ("accelerated_wear", 0.05, (ONSET, 1.0))
+
+
+def test_json_carries_it_exactly(warm):
+    built = extension_of(warm, TEMPERATURE, WEAR)
+    again = Extension.from_dict(json.loads(json.dumps(built.to_dict(), allow_nan=False)))
+    assert again.effects == built.effects == ("oil_temperature", "accelerated_wear")
+    run = warm.campaign.stationary[2]
+    assert np.array_equal(again.artefact(run, warm.campaign), built.artefact(run, warm.campaign))
+    for name in ("course", "course_sd"):
+        assert np.array_equal(
+            getattr(again, name)(CYCLES, PRESSURE, VELOCITY), getattr(built, name)(CYCLES, PRESSURE, VELOCITY)
+        )
+    facts = warm.design.facts
+    assert facts_to(facts_from(json.loads(json.dumps(facts_to(facts))))) == facts_to(facts)
+
+
+def test_the_artefact_of_temperature_is_that_of_the_viscosity(warm):
+    """Written out: C_v v^0.3 ((ν/ν_ref)^β - 1) with C_v of the fitted laws."""
+    run = warm.campaign.stationary[4]
+    found = extension_of(warm, TEMPERATURE).artefact(run, warm.campaign)
+    rows = warm.design.rows.run == 4
+    scene = warm.baseline.fit.prediction.scene
+    viscous = scene.parameters[rows, 3] * warm.design.rows.velocity[rows] ** 0.3
+    facts = warm.design.facts
+    ratio = log_viscosity_ratio(run.plateaus.oil_temperature, facts.reference_temperature, facts.oil)
+    assert np.allclose(found, viscous * np.expm1(0.4 * ratio), rtol=1e-9, atol=1e-12)
+    assert np.abs(found).max() > 0.05
+    # and what it leaves is nearer to a run at the usual temperature than what was measured
+    usual = replace(run.plateaus, oil_temperature=np.full_like(run.plateaus.torque, facts.reference_temperature))
+    assert np.abs(extension_of(warm, TEMPERATURE).artefact(replace(run, plateaus=usual), warm.campaign)).max() < 1e-12
+
+
+def test_turned_the_other_way_the_artefact_turns_as_well(warm):
+    run = warm.campaign.stationary[4]
+    back = replace(run, plateaus=replace(run.plateaus, speed=-run.plateaus.speed, torque=-run.plateaus.torque))
+    built = extension_of(warm, TEMPERATURE)
+    assert np.allclose(built.artefact(back, warm.campaign), -built.artefact(run, warm.campaign))
+    # a shifted zero does not turn with the clutch
+    zero = extension_of(warm, ("torque_zero_shift", 0.3, (0.0, ONSET)))
+    assert np.allclose(zero.artefact(back, warm.campaign), 0.3)
+    assert np.allclose(zero.artefact(run, warm.campaign), 0.3)
+    assert np.allclose(zero.artefact(warm.campaign.stationary[1], warm.campaign), 0.0)
+
+
+def test_without_temperature_nothing_is_taken_off(warm):
+    table = warm.campaign.stationary[4].plateaus
+    bare = Plateaus(pressure=table.pressure, speed=table.speed, torque=table.torque)
+    run = StationaryRun(run_id="later", cycles=2e4, plateaus=bare)
+    assert np.array_equal(extension_of(warm, TEMPERATURE).artefact(run, warm.campaign), np.zeros(table.torque.size))
+    # a course is no artefact
+    assert not extension_of(warm, WEAR).artefact(warm.campaign.stationary[5], warm.campaign).any()
+
+
+def test_a_huge_run_and_runs_unlike_any_before(warm):
+    rng = np.random.default_rng(0)
+    count = 2 * MOST_PLATEAUS + 345
+    table = Plateaus(
+        pressure=rng.uniform(0, 2e6, count),
+        speed=rng.uniform(-300, 300, count),
+        torque=rng.uniform(0, 40, count),
+        oil_temperature=rng.uniform(290, 400, count),
+    )
+    built = extension_of(warm, TEMPERATURE)
+    run = StationaryRun(run_id="huge", cycles=3e4, plateaus=table)
+    found = built.artefact(run, Campaign(geometry=warm.campaign.geometry, oil=warm.campaign.oil))
+    assert found.shape == (count,)
+    assert np.isfinite(found).all()
+    # the same plateaus by themselves
+    some = slice(MOST_PLATEAUS - 5, MOST_PLATEAUS + 5)
+    part = Plateaus(**{name: getattr(table, name)[some] for name in ("pressure", "speed", "torque", "oil_temperature")})
+    alone = built.artefact(replace(run, plateaus=part), warm.campaign)
+    assert np.allclose(alone, found[some], rtol=1e-9, atol=1e-12)
+    still = Plateaus(pressure=np.zeros(3), speed=np.zeros(3), torque=np.zeros(3))
+    assert np.array_equal(built.artefact(replace(run, plateaus=still), warm.campaign), np.zeros(3))
+
+
+def test_a_course_begins_at_its_onset_and_is_the_effects_mean(warm):
+    built = extension_of(warm, WEAR)
+    found = built.course(CYCLES, PRESSURE, VELOCITY)
+    assert found.shape == (4, 2)
+    assert np.array_equal(found[:2], np.zeros((2, 2)))
+    assert (found[2:] < 0).all()
+    # worn twice as far beyond the onset, linear growth: (20000 - 6000)/(8000 - 6000) as much, up to the law's decay
+    assert 3 < found[3, 0] / found[2, 0] < 7.5
+    assert np.allclose(built.course_sd(CYCLES, PRESSURE, VELOCITY), 0.1 * np.abs(found), rtol=0.02)
+    # the mean over velocity of a single velocity each
+    each = [built.course(CYCLES, PRESSURE, np.array([v])) for v in VELOCITY]
+    assert np.allclose(found, np.mean(each, axis=0))
+    silent = extension_of(warm, WEAR, courses=False)
+    assert not silent.course(CYCLES, PRESSURE, VELOCITY).any()
+    assert not silent.course_sd(CYCLES, PRESSURE, VELOCITY).any()
+
+
+def test_a_course_ends_friction_at_most_and_does_not_turn_it(warm):
+    """An effect of one and a half times the curve itself, at the beginning of a life."""
+    beyond = ("running_in", -1.5, (1e4, 1.0))
+    found = extension_of(warm, beyond).course(np.zeros(1), PRESSURE, VELOCITY)[0]
+    table = warm.baseline.fit.laws.parameters(np.repeat(PRESSURE, VELOCITY.size), np.zeros(2 * VELOCITY.size))
+    m_s, ratio, v_s, c_v = table.T
+    v = np.tile(VELOCITY, PRESSURE.size)
+    curve = m_s * (1 + (ratio - 1) * np.exp(-v_s / v)) + c_v * v**0.3
+    assert np.allclose(found, -curve.reshape(PRESSURE.size, -1).mean(axis=1))
+    # the control: half of it is half of it
+    half = extension_of(warm, ("running_in", -0.5, (1e4, 1.0))).course(np.zeros(1), PRESSURE, VELOCITY)[0]
+    assert np.allclose(half, 0.5 * found)
+
+
+def test_alternatives_count_by_their_probability(warm):
+    wear, none = with_effect(warm, WEAR), warm.baseline.fit
+    facts = warm.design.facts
+    alone = build_extension([(1.0, wear, [0.0])], facts, courses=True).course(CYCLES, PRESSURE, VELOCITY)
+    both = build_extension([(0.6, wear, [0.0]), (0.2, none, [])], facts, courses=True)
+    assert both.effects == ("accelerated_wear",)
+    assert np.allclose(both.course(CYCLES, PRESSURE, VELOCITY), 0.75 * alone)
+    # between one that says g and one that says nothing: √(0.75 · 0.25) |g|
+    assert np.allclose(both.course_sd(CYCLES, PRESSURE, VELOCITY), np.sqrt(0.1875) * np.abs(alone))
+
+
+def test_logged_severity_is_counted_and_then_no_course(warm):
+    logged = extension_of(warm, ("load_severity", 0.8, (0.0, 0.0)))
+    assert logged.severity_exponent == 0.8
+    assert not logged.course(CYCLES, PRESSURE, VELOCITY).any()
+    # the controls: not logged it is a course; without courses nothing of it is followed; others count nothing
+    unlogged = extension_of(warm, ("load_severity", 0.8, (1.0, ONSET)))
+    assert unlogged.severity_exponent is None
+    assert unlogged.course(CYCLES, PRESSURE, VELOCITY)[3].all()
+    assert not unlogged.course(CYCLES, PRESSURE, VELOCITY)[0].any()
+    assert extension_of(warm, ("load_severity", 0.8, (0.0, 0.0)), courses=False).severity_exponent is None
+    assert extension_of(warm, WEAR).severity_exponent is None

@@ -1,0 +1,151 @@
+"""The paragraph: every verdict has one, in words and units, and none says nan."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.diagnosis.catalogue import BY_SLUG, CATALOGUE
+from models.diagnosis.report import Advice, Candidate, Estimate, Gain, Misfit, Verdict, Visible, Where
+from models.diagnosis.summary import Findings, summarise
+
+MISFIT = Misfit(
+    rmse=0.15234,
+    noise=0.1012,
+    unexplained_share=0.123,
+    where=(
+        Where(axis="oil_temperature_c", strength=31.0, p_value=1e-9),
+        Where(axis="cycles", strength=4.0, p_value=0.1),
+    ),
+)
+GAIN = Gain(
+    held_out_runs=("a",),
+    rmse_before=0.161,
+    rmse_after=0.149,
+    reduction_percent=7.45,
+    reduction_sd=0.9,
+    excess_before=0.08,
+    excess_after=0.01,
+    mse_percent_before=0.3,
+    mse_percent_after=0.2,
+    log_score_gain=40.0,
+    remaining=3.0,
+)
+
+
+def candidate(slug: str, probability: float, evidence: float = 30.0) -> Candidate:
+    effect = BY_SLUG[slug]
+    estimate = Estimate(name=effect.amplitude, value=0.3634, sd=0.0547, unit=effect.unit)
+    return Candidate(
+        effect=slug, title=effect.title, probability=probability, log_evidence_gain=evidence, estimate=estimate
+    )
+
+
+def findings(verdict: Verdict, *causes: str) -> Findings:
+    advice = Advice(
+        key="repeat", test="stationary test with the oil at 60 °C", effect="oil_change", other="running_in", nats=1234.5
+    )
+    return Findings(
+        verdict=verdict,
+        causes=causes,
+        candidates=tuple(candidate(slug, 0.9 / len(causes)) for slug in causes),
+        baseline=MISFIT,
+        extended=MISFIT,
+        gain=GAIN,
+        advice=(advice,),
+        visible=tuple(
+            Visible(effect=each.slug, amplitude=0.2 * each.scale * each.prior_sd, unit=each.unit) for each in CATALOGUE
+        ),
+        notes=(),
+        tests=12,
+        states=6,
+    )
+
+
+ALL = [
+    findings(Verdict.MODEL_ADEQUATE),
+    *(findings(Verdict.CAUSE_NAMED, each.slug) for each in CATALOGUE),
+    findings(Verdict.CAUSE_NAMED, "oil_temperature", "oil_change"),
+    findings(Verdict.CAUSE_AMBIGUOUS, "oil_change", "running_in", "load_severity"),
+    findings(Verdict.UNEXPLAINED_STRUCTURE),
+    findings(Verdict.INSUFFICIENT_DATA),
+]
+
+
+@pytest.mark.parametrize("found", ALL, ids=lambda found: "-".join((found.verdict.value, *found.causes)))
+def test_every_verdict_has_a_paragraph(found):
+    said = summarise(found)
+    assert said.startswith("12 tests at 6 states of use")
+    assert said.endswith(".")
+    told = said.replace("M_s", "M").replace("C_v", "C").replace("V_S", "V")
+    assert not re.search(r"\bnan\b|\binf\b|None|_|  |\.\.|\( ", told)
+    # a number that has a unit is followed by it
+    for each in found.candidates:
+        if each.estimate.unit not in {"-", ""}:
+            assert f"± 0.055 {each.estimate.unit}" in said
+        assert each.effect.replace("_", " ") in said
+
+
+def test_what_is_named_is_explained_and_what_it_beat_is_said():
+    found = findings(Verdict.CAUSE_NAMED, "oil_temperature")
+    rival = candidate("torque_zero_shift", 0.01, evidence=12.3)
+    said = summarise(replace(found, candidates=(*found.candidates, rival)))
+    assert BY_SLUG["oil_temperature"].physics in said
+    assert "better than torque zero shift by 17.7 nats" in said
+    assert (
+        "0.149 Nm against 0.161 Nm (7.5 ± 0.9 % less)" in said or "0.149 Nm against 0.161 Nm (7.4 ± 0.9 % less)" in said
+    )
+    assert "foretells the last states better" in said
+    assert "1,234 nats" in said or "1,235 nats" in said
+
+
+def test_no_gain_is_said_as_none():
+    worse = replace(GAIN, reduction_percent=-2.0, remaining=-1.0)
+    said = summarise(replace(findings(Verdict.CAUSE_NAMED, "oil_change"), gain=worse))
+    assert "(2.0 ± 0.9 % more)" in said
+    assert "for remaining life it is no gain" in said
+
+
+def test_a_test_that_decides_little_is_not_oversold():
+    found = findings(Verdict.CAUSE_AMBIGUOUS, "oil_change", "running_in")
+    assert "What would decide: " in summarise(found)
+    weak = replace(found.advice[0], nats=0.6)
+    assert "No single test would decide" in summarise(replace(found, advice=(weak,)))
+    alone = replace(found.advice[0], other="baseline")
+    assert "To confirm it: " in summarise(replace(found, advice=(alone,)))
+    assert "decide" not in summarise(replace(found, advice=()))
+
+
+def test_what_was_not_measured_cannot_be_excluded():
+    found = findings(Verdict.CAUSE_AMBIGUOUS, "torque_zero_shift")
+    said = summarise(replace(found, causes=("torque_zero_shift", "oil_temperature")))
+    assert "oil temperature (not measured, so it cannot be excluded)" in said
+
+
+def test_effects_out_of_reach_are_said_to_be():
+    found = findings(Verdict.MODEL_ADEQUATE)
+    weak = Visible(effect="pressure_offset", amplitude=1e4 * BY_SLUG["pressure_offset"].prior_sd, unit="bar")
+    said = summarise(replace(found, visible=(weak,)))
+    assert "hidden behind the baseline for: pressure offset" in said
+    assert "hidden" not in summarise(found)
+
+
+def test_notes_on_single_runs_are_counted():
+    notes = ("sweep-003: 1 plateaus at rest left out.", "sweep-004: the same", "Nothing was known of the oil")
+    said = summarise(replace(findings(Verdict.UNEXPLAINED_STRUCTURE), notes=notes))
+    assert said.endswith("Nothing was known of the oil. 2 notes on single runs stand in the report.")
+    assert "sweep" not in said
+
+
+def test_any_amplitude_can_be_told():
+    rng = np.random.default_rng(7)
+    found = findings(Verdict.CAUSE_NAMED, "oil_change")
+    for _ in range(300):
+        value, sd = rng.choice([-1, 1]) * 10 ** rng.uniform(-12, 12), 10 ** rng.uniform(-12, 12)
+        estimate = Estimate(name="step of C_v", value=value, sd=float(rng.choice([0.0, sd])), unit="%")
+        said = summarise(replace(found, candidates=(replace(found.candidates[0], estimate=estimate),)))
+        told = re.search(r"step of C_v (-?[\d.,e+-]+)", said)
+        assert told is not None
+        number = float(told.group(1).replace(",", "").rstrip("."))
+        assert abs(number - value) <= max(0.006 * abs(value), 0.06 * estimate.sd)
