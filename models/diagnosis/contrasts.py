@@ -18,6 +18,7 @@ from models.diagnosis.design import Design
 Add: TypeAlias = Callable[[str, FloatArray], None]
 SPEED, PRESSURE, CYCLES = "speed_rpm", "pressure_bar", "cycles"
 TEMPERATURE, CLOCK, PHASE = "oil_temperature_c", "test_clock_s", "loop_phase"
+TORQUE = "torque_nm"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,6 +69,8 @@ def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
         add(CYCLES, here.astype(np.float64))
         for s in (1, 2):
             add(CYCLES, here * _cosine(s, speed) * steady)
+    for t in range(1, 5):
+        add(TORQUE, _cosine(t, _unit(torque)))
     _add_clock(design, add, steady)
     if design.loops:
         _add_loops(design, add, np.asarray(looping, dtype=np.float64), lives, presses)
@@ -111,6 +114,10 @@ def _add_loops(design: Design, add: Add, looping: FloatArray, lives: int, presse
     rising = np.sign(rows.acceleration) * looping
     for s in range(4):
         add(PHASE, rising * _cosine(s, _unit(rows.velocity)))
+    for way in (1.0, -1.0):
+        for centre in np.linspace(0.1, 0.9, 5):
+            bump = np.exp(-0.5 * ((_unit(rows.velocity) - centre) / 0.1) ** 2)
+            add(PHASE, bump * looping * (way * rows.acceleration > 0))
 
 
 def _cosine(order: int, unit: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ over the samples) within. So a loop is a few rows however fast it was sampled, a
 Everything is folded to v >= 0 (the model is odd): `sign` says which way the clutch turned.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,8 @@ from models.runs import pressure_levels
 PLATEAU_DURATION = 5.0
 #: A run keeps at most this many plateaus (evenly taken), a campaign about this many rows (states evenly taken).
 MOST_PLATEAUS, MOST_ROWS = 2000, 40_000
+#: Loops of so many states (evenly taken, the first and the last among them) say what more would say.
+MOST_LOOP_STATES = 20
 
 IntArray = NDArray[np.intp]
 
@@ -171,13 +173,13 @@ def _assembled(
 
 def _thinned(campaign: Campaign, notes: list[str]) -> Campaign:
     """The campaign with states left out evenly where it is too large; the first and the last stay."""
+    campaign = _with_fewer_loops(campaign, notes)
     states = np.unique([*(run.cycles for run in campaign.stationary), *(run.cycles for run in campaign.dynamic)])
     size = sum(min(run.plateaus.torque.size, MOST_PLATEAUS) for run in campaign.stationary)
     size += sum(8 * BINS for _ in campaign.dynamic)
     if size <= MOST_ROWS or states.size < 3:
         return campaign
-    count = max(2, int(states.size * MOST_ROWS / size))
-    keep = set(states[np.linspace(0, states.size - 1, count).round().astype(int)].tolist())
+    keep = _evenly(states, max(2, int(states.size * MOST_ROWS / size)))
     notes.append(
         f"{states.size - len(keep)} of {states.size} states were left out, evenly: the campaign is very large."
     )
@@ -190,6 +192,19 @@ def _thinned(campaign: Campaign, notes: list[str]) -> Campaign:
         duty=campaign.duty,
         maintenance=campaign.maintenance,
     )
+
+
+def _with_fewer_loops(campaign: Campaign, notes: list[str]) -> Campaign:
+    states = np.unique([run.cycles for run in campaign.dynamic])
+    if states.size <= MOST_LOOP_STATES:
+        return campaign
+    keep = _evenly(states, MOST_LOOP_STATES)
+    notes.append(f"Dynamic tests of {len(keep)} of {states.size} states were taken, evenly: there are very many.")
+    return replace(campaign, dynamic=tuple(run for run in campaign.dynamic if run.cycles in keep))
+
+
+def _evenly(states: FloatArray, count: int) -> set[float]:
+    return set(states[np.linspace(0, states.size - 1, count).round().astype(int)].tolist())
 
 
 def _plateaus(

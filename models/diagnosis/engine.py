@@ -1,6 +1,6 @@
 """The diagnosis of a campaign: baseline, alarm, candidates, verdict, and what follows from it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,25 +11,24 @@ from models.diagnosis.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.design import Design, build_design
 from models.diagnosis.effect import Kind
 from models.diagnosis.fitting import Fit, Priors, fit, priors_of
+from models.diagnosis.misfits import FIXED_LINE
 from models.diagnosis.noise import estimate_noise, first_noise
-from models.diagnosis.projection import GAINS
 from models.diagnosis.raw import RawEvidence, raw_evidence
-from models.diagnosis.refitting import Hypothesis, at_gain, refitted
+from models.diagnosis.refitting import Hypothesis
 from models.diagnosis.report import Report, Verdict
 from models.diagnosis.reporting import insufficient, report_of
-from models.diagnosis.selection import columns_of, linear_drop, screen, screen_pairs
+from models.diagnosis.searching import hypotheses_of
+from models.diagnosis.selection import columns_of
 from models.diagnosis.starting import starting_laws
 from models.diagnosis.unmeasured import temperature_evidence
-from models.diagnosis.verdict import CLOSE, PAIR_PRICE, Judgement, judge
+from models.diagnosis.verdict import CLOSE, Judgement, judge
 from models.diagnosis.viewing import View, view_of
 from models.diagnosis.whitening import Noise
 
-#: So many single effects and pairs are refitted.
-SINGLES, PAIRS = 5, 4
-#: ... where the screen leaves them this close [nats] to the best, and this share of λ more.
-MARGIN, MARGIN_SHARE = 9.0, 0.2
 #: Fewer plateaus or speeds are no campaign.
 FEWEST_ROWS, FEWEST_SPEEDS = 24, 6
+#: A line of one frequency at all speeds is structure from so much evidence [nats] on: nothing else need confirm it.
+LEAST_LINE = 14.0
 #: Torques [Nm] outside are no clutch's.
 LEAST_TORQUE, MOST_TORQUE = 1e-6, 1e7
 
@@ -72,7 +71,7 @@ def _diagnosed(campaign: Campaign, design: Design, without: frozenset[str], rng:
     noise, hypotheses = baseline.noise, list[Hypothesis]()
     judgement = Judgement(verdict=Verdict.MODEL_ADEQUATE)
     if any(each.raised for each in leads.values()):
-        noise, hypotheses = hypotheses_of(design, baseline, view, raw)
+        noise, hypotheses = hypotheses_of(design, baseline.noise, baseline.priors, baseline.fit, view, raw)
         unmeasured = -np.inf
         if not design.facts.temperature_measured and "oil_temperature" not in without:
             unmeasured = temperature_evidence(design, noise, baseline.priors, baseline.fit)
@@ -126,38 +125,14 @@ def alarms(design: Design, baseline: Baseline, view: View, rng: np.random.Genera
     }
 
 
-def hypotheses_of(
-    design: Design, baseline: Baseline, view: View, raw: tuple[RawEvidence, ...]
-) -> tuple[Noise, list[Hypothesis]]:
-    """The best singles and pairs refitted, and the rest as screened, best first; the noise with the likely gains."""
-    singles = screen(view.columns, view.projections)
-    pairs = screen_pairs(view.columns, view.projections)[:PAIRS]
-    first = max((*singles[:1], *pairs[:1]), key=lambda each: each.evidence, default=None)
-    if first is None:
-        return baseline.noise, []
-    noise = at_gain(baseline.noise, float(GAINS[first.gain]))
-    projected = view.projections[first.gain]
-    null = fit(design, noise, baseline.fit.laws, baseline.priors)
-    margin = MARGIN + MARGIN_SHARE * max(linear_drop(view.columns, projected, first)[1], 0.0)
-    tried = [each for each in singles[:SINGLES] if each.evidence > singles[0].evidence - margin]
-    tried += [each for each in pairs if each.evidence > singles[0].evidence + PAIR_PRICE - 0.5 * MARGIN]
-    found = [
-        refitted(design, noise, baseline.priors, null, each, linear_drop(view.columns, projected, each))
-        for each in tried
-    ]
-    rest = [
-        Hypothesis(effects=each.effects, evidence=each.evidence, drop=0.0, fit=None)
-        for each in singles
-        if each not in tried
-    ]
-    seen = {each.effect: each.log_evidence for each in raw}
-    told = [each.seen_raw(seen) for each in (*found, *rest)]
-    return noise, sorted(told, key=lambda each: -each.evidence)
-
-
 def with_lines(judgement: Judgement, raw: tuple[RawEvidence, ...]) -> Judgement:
     """The verdict with what raw records show beside it: vibrations of the catalogue are causes of their own, where they
-    are more than what a wrong template may leave behind."""
+    are more than what a wrong template may leave behind; another line alone is structure without a name."""
     least = CLOSE + 2 * judgement.statistics.get("tolerance", 0.0)
-    seen = [each for each in raw if each.effect in BY_SLUG and BY_SLUG[each.effect].kind is Kind.VIBRATION]
-    return judgement.joined(tuple(each.effect for each in seen if each.log_evidence > least))
+    seen = [each for each in raw if each.log_evidence > least]
+    known = [each for each in seen if each.effect in BY_SLUG and BY_SLUG[each.effect].kind is Kind.VIBRATION]
+    judgement = judgement.joined(tuple(each.effect for each in known))
+    lined = any(each.effect == FIXED_LINE and each.log_evidence > LEAST_LINE for each in seen)
+    if lined and judgement.verdict is Verdict.MODEL_ADEQUATE:
+        return replace(judgement, verdict=Verdict.UNEXPLAINED_STRUCTURE)
+    return judgement

@@ -44,12 +44,14 @@ class Gram:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Projected:
-    """info [m, m], score [m] of the changes; `miss` rᵀV⁻¹(1 - P)r; `evidence` [nats] of the gains' scatter."""
+    """info [m, m], score [m] of the changes; `miss` rᵀV⁻¹(1 - P)r; `evidence` [nats] of the gains' scatter, and `profile`
+    [nats] the same without the price of what is fitted."""
 
     info: FloatArray
     score: FloatArray
     miss: float
     evidence: float
+    profile: float
 
 
 def gram_of(design: Design, noise: Noise, priors: Priors, fit: Fit, changes: FloatArray) -> Gram:
@@ -91,14 +93,11 @@ def project(gram: Gram, run_gain: float) -> Projected:
     factor = _factor(corner * scale[:, None] * scale)
     half = np.linalg.solve(factor, full[:base, base:] * scale[:, None])
     left = full[base:, base:] - half.T @ half
-    logdet = 2 * float(np.log(np.diag(factor)).sum() - np.log(scale).sum()) + float(
-        np.log1p(run_gain**2 * squares).sum()
-    )
-    prior = -0.5 * (np.log(run_gain / _USUAL) / _SPREAD) ** 2
+    fitted = float(np.log(np.diag(factor)).sum() - np.log(scale).sum())
     miss = float(left[-1, -1])
-    return Projected(
-        info=left[:-1, :-1], score=left[:-1, -1], miss=miss, evidence=-0.5 * (miss + logdet) + float(prior)
-    )
+    prior = -0.5 * float((np.log(run_gain / _USUAL) / _SPREAD) ** 2)
+    profile = -0.5 * (miss + float(np.log1p(run_gain**2 * squares).sum())) + prior
+    return Projected(info=left[:-1, :-1], score=left[:-1, -1], miss=miss, evidence=profile - fitted, profile=profile)
 
 
 def _factor(correlation: FloatArray) -> FloatArray:

@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
-from models.arrays import FloatArray
 from models.diagnosis.design import Design
 from models.diagnosis.effect import Effect
 from models.diagnosis.fitting import Fit, Fitted, Priors, effect_precisions, fit
+from models.diagnosis.laws import Laws
 from models.diagnosis.projection import GAINS, gram_of, project
-from models.diagnosis.selection import Screened
 from models.diagnosis.whitening import Noise
 
 #: Gauss-Newton steps that a candidate is given.
@@ -21,12 +20,14 @@ STEPS = 10
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hypothesis:
     """What may be at work (no effect, one, two): evidence [nats] over none, and its fit (None where only screened);
-    drop [nats] of the cost, an estimate of λ."""
+    drop [nats] of the cost, the gains free under both, an estimate of λ; shape_evidence [nats] is the grid's part of the
+    evidence."""
 
     effects: tuple[Effect, ...]
     evidence: float
     drop: float
     fit: Fit | None
+    shape_evidence: float = 0.0
 
     @property
     def slugs(self) -> tuple[str, ...]:
@@ -38,35 +39,54 @@ class Hypothesis:
         return replace(self, evidence=self.evidence + sum(evidence.get(slug, 0.0) for slug in self.slugs))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Null:
+    """The baseline's fit at the likely gains, its log marginal likelihood, and its log likelihood at the gains that suit it
+    best [nats]."""
+
+    fit: Fit
+    evidence: float
+    profile: float
+
+
+def null_of(design: Design, noise: Noise, priors: Priors, fitted: Fit) -> Null:
+    """What every hypothesis is compared with."""
+    evidence, profile = laplace(design, noise, priors, fitted)
+    return Null(fit=fitted, evidence=evidence, profile=profile)
+
+
 def refitted(
     design: Design,
     noise: Noise,
     priors: Priors,
-    null: Fit,
-    screened: Screened,
-    linear: tuple[FloatArray, float],
+    null: Null,
+    laws: Laws,
+    start: tuple[Fitted, ...],
+    shape_evidence: float,
+    linear: tuple[float, float],
 ) -> Hypothesis:
-    """A screened candidate with everything free, from its linear amplitudes: its evidence is Laplace's about that fit,
-    summed over the gains' scatter, with the grid's part as screened."""
-    start = tuple(
-        Fitted(effect=effect, amplitude=float(amplitude), shape=shape)
-        for effect, amplitude, shape in zip(screened.effects, linear[0], screened.shapes, strict=True)
-    )
+    """A candidate with everything free, from laws and amplitudes: its evidence is Laplace's about that fit, summed over the
+    gains' scatter, with the grid's part as screened; `linear` (evidence, drop) where its sign is wrong from the start."""
+    effects = tuple(each.effect for each in start)
     if any(each.effect.positive and each.amplitude < 0 for each in start):
-        return Hypothesis(effects=screened.effects, evidence=screened.evidence, drop=linear[1], fit=None)
-    found = fit(design, noise, null.laws, priors, start, steps=STEPS)
-    with_effects, none = (laplace(design, noise, priors, each) for each in (found, null))
+        return Hypothesis(effects=effects, evidence=linear[0], drop=linear[1], fit=None, shape_evidence=shape_evidence)
+    found = fit(design, noise, laws, priors, start, steps=STEPS)
     wrong = any(each.effect.positive and each.amplitude < 0 for each in found.effects)
-    evidence = -np.inf if wrong else with_effects - none + screened.shape_evidence
-    return Hypothesis(effects=screened.effects, evidence=evidence, drop=null.cost - found.cost, fit=found)
+    marginal, profile = laplace(design, noise, priors, found)
+    evidence = -np.inf if wrong else marginal - null.evidence + shape_evidence
+    drop = max(profile - null.profile, 0.0)
+    return Hypothesis(effects=effects, evidence=evidence, drop=drop, fit=found, shape_evidence=shape_evidence)
 
 
-def laplace(design: Design, noise: Noise, priors: Priors, fitted: Fit) -> float:
-    """Log marginal likelihood [nats] about a fit up to a constant, the gains' scatter summed over."""
+def laplace(design: Design, noise: Noise, priors: Priors, fitted: Fit) -> tuple[float, float]:
+    """Log marginal likelihood [nats] about a fit up to a constant, the gains' scatter summed over; and log likelihood at the
+    gains' likeliest scatter."""
     gram = gram_of(design, noise, priors, fitted, np.zeros((design.torque.size, 0)))
     price = 0.5 * sum(float(np.log(effect_precisions(each.effect)).sum()) for each in fitted.effects)
     sided = np.log(2.0) * sum(each.effect.positive for each in fitted.effects)
-    return float(logsumexp([project(gram, float(gain)).evidence for gain in GAINS]) + price + sided)
+    projections = [project(gram, float(gain)) for gain in GAINS]
+    marginal = float(logsumexp([each.evidence for each in projections]) + price + sided)
+    return marginal, max(each.profile for each in projections)
 
 
 def at_gain(noise: Noise, run_gain: float) -> Noise:

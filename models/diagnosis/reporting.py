@@ -13,9 +13,12 @@ from models.diagnosis.extension import Extension, build_extension
 from models.diagnosis.fitting import Fit, Priors
 from models.diagnosis.gain import measure_gain
 from models.diagnosis.maps import loop_traces, residual_maps
+from models.diagnosis.misfits import axes_of, misfit_of
 from models.diagnosis.raw import RawEvidence
 from models.diagnosis.refitting import Hypothesis
-from models.diagnosis.report import Candidate, Estimate, Gain, Misfit, Report, Verdict, Visible, Where
+from models.diagnosis.report import Candidate, Estimate, Gain, Report, Verdict, Visible
+from models.diagnosis.smooth import AXES as SMOOTH_AXES
+from models.diagnosis.smooth import smooth_fit
 from models.diagnosis.summary import Findings, summarise
 from models.diagnosis.verdict import Judgement
 from models.diagnosis.viewing import View, amplitude_deviations
@@ -25,7 +28,9 @@ from models.diagnosis.whitening import Noise
 SEEN = 11.0
 #: Candidates with less than this probability are not listed.
 LEAST_PROBABILITY = 1e-3
-_LARGEST_DEVIATE = 1e9
+#: An extension whose held-out error is more than this times the baseline's is not proposed.
+MOST_WORSE = 1.02
+WITHHELD = "The extension is not proposed: runs that it had not seen were foretold worse with it than without."
 
 
 def report_of(
@@ -43,16 +48,25 @@ def report_of(
 ) -> Report:
     """Assemble it: candidates, misfits, gain, advice, maps, loops, extension, summary."""
     fits = [each.fit for each in judgement.standing if each.fit is not None]
+    where = axes_of(view, leads, raw)
     extended = fits[0] if fits else None
-    gain = None
-    if extended is not None and judgement.verdict in {Verdict.CAUSE_NAMED, Verdict.CAUSE_AMBIGUOUS}:
-        gain = measure_gain(design, noise, priors, view.fit, extended, rng)
+    if judgement.verdict is Verdict.UNEXPLAINED_STRUCTURE:
+        extended = smooth_fit(
+            design, noise, priors, view.fit, [each.axis for each in where if each.axis in SMOOTH_AXES]
+        )
+    gain = None if extended is None else measure_gain(design, noise, priors, view.fit, extended, rng)
     candidates = _candidates(design, noise, priors, judgement, hypotheses, raw)
-    baseline = misfit_of(noise, view, leads)
-    after = misfit_of(noise, judgement.view, {}) if judgement.view is not None else None
+    baseline = misfit_of(design, noise, view.fit, where)
+    after = None
+    if extended is not None:
+        left = axes_of(judgement.view, {}) if fits and judgement.view is not None else ()
+        after = misfit_of(design, noise, extended, left)
     advice = advise(campaign, design, noise, priors, fits) if fits else ()
     visible = visible_of(view)
+    extension = _extension(design, noise, priors, judgement, gain)
     said = (*notes, *(f"{each.effect}: {each.note}." for each in raw))
+    if extension is not None and harmful(gain):
+        extension, said = None, (*said, WITHHELD)
     findings = Findings(
         verdict=judgement.verdict,
         causes=judgement.causes,
@@ -78,7 +92,7 @@ def report_of(
         visible=visible,
         maps=residual_maps(design, noise, view.fit, extended),
         loops=loop_traces(design, view.fit, extended),
-        extension=_extension(design, noise, priors, judgement, gain),
+        extension=extension,
         notes=said,
         statistics=_statistics(leads, judgement),
     )
@@ -153,27 +167,9 @@ def _sound(told: Estimate) -> Estimate:
     return Estimate(name=told.name, value=_finite(told.value), sd=_finite(told.sd), unit=told.unit)
 
 
-def misfit_of(noise: Noise, view: View, leads: dict[str, Lead]) -> Misfit:
-    """How well a fit does, and on which axes the rest lives, strongest first."""
-    expected, actual = float((noise.deviation**2).mean()), float((view.fit.residual**2).mean())
-    info = np.maximum(np.diag(view.likely.info)[view.smooth], 1e-300)
-    z = np.minimum(np.abs(view.likely.score[view.smooth] / np.sqrt(info)), _LARGEST_DEVIATE)
-    axes = np.array(view.contrasts.axes)
-    where = {}
-    for axis in dict.fromkeys(view.contrasts.axes):
-        mine = z[axes == axis]
-        strength = 0.5 * float(mine.max()) ** 2
-        where[axis] = Where(axis=axis, strength=strength, p_value=float(min(1.0, mine.size * np.exp(-strength))))
-    line = leads.get("lines")
-    if line is not None and line.raised:
-        strength = max(line.value, where["test_clock_s"].strength if "test_clock_s" in where else 0.0)
-        where["test_clock_s"] = Where(axis="test_clock_s", strength=strength, p_value=line.p_value)
-    return Misfit(
-        rmse=float(np.sqrt(actual)),
-        noise=float(np.sqrt(expected)),
-        unexplained_share=max(0.0, 1 - expected / actual) if actual > 0 else 0.0,
-        where=tuple(sorted(where.values(), key=lambda each: -each.strength)),
-    )
+def harmful(gain: Gain | None) -> bool:
+    """Whether an extension foretells what it has not seen worse than the baseline does."""
+    return gain is not None and (gain.rmse_after > MOST_WORSE * gain.rmse_before or gain.log_score_gain < 0)
 
 
 def visible_of(view: View) -> tuple[Visible, ...]:

@@ -37,6 +37,9 @@ _OF_POINTS: dict[str, Callable[[Points], FloatArray]] = {
     TEMPERATURE: lambda points: points.temperature,
 }
 
+#: Axes that can carry a smooth discrepancy.
+AXES = frozenset({*_OF_POINTS, PHASE})
+
 
 def smooth_fit(design: Design, noise: Noise, priors: Priors, baseline: Fit, axes: Sequence[str]) -> Fit | None:
     """The baseline with a smooth discrepancy on the axes beside it, refitted; None where no axis can carry one."""

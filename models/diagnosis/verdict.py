@@ -1,9 +1,9 @@
 """From evidence to a verdict: what cannot be told from the best stands beside it, and the case is closed or not.
 
-Every template errs, so evidence saturates: with λ the drop of the best one's cost, candidates within
-CLOSE + TOLERANCE λ nats of it are not told from it, and two effects at once must gain PAIR_PRICE + 2 TOLERANCE λ more than
-the best alone. After the best one is fitted, what is left must look like noise, and its amplitude must be one in all
-parts of the data, both up to TOLERANCE λ; else the structure is unexplained.
+Every template errs, so evidence saturates: with λ the drop of the best one's cost, candidates within CLOSE + RIVAL λ nats
+of it are not told from it. Two effects at once must gain PAIR_PRICE nats over the best alone, and TOLERANCE λ more where
+that one closes the case by itself. After the best is fitted, what is left must look like noise, and its amplitude must be
+one in all parts of the data, both up to TOLERANCE λ; else the structure is unexplained.
 """
 
 from collections.abc import Sequence
@@ -21,11 +21,15 @@ from models.diagnosis.viewing import View, view_of
 from models.diagnosis.whitening import Noise
 
 #: Candidates this close [nats] to the best are not told from it, and this share of λ more.
-CLOSE, TOLERANCE = 4.6, 0.05
+CLOSE, RIVAL = 2.5, 0.04
+#: What a template may leave behind, as a share of λ.
+TOLERANCE = 0.05
 #: A cause is named where it has this many nats over nothing.
 OVER_NOTHING = 3.0
-#: Two effects at once must gain this much [nats] beyond twice the tolerance.
+#: Two effects at once must gain this much [nats].
 PAIR_PRICE = 4.0
+#: A cause is named where its own probability is this at least.
+LEAST_NAMED = 0.8
 #: False alarms allowed in closing a case: structure that is left, and amplitudes that differ between parts.
 LEFT_SHARE, PARTS_SHARE = 5e-3, 3e-3
 #: A line in raw records has paid for its search: it is there.
@@ -74,41 +78,72 @@ def judge(
     singles = [each for each in usable if len(each.effects) == 1]
     if not singles:
         return Judgement(verdict=Verdict.UNEXPLAINED_STRUCTURE)
-    best, pool = singles[0], singles
-    pairs = [each for each in usable if len(each.effects) == 2]
-    if pairs and pairs[0].evidence > best.evidence + PAIR_PRICE + 2 * tolerance(pairs[0]):
-        best, pool = pairs[0], pairs
+    tested = _Tested(design, noise, priors, rng)
+    best, price = _leader(singles, [each for each in usable if len(each.effects) == 2], tested)
+    pool = [each for each in usable if len(each.effects) == len(best.effects)]
+    near = [each for each in pool if each.evidence >= best.evidence - CLOSE - between(best, each, singles)][
+        :MOST_CLOSED
+    ]
+    closed = [each for each in near if tested(each).closed]
+    standing = tuple(each for each in near if closed and tested(each).excess <= CLOSE)
+    first = tested(standing[0] if standing else best)
     slack = tolerance(best)
-    near = tuple(each for each in pool if each.evidence >= best.evidence - CLOSE - between(best, each, singles))
-    closings = [close(design, noise, priors, each, rng) for each in near[:MOST_CLOSED]]
-    closed = [closing for closing in closings if closing.closed]
-    statistics = {"lambda": best.drop, "tolerance": slack, "closed": float(len(closed)), **closings[0].statistics}
-    probabilities = probabilities_of(hypotheses, slack)
-    view = closings[0].view
-    causes = tuple(dict.fromkeys(slug for each in near for slug in each.slugs))
+    statistics = {"lambda": best.drop, "tolerance": slack, "closed": float(len(closed)), **first.statistics}
+    probabilities = probabilities_of(hypotheses, slack, price, tested)
+    causes = tuple(dict.fromkeys(slug for each in standing for slug in each.slugs))
     imitated = unmeasured > max(best.evidence - CLOSE - slack, OVER_NOTHING)
     if imitated:
         probabilities = with_unmeasured(probabilities, unmeasured, best.evidence, slack)
         causes = tuple(dict.fromkeys(("oil_temperature", *causes)))
     elif best.evidence < OVER_NOTHING or not closed:
-        doubt = doubted(best, closings[0])
+        doubt = doubted(best, tested(best))
         return Judgement(
             verdict=Verdict.UNEXPLAINED_STRUCTURE,
-            view=view,
+            view=first.view,
             probabilities={slug: doubt * each for slug, each in probabilities.items()},
             statistics=statistics,
         )
     elif unmeasured > -np.inf and LIKE_TEMPERATURE & set(causes):
         imitated, causes = True, (*causes, "oil_temperature")
-    named = len(near) == 1 and not imitated
+    named = len(standing) == 1 and not imitated
+    if named and len(causes) > 1:
+        causes = tuple(slug for slug in causes if probabilities[slug] >= LEAST_NAMED) or causes[:1]
     return Judgement(
         verdict=Verdict.CAUSE_NAMED if named else Verdict.CAUSE_AMBIGUOUS,
         causes=causes,
-        standing=near,
-        view=view,
+        standing=standing,
+        view=first.view,
         probabilities=probabilities,
         statistics=statistics,
     )
+
+
+def _leader(singles: list[Hypothesis], pairs: list[Hypothesis], tested: "_Tested") -> tuple[Hypothesis, float]:
+    """The best hypothesis, and what two effects at once cost against one [nats]."""
+    alone = singles[0]
+    if not pairs or pairs[0].evidence <= alone.evidence + PAIR_PRICE:
+        return alone, PAIR_PRICE + tolerance(alone)
+    price = PAIR_PRICE + (tolerance(alone) if tested(alone).closed else 0.0)
+    return (pairs[0] if pairs[0].evidence > alone.evidence + price else alone), price
+
+
+class _Tested:
+    """Closings of hypotheses, each made once."""
+
+    def __init__(self, design: Design, noise: Noise, priors: Priors, rng: np.random.Generator) -> None:
+        self._given = design, noise, priors
+        self._rng = rng
+        self._known: dict[tuple[str, ...], Closing] = {}
+
+    def __call__(self, hypothesis: Hypothesis) -> "Closing":
+        if hypothesis.slugs not in self._known:
+            self._known[hypothesis.slugs] = close(*self._given, hypothesis, self._rng)
+        return self._known[hypothesis.slugs]
+
+    def excess(self, hypothesis: Hypothesis) -> float:
+        """By how much [nats] it is known not to close, 0 where it closes or was not looked at."""
+        known = self._known.get(hypothesis.slugs)
+        return max(known.excess, 0.0) if known is not None else 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,12 +195,13 @@ def between(best: Hypothesis, other: Hypothesis, singles: Sequence[Hypothesis]) 
     """What the templates by which two hypotheses differ may be wrong by [nats]: what both hold does not count."""
     shared = set(best.slugs) & set(other.slugs)
     alone = max((each.drop for each in singles if set(each.slugs) <= shared and each is not best), default=0.0)
-    return TOLERANCE * max(best.drop - alone, 0.0)
+    return RIVAL * max(best.drop - alone, 0.0)
 
 
-def probabilities_of(hypotheses: list[Hypothesis], slack: float) -> dict[str, float]:
-    """The probability that an effect is at work: evidences, pairs at their price, cooled by the tolerance."""
-    priced = [each.evidence - (PAIR_PRICE + slack if len(each.effects) == 2 else 0.0) for each in hypotheses]
+def probabilities_of(hypotheses: list[Hypothesis], slack: float, price: float, tested: _Tested) -> dict[str, float]:
+    """The probability that an effect is at work: evidences, pairs at their price, less what does not close, cooled by the
+    tolerance. Hypotheses exclude each other and no effect is twice in one, so no probability is beyond 1."""
+    priced = [each.evidence - (price if len(each.effects) == 2 else 0.0) - tested.excess(each) for each in hypotheses]
     logs = np.array([0.0, *priced]) / (1.0 + 0.5 * slack)
     weights = np.exp(logs - logsumexp(logs))
     found: dict[str, float] = {}

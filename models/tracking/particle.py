@@ -95,7 +95,7 @@ class ParticleState:
 class Particle:
     """The filter. `moves` = 0 leaves a plain resampling filter, which starves: it is there to be compared with."""
 
-    particles: int = 1_000
+    particles: int = 2_000
     moves: int = MOVES
 
     @property

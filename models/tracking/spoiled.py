@@ -95,6 +95,8 @@ def at_once(prior: Prior, history: History, spoiled: FloatArray, nodes: Nodes) -
     start = verdicts(prior, history, spoiled, nodes)
     sets, found = np.tile(spoiled, (nodes.b.shape[0], 1)), start
     for _ in range(ROUNDS):
+        if not (found.gain > 0.0).any():
+            break
         sets = np.where(found.gain > 0.0, 1.0 - sets, sets)
         found = verdicts(prior, history, sets, nodes)
     change = log_spoiled(prior, sets.T) - log_spoiled(prior, spoiled)

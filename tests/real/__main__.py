@@ -8,7 +8,7 @@ from typing import Any
 
 import httpx2
 
-from tests.real import diagnosis, lag, loaders
+from tests.real import diagnosis, lag, loaders, prognosis
 from tests.support import serving
 
 
@@ -87,6 +87,8 @@ def main() -> int:
     lag.main()
     print("\n## The diagnosis\n")
     diagnosis.main()
+    print("\n## The prognosis\n")
+    prognosis.main()
     return 0
 
 

@@ -20,7 +20,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="make score")
     parser.add_argument("parts", nargs="*")
     parser.add_argument("--size", type=float, default=1.0)
-    parser.add_argument("--seed", type=int, default=2026)
+    parser.add_argument("--seed", type=int, default=4100)
     parser.add_argument("--write", action="store_true")
     chosen = parser.parse_args()
 
@@ -42,7 +42,8 @@ def main() -> None:
         table = parts[name]()
         print(f"\n### {name} ({time.monotonic() - start:.0f} s)\n\n{table}", flush=True)
         if chosen.write:
-            block = f"<!-- score {name} -->\n{table}\n<!-- end -->"
+            command = f"`make score PARTS={name} SIZE={chosen.size:g} SEED={seed}`"
+            block = f"<!-- score {name} -->\n{command}: {table}\n<!-- end -->"
             text = DOCS.read_text()
             DOCS.write_text(
                 re.sub(rf"<!-- score {name} -->.*?<!-- end -->", lambda _, b=block: b, text, flags=re.DOTALL)

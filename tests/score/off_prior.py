@@ -81,16 +81,17 @@ def never(count: int, seed: int) -> str:
     lines = [
         f"{count} lives, seed {seed}, of which {100 * np.mean(came):.0f} % reach half of their COF within a million "
         "cycles; nothing foretold was infinite\n",
-        "| stated probability | lives | mean stated, % | reached it, % |",
+        "| stated probability | lives | mean stated ± what chance leaves, % | reached it, % |",
         "|---|---|---|---|",
     ]
+    told, reached = np.array(stated), np.array(came)
     for index in range(edges.size - 1):
         here = group == index
         if here.any():
+            due = math.sqrt(float((told[here] * (1.0 - told[here])).mean()) / int(here.sum()))
             lines.append(
                 f"| {edges[index]:.2f} to {min(edges[index + 1], 1.0):.2f} | {here.sum()} | "
-                f"{100 * np.mean(np.array(stated)[here]):.1f} | {100 * np.mean(np.array(came)[here]):.1f} "
-                f"± {100 * math.sqrt(max(np.var(np.array(came)[here]), 0.0) / here.sum()):.1f} |"
+                f"{100 * told[here].mean():.1f} ± {100 * due:.1f} | {100 * reached[here].mean():.1f} |"
             )
     return "\n".join(lines)
 

@@ -52,15 +52,19 @@ def beside_exact(count: int, seed: int, spoiled: float = 0.0) -> str:
     lines = [
         f"{count} lives, seed {seed}; the exact sample counts for {np.median(counts):.0f} draws in the median, "
         f"{np.quantile(counts, 0.05):.0f} at the 5 % quantile\n",
-        "| filter | CRPS over exact, all stages | 20 % | 40 % | 60 % | 80 % of life | width over exact, median at 20 | 40 "
-        "| 60 | 80 % |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "| filter | CRPS over exact, all stages | 20 % | 40 % | 60 % | 80 % of life | life by life, median at 20 | 40 | 60 "
+        "| 80 % | width over exact, median at 20 | 40 | 60 | 80 % |",
+        "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for tracker in FILTERS:
         cells = [
             "{:.3f} ± {:.3f}".format(*scores.ratio(tracker.name, "exact", stages))
             for stages in (STAGES, *((stage,) for stage in STAGES))
         ]
-        widths = [f"{scores.typical_ratio(tracker.name, 'exact', stage, 'width'):.3f}" for stage in STAGES]
-        lines.append(f"| `{tracker.name}` | " + " | ".join([*cells, *widths]) + " |")
+        typical = [
+            f"{scores.typical_ratio(tracker.name, 'exact', stage, what):.3f}"
+            for what in ("crps", "width")
+            for stage in STAGES
+        ]
+        lines.append(f"| `{tracker.name}` | " + " | ".join([*cells, *typical]) + " |")
     return "\n".join(lines)

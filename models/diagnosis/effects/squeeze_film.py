@@ -15,8 +15,8 @@ def _grid(_facts: Facts) -> tuple[Tried, ...]:
     return tuple(
         Tried(shape=(power, thin, least))
         for power in (0.0, 0.6)
-        for thin in (0.3, 0.7, 1.2)
-        for least in (0.01, 0.06, 0.25)
+        for thin in (0.6, 1.0, 1.5)
+        for least in (0.02, 0.06, 0.2)
     )
 
 
@@ -41,7 +41,7 @@ EFFECT = Effect(
     channels=("time_s",),
     amplitude="torque per acceleration at 5 bar and mid speed",
     unit="Nm s²/m",
-    prior_sd=0.3,
+    prior_sd=0.1,
     positive=True,
     scale=1.0,
     shapes=(

@@ -40,7 +40,10 @@ const known = new Map();
 export async function read(path) {
   const before = known.get(path);
   const answer = await ask(path, before ? { headers: { "If-None-Match": before.tag } } : {});
-  if (answer.status === 304) return { body: before.body, changed: false };
+  if (answer.status === 304) {
+    await answer.arrayBuffer(); // an answer that is not read to its end keeps its connection busy
+    return { body: before.body, changed: false };
+  }
   const body = await answer.json();
   known.set(path, { tag: answer.headers.get("ETag"), body });
   return { body, changed: true };
