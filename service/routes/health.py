@@ -30,4 +30,3 @@ def readyz(request: Request) -> Response:
 def metrics(context: Reader) -> Response:
     """Metrics for Prometheus: requests by route, and every clutch's runs, health and remaining cycles."""
     return Response(content=context.metrics.exposition(context.database), media_type=MEDIA_TYPE)
-
