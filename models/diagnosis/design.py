@@ -23,7 +23,7 @@ PLATEAU_DURATION = 5.0
 #: A run keeps at most this many plateaus (evenly taken), a campaign about this many rows (states evenly taken).
 MOST_PLATEAUS, MOST_ROWS = 2000, 40_000
 #: Loops of so many states (evenly taken, the first and the last among them) say what more would say.
-MOST_LOOP_STATES = 20
+MOST_LOOP_STATES = 12
 
 IntArray = NDArray[np.intp]
 

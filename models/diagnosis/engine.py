@@ -19,7 +19,7 @@ from models.diagnosis.report import Report, Verdict
 from models.diagnosis.reporting import insufficient, report_of
 from models.diagnosis.searching import hypotheses_of
 from models.diagnosis.selection import columns_of
-from models.diagnosis.starting import starting_laws
+from models.diagnosis.starting import sober, starting_laws
 from models.diagnosis.unmeasured import temperature_evidence
 from models.diagnosis.verdict import CLOSE, Judgement, judge
 from models.diagnosis.viewing import View, view_of
@@ -29,6 +29,8 @@ from models.diagnosis.whitening import Noise
 FEWEST_ROWS, FEWEST_SPEEDS = 24, 6
 #: A line of one frequency at all speeds is structure from so much evidence [nats] on: nothing else need confirm it.
 LEAST_LINE = 14.0
+#: So many plateaus determine every curve: one start is enough.
+MANY_PLATEAUS = 8000
 #: Torques [Nm] outside are no clutch's.
 LEAST_TORQUE, MOST_TORQUE = 1e-6, 1e7
 
@@ -103,7 +105,8 @@ def fit_baseline(design: Design) -> Baseline:
     start = starting_laws(design, frame)
     priors = priors_of(design, start.theta, frame)
     noise = first_noise(design)
-    fitted = fit(design, noise, start, priors, steps=10)
+    starts = (start, sober(design, start)) if design.plateaus < MANY_PLATEAUS else (start,)
+    fitted = min((fit(design, noise, each, priors, steps=12) for each in starts), key=lambda each: each.cost)
     assumed = False
     for _ in range(2):
         noise, assumed = estimate_noise(design, fitted.residual, fitted.torque, noise)

@@ -54,8 +54,9 @@ class Projected:
     profile: float
 
 
-def gram_of(design: Design, noise: Noise, priors: Priors, fit: Fit, changes: FloatArray) -> Gram:
-    """The Gram matrix of a fit (its effects belong to the baseline then) and changes [N, m] at the rows."""
+def gram_of(design: Design, noise: Noise, priors: Priors, fit: Fit, changes: FloatArray, *, held: bool = True) -> Gram:
+    """The Gram matrix of a fit (its effects belong to the baseline then) and changes [N, m] at the rows; `held` whether the
+    priors of the effects' amplitudes hold: what is left of a fit is not what a prior kept it from."""
     own = [effect_columns(design, fit.prediction, each) for each in fit.effects]
     jacobian = np.concatenate([fit.prediction.jacobian(design)[:, priors.free], *own], axis=1)
     white = whitened(np.column_stack([jacobian, changes, fit.residual]), design, noise)
@@ -71,6 +72,7 @@ def gram_of(design: Design, noise: Noise, priors: Priors, fit: Fit, changes: Flo
     at = free
     for each, columns in zip(fit.effects, own, strict=True):
         precisions = effect_precisions(each.effect)
+        precisions[0] *= float(held)
         diagonal = np.arange(at, at + columns.shape[1])
         matrix[diagonal, diagonal] += precisions
         matrix[at, -1] -= precisions[0] * each.amplitude

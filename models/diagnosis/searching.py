@@ -6,14 +6,12 @@ looked for in what is left of the best singles once they are refitted.
 
 from collections.abc import Iterable
 
-import numpy as np
-
 from models.diagnosis.design import Design
 from models.diagnosis.effect import unit_change
 from models.diagnosis.fitting import Fit, Fitted, Priors, fit
 from models.diagnosis.projection import GAINS, Projected, change_columns, gram_of, project
 from models.diagnosis.raw import RawEvidence
-from models.diagnosis.refitting import Hypothesis, Null, at_gain, null_of, refitted
+from models.diagnosis.refitting import Hypothesis, Null, at_gain, finite, null_of, refitted
 from models.diagnosis.selection import Column, Screened, linear_drop, screen, screen_pairs
 from models.diagnosis.viewing import View
 from models.diagnosis.whitening import Noise
@@ -43,13 +41,13 @@ def hypotheses_of(
     null = null_of(design, noise, priors, fit(design, noise, baseline.laws, priors))
     margin = MARGIN + MARGIN_SHARE * max(linear_drop(view.columns, projected, first)[1], 0.0)
     tried = [each for each in singles[:SINGLES] if each.evidence > singles[0].evidence - margin]
-    found = [_single(design, noise, priors, null, view.columns, projected, each) for each in tried]
+    found = [_refitted_linearly(design, noise, priors, null, view.columns, projected, each) for each in tried]
     seconds = _pairs_of(design, noise, priors, null, view.columns, found)
     linear = [each for each in pairs if each.evidence > singles[0].evidence + PAIR_PROMISE]
     held = {frozenset(each.slugs) for each in seconds}
     for each in linear:
         if frozenset(effect.slug for effect in each.effects) not in held:
-            seconds.append(_single(design, noise, priors, null, view.columns, projected, each))
+            seconds.append(_refitted_linearly(design, noise, priors, null, view.columns, projected, each))
     known = {each.slugs for each in found}
     rest = [
         Hypothesis(effects=each.effects, evidence=each.evidence, drop=0.0, fit=None)
@@ -61,7 +59,7 @@ def hypotheses_of(
     return noise, sorted(told, key=lambda each: -each.evidence)
 
 
-def _single(
+def _refitted_linearly(
     design: Design,
     noise: Noise,
     priors: Priors,
@@ -89,23 +87,40 @@ def _pairs_of(
     design: Design, noise: Noise, priors: Priors, null: Null, columns: list[Column], found: list[Hypothesis]
 ) -> list[Hypothesis]:
     """What stands out beside the best singles, refitted together with them."""
-    usable = sorted((each for each in found if each.fit is not None), key=lambda each: -each.evidence)
+    usable = sorted((each for each in found if finite(each)), key=lambda each: -each.evidence)
     pairs: dict[frozenset[str], Hypothesis] = {}
     for one in usable[:FIRSTS]:
-        if one.fit is None or not np.isfinite(one.evidence):
-            continue
-        others = [column for column in columns if column.effect.slug != one.slugs[0]]
-        projected = beside(design, noise, priors, one.fit, others)
-        for second in screen(others, [projected])[:SECONDS]:
-            slugs = frozenset((*one.slugs, second.effects[0].slug))
-            if second.evidence < SECOND_PROMISE or slugs in pairs:
-                continue
-            amplitudes, drop = linear_drop(others, projected, second)
-            start = (*one.fit.effects, *_start(second, amplitudes.tolist()))
-            shape_evidence = one.shape_evidence + second.shape_evidence
-            linear = (one.evidence + second.evidence, one.drop + drop)
-            pairs[slugs] = refitted(design, noise, priors, null, one.fit.laws, start, shape_evidence, linear)
+        _add_seconds(design, noise, priors, null, columns, one, pairs)
+    if pairs:  # what the best pair brought in may have a better partner
+        best = max(pairs.values(), key=lambda each: each.evidence)
+        for one in usable[FIRSTS:]:
+            if one.slugs[0] in best.slugs:
+                _add_seconds(design, noise, priors, null, columns, one, pairs)
     return list(pairs.values())
+
+
+def _add_seconds(
+    design: Design,
+    noise: Noise,
+    priors: Priors,
+    null: Null,
+    columns: list[Column],
+    one: Hypothesis,
+    pairs: dict[frozenset[str], Hypothesis],
+) -> None:
+    if one.fit is None:
+        return
+    others = [column for column in columns if column.effect.slug != one.slugs[0]]
+    projected = beside(design, noise, priors, one.fit, others)
+    for second in screen(others, [projected])[:SECONDS]:
+        slugs = frozenset((*one.slugs, second.effects[0].slug))
+        if second.evidence < SECOND_PROMISE or slugs in pairs:
+            continue
+        amplitudes, drop = linear_drop(others, projected, second)
+        start = (*one.fit.effects, *_start(second, amplitudes.tolist()))
+        shape_evidence = one.shape_evidence + second.shape_evidence
+        linear = (one.evidence + second.evidence, one.drop + drop)
+        pairs[slugs] = refitted(design, noise, priors, null, one.fit.laws, start, shape_evidence, linear)
 
 
 def beside(design: Design, noise: Noise, priors: Priors, fitted: Fit, columns: list[Column]) -> Projected:

@@ -16,6 +16,7 @@ MOST_RUNS = 6
 _SCALES = (0.05, 0.15, 0.4, 1.2)
 _EXPONENT = 0.8
 _ROBUST_STEPS = 4
+_LEAST_SHARE, _MOST_SHARE = 0.25, 0.6
 _DECAYS = (0.25, 0.6, 1.5)
 
 
@@ -46,6 +47,20 @@ def starting_laws(design: Design, frame: Frame) -> Laws:
                 if k == RATIO:
                     theta[LOG_DECAY] = np.log(decay * frame.span)
     return Laws(theta=theta, frame=frame)
+
+
+def sober(design: Design, start: Laws) -> Laws:
+    """A start beside it that trusts the curves less: fresh values near their usual size at both ends of the pressures, small
+    shares, half of them at half the life. Where curves hardly determine a parameter, the first start may lie in
+    another valley."""
+    theta = start.theta.copy()
+    for k in range(4):
+        block = k * BLOCK
+        usual = max(float(np.median(np.abs(theta[block : block + 2]))), 1e-12)
+        theta[block : block + 2] = np.clip(theta[block : block + 2], _LEAST_SHARE * usual, None)
+        theta[block + 2 : block + 4] = np.clip(theta[block + 2 : block + 4], -_MOST_SHARE, _MOST_SHARE)
+        theta[block + 4 : block + BLOCK] = np.log(0.5 * design.facts.life), np.log(_EXPONENT)
+    return Laws(theta=theta, frame=start.frame)
 
 
 def _along(

@@ -6,7 +6,7 @@ that one closes the case by itself. After the best is fitted, what is left must 
 one in all parts of the data, both up to TOLERANCE λ; else the structure is unexplained.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -22,12 +22,15 @@ from models.diagnosis.whitening import Noise
 
 #: Candidates this close [nats] to the best are not told from it, and this share of λ more.
 CLOSE, RIVAL = 2.5, 0.04
-#: What a template may leave behind, as a share of λ.
-TOLERANCE = 0.05
+#: What a template may leave behind, as a share of λ; and what its amplitude may be worth more in parts of the data: parts
+#: that differ by δ cost about δ² λ/4.
+TOLERANCE, PARTS_TOLERANCE = 0.05, 0.1
 #: A cause is named where it has this many nats over nothing.
 OVER_NOTHING = 3.0
 #: Two effects at once must gain this much [nats].
 PAIR_PRICE = 4.0
+#: ... and so much more where both are of one family: the second may mend the template of the first.
+KIN_PRICE = 8.0
 #: A cause is named where its own probability is this at least.
 LEAST_NAMED = 0.8
 #: False alarms allowed in closing a case: structure that is left, and amplitudes that differ between parts.
@@ -81,9 +84,12 @@ def judge(
     tested = _Tested(design, noise, priors, rng)
     best, price = _leader(singles, [each for each in usable if len(each.effects) == 2], tested)
     pool = [each for each in usable if len(each.effects) == len(best.effects)]
-    near = [each for each in pool if each.evidence >= best.evidence - CLOSE - between(best, each, singles)][
-        :MOST_CLOSED
-    ]
+    pool.sort(key=lambda each: price(each) - each.evidence)
+    near = [
+        each
+        for each in pool
+        if each.evidence - price(each) >= best.evidence - price(best) - CLOSE - between(best, each, singles)
+    ][:MOST_CLOSED]
     closed = [each for each in near if tested(each).closed]
     standing = tuple(each for each in near if closed and tested(each).excess <= CLOSE)
     first = tested(standing[0] if standing else best)
@@ -118,13 +124,22 @@ def judge(
     )
 
 
-def _leader(singles: list[Hypothesis], pairs: list[Hypothesis], tested: "_Tested") -> tuple[Hypothesis, float]:
-    """The best hypothesis, and what two effects at once cost against one [nats]."""
+def _leader(
+    singles: list[Hypothesis], pairs: list[Hypothesis], tested: "_Tested"
+) -> tuple[Hypothesis, Callable[[Hypothesis], float]]:
+    """The best hypothesis, and what each costs against one effect alone [nats]."""
     alone = singles[0]
-    if not pairs or pairs[0].evidence <= alone.evidence + PAIR_PRICE:
-        return alone, PAIR_PRICE + tolerance(alone)
-    price = PAIR_PRICE + (tolerance(alone) if tested(alone).closed else 0.0)
-    return (pairs[0] if pairs[0].evidence > alone.evidence + price else alone), price
+    promising = bool(pairs) and pairs[0].evidence > alone.evidence + PAIR_PRICE
+    slack = 0.0 if promising and not tested(alone).closed else tolerance(alone)
+
+    def price(hypothesis: Hypothesis) -> float:
+        if len(hypothesis.effects) < 2:
+            return 0.0
+        kin = len({effect.family for effect in hypothesis.effects}) < len(hypothesis.effects)
+        return PAIR_PRICE + slack + (KIN_PRICE if kin else 0.0)
+
+    best = max(pairs, key=lambda each: each.evidence - price(each), default=alone)
+    return (best if best.evidence - price(best) > alone.evidence else alone), price
 
 
 class _Tested:
@@ -169,7 +184,8 @@ def close(design: Design, noise: Noise, priors: Priors, hypothesis: Hypothesis, 
     statistics: dict[str, float] = {}
     for name, found in (("closure", left), ("parts", parts), ("left_lines", line)):
         statistics |= {f"{name}_value": found.value, f"{name}_p_value": found.p_value}
-    excess = max(each.value - each.threshold - slack for each in (left, parts, line))
+    uneven = PARTS_TOLERANCE / TOLERANCE * slack
+    excess = max(each.value - each.threshold - most for each, most in ((left, slack), (parts, uneven), (line, slack)))
     return Closing(closed=excess <= 0, excess=excess, view=view, statistics=statistics)
 
 
@@ -198,10 +214,12 @@ def between(best: Hypothesis, other: Hypothesis, singles: Sequence[Hypothesis]) 
     return RIVAL * max(best.drop - alone, 0.0)
 
 
-def probabilities_of(hypotheses: list[Hypothesis], slack: float, price: float, tested: _Tested) -> dict[str, float]:
+def probabilities_of(
+    hypotheses: list[Hypothesis], slack: float, price: Callable[[Hypothesis], float], tested: _Tested
+) -> dict[str, float]:
     """The probability that an effect is at work: evidences, pairs at their price, less what does not close, cooled by the
     tolerance. Hypotheses exclude each other and no effect is twice in one, so no probability is beyond 1."""
-    priced = [each.evidence - (price if len(each.effects) == 2 else 0.0) - tested.excess(each) for each in hypotheses]
+    priced = [each.evidence - price(each) - tested.excess(each) for each in hypotheses]
     logs = np.array([0.0, *priced]) / (1.0 + 0.5 * slack)
     weights = np.exp(logs - logsumexp(logs))
     found: dict[str, float] = {}

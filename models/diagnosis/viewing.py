@@ -8,7 +8,7 @@ from models.arrays import FloatArray
 from models.diagnosis.contrasts import Contrasts, contrasts_of
 from models.diagnosis.design import Design
 from models.diagnosis.effect import unit_change
-from models.diagnosis.fitting import Fit, Priors, effect_rows
+from models.diagnosis.fitting import Fit, Priors, effect_columns
 from models.diagnosis.projection import GAINS, Gram, Projected, change_columns, gram_of, project
 from models.diagnosis.selection import Column
 from models.diagnosis.whitening import Noise
@@ -56,7 +56,7 @@ def view_of(design: Design, noise: Noise, priors: Priors, fitted: Fit, columns: 
     )
     contrasts = contrasts_of(design, fitted.prediction)
     blocks = blocks_of(design, fitted)
-    gram = gram_of(design, noise, priors, fitted, np.column_stack([changes, contrasts.columns, blocks]))
+    gram = gram_of(design, noise, priors, fitted, np.column_stack([changes, contrasts.columns, blocks]), held=False)
     return View(
         fit=fitted,
         columns=columns,
@@ -68,14 +68,16 @@ def view_of(design: Design, noise: Noise, priors: Priors, fitted: Fit, columns: 
 
 
 def blocks_of(design: Design, fitted: Fit) -> FloatArray:
-    """Each effect's change [N, m] on one part of the rows: were the cause right, no part would want another amplitude.
+    """Each effect's change [N, m] on one part of the rows, to first order in its amplitude: were the cause right, no part
+    would want another amplitude.
 
     Parts: dynamic tests, the upper half of pressures, of speeds, of life, of the test's clock, accelerating rows.
     """
     rows = design.rows
     parts = [~rows.steady, rows.acceleration > 0]
     parts += [values > np.median(values) for values in (rows.pressure, rows.velocity, rows.cycles, rows.clock)]
-    changes = [effect_rows(design, fitted.prediction, each) for each in fitted.effects]
+    tangents = [(each.amplitude, effect_columns(design, fitted.prediction, each)) for each in fitted.effects]
+    changes = [amplitude * columns[:, 0] for amplitude, columns in tangents]
     columns = [np.where(part, change, 0.0) for change in changes for part in parts]
     return np.stack(columns, axis=1) if columns else np.zeros((rows.run.size, 0))
 

@@ -11,7 +11,7 @@ from models.diagnosis.viscosity import log_viscosity_ratio
 
 def _grid(facts: Facts) -> tuple[Tried, ...]:
     thinning = (0.0, 1.0) if facts.temperature_measured else (0.0,)
-    courses = ((0.7, 0.0), (1.0, 0.0), (1.5, 0.0), (1.0, 0.5), (1.0, 2.0))
+    courses = ((0.5, 0.0), (0.75, 0.0), (1.0, 0.0), (1.5, 0.0), (1.0, 0.5), (1.0, 2.0))
     return tuple(Tried(shape=(power, rupture, t)) for power, rupture in courses for t in thinning)
 
 
@@ -38,7 +38,7 @@ EFFECT = Effect(
     positive=True,
     scale=1.0,
     shapes=(
-        ShapeParameter(name="power m", unit="-", lowest=0.7, highest=2.0),
+        ShapeParameter(name="power m", unit="-", lowest=0.4, highest=2.0),
         ShapeParameter(name="rupture of the film r", unit="-", lowest=0.0, highest=5.0),
         ShapeParameter(name="viscosity's exponent t", unit="-", lowest=0.0, highest=1.0),
     ),

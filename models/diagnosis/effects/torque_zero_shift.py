@@ -20,7 +20,7 @@ def _grid(facts: Facts) -> tuple[Tried, ...]:
         logged = any(low <= cycles <= high for cycles in zeroed)
         tried.append(Tried(shape=(STEP, onset), log_weight=0.0 if logged else -float(np.log(len(facts.onsets)))))
     if facts.states.size > 2:
-        tried.append(Tried(shape=(LIFE, 0.0)))
+        tried += [Tried(shape=(LIFE, power), log_weight=-0.7) for power in (0.5, 1.0, 2.0)]
     return tuple(tried)
 
 
@@ -34,7 +34,7 @@ def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     elif course == SETTLING:
         share = -np.expm1(-np.maximum(clock, 0.0) / value)
     else:
-        share = (cycles - scene.facts.states[0]) / scene.facts.life
+        share = (np.maximum(cycles - scene.facts.states[0], 0.0) / scene.facts.life) ** value
     return np.asarray(amplitude * scene.points.sign * share, dtype=np.float64)
 
 
