@@ -91,9 +91,13 @@ def _named(found: Findings) -> list[str]:
     causes = " together with ".join(_name(slug) for slug in found.causes)
     parts = [_misses(found), f"The cause{'s are' if several else ' is'} {causes}."]
     parts += [f"{_physics(each.effect)} Here: {_estimate(each.estimate)}." for each in chosen]
-    rivals = [each for each in found.candidates if each.effect not in found.causes and each.probability > _RIVAL]
+    best = max((each.log_evidence_gain for each in chosen), default=0.0)
+    rivals = [
+        each  # one that is as good stood beside the cause, not against it
+        for each in found.candidates
+        if each.effect not in found.causes and each.probability > _RIVAL and each.log_evidence_gain < best - 1.0
+    ]
     if rivals and chosen:
-        best = max(each.log_evidence_gain for each in chosen)
         told = [f"{_name(each.effect)} by {_number(best - each.log_evidence_gain)} nats" for each in rivals[:_SPOKEN]]
         parts.append(f"Refitted with everything else free, that explains the data better than {_and(told)}.")
     return parts
