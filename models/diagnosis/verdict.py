@@ -24,7 +24,7 @@ from models.diagnosis.whitening import Noise
 CLOSE, RIVAL = 2.5, 0.04
 #: What a template may leave behind, as a share of λ; and what its amplitude may be worth more in parts of the data: parts
 #: that differ by δ cost about δ² λ/4.
-TOLERANCE, PARTS_TOLERANCE = 0.05, 0.1
+TOLERANCE, PARTS_TOLERANCE = 0.05, 0.15
 #: A cause is named where it has this many nats over nothing.
 OVER_NOTHING = 3.0
 #: Two effects at once must gain this much [nats].
