@@ -24,7 +24,7 @@ demo: $(VENV)/.runs
 
 test: $(VENV)/.tests
 	$(BIN)/python -m tests.browser
-	$(BIN)/python -m pytest -n 2 --dist worksteal $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal $(ARGS)
 
 check: $(VENV)/.tests
 	$(BIN)/ruff format --check .
@@ -35,7 +35,7 @@ check: $(VENV)/.tests
 # what the oldest releases deprecate among themselves is theirs; our own tests stay strict in `test`. Every dependency is met:
 # storage, files, numerics, the service over a socket.
 lowest: $(VENV)-lowest/.tests
-	$(VENV)-lowest/bin/python -m pytest -n 2 -W default::DeprecationWarning tests/storage tests/service/test_files_and_records.py \
+	OPENBLAS_NUM_THREADS=1 $(VENV)-lowest/bin/python -m pytest -n 2 -W default::DeprecationWarning tests/storage tests/service/test_files_and_records.py \
 		tests/service/test_formats_csv.py tests/service/test_formats_recorders.py tests/models/test_identification.py \
 		tests/models/test_tracking.py tests/models/diagnosis/test_engine.py tests/journeys/test_contract.py $(ARGS)
 

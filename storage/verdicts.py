@@ -13,9 +13,13 @@ from storage.tables import adopted_model, diagnosis
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VerdictRow:
-    """A finished diagnosis' verdict and causes; `adopted` where the model adopted last came from it."""
+    """A finished diagnosis' verdict and causes; `adopted` where the model adopted last came from it.
+
+    `life` is the run_id of the rebuild with which the diagnosed life began, "" for the first life.
+    """
 
     diagnosis_id: str
+    life: str
     verdict: str | None
     causes: tuple[str, ...]
     adopted: bool
@@ -43,6 +47,7 @@ _short = sa.func.json_object(
 _verdicts = select(
     diagnosis.c.clutch_id,
     diagnosis.c.diagnosis_id,
+    diagnosis.c.life,
     _short.label("short"),
     (_in_force == diagnosis.c.diagnosis_id).label("adopted"),
 ).where(diagnosis.c.clutch_id.in_(bindparam("wanted", expanding=True)), diagnosis.c.diagnosis_key == _newest)
@@ -51,10 +56,11 @@ _verdicts = select(
 def newest(connection: Connection, clutch_ids: Sequence[str]) -> dict[str, VerdictRow]:
     """clutch_id -> its newest finished diagnosis, where it has one."""
     found: dict[str, VerdictRow] = {}
-    for clutch_id, diagnosis_id, short, adopted in connection.execute(_verdicts, {"wanted": list(clutch_ids)}):
+    for clutch_id, diagnosis_id, life, short, adopted in connection.execute(_verdicts, {"wanted": list(clutch_ids)}):
         said = to_object(short)
         found[clutch_id] = VerdictRow(
             diagnosis_id=diagnosis_id,
+            life=life,
             verdict=said["verdict"],
             causes=tuple(said["causes"] or ()),
             adopted=bool(adopted),

@@ -119,12 +119,13 @@ class Recent(Answer):
 
 
 class LatestDiagnosis(Answer):
-    """The newest finished diagnosis; `adopted` where the model adopted last came from it."""
+    """The newest finished diagnosis; `adopted` where its model is in force, `earlier_life` where a rebuild came since."""
 
     diagnosis_id: str
     verdict: str | None
     causes: list[str]
     adopted: bool
+    earlier_life: bool
 
 
 class ClutchOut(Answer):

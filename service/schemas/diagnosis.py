@@ -150,6 +150,7 @@ class DiagnosisListed(Answer):
     revision: int
     as_of_cycles: Number
     stale: bool
+    earlier_life: bool
     adoptable: bool
     adopted: bool
     problem: str | None

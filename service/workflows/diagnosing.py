@@ -79,6 +79,7 @@ def _answers(connection: Connection, clutch_id: str, rows: list[DiagnosisRow]) -
             "revision": row.revision,
             "as_of_cycles": None if row.as_of_cycles is None else whole(row.as_of_cycles),
             "stale": latest > row.last_run_key,
+            "earlier_life": row.life != life,
             "adoptable": row.extension is not None and row.life == life,
             "adopted": adopted is not None and adopted.diagnosis_id == row.diagnosis_id,
             "problem": row.problem,

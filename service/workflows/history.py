@@ -70,6 +70,11 @@ class Life:
     events: tuple[Event, ...]
 
     @property
+    def name(self) -> str:
+        """The run_id of the rebuild that began it, "" where there was none."""
+        return self.events[0].run_id if self.events[0].rebuild else ""
+
+    @property
     def speed_range(self) -> Value | None:
         """That of the first stationary test: it sets the protocol over which means are taken."""
         return next((event.speed_range for event in self.events if event.speed_range is not None), None)

@@ -3,7 +3,6 @@
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Any
 
 from sqlalchemy import Connection
@@ -12,6 +11,7 @@ from service.errors import ConflictError
 from service.schemas.clutch import ClutchIn
 from service.workflows import stored
 from service.workflows.adopted import BASELINE
+from service.workflows.adoption import present_life
 from service.workflows.retrack import RANK_UNKNOWN, SUMMARY
 from storage import clutches, verdicts
 from storage.clutches import ClutchRow
@@ -77,14 +77,29 @@ def page(
 def _described(connection: Connection, rows: Sequence[ClutchRow]) -> list[dict[str, Any]]:
     """Clutches as they go out."""
     said = verdicts.newest(connection, [row.clutch_id for row in rows])
-    return [describe(row, said.get(row.clutch_id)) for row in rows]
+    return [describe(row, _latest(connection, row, said.get(row.clutch_id))) for row in rows]
+
+
+def _latest(connection: Connection, row: ClutchRow, verdict: VerdictRow | None) -> dict[str, Any] | None:
+    """The newest finished diagnosis as it goes out; what it says of a life that a rebuild has ended is past."""
+    if verdict is None:
+        return None
+    life = row.summary.get("life")  # what was stored by earlier releases does not say it
+    earlier = verdict.life != (present_life(connection, row.clutch_id) if life is None else life)
+    return {
+        "diagnosis_id": verdict.diagnosis_id,
+        "verdict": verdict.verdict,
+        "causes": list(verdict.causes),
+        "adopted": verdict.adopted and not earlier,
+        "earlier_life": earlier,
+    }
 
 
 #: What summaries did not say that were stored before models could be adopted.
 _BEFORE = {"model": dict(BASELINE)}
 
 
-def describe(row: ClutchRow, verdict: VerdictRow | None = None) -> dict[str, Any]:
+def describe(row: ClutchRow, diagnosis: dict[str, Any] | None = None) -> dict[str, Any]:
     """A clutch as it goes out."""
     return stored.record(row).model_dump(mode="json") | {
         "created_at": row.created_at,
@@ -92,5 +107,5 @@ def describe(row: ClutchRow, verdict: VerdictRow | None = None) -> dict[str, Any
         "runs": row.summary.get("runs", 0),
         "summary": {name: (_BEFORE | row.summary)[name] for name in SUMMARY} if row.summary else None,
         "recent": row.summary.get("recent"),
-        "diagnosis": None if verdict is None else asdict(verdict) | {"causes": list(verdict.causes)},
+        "diagnosis": diagnosis,
     }

@@ -51,7 +51,7 @@ def retrack(connection: Connection, clutch: ClutchRow, events: Sequence[Event], 
             said |= {(each.cycles, each.method): each for each in foretold}
     _write(connection, clutch.clutch_id, list(said.values()), last)
     summary, rank = _summarise(said[events[-1].cycles, "particle"].payload)
-    summary |= {"runs": len(events), "recent": recent(events, found[-1].pooled(basis))}
+    summary |= {"runs": len(events), "recent": recent(events, found[-1].pooled(basis)), "life": found[-1].name}
     clutches.set_summary(connection, clutch.clutch_id, rank, summary)
 
 

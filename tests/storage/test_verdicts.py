@@ -45,7 +45,7 @@ def test_the_newest_that_finished_is_told(stored: Database) -> None:
         said = verdicts.newest(connection, ["a", "b", "nobody"])
         assert verdicts.newest(connection, []) == {}
         assert verdicts.newest(connection, ["b"]) == {}
-    expected = VerdictRow(diagnosis_id="d1", verdict="cause_named", causes=("oil_change",), adopted=False)
+    expected = VerdictRow(diagnosis_id="d1", life="", verdict="cause_named", causes=("oil_change",), adopted=False)
     assert said == {"a": expected}
 
 

@@ -38,7 +38,7 @@ class Board {
     const pooled = items.find((item) => item.quantity === "mean_cof" && item.pressure_bar === null);
     this.charts.foretelling.show(foretelling({ life, foretold, events }));
     if (tests.length > 0) this.charts.cof.show(meanCof({ tests, events }));
-    return this.charts.fan.show(fan({ life, pooled, foretold, events }));
+    this.charts.fan.show(fan({ life, pooled, foretold, events }));
   }
 
   async rest(data) {
@@ -89,7 +89,7 @@ class Board {
     const { items, events, tests } = this.data;
     const again = () => { this.parameters(); this.stribeck(); };
     for (const key of Object.keys(PARAMETERS)) {
-      set(this.charts[key], key === "static_torque_nm" && tests.length > 0 && [this.pressureChoice(again)]);
+      set(this.charts[key], tests.length > 0 && [this.pressureChoice(again)]);
       this.charts[key].show(parameter({ items, events, name: key, pressure: this.pressure() }));
     }
     const which = choice("Parameter", Object.entries(PARAMETERS).map(([key, { title }]) => [key, title]), this.chosen.parameter, (value) => { this.chosen.parameter = value; this.parameters(); });

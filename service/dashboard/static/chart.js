@@ -1,9 +1,12 @@
-// One chart: its title, its drawing, its table, its PNG and its CSV.
+// One chart: its title, its drawing, its table, its PNG and its CSV. Until the plotting library is there, and where it does
+// not load, the drawing is a light one.
 
 import { h, save, saveText, symbol } from "./dom.js";
+import { settled } from "./frame.js";
 import { base, config } from "./layout.js";
 import { colours } from "./palette.js";
-import { has3d, plotly } from "./plotting.js";
+import { has3d, painted, plotly } from "./plotting.js";
+import { sketch } from "./sketch.js";
 
 const MOST_ROWS = 400;
 const seen = new IntersectionObserver((entries) => { for (const { target, isIntersecting } of entries) target.chart.near(isIntersecting); }, { rootMargin: "400px" });
@@ -11,7 +14,7 @@ const seen = new IntersectionObserver((entries) => { for (const { target, isInte
 export class Chart {
   /** `spatial` charts need WebGL; `name` is the start of saved files' names. */
   constructor({ id, title, name, letter = null, spatial = false, wide = false, height = 360 }) {
-    Object.assign(this, { id, title, name, spatial, height, spec: null, stale: false, visible: false });
+    Object.assign(this, { id, title, name, spatial, height, spec: null, stale: false, visible: false, turn: 0 });
     this.note = h("p", { class: "note" });
     this.controls = h("div", { class: "controls" });
     this.plot = h("div", { class: "plot", role: "img", "aria-label": title, style: { "min-height": `${height}px` } });
@@ -44,7 +47,7 @@ export class Chart {
     const bare = !spec.rows?.length;
     this.tools.hidden = this.details.hidden = bare;
     if (this.details.open) this.fill();
-    return this.redraw();
+    this.redraw();
   }
 
   near(visible) {
@@ -54,24 +57,53 @@ export class Chart {
 
   redraw() {
     this.stale = this.spec !== null && !this.element.classList.contains("empty");
-    return this.visible && this.stale ? this.draw() : null;
+    if (this.visible && this.stale) this.draw();
   }
 
   async draw() {
     this.stale = false;
-    const Plotly = await plotly();
-    if (this.element.classList.contains("empty")) return;
-    const c = colours();
-    const { data, layout } = this.spec.figure(c);
-    const compact = this.plot.clientWidth < 480;
-    await Plotly.react(this.plot, data, base(c, layout, { height: this.height, compact, spatial: this.spatial }), config(this.spatial));
+    this.turn += 1;
+    const { turn } = this;
+    if (!this.element.dataset.drawn) this.sketch();
+    let Plotly;
+    try {
+      Plotly = await plotly();
+    } catch {
+      this.stale = true; // tried again when the chart is next looked at
+      if (!this.plot.hasChildNodes()) this.plot.append(h("p", { class: "nothing" }, "The plotting library did not load. The table holds the numbers."));
+      return;
+    }
+    if (turn !== this.turn || this.element.classList.contains("empty")) return;
+    const { data, layout } = this.figure();
+    await Plotly.react(this.plot, data, layout, config(this.spatial));
+    this.plot.querySelector(".sketch, .nothing")?.remove();
     this.element.dataset.drawn = "yes";
     performance.mark(`drawn ${this.id}`);
   }
 
+  /** Data and layout in the colours of now. */
+  figure(scheme = null, { width = this.plot.clientWidth, height = this.height, compact = width < 480 } = {}) {
+    const c = colours(scheme);
+    const { data, layout } = this.spec.figure(c);
+    const whole = { data, layout: base(c, layout, { height, compact, spatial: this.spatial }) };
+    return settled(whole, { width, height }) ?? whole;
+  }
+
+  /** What can be drawn without the library is drawn at once. */
+  sketch() {
+    const figure = this.figure();
+    if (!figure.ticks) return;
+    this.plot.querySelector(".sketch, .nothing")?.remove();
+    this.plot.append(sketch(figure, { width: this.plot.clientWidth, height: this.height }));
+    this.element.dataset.sketched = "yes";
+    painted().then(() => performance.mark(`sketched ${this.id}`));
+  }
+
   clear() {
+    this.turn += 1;
     if (this.element.dataset.drawn) globalThis.Plotly?.purge(this.plot);
     delete this.element.dataset.drawn;
+    delete this.element.dataset.sketched;
   }
 
   fill() {
@@ -93,9 +125,8 @@ export class Chart {
       await this.draw();
       return Plotly.toImage(this.plot, { format, width, height, scale });
     }
-    const c = colours(scheme);
-    const { data, layout } = this.spec.figure(c);
-    return Plotly.toImage({ data, layout: { ...base(c, layout, { height, compact: false, spatial: false }), width, height } }, { format, width, height, scale });
+    const { data, layout } = this.figure(scheme, { width, height, compact: false });
+    return Plotly.toImage({ data, layout: { ...layout, width } }, { format, width, height, scale });
   }
 
   async savePng() {

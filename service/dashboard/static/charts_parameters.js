@@ -39,7 +39,7 @@ export function parameter({ items, name, pressure, events }) {
   if (!item) return { empty: "The tests at this pressure do not determine it." };
   const { measured, trajectory, coefficients: k } = item;
   const { unit } = PARAMETERS[name];
-  const inUnit = unit && ` ${unit}`;
+  const inUnit = unit && ` ${unit.replace("^0.3", "⁰·³")}`;
   return {
     note: `Eq. 6: ${withSd(k.initial.value, k.initial.sd)}${inUnit} when new, a change of ${withSd(k.change.value, k.change.sd)}${inUnit} in the end, on a scale of ${significant(k.scale_cycles.value, 2)} cycles.`,
     columns: COLUMNS, rows: rowsOf(item),

@@ -8,11 +8,10 @@ import { byId, h } from "./dom.js";
 import { withKey } from "./key.js";
 import { Live } from "./live.js";
 import { liveBar } from "./livebar.js";
-import { plotly } from "./plotting.js";
 import { makeReport } from "./report.js";
 import { showRuns } from "./runs.js";
 import { sender } from "./sending.js";
-import { stateOf } from "./state.js";
+import { openVerdict, stateOf } from "./state.js";
 import { firstRun } from "./welcome.js";
 
 const ID = decodeURIComponent(location.pathname.split("/").at(-1));
@@ -25,7 +24,6 @@ let due = true;
 let charts = null;
 let diagnosis = null;
 document.title = `${ID} · Clutchlife`;
-plotly().catch(() => {}); // starts to load beside the data; who draws hears of a failure
 
 async function look() {
   let found;
@@ -53,7 +51,8 @@ async function refresh(clutch) {
   shown = { ...(shown ?? data), ...data, tests: shown?.tests ?? [], loops: shown?.loops ?? [], runs: shown?.runs ?? [], events: shown?.events ?? [] };
   standing();
   diagnosis.setModel(data.life.model);
-  await Promise.all([charts.life(shown), diagnosis.look()]);
+  charts.life(shown);
+  await diagnosis.look();
   standing();
   const [tests, loops, runs] = await Promise.all([readAll(`${PATH}/stribeck?limit=1000`), readAll(`${PATH}/loops`), readAll(`${PATH}/runs?limit=1000`)]);
   shown = { ...data, tests: tests.items, loops: loops.items, runs: runs.items, events: runs.items.filter((run) => run.kind === "maintenance") };
@@ -74,9 +73,7 @@ function begin() {
 }
 
 function standing() {
-  const latest = diagnosis?.latest;
-  const open = latest && latest.status === "finished" && !latest.adopted ? latest.verdict : null;
-  const state = stateOf(shown.clutch.summary, open);
+  const state = stateOf(shown.clutch.summary, openVerdict(diagnosis?.latest));
   const text = JSON.stringify([shown.clutch, shown.life, state]);
   if (byId("head").dataset.shown === text) return;
   byId("head").dataset.shown = text;

@@ -21,7 +21,7 @@ export function report(found) {
     h("div", { class: `notice ${SHAPE[found.verdict] ?? ""}` },
       h("p", { class: "verdict" }, h("b", {}, `${VERDICTS[found.verdict] ?? words(found.verdict)}. `), sentence(found)),
       found.summary ? h("p", {}, found.summary) : null,
-      h("p", { class: "quiet" }, `${moment(found.created_at)}, of the runs up to ${cycles(found.as_of_cycles, 0, 20)} cycles.`, found.stale ? h("b", {}, " Runs have come since: run it again.") : null)),
+      h("p", { class: "quiet" }, `${moment(found.created_at)}, of the runs up to ${cycles(found.as_of_cycles, 0, 20)} cycles.`, found.earlier_life ? h("b", {}, " The clutch has been rebuilt since: this is of its earlier life.") : found.stale ? h("b", {}, " Runs have come since: run it again.") : null)),
     h("div", { class: "columns" }, candidates(found), fitness(found), gain(found), where(found), advice(found), notes(found), visible(found))];
 }
 

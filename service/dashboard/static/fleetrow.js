@@ -3,19 +3,13 @@
 import { h } from "./dom.js";
 import { age, cycles, fixed, interval, kindName, percent, words } from "./format.js";
 import { healthBar, intervalBar, sparkline } from "./sparkline.js";
-import { stateIcon, stateOf, VERDICTS } from "./state.js";
+import { openVerdict, stateIcon, stateOf, VERDICTS } from "./state.js";
 
 export const COLUMNS = ["State", "Clutch", "Health", "Remaining cycles, 90 % interval", "Mean COF over cycles", "Last run", "Diagnosis"];
 
-/** The verdict that waits for someone to act on it, or null. */
-export function openVerdict(clutch) {
-  const latest = clutch.diagnosis ?? null;
-  return latest === null || latest.adopted ? null : latest.verdict;
-}
-
 /** How a clutch stands: its state, and why. */
 export function standing(clutch) {
-  return { clutch, state: stateOf(clutch.summary, openVerdict(clutch)) };
+  return { clutch, state: stateOf(clutch.summary, openVerdict(clutch.diagnosis)) };
 }
 
 /** The row; `scale` is the cycles at the right end of every interval's bar. */
@@ -25,7 +19,8 @@ export function row({ clutch, state, word }, scale) {
     cell("State", h("span", { class: "state" }, stateIcon(state.name), h("span", {}, word, h("small", {}, state.why)))),
     h("th", { role: "rowheader", scope: "row", "data-label": "Clutch" },
       h("a", { href: `/clutches/${encodeURIComponent(clutch.clutch_id)}` }, clutch.clutch_id),
-      h("small", {}, `${clutch.friction_material} on ${clutch.reaction_plate}`, clutch.origin === "simulated" ? h("span", { class: "tag" }, "simulated") : null)),
+      clutch.origin === "simulated" ? h("span", { class: "tag" }, "simulated") : null,
+      h("small", {}, `${clutch.friction_material} on ${clutch.reaction_plate}`)),
     cell("Health", ...health(clutch.summary, state.name)),
     cell("Remaining", ...remaining(clutch.summary, scale)),
     cell("Mean COF", ...meanCof(clutch)),
@@ -70,5 +65,5 @@ function diagnosis(clutch) {
   if (found === null) return [h("span", { class: "quiet" }, "not asked")];
   const causes = (found.causes ?? []).map(words).join(", ");
   return [h("a", { href: `/clutches/${encodeURIComponent(clutch.clutch_id)}#diagnosis` }, VERDICTS[found.verdict] ?? words(found.verdict)),
-    h("small", {}, [causes, found.adopted ? "adopted" : ""].filter(Boolean).join(" · "))];
+    h("small", {}, [causes, found.adopted ? "adopted" : "", found.earlier_life ? "before the rebuild" : ""].filter(Boolean).join(" · "))];
 }

@@ -1,18 +1,24 @@
-// The plotting library, loaded once and only where a chart is drawn.
+// The plotting library, loaded once, where a chart is drawn and after what can be drawn without it: running its megabytes
+// keeps the page busy for a second.
 
 let loading = null;
 
 /** Plotly, when its script has run; it is a file of this service. */
 export function plotly() {
-  loading ??= new Promise((ready, fail) => {
-    const script = document.createElement("script");
-    script.src = new URL("./plotly.min.js", import.meta.url).href;
-    script.onload = () => ready(globalThis.Plotly);
-    script.onerror = () => { loading = null; script.remove(); fail(new Error("the plotting library did not load")); };
-    document.head.append(script);
-  });
+  loading ??= painted().then(script);
   return loading;
 }
+
+/** When the browser has shown what there is so far. */
+export const painted = () => new Promise((done) => { requestAnimationFrame(() => setTimeout(done)); });
+
+const script = () => new Promise((ready, fail) => {
+  const element = document.createElement("script");
+  element.src = new URL("./plotly.min.js", import.meta.url).href;
+  element.onload = () => ready(globalThis.Plotly);
+  element.onerror = () => { loading = null; element.remove(); fail(new Error("the plotting library did not load")); };
+  document.head.append(element);
+});
 
 let webgl = null;
 

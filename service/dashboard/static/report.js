@@ -3,7 +3,7 @@
 import { h, table } from "./dom.js";
 import { cycles, fixed, interval, moment, percent, probability, withSd, words } from "./format.js";
 import { sentence } from "./diagnosis_report.js";
-import { stateIcon, STATES, stateOf } from "./state.js";
+import { openVerdict, stateIcon, STATES, stateOf } from "./state.js";
 
 const LAST_TESTS = 6;
 
@@ -11,16 +11,23 @@ export async function makeReport(place, { clutch, life, tests, events, runs }, c
   if (life === null) return;
   const [fan, cof] = await Promise.all([charts.charts.fan, charts.charts.foretelling].map((chart) => chart.image("svg", { width: 760, height: 255, scheme: "light" })));
   const latest = diagnosis?.latest ?? null;
-  const state = stateOf(clutch.summary, latest && !latest.adopted ? latest.verdict : null);
+  const state = stateOf(clutch.summary, openVerdict(latest));
   place.replaceChildren(
     h("header", {}, h("div", {}, h("h1", {}, clutch.clutch_id), h("p", {}, `Wet clutch, ${clutch.friction_material} on ${clutch.reaction_plate}, ${clutch.fluid}${clutch.origin === "simulated" ? ", simulated" : ""}`)),
       h("p", { class: "made" }, "Clutchlife", h("br"), moment(new Date().toISOString()))),
     h("p", { class: "state" }, stateIcon(state.name), h("b", {}, STATES[state.name].word), ` – ${state.why}`),
     h("dl", { class: "facts" }, facts(clutch, life, runs).flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)])),
     fan ? h("img", { src: fan, alt: "" }) : "", cof ? h("img", { src: cof, alt: "" }) : "",
-    h("p", {}, h("b", {}, "Diagnosis: "), latest ? `${sentence(latest)} ${latest.adopted ? "The extended model is adopted." : ""}` : "not asked."),
+    h("p", {}, h("b", {}, "Diagnosis: "), told(latest)),
     table("The last tests", ["Cycles", "Test", "Mean COF, mean of pressures", "Fits acceptable"], tests.slice(-LAST_TESTS).map(testRow), { shown: true }),
     events.length > 0 ? h("p", {}, h("b", {}, "Events: "), events.slice(-6).map((event) => `${words(event.event)} at ${fixed(event.cycles)} cycles`).join("; ")) : "");
+}
+
+function told(latest) {
+  if (latest === null || latest.status === "running") return "not asked.";
+  if (latest.status === "failed") return `failed. ${latest.problem ?? ""}`;
+  const since = latest.adopted ? "The extended model is adopted." : latest.earlier_life ? "That was before the rebuild." : "";
+  return `${sentence(latest)} ${since}`;
 }
 
 function facts(clutch, life, runs) {

@@ -20,6 +20,12 @@ export const VERDICTS = {
   unexplained_structure: "Unexplained structure",
   insufficient_data: "Too little data",
 };
+
+/** The verdict of a finished diagnosis that waits for someone to act on it, or null; a rebuild ends it. */
+export function openVerdict(latest) {
+  return latest && (latest.status ?? "finished") === "finished" && !latest.adopted && !latest.earlier_life ? latest.verdict : null;
+}
+
 const DISAGREES = new Set(["cause_named", "cause_ambiguous", "unexplained_structure"]);
 
 /** The state's name and the sentence why. `verdict` is that of a diagnosis that nobody has acted on, or null. */

@@ -14,11 +14,11 @@ export function torque(v, { static_torque_nm: mS, coulomb_ratio: mC, stribeck_ve
   return mS * (1 + (mC - 1) * e) + cV * v ** GAMMA;
 }
 
-/** The fitted curve of one pressure between two speeds, rpm. */
+/** The fitted curve of one pressure between two speeds, rpm; closer points where it bends, near rest. */
 export function curveOf(fit, clutch, from, to, points = 80) {
   const perRpm = (meanRadius(clutch) * 2 * Math.PI) / 60;
   return Array.from({ length: points }, (_, index) => {
-    const speed = from + ((to - from) * index) / (points - 1);
+    const speed = from + (to - from) * (index / (points - 1)) ** 2;
     return { speed, torque: torque(speed * perRpm, fit.parameters) };
   });
 }
