@@ -41,6 +41,16 @@ class Family(StrEnum):
     HISTORY = "history"
 
 
+class Bend(StrEnum):
+    """Along what a template may be bent, for nobody knows its form that well; MOTION: in loops against plateaus."""
+
+    SPEED = "speed"
+    PRESSURE = "pressure"
+    LIFE = "life"
+    CLOCK = "clock"
+    MOTION = "motion"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShapeParameter:
     """A shape parameter: its name and unit, its bounds; `smooth` where the change may be differentiated in it (then it
@@ -72,6 +82,7 @@ class Effect:
     grid(facts) gives the shapes to be tried, none where the campaign cannot tell the effect.
     change(scene, amplitude, shape) -> [P] Nm at the scene's points. before_lag: whether it changes the stationary curve,
     which friction in loops then lags behind, or the measured torque itself.
+    bends: along what its form is uncertain (`models.diagnosis.bending`); an exact law has none.
     tests: what parts it from its neighbours, slug -> a test in words ("baseline": from none).
     """
 
@@ -92,6 +103,7 @@ class Effect:
     grid: Callable[[Facts], tuple[Tried, ...]]
     change: Callable[[Scene, float, Shape], FloatArray]
     before_lag: bool
+    bends: tuple[Bend, ...]
     tests: dict[str, str]
 
 

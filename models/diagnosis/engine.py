@@ -11,17 +11,17 @@ from models.diagnosis.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.design import Design, build_design
 from models.diagnosis.effect import Kind
 from models.diagnosis.fitting import Fit, Priors, fit, priors_of
-from models.diagnosis.misfits import FIXED_LINE
+from models.diagnosis.misfits import FIXED_LINE, axes_of
 from models.diagnosis.noise import estimate_noise, first_noise
 from models.diagnosis.raw import RawEvidence, raw_evidence
-from models.diagnosis.refitting import Hypothesis
+from models.diagnosis.refitting import Hypothesis, finite
 from models.diagnosis.report import Report, Verdict
 from models.diagnosis.reporting import insufficient, report_of
 from models.diagnosis.searching import hypotheses_of
 from models.diagnosis.selection import columns_of
 from models.diagnosis.starting import sober, starting_laws
 from models.diagnosis.unmeasured import temperature_evidence
-from models.diagnosis.verdict import CLOSE, Judgement, judge
+from models.diagnosis.verdict import CLOSE, OVER_NOTHING, Judgement, judge
 from models.diagnosis.viewing import View, view_of
 from models.diagnosis.whitening import Noise
 
@@ -29,6 +29,9 @@ from models.diagnosis.whitening import Noise
 FEWEST_ROWS, FEWEST_SPEEDS = 24, 6
 #: A line of one frequency at all speeds is structure from so much evidence [nats] on: nothing else need confirm it.
 LEAST_LINE = 14.0
+#: An alarm that neither an effect nor an axis of structure confirms must be so much [nats] beyond its threshold: about
+#: five times rarer by chance.
+UNCONFIRMED = 1.6
 #: So many plateaus determine every curve: one start is enough.
 MANY_PLATEAUS = 8000
 #: Torques [Nm] outside are no clutch's.
@@ -77,7 +80,9 @@ def _diagnosed(campaign: Campaign, design: Design, without: frozenset[str], rng:
         unmeasured = -np.inf
         if not design.facts.temperature_measured and "oil_temperature" not in without:
             unmeasured = temperature_evidence(design, noise, baseline.priors, baseline.fit)
-        judgement = judge(design, noise, baseline.priors, hypotheses, unmeasured, rng)
+        structure = max((each.strength for each in axes_of(view, leads, raw)), default=0.0)
+        if confirmed(leads, hypotheses, max(structure, unmeasured)):
+            judgement = judge(design, noise, baseline.priors, hypotheses, structure, unmeasured, rng)
     return report_of(
         campaign, design, noise, baseline.priors, view, with_lines(judgement, raw), hypotheses, raw, leads,
         baseline.notes, rng,
@@ -126,6 +131,13 @@ def alarms(design: Design, baseline: Baseline, view: View, rng: np.random.Genera
         "contrasts": lead(view.projections, view.smooth, np.zeros(len(view.contrasts.axes)), CONTRASTS_SHARE, rng),
         "lines": lines(design, baseline.noise, baseline.fit.residual)[0],
     }
+
+
+def confirmed(leads: dict[str, Lead], hypotheses: list[Hypothesis], otherwise: float) -> bool:
+    """Whether an alarm holds: an effect has evidence, or something else has (`otherwise` nats), or it is loud."""
+    evidence = max((each.evidence for each in hypotheses if finite(each)), default=-np.inf)
+    loud = any(each.value > each.threshold + UNCONFIRMED for each in leads.values() if each.raised)
+    return loud or max(evidence, otherwise) >= OVER_NOTHING
 
 
 def with_lines(judgement: Judgement, raw: tuple[RawEvidence, ...]) -> Judgement:

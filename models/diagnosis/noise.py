@@ -66,7 +66,7 @@ def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, bef
             continue
         variance = _variance(pieces, residual, torque, design.samples)
         deviation[part] = np.sqrt(variance[part])
-        correlation, scale = _correlation(pieces, residual / np.sqrt(variance))
+        correlation, scale = _correlation(pieces, residual, np.sqrt(variance))
         deviation[part] *= scale
         correlations.append(correlation)
     spiky = np.abs(residual) > _SPIKE * deviation
@@ -136,12 +136,12 @@ def _variance(pieces: list[_Piece], residual: FloatArray, torque: FloatArray, sa
     return np.asarray(np.maximum(found[0] + found[1] * torque**2 / level, 1e-4 * usual) / samples, dtype=np.float64)
 
 
-def _correlation(pieces: list[_Piece], unit: FloatArray) -> tuple[Correlation, float]:
+def _correlation(pieces: list[_Piece], residual: FloatArray, deviation: FloatArray) -> tuple[Correlation, float]:
     """(w, ρ) by restricted likelihood on a grid, and the factor by which the deviations are off."""
-    clipped = np.clip(unit, -_SPIKE, _SPIKE)
     groups: dict[int, tuple[FloatArray, list[FloatArray]]] = {}
     for piece in pieces:
-        groups.setdefault(id(piece.contrasts), (piece.contrasts, []))[1].append(clipped[piece.rows])
+        left = piece.contrasts @ (piece.contrasts.T @ residual[piece.rows]) / deviation[piece.rows]
+        groups.setdefault(id(piece.contrasts), (piece.contrasts, []))[1].append(np.clip(left, -_SPIKE, _SPIKE))
     best, told = -np.inf, (Correlation(), 1.0)
     tried = [Correlation(), *(Correlation(share=w, step=r) for w in _SHARES for r in _STEPS)]
     few = len(groups) > 40  # loops whose bins all differ: their correlation is not looked for

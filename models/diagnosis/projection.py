@@ -15,6 +15,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline import Prediction
+from models.diagnosis.bending import BEND, bent_columns
 from models.diagnosis.design import Design, IntArray
 from models.diagnosis.fitting import Fit, Priors, effect_columns, effect_precisions
 from models.diagnosis.whitening import Noise, by_curve, gains_of, whitened
@@ -58,7 +59,8 @@ def gram_of(design: Design, noise: Noise, priors: Priors, fit: Fit, changes: Flo
     """The Gram matrix of a fit (its effects belong to the baseline then) and changes [N, m] at the rows; `held` whether the
     priors of the effects' amplitudes hold: what is left of a fit is not what a prior kept it from."""
     own = [effect_columns(design, fit.prediction, each) for each in fit.effects]
-    jacobian = np.concatenate([fit.prediction.jacobian(design)[:, priors.free], *own], axis=1)
+    bent = [bent_columns(design, fit.prediction, each) for each in fit.effects]
+    jacobian = np.concatenate([fit.prediction.jacobian(design)[:, priors.free], *own, *bent], axis=1)
     white = whitened(np.column_stack([jacobian, changes, fit.residual]), design, noise)
     gains = gains_of(design, fit.torque, noise)
     matrix = white.T @ white
@@ -79,6 +81,8 @@ def gram_of(design: Design, noise: Noise, priors: Priors, fit: Fit, changes: Flo
         matrix[-1, at] -= precisions[0] * each.amplitude
         matrix[-1, -1] += precisions[0] * each.amplitude**2
         at += columns.shape[1]
+    diagonal = np.arange(at, base)
+    matrix[diagonal, diagonal] += BEND**-2.0
     return Gram(
         matrix=matrix, along=by_curve(white, gains), squares=gains.squares, run_of_curve=gains.run_of_curve, base=base
     )

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
+from models.diagnosis.bending import BEND, bends
 from models.diagnosis.design import Design
 from models.diagnosis.effect import Effect
 from models.diagnosis.fitting import Fit, Fitted, Priors, effect_precisions, fit
@@ -83,6 +84,7 @@ def laplace(design: Design, noise: Noise, priors: Priors, fitted: Fit) -> tuple[
     gains' likeliest scatter."""
     gram = gram_of(design, noise, priors, fitted, np.zeros((design.torque.size, 0)))
     price = 0.5 * sum(float(np.log(effect_precisions(each.effect)).sum()) for each in fitted.effects)
+    price -= np.log(BEND) * sum(bends(design, each.effect).shape[1] for each in fitted.effects)
     sided = np.log(2.0) * sum(each.effect.positive for each in fitted.effects)
     projections = [project(gram, float(gain)) for gain in GAINS]
     marginal = float(logsumexp([each.evidence for each in projections]) + price + sided)

@@ -104,6 +104,7 @@ def _effect(k: int, column: Callable[[Points], FloatArray], *, before_lag: bool)
         grid=lambda _: (),
         change=change,
         before_lag=before_lag,
+        bends=(),
         tests={},
     )
 

@@ -21,10 +21,13 @@ from models.diagnosis.viewing import View, view_of
 from models.diagnosis.whitening import Noise
 
 #: Candidates this close [nats] to the best are not told from it, and this share of λ more.
-CLOSE, RIVAL = 2.5, 0.04
+CLOSE, RIVAL = 2.5, 0.005
 #: What a template may leave behind, as a share of λ; and what its amplitude may be worth more in parts of the data: parts
 #: that differ by δ cost about δ² λ/4.
-TOLERANCE, PARTS_TOLERANCE = 0.05, 0.15
+TOLERANCE, PARTS_TOLERANCE = 0.05, 0.08
+#: Structure without a name may have so much more evidence, as a share of λ beyond CLEAR nats: below, no template's error
+#: shows.
+GENERIC, CLEAR = 0.1, 20.0
 #: A cause is named where it has this many nats over nothing.
 OVER_NOTHING = 3.0
 #: Two effects at once must gain this much [nats].
@@ -72,11 +75,12 @@ def judge(
     noise: Noise,
     priors: Priors,
     hypotheses: list[Hypothesis],
+    structure: float,
     unmeasured: float,
     rng: np.random.Generator,
 ) -> Judgement:
-    """The verdict on hypotheses, best first; `unmeasured` is the evidence [nats] of an oil temperature that was not
-    measured (-inf where it was)."""
+    """The verdict on hypotheses, best first; `structure` is the evidence [nats] of smooth structure without a name on the
+    axis that shows most of it, `unmeasured` that of an oil temperature that was not measured (-inf where it was)."""
     usable = [each for each in hypotheses if finite(each)]
     singles = [each for each in usable if len(each.effects) == 1]
     if not singles:
@@ -88,20 +92,22 @@ def judge(
     near = [
         each
         for each in pool
-        if each.evidence - price(each) >= best.evidence - price(best) - CLOSE - between(best, each, singles)
+        if each.evidence - price(each) >= best.evidence - price(best) - CLOSE - RIVAL * unshared(best, each, singles)
     ][:MOST_CLOSED]
     closed = [each for each in near if tested(each).closed]
     standing = tuple(each for each in near if closed and tested(each).excess <= CLOSE)
     first = tested(standing[0] if standing else best)
     slack = tolerance(best)
     statistics = {"lambda": best.drop, "tolerance": slack, "closed": float(len(closed)), **first.statistics}
-    probabilities = probabilities_of(hypotheses, slack, price, tested)
+    probabilities = probabilities_of(hypotheses, best, singles, price, tested, structure)
     causes = tuple(dict.fromkeys(slug for each in standing for slug in each.slugs))
     imitated = unmeasured > max(best.evidence - CLOSE - slack, OVER_NOTHING)
     if imitated:
         probabilities = with_unmeasured(probabilities, unmeasured, best.evidence, slack)
         causes = tuple(dict.fromkeys(("oil_temperature", *causes)))
-    elif best.evidence < OVER_NOTHING or not closed:
+    elif (
+        best.evidence - price(best) < max(OVER_NOTHING, structure - GENERIC * max(best.drop - CLEAR, 0.0)) or not closed
+    ):
         doubt = doubted(best, tested(best))
         return Judgement(
             verdict=Verdict.UNEXPLAINED_STRUCTURE,
@@ -207,21 +213,34 @@ def tolerance(hypothesis: Hypothesis) -> float:
     return TOLERANCE * max(hypothesis.drop, 0.0)
 
 
-def between(best: Hypothesis, other: Hypothesis, singles: Sequence[Hypothesis]) -> float:
-    """What the templates by which two hypotheses differ may be wrong by [nats]: what both hold does not count."""
+def unshared(best: Hypothesis, other: Hypothesis, singles: Sequence[Hypothesis]) -> float:
+    """λ [nats] of that in which two hypotheses differ: what both hold does not count."""
     shared = set(best.slugs) & set(other.slugs)
     alone = max((each.drop for each in singles if set(each.slugs) <= shared and each is not best), default=0.0)
-    return RIVAL * max(best.drop - alone, 0.0)
+    return max(best.drop - alone, 0.0)
 
 
 def probabilities_of(
-    hypotheses: list[Hypothesis], slack: float, price: Callable[[Hypothesis], float], tested: _Tested
+    hypotheses: list[Hypothesis],
+    best: Hypothesis,
+    singles: Sequence[Hypothesis],
+    price: Callable[[Hypothesis], float],
+    tested: _Tested,
+    structure: float,
 ) -> dict[str, float]:
-    """The probability that an effect is at work: evidences, pairs at their price, less what does not close, cooled by the
-    tolerance. Hypotheses exclude each other and no effect is twice in one, so no probability is beyond 1."""
-    priced = [each.evidence - price(each) - tested.excess(each) for each in hypotheses]
-    logs = np.array([0.0, *priced]) / (1.0 + 0.5 * slack)
-    weights = np.exp(logs - logsumexp(logs))
+    """The probability that an effect is at work: evidences against the best, pairs at their price, less what does not
+    close, cooled by the tolerance of what differs. Hypotheses, structure without a name and nothing at all exclude each
+    other and no effect is twice in one, so no probability is beyond 1."""
+
+    def value(each: Hypothesis) -> float:
+        return each.evidence - price(each) - tested.excess(each)
+
+    def cooled(lead: float, differing: float) -> float:
+        return lead / (1.0 + 0.5 * TOLERANCE * differing)
+
+    logs = [cooled(max(structure, 0.0) - value(best), best.drop)]
+    logs += [cooled(value(each) - value(best), unshared(best, each, singles)) for each in hypotheses]
+    weights = np.exp(np.array(logs) - logsumexp(logs))
     found: dict[str, float] = {}
     for weight, each in zip(weights[1:].tolist(), hypotheses, strict=True):
         for slug in each.slugs:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
+from models.diagnosis.bending import bends
 from models.diagnosis.contrasts import Contrasts, contrasts_of
 from models.diagnosis.design import Design
 from models.diagnosis.effect import unit_change
@@ -92,5 +93,6 @@ def amplitude_deviations(design: Design, noise: Noise, priors: Priors, fitted: F
     scale = 1 / np.sqrt(np.maximum(np.diag(corner), 1e-300))
     inverse = np.linalg.pinv(corner * scale[:, None] * scale, hermitian=True) * scale[:, None] * scale
     sizes = [1 + sum(shape.smooth for shape in each.effect.shapes) for each in fitted.effects]
-    places = gram.base - sum(sizes) + np.concatenate([[0], np.cumsum(sizes)])[: len(sizes)].astype(int)
+    bent = sum(bends(design, each.effect).shape[1] for each in fitted.effects)
+    places = gram.base - bent - sum(sizes) + np.concatenate([[0], np.cumsum(sizes)])[: len(sizes)].astype(int)
     return [float(np.sqrt(max(inverse[place, place], 0.0))) for place in places]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
 from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
 from models.diagnosis.viscosity import log_viscosity_ratio
@@ -45,6 +45,7 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=False,
+    bends=(Bend.SPEED, Bend.MOTION),
     tests={
         "viscous_exponent": "a sweep with the clutch open, which shows the drag alone",
         "interface_heating": "a sweep with the clutch open, where there is no frictional heat",

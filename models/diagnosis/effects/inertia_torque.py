@@ -34,6 +34,7 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=False,
+    bends=(),
     tests={
         "squeeze_film": "loops at 0.5 Hz, or the same swing with the clutch open: inertia stays",
         "channel_delay": "the same swing with the clutch open: inertia stays, a delay of no torque is nothing",

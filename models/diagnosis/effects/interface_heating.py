@@ -1,9 +1,10 @@
 """Friction heats the interface above the oil's temperature, and torque falls with the power density."""
 
 import numpy as np
+from scipy.linalg import solve_banded
 
 from models.arrays import FloatArray
-from models.diagnosis.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
 from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
 
@@ -35,16 +36,14 @@ def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
 def _along(heat: FloatArray, scene: Scene, settling: float) -> FloatArray:
     """Plateaus: the interface approaches each one's own warmth, from what the one before left; the mean of a plateau."""
     previous, clock = scene.points.previous, scene.points.clock
-    out, left = heat.copy(), heat.copy()  # a plateau's mean, and what it ends with
-    index = np.arange(previous.size)
-    depth = index - np.maximum.accumulate(np.where(previous < 0, index, 0))
-    order = np.argsort(depth, kind="stable")
-    for rows in np.split(order, np.flatnonzero(np.diff(depth[order])) + 1)[1:]:
-        before = previous[rows]
-        ratio = np.maximum(clock[rows] - clock[before], 1e-6) / settling
-        keep = np.exp(-ratio)
-        out[rows] = heat[rows] + (left[before] - heat[rows]) * (1 - keep) / ratio
-        left[rows] = heat[rows] + (left[before] - heat[rows]) * keep
+    follows = np.flatnonzero(previous >= 0)  # each follows the point just before it
+    ratio = np.maximum(clock[follows] - clock[previous[follows]], 1e-6) / settling
+    keep = np.zeros(previous.size)
+    keep[follows] = np.exp(-ratio)
+    bands = np.stack([np.ones(keep.size), np.append(-keep[1:], 0.0)])
+    left = solve_banded((1, 0), bands, (1.0 - keep) * heat)  # what each plateau ends with
+    out = heat.copy()
+    out[follows] += (left[previous[follows]] - heat[follows]) * (1.0 - keep[follows]) / ratio
     return out
 
 
@@ -86,6 +85,7 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=True,
+    bends=(Bend.SPEED, Bend.PRESSURE, Bend.MOTION),
     tests={
         "viscous_exponent": "the same sweep with falling instead of rising speed and with pauses: heat has a memory",
         "hydrodynamic_drag": "a sweep at 1 bar, where heat is small and drag is not",

@@ -3,7 +3,7 @@
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
 from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
 
@@ -52,6 +52,7 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=True,
+    bends=(Bend.SPEED, Bend.LIFE),
     tests={
         "accelerated_wear": "an oil sample, or the maintenance log; two more states tell a step from a growing loss",
         "load_severity": "the maintenance log, or an oil sample",

@@ -3,7 +3,7 @@
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
 from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
 from models.diagnosis.viscosity import log_viscosity_ratio
@@ -41,6 +41,7 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=True,
+    bends=(Bend.SPEED, Bend.PRESSURE, Bend.MOTION),
     tests={
         "torque_zero_shift": "one sweep at 60 °C oil temperature: a shifted zero does not follow it",
         "baseline": "one sweep at 60 °C and one at 95 °C oil temperature",

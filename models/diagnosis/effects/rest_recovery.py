@@ -3,7 +3,7 @@
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
 from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
 
@@ -54,5 +54,6 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=True,
+    bends=(Bend.SPEED, Bend.LIFE, Bend.CLOCK),
     tests={"baseline": "the same sweep twice right after a rest of a day: the second is back on its course"},
 )

@@ -3,7 +3,7 @@
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
 from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
 
@@ -45,6 +45,7 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=True,
+    bends=(Bend.SPEED, Bend.LIFE),
     tests={
         "oil_change": "no test can be made in a past life: of the next clutch, four tests in the first 1000 cycles",
         "load_severity": "of the next clutch, four tests in the first 1000 cycles at one load",

@@ -35,6 +35,7 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=False,
+    bends=(),
     tests={
         "stick_slip": "a raw record at two speeds: ripple follows the shaft, stick-slip keeps its frequency",
         "baseline": "a raw record of one sweep at 200 Hz or more",

@@ -3,7 +3,7 @@
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
 from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
 
@@ -46,12 +46,13 @@ EFFECT = Effect(
     scale=1.0,
     shapes=(
         ShapeParameter(name="power of pressure x", unit="-", lowest=-0.5, highest=1.5, smooth=True),
-        ShapeParameter(name="power of speed y", unit="-", lowest=0.15, highest=1.6, smooth=True),
-        ShapeParameter(name="least film f", unit="-", lowest=0.003, highest=0.5, smooth=True),
+        ShapeParameter(name="power of speed y", unit="-", lowest=0.4, highest=1.6, smooth=True),
+        ShapeParameter(name="least film f", unit="-", lowest=0.003, highest=0.2, smooth=True),
     ),
     grid=_grid,
     change=_change,
     before_lag=False,
+    bends=(Bend.SPEED, Bend.PRESSURE),
     tests={
         "inertia_torque": "loops at 0.5 Hz, or the same swing with the clutch open: a film's torque goes, inertia stays",
         "channel_delay": "loops at 0.5 Hz about several mean speeds",

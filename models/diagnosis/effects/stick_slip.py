@@ -34,6 +34,7 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=False,
+    bends=(),
     tests={
         "shaft_ripple": "a raw record at two speeds: stick-slip keeps its frequency, ripple follows the shaft",
         "baseline": "a raw record of one sweep at 200 Hz or more",

@@ -3,29 +3,32 @@
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
 from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
 
 #: Courses of the zero: one offset from a cycle on, along the test's clock (straight, or settling), along the life.
 STEP, CLOCK, SETTLING, LIFE = 0.0, 1.0, 2.0, 3.0
 _HOUR = 3600.0
+#: A zero that wanders along the life is off its straight course by so many amplitudes at knots between its ends.
+KNOTS, STRAIGHT = (0.0, 0.25, 0.5, 0.75, 1.0), (0.0, 0.0, 0.0)
 
 
 def _grid(facts: Facts) -> tuple[Tried, ...]:
     zeroed = facts.sensor_zeros
-    tried = [Tried(shape=(STEP, -1.0), log_weight=-1.0), Tried(shape=(CLOCK, 0.0))]
-    tried += [Tried(shape=(SETTLING, tau), log_weight=-0.7) for tau in (120.0, 400.0)]
+    tried = [Tried(shape=(STEP, -1.0, *STRAIGHT), log_weight=-1.0), Tried(shape=(CLOCK, 0.0, *STRAIGHT))]
+    tried += [Tried(shape=(SETTLING, tau, *STRAIGHT), log_weight=-0.7) for tau in (120.0, 400.0)]
     for low, onset, high in facts.onsets:
         logged = any(low <= cycles <= high for cycles in zeroed)
-        tried.append(Tried(shape=(STEP, onset), log_weight=0.0 if logged else -float(np.log(len(facts.onsets)))))
+        weight = 0.0 if logged else -float(np.log(len(facts.onsets)))
+        tried.append(Tried(shape=(STEP, onset, *STRAIGHT), log_weight=weight))
     if facts.states.size > 2:
-        tried += [Tried(shape=(LIFE, power), log_weight=-0.7) for power in (0.5, 1.0, 2.0)]
+        tried += [Tried(shape=(LIFE, power, *STRAIGHT), log_weight=-0.7) for power in (0.5, 1.0, 2.0)]
     return tuple(tried)
 
 
 def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
-    course, value = shape
+    course, value, *off = shape
     clock, cycles = scene.points.clock, scene.points.cycles
     if course == STEP:
         share = np.where(cycles > value, 1.0, 0.0)
@@ -34,7 +37,8 @@ def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     elif course == SETTLING:
         share = -np.expm1(-np.maximum(clock, 0.0) / value)
     else:
-        share = (np.maximum(cycles - scene.facts.states[0], 0.0) / scene.facts.life) ** value
+        life = np.maximum(cycles - scene.facts.states[0], 0.0) / scene.facts.life
+        share = life**value + np.interp(life, KNOTS, [0.0, *off, 0.0])
     return np.asarray(amplitude * scene.points.sign * share, dtype=np.float64)
 
 
@@ -56,10 +60,17 @@ EFFECT = Effect(
     shapes=(
         ShapeParameter(name="course", unit="-", lowest=0.0, highest=3.0),
         ShapeParameter(name="onset or settling time", unit="cycles or s", lowest=-1.0, highest=float("inf")),
+        *(
+            ShapeParameter(
+                name=f"off its course at {share:.0%} of life", unit="-", lowest=-2.0, highest=2.0, smooth=True
+            )
+            for share in KNOTS[1:-1]
+        ),
     ),
     grid=_grid,
     change=_change,
     before_lag=False,
+    bends=(Bend.LIFE, Bend.CLOCK),
     tests={
         "oil_temperature": "one sweep at 60 °C oil temperature, and an unloaded zero reading before and after it",
         "pressure_offset": "an unloaded zero reading before and after each test",

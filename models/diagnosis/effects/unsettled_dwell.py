@@ -3,7 +3,7 @@
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
 from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
 
@@ -50,6 +50,7 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=False,
+    bends=(Bend.SPEED, Bend.PRESSURE),
     tests={
         "baseline": "the raw record of one sweep, or the same sweep with plateaus of 15 s",
         "oil_temperature": "the same sweep with falling speed: what was not settled changes its sign",

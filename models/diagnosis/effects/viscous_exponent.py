@@ -3,7 +3,7 @@
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.effect import Effect, Family, Kind, Shape, Tried
+from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, Tried
 from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
 
@@ -37,6 +37,7 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=True,
+    bends=(Bend.SPEED, Bend.PRESSURE),
     tests={
         "hydrodynamic_drag": "a sweep with the clutch open, or at 1 bar: drag stays, the viscous term falls",
         "interface_heating": "the same sweep with pauses between plateaus: heat has a memory, an exponent has none",

@@ -11,6 +11,7 @@ from models.diagnosis.baseline import predict
 from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun
 from models.diagnosis.catalogue import BY_SLUG
 from models.diagnosis.design import build_design
+from models.diagnosis.effects.torque_zero_shift import STRAIGHT
 from models.diagnosis.fitting import Fit, Fitted, effect_rows
 from models.diagnosis.report import Advice
 from models.diagnosis.trials import TRIALS, with_trial
@@ -55,7 +56,7 @@ def squeeze(given: Study):
 
 def test_a_zero_is_parted_from_wear_by_going_on(warm):
     """A shifted zero stays as it is, wear grows."""
-    zero = of_size(warm, "torque_zero_shift", -0.6, (0.0, 8000.0))
+    zero = of_size(warm, "torque_zero_shift", -0.6, (0.0, 8000.0, *STRAIGHT))
     wear = of_size(warm, "accelerated_wear", 0.03, (6000.0, 1.0))
     found = advised(warm, zero, wear)
     assert found[0].key == "more_states"
@@ -104,13 +105,13 @@ def with_measured(given: Campaign, key: str, truth: Fit) -> Campaign:
 
 def test_without_oil_temperature_it_is_asked_for(warm):
     blind = study(campaign(23, loops=False, temperature=False))
-    zero = blind.extended(("torque_zero_shift", 0.3, (1.0, 0.0)))
+    zero = blind.extended(("torque_zero_shift", 0.3, (1.0, 0.0, *STRAIGHT)))
     first = advised(blind, zero)[0]
     assert (first.key, first.other) == ("sweep_60c", "oil_temperature")
     assert "oil temperature recorded" in first.test
     assert first.nats > WORTH
     # the control: where it was measured nobody asks for it
-    measured = warm.extended(("torque_zero_shift", 0.3, (1.0, 0.0)))
+    measured = warm.extended(("torque_zero_shift", 0.3, (1.0, 0.0, *STRAIGHT)))
     assert all(each.other != "oil_temperature" for each in advised(warm, measured))
 
 

@@ -8,6 +8,7 @@ from models.diagnosis.campaign import Oil
 from models.diagnosis.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.design import build_design
 from models.diagnosis.effect import Effect, Kind, unit_change
+from models.diagnosis.effects.torque_zero_shift import STRAIGHT
 from models.diagnosis.laws import Scene
 from models.diagnosis.starting import starting_laws
 from models.diagnosis.viscosity import viscosity
@@ -73,7 +74,7 @@ def test_units_of_a_few(scene: Scene) -> None:
     offset = BY_SLUG["pressure_offset"].change(scene, 1000.0, (0.0, 0.0))
     higher = scene.curve_at(pressure=scene.points.pressure + 1000.0) - scene.curve
     np.testing.assert_allclose(offset, higher, rtol=0.02, atol=1e-4)
-    zero = BY_SLUG["torque_zero_shift"].change(scene, 0.5, (0.0, 2000.0))
+    zero = BY_SLUG["torque_zero_shift"].change(scene, 0.5, (0.0, 2000.0, *STRAIGHT))
     assert set(np.unique(zero)) == {0.0, 0.5}
     assert (zero[scene.points.cycles > 2000.0] == 0.5).all()
 

@@ -9,6 +9,7 @@ import pytest
 from models.diagnosis.campaign import Campaign, DutyRun, StationaryRun
 from models.diagnosis.catalogue import BY_SLUG
 from models.diagnosis.design import MOST_PLATEAUS
+from models.diagnosis.effects.torque_zero_shift import STRAIGHT
 from models.diagnosis.extension import Extension, build_extension, facts_from, facts_to
 from models.diagnosis.fitting import Fit, Fitted
 from models.diagnosis.viscosity import log_viscosity_ratio
@@ -82,7 +83,7 @@ def test_turned_the_other_way_the_artefact_turns_as_well(warm):
     built = extension_of(warm, TEMPERATURE)
     assert np.allclose(built.artefact(back, warm.campaign), -built.artefact(run, warm.campaign))
     # a shifted zero does not turn with the clutch
-    zero = extension_of(warm, ("torque_zero_shift", 0.3, (0.0, ONSET)))
+    zero = extension_of(warm, ("torque_zero_shift", 0.3, (0.0, ONSET, *STRAIGHT)))
     assert np.allclose(zero.artefact(back, warm.campaign), 0.3)
     assert np.allclose(zero.artefact(run, warm.campaign), 0.3)
     assert np.allclose(zero.artefact(warm.campaign.stationary[1], warm.campaign), 0.0)
