@@ -1,6 +1,6 @@
 """Where the pressure of a record stands: the stretches at one level, without the ramps to and from it."""
 
-import itertools
+import bisect
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -42,10 +42,12 @@ def pressure_stretches(time: FloatArray, pressure: FloatArray) -> Iterator[Stret
     smooth = median_filter(pressure, size=min(5, pressure.size), mode="nearest")
     block = np.floor((time - time[0]) / max(_BLOCK, 5 * sample_interval(time))).astype(np.int64)
     edges = np.concatenate([[0], np.flatnonzero(np.diff(block)) + 1, [time.size]])
-    medians = np.array([np.median(smooth[a:b]) for a, b in itertools.pairwise(edges)])
+    medians = _block_medians(smooth, block, edges)
     first = 0
+    ordered: list[float] = []  # the medians [first, i), ascending
     for i in range(1, medians.size + 1):
-        level = float(np.median(medians[first:i]))
+        bisect.insort(ordered, float(medians[i - 1]))
+        level = 0.5 * (ordered[(i - first - 1) // 2] + ordered[(i - first) // 2])
         allowed = max(LEVEL_GAP, LEVEL_GAP_SHARE * abs(level))
         if i < medians.size and abs(medians[i] - level) <= allowed:
             continue
@@ -58,12 +60,19 @@ def pressure_stretches(time: FloatArray, pressure: FloatArray) -> Iterator[Stret
             start = int(lowest + before[-1] + 1) if before.size else int(lowest)
             stop = int(inside_stop + after[0]) if after.size else int(highest)
             if _ramps(medians[first:i], allowed):
-                first = i
+                first, ordered = i, []
                 continue
             start, stop = _standing(smooth, start, stop, allowed)
             if time[stop - 1] - time[start] >= _LEAST_BLOCKS * _BLOCK - _BLOCK:
                 yield Stretch(pressure=float(np.median(pressure[start:stop])), start=start, stop=stop)
-        first = i
+        first, ordered = i, []
+
+
+def _block_medians(values: FloatArray, block: NDArray[np.int64], edges: NDArray[np.int64]) -> FloatArray:
+    """The median of values [n] in each block [n], ascending, that starts at its edge."""
+    ordered = values[np.lexsort((values, block))]
+    first, count = edges[:-1], np.diff(edges)
+    return np.asarray(0.5 * (ordered[first + (count - 1) // 2] + ordered[first + count // 2]), dtype=np.float64)
 
 
 def _ramps(medians: FloatArray, gap: float) -> bool:

@@ -2,7 +2,7 @@
 
     change · (1 + Σ_k b_k φ_k),     b_k ~ N(0, BEND²)
 
-with φ_k cosines over the ranges of speed, pressure, life or the test's clock, or one that parts plateaus from loops: those
+with φ_k cosines over the ranges of speed, life or the test's clock, or one that parts plateaus from loops: those
 along which the effect's form is uncertain (`Effect.bends`). The b_k are integrated out wherever evidence is weighed or a
 case is closed: so a template is held to what it says up to a tolerance, and none wins because its form happens to be the
 more flexible one (after Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425).
@@ -25,7 +25,6 @@ def bends(design: Design, effect: Effect) -> FloatArray:
     rows = design.rows
     along = {
         Bend.SPEED: (rows.velocity, (1, 2)),
-        Bend.PRESSURE: (rows.pressure, (1,)),
         Bend.LIFE: (rows.cycles, (1,)),
         Bend.CLOCK: (rows.clock, (1,)),
         Bend.MOTION: (np.where(rows.steady, 1.0, 0.0), (1,)),

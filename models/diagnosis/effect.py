@@ -42,10 +42,10 @@ class Family(StrEnum):
 
 
 class Bend(StrEnum):
-    """Along what a template may be bent, for nobody knows its form that well; MOTION: in loops against plateaus."""
+    """Along what a template may be bent, for nobody knows its form that well; MOTION: in loops against plateaus. How an
+    effect goes with pressure is what tells it from others, and is not bent."""
 
     SPEED = "speed"
-    PRESSURE = "pressure"
     LIFE = "life"
     CLOCK = "clock"
     MOTION = "motion"

@@ -63,34 +63,44 @@ class Laws:
 
     def parameters(self, pressure: FloatArray, cycles: FloatArray) -> FloatArray:
         """M_s, M̄_c, V_S, C_v [n, 4] at pressure [n] Pa and cycles [n]. V_S is kept above nothing, the rest is as fitted."""
-        return self.with_gradient(pressure, cycles)[0]
+        return self._values(pressure, cycles, None)[0]
 
     def with_gradient(self, pressure: FloatArray, cycles: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Parameters [n, 4], their derivatives by θ's blocks [n, 4, BLOCK], and that of M̄_c by log p_0 [n]."""
-        values = np.empty((pressure.size, 4))
         slopes = np.empty((pressure.size, 4, BLOCK))
+        values, by_decay = self._values(pressure, cycles, slopes)
+        return values, slopes, by_decay
+
+    def _values(
+        self, pressure: FloatArray, cycles: FloatArray, slopes: FloatArray | None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Parameters [n, 4] and dM̄_c/dlog p_0 [n]; fills `slopes` [n, 4, BLOCK] where it is given."""
+        values = np.empty((pressure.size, 4))
+        by_decay = np.zeros(pressure.size)
         high = (pressure - self.frame.lowest) / self.frame.span
         states, of_state = np.unique(cycles, return_inverse=True)  # few: eq. 6 is worked out once for each
         fall, by_fall = falling_weight(high, self.frame.span, float(self.theta[LOG_DECAY]))
         for k in range(4):
             first, second, share_1, share_2, log_half, log_exponent = self.theta[k * BLOCK : (k + 1) * BLOCK].tolist()
             weight_1, weight_2 = (fall, 1.0 - fall) if k == RATIO else (1.0 - high, high)
-            done, by_half, by_exponent = (part[of_state] for part in _progress(states, log_half, log_exponent))
+            progress = _progress(states, log_half, log_exponent)
+            done = progress[0][of_state]
             lost = first * share_1 * weight_1 + second * share_2 * weight_2
             values[:, k] = first * weight_1 + second * weight_2 + lost * done
-            slopes[:, k, 0] = weight_1 * (1.0 + share_1 * done)
-            slopes[:, k, 1] = weight_2 * (1.0 + share_2 * done)
-            slopes[:, k, 2] = first * weight_1 * done
-            slopes[:, k, 3] = second * weight_2 * done
-            slopes[:, k, 4] = lost * by_half
-            slopes[:, k, 5] = lost * by_exponent
-        ends = self.theta[RATIO * BLOCK : RATIO * BLOCK + 4]
-        done = _progress(states, *self.theta[RATIO * BLOCK + 4 : RATIO * BLOCK + 6].tolist())[0][of_state]
-        by_decay = by_fall * (ends[0] * (1.0 + ends[2] * done) - ends[1] * (1.0 + ends[3] * done))
+            if k == RATIO:
+                by_decay = by_fall * (first * (1.0 + share_1 * done) - second * (1.0 + share_2 * done))
+            if slopes is not None:
+                slopes[:, k, 0] = weight_1 * (1.0 + share_1 * done)
+                slopes[:, k, 1] = weight_2 * (1.0 + share_2 * done)
+                slopes[:, k, 2] = first * weight_1 * done
+                slopes[:, k, 3] = second * weight_2 * done
+                slopes[:, k, 4] = lost * progress[1][of_state]
+                slopes[:, k, 5] = lost * progress[2][of_state]
         stuck = values[:, 2] < _LEAST_VELOCITY
         values[stuck, 2] = _LEAST_VELOCITY
-        slopes[stuck, 2] = 0.0
-        return values, slopes, by_decay
+        if slopes is not None:
+            slopes[stuck, 2] = 0.0
+        return values, by_decay
 
     def by_pressure(self, pressure: FloatArray, cycles: FloatArray) -> FloatArray:
         """d(M_s, M̄_c, V_S, C_v)/dp [n, 4] 1/Pa."""

@@ -1,9 +1,10 @@
 """From evidence to a verdict: what cannot be told from the best stands beside it, and the case is closed or not.
 
-Every template errs, so evidence saturates: with λ the drop of the best one's cost, candidates within CLOSE + RIVAL λ nats
-of it are not told from it. Two effects at once must gain PAIR_PRICE nats over the best alone, and TOLERANCE λ more where
-that one closes the case by itself. After the best is fitted, what is left must look like noise, and its amplitude must be
-one in all parts of the data, both up to TOLERANCE λ; else the structure is unexplained.
+Templates may be bent (`models.diagnosis.bending`), so evidence holds what they err by; with λ the drop of the best one's
+cost, candidates within CLOSE + RIVAL λ nats of it are not told from it. Two effects at once must gain PAIR_PRICE nats over
+the best alone, and TOLERANCE λ more where that one closes the case by itself. Structure without a name competes as well.
+After the best is fitted, what is left must look like noise, up to TOLERANCE λ, and its amplitude must be one in all parts
+of the data, up to PARTS_TOLERANCE λ; else the structure is unexplained.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,7 +28,7 @@ CLOSE, RIVAL = 2.5, 0.005
 TOLERANCE, PARTS_TOLERANCE = 0.05, 0.08
 #: Structure without a name may have so much more evidence, as a share of λ beyond CLEAR nats: below, no template's error
 #: shows.
-GENERIC, CLEAR = 0.1, 20.0
+GENERIC, CLEAR = 0.05, 20.0
 #: A cause is named where it has this many nats over nothing.
 OVER_NOTHING = 3.0
 #: Two effects at once must gain this much [nats].

@@ -17,7 +17,7 @@ WHOLE, VISCOUS = 0.0, 1.0
 def _grid(_facts: Facts) -> tuple[Tried, ...]:
     return tuple(
         Tried(shape=(float(np.log(settling)), part, saturation))
-        for settling in (0.3, 1.5, 6.0, 30.0, 120.0)
+        for settling in (0.03, 0.3, 1.5, 6.0, 30.0)
         for part in (WHOLE, VISCOUS)
         for saturation in (0.0, 1.5)
     )
@@ -78,14 +78,14 @@ EFFECT = Effect(
     positive=True,
     scale=100.0,
     shapes=(
-        ShapeParameter(name="log of the settling time τ", unit="ln s", lowest=-3.0, highest=6.0, smooth=True),
+        ShapeParameter(name="log of the settling time τ", unit="ln s", lowest=-5.0, highest=6.0, smooth=True),
         ShapeParameter(name="what weakens", unit="-", lowest=0.0, highest=1.0),
         ShapeParameter(name="saturation s", unit="-", lowest=0.0, highest=6.0),
     ),
     grid=_grid,
     change=_change,
     before_lag=True,
-    bends=(Bend.SPEED, Bend.PRESSURE, Bend.MOTION),
+    bends=(Bend.SPEED, Bend.MOTION),
     tests={
         "viscous_exponent": "the same sweep with falling instead of rising speed and with pauses: heat has a memory",
         "hydrodynamic_drag": "a sweep at 1 bar, where heat is small and drag is not",

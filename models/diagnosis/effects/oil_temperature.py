@@ -41,7 +41,7 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=True,
-    bends=(Bend.SPEED, Bend.PRESSURE, Bend.MOTION),
+    bends=(Bend.SPEED, Bend.MOTION),
     tests={
         "torque_zero_shift": "one sweep at 60 °C oil temperature: a shifted zero does not follow it",
         "baseline": "one sweep at 60 °C and one at 95 °C oil temperature",

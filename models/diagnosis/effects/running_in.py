@@ -15,13 +15,13 @@ def _grid(facts: Facts) -> tuple[Tried, ...]:
         return ()
     gap = max(float(np.diff(facts.states).min()), 1e-3 * facts.life)
     lengths = np.geomspace(gap / 3, facts.life / 6, 5)
-    return tuple(Tried(shape=(float(length), part)) for length in lengths for part in (STATIC, WHOLE))
+    return tuple(Tried(shape=(float(np.log(length)), part)) for length in lengths for part in (STATIC, WHOLE))
 
 
 def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
-    length, part = shape
+    log_length, part = shape
     carried = scene.curve if part == WHOLE else scene.gradient[:, 0] * scene.parameters[:, 0]
-    return np.asarray(amplitude * carried * np.exp(-scene.points.cycles / length), dtype=np.float64)
+    return np.asarray(amplitude * carried * np.exp(-scene.points.cycles / np.exp(log_length)), dtype=np.float64)
 
 
 EFFECT = Effect(
@@ -39,7 +39,7 @@ EFFECT = Effect(
     positive=False,
     scale=100.0,
     shapes=(
-        ShapeParameter(name="length ζ_r", unit="cycles", lowest=1.0, highest=float("inf")),
+        ShapeParameter(name="log of the length ζ_r", unit="ln cycles", lowest=2.0, highest=12.0, smooth=True),
         ShapeParameter(name="what is changed", unit="-", lowest=0.0, highest=1.0),
     ),
     grid=_grid,

@@ -16,7 +16,7 @@ def _grid(_facts: Facts) -> tuple[Tried, ...]:
         Tried(shape=(power, thin, least))
         for power in (0.0, 0.6)
         for thin in (0.6, 1.0, 1.5)
-        for least in (0.02, 0.06, 0.2)
+        for least in (0.02, 0.06, 0.15)
     )
 
 
@@ -46,13 +46,13 @@ EFFECT = Effect(
     scale=1.0,
     shapes=(
         ShapeParameter(name="power of pressure x", unit="-", lowest=-0.5, highest=1.5, smooth=True),
-        ShapeParameter(name="power of speed y", unit="-", lowest=0.4, highest=1.6, smooth=True),
-        ShapeParameter(name="least film f", unit="-", lowest=0.003, highest=0.2, smooth=True),
+        ShapeParameter(name="power of speed y", unit="-", lowest=0.6, highest=1.6, smooth=True),
+        ShapeParameter(name="least film f", unit="-", lowest=0.003, highest=0.15, smooth=True),
     ),
     grid=_grid,
     change=_change,
     before_lag=False,
-    bends=(Bend.SPEED, Bend.PRESSURE),
+    bends=(Bend.SPEED,),
     tests={
         "inertia_torque": "loops at 0.5 Hz, or the same swing with the clutch open: a film's torque goes, inertia stays",
         "channel_delay": "loops at 0.5 Hz about several mean speeds",

@@ -11,7 +11,7 @@ from models.diagnosis.laws import Scene
 STEP, CLOCK, SETTLING, LIFE = 0.0, 1.0, 2.0, 3.0
 _HOUR = 3600.0
 #: A zero that wanders along the life is off its straight course by so many amplitudes at knots between its ends.
-KNOTS, STRAIGHT = (0.0, 0.25, 0.5, 0.75, 1.0), (0.0, 0.0, 0.0)
+KNOTS, STRAIGHT = (0.0, 1 / 3, 2 / 3, 1.0), (0.0, 0.0)
 
 
 def _grid(facts: Facts) -> tuple[Tried, ...]:
@@ -62,7 +62,7 @@ EFFECT = Effect(
         ShapeParameter(name="onset or settling time", unit="cycles or s", lowest=-1.0, highest=float("inf")),
         *(
             ShapeParameter(
-                name=f"off its course at {share:.0%} of life", unit="-", lowest=-2.0, highest=2.0, smooth=True
+                name=f"off its course at {share:.0%} of life", unit="-", lowest=-0.8, highest=0.8, smooth=True
             )
             for share in KNOTS[1:-1]
         ),

@@ -50,7 +50,7 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=False,
-    bends=(Bend.SPEED, Bend.PRESSURE),
+    bends=(Bend.SPEED,),
     tests={
         "baseline": "the raw record of one sweep, or the same sweep with plateaus of 15 s",
         "oil_temperature": "the same sweep with falling speed: what was not settled changes its sign",

@@ -37,7 +37,7 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=True,
-    bends=(Bend.SPEED, Bend.PRESSURE),
+    bends=(Bend.SPEED,),
     tests={
         "hydrodynamic_drag": "a sweep with the clutch open, or at 1 bar: drag stays, the viscous term falls",
         "interface_heating": "the same sweep with pauses between plateaus: heat has a memory, an exponent has none",

@@ -20,7 +20,7 @@ def friction(speed: FloatArray, pressure: FloatArray) -> FloatArray:
 
 def noise(rng: np.random.Generator, size: int, memory: float = 0.8, deviation: float = 0.2) -> FloatArray:
     innovations = rng.standard_normal(size)
-    return deviation * lfilter([np.sqrt(1 - memory**2)], [1, -memory], innovations)
+    return np.asarray(deviation * lfilter([np.sqrt(1 - memory**2)], [1, -memory], innovations), dtype=np.float64)
 
 
 def stepped(rng: np.random.Generator, *, settling: float = 0.1, memory: float = 0.8) -> Record:
@@ -44,6 +44,50 @@ def swinging(rng: np.random.Generator, memory: float = 0.8) -> Record:
     return Record(
         time=time, pressure=pressure, speed=speed, torque=friction(speed, pressure) + noise(rng, time.size, memory)
     )
+
+
+def loops(
+    rng: np.random.Generator,
+    *,
+    rate: float = 100.0,
+    memory: float = 0.4,
+    deviation: float = 0.15,
+    count: float = 0.01,
+    pointed: bool = False,
+) -> Record:
+    """A dynamic test of 0.1 Hz at seven pressures, 15 s each and 3 s between; speed swings as a sine or is pointed."""
+    size = int(15 * rate)
+    swing = np.cos(2 * np.pi * 0.1 * np.arange(size) / rate)
+    speed = np.tile((1000 - 1000 * (2 / np.pi * np.arcsin(swing) if pointed else swing)) * RPM, 7)
+    pressure = np.repeat(np.linspace(4e5, 7e5, 7), size)
+    time = np.arange(speed.size) / rate + 3.0 * (np.arange(speed.size) // size)
+    torque = friction(speed, pressure) + noise(rng, time.size, memory, deviation)
+    return Record(time=time, pressure=pressure, speed=speed, torque=np.round(torque / count) * count)
+
+
+def with_bursts(record: Record, rng: np.random.Generator, amplitude: float, hertz: float, below: float) -> Record:
+    """A skewed wave at speeds below `below` rad/s, its phase anew in every passage."""
+    slow = (record.speed < below).astype(int)
+    passage = np.cumsum(np.diff(slow, prepend=0) > 0)
+    phase = 2 * np.pi * (hertz * record.time + rng.random(passage.max() + 1)[passage])
+    return _added(record, amplitude * slow * np.sin(phase + 0.4 * np.sin(phase)))
+
+
+def with_wandering_ripple(record: Record, rng: np.random.Generator, amplitude: float, order: float) -> Record:
+    """A ripple whose phase is anew in every loop and wanders by about a radian in one, its size with the torque."""
+    step = float(np.median(np.diff(record.time)))
+    loop = np.cumsum(np.diff(record.time, prepend=record.time[0]) > 1.0)
+    wander = np.cumsum(rng.standard_normal(record.time.size)) * np.sqrt(step / 15)
+    turn = order * np.cumsum(record.speed) * step + wander + 2 * np.pi * rng.random(loop.max() + 1)[loop]
+    return _added(record, amplitude * record.torque / record.torque.mean() * np.sin(turn))
+
+
+def ragged(record: Record, rng: np.random.Generator, jitter: float, lost: float) -> Record:
+    """Samples a share of the interval off their time, and a share of them lost."""
+    step = float(np.median(np.diff(record.time)))
+    kept = rng.random(record.time.size) >= lost
+    time = record.time + jitter * step * rng.standard_normal(record.time.size)
+    return Record(time=time[kept], pressure=record.pressure[kept], speed=record.speed[kept], torque=record.torque[kept])
 
 
 def with_ripple(record: Record, amplitude: float, order: float) -> Record:

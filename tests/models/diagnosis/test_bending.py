@@ -33,9 +33,9 @@ def test_bends_stay_within_one_and_stand_apart(given, effect):
 
 
 def test_an_exact_law_is_not_bent(given):
-    """J dω/dt has no form to be uncertain of, a drag does not care for pressure whoever doubts it."""
+    """J dω/dt has no form to be uncertain of; a zero adds the same torque at every speed, a drag does not."""
     assert bends(given.design, BY_SLUG["inertia_torque"]).shape[1] == 0
-    assert Bend.PRESSURE not in BY_SLUG["hydrodynamic_drag"].bends
+    assert Bend.SPEED not in BY_SLUG["torque_zero_shift"].bends
     assert Bend.SPEED in BY_SLUG["hydrodynamic_drag"].bends
 
 

@@ -140,7 +140,7 @@ def test_a_course_begins_at_its_onset_and_is_the_effects_mean(warm):
 
 def test_a_course_ends_friction_at_most_and_does_not_turn_it(warm):
     """An effect of one and a half times the curve itself, at the beginning of a life."""
-    beyond = ("running_in", -1.5, (1e4, 1.0))
+    beyond = ("running_in", -1.5, (float(np.log(1e4)), 1.0))
     found = extension_of(warm, beyond).course(np.zeros(1), PRESSURE, VELOCITY)[0]
     table = warm.baseline.fit.laws.parameters(np.repeat(PRESSURE, VELOCITY.size), np.zeros(2 * VELOCITY.size))
     m_s, ratio, v_s, c_v = table.T
@@ -148,7 +148,7 @@ def test_a_course_ends_friction_at_most_and_does_not_turn_it(warm):
     curve = m_s * (1 + (ratio - 1) * np.exp(-v_s / v)) + c_v * v**0.3
     assert np.allclose(found, -curve.reshape(PRESSURE.size, -1).mean(axis=1))
     # the control: half of it is half of it
-    half = extension_of(warm, ("running_in", -0.5, (1e4, 1.0))).course(np.zeros(1), PRESSURE, VELOCITY)[0]
+    half = extension_of(warm, ("running_in", -0.5, (float(np.log(1e4)), 1.0))).course(np.zeros(1), PRESSURE, VELOCITY)[0]
     assert np.allclose(half, 0.5 * found)
 
 
