@@ -22,7 +22,7 @@ from models.diagnosis.viewing import View, view_of
 from models.diagnosis.whitening import Noise
 
 #: Candidates this close [nats] to the best are not told from it, and this share of λ more.
-CLOSE, RIVAL = 2.5, 0.005
+CLOSE, RIVAL = 4.0, 0.005
 #: What a template may leave behind, as a share of λ; and what its amplitude may be worth more in parts of the data: parts
 #: that differ by δ cost about δ² λ/4.
 TOLERANCE, PARTS_TOLERANCE = 0.05, 0.08
