@@ -3,7 +3,7 @@
 The correlation ρ is estimated over all dwells of a record together, where it is known well, up to 2.5 times its own
 integrated time (Sokal's window) and free of the bias that removing a mean and a trend from each dwell has. A dwell may
 have another one: its batch means say so, and are followed as far as dwells differ by more than batch means scatter
-(Smyth's moderation of variances).
+(Smyth's moderation of variances). Where ρ has not faded within the dwells its tail is that of `models.slow_noise`.
 """
 
 from collections.abc import Sequence
@@ -13,6 +13,7 @@ import numpy as np
 from scipy.special import digamma, polygamma
 
 from models.arrays import FloatArray
+from models.slow_noise import slow_correlation
 
 #: The window of the sum, in integrated correlation times 1 + 2 Σ ρ.
 SOKAL = 2.5
@@ -38,7 +39,8 @@ class Stretch:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Correlation:
-    """ρ at lags 1, 2, ... [m]; resolved is false where it had not faded at the longest lag that dwells can show."""
+    """ρ at lags 1, 2, ... [m]; resolved is false where it had not faded at the longest lag that dwells can show: then it is
+    that of `models.slow_noise`."""
 
     lags: FloatArray
     resolved: bool = True
@@ -74,15 +76,16 @@ def pooled_correlation(residuals: Sequence[FloatArray], removed: int) -> Correla
     enough = lag >= SOKAL * times
     window = int(enough.argmax()) if enough.any() else longest
     lags = (covariance[1 : window + 1] + lost[window]) / (covariance[0] + lost[window])
-    faded = bool(enough.any()) or bool(np.abs(lags[-1]) < FADED)
-    return Correlation(lags=lags, resolved=faded)
+    if enough.any() or abs(float(lags[-1])) < FADED:
+        return Correlation(lags=lags)
+    return Correlation(lags=slow_correlation(residuals), resolved=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeanDeviations:
     """One row a dwell: of its mean [n] Nm, its drift [n] Nm/s, the drift's deviation [n] Nm/s, of an average [n] Nm.
 
-    resolved is false where noise remembers for longer than the dwells can show: deviations are then too small.
+    resolved is false where noise remembers for longer than a dwell can show: its memory is then a model's.
     """
 
     mean: FloatArray
@@ -105,6 +108,9 @@ def deviations(stretches: Sequence[Stretch]) -> MeanDeviations:
     correlation = pooled_correlation(residuals, removed=2)
     rows = [_moments(one, correlation) for one in residuals]
     variance, factor, ratio, freedom = np.array(rows).T
+    if not correlation.resolved and variance.any():  # a dwell of few independent values hardly tells its own variance
+        independent = np.maximum(np.array([one.size for one in residuals]) / factor - 2, 1.0)
+        variance = variance.mean() * _moderated(variance / variance.mean(), independent)
     long_run = variance * factor * _moderated(ratio, freedom)
     count = np.array([one.size for one in residuals])
     return MeanDeviations(

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.cleaning import SCALE_SAMPLES, Note, clean
+from models.cleaning import SCALE_SAMPLES, Note, Sampled, cleaning
 from models.mean_deviation import Stretch, deviations
-from models.runs import Plateaus, Record
+from models.runs import Plateaus
 from models.settling import SETTLING, Transients, dropped, fit_transients, mean_decay
 from models.steps import Blocks, Dwell, average, find_dwells, listed
 
@@ -24,7 +24,8 @@ DRIFTING = 4.0
 LEAST_SHARE = 1e-9
 SLOW_NOISE = (
     "slow_noise",
-    "The noise of torque remembers for longer than these dwells can show: deviations of means may be too small.",
+    "The noise of torque remembers for longer than a dwell can show: deviations of means rest on a white and a slow part "
+    "of it, estimated from all dwells together.",
 )
 
 
@@ -54,15 +55,15 @@ class PlateauCut:
     notes: tuple[Note, ...]
 
 
-def cut_plateaus(record: Record) -> PlateauCut:
+def cut_plateaus(record: Sampled) -> PlateauCut:
     """The steady plateaus of a record of 10 to 2,000 Hz.
 
     Steps of speed and pressure may come in any order and direction; samples may be missing, their times jitter, single
     samples spike, signals be quantised. Raises ValueError on fewer than 16 samples, a clock that does not advance or
     falls back, and a record without any steady dwell under pressure and in motion.
     """
-    cleaned, period, notes = clean(record)
-    blocks = average(cleaned, period)
+    kept = cleaning(record)
+    blocks = average(record, kept)
     dwells, left_out = find_dwells(blocks)
     if not dwells:
         reasons = " ".join(sentence for _, sentence in left_out)
@@ -78,9 +79,11 @@ def cut_plateaus(record: Record) -> PlateauCut:
     )
     noise = np.sqrt(_mean(blocks.scatter, used) + told.average**2)
     shift = np.nan_to_num(_shift(transients, drop, duration))
-    half = 0.5 * (blocks.duration - period)
+    half = 0.5 * (blocks.duration - kept.period)
     cut = PlateauCut(
-        plateaus=_plateaus(blocks, used, np.sqrt(told.mean**2 + _rounding(cleaned.torque, noise) ** 2 + shift**2)),
+        plateaus=_plateaus(
+            blocks, used, np.sqrt(told.mean**2 + _rounding(kept.of(record.torque), noise) ** 2 + shift**2)
+        ),
         count=np.array([(one.stop - one.start) * blocks.size for one in used]),
         drift=told.drift,
         drift_sd=told.drift_sd,
@@ -90,7 +93,7 @@ def cut_plateaus(record: Record) -> PlateauCut:
         noise=noise,
         start=np.array([blocks.time[one.start] for one in used]) - half,
         stop=np.array([blocks.time[one.stop - 1] for one in used]) + half,
-        notes=(*notes, *left_out),
+        notes=(*kept.notes, *left_out),
     )
     slow = () if told.resolved else (SLOW_NOISE,)
     return replace(cut, notes=(*cut.notes, *_notes(cut, drop), *slow))

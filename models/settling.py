@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.mean_deviation import Stretch, pooled_correlation
@@ -31,6 +32,8 @@ POOLED_GAIN, OWN_GAIN = 5.0, 25.0
 GAIN_CAP = 1e3
 #: What a discarded transient may leave in the mean, in deviations of the mean; least and most of a dwell that is dropped.
 LEFT, LEAST_DROPPED, MOST_DROPPED = 0.1, 0.05, 0.75
+#: So many sets of times are remembered.
+KNOWN_TIMES = 4
 #: Deviations of amplitude and of the time constant that are reckoned with.
 LATE = 2.0
 
@@ -59,7 +62,8 @@ def fit_transients(stretches: Sequence[Stretch], shortest: float) -> Transients:
     """The exponential approach of every dwell. `shortest` [s] is a block."""
     longest = max(float(one.time[-1]) for one in stretches)
     taus = np.geomspace(shortest, max(min(LONGEST_SHARE * longest, LONGEST), 4 * shortest), SCANNED)
-    scans = [_scan(one, taus) for one in stretches]
+    basis = _Bases(taus)
+    scans = [_scan(one, basis.of(one.time)) for one in stretches]
     correlation = pooled_correlation([scan.residual for scan in scans], removed=3)
     long_run = np.array([[scan.variance * correlation.factor(scan.residual.size)] for scan in scans])
     gain = np.stack([scan.gain for scan in scans]) / long_run
@@ -83,16 +87,41 @@ def _decays(time: FloatArray, taus: FloatArray) -> tuple[FloatArray, FloatArray]
     return decay, trend
 
 
-def _scan(stretch: Stretch, taus: FloatArray) -> _Scan:
-    decay, trend = _decays(stretch.time, taus)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Basis:
+    decay: FloatArray  # [J, m] as `_decays` has it
+    trend: FloatArray  # [m]
+    square: FloatArray  # [J] of the decays
+    drifts: NDArray[np.bool_]  # [J] whether torque may drift beside a transient so fast
+
+
+class _Bases:
+    """The transients tried over the times of a dwell: one clock gives most dwells the same times, to the microsecond."""
+
+    def __init__(self, taus: FloatArray) -> None:
+        self._taus = taus
+        self._known: dict[bytes, _Basis] = {}
+
+    def of(self, time: FloatArray) -> _Basis:
+        key = np.round(time, 6).tobytes()
+        if key not in self._known:
+            decay, trend = _decays(time, self._taus)
+            square = np.maximum(np.einsum("jk,jk->j", decay, decay), 1e-12)
+            if len(self._known) == KNOWN_TIMES:
+                self._known.clear()
+            drifts = self._taus < DRIFT_SHARE * time[-1]
+            self._known[key] = _Basis(decay=decay, trend=trend, square=square, drifts=drifts)
+        return self._known[key]
+
+
+def _scan(stretch: Stretch, basis: _Basis) -> _Scan:
     off = stretch.torque - stretch.torque.mean()
-    along = decay @ off
-    square = np.maximum(np.einsum("jk,jk->j", decay, decay), 1e-12)
-    gain = along**2 / square
-    drift = np.where(taus < DRIFT_SHARE * stretch.time[-1], float(trend @ off), 0.0)
+    along = basis.decay @ off
+    gain = along**2 / basis.square
+    drift = np.where(basis.drifts, float(basis.trend @ off), 0.0)
     total = gain + drift**2
     best = int(total.argmax())
-    residual = off - along[best] / square[best] * decay[best] - drift[best] * trend
+    residual = off - along[best] / basis.square[best] * basis.decay[best] - drift[best] * basis.trend
     floor = (1e-9 * max(float(np.abs(stretch.torque).max()), 1e-9)) ** 2
     variance = max(float(residual @ residual) / max(residual.size - 3, 1), floor)
     return _Scan(gain=gain, total=total, residual=residual, variance=variance)

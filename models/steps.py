@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.cleaning import Note
-from models.runs import Record
+from models.cleaning import Cleaning, Note, Sampled
 
 #: A block [s].
 BLOCK = 0.01
@@ -59,29 +58,37 @@ class Dwell:
     stop: int
 
 
-def average(record: Record, period: float) -> Blocks:
-    """Means over blocks of some 10 ms of a record in order; a remainder at its end is left out."""
+def average(record: Sampled, cleaning: Cleaning) -> Blocks:
+    """Means over blocks of some 10 ms of what is kept of a record; a remainder at its end is left out."""
+    period = cleaning.period
     size = max(1, round(BLOCK / period))
-    count = record.time.size // size
+    time = cleaning.of(record.time)
+    count = time.size // size
     share = np.full(size, 1.0 / size)
 
-    def mean(channel: FloatArray) -> FloatArray:
-        return np.asarray(channel[: count * size].reshape(count, size) @ share, dtype=np.float64)
+    def blocks_of(channel: FloatArray) -> FloatArray:
+        return cleaning.of(channel)[: count * size].reshape(count, size)
 
-    torque = mean(record.torque)
-    off = record.torque[: count * size].reshape(count, size) - torque[:, np.newaxis]
-    late = np.flatnonzero(np.diff(record.time) > max(GAP, GAP_BLOCKS * size * period)) + 1
+    def mean(channel: FloatArray) -> FloatArray:
+        return np.asarray(blocks_of(channel) @ share, dtype=np.float64)
+
+    def scatter(channel: FloatArray) -> FloatArray:
+        off = blocks_of(channel) - mean(channel)[:, np.newaxis]
+        return np.asarray(np.einsum("ij,ij->i", off, off) / size, dtype=np.float64)
+
+    late = np.flatnonzero(np.diff(time) > max(GAP, GAP_BLOCKS * size * period)) + 1
     gap: NDArray[np.bool_] = np.zeros(count, dtype=np.bool_)
     gap[np.minimum(late // size, count - 1)] = True
+    oil = record.oil_temperature
     return Blocks(
         size=size,
         duration=size * period,
-        time=mean(record.time),
+        time=np.asarray(time[: count * size].reshape(count, size) @ share, dtype=np.float64),
         pressure=mean(record.pressure),
         speed=mean(record.speed),
-        torque=torque,
-        scatter=np.einsum("ij,ij->i", off, off) / size,
-        oil_temperature=None if record.oil_temperature is None else mean(record.oil_temperature),
+        torque=mean(record.torque),
+        scatter=scatter(record.torque),
+        oil_temperature=None if oil is None else mean(oil),
         gap=gap,
     )
 
@@ -114,6 +121,7 @@ class _Channel:
         self.steady: NDArray[np.bool_] = np.ones(values.size, dtype=np.bool_)
         self.threshold = RESOLUTION * self.highest
         self.window = window
+        self._levels: dict[tuple[int, int], tuple[float, float]] = {}
 
     def judge(self, active: NDArray[np.bool_]) -> None:
         """Steady where the windows after and before agree; the ends of the record are as what lies next to them."""
@@ -128,9 +136,11 @@ class _Channel:
         self.steady = apart <= self.threshold
 
     def level(self, core: tuple[int, int]) -> tuple[float, float]:
-        """The level of a core and how far a block may lie off it."""
-        part = self.values[slice(*core)]
-        return float(np.median(part)), max(LEAVE * float(part.std()), self.threshold)
+        """The level of a core and how far a block may lie off it, once it has been judged what is steady."""
+        if core not in self._levels:
+            part = self.values[slice(*core)]
+            self._levels[core] = float(np.median(part)), max(LEAVE * float(part.std()), self.threshold)
+        return self._levels[core]
 
 
 def _merged(cores: list[tuple[int, int]], blocks: Blocks, channels: tuple[_Channel, ...]) -> list[tuple[int, int]]:

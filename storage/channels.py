@@ -1,7 +1,7 @@
 """The raw channels of a run, as they were sent: kept for ever and bit for bit, written once, never changed."""
 
-from collections.abc import Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import sqlalchemy as sa
@@ -9,12 +9,9 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection, bindparam, select
 
 from storage.codec import CODEC, decode, encode
+from storage.decimal_codec import DECIMAL_CODEC, decode_decimals, encode_decimals
 from storage.errors import DamagedData
 from storage.tables import channel, run
-
-#: From so many values on, columns are encoded two at a time: deflating lets other threads run, and each takes memory.
-_LONG = 1 << 17
-_THREADS = 2
 
 _insert = sa.insert(channel)
 _of_run = (
@@ -29,35 +26,33 @@ _samples = (
 )
 
 
-def write(connection: Connection, run_key: int, channels: Mapping[str, NDArray[np.float64]]) -> None:
-    """Store the channels [n] of a run, order kept. Raises IntegrityError where the run has them already."""
-    for several in _encoded(channels):
-        rows = [
-            {
-                "run_key": run_key,
-                "name": name,
-                "position": position,
-                "codec": CODEC,
-                "length": channels[name].size,
-                "data": data,
-            }
-            for position, name, data in several
-        ]
+@dataclass(frozen=True, slots=True)
+class Encoded:
+    """The channels of one run as they are stored, order kept: name, codec, length and bytes of each."""
+
+    columns: tuple[tuple[str, str, int, bytearray], ...]
+
+
+def encoded(channels: Mapping[str, NDArray[np.float64]]) -> Encoded:
+    """The channels [n] of a run encoded. It takes time where they are long, and needs no connection."""
+    return Encoded(tuple((name, *_encoded(column)) for name, column in channels.items()))
+
+
+def _encoded(column: NDArray[np.float64]) -> tuple[str, int, bytearray]:
+    decimals = encode_decimals(column)
+    if decimals is not None:
+        return DECIMAL_CODEC, column.size, decimals
+    return CODEC, column.size, encode(column)
+
+
+def write(connection: Connection, run_key: int, channels: Encoded) -> None:
+    """Store the channels of a run. Raises IntegrityError where the run has them already."""
+    rows = [
+        {"run_key": run_key, "name": name, "position": position, "codec": codec, "length": length, "data": data}
+        for position, (name, codec, length, data) in enumerate(channels.columns)
+    ]
+    if rows:
         connection.execute(_insert, rows)
-
-
-def _encoded(channels: Mapping[str, NDArray[np.float64]]) -> Iterator[list[tuple[int, str, bytes]]]:
-    """Position, name and bytes of the channels: long ones two at a time, short ones all at once."""
-    named = list(enumerate(channels))
-    if sum(column.size for column in channels.values()) < _LONG:
-        if named:
-            yield [(position, name, encode(channels[name])) for position, name in named]
-        return
-    with ThreadPoolExecutor(_THREADS) as pool:
-        for first in range(0, len(named), _THREADS):
-            some = named[first : first + _THREADS]
-            found = pool.map(encode, [channels[name] for _, name in some])
-            yield [(position, name, data) for (position, name), data in zip(some, found, strict=True)]
 
 
 def read(connection: Connection, run_key: int) -> dict[str, NDArray[np.float64]]:
@@ -65,7 +60,7 @@ def read(connection: Connection, run_key: int) -> dict[str, NDArray[np.float64]]
     channels = {}
     for name, codec, length, data in connection.execute(_of_run, {"of_run": run_key}):
         try:
-            channels[name] = decode(data, codec, length)
+            channels[name] = decode_decimals(data, length) if codec == DECIMAL_CODEC else decode(data, codec, length)
         except DamagedData as error:
             raise DamagedData(f"channel {name} of run {run_key}: {error}") from error
     return channels

@@ -17,7 +17,7 @@ A plane as long as the column is stored plain, a shorter one is deflated.
 import json
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import prod
 
 import numpy as np
@@ -30,35 +30,34 @@ CODEC = "shuffle-zlib"
 _PLANES = 8
 _PLANE_SIZES = struct.Struct("<8I")
 _NUMBER = struct.Struct("<I")
-#: A longer plane is deflated only where its middle 16 KiB shrink below 95 %.
+#: A longer plane is deflated only where its middle 16 KiB shrink below 80 %: less is not worth its time.
 _PROBE = 1 << 14
-_WORTH_IT = 0.95
+_WORTH_IT = 0.8
 #: Runs of equal bytes alone are looked for where that makes the probe no longer than by this.
 _NO_LONGER = 1.02
 
 
-def encode(column: NDArray[np.float64]) -> bytes:
+def encode(column: NDArray[np.float64]) -> bytearray:
     """The column [n] as bytes, to be read back by `decode`. Raises ValueError unless it is one row of 64-bit floats."""
     if column.dtype != np.float64 or column.ndim != 1:
         raise ValueError(f"a column must be one row of float64, got {column.dtype} of shape {column.shape}")
     shuffled = _little_endian(column).view(np.uint8).reshape(-1, _PLANES).T
-    planes = [_deflate(np.ascontiguousarray(plane).data) for plane in shuffled]
-    return _sealed(_PLANE_SIZES.pack(*map(len, planes)), *planes)
+    body = _NUMBER.size + _PLANE_SIZES.size
+    data = bytearray(body)
+    _PLANE_SIZES.pack_into(data, _NUMBER.size, *append_planes(data, shuffled))
+    seal(data)
+    return data
 
 
-def decode(data: bytes, codec: str, length: int) -> NDArray[np.float64]:
+def decode(data: bytes | bytearray, codec: str, length: int) -> NDArray[np.float64]:
     """The column [length] that `encode` was given. Raises DamagedData where the bytes are not what was stored."""
     if codec != CODEC:
         raise DamagedData(f"a column is stored with the codec {codec!r}, this release knows {CODEC!r}")
-    body = _unsealed(data, at_least=_PLANE_SIZES.size)
+    body = unsealed(data, at_least=_PLANE_SIZES.size)
     sizes = _PLANE_SIZES.unpack_from(body)
     if sum(sizes) + _PLANE_SIZES.size != len(body) or max(sizes) > length:
         raise DamagedData(f"a column of {length} values is stored in planes of {sizes} bytes, {len(body)} bytes in all")
-    shuffled = np.empty((_PLANES, length), dtype=np.uint8)
-    start = _PLANE_SIZES.size
-    for row, size in zip(shuffled, sizes, strict=True):
-        row[:] = _inflate(body[start : start + size], length)
-        start += size
+    shuffled = read_planes(body[_PLANE_SIZES.size :], sizes, length)
     return np.ascontiguousarray(shuffled.T).view("<f8").reshape(length).astype(np.float64, copy=False)
 
 
@@ -73,7 +72,7 @@ def pack(arrays: Mapping[str, NDArray[np.float64]]) -> bytes:
 
 def unpack(data: bytes) -> dict[str, NDArray[np.float64]]:
     """The arrays that `pack` was given. Raises DamagedData where the bytes are not what was stored."""
-    body = _unsealed(data, at_least=_NUMBER.size)
+    body = unsealed(data, at_least=_NUMBER.size)
     start = _NUMBER.size + _NUMBER.unpack_from(body)[0]
     try:
         index = json.loads(bytes(body[_NUMBER.size : start]))
@@ -91,6 +90,31 @@ def unpack(data: bytes) -> dict[str, NDArray[np.float64]]:
 
 def _little_endian(array: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.ascontiguousarray(array, dtype="<f8")
+
+
+def append_planes(data: bytearray, planes: NDArray[np.uint8]) -> list[int]:
+    """Put planes [k, n] behind `data`, deflated where that is worth it; the bytes that each one takes."""
+    sizes = []
+    for plane in planes:
+        before = len(data)
+        data += _deflate(np.ascontiguousarray(plane).data)
+        sizes.append(len(data) - before)
+    return sizes
+
+
+def read_planes(body: memoryview, sizes: Sequence[int], length: int) -> NDArray[np.uint8]:
+    """The planes [k, length] that `append_planes` put there, of those sizes. Raises DamagedData."""
+    planes = np.empty((len(sizes), length), dtype=np.uint8)
+    start = 0
+    for row, size in zip(planes, sizes, strict=True):
+        row[:] = _inflate(body[start : start + size], length)
+        start += size
+    return planes
+
+
+def seal(data: bytearray) -> None:
+    """Put the check of what follows into the first four bytes."""
+    _NUMBER.pack_into(data, 0, zlib.crc32(memoryview(data)[_NUMBER.size :]))
 
 
 def _deflate(plane: memoryview) -> bytes | memoryview:
@@ -124,14 +148,15 @@ def _inflate(stored: memoryview, length: int) -> NDArray[np.uint8]:
     return np.frombuffer(plane, dtype=np.uint8)
 
 
-def _sealed(*parts: bytes | memoryview) -> bytes:
+def _sealed(*parts: bytes) -> bytes:
     check = 0
     for part in parts:
         check = zlib.crc32(part, check)
     return b"".join((_NUMBER.pack(check), *parts))
 
 
-def _unsealed(data: bytes, *, at_least: int) -> memoryview:
+def unsealed(data: bytes | bytearray, *, at_least: int) -> memoryview:
+    """What follows the first four bytes, which check it. Raises DamagedData."""
     if len(data) < _NUMBER.size + at_least:
         raise DamagedData(f"stored numbers are cut off after {len(data)} bytes")
     body = memoryview(data)[_NUMBER.size :]

@@ -63,6 +63,9 @@ class Database:
         self._closed = False
         self._readers = _engine(path, lock_timeout)
         self._writers = self._readers.execution_options(begin="BEGIN IMMEDIATE")
+        self._watching = threading.Lock()
+        with translated(path):
+            self._watcher = sqlite3.connect(path, timeout=lock_timeout, isolation_level=None, check_same_thread=False)
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
@@ -88,6 +91,17 @@ class Database:
         finally:
             self._writers_turn.release()
 
+    def version(self) -> int:
+        """A number that is another after every commit, whichever process made it; it means nothing but to this object.
+
+        Taken before a reading, it says later whether that reading would still find the same.
+        """
+        self._refuse_closed()
+        with translated(self.path), self._watching:
+            # fetched to the end: an open statement would hold up commits
+            ((found,),) = self._watcher.execute("PRAGMA data_version").fetchall()
+        return int(found)
+
     def ready(self) -> bool:
         """Whether the file is still there, answers at the code's revision, and could be written. Writes nothing to stay."""
         try:
@@ -106,6 +120,8 @@ class Database:
     def close(self) -> None:
         """Close all connections; what is asked afterwards raises StorageUnavailable. Twice is once."""
         self._closed = True
+        with self._watching:
+            self._watcher.close()
         self._readers.dispose()
 
     def _refuse_closed(self) -> None:

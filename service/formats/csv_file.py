@@ -1,8 +1,8 @@
 """CSV -> columns: whole blocks of digits by `decimals`, and line by line where a block is not so plain.
 
-A block that `decimals` refuses is tidied first: comments and blank lines skipped, quotes taken apart, columns that are not
-taken left out. What it refuses then is read cell by cell, and line, column and value of what is wrong are named. So files
-of millions of rows are fast, tidy or not, and all files are told apart; what takes longer than the limit is refused.
+A block that `decimals` refuses is made plain first (`csv_cells`): comments and blank lines skipped, quotes and columns that
+are not taken left out. What it refuses then is read cell by cell, and line, column and value of what is wrong are named. So
+files of millions of rows are fast, tidy or not, and all files are told apart; what takes longer than the limit is refused.
 """
 
 import csv
@@ -10,14 +10,14 @@ import time
 from array import array
 from bisect import bisect_right
 from dataclasses import dataclass, field
-from operator import itemgetter
 
 import numpy as np
 
 from models.arrays import FloatArray
 from service.errors import MOST_ERRORS, FieldError, InvalidError, TooLargeError
 from service.formats.columns import LineOf
-from service.formats.csv_head import Layout, blocks, cells_of, is_comment, read_head, text_of
+from service.formats.csv_cells import INNER, picked, without_comments
+from service.formats.csv_head import Layout, blocks, cells_of, read_head, text_of
 from service.formats.decimals import NUMBER, parse_rows
 from service.formats.limits import Limits
 from service.formats.mapping import Taken, choose
@@ -26,8 +26,6 @@ from service.formats.sniffing import ByteSource
 _SHOWN = 80
 _MOST_PASSES = 16
 _KEPT = 1 << 18
-#: What a line of numbers begins with, and what separates the cells of one that was tidied.
-_NUMERIC, _INNER = frozenset("0123456789+-."), ";"
 
 
 @dataclass(slots=True)
@@ -142,34 +140,16 @@ class _Table:
 
     def _careful(self, block: bytes) -> FloatArray:
         """The columns taken of a block that is not so plain. Raises InvalidError with every line of it that is wrong."""
-        lines: list[str] = []
-        for line in text_of(block).split("\n")[:-1]:
-            if line[:1] not in _NUMERIC and (not line.strip() or is_comment(line, self._layout.separator)):
-                self.lines.skip(self._grown.rows + len(lines))
-            else:
-                lines.append(line)
-        rows = self._tidied(lines)
-        return self._cell_by_cell(lines) if rows is None else rows
-
-    def _tidied(self, lines: list[str]) -> FloatArray | None:
-        """The columns taken [rows, taken] of lines that hold numbers there; None where they do not."""
-        separator, width = self._layout.separator, len(self._layout.headers)
-        if any('"' in line for line in lines):
-            try:
-                rows = list(csv.reader(lines, delimiter=separator, skipinitialspace=True))
-            except csv.Error:
-                return None
-        else:
-            rows = [line.split(separator) for line in lines]
-        if set(map(len, rows)) != {width}:
-            rows = [row if any(row[width:]) else row[:width] for row in rows]
-        if len(rows) != len(lines) or set(map(len, rows)) != {width}:
-            return None
-        if len(self._at) == 1:
-            text = "\n".join([row[self._at[0]] for row in rows])
-        else:
-            text = "\n".join(map(_INNER.join, map(itemgetter(*self._at), rows)))
-        return self._parsed(text.encode() + b"\n", _INNER.encode(), len(self._at))
+        separator, width = self._layout.separator.encode(), len(self._layout.headers)
+        block, skipped = without_comments(block, self._layout.separator)
+        for line in skipped:
+            self.lines.skip(self._grown.rows + line)
+        tidy = block
+        if block.count(separator, 0, block.find(b"\n")) >= width:
+            tidy = _without(block, separator + b"\n", b"\n")
+        cells = picked(tidy, separator, width, self._at)
+        rows = None if cells is None else self._parsed(cells, INNER, len(self._at))
+        return self._cell_by_cell(text_of(block).split("\n")[:-1]) if rows is None else rows
 
     def _cell_by_cell(self, lines: list[str]) -> FloatArray:
         rows: list[list[float]] = []

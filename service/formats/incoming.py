@@ -55,7 +55,7 @@ def name_run(
     digest = hashlib.sha256(json.dumps(said, sort_keys=True, allow_nan=False).encode())
     for name in sorted(channels):
         digest.update(f"\n{name}:{channels[name].size}\n".encode())
-        digest.update(np.ascontiguousarray(channels[name], dtype="<f8").tobytes())
+        digest.update(np.ascontiguousarray(channels[name], dtype="<f8").data)
     content = digest.hexdigest()
     run = IncomingRun(
         kind=kind,
@@ -82,6 +82,41 @@ def sampled_record(channels: Mapping[str, FloatArray]) -> Record:
         torque=si["torque_nm"],
         oil_temperature=si.get("oil_temperature_c"),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class SampledChannels:
+    """A sampled record whose channels become SI units as they are asked for: all at once would be two thirds more memory."""
+
+    channels: Mapping[str, FloatArray]
+
+    def _si(self, name: str) -> FloatArray:
+        return CHANNELS[name].to_si(self.channels[name])
+
+    @property
+    def time(self) -> FloatArray:
+        """[n] s."""
+        return self._si("time_s")
+
+    @property
+    def pressure(self) -> FloatArray:
+        """[n] Pa."""
+        return self._si("pressure_bar")
+
+    @property
+    def speed(self) -> FloatArray:
+        """[n] rad/s."""
+        return self._si("speed_rpm")
+
+    @property
+    def torque(self) -> FloatArray:
+        """[n] Nm."""
+        return self._si("torque_nm")
+
+    @property
+    def oil_temperature(self) -> FloatArray | None:
+        """[n] K."""
+        return self._si("oil_temperature_c") if "oil_temperature_c" in self.channels else None
 
 
 def stationary_plateaus(channels: Mapping[str, FloatArray]) -> Plateaus:

@@ -13,7 +13,6 @@ from starlette.datastructures import UploadFile
 
 from service.errors import InvalidError
 from service.formats.file_run import read_file_run
-from service.formats.incoming import IncomingRun
 from service.problems import SENDING
 from service.responses import JSON_TYPE, encode
 from service.routes.context import Context, Ingester
@@ -82,5 +81,10 @@ async def _save(request: Request, path: Path, filename: str) -> str:
 def _ingest(
     context: Context, clutch_id: str, path: Path, filename: str, started_at: datetime | None, asked: dict[str, Any]
 ) -> tuple[dict[str, Any], bool]:
-    run: IncomingRun = read_file_run(path, filename=filename, started_at=started_at, **asked)
-    return ingest(context.database, clutch_id, run, received_at=context.now())
+    # The run is named by none here, so that its columns can go when they are encoded.
+    return ingest(
+        context.database,
+        clutch_id,
+        read_file_run(path, filename=filename, started_at=started_at, **asked),
+        received_at=context.now(),
+    )

@@ -13,7 +13,7 @@ from models.plateaus import cut_plateaus
 from models.protocol import protocol_speeds
 from models.runs import Plateaus, curves_by_pressure
 from service.errors import FieldError, InvalidError
-from service.formats.incoming import UNLOADED, IncomingRun, sampled_record, stationary_plateaus
+from service.formats.incoming import UNLOADED, IncomingRun, SampledChannels, stationary_plateaus
 from service.formats.units import PASCALS_PER_BAR
 
 #: Warnings that hang on what was known when the run arrived: cycles before those of an earlier run, other pressures.
@@ -68,7 +68,7 @@ def analyse(run: IncomingRun, geometry: Geometry) -> Analysis:
         plateaus = stationary_plateaus(run.channels)
         return _analyse_stationary(plateaus, geometry, _row_warnings(run, plateaus))
     try:
-        cut = cut_plateaus(sampled_record(run.channels))
+        cut = cut_plateaus(SampledChannels(run.channels))
     except ValueError as error:
         message = f"time_s, pressure_bar, speed_rpm, torque_nm: {error}"
         errors = [FieldError(pointer="/channels/torque_nm", code="no_plateau", message=message)]

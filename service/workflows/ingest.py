@@ -1,6 +1,8 @@
 """A run comes in: fitted, stored, tracked, its remaining life foretold, in one transaction."""
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any
 
 from sqlalchemy import Connection
@@ -35,12 +37,17 @@ def ingest(database: Database, clutch_id: str, run: IncomingRun, *, received_at:
     if known is not None:
         return _repeat(known, run), False
     geometry = stored.record(clutch).geometry.to_model()
-    analysis = analyse(run, geometry)
+    with ThreadPoolExecutor(1) as beside:  # deflating a long record lets its cutting run
+        encoding = beside.submit(channels.encoded, run.channels)
+        analysis = analyse(run, geometry)
+        columns = encoding.result()
+    if run.kind != DYNAMIC:  # whose loops are yet to be fitted; a long record need not be held twice
+        run = replace(run, channels={})
     with database.writing() as connection:
         known = runs.get(connection, clutch_id, run.run_id)
         if known is not None:
             return _repeat(known, run), False
-        return _store(connection, clutch, geometry, run, analysis, received_at), True
+        return _store(connection, clutch, geometry, run, columns, analysis, received_at), True
 
 
 def _repeat(known: RunRow, run: IncomingRun) -> dict[str, Any]:
@@ -57,6 +64,7 @@ def _store(
     clutch: ClutchRow,
     geometry: Geometry,
     run: IncomingRun,
+    columns: channels.Encoded,
     analysis: Analysis,
     received_at: str,
 ) -> dict[str, Any]:
@@ -91,14 +99,17 @@ def _store(
             code_version=CODE_VERSION,
         ),
     )
-    channels.write(connection, run_key, run.channels)
+    channels.write(connection, run_key, columns)
     fits.write(connection, run_key, stored.fit_rows(analysis.fits, cofs))
     clutches.bump_revision(connection, clutch.clutch_id)
     if _changes_the_past(connection, clutch.clutch_id, ordered, event):
         retrack_all(connection, clutch)
     else:
         newest = correct_newest(connection, clutch, ordered, event)
-        retrack(connection, clutch, [newest if each is event else each for each in ordered], newest=newest)
+        noticed = retrack(connection, clutch, [newest if each is event else each for each in ordered], newest=newest)
+        if noticed and event is ordered[-1] and event.cofs and not _absent(ordered, event):
+            answer["warnings"] += noticed
+            runs.set_results(connection, run_key, stored.details(run, analysis), answer, CODE_VERSION)
     if event.speed_range is not None:
         refresh_loops(connection, clutch.clutch_id, ordered, geometry, since=event)
     return answer

@@ -1,5 +1,6 @@
-"""What memory a process and its children hold for themselves, watched while something happens."""
+"""What a process and its children take: memory that they hold for themselves, watched, and time of the processor."""
 
+import os
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -18,6 +19,12 @@ def held(pid: int) -> int:
         except (FileNotFoundError, ProcessLookupError):
             continue  # it has just ended
     return total
+
+
+def processor_seconds(pid: int) -> float:
+    """Time of the processor that a process has taken, and the children that it has waited for."""
+    fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+    return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
 
 
 def added(pid: int, work: Callable[[], object], every: float = 0.02) -> int:

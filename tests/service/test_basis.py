@@ -88,6 +88,9 @@ def test_a_step_after_an_oil_change_does_not_look_like_wear(client: TestClient) 
     at_once = {name: said(client, name, at_cycles=8000) for name in ("told", "untold")}
     assert [each["code"] for each in at_once["untold"]["warnings"]] == ["off_track"]
     assert at_once["told"]["warnings"] == []
+    receipts = {name: client.get(f"/v1/clutches/{name}/runs/t8000").json()["warnings"] for name in at_once}
+    assert "off_track" in [each["code"] for each in receipts["untold"]]
+    assert "off_track" not in [each["code"] for each in receipts["told"]]
 
 
 @pytest.mark.parametrize(

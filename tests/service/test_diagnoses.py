@@ -166,12 +166,15 @@ def test_a_rebuild_ends_the_model(client: TestClient) -> None:
     assert client.get(RUL).json()["model"] == BASELINE
     assert client.get(f"{BASE}/model").json()["model"] == BASELINE
     kept = client.get(f"{BASE}/diagnoses/{report['diagnosis_id']}").json()
-    assert (kept["adoptable"], kept["adopted"], kept["stale"]) == (False, False, True)
+    assert (kept["adoptable"], kept["adopted"], kept["stale"], kept["earlier_life"]) == (False, False, True, True)
+    listed = client.get(BASE).json()["diagnosis"]
+    assert (listed["adopted"], listed["earlier_life"]) == (False, True)
     refused = client.put(f"{BASE}/model", json={"diagnosis_id": report["diagnosis_id"]})
     assert (refused.status_code, "rebuild" in refused.json()["detail"]) == (409, True)
     post_tests(client, 2500, 3500)
     assert "looked at 2 tests" in diagnosed(client, adopt=True)["summary"]
     assert client.get(RUL).json()["model"] == BASELINE
+    assert client.get(BASE).json()["diagnosis"]["earlier_life"] is False
 
 
 def test_nothing_to_adopt_is_refused(client: TestClient) -> None:

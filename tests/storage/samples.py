@@ -76,7 +76,7 @@ def fit_row(pressure: float, *, mse_percent: float | None = 1.7) -> FitRow:
 def store_run(connection: Connection, number: int, *, length: int = 40) -> int:
     """One accepted run as the workflow writes it: the run, its channels and the clutch's revision."""
     run_key = runs.insert(connection, new_run(number))
-    channels.write(connection, run_key, columns(number, length))
+    channels.write(connection, run_key, channels.encoded(columns(number, length)))
     clutches.bump_revision(connection, "bench3-017")
     return run_key
 

@@ -1,5 +1,6 @@
 """Opening, refusing, and what the store says where the file cannot be used."""
 
+import contextlib
 import sqlite3
 import time
 from contextlib import closing
@@ -216,3 +217,24 @@ def test_a_closed_database_says_so(database: Database, tmp_path: Path) -> None:
         pass
     with pytest.raises(StorageUnavailable, match="has been closed"):
         database.backup(tmp_path / "copy.db")
+
+
+def test_the_version_changes_with_every_commit_and_with_nothing_else(database: Database) -> None:
+    seen = [database.version(), database.version()]
+    with database.writing() as connection:
+        connection.exec_driver_sql("CREATE TABLE extra (x)")
+        seen.append(database.version())  # not committed yet
+    assert len(set(seen)) == 1
+    seen.append(database.version())
+    with contextlib.suppress(RuntimeError), database.writing() as connection:
+        connection.exec_driver_sql("INSERT INTO extra VALUES (1)")
+        raise RuntimeError
+    assert database.version() == seen[-1] != seen[0]
+    with database.reading() as connection:
+        connection.exec_driver_sql("SELECT * FROM extra").fetchall()
+    assert database.version() == seen[-1]
+    other = open_database(f"sqlite:///{database.path}")
+    with other.writing() as connection:
+        connection.exec_driver_sql("INSERT INTO extra VALUES (2)")
+    assert database.version() not in seen
+    other.close()

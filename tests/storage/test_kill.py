@@ -31,7 +31,7 @@ with database.writing() as connection:
     reached("begun")
     key = runs.insert(connection, new_run(1))
     reached("run inserted")
-    channels.write(connection, key, columns(1, length))
+    channels.write(connection, key, channels.encoded(columns(1, length)))
     reached("channels written")
     clutches.bump_revision(connection, "bench3-017")
     if mode == "delete":  # what a rollback journal must undo: pages that have reached the file already

@@ -148,8 +148,8 @@ def test_channels_keep_their_order_and_their_bits(database: Database) -> None:
     with database.writing() as connection:
         clutches.insert(connection, clutch_row())
         key, bare = (runs.insert(connection, new_run(number)) for number in range(2))
-        channels.write(connection, key, sent)
-        channels.write(connection, bare, {})
+        channels.write(connection, key, channels.encoded(sent))
+        channels.write(connection, bare, channels.encoded({}))
     with database.reading() as connection:
         back = channels.read(connection, key)
         assert list(back) == list(sent)
@@ -159,20 +159,20 @@ def test_channels_keep_their_order_and_their_bits(database: Database) -> None:
 
 def test_channels_belong_to_a_run_and_are_written_once(database: Database) -> None:
     with pytest.raises(IntegrityError, match="FOREIGN KEY"), database.writing() as connection:
-        channels.write(connection, 7, columns(1))
+        channels.write(connection, 7, channels.encoded(columns(1)))
     with database.writing() as connection:
         clutches.insert(connection, clutch_row())
         key = runs.insert(connection, new_run())
-        channels.write(connection, key, columns(1))
+        channels.write(connection, key, channels.encoded(columns(1)))
     with pytest.raises(IntegrityError, match="UNIQUE"), database.writing() as connection:
-        channels.write(connection, key, columns(2))
+        channels.write(connection, key, channels.encoded(columns(2)))
 
 
 def test_a_damaged_channel_is_named(database: Database) -> None:
     with database.writing() as connection:
         clutches.insert(connection, clutch_row())
         key = runs.insert(connection, new_run())
-        channels.write(connection, key, columns(1))
+        channels.write(connection, key, channels.encoded(columns(1)))
         connection.exec_driver_sql("UPDATE channel SET data = substr(data, 1, 50) WHERE name = 'speed_rpm'")
     with database.reading() as connection, pytest.raises(DamagedData, match=f"channel speed_rpm of run {key}"):
         channels.read(connection, key)
@@ -209,13 +209,16 @@ def test_a_fit_has_sixteen_finite_covariances_and_a_run(database: Database) -> N
         fits.write(connection, 99, [fit_row(1e5)])
 
 
-def test_long_channels_are_encoded_side_by_side_and_keep_their_order(database: Database) -> None:
+def test_long_channels_keep_their_order_and_their_bits(database: Database) -> None:
     sent = columns(7, 50_000) | {"oil_temperature_c": np.zeros(50_000), "time_s": np.arange(50_000) / 1000}
     with database.writing() as connection:
         clutches.insert(connection, clutch_row())
         run_key = runs.insert(connection, new_run(0))
-        channels.write(connection, run_key, sent)
+        channels.write(connection, run_key, channels.encoded(sent))
     with database.reading() as connection:
         kept = channels.read(connection, run_key)
+        rows = connection.exec_driver_sql("SELECT name, codec FROM channel").fetchall()
+        stored = {name: codec for name, codec in rows}  # noqa: C416  (rows are no pairs to mypy)
     assert list(kept) == list(sent)
     assert all(kept[name].tobytes() == column.tobytes() for name, column in sent.items())
+    assert {stored["time_s"], stored["torque_nm"]} == {"decimal-zlib", "shuffle-zlib"}
