@@ -11,26 +11,29 @@ so that viscosity falls by some 22 % from 80 to 90 °C.
 """
 
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
 from models.rig.stationary import OIL_TEMPERATURE
 from models.rig.truth import SimulatedClutch
-from models.runs import Plateaus
+from models.runs import Plateaus, Record
 from models.stribeck import torque
 
 #: Vogel's B and C [K].
 _B, _C = 880.0, 170.0
 
+Held = TypeVar("Held", Plateaus, Record)
 
-def warmed(plateaus: Plateaus, clutch: SimulatedClutch, wear: float, strength: float = 1.0) -> Plateaus:
-    """A simulated test's plateaus as its oil's temperature makes them; `wear` is the ζ at which it was made.
+
+def warmed(held: Held, clutch: SimulatedClutch, wear: float, strength: float = 1.0) -> Held:
+    """A simulated test's plateaus or record as its oil's temperature makes them; `wear` is the ζ at which it was made.
 
     `strength` [-] is the power of the viscosity's ratio. Raises ValueError where no oil temperature was recorded.
     """
-    if plateaus.oil_temperature is None:
-        raise ValueError("plateaus must have an oil_temperature, got None")
-    thinner = np.exp(strength * (_B / (plateaus.oil_temperature - _C) - _B / (OIL_TEMPERATURE - _C)))
-    velocity = clutch.geometry.sliding_velocity(plateaus.speed)
-    at = clutch.parameters(plateaus.pressure, wear)
-    return replace(plateaus, torque=plateaus.torque * torque(velocity * thinner, at) / torque(velocity, at))
+    if held.oil_temperature is None:
+        raise ValueError("a test must have an oil_temperature, got None")
+    thinner = np.exp(strength * (_B / (held.oil_temperature - _C) - _B / (OIL_TEMPERATURE - _C)))
+    velocity = clutch.geometry.sliding_velocity(held.speed)
+    at = clutch.parameters(held.pressure, wear)
+    return replace(held, torque=held.torque * torque(velocity * thinner, at) / torque(velocity, at))

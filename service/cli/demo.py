@@ -10,7 +10,6 @@ import time
 import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,8 +22,6 @@ from service.cli.diagnosis_view import shown
 from service.cli.options import Seed, fail, out
 
 _PORT = 8000
-#: The demo ends a little after the end of life.
-_STOP = 0.49
 _START_SECONDS = 60.0
 HIDDEN_EFFECT = "oil_temperature"
 HIDDEN = "the oil's temperature, whose viscosity acts as another speed would"
@@ -42,9 +39,10 @@ def demo(
     with tempfile.TemporaryDirectory(prefix="clutchlife-demo-") as folder, _service(Path(folder)) as (url, process):
         out.print(f"Clutchlife at {url}, its database in {folder}", markup=False, soft_wrap=True)
         with connect(url) as http:
-            _life(Service(http=http), seed)
-        if exit_at_end:
-            return
+            cycles = _life(Service(http=http), seed)
+            if exit_at_end:
+                return
+            _loops(Service(http=http), seed, cycles)
         page = f"{url}/clutches/sim-{seed}"
         out.print(
             f"\nThe dashboard stays open at {page} until Ctrl-C; all clutches: {url}", markup=False, soft_wrap=True
@@ -57,9 +55,10 @@ def demo(
             out.print("closing")
 
 
-def _life(service: Service, seed: int) -> None:
+def _life(service: Service, seed: int) -> float:
+    """Post the life and have it diagnosed; the duty cycles at its end."""
     from models.rig import campaign  # what only this command needs is loaded by it alone
-    from models.rig.oil_warmth import warmed
+    from service.cli import demo_life
     from service.formats import simulated
 
     clutch_id, truth = f"sim-{seed}", campaign.simulated_clutch(seed)
@@ -72,10 +71,8 @@ def _life(service: Service, seed: int) -> None:
     inside: list[bool] = []
     with _progress() as progress:
         task = progress.add_task("run-in", total=end)
-        for run in campaign.simulate(seed, stop_fraction=_STOP):
+        for run in demo_life.runs(seed):
             progress.update(task, description=f"{run.kind.value.replace('_', ' ')}, {run.cycles} cycles")
-            if run.plateaus is not None:
-                run = replace(run, plateaus=warmed(run.plateaus, truth, run.wear))
             body = json.dumps(simulated.simulated_body(run)).encode()
             service.post(f"/v1/clutches/{clutch_id}/runs", body)
             progress.update(task, completed=run.cycles)
@@ -89,6 +86,17 @@ def _life(service: Service, seed: int) -> None:
         "'-' means that too few tests are known yet, or that it may never come."
     )
     _diagnosed(service, clutch_id, end)
+    return run.cycles
+
+
+def _loops(service: Service, seed: int, last: float) -> None:
+    """Dynamic tests at some states of the same life, for the dashboard: they come late, as a rig's own archive would."""
+    from service.cli import demo_life
+    from service.formats import simulated
+
+    out.print("\nDynamic tests of the same life follow, for the friction loops on the dashboard.")
+    for run in demo_life.loops(seed, last):
+        service.post(f"/v1/clutches/sim-{seed}/runs", json.dumps(simulated.simulated_body(run)).encode())
 
 
 def _diagnosed(service: Service, clutch_id: str, end: float | None) -> None:

@@ -7,7 +7,7 @@ from fastapi.responses import Response
 
 from service.formats.json_run import invalid
 from service.problems import READING, SENDING
-from service.responses import JSON_TYPE, answer, encode, from_cursor, page
+from service.responses import JSON_TYPE, answer, encode, from_cursor, page, tagged
 from service.routes.bodies import described_body, json_body
 from service.routes.context import Context, Cursor, Ingester, Limit, Reader
 from service.schemas.clutch import ClutchIn, ClutchOut, ClutchPage
@@ -52,8 +52,13 @@ def _register(context: Context, body: bytes) -> tuple[dict[str, object], bool]:
 @router.get("", response_model=ClutchPage, responses=READING)
 def list_clutches(request: Request, context: Reader, limit: Limit = 100, cursor: Cursor = None) -> Response:
     """All clutches with current health and remaining life, the fewest remaining cycles first."""
-    items, after = registry.page(context.database, limit=limit, after=from_cursor(cursor))
-    return answer(request, page(items, after))
+    version = context.database.version()  # before the rows are read: what is committed meanwhile makes another
+    known = context.lists.find((limit, cursor))
+    if known is None or known[0] != version:
+        items, after = registry.page(context.database, limit=limit, after=from_cursor(cursor))
+        known = (version, encode(page(items, after)))
+        context.lists.keep((limit, cursor), known)
+    return tagged(request, known[1], JSON_TYPE)
 
 
 @router.get("/{clutch_id}", response_model=ClutchOut, responses=READING)

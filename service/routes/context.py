@@ -1,7 +1,7 @@
 """What a route is given: the database, the clock, and a caller who may ask."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Annotated
 
@@ -22,6 +22,7 @@ class Context:
 
     database: Database
     remembered: Remembered
+    lists: Remembered = field(default_factory=lambda: Remembered(most=8))  # a page may hold a megabyte
     metrics: Metrics
     worker: Worker
 

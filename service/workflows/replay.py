@@ -12,6 +12,7 @@ from service.workflows.analysis import NOTICED_ON_ARRIVAL, Analysis, Warned, ana
 from service.workflows.basis import ALL_PRESSURES
 from service.workflows.loops import refresh_loops
 from service.workflows.receipts import fit_receipt, receipt
+from service.workflows.surprise import OFF_TRACK
 from service.workflows.tracks import CARRIED
 from storage import channels, clutches, fits, predictions, runs
 from storage.database import Database
@@ -55,7 +56,7 @@ def results(connection: Connection, clutch_id: str) -> list[Any]:
 
 def _receipt(row: RunRow, incoming: IncomingRun, analysis: Analysis) -> dict[str, Any]:
     """The receipt anew, its mean COFs yet to come; what was noticed when the run arrived is known from the old one alone."""
-    kept = [Warned(**each) for each in row.receipt["warnings"] if each["code"] in NOTICED_ON_ARRIVAL]
+    kept = [Warned(**each) for each in row.receipt["warnings"] if each["code"] in (*NOTICED_ON_ARRIVAL, OFF_TRACK)]
     return receipt(
         row.clutch_id,
         incoming,

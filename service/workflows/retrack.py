@@ -29,10 +29,15 @@ RANK_UNKNOWN = 2 * HORIZON
 _STATES: dict[str, type[ParticleState] | type[UkfState]] = {"particle": ParticleState, "ukf": UkfState}
 
 
-def retrack(connection: Connection, clutch: ClutchRow, events: Sequence[Event], *, newest: Event | None = None) -> None:
-    """Track anew what the ordered history asks for: one step where `newest` comes last, else all of it."""
+def retrack(
+    connection: Connection, clutch: ClutchRow, events: Sequence[Event], *, newest: Event | None = None
+) -> list[dict[str, Any]]:
+    """Track anew what the ordered history asks for: one step where `newest` comes last, else all of it.
+
+    Returns the warnings of what is foretold after the last event.
+    """
     if not events:
-        return
+        return []
     fraction = stored.record(clutch).end_of_life.cof_fraction
     basis = basis_of(connection, clutch)
     found = lives(events)
@@ -50,9 +55,11 @@ def retrack(connection: Connection, clutch: ClutchRow, events: Sequence[Event], 
             last = states_then
             said |= {(each.cycles, each.method): each for each in foretold}
     _write(connection, clutch.clutch_id, list(said.values()), last)
-    summary, rank = _summarise(said[events[-1].cycles, "particle"].payload)
+    at_last = said[events[-1].cycles, "particle"].payload
+    summary, rank = _summarise(at_last)
     summary |= {"runs": len(events), "recent": recent(events, found[-1].pooled(basis)), "life": found[-1].name}
     clutches.set_summary(connection, clutch.clutch_id, rank, summary)
+    return list(at_last["warnings"])
 
 
 def _carried(connection: Connection, clutch_id: str, life: Life, basis: Basis, newest: Event) -> States | None:

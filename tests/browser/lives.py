@@ -1,15 +1,14 @@
 """Clutches for the pages to show."""
 
+import itertools
 import json
 import math
-from dataclasses import replace
 from typing import Any
 
 import httpx2
 import numpy as np
 
-from models.rig import campaign
-from models.rig.oil_warmth import warmed
+from service.cli import demo_life
 from service.formats import simulated
 from tests.support import stationary, torque_nm
 
@@ -53,13 +52,10 @@ def worn(http: httpx2.Client, clutch_id: str, last: int = 7000) -> None:
 
 def demo(http: httpx2.Client, seed: int = 1, last: float = math.inf) -> str:
     """The life that `clutchlife demo` simulates, warm oil hidden in it, posted run by run; the clutch's id."""
-    clutch_id, truth = f"sim-{seed}", campaign.simulated_clutch(seed)
+    clutch_id = f"sim-{seed}"
     http.post("/v1/clutches", json=simulated.simulated_clutch_body(clutch_id)).raise_for_status()
-    for run in campaign.simulate(seed, stop_fraction=0.49):
-        if run.cycles > last:
-            break
-        if run.plateaus is not None:
-            run = replace(run, plateaus=warmed(run.plateaus, truth, run.wear))
+    life = list(itertools.takewhile(lambda run: run.cycles <= last, demo_life.runs(seed)))
+    for run in sorted([*life, *demo_life.loops(seed, life[-1].cycles)], key=lambda run: run.cycles):
         body = json.dumps(simulated.simulated_body(run)).encode()
         http.post(f"/v1/clutches/{clutch_id}/runs", content=body, headers=JSON).raise_for_status()
     return clutch_id

@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -178,3 +179,26 @@ def test_the_demo_shows_a_life() -> None:
     assert "The truth: it halved at" in life
     assert rows[-1][-2] == "reached"
     assert "Hidden was oil_temperature: found." in diagnosis
+
+
+def test_the_demo_leaves_its_dashboard_open_with_friction_loops() -> None:
+    """Until Ctrl-C; what it adds to the life for the page does not lengthen `--exit`."""
+    called = [sys.executable, "-u", "-m", "service.cli.main", "demo", "--no-browser"]
+    with subprocess.Popen(called, stdout=subprocess.PIPE, text=True, start_new_session=True) as demo:
+        assert demo.stdout is not None
+        said = ""
+        try:
+            for line in demo.stdout:
+                said += line
+                if "all clutches: http" in line:
+                    break
+            url = line.rpartition("all clutches: ")[2].strip()
+            loops = httpx2.get(f"{url}/v1/clutches/sim-1/loops").json()["items"]
+        finally:
+            os.killpg(demo.pid, signal.SIGINT)
+            rest = demo.communicate(timeout=60)[0]
+    assert "Hidden was oil_temperature: found." in said
+    assert len({loop["cycles"] for loop in loops}) == len({loop["pressure_bar"] for loop in loops}) == 3
+    assert all(loop["loop_area_nm_m_s"] is not None for loop in loops)
+    assert "closing" in rest
+    assert demo.returncode == 0

@@ -87,6 +87,58 @@ def test_a_clutch_with_a_diagnosis_and_all_that_opens(
     watched.context.close()
 
 
+_COLOURS = """names => names.map((name) => {
+  const probe = document.body.appendChild(document.createElement("span"));
+  probe.style.color = `var(--${name})`;
+  const found = getComputedStyle(probe).color.match(/[\\d.]+/g).map(Number);
+  probe.remove();
+  return found;
+})"""
+#: What lines, points, bars, icons and borders of fields are drawn in.
+DRAWN = (
+    "ink",
+    "quiet",
+    "edge",
+    "accent",
+    "failure",
+    "out",
+    "maintenance",
+    "check",
+    "normal",
+    "fresh",
+    "midlife",
+    "worn",
+)
+
+
+def luminance(rgb: list[float]) -> float:
+    """Relative luminance after WCAG 2.2."""
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in (value / 255 for value in rgb[:3])]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one: list[float], other: list[float]) -> float:
+    """Contrast ratio after WCAG 2.2, 1 to 21."""
+    dark, light = sorted((luminance(one), luminance(other)))
+    return (light + 0.05) / (dark + 0.05)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_all_that_is_drawn_stands_out_three_to_one(browser: Browser, url: str, scheme: str) -> None:
+    assert contrast([255, 255, 255], [0, 0, 0]) == pytest.approx(21)
+    watched = Watched(browser, url, color_scheme=scheme)
+    page = watched.open("/")
+    page.locator("table.fleet tbody tr").first.wait_for()
+    found = dict(
+        zip(("panel", "page", "line", *DRAWN), page.evaluate(_COLOURS, ["panel", "page", "line", *DRAWN]), strict=True)
+    )
+    for name in DRAWN:
+        for ground in ("panel", "page"):
+            assert contrast(found[name], found[ground]) >= 3, (name, ground)
+    assert contrast(found["line"], found["panel"]) < 3  # grid lines carry nothing: the check can fail
+    watched.close()
+
+
 def test_an_empty_clutch_and_an_unknown_one(browser: Browser, url: str) -> None:
     watched = Watched(browser, url)
     for path, title in (("waiting", "No run has arrived"), ("nobody", "No such clutch")):

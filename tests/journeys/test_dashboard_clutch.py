@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from tests.browser.driving import Watched, chromium, launched
-from tests.browser.lives import demo, loops, post
+from tests.browser.lives import demo, post
 from tests.browser.pixels import seen
 from tests.support import Server, serving, stationary
 
@@ -44,12 +44,10 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture(scope="module")
 def life(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """The demo's life as sim-1, with two dynamic tests and an oil change beside what the simulation gives."""
+    """The demo's life as sim-1, with an oil change beside what the simulation gives."""
     with serving(tmp_path_factory.mktemp("life") / "clutchlife.db") as server:
         with httpx2.Client(base_url=server.url, timeout=60) as http:
             clutch_id = demo(http)
-            post(http, clutch_id, loops(0))
-            post(http, clutch_id, loops(5000))
             note = "<img src=x onerror=alert(1)>"
             post(http, clutch_id, {"kind": "maintenance", "cycles": 5000, "event": "oil_change", "note": note})
         yield server

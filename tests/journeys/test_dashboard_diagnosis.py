@@ -8,8 +8,9 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.driving import Watched, chromium, serving_with_engine
-from tests.browser.lives import worn
+from tests.browser.lives import post, worn
 from tests.browser.pixels import seen
+from tests.support import stationary
 
 pytestmark = pytest.mark.browser
 expect.set_options(timeout=30_000)
@@ -93,6 +94,26 @@ def maps_are_drawn(browser: Browser, page: Page) -> None:
         page.locator(f"#chart-{name}[data-drawn]").wait_for()
         page.wait_for_timeout(200)
         assert seen(browser, chart.locator(".plot").screenshot()).is_chart, name
+
+
+def test_a_rebuild_ends_what_a_diagnosis_said(browser: Browser, url: str) -> None:
+    httpx2.post(f"{url}/v1/clutches/bench/diagnoses", json={"adopt": False}, timeout=60).raise_for_status()
+    watched = Watched(browser, url)
+    page = watched.open("/")
+    row = page.locator("tr[data-clutch='bench']")
+    expect(row).to_contain_text("Out of specification")
+    expect(row).not_to_contain_text("before the rebuild")
+    with httpx2.Client(base_url=url, timeout=60) as http:
+        post(http, "bench", {"kind": "maintenance", "cycles": 5000, "event": "rebuild"})
+        for cycles in (5100, 6000, 7000):
+            post(http, "bench", stationary(cycles, wear=(cycles - 5000) / 26_000))
+    expect(row).to_contain_text("Normal")
+    expect(row.locator("td[data-label='Diagnosis']")).to_contain_text("before the rebuild")
+    watched.open("/clutches/bench")
+    page.locator("#diagnosis").get_by_text("this is of its earlier life").wait_for()
+    expect(page.locator("#head .verdict")).to_contain_text("Normal")
+    expect(page.get_by_role("button", name="Adopt the extended model")).to_have_count(0)
+    watched.close()
 
 
 def test_a_failed_diagnosis_says_why(browser: Browser, url: str) -> None:

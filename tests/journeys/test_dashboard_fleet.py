@@ -1,5 +1,6 @@
 """The fleet's page: empty, filling, worst first, live, by keyboard, with a service that goes away and comes back."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -82,6 +83,7 @@ def test_the_worst_comes_first_with_all_that_is_asked_of_a_row(watched: Watched)
     assert "ago" in ageing.locator("time").inner_text() or "now" in ageing.locator("time").inner_text()
     assert "Maintenance at 4,000 cycles" in ageing.inner_text()
     assert "not asked" in ageing.inner_text()
+    assert not any("plotly" in url for url in watched.asked)
     # what comes from outside is text, never markup
     assert "<i>carbon</i> on steel" in first.inner_text()
 
@@ -204,6 +206,7 @@ def test_a_service_that_goes_away_and_comes_back(browser: Browser, tmp_path: Pat
         assert page.get_by_role("link", name="kept").is_visible()
         waits = page.locator(".asof").inner_text()
         assert "next try in" in waits
+        expect(page.locator(".asof")).to_contain_text(re.compile("next try in [56] s"))  # it asked every 3 s before
         server.start()
         httpx2.post(f"{server.url}/v1/clutches", json={"clutch_id": "after"})
         page.get_by_role("link", name="after").wait_for(timeout=60_000)  # it had backed off

@@ -18,7 +18,8 @@ from tests.models.dynamic_records import FALLING, GEOMETRY, RISING, SWING, veloc
 pytestmark = pytest.mark.statistical
 
 SEED = 20130816
-#: 1,000 intervals of 90 % hold the truth in 90 % of cases with a standard deviation of 0.95 %: three of them.
+#: 1,000 intervals of 90 % hold the truth in 90 % of cases with a standard deviation of 0.95 %: three of them. A film takes
+#: three times as long: fewer records, and three deviations of their number.
 COVERAGE, WITHIN = 0.90, 0.03
 #: `tests/models/test_lag.py` holds the two laws themselves against a stiff integrator.
 FINE = np.linspace(-10.0, 15.1, 25_101)
@@ -63,7 +64,7 @@ def _records(law: Law, records: int) -> Iterator[tuple]:
         yield value, area, area_of(cycle, samples), fit_lag(law, cycle, samples.phase, samples.torque, curve)
 
 
-@pytest.mark.parametrize(("law", "records"), [(ATTRACTOR, 1000), (SQUEEZE_FILM, 2000)], ids=["attractor", "film"])
+@pytest.mark.parametrize(("law", "records"), [(ATTRACTOR, 1000), (SQUEEZE_FILM, 500)], ids=["attractor", "film"])
 def test_intervals_hold_what_they_promise(law, records):
     """C over 50 to 500 Nm/s (the interval of 1/C, open where C is only bounded), τ_1 over 0.02 to 0.3 s, the area."""
     held, held_area, halved, low, high = 0, 0, 0, 0, 0
@@ -76,8 +77,9 @@ def test_intervals_hold_what_they_promise(law, records):
         halved += abs(truth - centre) <= half / 2
         held_area += abs(area.area - true_area) <= NINETY * area.area_sd
     print(f"{law.name}: {held} of {records}, below {low}, above {high}; area {held_area}; halved {halved}")
-    assert abs(held / records - COVERAGE) <= WITHIN
-    assert abs(held_area / records - COVERAGE) <= WITHIN
+    within = max(WITHIN, 3 * float(np.sqrt(COVERAGE * (1 - COVERAGE) / records)))
+    assert abs(held / records - COVERAGE) <= within
+    assert abs(held_area / records - COVERAGE) <= within
     # the control: intervals of half the width hold 59 % if noise is normal, and must not pass
     assert halved / records < COVERAGE - 5 * WITHIN
 

@@ -117,21 +117,21 @@ export class Chart {
       rows.length > shown.length ? h("p", { class: "quiet" }, `The first ${shown.length} of ${rows.length} rows; the CSV holds all.`) : "");
   }
 
-  /** The chart as an image's address, in any size and scheme; null where there is nothing to draw. */
-  async image(format, { width, height, scheme = null, scale = 1 }) {
+  /** The light drawing as an image's address, in any size and scheme; null where there is none. */
+  light({ width, height, scheme = null }) {
     if (this.spec === null || this.element.classList.contains("empty")) return null;
-    const Plotly = await plotly();
-    if (this.spatial) {
-      await this.draw();
-      return Plotly.toImage(this.plot, { format, width, height, scale });
-    }
-    const { data, layout } = this.figure(scheme, { width, height, compact: false });
-    return Plotly.toImage({ data, layout: { ...layout, width } }, { format, width, height, scale });
+    const figure = this.figure(scheme, { width, height, compact: false });
+    return figure.ticks ? `data:image/svg+xml,${encodeURIComponent(new XMLSerializer().serializeToString(sketch(figure, { width, height })))}` : null;
   }
 
   async savePng() {
-    const address = await this.image("png", { width: 1000, height: 600, scale: 2 });
-    if (address) save(`${this.name()}-${this.id}.png`, address);
+    const Plotly = await plotly();
+    const [width, height] = [1000, 600];
+    if (this.spatial && !this.element.dataset.drawn) await this.draw();
+    const { data, layout } = this.figure(null, { width, height, compact: false });
+    // a chart in 3D is saved as it has been turned
+    const shown = this.spatial ? this.plot : { data, layout: { ...layout, width } };
+    save(`${this.name()}-${this.id}.png`, await Plotly.toImage(shown, { format: "png", width, height, scale: 2 }));
   }
 
   saveCsv() {

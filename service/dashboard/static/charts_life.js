@@ -41,7 +41,7 @@ export function fan({ life, pooled, foretold, events }) {
           xaxis: { title: { text: "duty cycles" }, range: [-0.01 * last, last] },
           yaxis: { title: { text: "mean COF" } },
           shapes: [...marks.shapes, ...(threshold === null ? [] : [{ type: "line", x0: 0, x1: 1, xref: "paper", y0: threshold, y1: threshold, line: { color: c.failure, width: 1.6, dash: "dash" } }])],
-          annotations: [...marks.annotations, ...(threshold === null ? [] : [{ x: 0, xref: "paper", xanchor: "left", y: threshold, yanchor: "top", text: `threshold ${fixed(threshold, 4)}`, showarrow: false, font: { color: c.failure, size: 12 } }])],
+          annotations: [...marks.annotations, ...(threshold === null ? [] : [{ x: 0, xref: "paper", xanchor: "left", y: threshold, yanchor: "bottom", text: `threshold ${fixed(threshold, 4)}`, showarrow: false, font: { color: c.failure, size: 12 } }])],
         },
       };
     },

@@ -4,13 +4,15 @@ import { fixed, significant } from "./format.js";
 import { eventMarks } from "./layout.js";
 
 const MOST = 1500;
+/** Bar about a level that still belong to it: on the way to the next one torque is of neither. */
+const NEAR = 0.1;
 
 export const loopPressures = (loops) => [...new Set(loops.map((loop) => loop.pressure_bar))].sort((a, b) => a - b);
 
 /** The record near a pressure, in its order, thinned evenly. */
 function traceOf({ pressure_bar: p, speed_rpm: n, torque_nm: m }, pressure) {
   const found = [];
-  for (let index = 0; index < n.length; index += 1) if (Math.abs(p[index] - pressure) <= 0.25) found.push([n[index], m[index]]);
+  for (let index = 0; index < n.length; index += 1) if (Math.abs(p[index] - pressure) <= NEAR) found.push([n[index], m[index]]);
   const step = Math.ceil(found.length / MOST);
   return step > 1 ? found.filter((_, index) => index % step === 0) : found;
 }

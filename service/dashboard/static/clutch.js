@@ -90,7 +90,7 @@ function unknown() {
   delete byId("head").dataset.shown;
 }
 
-byId("print").addEventListener("click", async () => { if (shown) await makeReport(byId("report"), shown, charts, diagnosis); print(); });
+byId("print").addEventListener("click", () => { if (shown) makeReport(byId("report"), shown, charts, diagnosis); print(); });
 const live = new Live(withKey(look), liveBar(byId("live")), 2000);
 sender(byId("send"), { clutches: () => [ID], sent: () => live.now() });
 live.start();

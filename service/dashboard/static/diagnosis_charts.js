@@ -3,6 +3,8 @@
 import { Chart } from "./chart.js";
 import { fixed, significant } from "./format.js";
 
+const NARROW = matchMedia("(max-width: 600px)");
+
 const MAPS = [
   { id: "map-speed", title: "What is left, over speed and pressure", key: "speed_pressure", columnwise: false, x: "speed_rpm", y: "pressure_bar", xName: "speed, rpm", yName: "pressure, bar" },
   { id: "map-cycles", title: "What is left, over cycles and pressure", key: "pressure_cycles", columnwise: true, x: "cycles", y: "pressure_bar", xName: "duty cycles", yName: "pressure, bar" },
@@ -27,14 +29,14 @@ function mapSpec(maps, { key, columnwise, x, y, xName, yName }) {
     rows: sides.flatMap(([side, z]) => z.flatMap((row, j) => row.map((value, i) => [side, xs[i], ys[j], value]))),
     figure: (c) => ({
       data: sides.map(([side, z], index) => ({
-        type: "heatmap", x: xs.map(String), y: ys.map(String), z, zmin: -most, zmax: most, xaxis: index ? "x2" : "x", yaxis: "y", xgap: 1, ygap: 1,
+        type: "heatmap", x: xs.map((value) => fixed(value)), y: ys.map((value) => significant(value, 3)), z, zmin: -most, zmax: most, xaxis: index ? "x2" : "x", yaxis: "y", xgap: 1, ygap: 1,
         colorscale: [[0, c.fresh], [0.5, c.panel], [1, c.worn]], showscale: index === sides.length - 1, colorbar: { title: { text: "σ" }, thickness: 12, outlinewidth: 0 },
         hovertemplate: `${side}<br>${xName} %{x}<br>${yName} %{y}<br>%{z:.2f} σ<extra></extra>`,
       })),
       layout: {
         grid: { rows: 1, columns: sides.length }, hovermode: "closest",
-        xaxis: { title: { text: xName }, domain: sides.length > 1 ? [0, 0.48] : [0, 1], type: "category", nticks: 7, showgrid: false },
-        ...(sides.length > 1 ? { xaxis2: { title: { text: xName }, domain: [0.52, 1], type: "category", nticks: 7, showgrid: false } } : {}),
+        xaxis: { title: { text: xName }, domain: sides.length > 1 ? [0, 0.48] : [0, 1], type: "category", nticks: NARROW.matches ? 3 : 5, tickangle: 0, showgrid: false },
+        ...(sides.length > 1 ? { xaxis2: { title: { text: xName }, domain: [0.52, 1], type: "category", nticks: NARROW.matches ? 3 : 5, tickangle: 0, showgrid: false } } : {}),
         yaxis: { title: { text: yName }, type: "category", showgrid: false }, margin: { t: 30 },
         annotations: sides.map(([side], index) => ({ text: `<b>${side}</b>`, x: index ? 0.76 : sides.length > 1 ? 0.24 : 0.5, xref: "paper", y: 1, yref: "paper", yanchor: "bottom", showarrow: false })),
       },
@@ -49,7 +51,7 @@ function loopSpec(loops) {
   if (loops.length === 0) return null;
   const kinds = [["measured", "measured_nm"], ["baseline", "baseline_nm"], ["extended", "extended_nm"]].filter(([, key]) => loops.every((loop) => loop[key]));
   const label = (loop) => `${fixed(loop.cycles)} cycles, ${fixed(loop.pressure_bar, 1)} bar${loop.frequency_hz ? `, ${significant(loop.frequency_hz, 2)} Hz` : ""}`;
-  const shown = loops.slice(0, 3);
+  const shown = loops.slice(0, NARROW.matches ? 1 : 3);
   return {
     note: shown.map(label).join(" · "),
     columns: [{ name: "loop" }, { name: "model" }, { name: "speed, rpm", text: (value) => fixed(value, 1) }, { name: "torque, Nm", text: (value) => fixed(value, 2) }],

@@ -36,11 +36,12 @@ export function withSd(value, sd) {
   return `${fixed(value, decimals)} ± ${fixed(sd, decimals)}`;
 }
 
-/** Cycles, rounded to a twentieth of the interval that they lie in. */
+/** Cycles, rounded to a twentieth of the interval that they lie in, but to no fewer than two digits. */
 export function cycles(value, low = null, high = null) {
   if (value === null || value === undefined) return "–";
   const width = low !== null && high !== null ? high - low : Math.abs(value) / 50;
-  const unit = width > 20 ? 10 ** Math.floor(Math.log10(width / 10)) : 1;
+  const coarsest = 10 ** (Math.floor(Math.log10(Math.max(10, Math.abs(value)))) - 1);
+  const unit = width > 20 ? Math.min(coarsest, 10 ** Math.floor(Math.log10(width / 10))) : 1;
   return fixed(Math.round(value / unit) * unit);
 }
 

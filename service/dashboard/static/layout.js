@@ -26,7 +26,7 @@ export function base(c, layout, { height, compact, spatial }) {
 
 function scene(c, own, compact) {
   const axis = { gridcolor: c.line, color: c.ink, backgroundcolor: c.panel, showbackground: false, zeroline: false, exponentformat: "none", tickformatstops: DIGITS, tickfont: { size: compact ? 9 : 11 }, title: { font: { size: compact ? 11 : 12.5 } } };
-  return { aspectmode: "manual", aspectratio: { x: 1.35, y: 1.1, z: 0.8 }, camera: { eye: { x: 1.5, y: -1.6, z: 0.75 }, center: { x: 0, y: 0, z: -0.12 } },
+  return { aspectmode: "manual", aspectratio: { x: 1.35, y: 1.1, z: 0.8 }, camera: { eye: compact ? { x: 1.9, y: -2.1, z: 0.95 } : { x: 1.5, y: -1.6, z: 0.75 }, center: { x: 0, y: 0, z: -0.12 } },
     ...own, xaxis: merged(axis, own.xaxis), yaxis: merged(axis, own.yaxis), zaxis: merged(axis, own.zaxis) };
 }
 

@@ -7,9 +7,9 @@ import { openVerdict, stateIcon, STATES, stateOf } from "./state.js";
 
 const LAST_TESTS = 6;
 
-export async function makeReport(place, { clutch, life, tests, events, runs }, charts, diagnosis) {
+export function makeReport(place, { clutch, life, tests, events, runs }, charts, diagnosis) {
   if (life === null) return;
-  const [fan, cof] = await Promise.all([charts.charts.fan, charts.charts.foretelling].map((chart) => chart.image("svg", { width: 760, height: 255, scheme: "light" })));
+  const [fan, cof] = [charts.charts.fan, charts.charts.foretelling].map((chart) => chart.light({ width: 760, height: 255, scheme: "light" }));
   const latest = diagnosis?.latest ?? null;
   const state = stateOf(clutch.summary, openVerdict(latest));
   place.replaceChildren(
@@ -20,7 +20,7 @@ export async function makeReport(place, { clutch, life, tests, events, runs }, c
     fan ? h("img", { src: fan, alt: "" }) : "", cof ? h("img", { src: cof, alt: "" }) : "",
     h("p", {}, h("b", {}, "Diagnosis: "), told(latest)),
     table("The last tests", ["Cycles", "Test", "Mean COF, mean of pressures", "Fits acceptable"], tests.slice(-LAST_TESTS).map(testRow), { shown: true }),
-    events.length > 0 ? h("p", {}, h("b", {}, "Events: "), events.slice(-6).map((event) => `${words(event.event)} at ${fixed(event.cycles)} cycles`).join("; ")) : "");
+    events.length > 0 ? h("p", {}, h("b", {}, "Events: "), events.slice(-6).map((event) => `${words(event.event)}${event.note ? ` (${event.note.slice(0, 80)})` : ""} at ${fixed(event.cycles)} cycles`).join("; ")) : "");
 }
 
 function told(latest) {

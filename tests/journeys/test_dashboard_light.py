@@ -1,0 +1,99 @@
+"""The charts before the plotting library is there: drawn light at once, and nothing moves when it takes their place."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import httpx2
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.driving import Watched, chromium
+from tests.browser.lives import worn
+from tests.browser.pixels import seen
+from tests.support import Server, serving
+
+pytestmark = pytest.mark.browser
+
+LIBRARY = "**/plotly.min.js"
+_SHIFTS = """
+window.shifted = 0;
+new PerformanceObserver((list) => {
+  for (const entry of list.getEntries()) window.shifted += entry.value;
+}).observe({type: "layout-shift", buffered: true});
+"""
+#: Where the measurements stand, px on the page.
+_LIGHT = "circles => circles.map((c) => c.getBoundingClientRect()).map((r) => [r.x + r.width / 2, r.y + r.height / 2])"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def life(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with serving(tmp_path_factory.mktemp("light") / "clutchlife.db") as server:
+        with httpx2.Client(base_url=server.url, timeout=60) as http:
+            worn(http, "bench", last=6000)
+        yield server
+
+
+def texts(page: Page, chart: str) -> list[str]:
+    """What is written in a chart, whoever drew it."""
+    found = page.locator(f"{chart} svg text").all_text_contents()
+    return sorted({text.replace("\u2212", "-").strip() for text in found if text.strip()})
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1360])
+def test_the_library_takes_the_place_of_the_light_drawing(
+    browser: Browser, life: Server, scheme: str, width: int
+) -> None:
+    watched = Watched(browser, life.url, viewport={"width": width, "height": 900}, color_scheme=scheme)
+    page, held = watched.page, list[Any]()
+    page.add_init_script(_SHIFTS)
+    page.route(LIBRARY, lambda route: held.append(route))
+    watched.open("/clutches/bench")
+    page.locator("#chart-fan[data-sketched]").wait_for()
+    page.locator("#runs .runs details").first.wait_for()
+    chart = page.locator("#chart-fan .plot")
+    chart.scroll_into_view_if_needed()
+    found = seen(browser, chart.screenshot())
+    assert (found.is_chart, found.is_dark) == (True, scheme == "dark")
+    page.locator("#chart-fan summary").click()
+    assert page.locator("#chart-fan table tbody tr").count() > 20
+    page.locator("#chart-fan summary").click()
+    points = page.locator("#chart-fan .sketch circle").evaluate_all(_LIGHT)
+    said, box = texts(page, "#chart-fan .plot"), chart.bounding_box()
+    assert len(points) >= 8
+    page.evaluate("window.shifted = 0")
+
+    for route in held:
+        route.continue_()
+    page.locator("#chart-fan[data-drawn]").wait_for()
+    expect(page.locator("#chart-fan .sketch")).to_have_count(0)
+    again = page.locator("#chart-fan .scatterlayer .points path").evaluate_all(_LIGHT)
+    for x, y in points[:-1]:
+        assert min(abs(x - u) + abs(y - v) for u, v in again) < 2.5, ((x, y), again)
+    assert texts(page, "#chart-fan .plot") == said
+    assert chart.bounding_box() == box
+    assert page.evaluate("window.shifted") < 0.01
+    watched.close()
+
+
+def test_without_the_library_the_light_charts_stay(browser: Browser, life: Server) -> None:
+    watched = Watched(browser, life.url)
+    page = watched.page
+    page.route(LIBRARY, lambda route: route.abort())
+    watched.open("/clutches/bench")
+    for name in ("fan", "foretold", "cof", "stribeck", "static-torque-nm", "loop-curves", "loop-areas"):
+        page.locator(f"#chart-{name}").scroll_into_view_if_needed()
+        page.locator(f"#chart-{name}[data-sketched]").wait_for()
+        assert seen(browser, page.locator(f"#chart-{name} .plot").screenshot()).is_chart, name
+    page.locator("#chart-surface").scroll_into_view_if_needed()
+    page.locator("#chart-surface").get_by_text("The plotting library did not load").wait_for()
+    page.get_by_text("Live, as of").wait_for()
+    assert all("ERR_FAILED" in line for line in watched.errors())
+    watched.said.clear()
+    watched.close()
