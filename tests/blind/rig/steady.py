@@ -90,7 +90,7 @@ def torque_zero_shift(rng: np.random.Generator, plan: Plan) -> Effect:
         walk /= np.abs(walk).max() * rng.choice([-1.0, 1.0])
 
         def zero(site: Site) -> FloatArray:
-            return np.interp(life.moment[site.state][:, None] + site.clock, days, walk)
+            return np.interp(site.life.moment[site.state][:, None] + site.clock, days, walk)
     else:
         k = int(rng.integers(1, life.cycles.size))
         at, wide = 0.5 * (life.cycles[k - 1] + life.cycles[k]), 0.05 * (life.cycles[k] - life.cycles[k - 1])
