@@ -15,7 +15,7 @@ from models.diagnosis.gain import measure_gain
 from models.diagnosis.maps import loop_traces, residual_maps
 from models.diagnosis.misfits import axes_of, misfit_of
 from models.diagnosis.raw import RawEvidence
-from models.diagnosis.refitting import Hypothesis
+from models.diagnosis.refitting import Hypothesis, finite
 from models.diagnosis.report import Candidate, Estimate, Gain, Report, Verdict, Visible
 from models.diagnosis.smooth import AXES as SMOOTH_AXES
 from models.diagnosis.smooth import smooth_fit
@@ -126,12 +126,14 @@ def _candidates(
     hypotheses: Sequence[Hypothesis],
     raw: Sequence[RawEvidence],
 ) -> tuple[Candidate, ...]:
+    """Each effect as the verdict has it, else alone, else beside the one that it goes with best."""
     seen = {each.effect: each for each in raw}
+    alone = [each for each in hypotheses if len(each.effects) == 1 and finite(each)]
     found = []
     for slug, probability in judgement.probabilities.items():
         if probability < LEAST_PROBABILITY and slug not in judgement.causes:
             continue
-        first = next((each for each in hypotheses if slug in each.slugs), None)
+        first = next((each for each in (*judgement.standing, *alone, *hypotheses) if slug in each.slugs), None)
         if first is None or first.fit is None:
             effect = BY_SLUG[slug]
             estimate = _sound(seen[slug].estimate) if slug in seen else _estimate(slug, 0.0, effect.prior_sd)

@@ -223,7 +223,8 @@ def _estimate(estimate: Estimate) -> str:
     digits = max(0, 1 - math.floor(math.log10(estimate.sd)))
     if digits > _DIGITS:
         return f"{estimate.name} {_number(estimate.value)} ± {_number(estimate.sd)}{unit}"
-    return f"{estimate.name} {estimate.value:.{digits}f} ± {estimate.sd:.{digits}f}{unit}"
+    value = f"{estimate.value:.{digits}f}".replace("-", "−")
+    return f"{estimate.name} {value} ± {estimate.sd:.{digits}f}{unit}"
 
 
 def _number(value: float) -> str:

@@ -25,7 +25,7 @@ from models.diagnosis.whitening import Noise
 CLOSE, RIVAL = 4.0, 0.005
 #: What a template may leave behind, as a share of λ; and what its amplitude may be worth more in parts of the data: parts
 #: that differ by δ cost about δ² λ/4.
-TOLERANCE, PARTS_TOLERANCE = 0.05, 0.08
+TOLERANCE, PARTS_TOLERANCE = 0.05, 0.15
 #: Structure without a name may have so much more evidence, as a share of λ beyond CLEAR nats: below, no template's error
 #: shows.
 GENERIC, CLEAR = 0.05, 20.0
