@@ -223,12 +223,16 @@ def _estimate(estimate: Estimate) -> str:
     digits = max(0, 1 - math.floor(math.log10(estimate.sd)))
     if digits > _DIGITS:
         return f"{estimate.name} {_number(estimate.value)} ± {_number(estimate.sd)}{unit}"
-    value = f"{estimate.value:.{digits}f}".replace("-", "−")
-    return f"{estimate.name} {value} ± {estimate.sd:.{digits}f}{unit}"
+    return f"{estimate.name} {_signed(f'{estimate.value:.{digits}f}')} ± {estimate.sd:.{digits}f}{unit}"
 
 
 def _number(value: float) -> str:
     """Three digits, without an exponent where that is readable."""
     if 100 <= abs(value) < 1e6:
-        return f"{value:,.0f}"
-    return f"{value:.3g}" if value == 0 or 1e-3 <= abs(value) < 100 else f"{value:.2e}"
+        return _signed(f"{value:,.0f}")
+    return _signed(f"{value:.3g}") if value == 0 or 1e-3 <= abs(value) < 100 else f"{value:.2e}"
+
+
+def _signed(number: str) -> str:
+    """With a minus that is no hyphen."""
+    return number.replace("-", "−")

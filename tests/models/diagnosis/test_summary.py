@@ -145,7 +145,7 @@ def test_any_amplitude_can_be_told():
         value, sd = rng.choice([-1, 1]) * 10 ** rng.uniform(-12, 12), 10 ** rng.uniform(-12, 12)
         estimate = Estimate(name="step of C_v", value=value, sd=float(rng.choice([0.0, sd])), unit="%")
         said = summarise(replace(found, candidates=(replace(found.candidates[0], estimate=estimate),)))
-        told = re.search(r"step of C_v (-?[\d.,e+-]+)", said)
+        told = re.search(r"step of C_v (-?[\d.,e+-]+)", said.replace("−", "-"))
         assert told is not None
         number = float(told.group(1).replace(",", "").rstrip("."))
         assert abs(number - value) <= max(0.006 * abs(value), 0.06 * estimate.sd)
