@@ -8,7 +8,7 @@ show the grid.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from models.tracking.history import History
 from models.tracking.lattice import Frame, Kinds
 from models.tracking.linear import Points, conditional, drawn_terms, evidence, pointwise
 from models.tracking.measurement import Measurement
+from models.tracking.overlooked import completed
 from models.tracking.prior import Prior
 from models.tracking.protocol import Posterior
 from models.tracking.sampling import correlated_pair, spread_points, systematic, thinned
@@ -34,35 +35,38 @@ BLEND = 0.15
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GridState:
-    """Everything measured, the kinds of history that count, the grid's frame, and the posterior's mass [kinds, levels,
-    rows, nodes] on it, summing to one."""
+    """Everything measured: the posterior is laid anew over the whole history, so nothing else is carried on."""
 
     prior: Prior
     history: History
-    kinds: Kinds
-    frame: Frame
-    mass: FloatArray
 
     def to_arrays(self) -> dict[str, FloatArray]:
         """The state as named arrays; `from_arrays` gives it back exactly."""
-        parts = {f.name: getattr(part, f.name) for part in (self.frame, self.kinds) for f in fields(part)}
-        return {"prior": self.prior.to_array(), "mass": self.mass} | parts | self.history.to_arrays()
+        return {"prior": self.prior.to_array()} | self.history.to_arrays()
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, FloatArray]) -> "GridState":
         """The inverse of `to_arrays`."""
-        return cls(
-            prior=Prior.from_array(arrays["prior"]),
-            history=History.from_arrays(arrays),
-            kinds=Kinds(**{field.name: arrays[field.name] for field in fields(Kinds)}),
-            frame=Frame(**{field.name: arrays[field.name] for field in fields(Frame)}),
-            mass=arrays["mass"],
-        )
+        return cls(prior=Prior.from_array(arrays["prior"]), history=History.from_arrays(arrays))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Laid:
+    """The kinds of history that count, the grid's frame, and the posterior's mass [kinds, levels, rows, nodes] on it,
+    summing to one."""
+
+    kinds: Kinds
+    frame: Frame
+    mass: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
-    """The filter: `nodes` of log τ on each of `rows` of log ε, at `levels` of log s; each at least 2."""
+    """The filter: `nodes` of log τ on each of `rows` of log ε, at `levels` of log s; each at least 2.
+
+    A measurement is noted, no more: the discrepancy is told in shares of what has been measured so far, so that with
+    every test all sums over the history are others. The grid is laid once, when its draws are asked for.
+    """
 
     nodes: int = 21
     rows: int = 21
@@ -74,49 +78,40 @@ class Grid:
         return "grid"
 
     def start(self, prior: Prior) -> GridState:
-        """The prior on its own range."""
+        """Nothing measured."""
         return self.from_history(prior, ())
 
     def update(self, state: GridState, measurement: Measurement, rng: np.random.Generator | None = None) -> GridState:  # noqa: ARG002
-        """The posterior with one more measurement, laid anew over the whole history; exact, so chance is not used."""
-        return self.laid_over(state.prior, state.history.append(measurement, state.prior))
-
-    def from_history(
-        self, prior: Prior, measurements: Sequence[Measurement], table: FloatArray | None = None
-    ) -> GridState:
-        """The posterior of all measurements at once: the same as `update` with one after another, bit for bit.
-
-        `table` may hold `basis(prior, progress)`, to be shared by series that have φ, ε and the progress in common.
-        """
-        return self.laid_over(prior, History.of(measurements, prior), table)
+        """One more measurement; exact, so chance is not used."""
+        return GridState(prior=state.prior, history=state.history.append(measurement, state.prior))
 
     @staticmethod
-    def basis(prior: Prior, progress: FloatArray) -> FloatArray:
-        """The first coarse grid's table of b, [t, cells], at progress [t]; it depends on the prior of φ and ε
-        alone."""
-        return np.asarray(lattice.tabled(lattice.whole(prior), lattice.FIRST, progress)[0])
+    def from_history(prior: Prior, measurements: Sequence[Measurement]) -> GridState:
+        """All measurements at once: the same as `update` with one after another, bit for bit."""
+        return GridState(prior=prior, history=History.of(measurements, prior))
 
-    def laid_over(self, prior: Prior, history: History, table: FloatArray | None = None) -> GridState:
-        """`from_history` for measurements that are columns already."""
-        kinds, frame = lattice.closed_in(prior, history, table)
+    def laid(self, state: GridState) -> Laid:
+        """The posterior of everything measured."""
+        prior, history = state.prior, state.history
+        kinds, frame = completed(prior, history, *lattice.closed_in(prior, history))
         frame = frame.resized(self.rows, self.levels)
         table = lattice.tabled(frame, self.nodes, history.progress)
         density = lattice.log_density(prior, history, kinds, frame, table)
         mass = np.exp(density - density.max()) * frame.cells(self.nodes)[:, None, :, None]
-        return GridState(prior=prior, history=history, kinds=kinds, frame=frame, mass=mass / mass.sum())
+        return Laid(kinds=kinds, frame=frame, mass=mass / mass.sum())
 
     def posterior(self, state: GridState, size: int, rng: np.random.Generator) -> Posterior:
         """`size` draws: systematic over the cells, evenly spread within them, weighted by the exact density."""
-        prior, history = state.prior, state.history
+        prior, history, laid = state.prior, state.history, self.laid(state)
         offset = rng.random(7)
         count = size * min(max(MANY // max(history.progress.size, 1), 1), OVERSAMPLING)
         uniform = spread_points(count, offset[:5])
-        chance = _blended(state.mass)
+        chance = _blended(laid.mass)
         cell = np.unravel_index(systematic(chance.ravel(), count, float(offset[5])), chance.shape)
-        points, volume = _placed(state, cell, uniform[:, :3])
+        points, volume = _placed(laid, cell, uniform[:, :3])
         sums, terms = pointwise(history, prior, points)
         density = evidence(sums, prior) + prior.log_density(points.log_scale, points.log_exponent, points.log_scatter)
-        density += state.kinds.log_weight[cell[0]]
+        density += laid.kinds.log_weight[cell[0]]
         weight = np.exp(density - density.max()) * volume / chance[cell]
         given = conditional(sums, prior)
         pair = correlated_pair(ndtri(uniform[:, 3:]), given.initial_variance, given.change_variance, given.covariance)
@@ -151,9 +146,9 @@ def _blended(mass: FloatArray) -> FloatArray:
     return np.ascontiguousarray(blended)
 
 
-def _placed(state: GridState, cell: tuple[NDArray[np.intp], ...], uniform: FloatArray) -> tuple[Points, FloatArray]:
+def _placed(laid: Laid, cell: tuple[NDArray[np.intp], ...], uniform: FloatArray) -> tuple[Points, FloatArray]:
     """Points placed within their cells by uniform numbers [n, 3], and the volume that each stands for [n]."""
-    frame, (kind, level, row, node) = state.frame, cell
+    frame, (kind, level, row, node) = laid.frame, cell
     log_scatter = _within(frame.log_scatter, kind, level, uniform[:, 0])
     log_exponent = _within(frame.log_exponent, kind, row, uniform[:, 1])
     lower, upper = np.empty(kind.size), np.empty(kind.size)
@@ -161,15 +156,15 @@ def _placed(state: GridState, cell: tuple[NDArray[np.intp], ...], uniform: Float
         here = kind == each
         lower[here] = np.interp(log_exponent[here], frame.log_exponent[each], frame.lower[each])
         upper[here] = np.interp(log_exponent[here], frame.log_exponent[each], frame.upper[each])
-    nodes = state.mass.shape[3]
+    nodes = laid.mass.shape[3]
     steps = np.ptp(frame.log_exponent, axis=1) * np.ptp(frame.log_scatter, axis=1)
     log_rate = lower + (upper - lower) * (node + uniform[:, 2] - 0.5) / (nodes - 1)
     points = Points(
         log_scale=log_rate + log_exponent,
         log_exponent=log_exponent,
         log_scatter=log_scatter,
-        size=state.kinds.size[kind],
-        spoiled=state.kinds.spoiled[kind].T,
+        size=laid.kinds.size[kind],
+        spoiled=laid.kinds.spoiled[kind].T,
     )
     return points, (upper - lower) * steps[kind]
 

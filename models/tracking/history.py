@@ -27,21 +27,18 @@ class History:
     @classmethod
     def of(cls, measurements: Sequence[Measurement], prior: Prior) -> "History":
         """The columns of a sequence of measurements, possibly empty, with the variance of their resolution added."""
-        rows = np.array([(m.progress, m.value, m.variance, m.epoch) for m in measurements], dtype=np.float64).reshape(
-            -1, 4
-        )
-        resolution = RESOLUTION * math.hypot(prior.initial_sd, prior.change_sd)
-        return cls(
-            progress=rows[:, 0].copy(),
-            value=rows[:, 1].copy(),
-            variance=rows[:, 2] + resolution**2,
-            epoch=rows[:, 3].copy(),
-        )
+        rows = np.array([_row(m, prior) for m in measurements], dtype=np.float64).reshape(-1, 4)
+        return cls(**{field.name: rows[:, column].copy() for column, field in enumerate(fields(cls))})
 
     def append(self, measurement: Measurement, prior: Prior) -> "History":
         """A history with one more measurement."""
-        more = History.of([measurement], prior)
-        return History(**{f.name: np.append(getattr(self, f.name), getattr(more, f.name)) for f in fields(self)})
+        progress, value, variance, epoch = _row(measurement, prior)
+        return History(
+            progress=np.append(self.progress, progress),
+            value=np.append(self.value, value),
+            variance=np.append(self.variance, variance),
+            epoch=np.append(self.epoch, epoch),
+        )
 
     @property
     def span(self) -> float:
@@ -62,3 +59,8 @@ class History:
     def from_arrays(cls, arrays: dict[str, FloatArray]) -> "History":
         """The inverse of `to_arrays`."""
         return cls(**{field.name: arrays[field.name] for field in fields(cls)})
+
+
+def _row(measurement: Measurement, prior: Prior) -> tuple[float, float, float, int]:
+    resolution = RESOLUTION * math.hypot(prior.initial_sd, prior.change_sd)
+    return measurement.progress, measurement.value, measurement.variance + resolution**2, measurement.epoch

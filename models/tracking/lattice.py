@@ -10,7 +10,8 @@ where the mass is, the next is laid there, until nothing shrinks any more. A coa
 so every measurement is blurred on it by about what the model changes from node to node.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,7 +139,7 @@ def log_density(
     return np.asarray(found + flat + kinds.log_weight[:, None, None, None])
 
 
-def closed_in(prior: Prior, history: History, table: FloatArray | None) -> tuple[Kinds, Frame]:
+def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame]:
     """The kinds and regions that hold the posterior's mass, by coarse lattices laid over what the last one left."""
     first = whole(prior)
     if history.value.size == 0:
@@ -146,11 +147,11 @@ def closed_in(prior: Prior, history: History, table: FloatArray | None) -> tuple
         return kinds, first.taken(np.zeros(kinds.size.size, dtype=np.intp))
     nodes, rows, levels = COARSE
     share = BLUR * float(np.ptp(history.value))
-    table = tabled(first, FIRST, history.progress)[0] if table is None else table
+    table = tabled(first, FIRST, history.progress)[0]
     blur = share * float((first.upper - first.lower).max()) / (FIRST - 1)
     kinds, density = _first(prior, history, first, table, blur)
-    frame = _shrunk(first.taken(np.zeros(kinds.size.size, dtype=np.intp)), density)
-    kinds, frame = _weighty(kinds, frame.resized(rows, levels), _log_mass(density, first.cells(FIRST)), NEGLIGIBLE)
+    frame = shrunk(first.taken(np.zeros(kinds.size.size, dtype=np.intp)), density)
+    kinds, frame = _weighty(kinds, frame.resized(rows, levels), log_masses(density, first.cells(FIRST)), NEGLIGIBLE)
     shares, left = np.full(kinds.size.size, share), np.ones(kinds.size.size, dtype=bool)
     log_mass = np.zeros(kinds.size.size)
     for _ in range(CLOSINGS):
@@ -161,8 +162,8 @@ def closed_in(prior: Prior, history: History, table: FloatArray | None) -> tuple
         widest = (wide.upper - wide.lower).max(axis=1)
         blurs = shares[now] * widest / (nodes - 1)
         density = log_density(prior, history, kinds.taken(now), wide, tabled(wide, nodes, history.progress), blurs)
-        closer = _shrunk(wide, density)
-        log_mass[now] = _log_mass(density, wide.cells(nodes))
+        closer = shrunk(wide, density)
+        log_mass[now] = log_masses(density, wide.cells(nodes))
         settled = _shrinkage(wide, closer) > WORTHWHILE
         left[now] = ~(settled & (blurs < 0.5 * np.exp(closer.log_scatter.mean(axis=1))))
         shares[now] *= np.where(settled, 0.3, 1.0)
@@ -214,11 +215,22 @@ def _chosen(prior: Prior, frame: Frame, table: FloatArray, log_mass: FloatArray,
     return at(drawn, log_share), at(best, 0.0)
 
 
-def _log_mass(density: FloatArray, cells: FloatArray) -> FloatArray:
+def log_masses(density: FloatArray, cells: FloatArray) -> FloatArray:
     """The logarithm of the mass of each kind [k] on cells of volume [k, rows] or [1, rows]."""
     top = density.max(axis=(1, 2, 3))
     off = np.exp(density - top[:, None, None, None]).sum(axis=(1, 3))
     return np.asarray(top + np.log((off * cells).sum(axis=1)))
+
+
+Part = TypeVar("Part", Kinds, Frame)
+
+
+def joined(first: Part, second: Part) -> Part:
+    """The kinds of both, or their lattices, one after the other."""
+    columns = {
+        each.name: np.concatenate([getattr(one, each.name) for one in (first, second)]) for each in fields(first)
+    }
+    return replace(first, **columns)
 
 
 def _weighty(kinds: Kinds, frame: Frame, log_mass: FloatArray, depth: float) -> tuple[Kinds, Frame]:
@@ -227,7 +239,7 @@ def _weighty(kinds: Kinds, frame: Frame, log_mass: FloatArray, depth: float) -> 
     return kinds.taken(kept), frame.taken(kept)
 
 
-def _shrunk(frame: Frame, density: FloatArray) -> Frame:
+def shrunk(frame: Frame, density: FloatArray) -> Frame:
     """The rows, levels and intervals that hold mass, with a node to spare on either side; as many as before."""
     nodes = density.shape[3]
     by_row = density.max(axis=1)

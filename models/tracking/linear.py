@@ -132,10 +132,11 @@ def log_spoiled(prior: Prior, spoiled: FloatArray) -> FloatArray:
 def pointwise(history: History, prior: Prior, points: Points, table: FloatArray | None = None) -> tuple[Sums, Terms]:
     """The sums at n points, each [n], and what is left of the further terms; `table` may hold their b [t, n]."""
     b = basis(history.progress[:, None], points.log_scale, points.log_exponent) if table is None else table
-    r = (prior.spoiled_size * prior.size) ** 2 * points.spoiled
-    r += history.variance[:, None]
-    r += np.exp(2.0 * points.log_scatter)
-    np.divide(1.0, r, out=r)
+    d = np.multiply(points.spoiled, (prior.spoiled_size * prior.size) ** 2, out=np.empty(b.shape))
+    d += history.variance[:, None]
+    d += np.exp(2.0 * points.log_scatter)
+    log_r = -_log_product(d) - b.shape[0] * math.log(2.0 * math.pi)
+    r = np.divide(1.0, d, out=d)
     y = history.value - prior.initial_mean
     rb = r * b
     sums = Sums(
@@ -145,7 +146,7 @@ def pointwise(history: History, prior: Prior, points: Points, table: FloatArray 
         ry=y @ r,
         rby=y @ rb,
         ryy=y**2 @ r,
-        log_r=np.log(r).sum(axis=0) - y.size * math.log(2.0 * math.pi),
+        log_r=log_r,
     )
     z = columns(history)
     sd = column_sds(prior, points.size, history.steps.size)
@@ -158,6 +159,35 @@ def pointwise(history: History, prior: Prior, points: Points, table: FloatArray 
     cross = np.stack([r @ z, (r * y) @ z, rb @ z], axis=2)
     terms = _reduced(gram, cross, sd, where)
     return _without(sums, terms), terms
+
+
+def turned_last(
+    history: History, prior: Prior, points: Points, sums: Sums, last: FloatArray, plain: NDArray[np.intp]
+) -> Sums:
+    """The sums at the points `plain` where the last run, whose b is `last` [n], is taken to be spoiled and was not before.
+
+    For points without further terms alone: one run's share of each sum is exchanged.
+    """
+    d = history.variance[-1] + np.exp(2.0 * points.log_scatter[plain])
+    spoiled = d + (prior.spoiled_size * prior.size) ** 2
+    change, b = 1.0 / spoiled - 1.0 / d, last[plain]
+    y = float(history.value[-1]) - prior.initial_mean
+    return Sums(
+        r=sums.r[plain] + change,
+        rb=sums.rb[plain] + change * b,
+        rbb=sums.rbb[plain] + change * b**2,
+        ry=sums.ry[plain] + change * y,
+        rby=sums.rby[plain] + change * y * b,
+        ryy=sums.ryy[plain] + change * y**2,
+        log_r=sums.log_r[plain] + np.log(d / spoiled),
+    )
+
+
+def _log_product(d: FloatArray) -> FloatArray:
+    """The logarithm of the product along the first axis of [t, ...], eight factors at a time: these neither overflow nor
+    vanish where each lies within 1e±38."""
+    blocks = [np.log(np.multiply.reduce(d[start : start + 8], axis=0)) for start in range(0, d.shape[0], 8)]
+    return np.asarray(np.sum(blocks, axis=0)) if blocks else np.zeros(d.shape[1:])
 
 
 def tabulated(

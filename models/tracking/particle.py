@@ -23,7 +23,16 @@ from scipy.special import ndtri
 from models.arrays import FloatArray
 from models.tracking.discrepancy import PAST, SIZES, drawn, log_size_weight
 from models.tracking.history import History
-from models.tracking.linear import Points, basis, conditional, drawn_terms, evidence, log_spoiled, pointwise
+from models.tracking.linear import (
+    Points,
+    basis,
+    conditional,
+    drawn_terms,
+    evidence,
+    log_spoiled,
+    pointwise,
+    turned_last,
+)
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
 from models.tracking.protocol import Posterior
@@ -211,13 +220,27 @@ class _Bridge:
         as_sound = replace(cloud, spoiled=np.column_stack([cloud.spoiled, np.zeros(count)]))
         as_spoiled = replace(cloud, spoiled=np.column_stack([cloud.spoiled, np.ones(count)]))
         table = _table(self.after, cloud)
-        sound, spoiled = (_log_target(self.after, self.prior, each, table) for each in (as_sound, as_spoiled))
+        sound, spoiled = self._either_way(as_sound, as_spoiled, table)
         total = np.logaddexp(sound, spoiled)
         turned = np.log(rng.random(total.size)) < spoiled - total
         entered = _merged(as_sound, as_spoiled, turned)
         after = np.where(turned, spoiled, sound)
         before = cloud.log_target + _log_prior_of_last(self.prior, entered)
         return replace(entered, log_weight=cloud.log_weight + total - cloud.log_target), before, after
+
+    def _either_way(self, as_sound: Cloud, as_spoiled: Cloud, table: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The log targets with the new run sound and spoiled; where there are no further terms, by its share of the sums
+        alone."""
+        points = as_sound.placed()
+        sums, terms = pointwise(self.after, self.prior, points, table)
+        sound = evidence(sums, self.prior) + _log_prior(self.prior, as_sound)
+        spoiled, plain = np.empty(sound.size), np.setdiff1d(np.arange(sound.size), terms.where)
+        spoiled[plain] = evidence(turned_last(self.after, self.prior, points, sums, table[-1], plain), self.prior)
+        spoiled[plain] += _log_prior(self.prior, as_spoiled)[plain]
+        if terms.where.size:
+            some = as_spoiled.taken(terms.where)
+            spoiled[terms.where] = _log_target(self.after, self.prior, some, table[:, terms.where])
+        return sound, spoiled
 
     def log_before(self, cloud: Cloud, table: FloatArray) -> FloatArray:
         """The target before the new run, with the prior of what is believed of it; `table` is that of the runs after."""
@@ -236,9 +259,12 @@ def _table(history: History, cloud: Cloud) -> FloatArray:
 
 def _log_target(history: History, prior: Prior, cloud: Cloud, table: FloatArray) -> FloatArray:
     """Log posterior density of every particle, up to a constant."""
-    placed = cloud.placed()
+    return evidence(pointwise(history, prior, cloud.placed(), table)[0], prior) + _log_prior(prior, cloud)
+
+
+def _log_prior(prior: Prior, cloud: Cloud) -> FloatArray:
     flat = prior.log_density(*cloud.points.T) + log_size_weight(prior)[cloud.size.astype(np.intp)]
-    return evidence(pointwise(history, prior, placed, table)[0], prior) + flat + log_spoiled(prior, placed.spoiled)
+    return np.asarray(flat + log_spoiled(prior, cloud.spoiled.T))
 
 
 def _proposed(cloud: Cloud, shape: FloatArray, rng: np.random.Generator) -> Cloud:

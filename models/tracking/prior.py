@@ -37,7 +37,7 @@ class Prior:
     log_scatter_sd: float
     spoiled_share: float = 0.05
     spoiled_size: float = 0.1
-    law_share: float = 0.9
+    law_share: float = 0.95
     step_size: float = 0.05
 
     def __post_init__(self) -> None:

@@ -24,7 +24,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.degradation import progress_fraction
 from models.tracking.discrepancy import PAST, SIZES, at_end, drawn
-from models.tracking.grid import Grid
+from models.tracking.grid import Grid, GridState
 from models.tracking.history import History
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
@@ -165,7 +165,7 @@ class Ukf:
 
 def _started(prior: Prior, history: History) -> UkfState:
     """The normals with the moments of the exact posterior, by size, from evenly spread draws."""
-    draws = STARTER.posterior(STARTER.laid_over(prior, history), DRAWS, np.random.default_rng(0))
+    draws = STARTER.posterior(GridState(prior=prior, history=history), DRAWS, np.random.default_rng(0))
     reference = history.span
     size, course, step = _beside(draws)
     points = scaled(

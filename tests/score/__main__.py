@@ -5,15 +5,13 @@ tables take their place in docs/prognosis.md.
 """
 
 import argparse
-import re
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 from tests.score import off_prior, on_prior
+from tests.score.belief import belief
 from tests.score.fleets import fleets
-
-DOCS = Path(__file__).parents[2] / "docs" / "prognosis.md"
+from tests.score.table import written
 
 
 def main() -> None:
@@ -29,6 +27,7 @@ def main() -> None:
 
     seed = chosen.seed
     parts: dict[str, Callable[[], str]] = {
+        "belief": lambda: belief(lives(600), seed + 7),
         "calibration": lambda: on_prior.calibration(lives(1_000), seed),
         "exact": lambda: on_prior.beside_exact(lives(100), seed + 1),
         "spoiled": lambda: on_prior.calibration(lives(1_000), seed + 2, spoiled=0.1),
@@ -42,12 +41,7 @@ def main() -> None:
         table = parts[name]()
         print(f"\n### {name} ({time.monotonic() - start:.0f} s)\n\n{table}", flush=True)
         if chosen.write:
-            command = f"`make score PARTS={name} SIZE={chosen.size:g} SEED={seed}`"
-            block = f"<!-- score {name} -->\n{command}: {table}\n<!-- end -->"
-            text = DOCS.read_text()
-            DOCS.write_text(
-                re.sub(rf"<!-- score {name} -->.*?<!-- end -->", lambda _, b=block: b, text, flags=re.DOTALL)
-            )
+            written(name, f"make score PARTS={name} SIZE={chosen.size:g} SEED={seed}", table)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,10 @@
 """Scores of predictions by stage of life, and how they are written down."""
 
+import math
+import re
 from collections import defaultdict
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -9,13 +12,16 @@ from models.scoring import crps_of_sample, pit_histogram, pit_of_sample
 from models.tracking.protocol import Posterior
 from tests.statistical.lives import ends, interval
 
+DOCS = Path(__file__).parents[2] / "docs" / "prognosis.md"
+
 
 @dataclass(frozen=True)
 class Score:
-    """One prediction: CRPS and width of the 90 % interval as shares of the life, whether it held, whether it began
-    after the truth, and the truth's place in it."""
+    """One prediction: CRPS as a share of the life and of the logarithm of the end, the width of the 90 % interval as a
+    share of the life, whether it held, whether it began after the truth, and the truth's place in it."""
 
     crps: float
+    log_crps: float
     width: float
     held: bool
     late: bool
@@ -26,6 +32,7 @@ def score(posterior: Posterior, end: float) -> Score:
     sample, (low, high) = ends(posterior), interval(posterior)
     return Score(
         crps=crps_of_sample(sample, posterior.weight, end) / end,
+        log_crps=crps_of_sample(np.log(np.maximum(sample, 1.0)), posterior.weight, math.log(end)),
         width=(high - low) / end,
         held=low <= end <= high,
         late=low > end,
@@ -67,3 +74,13 @@ def percents(numbers: list[float]) -> str:
 
 def shares(numbers: list[float]) -> str:
     return " | ".join(f"{100 * number:.1f}" for number in numbers)
+
+
+def written(part: str, command: str, table: str) -> None:
+    """Put a table, under the command that made it, in its place in docs/prognosis.md."""
+    block = f"<!-- score {part} -->\n`{command}`: {table}\n<!-- end -->"
+    text = DOCS.read_text()
+    found, count = re.subn(rf"<!-- score {part} -->.*?<!-- end -->", lambda _: block, text, flags=re.DOTALL)
+    if count != 1:
+        raise SystemExit(f"docs/prognosis.md has {count} places for {part}")
+    DOCS.write_text(found)

@@ -197,10 +197,12 @@ def exact(
     tail = np.sqrt(4.0 / rng.chisquare(4.0, size=count))
     proposed = around + tail[:, None] * rng.standard_normal((count, 3)) @ root.T
     near = np.zeros(count)
+    middle = turned.mean(axis=0)
+    there, here = (np.linalg.solve(root, (each - middle).T).T for each in (turned, proposed))
     for chunk in np.array_split(np.arange(count), max(1, count // 500)):
-        off = np.linalg.solve(root, (proposed[chunk, None, :] - turned).reshape(-1, 3).T)
-        distance = np.square(off).sum(axis=0).reshape(chunk.size, -1)
-        near[chunk] = np.log(((1.0 + distance / 4.0) ** -3.5) @ share)
+        apart = np.square(here[chunk]).sum(axis=1)[:, None] + np.square(there).sum(axis=1) - 2.0 * here[chunk] @ there.T
+        tails = 1.0 + np.maximum(apart, 0.0) / 4.0
+        near[chunk] = np.log((1.0 / (tails * tails * tails * np.sqrt(tails))) @ share)
     sizes = 0.9 * np.bincount(cloud.size.astype(int), weights=share, minlength=SIZES.size) + 0.1 / SIZES.size
     sets, which = np.unique(cloud.spoiled, axis=0, return_inverse=True)
     chances = np.bincount(which.ravel(), weights=share)

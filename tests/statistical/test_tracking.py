@@ -177,7 +177,7 @@ def coverage(count: int, seed: int, belief: Prior, spoiled: float = 0.0) -> dict
 def test_nine_in_ten_ends_of_life_lie_in_the_interval() -> None:
     """150 lives leave a deviation of 2.4 points; `make score` takes 1,000. Stopped at shares of the truth, unknown to
     the filter. Lives that follow eq. 6 alone are held a little more often than nine times in ten, for the filter keeps a
-    tenth of its belief for those that do not."""
+    twentieth of its belief for those that do not."""
     found = coverage(150, 600, PRIOR)
     print("coverage", found)
     assert all(0.84 < share < 0.98 for share in found.values())

@@ -148,7 +148,8 @@ def test_a_course_ends_friction_at_most_and_does_not_turn_it(warm):
     curve = m_s * (1 + (ratio - 1) * np.exp(-v_s / v)) + c_v * v**0.3
     assert np.allclose(found, -curve.reshape(PRESSURE.size, -1).mean(axis=1))
     # the control: half of it is half of it
-    half = extension_of(warm, ("running_in", -0.5, (float(np.log(1e4)), 1.0))).course(np.zeros(1), PRESSURE, VELOCITY)[0]
+    less = extension_of(warm, ("running_in", -0.5, (float(np.log(1e4)), 1.0)))
+    half = less.course(np.zeros(1), PRESSURE, VELOCITY)[0]
     assert np.allclose(half, 0.5 * found)
 
 
