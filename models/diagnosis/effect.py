@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TypeAlias
 
+import numpy as np
+
 from models.arrays import FloatArray
 from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
@@ -111,3 +113,13 @@ def unit_change(effect: Effect, scene: Scene, shape: Shape) -> FloatArray:
     """The change [P] Nm of a small amplitude, per unit: the column that a linear screen works with."""
     step = 1e-3 * effect.prior_sd
     return effect.change(scene, step, shape) / step
+
+
+def untried(_facts: Facts) -> tuple[Tried, ...]:
+    """No shapes: what a smooth model does not show is judged on raw records (`models.diagnosis.raw`)."""
+    return ()
+
+
+def unchanged(scene: Scene, _amplitude: float, _shape: Shape) -> FloatArray:
+    """No change [P] Nm of what is averaged over a plateau or a loop's bin."""
+    return np.zeros_like(scene.curve)

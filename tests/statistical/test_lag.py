@@ -64,7 +64,7 @@ def _records(law: Law, records: int) -> Iterator[tuple]:
         yield value, area, area_of(cycle, samples), fit_lag(law, cycle, samples.phase, samples.torque, curve)
 
 
-@pytest.mark.parametrize(("law", "records"), [(ATTRACTOR, 1000), (SQUEEZE_FILM, 500)], ids=["attractor", "film"])
+@pytest.mark.parametrize(("law", "records"), [(ATTRACTOR, 1000), (SQUEEZE_FILM, 300)], ids=["attractor", "film"])
 def test_intervals_hold_what_they_promise(law, records):
     """C over 50 to 500 Nm/s (the interval of 1/C, open where C is only bounded), τ_1 over 0.02 to 0.3 s, the area."""
     held, held_area, halved, low, high = 0, 0, 0, 0, 0
@@ -84,8 +84,8 @@ def test_intervals_hold_what_they_promise(law, records):
     assert halved / records < COVERAGE - 5 * WITHIN
 
 
-@pytest.mark.parametrize("law", [ATTRACTOR, SQUEEZE_FILM], ids=["attractor", "film"])
-def test_intervals_hold_what_they_promise_with_curves_that_were_fitted(law):
+@pytest.mark.parametrize(("law", "records"), [(ATTRACTOR, 400), (SQUEEZE_FILM, 200)], ids=["attractor", "film"])
+def test_intervals_hold_what_they_promise_with_curves_that_were_fitted(law, records):
     """The curve is that of a stationary test of 40 speeds with 0.3 to 1 % noise, not the true one.
 
     Where all parameters of the curve are determined the interval holds 90 %; where some are not, their deviations are
@@ -94,7 +94,7 @@ def test_intervals_hold_what_they_promise_with_curves_that_were_fitted(law):
     rng = np.random.default_rng([SEED, 2])
     speeds = GEOMETRY.sliding_velocity(np.arange(20.0, 1971.0, 50.0) * np.pi / 30)
     held: dict[str, list[bool]] = {"determined": [], "undetermined": [], "taken for exact": []}
-    for number, (value, law_of, samples, cycle) in enumerate(_loops(law, 400, rng)):
+    for number, (value, law_of, samples, cycle) in enumerate(_loops(law, records, rng)):
         truth = 1 / value if law is ATTRACTOR else value
         noise = np.exp(rng.uniform(*np.log([0.003, 0.01]))) * rng.standard_normal(speeds.size)
         stationary = Curve(
@@ -104,7 +104,7 @@ def test_intervals_hold_what_they_promise_with_curves_that_were_fitted(law):
         curve = StationaryCurve(parameters=fitted.parameters, covariance=fitted.covariance)
         low, high = fit_lag(law, cycle, samples.phase, samples.torque, curve).interval
         held["undetermined" if fitted.undetermined else "determined"].append(low <= truth <= high)
-        if number < 200:
+        if number < records // 2:
             exact = StationaryCurve(parameters=fitted.parameters)
             low, high = fit_lag(law, cycle, samples.phase, samples.torque, exact).interval
             held["taken for exact"].append(low <= truth <= high)

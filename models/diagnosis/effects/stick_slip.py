@@ -1,20 +1,6 @@
 """Self-excited vibration of the driveline at low speed; it stands in raw records."""
 
-import numpy as np
-
-from models.arrays import FloatArray
-from models.diagnosis.effect import Effect, Family, Kind, Shape, Tried
-from models.diagnosis.facts import Facts
-from models.diagnosis.laws import Scene
-
-
-def _grid(_facts: Facts) -> tuple[Tried, ...]:
-    return ()  # judged on raw records (models.diagnosis.raw)
-
-
-def _change(scene: Scene, _amplitude: float, _shape: Shape) -> FloatArray:
-    return np.zeros_like(scene.curve)
-
+from models.diagnosis.effect import Effect, Family, Kind, unchanged, untried
 
 EFFECT = Effect(
     slug="stick_slip",
@@ -31,8 +17,8 @@ EFFECT = Effect(
     positive=True,
     scale=1.0,
     shapes=(),
-    grid=_grid,
-    change=_change,
+    grid=untried,
+    change=unchanged,
     before_lag=False,
     bends=(),
     tests={
