@@ -17,6 +17,7 @@ _DIGITS = 5
 
 _AXES = {
     "pressure_bar": "pressure",
+    "torque_nm": "the torque itself",
     "speed_rpm": "speed",
     "cycles": "cycles",
     "test_clock_s": "the time since the test began",

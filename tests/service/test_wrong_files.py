@@ -112,7 +112,7 @@ def test_a_file_cut_off_at_random_places(
     service: Watched, tmp_path: Path, write: Callable[..., Path], name: str
 ) -> None:
     whole = write(tmp_path / name, record(400), units=UNITS).read_bytes()
-    for place in np.random.default_rng(20131113).integers(1, len(whole), 25).tolist():
+    for place in np.random.default_rng(20131113).integers(1, len(whole), 12).tolist():
         service.refuse(whole[:place], name=name)
 
 
