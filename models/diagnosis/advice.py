@@ -30,6 +30,8 @@ from models.diagnosis.whitening import Noise
 #: Tests advised at most; what one must bring [nats] to be worth its time (where none does, the best one with LEAST is
 #: named); what decides a pair.
 MOST, WORTH, LEAST, DECIDED = 3, 3.0, 0.1, 15.0
+#: What brings less than this share of the best one's nats is not advised beside it.
+FAINT = 0.02
 _NONE = "baseline"
 
 
@@ -73,7 +75,8 @@ def advise(campaign: Campaign, design: Design, noise: Noise, priors: Priors, fit
                 found.append(advice)
         ranked = [advice for _, advice in sorted(found, key=lambda each: each[0], reverse=True)]
         first = _thermometer(campaign, design, noise, priors, fits[0], causes)
-    worthy = [advice for advice in ranked if advice.nats >= WORTH] or ranked[:1]
+    least = max(WORTH, FAINT * max((advice.nats for advice in ranked), default=0.0))
+    worthy = [advice for advice in ranked if advice.nats >= least] or ranked[:1]
     return (*first, *worthy)[:MOST]
 
 

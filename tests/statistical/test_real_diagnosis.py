@@ -18,7 +18,7 @@ def test_traction_sweeps_get_no_name(count):
     assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
     assert report.causes == ()
     assert report.extension is None
-    # what is off is the curve's shape at the lowest speeds (where torque is a function of speed), and that the branches differ
+    # what is off is the curve's shape at the lowest speeds, where torque follows speed, and that the branches differ
     assert report.baseline is not None
     assert {each.axis for each in report.baseline.where[:3]} == {"speed_rpm", "torque_nm", "test_clock_s"}
     assert all(each.p_value < 1e-6 for each in report.baseline.where[:3])
