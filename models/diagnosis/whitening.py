@@ -7,7 +7,6 @@ predicted torque on the curve's (run's) rows. R is an ARMA(1, 1) process, whiten
 rank-one terms (Woodbury), whitened by shrinking along one direction.
 """
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,22 +38,26 @@ class Noise:
 
 def whitened(columns: FloatArray, design: Design, noise: Noise) -> FloatArray:
     """R^{-1/2} D^{-1} of columns [N, m]: everything but the gains."""
-    scaled = columns / noise.deviation[:, None]
-    out = np.empty_like(scaled)
+    out = columns / noise.deviation[:, None]
     for rows, correlation in _blocks(design, noise):
-        out[rows] = _filtered(scaled[rows], correlation)
+        out[rows] = _filtered(out[rows], correlation)
     return out
 
 
-def _blocks(design: Design, noise: Noise) -> list[tuple[slice, Correlation]]:
-    """Runs of plateaus and loops: rows that follow each other."""
+def _blocks(design: Design, noise: Noise) -> list[tuple[IntArray, Correlation]]:
+    """Runs of plateaus and loops [b, n]: rows that follow each other, those of one length together; none where neighbours
+    are independent."""
     owner = np.where(design.rows.steady, design.rows.run, design.rows.loop + len(design.runs))
     edges = np.concatenate([[0], np.flatnonzero(np.diff(owner)) + 1, [owner.size]])
-    return [
-        (slice(int(a), int(b)), noise.plateaus if a < design.plateaus else noise.loops)
-        for a, b in itertools.pairwise(edges)
-        if b > a
-    ]
+    starts, lengths = edges[:-1], np.diff(edges)
+    found = []
+    for correlation, mine in ((noise.plateaus, starts < design.plateaus), (noise.loops, starts >= design.plateaus)):
+        if correlation.step == 0.0 or correlation.share == 0.0:
+            continue
+        for length in np.unique(lengths[mine & (lengths > 0)]):
+            first = starts[mine & (lengths == length)]
+            found.append((first[:, None] + np.arange(length), correlation))
+    return found
 
 
 def arma(correlation: Correlation) -> tuple[float, float]:
@@ -69,15 +72,14 @@ def arma(correlation: Correlation) -> tuple[float, float]:
     return float(theta), float(np.sqrt(max(one / theta, 1e-12)))
 
 
-def _filtered(block: FloatArray, correlation: Correlation) -> FloatArray:
-    if correlation.step == 0.0 or correlation.share == 0.0:
-        return block
+def _filtered(blocks: FloatArray, correlation: Correlation) -> FloatArray:
+    """Blocks [b, n, m] whitened along n."""
     theta, scale = arma(correlation)
-    out = np.empty_like(block)
-    out[0] = block[0]
-    first = scale * block[0]  # as if the first innovation were all of x_0
-    start = (-correlation.step * block[0] - theta * first)[None]
-    out[1:] = lfilter([1.0, -correlation.step], [1.0, theta], block[1:], axis=0, zi=start)[0] / scale
+    out = np.empty_like(blocks)
+    out[:, 0] = blocks[:, 0]
+    first = scale * blocks[:, :1]  # as if the first innovation were all of x_0
+    start = -correlation.step * blocks[:, :1] - theta * first
+    out[:, 1:] = lfilter([1.0, -correlation.step], [1.0, theta], blocks[:, 1:], axis=1, zi=start)[0] / scale
     return out
 
 
