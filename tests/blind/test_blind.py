@@ -81,7 +81,6 @@ def test_where_nothing_is_hidden_nothing_is_found(nothing: list[Outcome]) -> Non
 
 #: What the diagnosis does not reach yet, and why; docs/diagnosis.md says so too.
 SHORT = {
-    "vibration": "lines in records of loops alone are seen from λ of some hundreds on",
     "viscous": "drag, the viscous exponent and heating of the interface are told apart too seldom",
 }
 
