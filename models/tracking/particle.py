@@ -17,22 +17,13 @@ A. Doucet, A. Jasra, "Sequential Monte Carlo samplers", J. R. Statist. Soc. B 68
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from models.arrays import FloatArray
+from models.tracking.cloud import Bridge, Cloud, effective, log_target_of, merged, table_of, weights
 from models.tracking.discrepancy import PAST, SIZES, drawn, log_size_weight
 from models.tracking.history import History
-from models.tracking.linear import (
-    Points,
-    basis,
-    conditional,
-    drawn_terms,
-    evidence,
-    log_spoiled,
-    pointwise,
-    turned_last,
-)
+from models.tracking.linear import conditional, drawn_terms, pointwise
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
 from models.tracking.protocol import Posterior
@@ -48,33 +39,6 @@ TIMID, SHORTER = 0.2, 0.5
 RESIZED, TURNED = 0.25, 0.1
 #: Degrees by which a measurement may be let in, and halvings in the search for each.
 DEGREES, HALVINGS = 30, 20
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Cloud:
-    """n particles: points [n, 3] of (log φ, log ε, log s), size [n] an index into SIZES, spoiled [n, t] (0, 1),
-    log_weight [n] and log_target [n] (log prior plus evidence)."""
-
-    points: FloatArray
-    size: FloatArray
-    spoiled: FloatArray
-    log_weight: FloatArray
-    log_target: FloatArray
-
-    def taken(self, index: NDArray[np.intp]) -> "Cloud":
-        """The particles at `index`, with equal weights."""
-        cloud = Cloud(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
-        return replace(cloud, log_weight=np.zeros(index.size))
-
-    def placed(self) -> Points:
-        """The particles as points of the closed form."""
-        return Points(
-            log_scale=self.points[:, 0],
-            log_exponent=self.points[:, 1],
-            log_scatter=self.points[:, 2],
-            size=SIZES[self.size.astype(np.intp)],
-            spoiled=self.spoiled.T,
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,12 +90,12 @@ class Particle:
             log_target=np.zeros(self.particles),
         )
         nothing = History.of((), prior)
-        target = _log_target(nothing, prior, cloud, _table(nothing, cloud))
+        target = log_target_of(nothing, prior, cloud, table_of(nothing, cloud))
         return ParticleState(prior=prior, history=nothing, cloud=replace(cloud, log_target=target))
 
     def update(self, state: ParticleState, measurement: Measurement, rng: np.random.Generator) -> ParticleState:
         """The posterior with one more measurement."""
-        bridge = _Bridge(state.prior, state.history, state.history.append(measurement, state.prior))
+        bridge = Bridge(state.prior, state.history, state.history.append(measurement, state.prior))
         cloud, before, after = bridge.entered(state.cloud, rng)
         held, degree = 1.0, 0.0
         for attempt in range(DEGREES):
@@ -140,7 +104,7 @@ class Particle:
             degree = 1.0 if attempt == DEGREES - 1 else _next_degree(start, gap, degree)
             log_weight = start + degree * gap
             cloud = replace(cloud, log_weight=log_weight - log_weight.max())
-            if degree < 1.0 or _effective(cloud.log_weight) < HEALTHY * self.particles:
+            if degree < 1.0 or effective(cloud.log_weight) < HEALTHY * self.particles:
                 cloud, before, after = self._renewed(bridge, cloud, before, after, degree, rng)
             if degree == 1.0:
                 break
@@ -149,7 +113,7 @@ class Particle:
 
     def _renewed(
         self,
-        bridge: "_Bridge",
+        bridge: Bridge,
         cloud: Cloud,
         before: FloatArray,
         after: FloatArray,
@@ -157,7 +121,7 @@ class Particle:
         rng: np.random.Generator,
     ) -> tuple[Cloud, FloatArray, FloatArray]:
         """Resampled, and moved by steps of a random walk shaped like the cloud; with both targets of each particle."""
-        weight = _weights(cloud.log_weight)
+        weight = weights(cloud.log_weight)
         off = cloud.points - weight @ cloud.points
         shape = _root((weight * off.T) @ off)
         index = systematic(weight, weight.size, float(rng.random()))
@@ -165,14 +129,14 @@ class Particle:
         moved, reach = np.zeros(weight.size, dtype=bool), 1.0
         for _ in range(self.moves):
             proposed = _proposed(cloud, reach * shape, rng)
-            table = _table(bridge.after, proposed)
-            offered_after = _log_target(bridge.after, bridge.prior, proposed, table)
+            table = table_of(bridge.after, proposed)
+            offered_after = log_target_of(bridge.after, bridge.prior, proposed, table)
             offered_before = before if degree == 1.0 else bridge.log_before(proposed, table)
             gain = degree * (offered_after - after)
             if degree < 1.0:
                 gain += (1.0 - degree) * (offered_before - before)
             accepted = np.log(rng.random(weight.size)) < gain
-            cloud = _merged(cloud, proposed, accepted)
+            cloud = merged(cloud, proposed, accepted)
             after = np.where(accepted, offered_after, after)
             before = np.where(accepted, offered_before, before)
             moved |= accepted
@@ -184,7 +148,7 @@ class Particle:
     def posterior(self, state: ParticleState, size: int, rng: np.random.Generator) -> Posterior:
         """`size` draws of equal weight: systematic over the particles, with evenly spread draws of (ξ0, Δ)."""
         cloud, offset = state.cloud, rng.random(3)
-        index = systematic(_weights(cloud.log_weight), size, float(offset[2]))
+        index = systematic(weights(cloud.log_weight), size, float(offset[2]))
         points = cloud.taken(index).placed()
         sums, terms = pointwise(state.history, state.prior, points)
         given = conditional(sums, state.prior)
@@ -203,68 +167,6 @@ class Particle:
             scatter=np.exp(points.log_scatter),
             discrepancy=drawn(state.history, state.prior, points.size, further, rng),
         )
-
-
-@dataclass(frozen=True, slots=True)
-class _Bridge:
-    """From the posterior of one history to that of the next, which has one measurement more."""
-
-    prior: Prior
-    before: History
-    after: History
-
-    def entered(self, cloud: Cloud, rng: np.random.Generator) -> tuple[Cloud, FloatArray, FloatArray]:
-        """The particles with a belief about the new run, drawn from its posterior given the rest of each; and their log
-        targets before (with the prior of that belief) and after."""
-        count = cloud.size.size
-        as_sound = replace(cloud, spoiled=np.column_stack([cloud.spoiled, np.zeros(count)]))
-        as_spoiled = replace(cloud, spoiled=np.column_stack([cloud.spoiled, np.ones(count)]))
-        table = _table(self.after, cloud)
-        sound, spoiled = self._either_way(as_sound, as_spoiled, table)
-        total = np.logaddexp(sound, spoiled)
-        turned = np.log(rng.random(total.size)) < spoiled - total
-        entered = _merged(as_sound, as_spoiled, turned)
-        after = np.where(turned, spoiled, sound)
-        before = cloud.log_target + _log_prior_of_last(self.prior, entered)
-        return replace(entered, log_weight=cloud.log_weight + total - cloud.log_target), before, after
-
-    def _either_way(self, as_sound: Cloud, as_spoiled: Cloud, table: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The log targets with the new run sound and spoiled; where there are no further terms, by its share of the sums
-        alone."""
-        points = as_sound.placed()
-        sums, terms = pointwise(self.after, self.prior, points, table)
-        sound = evidence(sums, self.prior) + _log_prior(self.prior, as_sound)
-        spoiled, plain = np.empty(sound.size), np.setdiff1d(np.arange(sound.size), terms.where)
-        spoiled[plain] = evidence(turned_last(self.after, self.prior, points, sums, table[-1], plain), self.prior)
-        spoiled[plain] += _log_prior(self.prior, as_spoiled)[plain]
-        if terms.where.size:
-            some = as_spoiled.taken(terms.where)
-            spoiled[terms.where] = _log_target(self.after, self.prior, some, table[:, terms.where])
-        return sound, spoiled
-
-    def log_before(self, cloud: Cloud, table: FloatArray) -> FloatArray:
-        """The target before the new run, with the prior of what is believed of it; `table` is that of the runs after."""
-        without = replace(cloud, spoiled=cloud.spoiled[:, :-1])
-        return _log_target(self.before, self.prior, without, table[:-1]) + _log_prior_of_last(self.prior, cloud)
-
-
-def _log_prior_of_last(prior: Prior, cloud: Cloud) -> FloatArray:
-    return log_spoiled(prior, cloud.spoiled[:, -1:].T)
-
-
-def _table(history: History, cloud: Cloud) -> FloatArray:
-    """b of every run and particle, [t, n]."""
-    return basis(history.progress[:, None], cloud.points[:, 0], cloud.points[:, 1])
-
-
-def _log_target(history: History, prior: Prior, cloud: Cloud, table: FloatArray) -> FloatArray:
-    """Log posterior density of every particle, up to a constant."""
-    return evidence(pointwise(history, prior, cloud.placed(), table)[0], prior) + _log_prior(prior, cloud)
-
-
-def _log_prior(prior: Prior, cloud: Cloud) -> FloatArray:
-    flat = prior.log_density(*cloud.points.T) + log_size_weight(prior)[cloud.size.astype(np.intp)]
-    return np.asarray(flat + log_spoiled(prior, cloud.spoiled.T))
 
 
 def _proposed(cloud: Cloud, shape: FloatArray, rng: np.random.Generator) -> Cloud:
@@ -286,31 +188,13 @@ def _proposed(cloud: Cloud, shape: FloatArray, rng: np.random.Generator) -> Clou
 def _next_degree(start: FloatArray, gap: FloatArray, degree: float) -> float:
     """The largest β, 1 if possible, at which weights start + β · gap do not starve the cloud."""
     enough = STARVED * start.size
-    if _effective(start + gap) >= enough:
+    if effective(start + gap) >= enough:
         return 1.0
     low, high = degree, 1.0
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if _effective(start + middle * gap) >= enough else (low, middle)
+        low, high = (middle, high) if effective(start + middle * gap) >= enough else (low, middle)
     return low if low > degree else degree + (1.0 - degree) * 2.0**-HALVINGS
-
-
-def _merged(old: Cloud, new: Cloud, accepted: NDArray[np.bool_]) -> Cloud:
-    columns = {}
-    for field in fields(Cloud):
-        kept, offered = getattr(old, field.name), getattr(new, field.name)
-        columns[field.name] = np.where(accepted if kept.ndim == 1 else accepted[:, None], offered, kept)
-    return Cloud(**columns)
-
-
-def _weights(log_weight: FloatArray) -> FloatArray:
-    weight = np.exp(log_weight - log_weight.max())
-    return np.asarray(weight / weight.sum())
-
-
-def _effective(log_weight: FloatArray) -> float:
-    """Effective number of particles, (Σw)²/Σw²."""
-    return float(1.0 / np.square(_weights(log_weight)).sum())
 
 
 def _root(covariance: FloatArray) -> FloatArray:

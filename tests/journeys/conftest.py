@@ -5,7 +5,9 @@ from pathlib import Path
 
 import httpx2
 import pytest
+from playwright.sync_api import Browser
 
+from tests.browser.driving import chromium
 from tests.support import Server, serving
 
 
@@ -20,4 +22,11 @@ def server(tmp_path: Path) -> Iterator[Server]:
 def http(server: Server) -> Iterator[httpx2.Client]:
     """A client for it."""
     with httpx2.Client(base_url=server.url, timeout=60) as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """A headless Chromium for the pages of a module."""
+    with chromium() as found:
         yield found

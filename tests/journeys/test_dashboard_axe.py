@@ -8,7 +8,7 @@ import pytest
 from axe_playwright_python.base import AXE_SCRIPT
 from playwright.sync_api import Browser, Page
 
-from tests.browser.driving import Watched, chromium, serving_with_engine
+from tests.browser.driving import Watched, serving_with_engine
 from tests.browser.lives import worn
 
 pytestmark = pytest.mark.browser
@@ -16,12 +16,6 @@ pytestmark = pytest.mark.browser
 ENGINE = "tests.service.stand_in_engine:diagnose"
 PHONE = {"width": 390, "height": 844}
 WIDE = {"width": 1360, "height": 900}
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")

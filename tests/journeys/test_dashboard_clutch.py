@@ -12,7 +12,7 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
-from tests.browser.driving import Watched, chromium, launched
+from tests.browser.driving import Watched, launched
 from tests.browser.lives import demo, post
 from tests.browser.pixels import seen
 from tests.support import Server, serving, stationary
@@ -34,12 +34,6 @@ CHARTS = {
     "loop-curves": "Loops: torque over speed",
     "loop-areas": "Loop area over cycles",
 }
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.driving import Watched, chromium, serving_with_engine
+from tests.browser.driving import Watched, serving_with_engine
 from tests.browser.lives import post, worn
 from tests.browser.pixels import seen
 from tests.support import stationary
@@ -16,12 +16,6 @@ pytestmark = pytest.mark.browser
 expect.set_options(timeout=30_000)
 
 ENGINE = "tests.service.stand_in_engine:diagnose"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as found:
-        yield found
 
 
 @pytest.fixture

@@ -8,18 +8,12 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.driving import Watched, chromium
+from tests.browser.driving import Watched
 from tests.browser.lives import post, worn
 from tests.support import Server, serving, stationary
 
 pytestmark = pytest.mark.browser
 expect.set_options(timeout=20_000)
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")

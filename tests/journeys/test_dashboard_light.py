@@ -7,7 +7,7 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.driving import Watched, chromium
+from tests.browser.driving import Watched
 from tests.browser.lives import worn
 from tests.browser.pixels import seen
 from tests.support import Server, serving
@@ -23,12 +23,6 @@ new PerformanceObserver((list) => {
 """
 #: Where the measurements stand, px on the page.
 _LIGHT = "circles => circles.map((c) => c.getBoundingClientRect()).map((r) => [r.x + r.width / 2, r.y + r.height / 2])"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")
