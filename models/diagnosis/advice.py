@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.arrays import FloatArray
+from models.diagnosis.amplitude import precision
 from models.diagnosis.baseline import predict
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.design import Design, build_design
@@ -47,8 +48,8 @@ class _Cause:
 
     @property
     def looseness(self) -> float:
-        """How far its amplitude may go, (fitted/prior deviation)²: the precision of a factor on the whole change."""
-        return float(np.mean([(each.amplitude / each.effect.prior_sd) ** 2 for each in self.effects]))
+        """How far its amplitude may go: the prior's precision of a factor on the whole change."""
+        return float(np.mean([each.amplitude**2 * precision(each.effect, each.amplitude) for each in self.effects]))
 
 
 def advise(campaign: Campaign, design: Design, noise: Noise, priors: Priors, fits: Sequence[Fit]) -> tuple[Advice, ...]:
@@ -144,7 +145,7 @@ def _gram(
     prediction = predict(design, fit.laws)
     effects = [each for cause in causes for each in cause.effects]
     changes = [
-        (np.nan_to_num(each.effect.change(prediction.scene, each.amplitude, each.shape)), each.effect.before_lag)
+        (np.nan_to_num(each.effect.change(prediction.scene, each.amplitude, each.shape)), each.effect.lags(each.shape))
         for each in effects
     ]
     owner = np.repeat(np.arange(len(causes)), [len(cause.effects) for cause in causes])

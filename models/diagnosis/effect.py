@@ -83,8 +83,10 @@ class Effect:
     `scale` turns the SI amplitude into `unit`.
     grid(facts) gives the shapes to be tried, none where the campaign cannot tell the effect.
     change(scene, amplitude, shape) -> [P] Nm at the scene's points. before_lag: whether it changes the stationary curve,
-    which friction in loops then lags behind, or the measured torque itself.
+    which friction in loops then lags behind, or the measured torque itself; None where nobody knows and the last shape
+    says (1 or 0).
     bends: along what its form is uncertain (`models.diagnosis.bending`); an exact law has none.
+    tails: degrees of freedom of the amplitude's prior (`models.diagnosis.amplitude`), infinite for a normal one.
     tests: what parts it from its neighbours, slug -> a test in words ("baseline": from none).
     """
 
@@ -104,9 +106,14 @@ class Effect:
     shapes: tuple[ShapeParameter, ...]
     grid: Callable[[Facts], tuple[Tried, ...]]
     change: Callable[[Scene, float, Shape], FloatArray]
-    before_lag: bool
+    before_lag: bool | None
     bends: tuple[Bend, ...]
     tests: dict[str, str]
+    tails: float = 2.0
+
+    def lags(self, shape: Shape) -> bool:
+        """Whether friction in loops lags behind what the effect changes."""
+        return shape[-1] > 0.5 if self.before_lag is None else self.before_lag
 
 
 def unit_change(effect: Effect, scene: Scene, shape: Shape) -> FloatArray:

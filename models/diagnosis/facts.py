@@ -23,7 +23,8 @@ class Facts:
     """What effects ask beside the rows. Cycles and moments as in the campaign.
 
     states [s]: the distinct cycles at which friction was tested, ascending; oil_changes, sensor_zeros and rests: cycles
-    of maintenance (a rest is also a long gap in the moments); rest_moments: when the pause ended, NaN where unknown.
+    of maintenance (a rest is also a long gap in the moments); rest_moments: when the pause ended, rest_lengths
+    [s]: how long it was, NaN where unknown.
     duty_ends [d], duty_energies [d] J an engagement: blocks whose energy is known, ascending.
     """
 
@@ -36,6 +37,7 @@ class Facts:
     sensor_zeros: tuple[float, ...]
     rests: tuple[float, ...]
     rest_moments: tuple[float, ...]
+    rest_lengths: tuple[float, ...]
     duty_ends: FloatArray
     duty_energies: FloatArray
 
@@ -68,7 +70,7 @@ def facts_of(campaign: Campaign) -> Facts:
         )
         if channel is not None
     ]
-    rests, moments = _pauses(campaign)
+    pauses = _pauses(campaign)
     known = [duty for duty in campaign.duty if duty.energy is not None and duty.energy > 0]
     return Facts(
         geometry=campaign.geometry,
@@ -78,8 +80,9 @@ def facts_of(campaign: Campaign) -> Facts:
         reference_temperature=float(np.median(np.concatenate(temperatures))) if temperatures else REFERENCE_TEMPERATURE,
         oil_changes=_events(campaign, EventKind.OIL_CHANGE),
         sensor_zeros=_events(campaign, EventKind.SENSOR_ZERO),
-        rests=rests,
-        rest_moments=moments,
+        rests=tuple(pauses),
+        rest_moments=tuple(end for end, _ in pauses.values()),
+        rest_lengths=tuple(length for _, length in pauses.values()),
         duty_ends=np.array([duty.cycles for duty in known], dtype=np.float64),
         duty_energies=np.array([duty.energy for duty in known], dtype=np.float64),
     )
@@ -89,9 +92,10 @@ def _events(campaign: Campaign, kind: EventKind) -> tuple[float, ...]:
     return tuple(sorted({event.cycles for event in campaign.maintenance if event.event is kind}))
 
 
-def _pauses(campaign: Campaign) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Cycles and ends of the pauses: maintenance that calls itself rest, and gaps between the moments of the runs."""
-    found: dict[float, float] = {}
+def _pauses(campaign: Campaign) -> dict[float, tuple[float, float]]:
+    """Cycles of the pauses, ascending, with their ends [s] and lengths [s]: gaps between the moments of the runs, and
+    maintenance that calls itself rest, which lasts from its own moment to the next run's."""
+    found: dict[float, tuple[float, float]] = {}
     runs: list[StationaryRun | DynamicRun | DutyRun] = [*campaign.stationary, *campaign.dynamic, *campaign.duty]
     timed = sorted((run.moment, run.cycles) for run in runs if run.moment is not None)
     if len(timed) >= 4:
@@ -99,8 +103,14 @@ def _pauses(campaign: Campaign) -> tuple[tuple[float, ...], tuple[float, ...]]:
         least = max(LEAST_PAUSE, PAUSE_RATIO * float(np.median(gaps)))
         for gap, (before, _), (moment, cycles) in zip(gaps.tolist(), timed[:-1], timed[1:], strict=True):
             if gap > least and np.isfinite(before):
-                found.setdefault(cycles, moment)
+                found.setdefault(cycles, (moment, gap))
+    tests: list[StationaryRun | DynamicRun] = [*campaign.stationary, *campaign.dynamic]
+    tested = sorted(run.moment for run in tests if run.moment is not None)
     for event in campaign.maintenance:
-        if event.event is EventKind.REST and event.cycles not in found:
-            found[event.cycles] = float("nan") if event.moment is None else event.moment
-    return tuple(sorted(found)), tuple(found[cycles] for cycles in sorted(found))
+        if event.event is EventKind.REST:
+            after = [moment for moment in tested if event.moment is not None and moment >= event.moment]
+            if event.moment is not None and after:
+                found[event.cycles] = (after[0], after[0] - event.moment)
+            else:
+                found.setdefault(event.cycles, (float("nan") if event.moment is None else event.moment, float("nan")))
+    return dict(sorted(found.items()))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
+from models.diagnosis import amplitude
 from models.diagnosis.baseline import Prediction, predict
 from models.diagnosis.design import Design
 from models.diagnosis.effect import Effect, Shape
@@ -96,7 +97,7 @@ def _free(design: Design, size: int) -> NDArray[np.bool_]:
 def effect_rows(design: Design, prediction: Prediction, fitted: Fitted) -> FloatArray:
     """The change [N] Nm of an effect at the rows."""
     change = fitted.effect.change(prediction.scene, fitted.amplitude, fitted.shape)
-    return prediction.change_at_rows(design, change, before_lag=fitted.effect.before_lag)
+    return prediction.change_at_rows(design, change, before_lag=fitted.effect.lags(fitted.shape))
 
 
 def fit(
@@ -149,7 +150,7 @@ def _evaluated(design: Design, noise: Noise, laws: Laws, priors: Priors, effects
             white = _white(residual[:, None], design, noise)
             cost = 0.5 * float((white**2).sum()) + 0.5 * float(((priors.rows @ laws.theta - priors.means) ** 2).sum())
             for each in effects:
-                cost += 0.5 * (each.amplitude / each.effect.prior_sd) ** 2
+                cost += amplitude.cost(each.effect, each.amplitude)
     return Fit(laws=laws, prediction=prediction, torque=torque, residual=residual, effects=effects, cost=cost)
 
 
@@ -174,7 +175,7 @@ def _normal(design: Design, noise: Noise, priors: Priors, state: Fit) -> tuple[F
     gradient[:count] -= rows.T @ (priors.rows @ state.laws.theta - priors.means)
     at = count
     for each in state.effects:
-        precisions = effect_precisions(each.effect)
+        precisions = effect_precisions(each)
         diagonal = np.arange(at, at + precisions.size)
         gram[diagonal, diagonal] += precisions
         gradient[at] -= each.amplitude * precisions[0]
@@ -183,10 +184,10 @@ def _normal(design: Design, noise: Noise, priors: Priors, state: Fit) -> tuple[F
     return gram, gradient
 
 
-def effect_precisions(effect: Effect) -> FloatArray:
-    """1/sd² of the priors on (amplitude, smooth shapes) [1 + s]."""
-    smooth = [0.5 * (shape.highest - shape.lowest) for shape in effect.shapes if shape.smooth]
-    return np.array([effect.prior_sd, *smooth]) ** -2.0
+def effect_precisions(fitted: Fitted) -> FloatArray:
+    """1/sd² of the priors on (amplitude, smooth shapes) [1 + s]; that of the amplitude where it is."""
+    smooth = [0.5 * (shape.highest - shape.lowest) for shape in fitted.effect.shapes if shape.smooth]
+    return np.array([amplitude.precision(fitted.effect, fitted.amplitude), *(width**-2.0 for width in smooth)])
 
 
 def effect_columns(design: Design, prediction: Prediction, fitted: Fitted) -> FloatArray:
@@ -205,7 +206,7 @@ def effect_columns(design: Design, prediction: Prediction, fitted: Fitted) -> Fl
                 width += delta_a
             ends.append(effect.change(prediction.scene, fitted.amplitude + side * delta_a, tuple(shape)))
         columns.append((ends[0] - ends[1]) / width)
-    return prediction.change_at_rows(design, np.stack(columns, axis=1), before_lag=effect.before_lag)
+    return prediction.change_at_rows(design, np.stack(columns, axis=1), before_lag=effect.lags(fitted.shape))
 
 
 def _moved(state: Fit, priors: Priors, step: FloatArray) -> tuple[Laws, tuple[Fitted, ...]] | None:
@@ -224,12 +225,12 @@ def _moved(state: Fit, priors: Priors, step: FloatArray) -> tuple[Laws, tuple[Fi
         theta[k * BLOCK + 4 : k * BLOCK + 6] = np.clip(theta[k * BLOCK + 4 : k * BLOCK + 6], -3.0, 25.0)
     at, effects = count, []
     for each in state.effects:
-        amplitude = each.amplitude + float(step[at])
+        size = each.amplitude + float(step[at])
         at += 1
         shape = list(each.shape)
         for index, parameter in enumerate(each.effect.shapes):
             if parameter.smooth:
                 shape[index] = float(np.clip(shape[index] + step[at], parameter.lowest, parameter.highest))
                 at += 1
-        effects.append(Fitted(effect=each.effect, amplitude=amplitude, shape=tuple(shape)))
+        effects.append(Fitted(effect=each.effect, amplitude=size, shape=tuple(shape)))
     return Laws(theta=theta, frame=state.laws.frame), tuple(effects)

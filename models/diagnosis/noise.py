@@ -19,6 +19,8 @@ from models.arrays import FloatArray
 from models.diagnosis.design import Design
 from models.diagnosis.whitening import Correlation, Noise
 
+#: A correlation of neighbours below is none.
+_LEAST_CORRELATION = 0.02
 #: Where too little is left to estimate noise, so much of the torque is assumed.
 ASSUMED = 0.01
 #: Fewer free squares estimate nothing.
@@ -30,8 +32,9 @@ _LONGEST = 120
 _SPIKE = 5.5
 _STEPS = (0.2, 0.35, 0.5, 0.65, 0.8, 0.9)
 _SHARES = (0.15, 0.3, 0.5, 0.75, 1.0)
-#: What a correlation must gain [nats] to be believed.
-_PRICE = 2.0
+#: What a correlation must gain [nats] to be believed, and a power of the swell of slow noise by which it is held back: what
+#: is slow was taken off with everything smooth, so the data say little about it.
+_PRICE, _SWELL = 2.0, 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -137,27 +140,51 @@ def _variance(pieces: list[_Piece], residual: FloatArray, torque: FloatArray, sa
 
 
 def _correlation(pieces: list[_Piece], residual: FloatArray, deviation: FloatArray) -> tuple[Correlation, float]:
-    """(w, ρ) by restricted likelihood on a grid, and the factor by which the deviations are off."""
+    """(w, ρ) by restricted likelihood, averaged over a grid, and the factor by which the deviations are off.
+
+    w ρ and w ρ², the correlations of the first and second neighbour, are averaged: a likelihood that is flat along a ridge
+    must not choose its end.
+    """
     groups: dict[int, tuple[FloatArray, list[FloatArray]]] = {}
     for piece in pieces:
         left = piece.contrasts @ (piece.contrasts.T @ residual[piece.rows]) / deviation[piece.rows]
         groups.setdefault(id(piece.contrasts), (piece.contrasts, []))[1].append(np.clip(left, -_SPIKE, _SPIKE))
-    best, told = -np.inf, (Correlation(), 1.0)
     tried = [Correlation(), *(Correlation(share=w, step=r) for w in _SHARES for r in _STEPS)]
     few = len(groups) > 40  # loops whose bins all differ: their correlation is not looked for
+    logs, scales = [], []
     for correlation in tried[: 1 if few else None]:
-        squares, logdet, free = 0.0, 0.0, 0
-        for contrasts, series in groups.values():
-            distance = np.abs(np.subtract.outer(np.arange(contrasts.shape[0]), np.arange(contrasts.shape[0])))
-            matrix = correlation.share * correlation.step**distance
-            np.fill_diagonal(matrix, 1.0)
-            factor = np.linalg.cholesky(contrasts.T @ matrix @ contrasts)
-            white = np.linalg.solve(factor, contrasts.T @ np.stack(series, axis=1))
-            squares += float((white**2).sum())
-            logdet += len(series) * 2 * float(np.log(np.diag(factor)).sum())
-            free += white.size
-        scale = squares / free
-        likelihood = -0.5 * (free * np.log(scale) + logdet) - (_PRICE if correlation.step else 0.0)
-        if likelihood > best:
-            best, told = likelihood, (correlation, float(np.sqrt(scale)))
-    return told
+        likelihood, scale = _restricted(correlation, groups)
+        logs.append(likelihood - (_PRICE if correlation.step else 0.0) - _SWELL * np.log(_swell(correlation)))
+        scales.append(scale)
+    weights = np.exp(np.array(logs) - max(logs))
+    weights /= weights.sum()
+    steps = np.array([each.step for each in tried[: weights.size]])
+    first = np.array([each.share for each in tried[: weights.size]]) * steps
+    scale = float(np.sqrt(weights @ np.array(scales)))
+    one, two = float(weights @ first), float(weights @ (first * steps))
+    if one < _LEAST_CORRELATION:
+        return Correlation(), scale
+    return Correlation(share=min(one * one / two, 1.0), step=two / one), scale
+
+
+def _restricted(
+    correlation: Correlation, groups: dict[int, tuple[FloatArray, list[FloatArray]]]
+) -> tuple[float, float]:
+    """Restricted log likelihood [nats] of a correlation at the variance that suits it best, and that variance."""
+    squares, logdet, free = 0.0, 0.0, 0
+    for contrasts, series in groups.values():
+        distance = np.abs(np.subtract.outer(np.arange(contrasts.shape[0]), np.arange(contrasts.shape[0])))
+        matrix = correlation.share * correlation.step**distance
+        np.fill_diagonal(matrix, 1.0)
+        factor = np.linalg.cholesky(contrasts.T @ matrix @ contrasts)
+        white = np.linalg.solve(factor, contrasts.T @ np.stack(series, axis=1))
+        squares += float((white**2).sum())
+        logdet += len(series) * 2 * float(np.log(np.diag(factor)).sum())
+        free += white.size
+    scale = squares / free
+    return -0.5 * (free * np.log(scale) + logdet), scale
+
+
+def _swell(correlation: Correlation) -> float:
+    """By how much slow noise is stronger than were neighbours independent: the spectral density at 0 over the variance."""
+    return 1.0 + 2.0 * correlation.share * correlation.step / (1.0 - correlation.step)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
+from models.diagnosis import amplitude
 from models.diagnosis.baseline import Prediction
 from models.diagnosis.bending import BEND, bent_columns
 from models.diagnosis.design import Design, IntArray
@@ -73,13 +74,13 @@ def gram_of(design: Design, noise: Noise, priors: Priors, fit: Fit, changes: Flo
     matrix[-1, -1] += float(off @ off)
     at = free
     for each, columns in zip(fit.effects, own, strict=True):
-        precisions = effect_precisions(each.effect)
+        precisions = effect_precisions(each)
         precisions[0] *= float(held)
         diagonal = np.arange(at, at + columns.shape[1])
         matrix[diagonal, diagonal] += precisions
         matrix[at, -1] -= precisions[0] * each.amplitude
         matrix[-1, at] -= precisions[0] * each.amplitude
-        matrix[-1, -1] += precisions[0] * each.amplitude**2
+        matrix[-1, -1] += 2.0 * float(held) * amplitude.cost(each.effect, each.amplitude)
         at += columns.shape[1]
     diagonal = np.arange(at, base)
     matrix[diagonal, diagonal] += BEND**-2.0

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
+from models.diagnosis.amplitude import log_peak
 from models.diagnosis.bending import BEND, bends
 from models.diagnosis.design import Design
 from models.diagnosis.effect import Effect
@@ -15,7 +16,7 @@ from models.diagnosis.projection import GAINS, gram_of, project
 from models.diagnosis.whitening import Noise
 
 #: Gauss-Newton steps that a candidate is given.
-STEPS = 10
+STEPS = 40
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,7 +84,9 @@ def laplace(design: Design, noise: Noise, priors: Priors, fitted: Fit) -> tuple[
     """Log marginal likelihood [nats] about a fit up to a constant, the gains' scatter summed over; and log likelihood at the
     gains' likeliest scatter."""
     gram = gram_of(design, noise, priors, fitted, np.zeros((design.torque.size, 0)))
-    price = 0.5 * sum(float(np.log(effect_precisions(each.effect)).sum()) for each in fitted.effects)
+    price = sum(
+        log_peak(each.effect) + 0.5 * float(np.log(effect_precisions(each)[1:]).sum()) for each in fitted.effects
+    )
     price -= np.log(BEND) * sum(bends(design, each.effect).shape[1] for each in fitted.effects)
     sided = np.log(2.0) * sum(each.effect.positive for each in fitted.effects)
     projections = [project(gram, float(gain)) for gain in GAINS]

@@ -18,6 +18,8 @@ from models.diagnosis.whitening import Noise
 
 #: So many single effects and pairs of the linear screens are refitted at most.
 SINGLES, PAIRS = 5, 4
+#: So many of them are looked for from other shapes as well.
+RESTARTED = 3
 #: ... where the screen leaves them this close [nats] to the best, and this share of λ more.
 MARGIN, MARGIN_SHARE = 9.0, 0.2
 #: Pairs of the linear screen must promise this much [nats] over the best single.
@@ -42,12 +44,18 @@ def hypotheses_of(
     margin = MARGIN + MARGIN_SHARE * max(linear_drop(view.columns, projected, first)[1], 0.0)
     tried = [each for each in singles[:SINGLES] if each.evidence > singles[0].evidence - margin]
     found = [_refitted_linearly(design, noise, priors, null, view.columns, projected, each) for each in tried]
+    for k in sorted(range(len(found)), key=lambda k: -found[k].evidence)[:RESTARTED]:
+        others = [
+            _refitted_linearly(design, noise, priors, null, view.columns, projected, each) for each in tried[k].others
+        ]
+        found[k] = max((found[k], *others), key=lambda each: each.evidence if finite(each) else float("-inf"))
     seconds = _pairs_of(design, noise, priors, null, view.columns, found)
     linear = [each for each in pairs if each.evidence > singles[0].evidence + PAIR_PROMISE]
     held = {frozenset(each.slugs) for each in seconds}
     for each in linear:
         if frozenset(effect.slug for effect in each.effects) not in held:
             seconds.append(_refitted_linearly(design, noise, priors, null, view.columns, projected, each))
+    found = _without_partners(design, noise, priors, null, found, seconds)
     known = {each.slugs for each in found}
     rest = [
         Hypothesis(effects=each.effects, evidence=each.evidence, drop=0.0, fit=None)
@@ -99,6 +107,24 @@ def _pairs_of(
     return list(pairs.values())
 
 
+def _without_partners(
+    design: Design, noise: Noise, priors: Priors, null: Null, found: list[Hypothesis], pairs: list[Hypothesis]
+) -> list[Hypothesis]:
+    """Singles looked for once more from where the best pair has them: what is missed alone may be found in company."""
+    best = max((each for each in pairs if finite(each)), key=lambda each: each.evidence, default=None)
+    if best is None or best.fit is None:
+        return found
+    alone = {each.slugs: each for each in found}
+    for each in best.fit.effects:
+        known = alone.get((each.effect.slug,))
+        if known is not None and known.evidence < best.evidence:
+            linear = (known.evidence, known.drop)
+            again = refitted(design, noise, priors, null, best.fit.laws, (each,), known.shape_evidence, linear)
+            if finite(again) and again.evidence > known.evidence:
+                alone[known.slugs] = again
+    return list(alone.values())
+
+
 def _add_seconds(
     design: Design,
     noise: Noise,
@@ -126,6 +152,6 @@ def _add_seconds(
 def beside(design: Design, noise: Noise, priors: Priors, fitted: Fit, columns: list[Column]) -> Projected:
     """The catalogue's columns projected off a fit with its effects, at the noise's scatter of the gains."""
     scene = fitted.prediction.scene
-    changes = [(unit_change(each.effect, scene, each.shape), each.effect.before_lag) for each in columns]
+    changes = [(unit_change(each.effect, scene, each.shape), each.effect.lags(each.shape)) for each in columns]
     gram = gram_of(design, noise, priors, fitted, change_columns(design, fitted.prediction, changes))
     return project(gram, noise.run_gain)

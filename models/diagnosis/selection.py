@@ -2,19 +2,28 @@
 
     evidence = drop of the cost - ½ ln(1 + s² info) + ln prior of the shape,   summed over the shape grid
 
-with s the prior deviation of the amplitude; the gains' scatter is summed over as well. Every template is a little wrong,
-so evidence saturates (`models.diagnosis.verdict`).
+with s the prior deviation of the amplitude, a usual and a large one; the gains' scatter is summed over as well. Every
+template is a little wrong, so evidence saturates (`models.diagnosis.verdict`).
 """
 
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp
 
 from models.arrays import FloatArray
+from models.diagnosis.amplitude import SCALES
 from models.diagnosis.effect import Effect, Shape, Tried
 from models.diagnosis.projection import Projected
+
+BoolArray: TypeAlias = NDArray[np.bool_]
+IntArray: TypeAlias = NDArray[np.intp]
+
+#: An effect is looked for from so many of its shapes, of which no two share more than this of what is visible of them.
+STARTS, ALIKE = 3, 0.9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +41,7 @@ class Column:
 class Screened:
     """One or two effects, judged linearly: evidence [nats] over none, the best shapes (and their places among the
     columns), the index of the gain scatter at which that is, and what the best shapes' prior and the rest of the grid add
-    to the evidence of the best shapes [nats]."""
+    to the evidence of the best shapes [nats]. `others`: the same effect by shapes unlike the best ones, best first."""
 
     effects: tuple[Effect, ...]
     evidence: float
@@ -40,12 +49,13 @@ class Screened:
     shapes: tuple[Shape, ...]
     places: tuple[int, ...]
     gain: int
+    others: tuple["Screened", ...] = ()
 
 
 def linear_drop(columns: list[Column], projected: Projected, screened: Screened) -> tuple[FloatArray, float]:
     """Amplitudes and the drop of the cost [nats] of a screened candidate at one scatter of the gains."""
     places = list(screened.places)
-    precision = np.diag([columns[place].effect.prior_sd ** -2.0 for place in places])
+    precision = np.diag([(SCALES[-1] * columns[place].effect.prior_sd) ** -2.0 for place in places])
     score = projected.score[places]
     amplitudes = np.linalg.solve(projected.info[np.ix_(places, places)] + precision, score)
     return np.asarray(amplitudes, dtype=np.float64), 0.5 * float(score @ amplitudes)
@@ -83,34 +93,57 @@ def screen(columns: list[Column], projections: list[Projected]) -> list[Screened
     sd = np.array([column.effect.prior_sd for column in columns])
     positive = np.array([column.effect.positive for column in columns])
     weight = np.array([column.log_weight for column in columns])
+    likely = max(projections, key=lambda each: each.evidence)
     table = []
     for each in projections:
         info, score = np.diag(each.info)[: sd.size], each.score[: sd.size]
-        precision = np.maximum(info, 0.0) + sd**-2
+        wide = np.outer(SCALES, sd)
+        precision = np.maximum(info, 0.0) + wide**-2
         mean = score / precision
-        gain = 0.5 * score * mean - 0.5 * np.log(precision * sd**2)
+        gain = 0.5 * score * mean - 0.5 * np.log(precision * wide**2)
         gain = gain + np.where(positive, np.log(2.0) + log_ndtr(mean * np.sqrt(precision)), 0.0)
-        table.append(each.evidence + gain + weight)
+        table.append(each.evidence + logsumexp(gain, axis=0) - np.log(len(SCALES)) + weight)
     stacked = np.stack(table)
     found = []
     for effect in dict.fromkeys(column.effect.slug for column in columns):
         mine = np.array([i for i, column in enumerate(columns) if column.effect.slug == effect])
-        k, i = np.unravel_index(int(np.argmax(stacked[:, mine])), (len(projections), mine.size))
-        best = int(mine[i])
+        best, *others = _unlike(stacked, mine, likely)
+        whole = float(logsumexp(stacked[:, mine]))
+        around = [columns[place].log_weight_around for place in (best, *others)]
+        of_best = whole - float(logsumexp(stacked[:, best])) + columns[best].log_weight
         found.append(
             Screened(
                 effects=(columns[best].effect,),
-                evidence=float(logsumexp(stacked[:, mine])) - null,
-                shape_evidence=max(
-                    float(logsumexp(stacked[:, mine]) - logsumexp(stacked[:, best])) + columns[best].log_weight,
-                    columns[best].log_weight_around,
-                ),
+                evidence=whole - null,
+                shape_evidence=max(of_best, around[0]),
                 shapes=(columns[best].shape,),
                 places=(best,),
-                gain=int(k),
+                gain=int(np.argmax(stacked[:, best])),
+                others=tuple(
+                    Screened(
+                        effects=(columns[place].effect,),
+                        evidence=float(logsumexp(stacked[:, place])) - columns[place].log_weight + weight_ - null,
+                        shape_evidence=weight_,
+                        shapes=(columns[place].shape,),
+                        places=(place,),
+                        gain=int(np.argmax(stacked[:, place])),
+                    )
+                    for place, weight_ in zip(others, around[1:], strict=True)
+                ),
             )
         )
     return sorted(found, key=lambda each: -each.evidence)
+
+
+def _unlike(table: FloatArray, mine: IntArray, projected: Projected) -> list[int]:
+    """Of an effect's columns the best by evidence [gains, m], and the best ones that no better one resembles."""
+    size = np.sqrt(np.maximum(np.diag(projected.info)[mine], 1e-300))
+    alike = (projected.info[np.ix_(mine, mine)] / size[:, None] / size) ** 2
+    chosen: list[int] = []
+    for i in np.argsort(-table[:, mine].max(axis=0)).tolist():
+        if len(chosen) < STARTS and all(alike[i, j] < ALIKE for j in chosen):
+            chosen.append(i)
+    return [int(mine[i]) for i in chosen]
 
 
 def screen_pairs(columns: list[Column], projections: list[Projected]) -> list[Screened]:
@@ -124,20 +157,10 @@ def screen_pairs(columns: list[Column], projections: list[Projected]) -> list[Sc
     order = np.argsort([-each.evidence for each in projections])[:1].tolist()
     likely = {int(k) for k in order} | {int(np.argmax([_best(each, sd) for each in projections]))}
     best: dict[tuple[str, str], Screened] = {}
-    for k in sorted(likely):
+    for k, width in product(sorted(likely), SCALES):
         each = projections[k]
-        scale = sd[:, None] * sd
-        unit = each.info[: sd.size, : sd.size] * scale
-        u = each.score[: sd.size] * sd
-        one = np.diag(unit) + 1.0
-        determinant = np.maximum(one[:, None] * one - unit**2, 1e-12)
-        drop = 0.5 * (u[:, None] ** 2 * one + u**2 * one[:, None] - 2 * u[:, None] * u * unit) / determinant
-        first = (u[:, None] * one - unit * u) / determinant
-        value = each.evidence + drop - 0.5 * np.log(determinant) + weight[:, None] + weight - null
-        wrong = (
-            (positive[:, None] & (first < 0)) | (positive & (first.T < 0)) | (np.abs(first) > 4) | (np.abs(first.T) > 4)
-        )
-        value = np.where(wrong, -np.inf, value)
+        value = _values(each, width * sd, positive) + each.evidence - null - np.log(len(SCALES))
+        value += weight[:, None] + weight
         for a, b in combinations(members, 2):
             block = value[np.ix_(members[a], members[b])]
             total = float(logsumexp(block)) if np.isfinite(block).any() else -np.inf
@@ -157,6 +180,19 @@ def screen_pairs(columns: list[Column], projections: list[Projected]) -> list[Sc
                 gain=k,
             )
     return sorted(best.values(), key=lambda each: -each.evidence)
+
+
+def _values(projected: Projected, sd: FloatArray, positive: BoolArray) -> FloatArray:
+    """Evidence [m, m] nats of every two columns with normal priors, -inf where a sign is wrong or a size unheard of."""
+    scale = sd[:, None] * sd
+    unit = projected.info[: sd.size, : sd.size] * scale
+    u = projected.score[: sd.size] * sd
+    one = np.diag(unit) + 1.0
+    determinant = np.maximum(one[:, None] * one - unit**2, 1e-12)
+    drop = 0.5 * (u[:, None] ** 2 * one + u**2 * one[:, None] - 2 * u[:, None] * u * unit) / determinant
+    first = (u[:, None] * one - unit * u) / determinant
+    wrong = (positive[:, None] & (first < 0)) | (positive & (first.T < 0)) | (np.abs(first) > 4) | (np.abs(first.T) > 4)
+    return np.where(wrong, -np.inf, drop - 0.5 * np.log(determinant))
 
 
 def _best(projected: Projected, sd: FloatArray) -> float:

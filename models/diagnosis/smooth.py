@@ -106,6 +106,7 @@ def _effect(k: int, column: Callable[[Points], FloatArray], *, before_lag: bool)
         before_lag=before_lag,
         bends=(),
         tests={},
+        tails=float("inf"),
     )
 
 
@@ -113,7 +114,7 @@ def _size(design: Design, noise: Noise, priors: Priors, baseline: Fit, effects: 
     """τ of the largest marginal likelihood: ½ uᵀ (1 + I)⁻¹ u - ½ ln|1 + I|, in units of the prior's deviations."""
     prediction: Prediction = baseline.prediction
     changes = change_columns(
-        design, prediction, [(each.change(prediction.scene, 1.0, ()), each.before_lag) for each in effects]
+        design, prediction, [(each.change(prediction.scene, 1.0, ()), each.lags(())) for each in effects]
     )
     projected = project(gram_of(design, noise, priors, baseline, changes), noise.run_gain)
     unit = np.array([each.prior_sd for each in effects])

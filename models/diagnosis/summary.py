@@ -113,6 +113,8 @@ def _ambiguous(found: Findings) -> list[str]:
             told.append(f"{_name(slug)} (probability {_probability(each.probability)}; {_estimate(each.estimate)})")
         else:
             told.append(f"{_name(slug)} (not measured, so it cannot be excluded)")
+    if len(told) == 1:
+        return [_misses(found), f"The cause may be {told[0]}, or something that the catalogue does not hold."]
     return [_misses(found), f"These data cannot tell which of these is the cause: {', '.join(told)}."]
 
 

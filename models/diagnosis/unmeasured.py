@@ -6,7 +6,7 @@ is many columns and no amplitude that could be told, so it is judged by its marg
 
     evidence = ½ sᵀ (I + Λ⁻¹)⁻¹ s - ½ ln det(1 + Λ I)        (s the score, I the information, Λ the prior variances)
 
-averaged over how strongly temperature swings.
+averaged over how strongly temperature swings, from test to test and, by itself, within one.
 """
 
 import numpy as np
@@ -18,35 +18,37 @@ from models.diagnosis.fitting import Fit, Priors
 from models.diagnosis.projection import Projected, gram_of, project
 from models.diagnosis.whitening import Noise
 
-#: Deviation of ln ν in a test that swings by some 3 K, and the factors on it that are considered.
-USUAL, FACTORS = 0.06, (0.5, 1.5, 4.0)
+#: Deviation of ln ν in a test that swings by some 3 K, and the factors on it that are considered from test to test and
+#: within a test.
+USUAL, BETWEEN, WITHIN = 0.06, (0.5, 1.5, 4.0), (0.0, 0.5, 1.5, 4.0)
 _WAVES = 4
 
 
 def temperature_evidence(design: Design, noise: Noise, priors: Priors, fitted: Fit) -> float:
     """Evidence [nats] of unmeasured courses of oil temperature over none."""
-    columns, relative = _courses(design, fitted)
+    columns, between, within = _courses(design, fitted)
     projected = project(gram_of(design, noise, priors, fitted, columns), noise.run_gain)
-    logs = [_marginal(projected, (factor * USUAL * relative) ** 2) for factor in FACTORS]
-    return float(logsumexp(logs) - np.log(len(FACTORS)))
+    logs = [_marginal(projected, (USUAL * (b * between + w * within)) ** 2) for b in BETWEEN for w in WITHIN]
+    return float(logsumexp(logs) - np.log(len(logs)))
 
 
-def _courses(design: Design, fitted: Fit) -> tuple[FloatArray, FloatArray]:
-    """Columns [N, m] of torque and their deviations [m] relative to the first of a run."""
+def _courses(design: Design, fitted: Fit) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Columns [N, m] of torque and their relative deviations [m] from test to test and within a test."""
     viscous = fitted.prediction.change_at_rows(design, fitted.prediction.scene.viscous, before_lag=True)
     columns, relative = [], []
     for run in np.unique(design.rows.run):
         here = design.rows.run == run
         own = np.where(here, viscous, 0.0)
         columns.append(own)
-        relative.append(1.0)
+        relative.append(0.0)
         if not design.rows.steady[here].all():
             continue
         turn = 2 * np.pi * design.rows.clock / max(float(np.ptp(design.rows.clock[here])), 1e-9)
         for k in range(1, _WAVES + 1):
             columns += [own * np.cos(k * turn), own * np.sin(k * turn)]
             relative += [1.0 / k, 1.0 / k]
-    return np.stack(columns, axis=1), np.array(relative)
+    within = np.array(relative)
+    return np.stack(columns, axis=1), np.where(within == 0, 1.0, 0.0), within
 
 
 def _marginal(projected: Projected, variances: FloatArray) -> float:

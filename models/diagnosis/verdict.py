@@ -121,6 +121,7 @@ def judge(
     named = len(standing) == 1 and not imitated
     if named and len(causes) > 1:
         causes = tuple(slug for slug in causes if probabilities[slug] >= LEAST_NAMED) or causes[:1]
+    named = named and probabilities[causes[0]] >= LEAST_NAMED
     return Judgement(
         verdict=Verdict.CAUSE_NAMED if named else Verdict.CAUSE_AMBIGUOUS,
         causes=causes,

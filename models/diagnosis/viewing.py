@@ -53,7 +53,7 @@ def view_of(design: Design, noise: Noise, priors: Priors, fitted: Fit, columns: 
     changes = change_columns(
         design,
         fitted.prediction,
-        [(unit_change(each.effect, scene, each.shape), each.effect.before_lag) for each in columns],
+        [(unit_change(each.effect, scene, each.shape), each.effect.lags(each.shape)) for each in columns],
     )
     contrasts = contrasts_of(design, fitted.prediction)
     blocks = blocks_of(design, fitted)

@@ -11,12 +11,14 @@ from models.diagnosis.viscosity import log_viscosity_ratio
 
 def _grid(facts: Facts) -> tuple[Tried, ...]:
     thinning = (0.0, 1.0) if facts.temperature_measured else (0.0,)
-    courses = ((0.5, 0.0), (0.75, 0.0), (1.0, 0.0), (1.5, 0.0), (1.0, 0.5), (1.0, 2.0))
-    return tuple(Tried(shape=(power, rupture, t)) for power, rupture in courses for t in thinning)
+    courses = ((0.6, 0.0), (1.0, 0.0), (1.5, 0.0), (1.0, 0.5), (1.0, 2.0))
+    return tuple(
+        Tried(shape=(power, rupture, t, lags)) for power, rupture in courses for t in thinning for lags in (0.0, 1.0)
+    )
 
 
 def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
-    power, rupture, thinning = shape
+    power, rupture, thinning, _ = shape
     logs = log_viscosity_ratio(scene.points.temperature, scene.facts.reference_temperature, scene.facts.oil)
     relative = scene.points.velocity / scene.laws.frame.reference_velocity
     share = relative**power * (1.0 + rupture) / (1.0 + rupture * relative**2)
@@ -38,13 +40,14 @@ EFFECT = Effect(
     positive=True,
     scale=1.0,
     shapes=(
-        ShapeParameter(name="power m", unit="-", lowest=0.4, highest=2.0),
+        ShapeParameter(name="power m", unit="-", lowest=0.4, highest=2.0, smooth=True),
         ShapeParameter(name="rupture of the film r", unit="-", lowest=0.0, highest=5.0),
         ShapeParameter(name="viscosity's exponent t", unit="-", lowest=0.0, highest=1.0),
+        ShapeParameter(name="whether friction lags behind it", unit="-", lowest=0.0, highest=1.0),
     ),
     grid=_grid,
     change=_change,
-    before_lag=False,
+    before_lag=None,
     bends=(Bend.SPEED, Bend.MOTION),
     tests={
         "viscous_exponent": "a sweep with the clutch open, which shows the drag alone",

@@ -43,7 +43,7 @@ def test_a_bend_takes_up_what_a_template_misses_as_far_as_its_prior_allows(given
     """Whitened squares that are left of a truth bent by one deviation of the prior, with bends and without; a truth that is
     bent by ten deviations keeps most of its misfit."""
     drag = BY_SLUG["hydrodynamic_drag"]
-    fitted = Fitted(effect=drag, amplitude=1.5, shape=(1.0, 0.0, 0.0))
+    fitted = Fitted(effect=drag, amplitude=1.5, shape=(1.0, 0.0, 0.0, 0.0))
     baseline = given.baseline
     change = effect_rows(given.design, baseline.fit.prediction, fitted)
     extra = bent_columns(given.design, baseline.fit.prediction, fitted)[:, :1].sum(axis=1)

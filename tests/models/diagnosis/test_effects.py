@@ -69,7 +69,7 @@ def test_units_of_a_few(scene: Scene) -> None:
     steady = scene.points.steady
     inertia = BY_SLUG["inertia_torque"].change(scene, 1.0, ())
     np.testing.assert_allclose(inertia, scene.points.acceleration / 0.058)  # 1 kg m² feels dω/dt
-    drag = BY_SLUG["hydrodynamic_drag"].change(scene, 1.0, (1.0, 0.0, 0.0))
+    drag = BY_SLUG["hydrodynamic_drag"].change(scene, 1.0, (1.0, 0.0, 0.0, 0.0))
     assert np.ptp(drag[steady] / scene.points.velocity[steady]) < 1e-12  # pressure is not in it
     offset = BY_SLUG["pressure_offset"].change(scene, 1000.0, (0.0, 0.0))
     higher = scene.curve_at(pressure=scene.points.pressure + 1000.0) - scene.curve

@@ -33,6 +33,20 @@ def test_noise_is_found_beside_something_smooth(design: Design, memory: float) -
     assert abs(next_row - memory) < 0.15
 
 
+def test_a_flat_likelihood_does_not_choose_persistent_noise(design: Design) -> None:
+    """Neighbours that remember by 0.3 in 20 draws: slow noise, of which curves freed of all that is smooth say little, must
+    not be taken for much stronger than it is (1.86 times that of independent neighbours) in any of them."""
+    swells = []
+    for seed in range(20):
+        white = np.random.default_rng([SEED, seed]).standard_normal(design.torque.size)
+        remembered = lfilter([np.sqrt(1 - 0.3**2)], [1, -0.3], white)
+        residual = 0.01 * design.torque * remembered / np.sqrt(design.samples)
+        found = estimate_noise(design, residual, design.torque, first_noise(design))[0].plateaus
+        swells.append(1 + 2 * found.share * found.step / (1 - found.step))
+    assert 1.4 < np.median(swells) < 2.4
+    assert max(swells) < 4.0
+
+
 def test_whitening_is_the_inverse_root_of_the_covariance(design: Design) -> None:
     correlation = Correlation(share=0.7, step=0.6)
     noise = Noise(

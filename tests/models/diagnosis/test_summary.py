@@ -100,6 +100,12 @@ def test_what_is_named_is_explained_and_what_it_beat_is_said():
     assert "1,234 nats" in said or "1,235 nats" in said
 
 
+def test_a_cause_without_a_rival_of_the_catalogue_may_be_none_of_it():
+    said = summarise(findings(Verdict.CAUSE_AMBIGUOUS, "squeeze_film"))
+    assert "The cause may be squeeze film (probability" in said
+    assert "or something that the catalogue does not hold." in said
+
+
 def test_no_gain_is_said_as_none():
     worse = replace(GAIN, reduction_percent=-2.0, remaining=-1.0)
     said = summarise(replace(findings(Verdict.CAUSE_NAMED, "oil_change"), gain=worse))
