@@ -11,6 +11,7 @@ from models.diagnosis.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.design import Design, build_design
 from models.diagnosis.effect import Kind
 from models.diagnosis.fitting import Fit, Priors, fit, priors_of
+from models.diagnosis.laws import Laws
 from models.diagnosis.misfits import FIXED_LINE, axes_of
 from models.diagnosis.noise import estimate_noise, first_noise
 from models.diagnosis.raw import RawEvidence, raw_evidence
@@ -40,8 +41,9 @@ LEAST_TORQUE, MOST_TORQUE = 1e-6, 1e7
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Baseline:
-    """The pooled fit without effects, its noise, its priors, and what was noted on the way."""
+    """The pooled fit without effects, where it started, its noise, its priors, and what was noted on the way."""
 
+    start: Laws
     noise: Noise
     priors: Priors
     fit: Fit
@@ -76,7 +78,9 @@ def _diagnosed(campaign: Campaign, design: Design, without: frozenset[str], rng:
     noise, hypotheses = baseline.noise, list[Hypothesis]()
     judgement = Judgement(verdict=Verdict.MODEL_ADEQUATE)
     if any(each.raised for each in leads.values()):
-        noise, hypotheses = hypotheses_of(design, baseline.noise, baseline.priors, baseline.fit, view, raw)
+        noise, hypotheses = hypotheses_of(
+            design, baseline.noise, baseline.priors, baseline.start, baseline.fit, view, raw
+        )
         unmeasured = -np.inf
         if not design.facts.temperature_measured and "oil_temperature" not in without:
             unmeasured = temperature_evidence(design, noise, baseline.priors, baseline.fit)
@@ -120,7 +124,7 @@ def fit_baseline(design: Design) -> Baseline:
         notes.append("Too few rows to tell noise: 1 % of the torque is assumed.")
     if not design.facts.temperature_measured:
         notes.append("No oil temperature was measured: nothing that it could imitate is named.")
-    return Baseline(noise=noise, priors=priors, fit=fitted, notes=tuple(notes))
+    return Baseline(start=start, noise=noise, priors=priors, fit=fitted, notes=tuple(notes))
 
 
 def alarms(design: Design, baseline: Baseline, view: View, rng: np.random.Generator) -> dict[str, Lead]:

@@ -15,8 +15,8 @@ from models.diagnosis.laws import Laws
 from models.diagnosis.projection import GAINS, gram_of, project
 from models.diagnosis.whitening import Noise
 
-#: Gauss-Newton steps that a candidate is given.
-STEPS = 40
+#: Gauss-Newton steps that a candidate is given, and one that is worth following to its end.
+STEPS, MOST_STEPS = 10, 40
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,13 +66,15 @@ def refitted(
     start: tuple[Fitted, ...],
     shape_evidence: float,
     linear: tuple[float, float],
+    *,
+    steps: int = STEPS,
 ) -> Hypothesis:
     """A candidate with everything free, from laws and amplitudes: its evidence is Laplace's about that fit, summed over the
     gains' scatter, with the grid's part as screened; `linear` (evidence, drop) where its sign is wrong from the start."""
     effects = tuple(each.effect for each in start)
     if any(each.effect.positive and each.amplitude < 0 for each in start):
         return Hypothesis(effects=effects, evidence=linear[0], drop=linear[1], fit=None, shape_evidence=shape_evidence)
-    found = fit(design, noise, laws, priors, start, steps=STEPS)
+    found = fit(design, noise, laws, priors, start, steps=steps)
     wrong = any(each.effect.positive and each.amplitude < 0 for each in found.effects)
     marginal, profile = laplace(design, noise, priors, found)
     evidence = -np.inf if wrong else marginal - null.evidence + shape_evidence

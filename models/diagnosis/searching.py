@@ -1,27 +1,34 @@
 """Which hypotheses are worth a full refit: the best singles, the best pairs, and what the best singles leave for a second.
 
-A linear screen of pairs sees them from the baseline's fit, where a loud effect bends everything; so a second effect is also
-looked for in what is left of the best singles once they are refitted.
+A linear screen sees everything from the baseline's fit, which a loud effect has bent. So the best singles are looked for
+from several shapes, and, where the baseline has swallowed much of them, from laws that nothing has bent; a second effect
+is also looked for in what is left of the best singles once they are refitted, and a single from where the best pair has it.
 """
 
-from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
 
 from models.diagnosis.design import Design
 from models.diagnosis.effect import unit_change
 from models.diagnosis.fitting import Fit, Fitted, Priors, fit
+from models.diagnosis.laws import Laws
 from models.diagnosis.projection import GAINS, Projected, change_columns, gram_of, project
 from models.diagnosis.raw import RawEvidence
-from models.diagnosis.refitting import Hypothesis, Null, at_gain, finite, null_of, refitted
+from models.diagnosis.refitting import MOST_STEPS, STEPS, Hypothesis, Null, at_gain, finite, null_of, refitted
 from models.diagnosis.selection import Column, Screened, linear_drop, screen, screen_pairs
 from models.diagnosis.viewing import View
 from models.diagnosis.whitening import Noise
 
 #: So many single effects and pairs of the linear screens are refitted at most.
 SINGLES, PAIRS = 5, 4
-#: So many of them are looked for from other shapes as well.
-RESTARTED = 3
 #: ... where the screen leaves them this close [nats] to the best, and this share of λ more.
 MARGIN, MARGIN_SHARE = 9.0, 0.2
+#: So many of them are looked for from other shapes as well, and from other laws where so much [nats] of them would be there
+#: to be seen if the baseline did not take it up: so far off, nothing is linear.
+RESTARTED, SWALLOWED = 3, 1000.0
+#: Gauss-Newton steps after which starts are compared.
+ROUGH = 6
 #: Pairs of the linear screen must promise this much [nats] over the best single.
 PAIR_PROMISE = -1.0
 #: A second effect is looked for beside so many of the best singles, so many of each are refitted, and each must promise
@@ -30,123 +37,159 @@ FIRSTS, SECONDS, SECOND_PROMISE = 2, 3, 3.0
 
 
 def hypotheses_of(
-    design: Design, noise: Noise, priors: Priors, baseline: Fit, view: View, raw: tuple[RawEvidence, ...]
+    design: Design, noise: Noise, priors: Priors, start: Laws, baseline: Fit, view: View, raw: tuple[RawEvidence, ...]
 ) -> tuple[Noise, list[Hypothesis]]:
-    """Singles and pairs refitted, and the rest as screened, best first; the noise with the likely gains."""
+    """Singles and pairs refitted, and the rest as screened, best first; the noise with the likely gains. `start`: laws that
+    no effect has bent."""
     singles = screen(view.columns, view.projections)
     pairs = screen_pairs(view.columns, view.projections)[:PAIRS]
     first = max((*singles[:1], *pairs[:1]), key=lambda each: each.evidence, default=None)
     if first is None:
         return noise, []
     noise = at_gain(noise, float(GAINS[first.gain]))
-    projected = view.projections[first.gain]
     null = null_of(design, noise, priors, fit(design, noise, baseline.laws, priors))
-    margin = MARGIN + MARGIN_SHARE * max(linear_drop(view.columns, projected, first)[1], 0.0)
-    tried = [each for each in singles[:SINGLES] if each.evidence > singles[0].evidence - margin]
-    found = [_refitted_linearly(design, noise, priors, null, view.columns, projected, each) for each in tried]
-    for k in sorted(range(len(found)), key=lambda k: -found[k].evidence)[:RESTARTED]:
-        others = [
-            _refitted_linearly(design, noise, priors, null, view.columns, projected, each) for each in tried[k].others
-        ]
-        found[k] = max((found[k], *others), key=lambda each: each.evidence if finite(each) else float("-inf"))
-    seconds = _pairs_of(design, noise, priors, null, view.columns, found)
+    search = _Search(
+        design=design, noise=noise, priors=priors, start=start, null=null, view=view,
+        projected=view.projections[first.gain],
+    )  # fmt: skip
+    found = search.singles(singles, first)
+    seconds = search.pairs(found)
     linear = [each for each in pairs if each.evidence > singles[0].evidence + PAIR_PROMISE]
     held = {frozenset(each.slugs) for each in seconds}
-    for each in linear:
-        if frozenset(effect.slug for effect in each.effects) not in held:
-            seconds.append(_refitted_linearly(design, noise, priors, null, view.columns, projected, each))
-    found = _without_partners(design, noise, priors, null, found, seconds)
+    seconds += [search.from_screen(each) for each in linear if frozenset(_slugs(each)) not in held]
+    found = search.without_partners(found, seconds)
     known = {each.slugs for each in found}
     rest = [
         Hypothesis(effects=each.effects, evidence=each.evidence, drop=0.0, fit=None)
         for each in singles
-        if tuple(effect.slug for effect in each.effects) not in known
+        if _slugs(each) not in known
     ]
     seen = {each.effect: each.log_evidence for each in raw}
     told = [each.seen_raw(seen) for each in (*found, *seconds, *rest)]
     return noise, sorted(told, key=lambda each: -each.evidence)
 
 
-def _refitted_linearly(
-    design: Design,
-    noise: Noise,
-    priors: Priors,
-    null: Null,
-    columns: list[Column],
-    projected: Projected,
-    screened: Screened,
-) -> Hypothesis:
-    """A screened candidate refitted from its linear amplitudes."""
-    amplitudes, drop = linear_drop(columns, projected, screened)
-    start = _start(screened, amplitudes.tolist())
-    return refitted(
-        design, noise, priors, null, null.fit.laws, start, screened.shape_evidence, (screened.evidence, drop)
-    )
+def _evidence(hypothesis: Hypothesis) -> float:
+    return hypothesis.evidence if finite(hypothesis) else -np.inf
 
 
-def _start(screened: Screened, amplitudes: Iterable[float]) -> tuple[Fitted, ...]:
-    return tuple(
-        Fitted(effect=effect, amplitude=amplitude, shape=shape)
-        for effect, amplitude, shape in zip(screened.effects, amplitudes, screened.shapes, strict=True)
-    )
+def _slugs(screened: Screened) -> tuple[str, ...]:
+    return tuple(effect.slug for effect in screened.effects)
 
 
-def _pairs_of(
-    design: Design, noise: Noise, priors: Priors, null: Null, columns: list[Column], found: list[Hypothesis]
-) -> list[Hypothesis]:
-    """What stands out beside the best singles, refitted together with them."""
-    usable = sorted((each for each in found if finite(each)), key=lambda each: -each.evidence)
-    pairs: dict[frozenset[str], Hypothesis] = {}
-    for one in usable[:FIRSTS]:
-        _add_seconds(design, noise, priors, null, columns, one, pairs)
-    if pairs:  # what the best pair brought in may have a better partner
-        best = max(pairs.values(), key=lambda each: each.evidence)
-        for one in usable[FIRSTS:]:
-            if one.slugs[0] in best.slugs:
-                _add_seconds(design, noise, priors, null, columns, one, pairs)
-    return list(pairs.values())
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Search:
+    """What every refit needs: the null, laws that nothing has bent, the view of the baseline and its projection at the
+    likely gains."""
 
+    design: Design
+    noise: Noise
+    priors: Priors
+    start: Laws
+    null: Null
+    view: View
+    projected: Projected
 
-def _without_partners(
-    design: Design, noise: Noise, priors: Priors, null: Null, found: list[Hypothesis], pairs: list[Hypothesis]
-) -> list[Hypothesis]:
-    """Singles looked for once more from where the best pair has them: what is missed alone may be found in company."""
-    best = max((each for each in pairs if finite(each)), key=lambda each: each.evidence, default=None)
-    if best is None or best.fit is None:
+    def refitted(
+        self,
+        laws: Laws,
+        effects: tuple[Fitted, ...],
+        shape_evidence: float,
+        linear: tuple[float, float],
+        steps: int,
+    ) -> Hypothesis:
+        """A hypothesis from laws and effects."""
+        return refitted(
+            self.design, self.noise, self.priors, self.null, laws, effects, shape_evidence, linear, steps=steps
+        )
+
+    def linear(self, screened: Screened) -> tuple[tuple[Fitted, ...], float]:
+        """A screened candidate's effects at their linear amplitudes, and the drop of the cost [nats]."""
+        amplitudes, drop = linear_drop(self.view.columns, self.projected, screened)
+        effects = tuple(
+            Fitted(effect=effect, amplitude=amplitude, shape=shape)
+            for effect, amplitude, shape in zip(screened.effects, amplitudes.tolist(), screened.shapes, strict=True)
+        )
+        return effects, drop
+
+    def from_screen(self, screened: Screened) -> Hypothesis:
+        """A screened candidate refitted from its linear amplitudes and the null's laws."""
+        effects, drop = self.linear(screened)
+        return self.refitted(self.null.fit.laws, effects, screened.shape_evidence, (screened.evidence, drop), STEPS)
+
+    def singles(self, screened: list[Screened], first: Screened) -> list[Hypothesis]:
+        """The best single effects, the very best from several starts."""
+        margin = MARGIN + MARGIN_SHARE * max(linear_drop(self.view.columns, self.projected, first)[1], 0.0)
+        tried = [each for each in screened[:SINGLES] if each.evidence > screened[0].evidence - margin]
+        found = [self.from_screen(each) for each in tried]
+        for k in sorted(range(len(found)), key=lambda k: -found[k].evidence)[:RESTARTED]:
+            found[k] = max(found[k], self.restarted(tried[k], found[k]), key=_evidence)
         return found
-    alone = {each.slugs: each for each in found}
-    for each in best.fit.effects:
-        known = alone.get((each.effect.slug,))
-        if known is not None and known.evidence < best.evidence:
-            linear = (known.evidence, known.drop)
-            again = refitted(design, noise, priors, null, best.fit.laws, (each,), known.shape_evidence, linear)
-            if finite(again) and again.evidence > known.evidence:
-                alone[known.slugs] = again
-    return list(alone.values())
 
+    def restarted(self, screened: Screened, known: Hypothesis) -> Hypothesis:
+        """A single effect followed to the end from the best of several starts."""
+        starts = [(self.null.fit.laws, each) for each in screened.others]
+        if self.swallowed(screened) > SWALLOWED:
+            starts += [(self.start, each) for each in (screened, *screened.others)]
+        rough = [
+            (fit(self.design, self.noise, laws, self.priors, self.linear(each)[0], steps=ROUGH), each.shape_evidence)
+            for laws, each in starts
+        ]
+        if known.fit is not None:
+            rough.append((known.fit, known.shape_evidence))
+        if not rough:
+            return known
+        best, shape_evidence = min(rough, key=lambda each: each[0].cost - each[1])
+        return self.refitted(best.laws, best.effects, shape_evidence, (known.evidence, known.drop), MOST_STEPS)
 
-def _add_seconds(
-    design: Design,
-    noise: Noise,
-    priors: Priors,
-    null: Null,
-    columns: list[Column],
-    one: Hypothesis,
-    pairs: dict[frozenset[str], Hypothesis],
-) -> None:
-    if one.fit is None:
-        return
-    others = [column for column in columns if column.effect.slug != one.slugs[0]]
-    projected = beside(design, noise, priors, one.fit, others)
-    for second in screen(others, [projected])[:SECONDS]:
-        slugs = frozenset((*one.slugs, second.effects[0].slug))
-        if second.evidence < SECOND_PROMISE or slugs in pairs:
-            continue
-        amplitudes, drop = linear_drop(others, projected, second)
-        start = (*one.fit.effects, *_start(second, amplitudes.tolist()))
-        shape_evidence = one.shape_evidence + second.shape_evidence
-        linear = (one.evidence + second.evidence, one.drop + drop)
-        pairs[slugs] = refitted(design, noise, priors, null, one.fit.laws, start, shape_evidence, linear)
+    def swallowed(self, screened: Screened) -> float:
+        """λ [nats] that a single effect of its linear amplitude had if the baseline took nothing of it up."""
+        amplitude = self.linear(screened)[0][0].amplitude
+        place = self.view.gram.base + screened.places[0]
+        return 0.5 * amplitude**2 * float(self.view.gram.matrix[place, place])
+
+    def pairs(self, found: list[Hypothesis]) -> list[Hypothesis]:
+        """What stands out beside the best singles, refitted together with them."""
+        usable = sorted((each for each in found if finite(each)), key=lambda each: -each.evidence)
+        pairs: dict[frozenset[str], Hypothesis] = {}
+        for one in usable[:FIRSTS]:
+            self._add_seconds(one, pairs)
+        if pairs:  # what the best pair brought in may have a better partner
+            best = max(pairs.values(), key=lambda each: each.evidence)
+            for one in usable[FIRSTS:]:
+                if one.slugs[0] in best.slugs:
+                    self._add_seconds(one, pairs)
+        return list(pairs.values())
+
+    def _add_seconds(self, one: Hypothesis, pairs: dict[frozenset[str], Hypothesis]) -> None:
+        if one.fit is None:
+            return
+        others = [column for column in self.view.columns if column.effect.slug != one.slugs[0]]
+        projected = beside(self.design, self.noise, self.priors, one.fit, others)
+        for second in screen(others, [projected])[:SECONDS]:
+            slugs = frozenset((*one.slugs, *_slugs(second)))
+            if second.evidence < SECOND_PROMISE or slugs in pairs:
+                continue
+            amplitudes, drop = linear_drop(others, projected, second)
+            added = Fitted(effect=second.effects[0], amplitude=float(amplitudes[0]), shape=second.shapes[0])
+            shape_evidence = one.shape_evidence + second.shape_evidence
+            linear = (one.evidence + second.evidence, one.drop + drop)
+            pairs[slugs] = self.refitted(one.fit.laws, (*one.fit.effects, added), shape_evidence, linear, STEPS)
+
+    def without_partners(self, found: list[Hypothesis], pairs: list[Hypothesis]) -> list[Hypothesis]:
+        """Singles looked for once more from where the best pair has them: what is missed alone may be found in company."""
+        best = max((each for each in pairs if finite(each)), key=lambda each: each.evidence, default=None)
+        if best is None or best.fit is None:
+            return found
+        alone = {each.slugs: each for each in found}
+        for each in best.fit.effects:
+            known = alone.get((each.effect.slug,))
+            if known is not None and known.evidence < best.evidence:
+                linear = (known.evidence, known.drop)
+                again = self.refitted(best.fit.laws, (each,), known.shape_evidence, linear, MOST_STEPS)
+                if finite(again) and again.evidence > known.evidence:
+                    alone[known.slugs] = again
+        return list(alone.values())
 
 
 def beside(design: Design, noise: Noise, priors: Priors, fitted: Fit, columns: list[Column]) -> Projected:

@@ -23,7 +23,7 @@ BoolArray: TypeAlias = NDArray[np.bool_]
 IntArray: TypeAlias = NDArray[np.intp]
 
 #: An effect is looked for from so many of its shapes, of which no two share more than this of what is visible of them.
-STARTS, ALIKE = 3, 0.9
+STARTS, ALIKE = 4, 0.9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -21,8 +21,9 @@ from models.diagnosis.report import Verdict
 from models.diagnosis.viewing import View, view_of
 from models.diagnosis.whitening import Noise
 
-#: Candidates this close [nats] to the best are not told from it, and this share of λ more.
-CLOSE, RIVAL = 4.0, 0.005
+#: Candidates this close [nats] to the best are not told from it (pairs, of which each half has evidence of its own, where
+#: they are closer), and this share of λ more.
+CLOSE, CLOSE_PAIRS, RIVAL = 4.0, 3.0, 0.005
 #: What a template may leave behind, as a share of λ; and what its amplitude may be worth more in parts of the data: parts
 #: that differ by δ cost about δ² λ/4.
 TOLERANCE, PARTS_TOLERANCE = 0.05, 0.15
@@ -90,11 +91,13 @@ def judge(
     best, price = _leader(singles, [each for each in usable if len(each.effects) == 2], tested)
     pool = [each for each in usable if len(each.effects) == len(best.effects)]
     pool.sort(key=lambda each: price(each) - each.evidence)
-    near = [
-        each
-        for each in pool
-        if each.evidence - price(each) >= best.evidence - price(best) - CLOSE - RIVAL * unshared(best, each, singles)
-    ][:MOST_CLOSED]
+    margin = CLOSE if len(best.effects) == 1 else CLOSE_PAIRS
+
+    def stands(each: Hypothesis) -> bool:
+        lead = best.evidence - price(best) - each.evidence + price(each)
+        return lead <= margin + RIVAL * unshared(best, each, singles)
+
+    near = [each for each in pool if stands(each)][:MOST_CLOSED]
     closed = [each for each in near if tested(each).closed]
     standing = tuple(each for each in near if closed and tested(each).excess <= CLOSE)
     first = tested(standing[0] if standing else best)

@@ -39,7 +39,7 @@ EFFECT = Effect(
     positive=False,
     scale=100.0,
     shapes=(
-        ShapeParameter(name="log of the length ζ_r", unit="ln cycles", lowest=2.0, highest=12.0, smooth=True),
+        ShapeParameter(name="log of the length ζ_r", unit="ln cycles", lowest=3.0, highest=8.6, smooth=True),
         ShapeParameter(name="what is changed", unit="-", lowest=0.0, highest=1.0),
     ),
     grid=_grid,
