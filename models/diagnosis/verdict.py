@@ -89,20 +89,10 @@ def judge(
         return Judgement(verdict=Verdict.UNEXPLAINED_STRUCTURE)
     tested = _Tested(design, noise, priors, rng)
     best, price = _leader(singles, [each for each in usable if len(each.effects) == 2], tested)
-    pool = [each for each in usable if len(each.effects) == len(best.effects)]
-    pool.sort(key=lambda each: price(each) - each.evidence)
-    margin = CLOSE if len(best.effects) == 1 else CLOSE_PAIRS
-
-    def stands(each: Hypothesis) -> bool:
-        lead = best.evidence - price(best) - each.evidence + price(each)
-        return lead <= margin + RIVAL * unshared(best, each, singles)
-
-    near = [each for each in pool if stands(each)][:MOST_CLOSED]
-    closed = [each for each in near if tested(each).closed]
-    standing = tuple(each for each in near if closed and tested(each).excess <= CLOSE)
+    standing = _standing(best, usable, singles, price, tested)
     first = tested(standing[0] if standing else best)
     slack = tolerance(best)
-    statistics = {"lambda": best.drop, "tolerance": slack, "closed": float(len(closed)), **first.statistics}
+    statistics = {"lambda": best.drop, "tolerance": slack, "standing": float(len(standing)), **first.statistics}
     probabilities = probabilities_of(hypotheses, best, singles, price, tested, structure)
     causes = tuple(dict.fromkeys(slug for each in standing for slug in each.slugs))
     imitated = unmeasured > max(best.evidence - CLOSE - slack, OVER_NOTHING)
@@ -110,7 +100,8 @@ def judge(
         probabilities = with_unmeasured(probabilities, unmeasured, best.evidence, slack)
         causes = tuple(dict.fromkeys(("oil_temperature", *causes)))
     elif (
-        best.evidence - price(best) < max(OVER_NOTHING, structure - GENERIC * max(best.drop - CLEAR, 0.0)) or not closed
+        best.evidence - price(best) < max(OVER_NOTHING, structure - GENERIC * max(best.drop - CLEAR, 0.0))
+        or not standing
     ):
         doubt = doubted(best, tested(best))
         return Judgement(
@@ -133,6 +124,27 @@ def judge(
         probabilities=probabilities,
         statistics=statistics,
     )
+
+
+def _standing(
+    best: Hypothesis,
+    usable: list[Hypothesis],
+    singles: Sequence[Hypothesis],
+    price: Callable[[Hypothesis], float],
+    tested: "_Tested",
+) -> tuple[Hypothesis, ...]:
+    """What cannot be told from the best, best first; none where no case among them closes."""
+    pool = [each for each in usable if len(each.effects) == len(best.effects)]
+    pool.sort(key=lambda each: price(each) - each.evidence)
+    margin = CLOSE if len(best.effects) == 1 else CLOSE_PAIRS
+
+    def stands(each: Hypothesis) -> bool:
+        lead = best.evidence - price(best) - each.evidence + price(each)
+        return lead <= margin + RIVAL * unshared(best, each, singles)
+
+    near = [each for each in pool if stands(each)][:MOST_CLOSED]
+    closed = [each for each in near if tested(each).closed]
+    return tuple(each for each in near if closed and tested(each).excess <= CLOSE)
 
 
 def _leader(

@@ -8,12 +8,18 @@ from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
 from models.diagnosis.viscosity import log_viscosity_ratio
 
+#: How much less is expected [nats] of a film that ruptures or a drag that does not heed viscosity: Newton's has neither.
+_UNUSUAL = 1.5
+
 
 def _grid(facts: Facts) -> tuple[Tried, ...]:
     thinning = (0.0, 1.0) if facts.temperature_measured else (0.0,)
     courses = ((0.6, 0.0), (1.0, 0.0), (1.5, 0.0), (1.0, 0.5), (1.0, 2.0))
     return tuple(
-        Tried(shape=(power, rupture, t, lags)) for power, rupture in courses for t in thinning for lags in (0.0, 1.0)
+        Tried(shape=(power, rupture, t, lags), log_weight=-_UNUSUAL * ((rupture > 0.0) + (t < max(thinning))))
+        for power, rupture in courses
+        for t in thinning
+        for lags in (0.0, 1.0)
     )
 
 
@@ -40,7 +46,7 @@ EFFECT = Effect(
     positive=True,
     scale=1.0,
     shapes=(
-        ShapeParameter(name="power m", unit="-", lowest=0.4, highest=2.0, smooth=True),
+        ShapeParameter(name="power m", unit="-", lowest=0.5, highest=1.8, smooth=True),
         ShapeParameter(name="rupture of the film r", unit="-", lowest=0.0, highest=5.0),
         ShapeParameter(name="viscosity's exponent t", unit="-", lowest=0.0, highest=1.0),
         ShapeParameter(name="whether friction lags behind it", unit="-", lowest=0.0, highest=1.0),
