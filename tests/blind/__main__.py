@@ -1,7 +1,7 @@
 """`make blind`: hide effects, let the diagnosis find them, print what it found as Markdown.
 
 SEED=  another seed, other campaigns          SIZE=   small, full, or a share of the full table
-ONLY=  rows whose names begin with these      PROCESSES= how many at once (2)
+ONLY=  rows whose names begin with these (lives: remaining life)    PROCESSES= how many at once (2)
 ARGS=--write puts the table into docs/diagnosis.md, ARGS=--failures lists what went wrong with the line that repeats it
 """
 
@@ -9,41 +9,50 @@ import multiprocessing
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TypeVar
 
-from tests.blind import table
+from tests.blind import lives, table
 from tests.blind.rows import trials
-from tests.blind.trials import Outcome, Trial, judge
+from tests.blind.trials import Outcome, judge
+
+Job = TypeVar("Job")
+Result = TypeVar("Result")
 
 SIZES = {"small": 0.1, "full": 1.0}
 DOCUMENT = Path(__file__).parents[2] / "docs" / "diagnosis.md"
 BEGIN, END = "<!-- blind tests: begin -->", "<!-- blind tests: end -->"
 
 
-def run(chosen: Sequence[Trial], processes: int) -> list[Outcome]:
-    """All trials, in as many processes, in their order; a word on the way to whoever waits."""
-    outcomes, told = [], time.monotonic()
+def run(work: Callable[[Job], Result], chosen: Sequence[Job], processes: int) -> list[Result]:
+    """All of it, in as many processes, in its order; a word on the way to whoever waits."""
+    results, told = [], time.monotonic()
     with multiprocessing.get_context("spawn").Pool(processes, initializer=os.nice, initargs=(10,)) as pool:
-        for done, outcome in enumerate(pool.imap(judge, chosen), start=1):
-            outcomes.append(outcome)
+        for done, result in enumerate(pool.imap(work, chosen), start=1):
+            results.append(result)
             if time.monotonic() - told > 20:
                 told = time.monotonic()
-                print(f"{done} of {len(chosen)}: {outcome.trial.row}", file=sys.stderr, flush=True)
-    return outcomes
+                print(f"{done} of {len(chosen)} {work.__name__}", file=sys.stderr, flush=True)
+    return results
 
 
-def document(outcomes: Sequence[Outcome], command: str) -> list[str]:
-    """All tables, with the command that makes them."""
+def document(outcomes: Sequence[Outcome], lived: Sequence[lives.Lived], command: str) -> list[str]:
+    """All tables, with the command that makes them; what could not be made is stated and counts nowhere."""
+    made = [one for one in outcomes if one.made]
     parts = [
         [f"`{command}`"],
-        table.summary(outcomes),
+        table.unmade(outcomes),
+        table.summary(made),
         ["One effect, λ = 20, 6 states:"],
-        table.by_effect(outcomes),
-        table.outside(outcomes),
-        table.reliability(outcomes),
-        table.gains(outcomes),
-        table.speed(outcomes),
+        table.by_effect(made),
+        table.outside(made),
+        table.reliability(made),
+        table.of_gains(),
+        table.gains(made),
+        lives.meaning(lived),
+        lives.table(lived),
+        table.speed(made),
     ]
     return [line for part in parts if len(part) != 2 or not part[0].startswith("|") for line in (*part, "")]
 
@@ -62,8 +71,10 @@ def main() -> None:
     only = tuple((os.environ.get("ONLY") or "").split(","))
     size = SIZES[asked] if asked in SIZES else float(asked)
     chosen = [trial for trial in trials(seed, size) if trial.row.startswith(only)]
-    outcomes = run(chosen, int(os.environ.get("PROCESSES") or 2))
-    lines = document(outcomes, f"make blind SEED={seed} SIZE={asked}")
+    processes = int(os.environ.get("PROCESSES") or 2)
+    outcomes = run(judge, chosen, processes)
+    lived = run(lives.lived, lives.jobs(seed, size) if "lives".startswith(only) else [], processes)
+    lines = document(outcomes, lived, f"make blind SEED={seed} SIZE={asked}")
     print("\n".join(lines))
     if "--failures" in sys.argv:
         print("\n".join(table.failures(outcomes)))

@@ -14,6 +14,8 @@ Test = Callable[[Outcome], bool]
 LOUDNESSES = (10.0, 20.0, 50.0, 200.0, 1000.0)
 #: Effects that raise or lower the whole course of friction or do not show without raw records need no temperature.
 WARM = ("oil_temperature",)
+#: Whose error beyond noise an extension has to halve.
+HALVED = ("oil_temperature", "oil_change")
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,8 @@ class Count:
     among: Test = lambda _: True
 
     def of(self, outcomes: Iterable[Outcome]) -> tuple[int, int]:
-        found = [self.met(one) for one in outcomes if one.trial.row.startswith(self.prefix) and self.among(one)]
+        mine = (one for one in outcomes if one.made and one.trial.row.startswith(self.prefix))
+        found = [self.met(one) for one in mine if self.among(one)]
         return sum(found), len(found)
 
     def holds(self, hits: int, count: int) -> bool | None:
@@ -100,7 +103,7 @@ def _special(seed: int, count: int) -> list[Trial]:
         row = f"blindfold/{lam:.0f}"
         wanted = {"oil": False, "moments": True}
         made += [Trial(row, s, WARM, lam, wanted=wanted) for s in _seeds(row, seed, count)]
-    for slug in ("oil_temperature", "oil_change"):
+    for slug in HALVED:
         row = f"gain/{slug}"
         made += [Trial(row, s, (slug,), 60.0) for s in _seeds(row, seed, count)]
     row = "film"

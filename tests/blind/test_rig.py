@@ -7,14 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares
 from scipy.stats import chi2
 
 from tests.blind.rig.hide import hide
-from tests.blind.rig.loudness import LEAST_GAIN, UnreachableError, listen
+from tests.blind.rig.loudness import UnreachableError, listen
 from tests.blind.rig.makers import ALL, CATALOGUED, OUTSIDE
 from tests.blind.rig.more import ASKED, with_test
 from tests.blind.rig.plan import RADIUS, RPM
-from tests.blind.rig.sensor import whiten
+from tests.blind.rig.refit import LEAST_GAIN, spreads, theta_at
+from tests.blind.rig.sensor import Whitening
 from tests.blind.rig.told import campaign, runs
 from tests.blind.rig.world import Effect, follow, read
 
@@ -29,6 +31,8 @@ ALLOWED = {
     "models.plateaus",
     "models.runs",
 }
+#: What lives besides need: the service as whoever uses it sees it, and scores.
+IN_USE = {"models.scoring", "service.app", "service.settings"}
 CONTRACT = {
     "oil_temperature", "interface_heating", "viscous_exponent", "hydrodynamic_drag", "torque_zero_shift",
     "pressure_offset", "unsettled_dwell", "channel_delay", "inertia_torque", "squeeze_film", "shaft_ripple",
@@ -52,7 +56,7 @@ def test_nothing_of_the_catalogue_is_imported() -> None:
     sources = [path for path in FOLDER.rglob("*.py") if not path.name.startswith("test_")]
     assert len(sources) > 10
     for path in sources:
-        assert imported(path.read_text()) <= ALLOWED, path
+        assert imported(path.read_text()) <= ALLOWED | (IN_USE if path.name == "lives.py" else set()), path
     assert not imported("from models.diagnosis.effects.oil import X\nfrom models.diagnosis import baseline") <= ALLOWED
 
 
@@ -89,7 +93,7 @@ def test_the_noise_is_what_the_sensor_says(seed: int) -> None:
     hidden = hide((6, seed))
     truth = read(hidden.plan, hidden.clutch)
     error = [m - t for m, t in zip(hidden.measured, truth, strict=True)]
-    white = whiten(hidden.plan, hidden.sensor, truth, error)
+    white = Whitening(hidden.plan, hidden.sensor, truth)(error)
     low, high = chi2.ppf([1e-4, 1 - 1e-4], white.size)
     assert low < white @ white < high + 0.01 * white.size  # rounding adds a little
     assert abs(white[1:] @ white[:-1]) / white.size < 5 / np.sqrt(white.size)
@@ -102,7 +106,9 @@ def test_an_effect_of_no_size_is_none_and_a_louder_one_is_larger(slug: str) -> N
     ear = listen(hidden.plan, hidden.clutch, hidden.sensor)
     for none, torque in zip(read(hidden.plan, hidden.clutch, [(effect, 1e-9)]), ear.base, strict=True):
         np.testing.assert_allclose(none, torque, atol=1e-5)
-    assert ear.loudness(effect, amplitude) == pytest.approx(20.0, rel=0.021)
+    assert ear.loudness(effect, amplitude) == pytest.approx(
+        20.0, rel=0.06
+    )  # the search ends within 3 % of it, a refit within 2 %
     assert ear.loudness(effect, 1.5 * amplitude) > 25.0
 
 
@@ -110,13 +116,13 @@ def test_means_over_samples_are_as_loud_as_the_samples() -> None:
     hidden = hide((8, 2), ("interface_heating",), 20.0, states=3)
     fine = listen(hidden.plan, hidden.clutch, replace(hidden.sensor, sample_memory=0.4), count=1)
     thin = listen(hidden.plan, hidden.clutch, replace(hidden.sensor, sample_memory=0.4), count=5)
-    for amplitude in (0.002, 0.02):
+    for amplitude in (0.002, 0.01):
         one, other = (ear.loudness(hidden.effects[0][0], amplitude) for ear in (fine, thin))
         assert other == pytest.approx(one, rel=0.03)
 
 
 def test_loudness_is_the_likelihood_ratio_left_after_a_refit() -> None:
-    """λ against generalised least squares on the dense covariance, on stationary tests alone."""
+    """λ of a small effect against generalised least squares on the dense covariance, on stationary tests alone."""
     hidden = hide((5, 2), ("rest_recovery",), 30.0, loops=False)
     plan, clutch, sensor = hidden.plan, hidden.clutch, hidden.sensor
     ear = listen(plan, clutch, sensor)
@@ -130,14 +136,51 @@ def test_loudness_is_the_likelihood_ratio_left_after_a_refit() -> None:
         covariance += max(sensor.gain, LEAST_GAIN) ** 2 * np.outer(base[k], base[k])
         block = slice(k * rows.size, (k + 1) * rows.size)
         inverse[block, block] = np.linalg.inv(covariance)
-    jacobian = []
+    jacobian, prior = [], []
     for i in range(clutch.theta.size - plan.pressures.size - 1):  # the attractor does not act on plateaus
         up, down = (read(plan, clutch.nudged(i, h))[0].ravel() for h in (1e-4, -1e-4))
-        jacobian.append((up - down) / np.linalg.norm(up - down))
+        jacobian.append((up - down) / 2e-4)
+        prior.append(spreads(clutch)[i] ** -2.0)
     j = np.stack(jacobian, axis=1)
-    left = delta @ inverse @ delta - delta @ inverse @ j @ np.linalg.lstsq(j.T @ inverse @ j, j.T @ inverse @ delta)[0]
-    assert 0.5 * left == pytest.approx(30.0, rel=0.03)  # the search for the amplitude ends within 2 %
+    b = j.T @ inverse @ delta
+    left = delta @ inverse @ delta - b @ np.linalg.solve(j.T @ inverse @ j + np.diag(prior), b)
+    assert ear.linear(*hidden.effects[0]) == pytest.approx(0.5 * left, rel=0.01)
+    assert ear.loudness(*hidden.effects[0]) == pytest.approx(0.5 * left, rel=0.05)
+    assert 0.5 * left == pytest.approx(30.0, rel=0.07)
     assert 0.5 * delta @ inverse @ delta > 1.1 * 0.5 * left  # the refit does take some of it
+
+
+@pytest.mark.parametrize(
+    ("slug", "amplitude"), [("running_in", 0.1), ("accelerated_wear", 0.6), ("pressure_offset", 1.0)]
+)
+def test_a_refit_leaves_what_a_general_solver_leaves(slug: str, amplitude: float) -> None:
+    """λ against scipy's least squares in the clutch's own parameters, from the truth and from beside it."""
+    hidden = hide((5, 8), (slug,), 20.0, loops=False, states=5)
+    ear, clutch = listen(hidden.plan, hidden.clutch, hidden.sensor), hidden.clutch
+    effect, spread = hidden.effects[0][0], spreads(clutch)
+    whitened = Whitening(hidden.plan, replace(hidden.sensor, gain=max(hidden.sensor.gain, LEAST_GAIN)), ear.base)
+    changed = read(hidden.plan, clutch, [(effect, amplitude)])
+    count = clutch.theta.size - clutch.pressures.size - 1
+
+    def missed(x: np.ndarray) -> np.ndarray:
+        theta = np.concatenate([x, clutch.theta[count:]])
+        told = read(hidden.plan, replace(clutch, theta=theta))
+        difference = [one - other for one, other in zip(told, changed, strict=True)]
+        return np.concatenate([whitened(difference), ((theta - clutch.theta) / spread)[:count]])
+
+    nothing = 0.5 * float(np.square(missed(clutch.theta[:count])).sum())
+    rng, found = np.random.default_rng(3), []
+    for share in (0.0, 0.2):
+        start = clutch.theta[:count] + share * np.where(spread < 2, spread, 0)[:count] * rng.standard_normal(count)
+        found.append(least_squares(missed, start, x_scale="jac", max_nfev=100).cost)
+    ended = theta_at(ear.refitted(effect, amplitude).at, clutch.span)
+    found.append(least_squares(missed, ended[:count], x_scale="jac", max_nfev=100).cost)
+    loud = ear.loudness(effect, amplitude)
+    assert loud == pytest.approx(min(found), rel=0.05)
+    assert loud < 0.5 * nothing  # the baseline does take it up
+    assert abs(ear.linear(effect, 0.02 * amplitude) / ear.loudness(effect, 0.02 * amplitude) - 1) < 0.1
+    bent = abs(ear.linear(effect, amplitude) / loud - 1)
+    assert (bent > 0.3) == (slug != "pressure_offset")  # where it matters, the linear prediction is far off
 
 
 def test_what_cannot_be_loud_says_so() -> None:

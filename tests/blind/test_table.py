@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import pytest
 
+from models.diagnosis.report import Gain
 from tests.blind import __main__ as blind
 from tests.blind import table
+from tests.blind.rig.loudness import UnreachableError
 from tests.blind.rig.makers import CATALOGUED, OUTSIDE
 from tests.blind.rows import counts, trials, wilson
-from tests.blind.trials import Outcome, Trial
+from tests.blind.trials import Outcome, Trial, judge
 
 
 def all_knowing(trial: Trial) -> Outcome:
@@ -53,6 +55,39 @@ def test_every_effect_has_its_row_and_every_line_its_trials() -> None:
 def test_intervals_are_wilsons() -> None:
     assert wilson(0, 10) == pytest.approx((0.0, 0.2775), abs=1e-4)  # Newcombe 1998, method 3
     assert wilson(81, 263) == pytest.approx((0.2553, 0.3662), abs=1e-4)  # the same, table I
+
+
+def test_what_cannot_be_made_is_an_outcome_that_counts_nowhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(_: Trial) -> None:
+        raise UnreachableError("running_in: no amplitude up to 0.6 has λ = 1000.0")
+
+    monkeypatch.setattr(Trial, "hidden", never)
+    trial = Trial("loud/1000/running_in", (1, 2), ("running_in",), 1000.0)
+    unmade = judge(trial)
+    assert unmade.verdict == "unreachable"
+    assert not unmade.detected
+    made = [all_knowing(replace(trial, seed=(1, 3))), all_knowing(Trial("none", (1, 4)))]
+    line = next(line for line in counts() if line.title == "λ = 1000: named and wrong")
+    assert (line.of([unmade]), line.of([*made, unmade])) == ((0, 0), (0, 1))
+    told = blind.document([*made, unmade], [], "make blind")
+    assert any("1 of 3 trials could not be made" in row and "`running_in` at λ = 1000 (1)" in row for row in told)
+    assert told[4:] == blind.document(made, [], "make blind")[4:]
+    assert table.unmade(made) == ["All 2 trials could be made."]
+    assert table.failures([unmade]) == []
+
+
+def test_gains_are_held_against_their_targets() -> None:
+    good = Gain(
+        held_out_runs=(), rmse_before=1.0, rmse_after=0.9, reduction_percent=10.0, reduction_sd=1.0, excess_before=0.5,
+        excess_after=0.2, mse_percent_before=1.0, mse_percent_after=0.8, log_score_gain=1.0, remaining=1.0,
+    )  # fmt: skip
+    trials_ = [Trial("gain/oil_change", (1, k), ("oil_change",), 60.0) for k in range(3)]
+    row = "| `oil_change`, λ = 60 | 3 | 0.900 | 0.900 | ≤ 1.02 | met | 0.40 of 3 | ≤ 0.5 | met |"
+    assert table.gains([replace(all_knowing(each), gain=good) for each in trials_])[2:] == [row]
+    worse = replace(good, rmse_after=1.1, excess_after=0.4)
+    (row,) = table.gains([replace(all_knowing(each), gain=worse) for each in trials_])[2:]
+    assert row.count("missed") == 2
+    assert table.beyond(replace(all_knowing(trials_[0]), gain=replace(good, excess_before=0.01))) is None
 
 
 def test_failures_say_how_to_repeat_them() -> None:

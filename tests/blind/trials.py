@@ -9,12 +9,15 @@ import numpy as np
 
 from models.diagnosis import engine
 from models.diagnosis.campaign import Campaign
-from models.diagnosis.report import Report
+from models.diagnosis.report import Gain, Report
 from tests.blind.rig.hide import Hidden, hide
+from tests.blind.rig.loudness import UnreachableError
 from tests.blind.rig.more import with_test
 from tests.blind.rig.told import campaign
 
 Diagnose = Callable[..., Report]
+#: The verdict on a campaign that could not be made: no draw in which the effect was as loud as it should be.
+UNREACHABLE = "unreachable"
 
 
 @dataclass(frozen=True)
@@ -48,7 +51,7 @@ class Outcome:
     candidates: tuple[tuple[str, float], ...]
     where: tuple[str, ...]
     axes: frozenset[str]
-    gain: tuple[float, float, float] | None  # rmse before, after, noise
+    gain: Gain | None
     advice: tuple[str, ...]  # keys of the advised tests, best first
     seconds: float  # of one core
     statistics: dict[str, float]
@@ -61,7 +64,12 @@ class Outcome:
 
     @property
     def detected(self) -> bool:
-        return self.verdict not in {"model_adequate", "insufficient_data", "crashed"}
+        return self.verdict not in {"model_adequate", "insufficient_data", "crashed", UNREACHABLE}
+
+    @property
+    def made(self) -> bool:
+        """Whether there was a campaign at all; where there was none, nothing is counted."""
+        return self.verdict != UNREACHABLE
 
     @property
     def named(self) -> bool:
@@ -84,12 +92,20 @@ class Outcome:
 
 def judge(trial: Trial, diagnose: Diagnose | None = None) -> Outcome:
     """Hide, diagnose, and hold what was said beside what was true. A crash is an outcome, and never a good one."""
-    hidden = trial.hidden()
+    try:
+        hidden = trial.hidden()
+    except UnreachableError as failure:
+        return nothing(trial, UNREACHABLE, str(failure))
     outcome = judged(trial, hidden, campaign(hidden), diagnose)
     if trial.follow and outcome.verdict == "cause_ambiguous" and outcome.advice:
         after = with_test(hidden, outcome.advice[0])
         return replace(outcome, advised=judged(trial, after, campaign(after), diagnose))
     return outcome
+
+
+def nothing(trial: Trial, verdict: str, error: str, axes: frozenset[str] = frozenset()) -> Outcome:
+    """The outcome where no report came."""
+    return Outcome(trial, verdict, frozenset(), (), (), axes, None, (), 0.0, {}, error)
 
 
 def judged(trial: Trial, hidden: Hidden, seen: Campaign, diagnose: Diagnose | None = None) -> Outcome:
@@ -100,14 +116,9 @@ def judged(trial: Trial, hidden: Hidden, seen: Campaign, diagnose: Diagnose | No
     try:
         report = look(seen, rng=np.random.default_rng(11), without=trial.without)
     except Exception as failure:  # noqa: BLE001 -- one crash must not end a night of trials; it fails its row instead
-        return Outcome(trial, "crashed", frozenset(), (), (), axes, None, (), 0.0, {}, repr(failure))
+        return nothing(trial, "crashed", repr(failure), axes)
     seconds = process_time() - began
     where = sorted(report.baseline.where, key=lambda one: -one.strength) if report.baseline else []
-    gain = report.gain and (
-        report.gain.rmse_before,
-        report.gain.rmse_after,
-        report.baseline.noise if report.baseline else 0,
-    )
     return Outcome(
         trial=trial,
         verdict=str(report.verdict),
@@ -115,7 +126,7 @@ def judged(trial: Trial, hidden: Hidden, seen: Campaign, diagnose: Diagnose | No
         candidates=tuple((one.effect, one.probability) for one in report.candidates),
         where=tuple(one.axis for one in where),
         axes=axes,
-        gain=gain,
+        gain=report.gain,
         advice=tuple(one.key for one in report.advice),
         seconds=seconds,
         statistics=dict(report.statistics),

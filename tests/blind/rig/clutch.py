@@ -17,6 +17,16 @@ LAWS = ("static", "stribeck", "viscous", "ratio")
 GAMMA = 0.3
 
 
+def slots() -> list[tuple[slice, slice, int, int]]:
+    """Where in `theta` each of LAWS has its terms (ln p0 among them), its two shares, log time scale, log order."""
+    found, at = [], 0
+    for name in LAWS:
+        terms = 3 if name == "ratio" else 2
+        found.append((slice(at, at + terms), slice(at + terms, at + terms + 2), at + terms + 2, at + terms + 3))
+        at += terms + 4
+    return found
+
+
 @dataclass(frozen=True)
 class Law:
     """The four of eq. 3 somewhere: M_s [Nm], M̄_c [-], V_S [m/s], C_v [Nm (s/m)^0.3], arrays that broadcast."""
@@ -54,21 +64,13 @@ class Clutch:
 
     def law(self, bar: FloatArray, cycles: FloatArray) -> Law:
         """The laws at a pressure [bar] after `cycles`."""
-        found, at = {}, 0
-        for name in LAWS:
-            first, second = self.theta[at], self.theta[at + 1]
-            at += 2
-            if name == "ratio":
-                shape = np.exp(-bar / np.exp(self.theta[at]))
-                at += 1
-            else:
-                shape = bar
-            shares = self.theta[at : at + 2]
-            at += 2
-            scale, order = np.exp(self.theta[at : at + 2])
-            at += 2
-            gone = 1 - (1 + cycles / scale) ** -order
-            found[name] = first * (1 + shares[0] * gone) + second * shape * (1 + shares[-1] * gone)
+        found = {}
+        for name, (terms, ends, scale, order) in zip(LAWS, slots(), strict=True):
+            first, second, *decay = self.theta[terms]
+            shape = np.exp(-bar / np.exp(decay[0])) if decay else bar
+            shares = self.theta[ends]
+            gone = 1 - (1 + cycles / np.exp(self.theta[scale])) ** -np.exp(self.theta[order])
+            found[name] = first * (1 + shares[0] * gone) + second * shape * (1 + shares[1] * gone)
 
         def elsewhere(other: FloatArray | None, later: FloatArray | None) -> Law:
             return self.law(bar if other is None else other, cycles if later is None else later)

@@ -14,6 +14,9 @@ from tests.blind.rig.plan import Plan, Wish, draw_plan
 from tests.blind.rig.sensor import Sensor, draw_sensor, measure
 from tests.blind.rig.world import Effect, read
 
+#: So many campaigns are drawn before an effect is said to be never as loud as it should be.
+DRAWS = 8
+
 
 @dataclass(frozen=True)
 class Hidden:
@@ -45,7 +48,7 @@ def combined(slugs: Sequence[str], **wanted: object) -> Wish:
 def hide(seed: Sequence[int], slugs: Sequence[str] = (), lam: float = 0.0, **wanted: object) -> Hidden:
     """Hide effects by slug, each at loudness `lam` [nats] by itself; `wanted` overrides the wish. Same seed, same data.
 
-    Campaigns in which an effect cannot be as loud as that are drawn anew.
+    Campaigns in which an effect cannot be as loud as that are drawn anew; raises UnreachableError after `DRAWS`.
     """
     wish = combined(slugs, **wanted)
     for attempt in count():
@@ -58,7 +61,7 @@ def hide(seed: Sequence[int], slugs: Sequence[str] = (), lam: float = 0.0, **wan
             ear: Ear | None = listen(plan, clutch, sensor) if slugs else None
             effects = tuple((one, ear.amplitude_for(one, lam)) for one in made) if ear else ()
         except UnreachableError:
-            if attempt == 30:
+            if attempt + 1 == DRAWS:
                 raise
             continue
         truth = read(plan, clutch, effects)

@@ -73,27 +73,33 @@ def measure(rng: np.random.Generator, plan: Plan, sensor: Sensor, truth: list[Fl
     return told
 
 
-def whiten(
-    plan: Plan, sensor: Sensor, base: list[FloatArray], changes: list[FloatArray], slowest: float = 0.0
-) -> FloatArray:
-    """Changes of torque in deviations, uncorrelated: one vector over all sites, given the readings without them.
+class Whitening:
+    """Takes the noise out of changes of torque, given the readings `base` without them.
 
     Samples of records below `slowest` rpm count for nothing.
     """
-    out = []
-    for site, torque, change in zip(plan.sites, base, changes, strict=True):
-        sigma, rho = sensor.sigma(site, torque), sensor.rho(site)
-        if site.kind != "stationary":
-            sigma = np.where(site.rpm < slowest, 1e9, sigma)
-        y, u = uncorrelated(change / sigma, rho), uncorrelated(sensor.gain * torque / sigma, rho)
-        for k in range(plan.life.cycles.size):
-            rows = site.state == k
-            part, gain = y[rows].ravel(), u[rows].ravel()
-            square = float(gain @ gain)
-            if square > 1e-12:
-                part = part - (1 - 1 / np.sqrt(1 + square)) / square * (gain @ part) * gain
-            out.append(part)
-    return np.concatenate(out)
+
+    def __init__(self, plan: Plan, sensor: Sensor, base: list[FloatArray], slowest: float = 0.0) -> None:
+        self._sites = []
+        for site, torque in zip(plan.sites, base, strict=True):
+            sigma, rho = sensor.sigma(site, torque), sensor.rho(site)
+            if site.kind != "stationary":
+                sigma = np.where(site.rpm < slowest, 1e9, sigma)
+            u = uncorrelated(sensor.gain * torque / sigma, rho)
+            runs = [(rows, u[rows].ravel()) for k in range(plan.life.cycles.size) if (rows := site.state == k).any()]
+            self._sites.append((1 / sigma, rho, [(rows, gain, float(gain @ gain)) for rows, gain in runs]))
+
+    def __call__(self, changes: list[FloatArray]) -> FloatArray:
+        """Changes in deviations, uncorrelated: one vector over all sites."""
+        out = []
+        for change, (weight, rho, runs) in zip(changes, self._sites, strict=True):
+            y = uncorrelated(change * weight, rho)
+            for rows, gain, square in runs:
+                part = y[rows].ravel()
+                if square > 1e-12:
+                    part = part - (1 - 1 / np.sqrt(1 + square)) / square * (gain @ part) * gain
+                out.append(part)
+        return np.concatenate(out)
 
 
 def uncorrelated(x: FloatArray, rho: float) -> FloatArray:

@@ -1,0 +1,68 @@
+"""Lives that go on after what was measured, and the table of what is said of them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.blind import lives
+from tests.blind.rig.hide import hide
+from tests.blind.rig.plan import RADIUS, RPM
+from tests.blind.rig.world import read
+
+SECONDS = (5, 31)
+
+
+def test_the_true_course_is_that_of_what_is_measured() -> None:
+    """Mean torque over pressure at the states, reckoned from noise-free readings on the reference's own grid."""
+    hidden = hide(SECONDS, ("running_in",), 50.0, loops=False, full=True)
+    site = hidden.plan.sites[0]
+    told = read(hidden.plan, hidden.clutch, hidden.effects)[0]
+    seen = (told / site.bar).mean(axis=1)
+    course = lives.mean_cof(hidden, hidden.plan.life.cycles)
+    np.testing.assert_allclose(course / course[0], seen / seen[0], rtol=2e-3)
+    bare = lives.mean_cof(replace(hidden, effects=()), hidden.plan.life.cycles)
+    assert np.abs(bare / bare[0] - seen / seen[0]).max() > 5e-3  # the effect is in it
+
+
+def test_an_artefact_moves_no_life() -> None:
+    hidden = hide(SECONDS, ("oil_temperature",), 50.0, loops=False)
+    cycles = np.linspace(0, 2 * hidden.plan.life.span, 7)
+    bare = lives.mean_cof(replace(hidden, effects=()), cycles)
+    np.testing.assert_array_equal(lives.mean_cof(hidden, cycles), bare)
+    law = hidden.clutch.law(hidden.plan.pressures[:, None], np.array(cycles[-1]))
+    torque = law.torque(np.linspace(20, 1970, 40) * RPM * RADIUS)
+    assert bare[-1] == pytest.approx((torque / hidden.plan.pressures[:, None]).mean(), rel=1e-12)
+
+
+def test_an_end_is_the_first_time_that_its_share_is_passed() -> None:
+    hidden = hide(SECONDS, loops=False)
+    end = 2 * hidden.plan.life.span
+    share = lives.passed_at(hidden, end)
+    assert share is not None
+    cycles = np.linspace(0, 2 * end, 4001)
+    course = lives.mean_cof(hidden, cycles)
+    first = cycles[np.flatnonzero(course <= share * course[0])[0]]
+    assert first == pytest.approx(end, abs=2 * cycles[1])
+    growing = replace(hidden, clutch=replace(hidden.clutch, theta=np.abs(hidden.clutch.theta)))
+    assert lives.passed_at(growing, end) is None  # it never falls
+
+
+def test_a_forecast_is_scored_by_how_far_it_is_from_the_truth() -> None:
+    levels = ("0.05", "0.5", "0.95")
+    near = {"end_of_life_cycles": dict(zip(levels, (9e3, 1e4, 1.1e4), strict=True))}
+    far = {"end_of_life_cycles": dict(zip(levels, (2e4, 4e4, None), strict=True))}
+    assert lives._crps(near, 1e4) < 0.05 < 1.0 < lives._crps(far, 1e4)
+
+
+def test_the_table_counts_what_was_made() -> None:
+    good = lives.Lived("running_in", (1,), "cause_named", True, 0.3, 0.1)
+    bad = lives.Lived("oil_change", (1,), "cause_named", True, 0.1, 0.3)
+    unmade = lives.Lived("oil_change", (2,), "unreachable", False, None, None)
+    rows = lives.table([good, good, bad, unmade])
+    assert rows[2] == "| `running_in` | 2 | 2 | 0.300 | 0.100 | 2/0 | -0.200 [-0.200, -0.200] | met |"
+    assert rows[3].startswith("| `oil_change` | 1 | 1 |")
+    assert rows[3].endswith("| missed |")
+    assert "1 of 4 lives could not be made" in lives.meaning([good, good, bad, unmade])[0]
+    assert {job[0] for job in lives.jobs(1, 0.01)} == {*lives.COURSES, *lives.ARTEFACTS}
+    assert len(lives.jobs(1, 1.0)) == 7 * lives.LIVES
