@@ -30,12 +30,17 @@ def answer(request: Request, payload: object) -> Response:
 
 
 def table(request: Request, columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> Response:
-    """A GET's answer as CSV after RFC 4180, a header row first; null is an empty field."""
+    """A GET's answer as CSV."""
+    return tagged(request, encode_table(columns, rows), CSV_TYPE)
+
+
+def encode_table(columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> bytes:
+    """CSV after RFC 4180 in UTF-8, a header row first; null is an empty field."""
     text = io.StringIO()
     writer = csv.DictWriter(text, fieldnames=columns, extrasaction="raise", restval="")
     writer.writeheader()
     writer.writerows({name: "" if value is None else value for name, value in row.items()} for row in rows)
-    return tagged(request, text.getvalue().encode(), CSV_TYPE)
+    return text.getvalue().encode()
 
 
 def tagged(request: Request, body: bytes, media_type: str) -> Response:

@@ -28,6 +28,14 @@ from storage.errors import StorageError
 
 INTERRUPTED = "the service ended while the diagnosis ran: ask again"
 _TAIL = 2000
+#: One thread; and memory that arrays gave back is kept for the next ones: having it mapped anew each time takes as long as
+#: what is worked out in it.
+_NUMERICS = {
+    "OPENBLAS_NUM_THREADS": "1",
+    "OMP_NUM_THREADS": "1",
+    "MALLOC_MMAP_THRESHOLD_": str(32 << 20),
+    "MALLOC_TRIM_THRESHOLD_": str(1 << 30),
+}
 _log = logging.getLogger("clutchlife")
 
 
@@ -155,7 +163,7 @@ class Worker:
                     stdin=subprocess.PIPE,
                     stdout=answer,
                     stderr=errors,
-                    env=os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
+                    env=os.environ | _NUMERICS,
                 )
             code = self._ended(self._process)
             if code != 0:

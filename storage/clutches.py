@@ -80,6 +80,12 @@ def bump_revision(connection: Connection, clutch_id: str) -> int:
     return revision
 
 
+def revision(connection: Connection, clutch_id: str) -> int | None:
+    """The clutch's revision, or None."""
+    found: int | None = connection.execute(_revision, {"wanted": clutch_id}).scalar_one_or_none()
+    return found
+
+
 def all_ids(connection: Connection) -> list[str]:
     """The ids of all clutches, ascending."""
     return list(connection.execute(_ids).scalars())

@@ -32,8 +32,10 @@ class Prediction:
     def _lagged(self, design: Design, change: FloatArray) -> FloatArray:
         if self.lag is None:
             return change
-        columns = change[design.plateaus :].reshape(design.loops, PHASES, -1)
-        return np.concatenate([change[: design.plateaus], self.lag.follow(columns).reshape(-1, *change.shape[1:])])
+        out = change.copy()
+        loops = out[design.plateaus :].reshape(design.loops, PHASES, -1)
+        loops[:] = self.lag.follow(loops)
+        return out
 
     def jacobian(self, design: Design) -> FloatArray:
         """∂torque/∂θ [N, θ.size]."""
@@ -45,9 +47,9 @@ class Prediction:
         columns[:, LOG_DECAY] = scene.gradient[:, RATIO] * by_decay
         columns = self._lagged(design, columns)
         if self.lag is not None:
-            start = design.plateaus
-            _, weights = laws.log_attractor(points.pressure[start:], points.cycles[start:])
-            columns[start:, DRIFT:] = self.lag.by_log_attractor.reshape(-1, 1) * weights
+            _, weights = _log_attractor(design, laws)
+            slowness = self.lag.by_log_attractor[:, :, None] * weights[:, None, :]
+            columns[design.plateaus :, DRIFT:] = slowness.reshape(-1, weights.shape[1])
         return design.to_rows(columns)
 
 
@@ -68,9 +70,15 @@ def predict(design: Design, laws: Laws) -> Prediction:
     scene = scene_of(laws, design.points, design.facts)
     at_points, lag = scene.curve, None
     if design.loops:
-        at = design.points.angular_frequency[design.plateaus :].reshape(design.loops, PHASES)
-        shape = (design.loops, PHASES)
         start = design.plateaus
-        lag = lag_of(scene.curve[start:].reshape(shape), scene.attractor[start:].reshape(shape), at[:, 0])
+        attractor = np.exp(_log_attractor(design, laws)[0])
+        frequency = design.points.angular_frequency[start::PHASES]
+        lag = lag_of(scene.curve[start:].reshape(design.loops, PHASES), attractor[:, None], frequency)
         at_points = np.concatenate([scene.curve[:start], lag.torque.ravel()])
     return Prediction(torque=design.to_rows(at_points), scene=scene, lag=lag)
+
+
+def _log_attractor(design: Design, laws: Laws) -> tuple[FloatArray, FloatArray]:
+    """log C [l] of the loops, and its derivatives [l, ...] by θ from DRIFT on."""
+    points, first = design.points, slice(design.plateaus, None, PHASES)
+    return laws.log_attractor(points.pressure[first], points.cycles[first])

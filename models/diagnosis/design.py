@@ -74,7 +74,8 @@ class Design:
     """Points [P] (plateaus first, then PHASES points a loop), rows [N] (plateaus first, then the loops' bins), measured
     torque [N] Nm (folded), `samples` [N] averaged in each row, `torque_sd` [N] Nm as sent (NaN where not), `level` [N]
     Pa the pressure level, `curve` [N] an index that run and level share, `bins` [N - plateaus] which bin of the flat
-    (loop, bin) order each loop row is, `notes` what was left out."""
+    (loop, bin) order each loop row is, `chains` [b, n] rows that follow
+    each other in a run or loop, those of one length together, `notes` what was left out."""
 
     points: Points
     rows: Points
@@ -84,6 +85,7 @@ class Design:
     level: FloatArray
     curve: IntArray
     bins: IntArray
+    chains: tuple[IntArray, ...]
     plateaus: int
     loops: int
     runs: tuple[RunInfo, ...]
@@ -92,11 +94,13 @@ class Design:
 
     def to_rows(self, at_points: FloatArray) -> FloatArray:
         """[P, ...] at points -> [N, ...] at rows: bins are the means of their points."""
-        loops = at_points[self.plateaus :]
         if not self.loops:
             return at_points
-        shape = (self.loops * BINS, PHASES // BINS, *at_points.shape[1:])
-        return np.concatenate([at_points[: self.plateaus], loops.reshape(shape).mean(axis=1)[self.bins]])
+        out = np.empty((self.torque.size, *at_points.shape[1:]))
+        out[: self.plateaus] = at_points[: self.plateaus]
+        loops = at_points[self.plateaus :].reshape(self.loops * BINS, PHASES // BINS, *at_points.shape[1:])
+        np.take(loops.mean(axis=1), self.bins, axis=0, out=out[self.plateaus :], mode="clip")
+        return out
 
 
 def build_design(campaign: Campaign) -> Design:
@@ -163,12 +167,27 @@ def _assembled(
         level=level,
         curve=np.asarray(curve, dtype=np.intp).reshape(-1),
         bins=np.asarray(bins, dtype=np.intp),
+        chains=_chains(rows),
         plateaus=plateaus,
         loops=len(loops),
         runs=tuple(runs),
         facts=facts_of(campaign),
         notes=notes,
     )
+
+
+def _chains(rows: Points) -> tuple[IntArray, ...]:
+    """Rows [b, n] that follow each other in runs of plateaus, then in loops, those of one length together."""
+    owner = np.where(rows.steady, rows.run, rows.loop + int(rows.run.max(initial=0)) + 1)
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(owner)) + 1, [owner.size]])
+    starts, lengths = edges[:-1], np.diff(edges)
+    steady = np.append(rows.steady, False)[starts]
+    found = []
+    for mine in (steady, ~steady):
+        for length in np.unique(lengths[mine & (lengths > 0)]):
+            first = starts[mine & (lengths == length)]
+            found.append(np.asarray(first[:, None] + np.arange(length), dtype=np.intp))
+    return tuple(found)
 
 
 def _thinned(campaign: Campaign, notes: list[str]) -> Campaign:

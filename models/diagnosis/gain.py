@@ -132,7 +132,9 @@ def _held(design: Design, noise: Noise, priors: Priors, baseline: Fit, extended:
     missed = []
     for model in (baseline, extended):
         found = fit(design, masked, model.laws, priors, model.effects, steps=_STEPS)
-        found = fit(design, masked, _bridged(found.laws, design, out), priors, found.effects, steps=0)
+        bridged = _bridged(found.laws, design, out)
+        if bridged is not found.laws:
+            found = fit(design, masked, bridged, priors, found.effects, steps=0)
         missed.append(np.where(out, found.residual, 0.0))
     squares = np.square(_white(np.stack(missed, axis=1), design, noise)).sum(axis=0)
     rows = np.flatnonzero(out)

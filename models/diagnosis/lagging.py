@@ -34,7 +34,7 @@ class Lag:
 
 
 def lag_of(curve: FloatArray, attractor: FloatArray, angular_frequency: FloatArray) -> Lag:
-    """For curves S [l, k] Nm at evenly spaced phases, attractors C [l, k] Nm/s > 0 and frequencies [l] rad/s."""
+    """For curves S [l, k] Nm at evenly spaced phases, attractors C [l, k] or [l, 1] Nm/s > 0, frequencies [l] rad/s."""
     strength = np.maximum(np.abs(curve), _LEAST_SHARE * np.abs(curve).max(axis=1, keepdims=True) + 1e-12)
     rate = np.clip(attractor / strength, 1e-9, 1e9)
     step = 2 * np.pi / (curve.shape[1] * angular_frequency[:, None])
@@ -45,7 +45,7 @@ def lag_of(curve: FloatArray, attractor: FloatArray, angular_frequency: FloatArr
     torque = _relaxed(keep, mean_keep, curve[:, :, None])[:, :, 0]
     by_mean = keep - mean_keep  # x dm/dx of M_i = e^-x M_{i-1} + (1 - m) S_i + (m - e^-x) S_{i-1}
     gain = -x * keep * np.roll(torque, 1, axis=1) - by_mean * curve + (by_mean + x * keep) * np.roll(curve, 1, axis=1)
-    behind = _periodic(keep, gain[:, :, None])[:, :, 0]
+    behind = _periodic(keep, gain.T[:, :, None].copy())[:, :, 0]
     return Lag(
         keep=keep,
         mean_keep=mean_keep,
@@ -57,18 +57,20 @@ def lag_of(curve: FloatArray, attractor: FloatArray, angular_frequency: FloatArr
 
 def _relaxed(keep: FloatArray, mean_keep: FloatArray, target: FloatArray) -> FloatArray:
     """R[target] for targets [l, k, m]."""
-    gain = (1 - mean_keep)[:, :, None] * target
-    gain += (mean_keep - keep)[:, :, None] * np.roll(target, 1, axis=1)
+    by_phase = np.ascontiguousarray(target.transpose(1, 0, 2))
+    here, before = 1 - mean_keep.T[:, :, None], (mean_keep - keep).T[:, :, None]
+    gain = here * by_phase
+    gain[1:] += before[1:] * by_phase[:-1]
+    gain[0] += before[0] * by_phase[-1]
     return _periodic(keep, gain)
 
 
 def _periodic(keep: FloatArray, gain: FloatArray) -> FloatArray:
-    """The periodic y [l, k, m] of y_i = keep_i y_{i-1} + gain_i: once around from nothing, then what was missing."""
-    out = np.empty_like(gain)
-    before = np.zeros((gain.shape[0], gain.shape[2]))
-    for i in range(gain.shape[1]):
-        before = keep[:, i, None] * before + gain[:, i]
-        out[:, i] = before
-    left = np.cumprod(keep, axis=1)
-    first = before / (1 - left[:, -1:])
-    return np.asarray(out + left[:, :, None] * first[:, None, :], dtype=np.float64)
+    """The periodic y [l, k, m] of y_i = keep_i y_{i-1} + gain_i, keep [l, k], gain [k, l, m] (taken for y): once around
+    from nothing, then what was missing."""
+    steps = keep.T[:, :, None]
+    for i in range(1, gain.shape[0]):
+        gain[i] += steps[i] * gain[i - 1]
+    left = np.cumprod(steps, axis=0)
+    gain += left * (gain[-1] / (1 - left[-1]))
+    return gain.transpose(1, 0, 2)

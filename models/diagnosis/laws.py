@@ -78,13 +78,16 @@ class Laws:
         values = np.empty((pressure.size, 4))
         by_decay = np.zeros(pressure.size)
         high = (pressure - self.frame.lowest) / self.frame.span
-        states, of_state = np.unique(cycles, return_inverse=True)  # few: eq. 6 is worked out once for each
+        # rows of one test stand together: eq. 6 is worked out once for each
+        begins = np.flatnonzero(np.diff(cycles, prepend=np.nan))
+        states, repeats = cycles[begins], np.diff(begins, append=cycles.size)
         fall, by_fall = falling_weight(high, self.frame.span, float(self.theta[LOG_DECAY]))
         for k in range(4):
             first, second, share_1, share_2, log_half, log_exponent = self.theta[k * BLOCK : (k + 1) * BLOCK].tolist()
             weight_1, weight_2 = (fall, 1.0 - fall) if k == RATIO else (1.0 - high, high)
-            progress = _progress(states, log_half, log_exponent)
-            done = progress[0][of_state]
+            done, by_half, by_exponent = (
+                np.repeat(each, repeats) for each in _progress(states, log_half, log_exponent)
+            )
             lost = first * share_1 * weight_1 + second * share_2 * weight_2
             values[:, k] = first * weight_1 + second * weight_2 + lost * done
             if k == RATIO:
@@ -94,8 +97,8 @@ class Laws:
                 slopes[:, k, 1] = weight_2 * (1.0 + share_2 * done)
                 slopes[:, k, 2] = first * weight_1 * done
                 slopes[:, k, 3] = second * weight_2 * done
-                slopes[:, k, 4] = lost * progress[1][of_state]
-                slopes[:, k, 5] = lost * progress[2][of_state]
+                slopes[:, k, 4] = lost * by_half
+                slopes[:, k, 5] = lost * by_exponent
         stuck = values[:, 2] < _LEAST_VELOCITY
         values[stuck, 2] = _LEAST_VELOCITY
         if slopes is not None:
@@ -151,7 +154,7 @@ def curve(velocity: FloatArray, parameters: FloatArray) -> FloatArray:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
     """Points and what the baseline says there, all [P]: curve S [Nm]; parameters [P, 4] and gradient [P, 4] = ∂S by them;
-    decay e = exp(-V_S/v); by_velocity ∂S/∂v [Nm s/m]; attractor C [Nm/s] (NaN without loops)."""
+    decay e = exp(-V_S/v); by_velocity ∂S/∂v [Nm s/m]."""
 
     points: Points
     facts: Facts
@@ -161,7 +164,6 @@ class Scene:
     gradient: FloatArray
     decay: FloatArray
     by_velocity: FloatArray
-    attractor: FloatArray
 
     @property
     def by_pressure(self) -> FloatArray:
@@ -203,17 +205,13 @@ def scene_of(laws: Laws, points: Points, facts: Facts) -> Scene:
     gradient, decay = gradient_of(points.velocity, values)
     falling = gradient[:, 2] * values[:, 2] / points.velocity
     by_velocity = -falling + GAMMA * values[:, 3] * points.velocity ** (GAMMA - 1.0)
-    attractor = np.full(points.run.size, np.nan)
-    if laws.frame.loop_pressures.size:
-        attractor = np.exp(laws.log_attractor(points.pressure, points.cycles)[0])
     return Scene(
         points=points,
         facts=facts,
         laws=laws,
         parameters=values,
-        curve=curve(points.velocity, values),
+        curve=np.asarray(values[:, 0] * gradient[:, 0] + values[:, 3] * gradient[:, 3], dtype=np.float64),
         gradient=gradient,
         decay=decay,
         by_velocity=np.asarray(by_velocity, dtype=np.float64),
-        attractor=attractor,
     )

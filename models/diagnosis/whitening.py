@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import lfilter
+from scipy.sparse import csr_array
 
 from models.arrays import FloatArray
 from models.diagnosis.design import Design, IntArray
@@ -39,25 +40,18 @@ class Noise:
 def whitened(columns: FloatArray, design: Design, noise: Noise) -> FloatArray:
     """R^{-1/2} D^{-1} of columns [N, m]: everything but the gains."""
     out = columns / noise.deviation[:, None]
-    for rows, correlation in _blocks(design, noise):
-        out[rows] = _filtered(out[rows], correlation)
-    return out
-
-
-def _blocks(design: Design, noise: Noise) -> list[tuple[IntArray, Correlation]]:
-    """Runs of plateaus and loops [b, n]: rows that follow each other, those of one length together; none where neighbours
-    are independent."""
-    owner = np.where(design.rows.steady, design.rows.run, design.rows.loop + len(design.runs))
-    edges = np.concatenate([[0], np.flatnonzero(np.diff(owner)) + 1, [owner.size]])
-    starts, lengths = edges[:-1], np.diff(edges)
-    found = []
-    for correlation, mine in ((noise.plateaus, starts < design.plateaus), (noise.loops, starts >= design.plateaus)):
+    for rows in design.chains:
+        first, last = int(rows[0, 0]), int(rows[-1, -1])
+        correlation = noise.plateaus if first < design.plateaus else noise.loops
         if correlation.step == 0.0 or correlation.share == 0.0:
             continue
-        for length in np.unique(lengths[mine & (lengths > 0)]):
-            first = starts[mine & (lengths == length)]
-            found.append((first[:, None] + np.arange(length), correlation))
-    return found
+        if last - first + 1 == rows.size:  # one stretch: in its place
+            _filter(out[first : last + 1].reshape(*rows.shape, -1), correlation)
+        else:
+            blocks = out[rows]
+            _filter(blocks, correlation)
+            out[rows] = blocks
+    return out
 
 
 def arma(correlation: Correlation) -> tuple[float, float]:
@@ -72,25 +66,31 @@ def arma(correlation: Correlation) -> tuple[float, float]:
     return float(theta), float(np.sqrt(max(one / theta, 1e-12)))
 
 
-def _filtered(blocks: FloatArray, correlation: Correlation) -> FloatArray:
-    """Blocks [b, n, m] whitened along n."""
+def _filter(blocks: FloatArray, correlation: Correlation) -> None:
+    """Whiten blocks [b, n, m] along n, in place."""
     theta, scale = arma(correlation)
-    out = np.empty_like(blocks)
-    out[:, 0] = blocks[:, 0]
-    first = scale * blocks[:, :1]  # as if the first innovation were all of x_0
-    start = -correlation.step * blocks[:, :1] - theta * first
-    out[:, 1:] = lfilter([1.0, -correlation.step], [1.0, theta], blocks[:, 1:], axis=1, zi=start)[0] / scale
-    return out
+    first = blocks[:, :1]
+    start = -correlation.step / scale * first - theta * first  # as if the first innovation were all of x_0
+    numerator = [1.0 / scale, -correlation.step / scale]
+    blocks[:, 1:] = lfilter(numerator, [1.0, theta], blocks[:, 1:], axis=1, zi=start)[0]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gains:
-    """Directions of the gains in whitened rows: torque [N], curve [N] and run_of_curve [c] indices, squares [c] = |m_c|²."""
+    """Directions of the gains in whitened rows: torque [N], curve [N] and run_of_curve [c] indices, squares [c] = |m_c|²;
+    directions [c, N] are the m_c themselves."""
 
     torque: FloatArray
     curve: IntArray
     run_of_curve: IntArray
     squares: FloatArray
+    directions: csr_array
+
+    def by_run(self, of_curve: FloatArray) -> FloatArray:
+        """Sums [r, ...] over the curves of each run."""
+        out = np.zeros((int(self.run_of_curve.max()) + 1, *of_curve.shape[1:]))
+        np.add.at(out, self.run_of_curve, of_curve)
+        return out
 
 
 def gains_of(design: Design, torque: FloatArray, noise: Noise) -> Gains:
@@ -100,28 +100,32 @@ def gains_of(design: Design, torque: FloatArray, noise: Noise) -> Gains:
     run_of_curve = np.zeros(count, dtype=np.intp)
     run_of_curve[design.curve] = design.rows.run
     squares = np.asarray(np.bincount(design.curve, weights=white * white, minlength=count), dtype=np.float64)
-    return Gains(torque=white, curve=design.curve, run_of_curve=run_of_curve, squares=squares)
+    order = np.argsort(design.curve, kind="stable")
+    ends = np.concatenate([[0], np.cumsum(np.bincount(design.curve, minlength=count))])
+    return Gains(
+        torque=white,
+        curve=design.curve,
+        run_of_curve=run_of_curve,
+        squares=squares,
+        directions=csr_array((white[order], order, ends), shape=(count, white.size)),
+    )
 
 
 def by_curve(columns: FloatArray, gains: Gains) -> FloatArray:
     """m_cᵀ X [c, m] for whitened columns X [N, m]."""
-    order = np.argsort(gains.curve, kind="stable")
-    starts = np.concatenate([[0], np.flatnonzero(np.diff(gains.curve[order])) + 1])
-    return np.asarray(np.add.reduceat((gains.torque[:, None] * columns)[order], starts, axis=0), dtype=np.float64)
+    return np.asarray(gains.directions @ columns, dtype=np.float64)
 
 
 def without_gains(columns: FloatArray, gains: Gains, run_gain: float, curve_gain: float) -> FloatArray:
     """Whitened columns [N, m] with the gains' variance whitened as well (exact, curve by curve and then run by run)."""
-    shrink_c = _shrink(curve_gain**2 * gains.squares)
-    share = (shrink_c / np.maximum(gains.squares, 1e-300))[:, None] * by_curve(columns, gains)
-    out = columns - gains.torque[:, None] * share[gains.curve]
-    left = (1 - shrink_c)[gains.curve] * gains.torque
-    runs = gains.run_of_curve[gains.curve]
-    count = int(gains.run_of_curve.max()) + 1
-    norm = np.bincount(runs, weights=left * left, minlength=count)
-    along = np.stack([np.bincount(runs, weights=left * column, minlength=count) for column in out.T], axis=1)
-    factor = _shrink(np.asarray(run_gain**2 * norm, dtype=np.float64)) / np.maximum(norm, 1e-300)
-    return np.asarray(out - left[:, None] * (factor[:, None] * along)[runs], dtype=np.float64)
+    along = by_curve(columns, gains)
+    off = _shrink(curve_gain**2 * gains.squares)  # what is taken off along each m_c, as a share
+    left = (1 - off)[:, None]
+    norm = gains.by_run(left[:, 0] ** 2 * gains.squares)
+    factor = _shrink(run_gain**2 * norm) / np.maximum(norm, 1e-300)
+    of_run = factor[:, None] * gains.by_run(left**2 * along)
+    taken = (off / np.maximum(gains.squares, 1e-300))[:, None] * along + left * of_run[gains.run_of_curve]
+    return np.asarray(columns - gains.torque[:, None] * taken[gains.curve], dtype=np.float64)
 
 
 def _shrink(variance: FloatArray) -> FloatArray:

@@ -53,11 +53,11 @@ def _register(context: Context, body: bytes) -> tuple[dict[str, object], bool]:
 def list_clutches(request: Request, context: Reader, limit: Limit = 100, cursor: Cursor = None) -> Response:
     """All clutches with current health and remaining life, the fewest remaining cycles first."""
     version = context.database.version()  # before the rows are read: what is committed meanwhile makes another
-    known = context.lists.find((limit, cursor))
+    known = context.pages.find((limit, cursor))
     if known is None or known[0] != version:
         items, after = registry.page(context.database, limit=limit, after=from_cursor(cursor))
         known = (version, encode(page(items, after)))
-        context.lists.keep((limit, cursor), known)
+        context.pages.keep((limit, cursor), known, len(known[1]))
     return tagged(request, known[1], JSON_TYPE)
 
 

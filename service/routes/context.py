@@ -15,14 +15,17 @@ from service.worker import Worker
 from service.workflows.views import Remembered
 from storage.database import Database
 
+#: Bytes of encoded pages that are remembered, together.
+MOST_PAGES = 64 << 20
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Context:
-    """The service's parts, made when it starts and closed when it stops."""
+    """The service's parts, made when it starts and closed when it stops: `remembered` are answers, `pages` their bytes."""
 
     database: Database
     remembered: Remembered
-    lists: Remembered = field(default_factory=lambda: Remembered(most=8))  # a page may hold a megabyte
+    pages: Remembered = field(default_factory=lambda: Remembered(most=MOST_PAGES))
     metrics: Metrics
     worker: Worker
 

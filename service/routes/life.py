@@ -1,6 +1,5 @@
 """Remaining useful life, degradation, Stribeck curves, loops and flat series, each with its CSV twin."""
 
-from collections.abc import Iterator
 from typing import Any
 
 from fastapi import APIRouter, Request
@@ -9,6 +8,7 @@ from fastapi.responses import Response
 from service.problems import READING
 from service.responses import answer, from_cursor, page, sliced, table
 from service.routes.context import AtCycles, Cursor, Limit, PressureBar, Reader, Whole
+from service.routes.lasting import lasting_answer, lasting_table
 from service.schemas.fleet import Scores
 from service.schemas.life import (
     Degradation,
@@ -56,21 +56,24 @@ def degradation(
     request: Request, context: Reader, clutch_id: str, limit: Whole = 1_000_000, cursor: Cursor = None
 ) -> Response:
     """Eq. 6 for every Stribeck parameter and for mean COF: coefficients, measurements, trajectory with its 90 % band."""
-    said = answers.degradation(context.database, context.remembered, clutch_id)
-    return answer(request, said | sliced(said["items"], limit, from_cursor(cursor)))
+    after = from_cursor(cursor)
+
+    def told() -> dict[str, Any]:
+        said = answers.degradation(context.database, context.remembered, clutch_id)
+        return said | sliced(said["items"], limit, after)
+
+    return lasting_answer(request, context, clutch_id, told)
 
 
 @router.get("/stribeck", response_model=StribeckPage, responses=READING)
 def stribeck(request: Request, context: Reader, clutch_id: str, limit: Limit = 100, cursor: Cursor = None) -> Response:
     """The Stribeck curves of the stationary tests by cycles, and the pressure laws through them (fig. 9)."""
-    return answer(
-        request,
-        page(
-            *answers.stribeck_page(
-                context.database, context.remembered, clutch_id, limit=limit, after=from_cursor(cursor)
-            )
-        ),
-    )
+    after = from_cursor(cursor)
+
+    def told() -> dict[str, Any]:
+        return page(*answers.stribeck_page(context.database, context.remembered, clutch_id, limit=limit, after=after))
+
+    return lasting_answer(request, context, clutch_id, told)
 
 
 @router.get("/engagement", response_model=EngagementOut, responses=READING)
@@ -82,7 +85,9 @@ def engagement(request: Request, context: Reader, clutch_id: str, at_cycles: AtC
 @router.get("/surfaces", response_model=Surfaces, responses=READING)
 def surfaces(request: Request, context: Reader, clutch_id: str) -> Response:
     """The tracked Stribeck parameters over pressure and cycles (figs. 10, 11), and torque over speed besides."""
-    return answer(request, answers.surface(context.database, context.remembered, clutch_id))
+    return lasting_answer(
+        request, context, clutch_id, lambda: answers.surface(context.database, context.remembered, clutch_id)
+    )
 
 
 @router.get("/scores", response_model=Scores, responses=READING)
@@ -104,7 +109,10 @@ def loops(
     request: Request, context: Reader, clutch_id: str, limit: Whole = 1_000_000, cursor: Cursor = None
 ) -> Response:
     """Friction loops of the dynamic tests by cycles and pressure."""
-    return answer(request, sliced(answers.loop_page(context.database, clutch_id), limit, from_cursor(cursor)))
+    after = from_cursor(cursor)
+    return lasting_answer(
+        request, context, clutch_id, lambda: sliced(answers.loop_page(context.database, clutch_id), limit, after)
+    )
 
 
 @router.get("/series", response_model=SeriesPage, responses=READING)
@@ -117,7 +125,10 @@ def series(
     cursor: Cursor = None,
 ) -> Response:
     """Flat rows for dashboards and spreadsheets: every fitted quantity, then what was foretold."""
-    return answer(request, sliced(_series(context.database, clutch_id, quantity), limit, from_cursor(cursor)))
+    after = from_cursor(cursor)
+    return lasting_answer(
+        request, context, clutch_id, lambda: sliced(_series(context.database, clutch_id, quantity), limit, after)
+    )
 
 
 def _series(database: Database, clutch_id: str, quantity: str | None) -> list[dict[str, Any]]:
@@ -210,8 +221,5 @@ def loops_csv(request: Request, context: Reader, clutch_id: str) -> Response:
 @twins.get("/series.csv", response_class=Response, responses=READING)
 def series_csv(request: Request, context: Reader, clutch_id: str, quantity: str | None = None) -> Response:
     """The flat rows as CSV."""
-
-    def rows() -> Iterator[dict[str, Any]]:
-        yield from _series(context.database, clutch_id, quantity)
-
-    return table(request, tuple(SeriesItem.model_fields), rows())
+    columns = tuple(SeriesItem.model_fields)
+    return lasting_table(request, context, clutch_id, columns, lambda: _series(context.database, clutch_id, quantity))

@@ -11,6 +11,7 @@ from service.problems import READING, SENDING
 from service.responses import JSON_TYPE, answer, encode, from_cursor, page, table
 from service.routes.bodies import described_body, json_body
 from service.routes.context import Context, Cursor, Ingester, Limit, Reader
+from service.routes.lasting import lasting_answer
 from service.schemas.run import RUN_IN, Receipt, RunOut, RunPage
 from service.workflows import answers
 from service.workflows.ingest import ingest
@@ -55,8 +56,12 @@ def _ingest(context: Context, clutch_id: str, body: bytes) -> tuple[dict[str, An
 @router.get("", response_model=RunPage, responses=READING)
 def list_runs(request: Request, context: Reader, clutch_id: str, limit: Limit = 100, cursor: Cursor = None) -> Response:
     """Receipts by cycles."""
-    items, after = answers.run_page(context.database, clutch_id, limit=limit, after=from_cursor(cursor))
-    return answer(request, page(items, after))
+    after = from_cursor(cursor)
+
+    def told() -> dict[str, Any]:
+        return page(*answers.run_page(context.database, clutch_id, limit=limit, after=after))
+
+    return lasting_answer(request, context, clutch_id, told)
 
 
 @router.get("/{run_id}", response_model=RunOut, responses=READING)

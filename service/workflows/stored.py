@@ -28,8 +28,20 @@ def clutch(connection: Connection, clutch_id: str) -> ClutchRow:
     """The clutch, or NotFoundError."""
     found = clutches.get(connection, clutch_id)
     if found is None:
-        raise NotFoundError(f"no clutch is known as {clutch_id!r}")
+        raise _unknown(clutch_id)
     return found
+
+
+def revision(connection: Connection, clutch_id: str) -> int:
+    """The clutch's revision, which every change of its results moves on; or NotFoundError."""
+    found = clutches.revision(connection, clutch_id)
+    if found is None:
+        raise _unknown(clutch_id)
+    return found
+
+
+def _unknown(clutch_id: str) -> NotFoundError:
+    return NotFoundError(f"no clutch is known as {clutch_id!r}")
 
 
 def run(connection: Connection, clutch_id: str, run_id: str) -> RunRow:

@@ -25,26 +25,34 @@ from service.workflows.trajectories import item, posterior_of
 
 
 class Remembered:
-    """The last answers, by what they depend on; safe to share between threads, the least lately asked for goes first."""
+    """The last answers, by what they depend on; safe to share between threads, the least lately asked for goes first.
+
+    `most` is how large they may be together, in whatever unit `keep` is told sizes.
+    """
 
     def __init__(self, most: int = 256) -> None:
         self._most = most
-        self._answers: OrderedDict[Hashable, Any] = OrderedDict()
+        self._held = 0
+        self._answers: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
         self._lock = threading.Lock()
 
     def find(self, key: Hashable) -> Any | None:
         """The answer for `key`, or None where it is not remembered."""
         with self._lock:
-            if key in self._answers:
-                self._answers.move_to_end(key)
-            return self._answers.get(key)
+            if key not in self._answers:
+                return None
+            self._answers.move_to_end(key)
+            return self._answers[key][0]
 
-    def keep(self, key: Hashable, answer: Any) -> None:
-        """Remember an answer."""
+    def keep(self, key: Hashable, answer: Any, size: int = 1) -> None:
+        """Remember an answer of that size; one that is larger than all may be together is not."""
+        if size > self._most:
+            return
         with self._lock:
-            self._answers[key] = answer
-            while len(self._answers) > self._most:
-                self._answers.popitem(last=False)
+            self._held += size - self._answers.pop(key, (None, 0))[1]
+            self._answers[key] = answer, size
+            while self._held > self._most:
+                self._held -= self._answers.popitem(last=False)[1][1]
 
 
 def foretell(
