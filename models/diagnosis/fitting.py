@@ -3,8 +3,9 @@
 Effects may be fitted along: each brings its amplitude and its smooth shapes as further parameters.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ from models.diagnosis.whitening import Noise, gains_of, whitened, without_gains
 #: How alike the two shares of one law are expected to drift [-].
 ALIKE_SD = 0.1
 _LARGEST_STEP = 1.5
+#: Columns [N, m] with noise and gains whitened.
+Whiten: TypeAlias = Callable[[FloatArray], FloatArray]
 _SMALL = 0.01  # nats: when the cost falls by less the fit has converged
 
 
@@ -109,22 +112,30 @@ def fit(
     *,
     steps: int = 30,
 ) -> Fit:
-    """Minimise half the whitened squares from a start, effects included."""
-    state = _evaluated(design, noise, start, priors, tuple(effects))
+    """Minimise half the whitened squares from a start, effects included.
+
+    Gains are taken along the measured torque: it changes little and keeps the metric fixed while a fit moves.
+    """
+    gains = gains_of(design, design.torque, noise)
+
+    def white(columns: FloatArray) -> FloatArray:
+        return without_gains(whitened(columns, design, noise), gains, noise.run_gain, noise.curve_gain)
+
+    state = _evaluated(design, white, start, priors, tuple(effects))
     damping, growth = 1e-3, 2.0
     for _ in range(steps):
-        gram, gradient = _normal(design, noise, priors, state)
+        gram, gradient = _normal(design, white, priors, state)
         fallen = 0.0
         for _ in range(8):
-            step = np.asarray(np.linalg.solve(gram + damping * np.diag(np.diag(gram)), gradient), dtype=np.float64)
+            step = _inside(state, priors, gram + damping * np.diag(np.diag(gram)), gradient)
             trial = _moved(state, priors, step)
             if trial is not None:
-                candidate = _evaluated(design, noise, trial[0], priors, trial[1])
+                candidate = _evaluated(design, white, trial[0], priors, trial[1])
                 expected = float(step @ gradient - 0.5 * step @ (gram @ step))
                 fallen = state.cost - candidate.cost
                 if np.isfinite(candidate.cost) and fallen > 0:
                     share = fallen / max(expected, 1e-12)
-                    damping *= max(1 / 5, 1 - (2 * min(share, 1.5) - 1) ** 3)
+                    damping *= 1 / 5 if share > 0.5 else 1 - (2 * share - 1) ** 3
                     growth = 2.0
                     break
             fallen = 0.0
@@ -137,7 +148,23 @@ def fit(
     return state
 
 
-def _evaluated(design: Design, noise: Noise, laws: Laws, priors: Priors, effects: tuple[Fitted, ...]) -> Fit:
+def _inside(state: Fit, priors: Priors, matrix: FloatArray, gradient: FloatArray) -> FloatArray:
+    """The step [m] that matrix · step = gradient asks for; shapes at a bound beyond which it would lead are held there."""
+    step = np.asarray(np.linalg.solve(matrix, gradient), dtype=np.float64)
+    at, held = int(priors.free.sum()), np.zeros(step.size, dtype=np.bool_)
+    for each in state.effects:
+        at += 1
+        for value, known in zip(each.shape, each.effect.shapes, strict=True):
+            if known.smooth:
+                held[at] = (value <= known.lowest and step[at] < 0) or (value >= known.highest and step[at] > 0)
+                at += 1
+    if held.any():
+        step[held] = 0.0
+        step[~held] = np.linalg.solve(matrix[np.ix_(~held, ~held)], gradient[~held])
+    return step
+
+
+def _evaluated(design: Design, white: Whiten, laws: Laws, priors: Priors, effects: tuple[Fitted, ...]) -> Fit:
     with np.errstate(all="ignore"):
         prediction = predict(design, laws)
         torque = prediction.torque.copy()
@@ -147,29 +174,24 @@ def _evaluated(design: Design, noise: Noise, laws: Laws, priors: Priors, effects
         if not np.isfinite(residual).all():
             cost = float("inf")
         else:
-            white = _white(residual[:, None], design, noise)
-            cost = 0.5 * float((white**2).sum()) + 0.5 * float(((priors.rows @ laws.theta - priors.means) ** 2).sum())
+            cost = 0.5 * float((white(residual[:, None]) ** 2).sum()) + 0.5 * float(
+                ((priors.rows @ laws.theta - priors.means) ** 2).sum()
+            )
             for each in effects:
                 cost += amplitude.cost(each.effect, each.amplitude)
     return Fit(laws=laws, prediction=prediction, torque=torque, residual=residual, effects=effects, cost=cost)
 
 
-def _white(columns: FloatArray, design: Design, noise: Noise) -> FloatArray:
-    """Gains are taken along the measured torque: it changes little and keeps the metric fixed while a fit moves."""
-    gains = gains_of(design, design.torque, noise)
-    return without_gains(whitened(columns, design, noise), gains, noise.run_gain, noise.curve_gain)
-
-
-def _normal(design: Design, noise: Noise, priors: Priors, state: Fit) -> tuple[FloatArray, FloatArray]:
+def _normal(design: Design, white: Whiten, priors: Priors, state: Fit) -> tuple[FloatArray, FloatArray]:
     """Gram matrix and gradient over the free θ and the effects' parameters."""
     columns = [state.prediction.jacobian(design)[:, priors.free]]
     columns += [effect_columns(design, state.prediction, each) for each in state.effects]
     jacobian = np.concatenate(columns, axis=1)
-    white = _white(np.column_stack([jacobian, state.residual]), design, noise)
+    rows_white = white(np.column_stack([jacobian, state.residual]))
     size = jacobian.shape[1]
     count = int(priors.free.sum())
-    gram = white[:, :size].T @ white[:, :size]
-    gradient = white[:, :size].T @ white[:, size]
+    gram = rows_white[:, :size].T @ rows_white[:, :size]
+    gradient = rows_white[:, :size].T @ rows_white[:, size]
     rows = priors.rows[:, priors.free]
     gram[:count, :count] += rows.T @ rows
     gradient[:count] -= rows.T @ (priors.rows @ state.laws.theta - priors.means)
