@@ -20,6 +20,8 @@ from models.diagnosis.whitening import Noise, whitened
 
 #: False alarms allowed to each statistic.
 EFFECTS_SHARE, CONTRASTS_SHARE, LINES_SHARE = 0.006, 0.0025, 0.001
+#: Less than this share of a change is nothing visible. Amplitudes have units of their own: no two changes are compared.
+VISIBLE = 1e-9
 _DRAWS = 400
 #: The periodogram's steps are half a cycle a test: it starts at two cycles, and a neighbourhood is so many steps.
 _FIRST_LINE, _NEIGHBOURS = 4, 61
@@ -53,7 +55,7 @@ def likelihood_ratios(projections: list[Projected], columns: slice, one_sided: F
 
 def _standard(projected: Projected, columns: slice) -> FloatArray:
     info = np.diag(projected.info)[columns]
-    visible = info > 1e-12 * max(float(info.max(initial=0.0)), 1e-300)
+    visible = info > VISIBLE * np.maximum(projected.whole[columns], 1e-300)
     return np.where(visible, projected.score[columns] / np.sqrt(np.where(visible, info, 1.0)), 0.0)
 
 
@@ -80,7 +82,7 @@ def _independent_tests(projected: Projected, columns: slice, rng: np.random.Gene
     """How many independent standard normals have maxima like these correlated ones, in their upper tenth."""
     info = projected.info[columns, columns]
     scale = np.sqrt(np.maximum(np.diag(info), 1e-300))
-    keep = np.diag(info) > max(1e-12 * float(np.diag(info).max()), 0.0)
+    keep = np.diag(info) > VISIBLE * np.maximum(projected.whole[columns], 1e-300)
     if not keep.any() or not np.isfinite(info).all():
         return float(max(info.shape[0], 1))
     correlation = (info / scale[:, None] / scale)[np.ix_(keep, keep)]

@@ -202,7 +202,8 @@ def _normal(design: Design, white: Whiten, priors: Priors, state: Fit) -> tuple[
         gram[diagonal, diagonal] += precisions
         gradient[at] -= each.amplitude * precisions[0]
         at += precisions.size
-    gram[np.diag_indices_from(gram)] += 1e-12 * np.abs(np.diag(gram)).max()
+    diagonal = np.diag(gram)
+    gram[np.diag_indices_from(gram)] = np.where(diagonal > 0, (1.0 + 1e-12) * diagonal, 1.0)
     return gram, gradient
 
 

@@ -117,7 +117,7 @@ def _foretold(design: Design, noise: Noise, priors: Priors, model: Fit, out: Boo
     rows = priors.rows[:, priors.free]
     precision[: rows.shape[1], : rows.shape[1]] += rows.T @ rows
     weak = np.concatenate([np.zeros(rows.shape[1]), *(effect_precisions(each) for each in found.effects)])
-    precision[np.diag_indices_from(precision)] += weak + 1e-12 * np.abs(np.diag(precision)).max()
+    precision[np.diag_indices_from(precision)] += weak + 1e-12 * np.diag(precision)
     columns, residual = told[:, :-1], told[:, -1]
     scale = 1 / np.sqrt(np.diag(precision))
     inner = (precision + columns.T @ columns) * scale[:, None] * scale

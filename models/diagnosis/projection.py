@@ -46,11 +46,13 @@ class Gram:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Projected:
-    """info [m, m], score [m] of the changes; `miss` rᵀV⁻¹(1 - P)r; `evidence` [nats] of the gains' scatter, and `profile`
+    """info [m, m], score [m] of the changes, and `whole` [m], what info's diagonal were if nothing of them was taken up;
+    `miss` rᵀV⁻¹(1 - P)r; `evidence` [nats] of the gains' scatter, and `profile`
     [nats] the same without the price of what is fitted."""
 
     info: FloatArray
     score: FloatArray
+    whole: FloatArray
     miss: float
     evidence: float
     profile: float
@@ -104,7 +106,14 @@ def project(gram: Gram, run_gain: float) -> Projected:
     miss = float(left[-1, -1])
     prior = -0.5 * float((np.log(run_gain / _USUAL) / _SPREAD) ** 2)
     profile = -0.5 * (miss + float(np.log1p(run_gain**2 * squares).sum())) + prior
-    return Projected(info=left[:-1, :-1], score=left[:-1, -1], miss=miss, evidence=profile - fitted, profile=profile)
+    return Projected(
+        info=left[:-1, :-1],
+        score=left[:-1, -1],
+        whole=np.diag(full)[base:-1],
+        miss=miss,
+        evidence=profile - fitted,
+        profile=profile,
+    )
 
 
 def _factor(correlation: FloatArray) -> FloatArray:
