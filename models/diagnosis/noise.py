@@ -34,7 +34,7 @@ _STEPS = (0.2, 0.35, 0.5, 0.65, 0.8, 0.9)
 _SHARES = (0.15, 0.3, 0.5, 0.75, 1.0)
 #: What a correlation must gain [nats] to be believed, and a power of the swell of slow noise by which it is held back: what
 #: is slow was taken off with everything smooth, so the data say little about it.
-_PRICE, _SWELL = 2.0, 1.0
+_PRICE, _SWELL = 2.0, 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
