@@ -26,8 +26,8 @@ from models.diagnosis.whitening import Noise, gains_of, whitened, without_gains
 STATE_FOLDS, PRESSURE_FOLDS, FORWARD_SHARE = 3, 2, 1 / 3
 #: Rows left out weigh as if their noise were so many times what it is.
 _LEFT_OUT = 1e6
-#: Gauss-Newton steps from the fit to all rows.
-_STEPS = 2
+#: Gauss-Newton steps from the fit to all rows: enough to forget the rows that are held out.
+_STEPS = 12
 _RESAMPLES = 400
 
 BoolArray = NDArray[np.bool_]

@@ -13,9 +13,9 @@ from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, 
 from models.diagnosis.design import PLATEAU_DURATION
 from models.runs import Plateaus, Record, pressure_levels
 
-#: The dynamic test of the reference (section 2.3.4): a swing of 1000 rpm about 1000 rpm, sampled at 100 a period.
+#: The dynamic test of the reference (section 2.3.4): a swing of 1000 rpm about 1000 rpm, sampled at 200 a period.
 SWING = 1000 * 2 * np.pi / 60
-_SAMPLES, _PERIODS = 100, 4
+_SAMPLES, _PERIODS = 200, 10
 _HOUR = 3600.0
 
 
@@ -23,9 +23,10 @@ _HOUR = 3600.0
 class Trial:
     """What a test would be. `text` is for the engineer; everything else is for machines.
 
-    loops: a dynamic test at `frequency` [Hz]; else a stationary test, at `temperature` [K] of the oil (None: as usual),
-    speeds `falling`, pressures times `pressure` [-]. `later`: how many usual distances between states it lies ahead, with
-    `energy` [-] times the usual energy of an engagement up to there. `rest` [s]: after a pause of so long.
+    loops: a dynamic test at `frequency` [Hz]; else a stationary test, with the oil at `temperature` [K] (None: as usual),
+    speeds `falling`; either with pressures times `pressure` [-], `times` over. `later`: how many usual distances between
+    states it lies ahead, with `energy` [-] times the usual energy of an engagement up to there. `rest` [s]: a pause before
+    the first test and every second one after it.
     """
 
     text: str
@@ -34,25 +35,43 @@ class Trial:
     temperature: float | None = None
     falling: bool = False
     pressure: float = 1.0
+    times: int = 1
     later: int = 0
     energy: float = 1.0
     rest: float = 0.0
 
 
 TRIALS: dict[str, Trial] = {
-    "loops_0.5hz": Trial(
-        text="dynamic test at 0.5 Hz, 1000 ± 1000 rpm, all pressures, four periods each", loops=True, frequency=0.5
+    "loops_0.3hz": Trial(
+        text="dynamic test at 0.3 Hz, 1000 ± 1000 rpm, all pressures, ten periods each, 60 samples a second",
+        loops=True,
+        frequency=0.3,
     ),
-    "loops_1hz": Trial(
-        text="dynamic test at 1 Hz, 1000 ± 1000 rpm, all pressures, four periods each", loops=True, frequency=1.0
+    "light_loops": Trial(
+        text="dynamic test at 0.3 Hz, 1000 ± 1000 rpm, all pressures a quarter of the usual ones, ten periods each, "
+        "60 samples a second",
+        loops=True,
+        frequency=0.3,
+        pressure=0.25,
     ),
     "sweep_60c": Trial(text="stationary test with the oil at 60 °C", temperature=333.15),
+    "sweeps_60c": Trial(text="stationary test with the oil at 60 °C, three times", temperature=333.15, times=3),
     "sweep_100c": Trial(text="stationary test with the oil at 100 °C", temperature=373.15),
-    "falling_speeds": Trial(text="stationary test with the speeds falling instead of rising", falling=True),
+    "falling_speeds": Trial(
+        text="stationary test with the speeds falling instead of rising, three times", falling=True, times=3
+    ),
     "light_sweep": Trial(text="stationary test at a quarter of the usual pressures", pressure=0.25),
-    "repeat": Trial(text="the stationary test again at once"),
-    "after_rest": Trial(text="the stationary test again after a night's rest", rest=12 * _HOUR),
+    "light_sweeps": Trial(
+        text="stationary test at a quarter of the usual pressures, five times", pressure=0.25, times=5
+    ),
+    "repeats": Trial(text="the stationary test again at once, five times", times=5),
     "more_states": Trial(text="three more states of use, at the usual distance, with a stationary test each", later=3),
+    "rests": Trial(
+        text="three more states of use, at the usual distance, with a stationary test each; the clutch rests for two days "
+        "before the first and the third of these tests, not before the second",
+        later=3,
+        rest=48 * _HOUR,
+    ),
     "half_energy": Trial(
         text="two more states of use with engagements of half the usual energy, with a stationary test each",
         later=2,
@@ -79,15 +98,26 @@ def with_trial(campaign: Campaign, key: str) -> Campaign | None:
     if pattern is None:
         return None
     step = _distance(states) if trial.later else 0.0
-    ahead = [last + step * (k + 1) for k in range(trial.later)] or [last]
-    tests = tuple(_sweep(pattern, trial, cycles, f"trial-{k}") for k, cycles in enumerate(ahead))
+    ahead = [last + step * (k + 1) for k in range(trial.later)] or [last] * trial.times
+    rested = [trial.rest * float(k % 2 == 0) for k in range(len(ahead))]
+    tests = tuple(
+        _sweep(pattern, trial, cycles, k, sum(rested[: k + 1]))  # in the order in which they are made
+        for k, cycles in enumerate(ahead)
+    )
     added = replace(campaign, stationary=(*campaign.stationary, *tests))
     if trial.later:
         added = replace(added, duty=(*campaign.duty, *_duty(campaign, trial, ahead, step)))
-    if trial.rest:
-        event = MaintenanceEvent(run_id="trial-rest", cycles=last, event=EventKind.REST, moment=tests[0].moment)
-        added = replace(added, maintenance=(*campaign.maintenance, event))
-    return added
+    rests = tuple(
+        MaintenanceEvent(
+            run_id=f"trial-rest-{k}",
+            cycles=test.cycles,
+            event=EventKind.REST,
+            moment=None if test.moment is None else test.moment - rested[k],
+        )
+        for k, test in enumerate(tests)
+        if rested[k]
+    )
+    return replace(added, maintenance=(*campaign.maintenance, *rests))
 
 
 def _distance(states: FloatArray) -> float:
@@ -95,7 +125,8 @@ def _distance(states: FloatArray) -> float:
     return float(np.median(np.diff(states[max(0, min(states.size // 2, states.size - 2)) :])))
 
 
-def _sweep(pattern: StationaryRun, trial: Trial, cycles: float, run_id: str) -> StationaryRun:
+def _sweep(pattern: StationaryRun, trial: Trial, cycles: float, number: int, rested: float) -> StationaryRun:
+    """The trial's test of that number, after so many seconds of pauses."""
     table = pattern.plateaus
     levels = pressure_levels(table.pressure)
     rows = np.arange(table.torque.size)
@@ -104,9 +135,10 @@ def _sweep(pattern: StationaryRun, trial: Trial, cycles: float, run_id: str) -> 
     oil = table.oil_temperature
     if trial.temperature is not None:
         oil = np.full(rows.size, trial.temperature)
-    moment = None if pattern.moment is None else pattern.moment + PLATEAU_DURATION * rows.size + trial.rest
+    taken = PLATEAU_DURATION * rows.size * (number + 1) + rested
+    moment = None if pattern.moment is None else pattern.moment + taken
     return StationaryRun(
-        run_id=run_id,
+        run_id=f"trial-{number}",
         cycles=cycles,
         plateaus=Plateaus(
             pressure=trial.pressure * table.pressure[rows],
@@ -119,9 +151,9 @@ def _sweep(pattern: StationaryRun, trial: Trial, cycles: float, run_id: str) -> 
 
 
 def _loops(campaign: Campaign, trial: Trial, cycles: float) -> DynamicRun:
-    """The pressures of the last dynamic test, at another frequency."""
+    """The pressures of the last dynamic test, or a share of them, at another frequency."""
     record = campaign.dynamic[-1].record
-    levels = np.unique(pressure_levels(record.pressure[:: max(1, record.pressure.size // 5000)]))
+    levels = trial.pressure * np.unique(pressure_levels(record.pressure[:: max(1, record.pressure.size // 5000)]))
     count = _SAMPLES * _PERIODS + 1
     step = 1.0 / (trial.frequency * _SAMPLES)
     phase = 2 * np.pi * np.arange(count) / _SAMPLES

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from models.diagnosis import amplitude
 from models.diagnosis.catalogue import BY_SLUG
 from models.diagnosis.fitting import Fit, Fitted, effect_columns, fit
-from models.diagnosis.gain import _ahead, _bridged, _foretold, _held, _without, measure_gain
+from models.diagnosis.gain import _STEPS, _ahead, _bridged, _foretold, _held, _without, measure_gain
 from models.diagnosis.laws import ATTRACTOR, Scene
 from models.diagnosis.report import Gain
 from models.diagnosis.whitening import Correlation
@@ -106,7 +107,7 @@ def test_states_ahead_are_foretold_with_the_parameters_uncertainty(warm):
     assert out is not None
     for model in (given.baseline.fit, extended):
         masked = _without(noise, out)
-        found = fit(given.design, masked, model.laws, priors, model.effects, steps=2)
+        found = fit(given.design, masked, model.laws, priors, model.effects, steps=_STEPS)
         own = [effect_columns(given.design, found.prediction, each) for each in found.effects]
         jacobian = np.concatenate([found.prediction.jacobian(given.design)[:, priors.free], *own], axis=1)
         unit = jacobian / noise.deviation[:, None]
@@ -114,8 +115,8 @@ def test_states_ahead_are_foretold_with_the_parameters_uncertainty(warm):
         rows = priors.rows[:, priors.free]
         precision[: rows.shape[1], : rows.shape[1]] += rows.T @ rows
         if own:
-            sds = [BY_SLUG["oil_temperature"].prior_sd, 1.5]
-            precision[[-2, -1], [-2, -1]] += np.array(sds) ** -2.0
+            weak = [amplitude.precision(each.effect, each.amplitude) for each in found.effects]
+            precision[[-2, -1], [-2, -1]] += [*weak, 1.5**-2.0]
         scale = 1 / np.sqrt(np.diag(precision))
         spread = np.linalg.inv(precision * scale[:, None] * scale) * scale[:, None] * scale
         covariance = np.eye(int(out.sum())) + unit[out] @ spread @ unit[out].T
