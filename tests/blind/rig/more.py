@@ -10,17 +10,20 @@ from tests.blind.rig.plan import Life, Site, oil_course
 from tests.blind.rig.sensor import measure
 from tests.blind.rig.world import read
 
-#: What each advice asks for: states to come, energy of their duty, pause [s], oil [°C], pressures, order, loops [Hz].
+#: What each advice asks for: states to come, energy of their duty, pause [s] before every second, oil [°C], pressures, order,
+#: loops [Hz], how many tests.
 ASKED: dict[str, dict[str, float]] = {
-    "loops_0.5hz": {"frequency": 0.5},
-    "loops_1hz": {"frequency": 1.0},
+    "loops_0.3hz": {"frequency": 0.3},
+    "light_loops": {"frequency": 0.3, "pressure": 0.25},
     "sweep_60c": {"oil": 60.0},
+    "sweeps_60c": {"oil": 60.0, "times": 3},
     "sweep_100c": {"oil": 100.0},
-    "falling_speeds": {"falling": 1.0},
+    "falling_speeds": {"falling": 1.0, "times": 3},
     "light_sweep": {"pressure": 0.25},
-    "repeat": {},
-    "after_rest": {"rest": 12 * 3600.0},
+    "light_sweeps": {"pressure": 0.25, "times": 5},
+    "repeats": {"times": 5},
     "more_states": {"states": 3},
+    "rests": {"states": 3, "rest": 48 * 3600.0},
     "half_energy": {"states": 2, "energy": 0.5},
     "twice_energy": {"states": 2, "energy": 2.0},
 }
@@ -33,7 +36,7 @@ def with_test(hidden: Hidden, key: str) -> Hidden:
     life = _lived_on(hidden.plan.life, asked)
     new = np.arange(hidden.plan.life.cycles.size, life.cycles.size)
     old = tuple(replace(site, life=life) for site in hidden.plan.sites)
-    site = _loops(rng, hidden, life, asked["frequency"]) if "frequency" in asked else _sweeps(rng, old[0], new, asked)
+    site = _loops(rng, hidden, life, asked) if "frequency" in asked else _sweeps(rng, old[0], new, asked)
     added = replace(hidden.plan, life=life, sites=(site,))
     readings = measure(rng, added, hidden.sensor, read(added, hidden.clutch, hidden.effects))
     plan = replace(hidden.plan, life=life, sites=(*old, site))
@@ -41,10 +44,11 @@ def with_test(hidden: Hidden, key: str) -> Hidden:
 
 
 def _lived_on(life: Life, asked: dict[str, float]) -> Life:
-    states = int(asked.get("states", 1))
+    """A state a test: further on in life, or again where it is."""
+    states = int(asked.get("states", asked.get("times", 1)))
     step = float(np.median(np.diff(life.cycles)[life.cycles.size // 2 - 1 :])) if "states" in asked else 0.0
     cycles = life.cycles[-1] + step * (1 + np.arange(states))
-    pause = np.full(states, asked.get("rest", 600.0))
+    pause = np.where(np.arange(states) % 2 == 0, asked.get("rest", 600.0), 600.0)
     moment = life.moment[-1] + 3600 + np.cumsum(20 * step + pause + 2500 * np.ones(states))
     energy = np.full(states, asked.get("energy", 1.0) * life.usual_energy)
     return replace(
@@ -68,10 +72,10 @@ def _sweeps(rng: np.random.Generator, last: Site, new: FloatArray, asked: dict[s
     return replace(last, state=new, bar=bar, rpm=rpm, clock=np.repeat(last.clock[-1:], new.size, axis=0), oil=oil)
 
 
-def _loops(rng: np.random.Generator, hidden: Hidden, life: Life, frequency: float) -> Site:
-    """Four periods at every pressure, a hundred samples a period."""
-    pressures = hidden.plan.pressures
-    time = np.arange(401) / (100 * frequency)
+def _loops(rng: np.random.Generator, hidden: Hidden, life: Life, asked: dict[str, float]) -> Site:
+    """Ten periods at every pressure, two hundred samples a period."""
+    frequency, pressures = asked["frequency"], asked.get("pressure", 1.0) * hidden.plan.pressures
+    time = np.arange(2001) / (200 * frequency)
     rpm = np.broadcast_to(1000 - 1000 * np.cos(2 * np.pi * frequency * time), (pressures.size, time.size))
     clock = np.arange(pressures.size)[:, None] * (time[-1] + 3.0) + time
     oil = np.full(clock.shape, 85.0 + rng.uniform(-2, 2))
