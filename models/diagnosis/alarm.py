@@ -21,7 +21,7 @@ from models.diagnosis.whitening import Noise, whitened
 #: False alarms allowed to each statistic.
 EFFECTS_SHARE, CONTRASTS_SHARE, LINES_SHARE = 0.006, 0.0025, 0.001
 #: Less than this share of a change is nothing visible. Amplitudes have units of their own: no two changes are compared.
-VISIBLE = 1e-9
+VISIBLE = 1e-6
 _DRAWS = 400
 #: The periodogram's steps are half a cycle a test: it starts at two cycles, and a neighbourhood is so many steps.
 _FIRST_LINE, _NEIGHBOURS = 4, 61

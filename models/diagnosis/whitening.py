@@ -62,8 +62,8 @@ def arma(correlation: Correlation) -> tuple[float, float]:
     if abs(one) < 1e-12:
         return 0.0, float(np.sqrt(max(zero, 1e-12)))
     half = zero / (2 * one)
-    theta = half - np.copysign(np.sqrt(max(half * half - 1, 0.0)), half)
-    return float(theta), float(np.sqrt(max(one / theta, 1e-12)))
+    inverse = half + np.copysign(np.sqrt(max(half * half - 1, 0.0)), half)  # the root beyond 1, which does not cancel
+    return float(1 / inverse), float(np.sqrt(max(one * inverse, 1e-12)))
 
 
 def _filter(blocks: FloatArray, correlation: Correlation) -> None:

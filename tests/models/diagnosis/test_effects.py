@@ -55,7 +55,11 @@ def test_no_amplitude_no_change_and_all_changes_are_finite(effect: Effect, scene
         assert np.isfinite(column).all()
         assert np.abs(column).max() > 0
         doubled = effect.change(scene, 2e-3 * effect.prior_sd, tried.shape) / (2e-3 * effect.prior_sd)
-        assert np.abs(doubled - column).max() < 0.02 * np.abs(column).max()  # small amplitudes act in proportion
+        moving = (
+            scene.points.velocity > 0.01 * scene.points.velocity.max()
+        )  # a film that stands is slow whatever its time
+        # small amplitudes act in proportion
+        assert np.abs(doubled - column)[moving].max() < 0.02 * np.abs(column[moving]).max()
 
 
 def test_effects_of_loops_leave_plateaus_alone(scene: Scene) -> None:

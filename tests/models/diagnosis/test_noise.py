@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from models.diagnosis.design import Design, build_design
 from models.diagnosis.noise import estimate_noise, first_noise
-from models.diagnosis.whitening import Correlation, Noise, gains_of, whitened, without_gains
+from models.diagnosis.whitening import Correlation, Noise, arma, gains_of, whitened, without_gains
 from tests.models.diagnosis.campaigns import campaign
 
 SEED = 20
@@ -45,6 +45,17 @@ def test_a_flat_likelihood_does_not_choose_persistent_noise(design: Design) -> N
         swells.append(1 + 2 * found.share * found.step / (1 - found.step))
     assert 1.4 < np.median(swells) < 2.4
     assert max(swells) < 4.0
+
+
+@pytest.mark.parametrize("share", [1.0, 1.0 - 1e-12, 1.0 - 1e-9, 1.0 - 1e-6, 0.998, 0.5, 1e-6])
+@pytest.mark.parametrize("step", [0.2, 0.9, 0.95])
+def test_an_arma_process_has_the_correlations_that_it_was_made_for(share: float, step: float) -> None:
+    theta, scale = arma(Correlation(share=share, step=step))
+    assert abs(theta) < 1
+    # x_i = ρ x_{i-1} + s (e_i + θ e_{i-1}): its variance, and its covariance with the neighbour
+    variance = scale**2 * (1 + theta**2 + 2 * step * theta) / (1 - step**2)
+    assert variance == pytest.approx(1.0, rel=1e-6)
+    assert step * variance + scale**2 * theta == pytest.approx(share * step, rel=1e-6, abs=1e-9)
 
 
 def test_whitening_is_the_inverse_root_of_the_covariance(design: Design) -> None:
