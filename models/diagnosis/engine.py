@@ -35,6 +35,8 @@ LEAST_LINE = 14.0
 UNCONFIRMED = 1.6
 #: So many plateaus determine every curve: one start is enough.
 MANY_PLATEAUS = 8000
+#: A slow vibration leaves something in averages too: up to this share of its own evidence nothing else is named.
+LEFT_BY_VIBRATION = 0.1
 #: Torques [Nm] outside are no clutch's.
 LEAST_TORQUE, MOST_TORQUE = 1e-6, 1e7
 
@@ -77,7 +79,9 @@ def _diagnosed(campaign: Campaign, design: Design, without: frozenset[str], rng:
     leads = alarms(design, baseline, view, rng)
     noise, hypotheses = baseline.noise, list[Hypothesis]()
     judgement = Judgement(verdict=Verdict.MODEL_ADEQUATE)
-    if any(each.raised for each in leads.values()):
+    if any(each.raised for each in leads.values()) or any(
+        each.effect in BY_SLUG for each in raw if not _vibrates(each)
+    ):
         noise, hypotheses = hypotheses_of(
             design, baseline.noise, baseline.priors, baseline.start, baseline.fit, view, raw
         )
@@ -144,12 +148,19 @@ def confirmed(leads: dict[str, Lead], hypotheses: list[Hypothesis], otherwise: f
     return loud or max(evidence, otherwise) >= OVER_NOTHING
 
 
+def _vibrates(each: RawEvidence) -> bool:
+    return each.effect in BY_SLUG and BY_SLUG[each.effect].kind is Kind.VIBRATION
+
+
 def with_lines(judgement: Judgement, raw: tuple[RawEvidence, ...]) -> Judgement:
     """The verdict with what raw records show beside it: vibrations of the catalogue are causes of their own, where they
     are more than what a wrong template may leave behind; another line alone is structure without a name."""
     least = CLOSE + 2 * judgement.statistics.get("tolerance", 0.0)
     seen = [each for each in raw if each.log_evidence > least]
-    known = [each for each in seen if each.effect in BY_SLUG and BY_SLUG[each.effect].kind is Kind.VIBRATION]
+    known = [each for each in seen if _vibrates(each)]
+    loudest = max((each.log_evidence for each in known), default=0.0)
+    if 0.0 < judgement.statistics.get("lambda", 0.0) < LEFT_BY_VIBRATION * loudest:
+        judgement = Judgement(verdict=Verdict.MODEL_ADEQUATE, statistics=judgement.statistics)
     judgement = judgement.joined(tuple(each.effect for each in known))
     lined = any(each.effect == FIXED_LINE and each.log_evidence > LEAST_LINE for each in seen)
     if lined and judgement.verdict is Verdict.MODEL_ADEQUATE:

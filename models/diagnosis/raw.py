@@ -18,6 +18,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from models.diagnosis.approaches import approach
 from models.diagnosis.bursts import best_anywhere, best_slow
 from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
 from models.diagnosis.orders import Line, best_order
@@ -55,7 +56,7 @@ def raw_evidence(campaign: Campaign) -> tuple[RawEvidence, ...]:
     cuts = [(record, _cut(record)) for _, record in _spread(held)]
     dwells = [(record, cut) for record, cut in cuts if cut is not None]
     found = [*_standing(dwells), *(swings(record) for _, record in _spread([(r, r.record) for r in campaign.dynamic]))]
-    return (*_lines([each for each in found if each is not None]), *_unsettled([cut for _, cut in dwells]))
+    return (*_lines([each for each in found if each is not None]), *_unsettled(dwells))
 
 
 def _standing(dwells: list[tuple[Record, PlateauCut]]) -> Iterator[Swings | None]:
@@ -117,21 +118,27 @@ def _seen(effect: str, line: Line, name: str, note: str) -> RawEvidence:
     return RawEvidence(effect=effect, log_evidence=line.evidence, estimate=estimate, note=note)
 
 
-def _unsettled(cuts: list[PlateauCut]) -> list[RawEvidence]:
-    """Dwells that ended before torque had settled: how many, and the time constant of their approach."""
+def _unsettled(dwells: list[tuple[Record, PlateauCut]]) -> list[RawEvidence]:
+    """Dwells that ended before torque had settled: the evidence of all together, or how many show it by themselves."""
+    cuts = [cut for _, cut in dwells]
     late = [
         (SETTLING * cut.time_constant > SETTLED_SHARE * (cut.stop - cut.start + cut.settling_time)) | ~cut.settled
         for cut in cuts
     ]
     rows = np.concatenate(late) if late else np.zeros(0, dtype=np.bool_)
-    seen = int(np.count_nonzero(rows))
-    if rows.size == 0 or seen < max(4, 0.25 * rows.size):
+    if rows.size == 0:
         return []
+    seen = int(np.count_nonzero(rows))
     constants = np.concatenate([cut.time_constant for cut in cuts])[rows]
     known = constants[np.isfinite(constants)]
-    if known.size < 4:
+    alone = 0.5 * seen if seen >= max(4, 0.25 * rows.size) and known.size >= 4 else 0.0
+    together, likely = approach(dwells)
+    if max(alone, together) <= SEEN:
         return []
-    spread = float(1.4826 * np.median(np.abs(known - np.median(known)))) / np.sqrt(known.size)
-    estimate = Estimate(name="settling time constant", value=float(np.median(known)), sd=spread, unit="s")
     note = f"{seen} of {rows.size} dwells ended before their torque had settled"
-    return [RawEvidence(effect="unsettled_dwell", log_evidence=0.5 * seen, estimate=estimate, note=note)]
+    if together > alone:
+        note = f"after each step torque approaches its level from the side of the last one, for some {likely:.2g} s"
+    usual = float(np.median(known)) if alone > 0 else likely
+    spread = float(1.4826 * np.median(np.abs(known - usual))) / np.sqrt(known.size) if alone > 0 else 0.5 * likely
+    estimate = Estimate(name="settling time constant", value=usual, sd=spread, unit="s")
+    return [RawEvidence(effect="unsettled_dwell", log_evidence=max(alone, together), estimate=estimate, note=note)]

@@ -133,14 +133,15 @@ def _standing(
     price: Callable[[Hypothesis], float],
     tested: "_Tested",
 ) -> tuple[Hypothesis, ...]:
-    """What cannot be told from the best, best first; none where no case among them closes."""
+    """What is better than nothing and cannot be told from the best, best first; none where no case among them closes."""
     pool = [each for each in usable if len(each.effects) == len(best.effects)]
     pool.sort(key=lambda each: price(each) - each.evidence)
     margin = CLOSE if len(best.effects) == 1 else CLOSE_PAIRS
 
     def stands(each: Hypothesis) -> bool:
-        lead = best.evidence - price(best) - each.evidence + price(each)
-        return lead <= margin + RIVAL * unshared(best, each, singles)
+        worth = each.evidence - price(each)
+        lead = best.evidence - price(best) - worth
+        return (each is best or worth > 0.0) and lead <= margin + RIVAL * unshared(best, each, singles)
 
     near = [each for each in pool if stands(each)][:MOST_CLOSED]
     closed = [each for each in near if tested(each).closed]

@@ -59,7 +59,7 @@ def test_no_amplitude_no_change_and_all_changes_are_finite(effect: Effect, scene
             scene.points.velocity > 0.01 * scene.points.velocity.max()
         )  # a film that stands is slow whatever its time
         # small amplitudes act in proportion
-        assert np.abs(doubled - column)[moving].max() < 0.02 * np.abs(column[moving]).max()
+        assert np.abs(doubled - column)[moving].max() < 0.05 * np.abs(column[moving]).max()
 
 
 def test_effects_of_loops_leave_plateaus_alone(scene: Scene) -> None:

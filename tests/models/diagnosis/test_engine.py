@@ -7,8 +7,10 @@ import pytest
 
 from models.diagnosis.campaign import Campaign, MaintenanceEvent
 from models.diagnosis.campaign import EventKind as Event
-from models.diagnosis.engine import diagnose
-from models.diagnosis.report import Report, Verdict
+from models.diagnosis.engine import diagnose, with_lines
+from models.diagnosis.raw import RawEvidence
+from models.diagnosis.report import Estimate, Report, Verdict
+from models.diagnosis.verdict import Judgement
 from models.runs import Plateaus
 from models.stribeck import StribeckParameters, torque
 from tests.models.diagnosis.campaigns import Planted, Where, campaign
@@ -139,3 +141,18 @@ def test_a_logged_oil_change_is_preferred_to_an_unlogged_one() -> None:
     with_log = next(each for each in look(logged).candidates if each.effect == "oil_change")
     without = next(each for each in look(given).candidates if each.effect == "oil_change")
     assert with_log.log_evidence_gain > without.log_evidence_gain + 1.0
+
+
+def test_what_a_loud_vibration_leaves_in_averages_is_not_named_beside_it() -> None:
+    """A named cause of 15 nats beside a ripple of 300 is the ripple's; one of 60 nats is a cause of its own."""
+    estimate = Estimate(name="ripple amplitude", value=0.1, sd=0.01, unit="Nm")
+    ripple = RawEvidence(effect="shaft_ripple", log_evidence=300.0, estimate=estimate, note="")
+    for nats, causes in ((15.0, ("shaft_ripple",)), (60.0, ("viscous_exponent", "shaft_ripple"))):
+        judged = Judgement(
+            verdict=Verdict.CAUSE_NAMED,
+            causes=("viscous_exponent",),
+            statistics={"lambda": nats, "tolerance": 0.05 * nats},
+        )
+        found = with_lines(judged, (ripple,))
+        assert found.verdict is Verdict.CAUSE_NAMED
+        assert found.causes == causes
