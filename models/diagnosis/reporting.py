@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.diagnosis.advice import advise
+from models.diagnosis.advice import Rival, advise
 from models.diagnosis.alarm import Lead
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.catalogue import BY_SLUG
@@ -30,6 +30,8 @@ SEEN = 11.0
 LEAST_PROBABILITY = 1e-3
 #: An extension whose held-out error is more than this times the baseline's is not proposed.
 MOST_WORSE = 1.02
+#: Hypotheses so much [nats] behind may come back when another test is made.
+NEARBY = 8.0
 WITHHELD = "The extension is not proposed: runs that it had not seen were foretold worse with it than without."
 
 
@@ -61,7 +63,7 @@ def report_of(
     if extended is not None:
         left = axes_of(judgement.view, {}) if fits and judgement.view is not None else ()
         after = misfit_of(design, noise, extended, left)
-    advice = advise(campaign, design, noise, priors, fits) if fits else ()
+    advice = advise(campaign, design, noise, priors, *_race(judgement, hypotheses))
     visible = visible_of(view)
     extension = _extension(design, noise, priors, judgement, gain)
     said = (*notes, *(f"{each.effect}: {each.note}." for each in raw))
@@ -96,6 +98,23 @@ def report_of(
         notes=said,
         statistics=_statistics(leads, judgement),
     )
+
+
+def _race(judgement: Judgement, hypotheses: Sequence[Hypothesis]) -> tuple[list[Rival], list[Rival]]:
+    """The hypotheses that stand, and those of as many effects that are not far behind, best first."""
+    standing = [Rival(fit=each.fit, evidence=each.evidence) for each in judgement.standing if each.fit is not None]
+    if not standing:
+        return [], []
+    out = {each.slugs for each in judgement.standing}
+    alike = [
+        each
+        for each in hypotheses
+        if each.slugs not in out
+        and len(each.effects) == len(judgement.standing[0].effects)
+        and each.evidence > standing[0].evidence - NEARBY
+    ]
+    alike.sort(key=lambda each: -each.evidence)
+    return standing, [Rival(fit=each.fit, evidence=each.evidence) for each in alike if each.fit is not None]
 
 
 def insufficient(missing: str, design: Design) -> Report:

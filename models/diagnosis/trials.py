@@ -17,16 +17,20 @@ from models.runs import Plateaus, Record, pressure_levels
 SWING = 1000 * 2 * np.pi / 60
 _SAMPLES, _PERIODS = 200, 10
 _HOUR = 3600.0
+#: Light pressures of loops, as multiples: far enough apart to be told from each other.
+LIGHT = (1.0, 1.5, 2.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
-    """What a test would be. `text` is for the engineer; everything else is for machines.
+    """What a test would be. `text` is for the engineer, empty where it is only made as a part of others.
 
-    loops: a dynamic test at `frequency` [Hz]; else a stationary test, with the oil at `temperature` [K] (None: as usual),
-    speeds `falling`; either with pressures times `pressure` [-], `times` over. `later`: how many usual distances between
-    states it lies ahead, with `energy` [-] times the usual energy of an engagement up to there. `rest` [s]: a pause before
-    the first test and every second one after it.
+    loops: a dynamic test at `frequency` [Hz]; else a stationary test, with
+    speeds `falling`. Either with the oil at `temperature` [K] (None: as usual), pressures times `pressure` [-] (of loops at
+    LIGHT times that of the lowest one, where it is not 1); `times` over, each as the first. `later`: how many usual
+    distances between states it lies ahead, with `energy` [-] times the usual energy of an engagement up to there. `rest`
+    [s]: a pause before the first test and every second one after it. `parts`: keys of the trials that it consists of, and
+    nothing else.
     """
 
     text: str
@@ -39,20 +43,33 @@ class Trial:
     later: int = 0
     energy: float = 1.0
     rest: float = 0.0
+    parts: tuple[str, ...] = ()
 
+
+_LOOPS = "dynamic test at 0.3 Hz, ten periods a pressure, 60 samples a second, 1000 ± 1000 rpm"
+_LIGHT_SWEEP = "stationary test at a quarter of the usual pressures"
+_LIGHT = "at a quarter, three eighths and a half of the lowest usual pressure"
 
 TRIALS: dict[str, Trial] = {
-    "loops_0.3hz": Trial(
-        text="dynamic test at 0.3 Hz, 1000 ± 1000 rpm, all pressures, ten periods each, 60 samples a second",
-        loops=True,
-        frequency=0.3,
+    "loops_0.3hz": Trial(text=f"{_LOOPS}, at the usual pressures", loops=True, frequency=0.3),
+    "light_loops": Trial(text="", loops=True, frequency=0.3, pressure=0.25),
+    "light_loops_60c": Trial(text="", loops=True, frequency=0.3, pressure=0.25, temperature=333.15),
+    "light_tests": Trial(text=f"{_LIGHT_SWEEP}, and {_LOOPS}, {_LIGHT}", parts=("light_sweep", "light_loops")),
+    "light_tests_60c": Trial(
+        text=f"{_LIGHT_SWEEP}, and {_LOOPS}, {_LIGHT}, with the oil at 60 °C", parts=("light_sweep", "light_loops_60c")
     ),
-    "light_loops": Trial(
-        text="dynamic test at 0.3 Hz, 1000 ± 1000 rpm, all pressures a quarter of the usual ones, ten periods each, "
-        "60 samples a second",
-        loops=True,
-        frequency=0.3,
-        pressure=0.25,
+    "warm_and_cool": Trial(
+        text=f"{_LIGHT_SWEEP}, and {_LOOPS}, {_LIGHT}, first with the oil as usual, then at 60 °C",
+        parts=("light_sweep", "light_loops", "light_loops_60c"),
+    ),
+    "all_loads": Trial(
+        text=f"{_LIGHT_SWEEP}, and {_LOOPS}, at the usual pressures and then {_LIGHT}",
+        parts=("light_sweep", "loops_0.3hz", "light_loops"),
+    ),
+    "all_loads_and_60c": Trial(
+        text=f"{_LIGHT_SWEEP}, and {_LOOPS}: at the usual pressures, then {_LIGHT}, then there once more with the oil "
+        "at 60 °C",
+        parts=("light_sweep", "loops_0.3hz", "light_loops", "light_loops_60c"),
     ),
     "sweep_60c": Trial(text="stationary test with the oil at 60 °C", temperature=333.15),
     "sweeps_60c": Trial(text="stationary test with the oil at 60 °C, three times", temperature=333.15, times=3),
@@ -60,10 +77,8 @@ TRIALS: dict[str, Trial] = {
     "falling_speeds": Trial(
         text="stationary test with the speeds falling instead of rising, three times", falling=True, times=3
     ),
-    "light_sweep": Trial(text="stationary test at a quarter of the usual pressures", pressure=0.25),
-    "light_sweeps": Trial(
-        text="stationary test at a quarter of the usual pressures, five times", pressure=0.25, times=5
-    ),
+    "light_sweep": Trial(text=_LIGHT_SWEEP, pressure=0.25),
+    "light_sweeps": Trial(text=f"{_LIGHT_SWEEP}, five times", pressure=0.25, times=5),
     "repeats": Trial(text="the stationary test again at once, five times", times=5),
     "more_states": Trial(text="three more states of use, at the usual distance, with a stationary test each", later=3),
     "rests": Trial(
@@ -85,9 +100,27 @@ TRIALS: dict[str, Trial] = {
 }
 
 
+def runs_of(key: str) -> float:
+    """How much work a trial is, in runs: pressures that were not tried before are as much as two more, another oil
+    temperature (hours of settling, and all changes that oil changes) as ten, a state of use as three, unusual
+    engagements as four, a pause as one."""
+    trial = TRIALS[key]
+    if trial.parts:
+        return sum(runs_of(part) for part in trial.parts)
+    made = 3.0 * trial.later if trial.later else float(trial.times)
+    made += 2.0 * (trial.pressure != 1.0) + 4.0 * (trial.energy != 1.0) + 1.0 * (trial.rest > 0)
+    return made + 10.0 * (trial.temperature is not None)
+
+
 def with_trial(campaign: Campaign, key: str) -> Campaign | None:
-    """The campaign with the trial's runs added at its end (torques 0); None where the campaign has no pattern for it."""
+    """The campaign with the trial's runs added at its end (torques 0), the first of those that are alike; None where the
+    campaign has no pattern for it."""
     trial, pattern = TRIALS[key], campaign.stationary[-1] if campaign.stationary else None
+    if trial.parts:
+        whole: Campaign | None = campaign
+        for part in trial.parts:
+            whole = None if whole is None else with_trial(whole, part)
+        return whole
     states = np.unique([*(run.cycles for run in campaign.stationary), *(run.cycles for run in campaign.dynamic)])
     if states.size == 0 or (trial.later and states.size < 2):
         return None
@@ -98,7 +131,7 @@ def with_trial(campaign: Campaign, key: str) -> Campaign | None:
     if pattern is None:
         return None
     step = _distance(states) if trial.later else 0.0
-    ahead = [last + step * (k + 1) for k in range(trial.later)] or [last] * trial.times
+    ahead = [last + step * (k + 1) for k in range(trial.later)] or [last]
     rested = [trial.rest * float(k % 2 == 0) for k in range(len(ahead))]
     tests = tuple(
         _sweep(pattern, trial, cycles, k, sum(rested[: k + 1]))  # in the order in which they are made
@@ -153,15 +186,18 @@ def _sweep(pattern: StationaryRun, trial: Trial, cycles: float, number: int, res
 def _loops(campaign: Campaign, trial: Trial, cycles: float) -> DynamicRun:
     """The pressures of the last dynamic test, or a share of them, at another frequency."""
     record = campaign.dynamic[-1].record
-    levels = trial.pressure * np.unique(pressure_levels(record.pressure[:: max(1, record.pressure.size // 5000)]))
+    levels = np.unique(pressure_levels(record.pressure[:: max(1, record.pressure.size // 5000)]))
+    if trial.pressure != 1.0:
+        levels = trial.pressure * float(levels[0]) * np.array(LIGHT)
     count = _SAMPLES * _PERIODS + 1
     step = 1.0 / (trial.frequency * _SAMPLES)
     phase = 2 * np.pi * np.arange(count) / _SAMPLES
     speed = np.tile(SWING * (1 - np.cos(phase)), levels.size)
     pressure = np.repeat(levels, count)
-    temperature = (
-        None if record.oil_temperature is None else np.full(speed.size, float(np.median(record.oil_temperature)))
-    )
+    temperature = None
+    if record.oil_temperature is not None:
+        usual = float(np.median(record.oil_temperature))
+        temperature = np.full(speed.size, usual if trial.temperature is None else trial.temperature)
     time = np.arange(speed.size, dtype=np.float64) * step
     torque = speed * 1e-3  # a record must swing to be cut into loops
     return DynamicRun(

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from tests.blind.rig.hide import hide
 from tests.blind.rig.loudness import UnreachableError, listen
 from tests.blind.rig.makers import ALL, CATALOGUED, OUTSIDE
-from tests.blind.rig.more import ASKED, with_test
+from tests.blind.rig.more import ASKED, TOGETHER, with_test
 from tests.blind.rig.plan import RADIUS, RPM
 from tests.blind.rig.refit import LEAST_GAIN, spreads, theta_at
 from tests.blind.rig.sensor import Whitening
@@ -205,7 +205,7 @@ def test_the_campaign_holds_what_the_runs_say() -> None:
     assert {run["cycles"] for run in told if run["kind"] == "dynamic_stribeck"} == {run.cycles for run in seen.dynamic}
 
 
-@pytest.mark.parametrize("key", sorted(ASKED))
+@pytest.mark.parametrize("key", sorted({*ASKED, *TOGETHER}))
 def test_an_advised_test_is_made_with_the_same_secret(key: str) -> None:
     hidden = hide((5, 6), ("torque_zero_shift",), 20.0, states=4)
     before, after = campaign(hidden), campaign(with_test(hidden, key))

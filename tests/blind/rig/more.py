@@ -4,17 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.arrays import FloatArray
 from tests.blind.rig.hide import Hidden
 from tests.blind.rig.plan import Life, Site, oil_course
 from tests.blind.rig.sensor import measure
 from tests.blind.rig.world import read
 
-#: What each advice asks for: states to come, energy of their duty, pause [s] before every second, oil [°C], pressures, order,
-#: loops [Hz], how many tests.
+#: What each advice asks for: states to come, energy of their duty, pause [s] before every second, oil [°C], pressures,
+#: order, loops [Hz], how many tests.
 ASKED: dict[str, dict[str, float]] = {
     "loops_0.3hz": {"frequency": 0.3},
     "light_loops": {"frequency": 0.3, "pressure": 0.25},
+    "light_loops_60c": {"frequency": 0.3, "pressure": 0.25, "oil": 60.0},
     "sweep_60c": {"oil": 60.0},
     "sweeps_60c": {"oil": 60.0, "times": 3},
     "sweep_100c": {"oil": 100.0},
@@ -27,12 +27,24 @@ ASKED: dict[str, dict[str, float]] = {
     "half_energy": {"states": 2, "energy": 0.5},
     "twice_energy": {"states": 2, "energy": 2.0},
 }
+#: Advice that asks for several of these.
+TOGETHER = {
+    "light_tests": ("light_sweep", "light_loops"),
+    "light_tests_60c": ("light_sweep", "light_loops_60c"),
+    "warm_and_cool": ("light_sweep", "light_loops", "light_loops_60c"),
+    "all_loads": ("light_sweep", "loops_0.3hz", "light_loops"),
+    "all_loads_and_60c": ("light_sweep", "loops_0.3hz", "light_loops", "light_loops_60c"),
+}
 
 
 def with_test(hidden: Hidden, key: str) -> Hidden:
     """The campaign after the test of that key has been made too; raises KeyError for a test the rig does not know."""
+    if key in TOGETHER:
+        for part in TOGETHER[key]:
+            hidden = with_test(hidden, part)
+        return hidden
     asked = ASKED[key]
-    rng = np.random.default_rng([*hidden.seed, 99])
+    rng = np.random.default_rng([*hidden.seed, 99, len(hidden.plan.sites)])
     life = _lived_on(hidden.plan.life, asked)
     new = np.arange(hidden.plan.life.cycles.size, life.cycles.size)
     old = tuple(replace(site, life=life) for site in hidden.plan.sites)
@@ -60,7 +72,7 @@ def _lived_on(life: Life, asked: dict[str, float]) -> Life:
     )
 
 
-def _sweeps(rng: np.random.Generator, last: Site, new: FloatArray, asked: dict[str, float]) -> Site:
+def _sweeps(rng: np.random.Generator, last: Site, new: np.ndarray, asked: dict[str, float]) -> Site:
     """The stationary test in its own order, or with speeds falling, at each new state."""
     rows = np.arange(last.bar.shape[1])
     if "falling" in asked and last.kind == "stationary":
@@ -73,12 +85,14 @@ def _sweeps(rng: np.random.Generator, last: Site, new: FloatArray, asked: dict[s
 
 
 def _loops(rng: np.random.Generator, hidden: Hidden, life: Life, asked: dict[str, float]) -> Site:
-    """Ten periods at every pressure, two hundred samples a period."""
-    frequency, pressures = asked["frequency"], asked.get("pressure", 1.0) * hidden.plan.pressures
+    """Ten periods at every pressure, or at three light ones, two hundred samples a period."""
+    frequency, pressures = asked["frequency"], hidden.plan.pressures
+    if "pressure" in asked:
+        pressures = asked["pressure"] * pressures[0] * np.array([1.0, 1.5, 2.0])
     time = np.arange(2001) / (200 * frequency)
     rpm = np.broadcast_to(1000 - 1000 * np.cos(2 * np.pi * frequency * time), (pressures.size, time.size))
     clock = np.arange(pressures.size)[:, None] * (time[-1] + 3.0) + time
-    oil = np.full(clock.shape, 85.0 + rng.uniform(-2, 2))
+    oil = np.full(clock.shape, asked.get("oil", 85.0) + rng.uniform(-2, 2))
     state = np.full(pressures.size, life.cycles.size - 1)
     bar = pressures[:, None] + np.zeros_like(time)
     return Site("loop", state, bar, rpm, clock, oil, life, float(time[1]), None, frequency)

@@ -31,7 +31,7 @@ def catalogue_table() -> str:
 
 def trials_table() -> str:
     """A trial a row."""
-    rows = [("key", "test"), ("---", "---"), *((f"`{key}`", trial.text) for key, trial in TRIALS.items())]
+    rows = [("key", "test"), ("---", "---"), *((f"`{key}`", trial.text) for key, trial in TRIALS.items() if trial.text)]
     return _table(rows)
 
 

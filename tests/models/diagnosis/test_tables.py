@@ -26,4 +26,4 @@ def test_the_tables_are_whole():
         cells = line.replace("\\|", "").strip("| ").split(" | ")
         assert len(cells) == 6
         assert all(cell.strip() for cell in cells)
-    assert len(trials_table().splitlines()) == 2 + len(TRIALS)
+    assert len(trials_table().splitlines()) == 2 + sum(bool(trial.text) for trial in TRIALS.values())
