@@ -95,9 +95,9 @@ def _standing(smooth: FloatArray, start: int, stop: int, gap: float) -> tuple[in
         wander = 1.4826 * float(np.median(np.abs(middle - level)))
         off = np.abs(smooth[start:stop] - level) > max(_OFF_LEVEL * wander, _OFF_SHARE * gap)
         before, after = _run_of(off), _run_of(off[::-1])
-        if before + after in (0, off.size):
+        if before + after == 0 or before + after >= off.size:
             break
-        start, stop = start + before, max(stop - after, start + before + 1)
+        start, stop = start + before, stop - after
     return start, stop
 
 

@@ -7,7 +7,7 @@ from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, ShapePara
 from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
 
-_HOUR = 3600.0
+_HOUR, _MINUTE = 3600.0, 60.0
 
 
 def _grid(facts: Facts) -> tuple[Tried, ...]:
@@ -31,6 +31,7 @@ def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
         left = np.where(since >= 0, strength * np.exp(-np.maximum(since, 0.0) / length), 0.0)
         if seconds > 0 and np.isfinite(moment):
             waited = np.where(np.isfinite(points.moment), points.moment - moment, points.clock)
+            left = np.where(waited < -_MINUTE, 0.0, left)  # tested at the same cycles, but before the pause
             left = left * np.exp(-np.clip(waited, 0.0, 50 * seconds) / seconds)
         share = np.maximum(share, left)
     return np.asarray(amplitude * scene.curve * share, dtype=np.float64)
