@@ -74,8 +74,9 @@ def axes_of(view: View, leads: dict[str, Lead], raw: Sequence[RawEvidence] = ())
         found[axis] = Where(axis=axis, strength=strength, p_value=p_value)
     line = leads.get("lines")
     if line is not None and line.raised:
-        strength = max(-float(np.log(max(line.p_value, 1e-300))), found[CLOCK].strength if CLOCK in found else 0.0)
-        found[CLOCK] = Where(axis=CLOCK, strength=strength, p_value=line.p_value)
+        slow = found.get(CLOCK, Where(axis=CLOCK, strength=0.0, p_value=1.0))
+        strength = max(-float(np.log(max(line.p_value, 1e-300))), slow.strength)
+        found[CLOCK] = Where(axis=CLOCK, strength=strength, p_value=min(line.p_value, slow.p_value))
     for each in raw:
         if each.effect == FIXED_LINE:
             p_value = float(np.exp(-np.clip(each.log_evidence, 0.0, 700.0)))
