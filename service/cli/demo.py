@@ -9,7 +9,7 @@ import tempfile
 import time
 import webbrowser
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -44,15 +44,14 @@ def demo(
                 return
             _loops(Service(http=http), seed, cycles)
         page = f"{url}/clutches/sim-{seed}"
-        out.print(
-            f"\nThe dashboard stays open at {page} until Ctrl-C; all clutches: {url}", markup=False, soft_wrap=True
-        )
-        if browser and sys.stdout.isatty() and "CI" not in os.environ:
-            webbrowser.open(page)
-        try:
+        with suppress(KeyboardInterrupt):
+            out.print(
+                f"\nThe dashboard stays open at {page} until Ctrl-C; all clutches: {url}", markup=False, soft_wrap=True
+            )
+            if browser and sys.stdout.isatty() and "CI" not in os.environ:
+                webbrowser.open(page)
             process.wait()
-        except KeyboardInterrupt:
-            out.print("closing")
+        out.print("closing")
 
 
 def _life(service: Service, seed: int) -> float:

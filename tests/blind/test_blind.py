@@ -48,17 +48,17 @@ def judged(trials: list[Trial]) -> list[Outcome]:
 
 @pytest.fixture(scope="module")
 def nothing() -> list[Outcome]:
-    return judged([Trial("none", (SEED, 0, k)) for k in range(20)])
+    return judged([Trial("none", (SEED, 0, k)) for k in range(16)])
 
 
 @pytest.fixture(scope="module")
 def catalogued() -> list[Outcome]:
-    """Four campaigns a family, eight of the family whose target is low, λ = 50, 6 states."""
+    """Three campaigns a family, eight of the family whose target is low, λ = 50, 6 states."""
     return judged(
         [
             Trial(family, (SEED, 1, k), (slug,), 50.0)
             for family, slug in FAMILIES.items()
-            for k in range(8 if family == "history" else 4)
+            for k in range(8 if family == "history" else 3)
         ]
     )
 
@@ -79,19 +79,7 @@ def test_where_nothing_is_hidden_nothing_is_found(nothing: list[Outcome]) -> Non
     assert sum(one.verdict != "model_adequate" for one in nothing) <= most(len(nothing), 0.02)
 
 
-#: What the diagnosis does not reach yet, and why; docs/diagnosis.md says so too.
-SHORT = {
-    "viscous": "drag, the viscous exponent and heating of the interface are told apart too seldom",
-}
-
-
-@pytest.mark.parametrize(
-    "family",
-    [
-        pytest.param(each, marks=[pytest.mark.xfail(reason=SHORT[each], strict=False)] if each in SHORT else [])
-        for each in FAMILIES
-    ],
-)
+@pytest.mark.parametrize("family", FAMILIES)
 def test_what_is_hidden_is_found_in_each_family(catalogued: list[Outcome], family: str) -> None:
     """Target: the truth leads in 95 % outside the history family, in 60 % inside."""
     mine = [one for one in catalogued if one.trial.row == family]
@@ -115,7 +103,7 @@ def test_nothing_wrong_is_named(catalogued: list[Outcome], uncatalogued: list[Ou
     both = [*catalogued, *uncatalogued]
     allowed = most(len(both), 0.02)
     assert sum(one.wrong for one in both) <= allowed
-    permuted = [replace(one, trial=other.trial) for one, other in zip(both, [*both[4:], *both[:4]], strict=True)]
+    permuted = [replace(one, trial=other.trial) for one, other in zip(both, [*both[3:], *both[:3]], strict=True)]
     assert sum(one.wrong for one in permuted) > allowed
 
 
