@@ -74,8 +74,8 @@ class Design:
     """Points [P] (plateaus first, then PHASES points a loop), rows [N] (plateaus first, then the loops' bins), measured
     torque [N] Nm (folded), `samples` [N] averaged in each row, `torque_sd` [N] Nm as sent (NaN where not), `level` [N]
     Pa the pressure level, `curve` [N] an index that run and level share, `bins` [N - plateaus] which bin of the flat
-    (loop, bin) order each loop row is, `chains` [b, n] rows that follow
-    each other in a run or loop, those of one length together, `notes` what was left out."""
+    (loop, bin) order each loop row is, `chains` [b, n] rows that follow each other in a run or loop, those of one length
+    together, `notes` what was left out."""
 
     points: Points
     rows: Points

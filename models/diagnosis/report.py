@@ -84,7 +84,7 @@ class Gain:
 class Advice:
     """A test that would decide between two effects (or between an effect and none, then `other` is "baseline").
 
-    `key` names the test for machines (`models.diagnosis.advice.TESTS`), `nats` is what it is expected to bring.
+    `key` names the test for machines (`models.diagnosis.trials.TRIALS`), `nats` is what it is expected to bring.
     """
 
     key: str

@@ -25,12 +25,11 @@ LIGHT = (1.0, 1.5, 2.0)
 class Trial:
     """What a test would be. `text` is for the engineer, empty where it is only made as a part of others.
 
-    loops: a dynamic test at `frequency` [Hz]; else a stationary test, with
-    speeds `falling`. Either with the oil at `temperature` [K] (None: as usual), pressures times `pressure` [-] (of loops at
-    LIGHT times that of the lowest one, where it is not 1); `times` over, each as the first. `later`: how many usual
-    distances between states it lies ahead, with `energy` [-] times the usual energy of an engagement up to there. `rest`
-    [s]: a pause before the first test and every second one after it. `parts`: keys of the trials that it consists of, and
-    nothing else.
+    loops: a dynamic test at `frequency` [Hz]; else a stationary test, with speeds `falling`. Either with the oil at
+    `temperature` [K] (None: as usual), pressures times `pressure` [-] (of loops at LIGHT times that of the lowest one,
+    where it is not 1); `times` over, each as the first. `later`: how many usual distances between states it lies ahead,
+    with `energy` [-] times the usual energy of an engagement up to there. `rest` [s]: a pause before the first test and
+    every second one after it. `parts`: keys of the trials that it consists of, and nothing else.
     """
 
     text: str

@@ -62,10 +62,12 @@ def _over_film(
     rate = step / np.maximum(time[looping].reshape(-1, phases)[:, 0], 1e-12)
     before = np.roll(v, 1, axis=1)
     film, now = np.empty_like(v), v[:, -round(_BEFORE * phases) - 1]
+    last = now
     for k in range(-round(_BEFORE * phases), phases):
-        steps = rate * (np.maximum(now, 0.0) / middle + least) ** thin
+        halfway = 1.5 * now - 0.5 * last
+        steps = rate * (np.maximum(halfway, 0.0) / middle + least) ** thin
         keep = np.exp(-steps)
-        now = v[:, k] + (now - before[:, k]) * keep - (v[:, k] - before[:, k]) * (1 - keep) / steps
+        last, now = now, v[:, k] + (now - before[:, k]) * keep - (v[:, k] - before[:, k]) * (1 - keep) / steps
         film[:, k] = now
     speed = v.ravel()
     w = np.maximum(film.ravel(), 1e-3 * speed)

@@ -1,0 +1,98 @@
+"""What a rest's length and a film's own equation do, against reckonings of another kind."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+
+from models.diagnosis.baseline import frame_of, predict
+from models.diagnosis.campaign import Campaign, EventKind, MaintenanceEvent
+from models.diagnosis.catalogue import BY_SLUG
+from models.diagnosis.design import build_design
+from models.diagnosis.effects.squeeze_film import FILM, FIRST_ORDER
+from models.diagnosis.facts import facts_of
+from models.diagnosis.laws import GAMMA, Scene, curve
+from models.diagnosis.starting import starting_laws
+from tests.models.diagnosis.campaigns import campaign
+
+HOUR, DAY = 3600.0, 86400.0
+
+
+def scene_of_all(given: Campaign) -> Scene:
+    design = build_design(given)
+    return predict(design, starting_laws(design, frame_of(design))).scene
+
+
+def rested(*hours: float) -> Campaign:
+    """A campaign of a test a day whose log says how long the clutch rested before those at 1000, 3000 ... cycles."""
+    given = campaign(1)
+    tests = given.stationary[1 : 1 + len(hours)]
+    events = [
+        MaintenanceEvent(
+            run_id=f"rest-{k}", cycles=test.cycles, event=EventKind.REST, moment=(test.moment or 0.0) - HOUR * rest
+        )
+        for k, (test, rest) in enumerate(zip(tests, hours, strict=True))
+    ]
+    return replace(given, maintenance=tuple(events))
+
+
+def test_a_rest_lasts_from_its_own_moment_to_the_next_test() -> None:
+    facts = facts_of(rested(2.0, 10.0))
+    assert facts.rests[:2] == (1000.0, 3000.0)
+    np.testing.assert_allclose(facts.rest_lengths[:2], [2 * HOUR, 10 * HOUR])
+    np.testing.assert_allclose(facts.rest_moments[:2], [1e9 + DAY, 1e9 + 2 * DAY])
+    np.testing.assert_allclose(facts.rest_lengths[2:], DAY - 2000.0)  # nothing is logged: the gap since the test before
+
+
+def test_friction_recovers_with_the_logarithm_of_the_rest_where_the_power_is_one() -> None:
+    scene = scene_of_all(rested(2.0, 10.0))
+    effect, first = BY_SLUG["rest_recovery"], scene.points.clock == scene.points.clock[0]
+    shares = {}
+    for power in (0.0, 1.0):
+        change = effect.change(scene, 0.01, (10.0, 0.0, power)) / scene.curve
+        shares[power] = [float(change[first & (scene.points.cycles == at)].max()) for at in (1000.0, 3000.0)]
+    kept = shares[0.0][0]  # of the cycles and the clock, the same for both
+    assert shares[0.0] == pytest.approx([kept, kept])
+    longest = np.log1p((DAY - 2000.0) / HOUR)
+    assert shares[1.0] == pytest.approx([kept * np.log(3.0) / longest, kept * np.log(11.0) / longest])
+
+
+def test_a_test_before_the_pause_at_the_same_cycles_has_not_rested() -> None:
+    """The dynamic test follows the stationary one by 2000 s; the pause lies between them."""
+    given = campaign(1)
+    pause = MaintenanceEvent(run_id="rest", cycles=3000.0, event=EventKind.REST, moment=1e9 + 2 * DAY + 1000.0)
+    scene = scene_of_all(replace(given, maintenance=(pause,)))
+    change = BY_SLUG["rest_recovery"].change(scene, 0.01, (100.0, 600.0, 0.0))
+    here = scene.points.cycles == 3000.0
+    assert np.abs(change[here & scene.points.steady]).max() < 1e-6
+    assert np.abs(change[here & ~scene.points.steady]).max() > 1e-3
+
+
+@pytest.mark.parametrize(("thin", "least", "sheared"), [(0.8, 0.2, 0.5), (1.4, 0.3, 0.7)])
+def test_a_film_follows_its_equation(thin: float, least: float, sheared: float) -> None:
+    """Against a general solver, two periods long, on the torque of one loop; and to first order where the film is fast."""
+    scene = scene_of_all(campaign(1))
+    effect, points, middle = BY_SLUG["squeeze_film"], scene.points, scene.laws.frame.reference_velocity
+    looping = points.loop >= 0
+    carried = scene.viscous / points.velocity
+    slope = float(np.median((sheared * carried - scene.by_velocity + GAMMA * carried)[looping]))
+    time = 0.08  # of the film at mid speed and 5 bar [s]
+    change = effect.change(scene, time * slope, (0.0, thin, least, sheared, FILM, 0.0))
+    one = np.flatnonzero(points.loop == points.loop[looping][0])
+    v, step = points.velocity[one], 2 * np.pi / (one.size * points.angular_frequency[one][0])
+    at = step * np.arange(-1, one.size + 1)
+    course = CubicSpline(step * np.arange(one.size + 1), np.append(v, v[0]), bc_type="periodic")
+    period = step * one.size
+
+    def film(t: float, w: np.ndarray) -> np.ndarray:
+        return np.asarray((course(t % period) - w) * (np.maximum(w, 0.0) / middle + least) ** thin / time)
+
+    told = solve_ivp(film, (0.0, 2 * period), [v[0]], t_eval=period + at[1:-1], rtol=1e-8, atol=1e-10, method="LSODA")
+    w, dry = told.y[0], scene.parameters[one] * np.array([1.0, 1.0, 1.0, 0.0])
+    expected = curve(w, dry) - curve(v, dry) + scene.viscous[one] * ((v / w) ** sheared - 1.0)
+    moving = v > 0.05 * v.max()
+    np.testing.assert_allclose(change[one][moving], expected[moving], atol=0.02 * np.abs(expected[moving]).max())
+    by_powers = effect.change(scene, time * slope, (0.0, thin, least, sheared, FIRST_ORDER, 0.0))[one]
+    assert np.abs(by_powers - expected)[moving].max() > 0.1 * np.abs(expected[moving]).max()  # the control

@@ -1,0 +1,83 @@
+"""Effects that the baseline swallows are found where they are, and what stands beside the best is not nothing."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from models.diagnosis import searching, verdict
+from models.diagnosis.catalogue import BY_SLUG, CATALOGUE
+from models.diagnosis.fitting import _inside
+from models.diagnosis.refitting import Hypothesis
+from models.diagnosis.searching import hypotheses_of
+from models.diagnosis.selection import columns_of
+from models.diagnosis.viewing import view_of
+from tests.models.diagnosis.campaigns import campaign
+from tests.models.diagnosis.fitted import Study, study
+
+CYCLES, ZEROS = [0.0, 1000.0, 3000.0, 6000.0, 10000.0, 15000.0], [0.0, -2.5, -3.2, -4.4, -4.6, -5.5]
+
+
+@pytest.fixture(scope="module")
+def wandering() -> Study:
+    """A zero that wanders off by 5.5 Nm: eleven deviations of its prior, and most of it looks like eq. 6."""
+    return study(campaign(5, lambda at: np.full_like(at.velocity, np.interp(at.cycles, CYCLES, ZEROS))))
+
+
+def found(given: Study, slug: str) -> Hypothesis:
+    known = given.baseline
+    columns = columns_of(list(CATALOGUE), [effect.grid(given.design.facts) for effect in CATALOGUE])
+    view = view_of(given.design, known.noise, known.priors, known.fit, columns)
+    _, hypotheses = hypotheses_of(given.design, known.noise, known.priors, known.start, known.fit, view, ())
+    return next(each for each in hypotheses if each.slugs == (slug,))
+
+
+def test_a_zero_that_the_baseline_swallowed_is_found_from_laws_that_nothing_bent(
+    wandering: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    several = found(wandering, "torque_zero_shift")
+    assert several.fit is not None
+    assert several.fit.effects[0].amplitude < 0.0
+    monkeypatch.setattr(searching, "RESTARTED", 0)
+    once = found(wandering, "torque_zero_shift")
+    assert several.evidence > once.evidence + 100.0
+
+
+def test_a_shape_at_its_bound_is_held_while_the_rest_moves(wandering: Study) -> None:
+    """The step solves the equations of what may move, not those of all with one entry struck out."""
+    known = wandering.baseline
+    effect = BY_SLUG["hydrodynamic_drag"]
+    at_bound = wandering.extended((effect.slug, 0.5, (0.5, 0.0, 1.0, 1.0)))
+    state = replace(at_bound, effects=(replace(at_bound.effects[0], shape=(0.5, 0.0, 1.0, 1.0)),))
+    size = int(known.priors.free.sum()) + 2
+    root = np.random.default_rng(2).standard_normal((2 * size, size))
+    matrix, gradient = root.T @ root, root.T @ np.ones(2 * size)
+    free = np.linalg.solve(matrix, gradient)
+    gradient -= matrix[:, -1] * (free[-1] + 1.0)  # now the power would go down, beyond its bound
+    step = _inside(state, known.priors, matrix, gradient)
+    assert step[-1] == 0.0
+    np.testing.assert_allclose(matrix[:-1, :-1] @ step[:-1], gradient[:-1], rtol=1e-8, atol=1e-8)
+
+
+def candidate(*slugs: str, evidence: float) -> Hypothesis:
+    return Hypothesis(effects=tuple(BY_SLUG[slug] for slug in slugs), evidence=evidence, drop=20.0, fit=None)
+
+
+def standing(*given: Hypothesis) -> set[tuple[str, ...]]:
+    singles = [each for each in given if len(each.effects) == 1]
+    closes = SimpleNamespace(closed=True, excess=-1.0)
+    stood = verdict._standing(given[0], list(given), singles, lambda _: 0.0, lambda _: closes)  # type: ignore[arg-type]
+    return {each.slugs for each in stood}
+
+
+def test_what_is_no_better_than_nothing_does_not_stand_beside_the_best() -> None:
+    best, close = candidate("oil_change", evidence=3.5), candidate("running_in", evidence=0.2)
+    assert standing(best, close, candidate("inertia_torque", evidence=-0.1)) == {("oil_change",), ("running_in",)}
+
+
+def test_pairs_must_be_closer_than_single_effects_to_stand_beside_the_best() -> None:
+    assert len(standing(candidate("oil_change", evidence=30.0), candidate("running_in", evidence=26.5))) == 2
+    pair, rival = ("oil_change", "inertia_torque"), ("oil_change", "squeeze_film")
+    assert len(standing(candidate(*pair, evidence=60.0), candidate(*rival, evidence=56.5))) == 1
+    assert len(standing(candidate(*pair, evidence=60.0), candidate(*rival, evidence=57.5))) == 2
