@@ -39,18 +39,19 @@ class Prediction:
 
     def jacobian(self, design: Design) -> FloatArray:
         """∂torque/∂θ [N, θ.size]."""
-        scene, laws = self.scene, self.scene.laws
-        points = scene.points
-        _, slopes, by_decay = laws.with_gradient(points.pressure, points.cycles)
-        columns = np.zeros((points.run.size, laws.theta.size))
-        columns[:, :LOG_DECAY] = (scene.gradient[:, :, None] * slopes).reshape(points.run.size, 4 * BLOCK)
-        columns[:, LOG_DECAY] = scene.gradient[:, RATIO] * by_decay
-        columns = self._lagged(design, columns)
+        laws, rows = self.scene.laws, design.rows
+        by_parameters = self.change_at_rows(design, self.scene.gradient, before_lag=True)
+        # a loop has one pressure and one state: how the parameters go with θ is the same at its rows as at its points
+        _, slopes, by_decay = laws.with_gradient(rows.pressure, rows.cycles)
+        columns = np.zeros((rows.run.size, laws.theta.size))
+        columns[:, :LOG_DECAY] = (by_parameters[:, :, None] * slopes).reshape(-1, 4 * BLOCK)
+        columns[:, LOG_DECAY] = by_parameters[:, RATIO] * by_decay
         if self.lag is not None:
-            _, weights = _log_attractor(design, laws)
-            slowness = self.lag.by_log_attractor[:, :, None] * weights[:, None, :]
-            columns[design.plateaus :, DRIFT:] = slowness.reshape(-1, weights.shape[1])
-        return design.to_rows(columns)
+            slowness = design.to_rows(np.append(np.zeros(design.plateaus), self.lag.by_log_attractor))
+            looping = slice(design.plateaus, None)
+            weights = laws.log_attractor(rows.pressure[looping], rows.cycles[looping])[1]
+            columns[looping, DRIFT:] = slowness[looping, None] * weights
+        return columns
 
 
 def frame_of(design: Design) -> Frame:

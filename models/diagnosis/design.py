@@ -16,6 +16,7 @@ from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, StationaryRun
 from models.diagnosis.facts import Facts, facts_of
 from models.diagnosis.loop_bins import BINS, PHASES, BinnedLoop, binned_loops
+from models.diagnosis.sample_memory import bins_remember
 from models.runs import pressure_levels
 
 #: Time on one plateau [s] where nothing else is known (the reference's section 2.3.3).
@@ -75,7 +76,8 @@ class Design:
     torque [N] Nm (folded), `samples` [N] averaged in each row, `torque_sd` [N] Nm as sent (NaN where not), `level` [N]
     Pa the pressure level, `curve` [N] an index that run and level share, `bins` [N - plateaus] which bin of the flat
     (loop, bin) order each loop row is, `chains` [b, n] rows that follow each other in a run or loop, those of one length
-    together, `notes` what was left out."""
+    together, `bins_remember` the correlations of neighbouring bins, and of those next but one, that the loops' samples tell
+    (None: they do not), `notes` what was left out."""
 
     points: Points
     rows: Points
@@ -88,6 +90,7 @@ class Design:
     chains: tuple[IntArray, ...]
     plateaus: int
     loops: int
+    bins_remember: tuple[float, float] | None
     runs: tuple[RunInfo, ...]
     facts: Facts
     notes: tuple[str, ...]
@@ -170,6 +173,7 @@ def _assembled(
         chains=_chains(rows),
         plateaus=plateaus,
         loops=len(loops),
+        bins_remember=bins_remember([loop.memory for loop in loops]),
         runs=tuple(runs),
         facts=facts_of(campaign),
         notes=notes,

@@ -6,7 +6,7 @@ constant, an exponent) bend. Amplitude 0 is no effect. Adding an effect is addin
 `catalogue.py`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TypeAlias
@@ -86,6 +86,7 @@ class Effect:
     which friction in loops then lags behind, or the measured torque itself; None where nobody knows and the last shape
     says (1 or 0).
     bends: along what its form is uncertain (`models.diagnosis.bending`); an exact law has none.
+    several(scene, settings) -> [P, m] Nm is the same for many (amplitude, shape) at once, where that is cheaper.
     tails: degrees of freedom of the amplitude's prior (`models.diagnosis.amplitude`), infinite for a normal one.
     tests: what parts it from its neighbours, slug -> a test in words ("baseline": from none).
     """
@@ -110,16 +111,23 @@ class Effect:
     bends: tuple[Bend, ...]
     tests: dict[str, str]
     tails: float = 2.0
+    several: Callable[[Scene, Sequence[tuple[float, Shape]]], FloatArray] | None = None
+
+    def changes(self, scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:
+        """The changes [P, m] Nm of several (amplitude, shape)."""
+        if self.several is not None:
+            return self.several(scene, settings)
+        return np.stack([self.change(scene, amplitude, shape) for amplitude, shape in settings], axis=1)
 
     def lags(self, shape: Shape) -> bool:
         """Whether friction in loops lags behind what the effect changes."""
         return shape[-1] > 0.5 if self.before_lag is None else self.before_lag
 
 
-def unit_change(effect: Effect, scene: Scene, shape: Shape) -> FloatArray:
-    """The change [P] Nm of a small amplitude, per unit: the column that a linear screen works with."""
+def unit_changes(effect: Effect, scene: Scene, shapes: Sequence[Shape]) -> FloatArray:
+    """The changes [P, m] Nm of a small amplitude, per unit: the columns that a linear screen works with."""
     step = 1e-3 * effect.prior_sd
-    return effect.change(scene, step, shape) / step
+    return effect.changes(scene, [(step, shape) for shape in shapes]) / step
 
 
 def untried(_facts: Facts) -> tuple[Tried, ...]:

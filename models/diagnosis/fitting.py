@@ -215,21 +215,19 @@ def effect_precisions(fitted: Fitted) -> FloatArray:
 
 def effect_columns(design: Design, prediction: Prediction, fitted: Fitted) -> FloatArray:
     """∂change/∂(amplitude, smooth shapes) [N, 1 + s] at the rows, by central differences."""
-    effect, columns = fitted.effect, []
-    step = 1e-3 * effect.prior_sd
-    for delta_a, index in [(step, None), *((0.0, i) for i, shape in enumerate(effect.shapes) if shape.smooth)]:
-        ends, width = [], 0.0
-        for side in (1.0, -1.0):
-            shape = list(fitted.shape)
-            if index is not None:
-                delta = 1e-3 * (effect.shapes[index].highest - effect.shapes[index].lowest)
-                shape[index] += side * delta
-                width += delta
-            else:
-                width += delta_a
-            ends.append(effect.change(prediction.scene, fitted.amplitude + side * delta_a, tuple(shape)))
-        columns.append((ends[0] - ends[1]) / width)
-    return prediction.change_at_rows(design, np.stack(columns, axis=1), before_lag=effect.lags(fitted.shape))
+    effect, ends = fitted.effect, list[tuple[float, Shape]]()
+    deltas = [1e-3 * effect.prior_sd]
+    ends += [(fitted.amplitude + side * deltas[0], fitted.shape) for side in (1.0, -1.0)]
+    for index, known in enumerate(effect.shapes):
+        if known.smooth:
+            deltas.append(1e-3 * (known.highest - known.lowest))
+            for side in (1.0, -1.0):
+                shape = list(fitted.shape)
+                shape[index] += side * deltas[-1]
+                ends.append((fitted.amplitude, tuple(shape)))
+    changes = effect.changes(prediction.scene, ends)
+    columns = (changes[:, ::2] - changes[:, 1::2]) / (2 * np.array(deltas))
+    return prediction.change_at_rows(design, columns, before_lag=effect.lags(fitted.shape))
 
 
 def _moved(state: Fit, priors: Priors, step: FloatArray) -> tuple[Laws, tuple[Fitted, ...]] | None:

@@ -8,7 +8,8 @@ from scipy.ndimage import median_filter
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
-from models.periods import SPEED_HARMONICS, Cycle, fit_cycle, harmonics, inliers
+from models.diagnosis.sample_memory import Memory, memory_of
+from models.periods import SPEED_HARMONICS, Cycle, fit_cycle, harmonics, inliers, sample_interval
 from models.runs import Record
 from models.standing import pressure_stretches
 
@@ -34,7 +35,7 @@ _AS_BEFORE = 1.3
 class BinnedLoop:
     """One pressure of a dynamic test [Pa]. At PHASES phases: phase [rad], velocity [m/s] >= 0, acceleration [m/s²],
     clock [s]. In BINS bins: torque [Nm] (folded) and how many samples it is the mean of, 0 where the bin is not used.
-    temperature [K], NaN where not measured; angular_frequency [rad/s]; sign ±1."""
+    temperature [K], NaN where not measured; angular_frequency [rad/s]; sign ±1. `memory` of its samples, where known."""
 
     pressure: float
     sign: float
@@ -46,6 +47,7 @@ class BinnedLoop:
     clock: FloatArray
     torque: FloatArray
     samples: FloatArray
+    memory: Memory | None
 
 
 def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], list[str]]:
@@ -115,12 +117,16 @@ def _binned(
         return "the speed changes sign; the loop was left out."
     inside = (time >= time[0] + START / cycle.frequency) & (time < cycle.stop)
     inside[inside] = inliers(torque[inside] - median_filter(torque[inside], size=5, mode="nearest"), torque[inside])
-    number = np.floor(np.mod(cycle.phase(time[inside]), 2 * math.pi) * (BINS / (2 * math.pi))).astype(np.intp) % BINS
+    turned = np.mod(cycle.phase(time), 2 * math.pi)
+    number = np.floor(turned[inside] * (BINS / (2 * math.pi))).astype(np.intp) % BINS
     count = np.bincount(number, minlength=BINS).astype(np.float64)
     count[fitted.reshape(BINS, -1).min(axis=1) < LEAST_SPEED * fastest] = 0.0
     if np.count_nonzero(count) < FEWEST_BINS:
         return "too few samples lie in whole periods."
     angular = 2 * math.pi * cycle.frequency
+    used = inside.copy()
+    used[inside] = count[number] > 0
+    to_a_bin = 1.0 / (max(sample_interval(time), 1e-9) * cycle.frequency * BINS)
     first = math.ceil((cycle.start - cycle.origin) * cycle.frequency)
     return BinnedLoop(
         pressure=pressure,
@@ -133,4 +139,5 @@ def _binned(
         clock=np.asarray(cycle.origin + (phase / (2 * math.pi) + first) / cycle.frequency - begin, dtype=np.float64),
         torque=np.bincount(number, weights=torque[inside], minlength=BINS) / np.maximum(count, 1.0),
         samples=count,
+        memory=memory_of(torque, turned, used, to_a_bin),
     )

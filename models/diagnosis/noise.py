@@ -35,6 +35,10 @@ _SHARES = (0.15, 0.3, 0.5, 0.75, 1.0)
 #: What a correlation must gain [nats] to be believed, and a power of the swell of slow noise by which it is held back: what
 #: is slow was taken off with everything smooth, so the data say little about it.
 _PRICE, _SWELL = 2.0, 2.0
+#: ... the price where samples tell of it.
+_PRICE_TOLD = 5.0
+#: A spectrum is nowhere negative: w ρ is at most (1 + ρ)/2, and stays below.
+_HALF = 0.49
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,7 +73,8 @@ def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, bef
             continue
         variance = _variance(pieces, residual, torque, design.samples)
         deviation[part] = np.sqrt(variance[part])
-        correlation, scale = _correlation(pieces, residual, np.sqrt(variance))
+        told = design.bins_remember if not part[0] else None
+        correlation, scale = _correlation(pieces, residual, np.sqrt(variance), told)
         deviation[part] *= scale
         correlations.append(correlation)
     spiky = np.abs(residual) > _SPIKE * deviation
@@ -139,22 +144,28 @@ def _variance(pieces: list[_Piece], residual: FloatArray, torque: FloatArray, sa
     return np.asarray(np.maximum(found[0] + found[1] * torque**2 / level, 1e-4 * usual) / samples, dtype=np.float64)
 
 
-def _correlation(pieces: list[_Piece], residual: FloatArray, deviation: FloatArray) -> tuple[Correlation, float]:
+def _correlation(
+    pieces: list[_Piece], residual: FloatArray, deviation: FloatArray, told: tuple[float, float] | None
+) -> tuple[Correlation, float]:
     """(w, ρ) by restricted likelihood, averaged over a grid, and the factor by which the deviations are off.
 
     w ρ and w ρ², the correlations of the first and second neighbour, are averaged: a likelihood that is flat along a ridge
-    must not choose its end.
+    must not choose its end. Where samples have `told` of both, that is believed unless the bins contradict.
     """
     groups: dict[int, tuple[FloatArray, list[FloatArray]]] = {}
     for piece in pieces:
         left = piece.contrasts @ (piece.contrasts.T @ residual[piece.rows]) / deviation[piece.rows]
         groups.setdefault(id(piece.contrasts), (piece.contrasts, []))[1].append(np.clip(left, -_SPIKE, _SPIKE))
     tried = [Correlation(), *(Correlation(share=w, step=r) for w in _SHARES for r in _STEPS)]
+    usual, price = (Correlation(), _PRICE) if told is None else (_by_neighbours(*told), _PRICE_TOLD)
+    if told is not None:
+        tried = [usual, *tried]
     few = len(groups) > 40  # loops whose bins all differ: their correlation is not looked for
     logs, scales = [], []
     for correlation in tried[: 1 if few else None]:
         likelihood, scale = _restricted(correlation, groups)
-        logs.append(likelihood - (_PRICE if correlation.step else 0.0) - _SWELL * np.log(_swell(correlation)))
+        slower = abs(float(np.log(_swell(correlation) / _swell(usual))))
+        logs.append(likelihood - (0.0 if correlation is tried[0] else price) - _SWELL * slower)
         scales.append(scale)
     weights = np.exp(np.array(logs) - max(logs))
     weights /= weights.sum()
@@ -162,9 +173,15 @@ def _correlation(pieces: list[_Piece], residual: FloatArray, deviation: FloatArr
     first = np.array([each.share for each in tried[: weights.size]]) * steps
     scale = float(np.sqrt(weights @ np.array(scales)))
     one, two = float(weights @ first), float(weights @ (first * steps))
+    return _by_neighbours(one, two), scale
+
+
+def _by_neighbours(one: float, two: float) -> Correlation:
+    """With these correlations of the first and the second neighbour, as far as there is such a process."""
     if one < _LEAST_CORRELATION:
-        return Correlation(), scale
-    return Correlation(share=min(one * one / two, 1.0), step=two / one), scale
+        return Correlation()
+    step = max(two, 1e-3 * one) / one
+    return Correlation(share=min(one / step, _HALF * (1.0 + step) / step), step=step)
 
 
 def _restricted(

@@ -10,14 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.diagnosis.design import Design
-from models.diagnosis.effect import unit_change
 from models.diagnosis.fitting import Fit, Fitted, Priors, fit
 from models.diagnosis.laws import Laws
-from models.diagnosis.projection import GAINS, Projected, change_columns, gram_of, project
+from models.diagnosis.projection import GAINS, Projected, gram_of, project
 from models.diagnosis.raw import RawEvidence
 from models.diagnosis.refitting import MOST_STEPS, STEPS, Hypothesis, Null, at_gain, finite, null_of, refitted
 from models.diagnosis.selection import Column, Screened, linear_drop, screen, screen_pairs
-from models.diagnosis.viewing import View
+from models.diagnosis.viewing import View, columns_at_rows
 from models.diagnosis.whitening import Noise
 
 #: So many single effects and pairs of the linear screens are refitted at most.
@@ -194,7 +193,5 @@ class _Search:
 
 def beside(design: Design, noise: Noise, priors: Priors, fitted: Fit, columns: list[Column]) -> Projected:
     """The catalogue's columns projected off a fit with its effects, at the noise's scatter of the gains."""
-    scene = fitted.prediction.scene
-    changes = [(unit_change(each.effect, scene, each.shape), each.effect.lags(each.shape)) for each in columns]
-    gram = gram_of(design, noise, priors, fitted, change_columns(design, fitted.prediction, changes))
+    gram = gram_of(design, noise, priors, fitted, columns_at_rows(design, fitted.prediction, columns))
     return project(gram, noise.run_gain)

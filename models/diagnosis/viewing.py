@@ -1,14 +1,16 @@
 """A fit and everything projected off it: the catalogue's changes, the smooth contrasts, blocks of the fit's own effects."""
 
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 
 from models.arrays import FloatArray
+from models.diagnosis.baseline import Prediction
 from models.diagnosis.bending import bends
 from models.diagnosis.contrasts import Contrasts, contrasts_of
 from models.diagnosis.design import Design
-from models.diagnosis.effect import unit_change
+from models.diagnosis.effect import unit_changes
 from models.diagnosis.fitting import Fit, Priors, effect_columns
 from models.diagnosis.projection import GAINS, Gram, Projected, change_columns, gram_of, project
 from models.diagnosis.selection import Column
@@ -49,12 +51,7 @@ class View:
 
 def view_of(design: Design, noise: Noise, priors: Priors, fitted: Fit, columns: list[Column]) -> View:
     """Project the catalogue's columns, the contrasts and the effects' blocks off a fit."""
-    scene = fitted.prediction.scene
-    changes = change_columns(
-        design,
-        fitted.prediction,
-        [(unit_change(each.effect, scene, each.shape), each.effect.lags(each.shape)) for each in columns],
-    )
+    changes = columns_at_rows(design, fitted.prediction, columns)
     contrasts = contrasts_of(design, fitted.prediction)
     blocks = blocks_of(design, fitted)
     gram = gram_of(design, noise, priors, fitted, np.column_stack([changes, contrasts.columns, blocks]), held=False)
@@ -66,6 +63,16 @@ def view_of(design: Design, noise: Noise, priors: Priors, fitted: Fit, columns: 
         gram=gram,
         projections=[project(gram, float(gain)) for gain in GAINS],
     )
+
+
+def columns_at_rows(design: Design, prediction: Prediction, columns: list[Column]) -> FloatArray:
+    """The changes [N, m] of small amplitudes, per unit, at the rows."""
+    changes = list[tuple[FloatArray, bool]]()
+    for _, alike in groupby(columns, key=lambda each: each.effect.slug):
+        mine = list(alike)
+        told = unit_changes(mine[0].effect, prediction.scene, [each.shape for each in mine])
+        changes += [(told[:, i], each.effect.lags(each.shape)) for i, each in enumerate(mine)]
+    return change_columns(design, prediction, changes)
 
 
 def blocks_of(design: Design, fitted: Fit) -> FloatArray:

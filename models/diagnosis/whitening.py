@@ -19,7 +19,8 @@ from models.diagnosis.design import Design, IntArray
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Correlation:
-    """Of neighbouring rows: `share` w [0, 1] of the variance is correlated, by `step` ρ [0, 1) a row."""
+    """Of a row with the k-th after it, w ρ^k: a `share` w up to 1 is how much of the variance remembers, by `step` ρ [0, 1)
+    a row; beyond, as far as a spectrum allows, neighbours have much in common and others nothing."""
 
     share: float = 0.0
     step: float = 0.0

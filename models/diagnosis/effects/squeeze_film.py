@@ -1,12 +1,14 @@
 """The oil film needs time to be squeezed out and drawn in: more torque while accelerating, less while decelerating."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
 from models.diagnosis.facts import Facts
-from models.diagnosis.laws import Scene, curve
+from models.diagnosis.laws import Scene
 from models.stribeck import GAMMA
 
 #: Pressure to which the amplitude refers [Pa].
@@ -31,49 +33,61 @@ def _grid(_facts: Facts) -> tuple[Tried, ...]:
 
 
 def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
-    power, thin, least, sheared, form, _ = shape
+    return _changes(scene, [(amplitude, shape)])[:, 0]
+
+
+def _changes(scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:
     points = scene.points
     speed = points.velocity / scene.laws.frame.reference_velocity
-    strength = amplitude * (points.pressure / REFERENCE_PRESSURE) ** power
-    if form == FIRST_ORDER:
-        return np.asarray(strength * points.acceleration / (speed + least) ** thin, dtype=np.float64)
-    out = np.zeros(points.velocity.size)
+    out = np.zeros((speed.size, len(settings)))
     looping = np.flatnonzero(points.loop >= 0)
-    carried = scene.viscous / points.velocity
-    slope = (
-        float(np.median((sheared * carried - scene.by_velocity + GAMMA * carried)[looping])) if looping.size else 0.0
-    )
-    if not (slope > 0 and amplitude > 0):
-        return out
-    time = strength / slope  # of the film in mid speed [s]
-    out[looping] = _over_film(scene, looping, time, thin, least, sheared)
+    films = [
+        i for i, (amplitude, shape) in enumerate(settings) if shape[4] == FILM and amplitude > 0.0 and looping.size
+    ]
+    for i, (amplitude, (power, thin, least, _, form, _)) in enumerate(settings):
+        if form == FIRST_ORDER:
+            strength = amplitude * (points.pressure / REFERENCE_PRESSURE) ** power
+            out[:, i] = strength * points.acceleration / (speed + least) ** thin
+    if films:
+        amplitudes, shapes = np.array([settings[i][0] for i in films]), np.array([settings[i][1] for i in films])
+        out[looping[:, None], films] = _over_film(scene, looping, amplitudes, shapes.T)
     return out
 
 
-def _over_film(
-    scene: Scene, looping: NDArray[np.intp], time: FloatArray, thin: float, least: float, sheared: float
-) -> FloatArray:
-    """Loops: w is the speed to which the present film belongs, ẇ = (v - w) (w/v_0 + f)^y/τ, a step from phase to phase
-    exact for a film whose time and a speed whose slope stay; asperities follow w, shear grows as the film thins."""
+def _over_film(scene: Scene, looping: NDArray[np.intp], amplitude: FloatArray, shapes: FloatArray) -> FloatArray:
+    """Loops' points [n] by films [m]: w is the speed to which the present film belongs, ẇ = (v - w)(w/v_0 + f)^y/τ, a
+    step from phase to phase exact for a film whose time and a speed whose slope stay; asperities follow w, shear grows as
+    the film thins."""
     points, middle = scene.points, scene.laws.frame.reference_velocity
+    power, thin, least, sheared = shapes[:4]
+    carried = (scene.viscous / points.velocity)[looping]
+    falling = scene.by_velocity[looping] - GAMMA * carried
+    slope = np.array([float(np.median(share * carried - falling)) for share in sheared])
+    real = slope > 0
     phases = np.flatnonzero(np.diff(points.loop[looping], append=-2))[0] + 1
-    v = points.velocity[looping].reshape(-1, phases)
-    step = 2 * np.pi / (phases * points.angular_frequency[looping].reshape(-1, phases)[:, 0])
-    rate = step / np.maximum(time[looping].reshape(-1, phases)[:, 0], 1e-12)
-    before = np.roll(v, 1, axis=1)
-    film, now = np.empty_like(v), v[:, -round(_BEFORE * phases) - 1]
-    last = now
+    v = np.ascontiguousarray(points.velocity[looping].reshape(-1, phases).T)[:, :, None]
+    pressure = points.pressure[looping].reshape(-1, phases)[:, :1]
+    step = 2 * np.pi / (phases * points.angular_frequency[looping].reshape(-1, phases)[:, :1])
+    time = (
+        amplitude / np.where(real, slope, 1.0) * (pressure / REFERENCE_PRESSURE) ** power
+    )  # of the film, mid speed [s]
+    rate = step / np.maximum(time, 1e-12)
+    change = v - np.roll(v, 1, axis=0)
+    film = np.empty((phases, *rate.shape))
+    behind = np.zeros_like(rate)  # v - w
+    last = now = np.broadcast_to(v[-round(_BEFORE * phases) - 1], rate.shape)
     for k in range(-round(_BEFORE * phases), phases):
-        halfway = 1.5 * now - 0.5 * last
-        steps = rate * (np.maximum(halfway, 0.0) / middle + least) ** thin
+        steps = rate * (np.maximum(1.5 * now - 0.5 * last, 0.0) / middle + least) ** thin
         keep = np.exp(-steps)
-        last, now = now, v[:, k] + (now - before[:, k]) * keep - (v[:, k] - before[:, k]) * (1 - keep) / steps
-        film[:, k] = now
-    speed = v.ravel()
-    w = np.maximum(film.ravel(), 1e-3 * speed)
-    dry = scene.parameters[looping] * np.array([1.0, 1.0, 1.0, 0.0])
+        behind = behind * keep + change[k] * (1 - keep) / steps
+        last, now = now, v[k] - behind
+        film[k] = now
+    speed = points.velocity[looping][:, None]
+    w = np.maximum(film.transpose(1, 0, 2).reshape(looping.size, -1), 1e-3 * speed)
+    m_s, m_c, v_s, _ = scene.parameters[looping].T[:, :, None]
+    dry = m_s * (m_c - 1.0) * (np.exp(-np.minimum(v_s / w, 700.0)) - scene.decay[looping, None])
     thinner = np.expm1(np.clip(sheared * np.log(speed / w), -3.0, 3.0))
-    return np.asarray(curve(w, dry) - curve(speed, dry) + scene.viscous[looping] * thinner, dtype=np.float64)
+    return np.asarray(np.where(real, dry + scene.viscous[looping, None] * thinner, 0.0), dtype=np.float64)
 
 
 EFFECT = Effect(
@@ -102,6 +116,7 @@ EFFECT = Effect(
     ),
     grid=_grid,
     change=_change,
+    several=_changes,
     before_lag=None,
     bends=(Bend.SPEED,),
     tests={
