@@ -1,30 +1,24 @@
 """Is there anything beyond noise? The largest projected likelihood ratios against what chance makes of them.
 
 Statistics: the largest over the catalogue's changes and their shape grids, the largest over the smooth contrasts, and the
-highest line of a periodogram over the tests' clock. The first two are maxima of correlated standard normals, whose
-distribution is simulated and followed into its tail by the number of independent tests that would give the same; the
-third is a sum of exponentials. Each has its part of a total of about 1 % of false alarms.
+highest line of a periodogram over the tests' clock (`models.diagnosis.periodogram`). The first two are maxima of correlated
+standard normals, whose distribution is simulated and followed into its tail by the number of independent tests that would
+give the same. Each has its part of a total of about 1 % of false alarms.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
 from scipy.special import ndtr, ndtri
-from scipy.stats import gamma
 
 from models.arrays import FloatArray
-from models.diagnosis.design import Design
 from models.diagnosis.projection import Projected
-from models.diagnosis.whitening import Noise, whitened
 
 #: False alarms allowed to each statistic.
-EFFECTS_SHARE, CONTRASTS_SHARE, LINES_SHARE = 0.006, 0.0025, 0.001
+EFFECTS_SHARE, CONTRASTS_SHARE = 0.006, 0.0025
 #: Less than this share of a change is nothing visible. Amplitudes have units of their own: no two changes are compared.
 VISIBLE = 1e-6
 _DRAWS = 400
-#: The periodogram's steps are half a cycle a test: it starts at two cycles, and a neighbourhood is so many steps.
-_FIRST_LINE, _NEIGHBOURS = 4, 61
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,38 +88,3 @@ def _independent_tests(projected: Projected, columns: slice, rng: np.random.Gene
     tails = 2 * ndtr(-np.quantile(draws, quantiles))
     counts = np.log(quantiles) / np.log1p(-tails)
     return float(np.clip(counts.mean(), 1.0, keep.sum()))
-
-
-def lines(design: Design, noise: Noise, residual: FloatArray) -> tuple[Lead, float]:
-    """The highest line over the tests' clock, summed over the runs, and its period [plateaus]."""
-    nothing = Lead(value=0.0, threshold=np.inf, p_value=1.0, index=-1), 0.0
-    if design.plateaus < 64:
-        return nothing
-    white = whitened(np.column_stack([residual, design.torque]), design, noise)[: design.plateaus]
-    runs = []
-    for run in np.unique(design.rows.run[: design.plateaus]):
-        left, along = white[design.rows.run[: design.plateaus] == run].T
-        runs.append(left - along * float(along @ left) / max(float(along @ along), 1e-300))  # without the run's gain
-    length = max(run.size for run in runs)
-    kept = [run for run in runs if run.size > 0.5 * length]
-    if length < 32:
-        return nothing
-    frequencies = np.arange(_FIRST_LINE, length) / (2.0 * length)
-    power = np.zeros(frequencies.size)
-    for run in kept:
-        waves = np.abs(np.fft.rfft(run, 2 * length)) ** 2 / max(float(run.size), 1.0)
-        power += waves[_FIRST_LINE:length]
-    # a line stands out of its neighbourhood: noise that remembers otherwise than was thought does not
-    middle = float(gamma.ppf(0.5, len(kept)))
-    power /= np.maximum(median_filter(power, size=_NEIGHBOURS, mode="nearest") / middle, 1.0)
-    index = int(np.argmax(power))
-    tail = float(gamma.logsf(power[index], len(kept)))
-    tests = 1.5 * frequencies.size
-    threshold = float(gamma.isf(LINES_SHARE / tests, len(kept)))
-    found = Lead(
-        value=max(float(power[index]) - middle, 0.0),
-        threshold=threshold - middle,
-        p_value=float(min(1.0, tests * np.exp(tail))),
-        index=index,
-    )
-    return found, 1.0 / float(frequencies[index])

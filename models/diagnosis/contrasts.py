@@ -20,6 +20,9 @@ SPEED, PRESSURE, CYCLES = "speed_rpm", "pressure_bar", "cycles"
 TEMPERATURE, CLOCK, PHASE = "oil_temperature_c", "test_clock_s", "loop_phase"
 TORQUE = "torque_nm"
 
+#: A sensor that is not straight may be so in many waves over its range.
+TORQUE_WAVES = 20
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contrasts:
@@ -69,7 +72,7 @@ def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
         add(CYCLES, here.astype(np.float64))
         for s in (1, 2):
             add(CYCLES, here * _cosine(s, speed) * steady)
-    for t in range(1, 5):
+    for t in range(1, TORQUE_WAVES + 1):
         add(TORQUE, _cosine(t, _unit(torque)))
     _add_clock(design, add, steady)
     if design.loops:

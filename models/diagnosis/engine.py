@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.diagnosis.alarm import CONTRASTS_SHARE, EFFECTS_SHARE, Lead, lead, lines
+from models.diagnosis.alarm import CONTRASTS_SHARE, EFFECTS_SHARE, Lead, lead
 from models.diagnosis.baseline import frame_of
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.catalogue import BY_SLUG, CATALOGUE
@@ -14,6 +14,7 @@ from models.diagnosis.fitting import Fit, Priors, fit, priors_of
 from models.diagnosis.laws import Laws
 from models.diagnosis.misfits import FIXED_LINE, axes_of
 from models.diagnosis.noise import estimate_noise, first_noise
+from models.diagnosis.periodogram import lines
 from models.diagnosis.raw import RawEvidence, raw_evidence
 from models.diagnosis.refitting import Hypothesis, finite
 from models.diagnosis.report import Report, Verdict
@@ -137,7 +138,7 @@ def alarms(design: Design, baseline: Baseline, view: View, rng: np.random.Genera
     return {
         "effects": lead(view.projections, view.effects, one_sided, EFFECTS_SHARE, rng),
         "contrasts": lead(view.projections, view.smooth, np.zeros(len(view.contrasts.axes)), CONTRASTS_SHARE, rng),
-        "lines": lines(design, baseline.noise, baseline.fit.residual)[0],
+        "lines": lines(design, baseline.noise, baseline.fit.residual),
     }
 
 

@@ -13,9 +13,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.special import logsumexp
 
-from models.diagnosis.alarm import lead, lines
+from models.diagnosis.alarm import lead
 from models.diagnosis.design import Design
 from models.diagnosis.fitting import Priors
+from models.diagnosis.periodogram import lines
 from models.diagnosis.refitting import Hypothesis, finite
 from models.diagnosis.report import Verdict
 from models.diagnosis.viewing import View, view_of
@@ -204,7 +205,7 @@ def close(design: Design, noise: Noise, priors: Priors, hypothesis: Hypothesis, 
     view = view_of(design, noise, priors, hypothesis.fit, [])
     left = lead(view.projections, view.smooth, np.zeros(len(view.contrasts.axes)), LEFT_SHARE, rng)
     parts = lead(view.projections, view.inside, np.zeros(view.blocks), PARTS_SHARE, rng)
-    line, _ = lines(design, noise, hypothesis.fit.residual)
+    line = lines(design, noise, hypothesis.fit.residual)
     statistics: dict[str, float] = {}
     for name, found in (("closure", left), ("parts", parts), ("left_lines", line)):
         statistics |= {f"{name}_value": found.value, f"{name}_p_value": found.p_value}

@@ -141,7 +141,7 @@ def weird(rng: np.random.Generator) -> list[Measurement]:
 
 
 @pytest.mark.parametrize(
-    ("tracker", "count"), [(Grid(), 150), (Particle(particles=200), 150), (Ukf(), 60)], ids=["grid", "particle", "ukf"]
+    ("tracker", "count"), [(Grid(), 150), (Particle(particles=200), 100), (Ukf(), 25)], ids=["grid", "particle", "ukf"]
 )
 def test_weird_lives_are_survived(tracker: Any, count: int) -> None:
     print("seed 501")

@@ -7,7 +7,7 @@ from models.diagnosis.baseline import frame_of, predict
 from models.diagnosis.campaign import Oil
 from models.diagnosis.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.design import build_design
-from models.diagnosis.effect import Effect, Kind, unit_change
+from models.diagnosis.effect import Effect, Kind, unit_changes
 from models.diagnosis.effects.torque_zero_shift import STRAIGHT
 from models.diagnosis.laws import Scene
 from models.diagnosis.starting import starting_laws
@@ -48,9 +48,10 @@ def test_the_catalogue_is_the_contracts() -> None:
 
 @pytest.mark.parametrize("effect", CATALOGUE, ids=SLUGS)
 def test_no_amplitude_no_change_and_all_changes_are_finite(effect: Effect, scene: Scene) -> None:
-    for tried in effect.grid(scene.facts):
+    grid = effect.grid(scene.facts)
+    columns = unit_changes(effect, scene, [tried.shape for tried in grid]).T if grid else np.zeros((0, 0))
+    for tried, column in zip(grid, columns, strict=True):
         assert np.abs(effect.change(scene, 0.0, tried.shape)).max() < 1e-9
-        column = unit_change(effect, scene, tried.shape)
         assert column.shape == scene.curve.shape
         assert np.isfinite(column).all()
         assert np.abs(column).max() > 0
