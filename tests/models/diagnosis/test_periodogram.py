@@ -1,4 +1,4 @@
-"""What swings with a test's clock is found where noise goes with torque, noise alone is not; a sensor's waves are as well."""
+"""What swings with a test's clock is found where noise goes with torque, noise alone is not; a sensor's waves too."""
 
 from dataclasses import replace
 
