@@ -24,13 +24,15 @@ from models.diagnosis.whitening import Noise
 
 #: Candidates this close [nats] to the best are not told from it (pairs, of which each half has evidence of its own, where
 #: they are closer), and this share of λ more.
-CLOSE, CLOSE_PAIRS, RIVAL = 4.0, 3.0, 0.005
+CLOSE, CLOSE_PAIRS, RIVAL = 4.6, 3.0, 0.005
 #: What a template may leave behind, as a share of λ; and what its amplitude may be worth more in parts of the data: parts
 #: that differ by δ cost about δ² λ/4.
 TOLERANCE, PARTS_TOLERANCE = 0.05, 0.15
 #: Structure without a name may have so much more evidence, as a share of λ beyond CLEAR nats: below, no template's error
 #: shows.
 GENERIC, CLEAR = 0.05, 20.0
+#: ... and so many nats more in any case: it is the best of some eight axes.
+AXES_PRICE = 2.0
 #: A cause is named where it has this many nats over nothing.
 OVER_NOTHING = 3.0
 #: Two effects at once must gain this much [nats].
@@ -101,7 +103,7 @@ def judge(
         probabilities = with_unmeasured(probabilities, unmeasured, best.evidence, slack)
         causes = tuple(dict.fromkeys(("oil_temperature", *causes)))
     elif (
-        best.evidence - price(best) < max(OVER_NOTHING, structure - GENERIC * max(best.drop - CLEAR, 0.0))
+        best.evidence - price(best) < max(OVER_NOTHING, structure - AXES_PRICE - GENERIC * max(best.drop - CLEAR, 0.0))
         or not standing
     ):
         doubt = doubted(best, tested(best))
@@ -257,7 +259,7 @@ def probabilities_of(
     def cooled(lead: float, differing: float) -> float:
         return lead / (1.0 + 0.5 * TOLERANCE * differing)
 
-    logs = [cooled(max(structure, 0.0) - value(best), best.drop)]
+    logs = [cooled(max(structure - AXES_PRICE, 0.0) - value(best), best.drop)]
     logs += [cooled(value(each) - value(best), unshared(best, each, singles)) for each in hypotheses]
     weights = np.exp(np.array(logs) - logsumexp(logs))
     found: dict[str, float] = {}
