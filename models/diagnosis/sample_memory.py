@@ -50,7 +50,8 @@ def memory_of(torque: FloatArray, phase: FloatArray, used: NDArray[np.bool_], to
         return None
     basis = np.column_stack([np.ones(int(used.sum())), harmonics(phase[used], HARMONICS)])
     left = np.zeros(torque.size)
-    left[used] = torque[used] - basis @ np.linalg.lstsq(basis, torque[used], rcond=None)[0]
+    known = np.linalg.solve(basis.T @ basis + 1e-9 * used.sum() * np.eye(basis.shape[1]), basis.T @ torque[used])
+    left[used] = torque[used] - basis @ known
     there = used.astype(np.float64)
     sums = [float(left[k:] @ left[: left.size - k]) for k in range(3)]
     counts = [float(there[k:] @ there[: there.size - k]) for k in range(3)]

@@ -26,8 +26,8 @@ MARGIN, MARGIN_SHARE = 9.0, 0.2
 #: So many of them are looked for from other shapes as well, and from other laws where so much [nats] of them would be there
 #: to be seen if the baseline did not take it up: so far off, nothing is linear.
 RESTARTED, SWALLOWED = 3, 1000.0
-#: Gauss-Newton steps after which starts are compared.
-ROUGH = 6
+#: Gauss-Newton steps after which starts are compared, and how many of them go on each time.
+ROUGH = ((3, 3), (3, 1))
 #: Pairs of the linear screen must promise this much [nats] over the best single.
 PAIR_PROMISE = -1.0
 #: A second effect is looked for beside so many of the best singles, so many of each are refitted, and each must promise
@@ -130,15 +130,19 @@ class _Search:
         starts = [(self.null.fit.laws, each) for each in screened.others]
         if self.swallowed(screened) > SWALLOWED:
             starts += [(self.start, each) for each in (screened, *screened.others)]
-        rough = [
-            (fit(self.design, self.noise, laws, self.priors, self.linear(each)[0], steps=ROUGH), each.shape_evidence)
-            for laws, each in starts
-        ]
-        if known.fit is not None:
-            rough.append((known.fit, known.shape_evidence))
-        if not rough:
+        racing = [(laws, self.linear(each)[0], each.shape_evidence) for laws, each in starts]
+        reached = [] if known.fit is None else [(known.fit, known.shape_evidence)]
+        for steps, left in ROUGH:
+            rough = [
+                (fit(self.design, self.noise, laws, self.priors, effects, steps=steps), shape_evidence)
+                for laws, effects, shape_evidence in racing
+            ]
+            rough.sort(key=lambda each: each[0].cost - each[1])
+            racing = [(each.laws, each.effects, shape_evidence) for each, shape_evidence in rough[:left]]
+        reached += rough[:1]
+        if not reached:
             return known
-        best, shape_evidence = min(rough, key=lambda each: each[0].cost - each[1])
+        best, shape_evidence = min(reached, key=lambda each: each[0].cost - each[1])
         return self.refitted(best.laws, best.effects, shape_evidence, (known.evidence, known.drop), MOST_STEPS)
 
     def swallowed(self, screened: Screened) -> float:
