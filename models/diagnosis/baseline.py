@@ -72,14 +72,9 @@ def predict(design: Design, laws: Laws) -> Prediction:
     at_points, lag = scene.curve, None
     if design.loops:
         start = design.plateaus
-        attractor = np.exp(_log_attractor(design, laws)[0])
-        frequency = design.points.angular_frequency[start::PHASES]
+        points, first = design.points, slice(start, None, PHASES)
+        attractor = np.exp(laws.log_attractor(points.pressure[first], points.cycles[first])[0])
+        frequency = points.angular_frequency[first]
         lag = lag_of(scene.curve[start:].reshape(design.loops, PHASES), attractor[:, None], frequency)
         at_points = np.concatenate([scene.curve[:start], lag.torque.ravel()])
     return Prediction(torque=design.to_rows(at_points), scene=scene, lag=lag)
-
-
-def _log_attractor(design: Design, laws: Laws) -> tuple[FloatArray, FloatArray]:
-    """log C [l] of the loops, and its derivatives [l, ...] by θ from DRIFT on."""
-    points, first = design.points, slice(design.plateaus, None, PHASES)
-    return laws.log_attractor(points.pressure[first], points.cycles[first])

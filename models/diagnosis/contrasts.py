@@ -1,7 +1,8 @@
 """Smooth contrasts: shapes of structure that any unknown cause might have, each on the axes on which it lives.
 
 They are relative to the predicted torque (structure in friction scales with it) and are products of cosines over the
-ranks of pressure, speed, life, clock and phase. Axes are public channel names, or `test_clock_s`, `cycles`, `loop_phase`.
+ranges of pressure, speed, clock and torque and over the rank of life, bumps in speed, waves over a loop's phase, and single
+states. Axes are public channel names, or `test_clock_s`, `cycles`, `loop_phase`.
 """
 
 from collections.abc import Callable

@@ -37,7 +37,7 @@ UNCONFIRMED = 1.6
 #: So many plateaus determine every curve: one start is enough.
 MANY_PLATEAUS = 8000
 #: A slow vibration leaves something in averages too: up to this share of its own evidence nothing else is named, and up
-#: to a larger one what has no name is taken for it.
+#: to a larger one structure without a name is taken for it.
 LEFT_BY_VIBRATION, LEFT_WITHOUT_NAME = 0.1, 0.5
 #: Torques [Nm] outside are no clutch's.
 LEAST_TORQUE, MOST_TORQUE = 1e-6, 1e7
@@ -162,8 +162,8 @@ def with_lines(judgement: Judgement, raw: tuple[RawEvidence, ...]) -> Judgement:
     known = [each for each in seen if _vibrates(each)]
     loudest = max((each.log_evidence for each in known), default=0.0)
     unnamed = judgement.verdict is Verdict.UNEXPLAINED_STRUCTURE
-    least_left = (LEFT_WITHOUT_NAME if unnamed else LEFT_BY_VIBRATION) * loudest
-    if 0.0 < judgement.statistics.get("lambda", 0.0) < least_left:
+    share = LEFT_WITHOUT_NAME if unnamed else LEFT_BY_VIBRATION
+    if 0.0 < max(judgement.statistics.get(name, 0.0) for name in ("lambda", "structure")) < share * loudest:
         judgement = Judgement(verdict=Verdict.MODEL_ADEQUATE, statistics=judgement.statistics)
     judgement = judgement.joined(tuple(each.effect for each in known))
     lined = any(each.effect == FIXED_LINE and each.log_evidence > LEAST_LINE for each in seen)

@@ -23,6 +23,7 @@ ALIKE_SD = 0.1
 _LARGEST_STEP = 1.5
 #: Columns [N, m] with noise and gains whitened.
 Whiten: TypeAlias = Callable[[FloatArray], FloatArray]
+_SMALL = 0.01  # nats: when the cost falls by less the fit has converged
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,9 +111,8 @@ def fit(
     effects: Sequence[Fitted] = (),
     *,
     steps: int = 30,
-    small: float = 0.01,
 ) -> Fit:
-    """Minimise half the whitened squares from a start, effects included, until the cost falls by less than `small` [nats].
+    """Minimise half the whitened squares from a start, effects included.
 
     Gains are taken along the measured torque: it changes little and keeps the metric fixed while a fit moves.
     """
@@ -143,7 +143,7 @@ def fit(
         if fallen <= 0:
             break
         state = candidate
-        if fallen < small:
+        if fallen < _SMALL:
             break
     return state
 

@@ -26,9 +26,8 @@ from models.diagnosis.whitening import Noise, gains_of, whitened, without_gains
 STATE_FOLDS, PRESSURE_FOLDS, FORWARD_SHARE = 3, 2, 1 / 3
 #: Rows left out weigh as if their noise were so many times what it is.
 _LEFT_OUT = 1e6
-#: Gauss-Newton steps from the fit to all rows, until the cost falls by less [nats]: enough to forget the rows that are held
-#: out.
-_STEPS, _SMALL = 12, 0.1
+#: Gauss-Newton steps from the fit to all rows: enough to forget the rows that are held out.
+_STEPS = 12
 _RESAMPLES = 400
 
 BoolArray = NDArray[np.bool_]
@@ -109,7 +108,7 @@ def _white(columns: FloatArray, design: Design, noise: Noise) -> FloatArray:
 def _foretold(design: Design, noise: Noise, priors: Priors, model: Fit, out: BoolArray) -> float:
     """The log score [nats] of rows that are held out, the uncertainty of what was fitted to the others included."""
     before = _without(noise, out)
-    found = fit(design, before, model.laws, priors, model.effects, steps=_STEPS, small=_SMALL)
+    found = fit(design, before, model.laws, priors, model.effects, steps=_STEPS)
     own = [effect_columns(design, found.prediction, each) for each in found.effects]
     jacobian = np.concatenate([found.prediction.jacobian(design)[:, priors.free], *own], axis=1)
     seen = _white(jacobian, design, before)
@@ -132,7 +131,7 @@ def _held(design: Design, noise: Noise, priors: Priors, baseline: Fit, extended:
     masked = _without(noise, out)
     missed = []
     for model in (baseline, extended):
-        found = fit(design, masked, model.laws, priors, model.effects, steps=_STEPS, small=_SMALL)
+        found = fit(design, masked, model.laws, priors, model.effects, steps=_STEPS)
         bridged = _bridged(found.laws, design, out)
         if bridged is not found.laws:
             found = fit(design, masked, bridged, priors, found.effects, steps=0)

@@ -8,8 +8,9 @@ from scipy.ndimage import median_filter
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
+from models.diagnosis.sample_memory import LEAST_SPEED as MEMORY_SPEED
 from models.diagnosis.sample_memory import Memory, memory_of
-from models.periods import SPEED_HARMONICS, Cycle, fit_cycle, harmonics, inliers, sample_interval
+from models.periods import SPEED_HARMONICS, Cycle, fit_cycle, harmonics, inliers
 from models.runs import Record
 from models.standing import pressure_stretches
 
@@ -124,10 +125,10 @@ def _binned(
     if np.count_nonzero(count) < FEWEST_BINS:
         return "too few samples lie in whole periods."
     angular = 2 * math.pi * cycle.frequency
-    used = inside.copy()
-    used[inside] = count[number] > 0
-    to_a_bin = 1.0 / (max(sample_interval(time), 1e-9) * cycle.frequency * BINS)
     first = math.ceil((cycle.start - cycle.origin) * cycle.frequency)
+    lasting = float(time[inside][-1] - time[inside][0])
+    to_a_bin = np.count_nonzero(inside) / (max(lasting * cycle.frequency, 0.1) * BINS)
+    used = inside & (cycle.value(turned) > MEMORY_SPEED * fastest)
     return BinnedLoop(
         pressure=pressure,
         sign=sign,

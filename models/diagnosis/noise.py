@@ -16,11 +16,10 @@ from numpy.polynomial.legendre import legvander
 from scipy.optimize import nnls
 
 from models.arrays import FloatArray
+from models.diagnosis.correlation import Correlation
 from models.diagnosis.design import Design
-from models.diagnosis.whitening import Correlation, Noise
+from models.diagnosis.whitening import Noise
 
-#: A correlation of neighbours below is none.
-_LEAST_CORRELATION = 0.02
 #: Where too little is left to estimate noise, so much of the torque is assumed.
 ASSUMED = 0.01
 #: Fewer free squares estimate nothing.
@@ -37,8 +36,6 @@ _SHARES = (0.15, 0.3, 0.5, 0.75, 1.0)
 _PRICE, _SWELL = 2.0, 2.0
 #: ... the price where samples tell of it.
 _PRICE_TOLD = 5.0
-#: A spectrum is nowhere negative: w ρ is at most (1 + ρ)/2, and stays below.
-_HALF = 0.49
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +70,7 @@ def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, bef
             continue
         variance = _variance(pieces, residual, torque, design.samples)
         deviation[part] = np.sqrt(variance[part])
-        told = design.bins_remember if not part[0] else None
+        told = design.bins_remember if part[-1] else None  # loops stand last
         correlation, scale = _correlation(pieces, residual, np.sqrt(variance), told)
         deviation[part] *= scale
         correlations.append(correlation)
@@ -157,15 +154,15 @@ def _correlation(
         left = piece.contrasts @ (piece.contrasts.T @ residual[piece.rows]) / deviation[piece.rows]
         groups.setdefault(id(piece.contrasts), (piece.contrasts, []))[1].append(np.clip(left, -_SPIKE, _SPIKE))
     tried = [Correlation(), *(Correlation(share=w, step=r) for w in _SHARES for r in _STEPS)]
-    usual, price = (Correlation(), _PRICE) if told is None else (_by_neighbours(*told), _PRICE_TOLD)
+    usual, price = (Correlation(), _PRICE) if told is None else (Correlation.of_neighbours(*told), _PRICE_TOLD)
     if told is not None:
         tried = [usual, *tried]
     few = len(groups) > 40  # loops whose bins all differ: their correlation is not looked for
     logs, scales = [], []
     for correlation in tried[: 1 if few else None]:
         likelihood, scale = _restricted(correlation, groups)
-        slower = abs(float(np.log(_swell(correlation) / _swell(usual))))
-        logs.append(likelihood - (0.0 if correlation is tried[0] else price) - _SWELL * slower)
+        off = abs(float(np.log(_swell(correlation) / _swell(usual))))
+        logs.append(likelihood - (0.0 if correlation is tried[0] else price) - _SWELL * off)
         scales.append(scale)
     weights = np.exp(np.array(logs) - max(logs))
     weights /= weights.sum()
@@ -173,15 +170,7 @@ def _correlation(
     first = np.array([each.share for each in tried[: weights.size]]) * steps
     scale = float(np.sqrt(weights @ np.array(scales)))
     one, two = float(weights @ first), float(weights @ (first * steps))
-    return _by_neighbours(one, two), scale
-
-
-def _by_neighbours(one: float, two: float) -> Correlation:
-    """With these correlations of the first and the second neighbour, as far as there is such a process."""
-    if one < _LEAST_CORRELATION:
-        return Correlation()
-    step = max(two, 1e-3 * one) / one
-    return Correlation(share=min(one / step, _HALF * (1.0 + step) / step), step=step)
+    return Correlation.of_neighbours(one, two), scale
 
 
 def _restricted(

@@ -25,32 +25,42 @@ _FIRST, _NEIGHBOURS = 4, 61
 #: Fewer plateaus in all, or in the longest run, show no line.
 _FEWEST, _FEWEST_IN_A_RUN = 64, 32
 
+#: Frequencies at most, and gaps between plateaus, in usual steps, beyond which a pause is taken for one of that length.
+_MOST, _LONGEST_GAP = 4000, 5.0
+_NOTHING = Lead(value=0.0, threshold=np.inf, p_value=1.0, index=-1)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Run:
-    """Times [n] s from the run's first plateau, whitened residual [n] without the gain, and weights m [n, 2]."""
+    """Times [n] s from the run's start, pauses cut short; whitened residual [n] without the gain; weights m [n, 2]."""
 
     time: FloatArray
     left: FloatArray
     weights: FloatArray
 
-    def power(self, angular: FloatArray) -> FloatArray:
-        """[f, 2] at angular frequencies [f] rad/s."""
-        waves = np.exp(-1j * np.outer(angular, self.time))
-        sums = waves @ (self.left[:, None] * self.weights)
+    def power(self, first: int, last: int, spacing: float) -> FloatArray:
+        """[last - first, 2] at angular frequencies `spacing` [rad/s] times first ... last - 1."""
+        wave, step = np.exp(-1j * first * spacing * self.time), np.exp(-1j * spacing * self.time)
+        sums, weighed = np.empty((last - first, 2), dtype=np.complex128), self.left[:, None] * self.weights
+        for k in range(last - first):
+            sums[k] = wave @ weighed
+            wave *= step
         return np.asarray(np.abs(sums) ** 2 / np.maximum((self.weights**2).sum(axis=0), 1e-300), dtype=np.float64)
 
 
 def lines(design: Design, noise: Noise, residual: FloatArray) -> Lead:
     """The highest line, summed over the runs."""
     runs = _runs(design, noise, residual)
-    length = max((run.time.size for run in runs), default=0)
-    duration = max((float(run.time[-1]) * (1 + 1 / run.time.size) for run in runs), default=0.0)
-    if sum(run.time.size for run in runs) < _FEWEST or length < _FEWEST_IN_A_RUN or not duration > 0.0:
-        return Lead(value=0.0, threshold=np.inf, p_value=1.0, index=-1)
-    kept = [run for run in runs if run.time.size > 0.5 * length]
-    angular = np.asarray(np.pi * np.arange(_FIRST, length) / duration, dtype=np.float64)
-    power = np.sum([run.power(angular) for run in kept], axis=0)
+    longest = max((run.time.size for run in runs), default=0)
+    if sum(run.time.size for run in runs) < _FEWEST or longest < _FEWEST_IN_A_RUN:
+        return _NOTHING
+    kept = [run for run in runs if run.time.size > 0.5 * longest]
+    duration = float(np.median([run.time[-1] * run.time.size / (run.time.size - 1) for run in kept]))
+    step = float(np.median([np.median(np.diff(run.time)) for run in kept]))
+    last = min(int(duration / step), _MOST) if step > 0.0 else 0
+    if last < _FEWEST_IN_A_RUN:
+        return _NOTHING
+    power = np.sum([run.power(_FIRST, last, np.pi / duration) for run in kept], axis=0)
     # a line stands out of its neighbourhood: noise that remembers otherwise than was thought does not
     middle = float(gamma.ppf(0.5, len(kept)))
     for column in power.T:
@@ -74,9 +84,11 @@ def _runs(design: Design, noise: Noise, residual: FloatArray) -> list[_Run]:
         mine = np.flatnonzero(design.rows.run[steady] == run)
         left, along = white[mine].T
         deviation = noise.deviation[mine]
+        steps = np.maximum(np.diff(design.rows.clock[mine], prepend=design.rows.clock[mine[0]]), 0.0)
+        usual = float(np.median(steps[1:])) if mine.size > 1 else 0.0
         found.append(
             _Run(
-                time=design.rows.clock[mine] - design.rows.clock[mine[0]],
+                time=np.cumsum(np.minimum(steps, _LONGEST_GAP * usual)),
                 left=left - along * float(along @ left) / max(float(along @ along), 1e-300),
                 weights=np.stack([1 / deviation, np.abs(design.torque[mine]) / deviation], axis=1),
             )

@@ -5,22 +5,28 @@ partly white and partly remembers has r_k = w ρ^k. The means of n samples in a 
 
     variance ∝ n + 2 Σ_{d<n} (n - d) w ρ^d,    covariance k bins on ∝ w ρ^{(k-1) n + 1} ((1 - ρⁿ)/(1 - ρ))²
 
-Samples say that far better than bins do: there are many of them, and what is smooth in a loop hides little so close by.
+Samples say more of it than bins do: there are many of them. What turns sharply in a loop is no noise: samples next to
+standstill are left out. Noise as slow as a bin is told a little too fast, for the harmonics take some of it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
+from models.diagnosis.correlation import Correlation
 from models.periods import harmonics
 
 #: Harmonics of a loop that are not taken for noise.
 HARMONICS = 8
+#: Samples slower than this share of the loop's highest speed are left out.
+LEAST_SPEED = 0.08
 #: Fewer samples to a bin say nothing that the bins do not say themselves.
 FEWEST_TO_A_BIN = 4.0
-_MOST = 0.98
+#: Loops whose samples to a bin differ by less than this factor are taken together.
+_ALIKE = 1.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,22 +41,20 @@ class Memory:
         """Correlations [-] of the means in neighbouring bins and in those next but one."""
         if self.one <= 0.0 or self.two <= 0.0:
             return 0.0, 0.0
-        step = min(self.two / self.one, _MOST)
-        share = min(self.one / step, 1.0)
-        n = self.to_a_bin
-        lags = np.arange(1, int(np.ceil(n)))
-        variance = n + 2 * float(((n - lags) * share * step**lags).sum())
-        first = share * step * ((1 - step**n) / (1 - step)) ** 2 / variance
-        return float(first), float(first * step**n)
+        known, n = Correlation.of_neighbours(self.one, self.two), self.to_a_bin
+        step, all_on = known.step, known.step**n
+        inside = step * (n - 1 - n * step + all_on) / (1 - step) ** 2
+        first = known.share * step * ((1 - all_on) / (1 - step)) ** 2 / (n + 2 * known.share * inside)
+        return first, first * all_on
 
 
 def memory_of(torque: FloatArray, phase: FloatArray, used: NDArray[np.bool_], to_a_bin: float) -> Memory | None:
-    """Of torque [n] Nm at phase [rad], where samples are `used`; None where they are too few."""
+    """Of torque [n] Nm at phase [rad], where samples are `used`; None where they are too few or all alike."""
     if to_a_bin < FEWEST_TO_A_BIN or np.count_nonzero(used) < 8 * (2 * HARMONICS + 1):
         return None
     basis = np.column_stack([np.ones(int(used.sum())), harmonics(phase[used], HARMONICS)])
-    left = np.zeros(torque.size)
     known = np.linalg.solve(basis.T @ basis + 1e-9 * used.sum() * np.eye(basis.shape[1]), basis.T @ torque[used])
+    left = np.zeros(torque.size)
     left[used] = torque[used] - basis @ known
     there = used.astype(np.float64)
     sums = [float(left[k:] @ left[: left.size - k]) for k in range(3)]
@@ -61,11 +65,18 @@ def memory_of(torque: FloatArray, phase: FloatArray, used: NDArray[np.bool_], to
     return Memory(one=one, two=two, to_a_bin=to_a_bin)
 
 
-def bins_remember(memories: list[Memory | None]) -> tuple[float, float] | None:
-    """Correlations [-] of neighbouring bins, and of those next but one, on the average over loops; None where unknown."""
+def bins_remember(memories: Sequence[Memory | None]) -> tuple[float, float] | None:
+    """Correlations [-] of neighbouring bins, and of those next but one, on the average over loops; None where most of the
+    loops do not tell. Loops that were sampled alike share their autocorrelations."""
     known = [each for each in memories if each is not None]
     if 2 * len(known) <= len(memories) or not known:
         return None
-    one, two = (float(np.mean([getattr(each, name) for each in known])) for name in ("one", "two"))
-    told = np.mean([Memory(one=one, two=two, to_a_bin=each.to_a_bin).of_bins() for each in known], axis=0)
-    return float(told[0]), float(told[1])
+    kinds: dict[int, list[Memory]] = {}
+    for each in known:
+        kinds.setdefault(round(np.log(each.to_a_bin) / np.log(_ALIKE)), []).append(each)
+    told = []
+    for alike in kinds.values():
+        one, two, to_a_bin = (float(np.mean([getattr(each, name) for each in alike])) for name in Memory.__slots__)
+        told += [Memory(one=one, two=two, to_a_bin=to_a_bin).of_bins()] * len(alike)
+    first, second = np.mean(told, axis=0).tolist()
+    return first, second

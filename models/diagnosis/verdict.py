@@ -95,7 +95,13 @@ def judge(
     standing = _standing(best, usable, singles, price, tested)
     first = tested(standing[0] if standing else best)
     slack = tolerance(best)
-    statistics = {"lambda": best.drop, "tolerance": slack, "standing": float(len(standing)), **first.statistics}
+    statistics = {
+        "lambda": best.drop,
+        "structure": structure,
+        "tolerance": slack,
+        "standing": float(len(standing)),
+        **first.statistics,
+    }
     probabilities = probabilities_of(hypotheses, best, singles, price, tested, structure)
     causes = tuple(dict.fromkeys(slug for each in standing for slug in each.slugs))
     imitated = unmeasured > max(best.evidence - CLOSE - slack, OVER_NOTHING)

@@ -14,16 +14,8 @@ from scipy.signal import lfilter
 from scipy.sparse import csr_array
 
 from models.arrays import FloatArray
+from models.diagnosis.correlation import Correlation, arma
 from models.diagnosis.design import Design, IntArray
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Correlation:
-    """Of a row with the k-th after it, w ρ^k: a `share` w up to 1 is how much of the variance remembers, by `step` ρ [0, 1)
-    a row; beyond, as far as a spectrum allows, neighbours have much in common and others nothing."""
-
-    share: float = 0.0
-    step: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,18 +45,6 @@ def whitened(columns: FloatArray, design: Design, noise: Noise) -> FloatArray:
             _filter(blocks, correlation)
             out[rows] = blocks
     return out
-
-
-def arma(correlation: Correlation) -> tuple[float, float]:
-    """(θ, s): the process with unit variance is x_i - ρ x_{i-1} = s (e_i + θ e_{i-1}), |θ| < 1."""
-    rho, share = correlation.step, correlation.share
-    zero = 1 + rho * rho - 2 * share * rho * rho  # autocovariances of x_i - ρ x_{i-1}
-    one = -rho * (1 - share)
-    if abs(one) < 1e-12:
-        return 0.0, float(np.sqrt(max(zero, 1e-12)))
-    half = zero / (2 * one)
-    inverse = half + np.copysign(np.sqrt(max(half * half - 1, 0.0)), half)  # the root beyond 1, which does not cancel
-    return float(1 / inverse), float(np.sqrt(max(one * inverse, 1e-12)))
 
 
 def _filter(blocks: FloatArray, correlation: Correlation) -> None:

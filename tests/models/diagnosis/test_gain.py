@@ -8,11 +8,11 @@ from scipy.stats import multivariate_normal
 
 from models.diagnosis import amplitude
 from models.diagnosis.catalogue import BY_SLUG
+from models.diagnosis.correlation import Correlation
 from models.diagnosis.fitting import Fit, Fitted, effect_columns, fit
 from models.diagnosis.gain import _STEPS, _ahead, _bridged, _foretold, _held, _without, measure_gain
 from models.diagnosis.laws import ATTRACTOR, Scene
 from models.diagnosis.report import Gain
-from models.diagnosis.whitening import Correlation
 from tests.models.diagnosis.campaigns import CYCLES, campaign
 from tests.models.diagnosis.fitted import Study, study, warmth
 

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from models.diagnosis.correlation import Correlation, arma
 from models.diagnosis.design import Design, build_design
 from models.diagnosis.noise import estimate_noise, first_noise
-from models.diagnosis.whitening import Correlation, Noise, arma, gains_of, whitened, without_gains
+from models.diagnosis.whitening import Noise, gains_of, whitened, without_gains
 from tests.models.diagnosis.campaigns import campaign
 
 SEED = 20

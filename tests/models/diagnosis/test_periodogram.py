@@ -7,12 +7,13 @@ import pytest
 
 from models.arrays import FloatArray
 from models.diagnosis.contrasts import TORQUE
+from models.diagnosis.correlation import Correlation
 from models.diagnosis.design import Design, build_design
 from models.diagnosis.misfits import axes_of
 from models.diagnosis.noise import first_noise
 from models.diagnosis.periodogram import lines
 from models.diagnosis.viewing import view_of
-from models.diagnosis.whitening import Correlation, Noise
+from models.diagnosis.whitening import Noise
 from models.stribeck import torque
 from tests.models.diagnosis.campaigns import Where, campaign
 from tests.models.diagnosis.fitted import study
