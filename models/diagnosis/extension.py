@@ -19,7 +19,6 @@ from models.diagnosis.campaign import Campaign, Oil, StationaryRun
 from models.diagnosis.catalogue import BY_SLUG
 from models.diagnosis.design import Points, build_design
 from models.diagnosis.effect import Kind
-from models.diagnosis.effects.load_severity import LOGGED
 from models.diagnosis.facts import Facts, facts_of
 from models.diagnosis.fitting import Fit
 from models.diagnosis.laws import Frame, Laws, scene_of
@@ -151,7 +150,7 @@ def build_extension(
 
 def _counted(effect: Mapping[str, Any]) -> bool:
     """Whether an effect is in what ζ counts (`severity_exponent`), and not in a course."""
-    return bool(effect["slug"] == "load_severity" and effect["shape"][0] == LOGGED)
+    return bool(effect["slug"] == "load_severity")
 
 
 def facts_to(facts: Facts) -> dict[str, Any]:

@@ -31,7 +31,8 @@ TOLERANCE, PARTS_TOLERANCE = 0.05, 0.15
 #: Structure without a name may have so much more evidence, as a share of λ beyond CLEAR nats: below, no template's error
 #: shows.
 GENERIC, CLEAR = 0.05, 20.0
-#: ... and so many nats more in any case: it is the best of some eight axes.
+#: ... and so many nats more in any case: it is the best of some eight axes. (A probability reckons without: what nobody
+#: wrote down comes in more kinds than the catalogue.)
 AXES_PRICE = 2.0
 #: A cause is named where it has this many nats over nothing.
 OVER_NOTHING = 3.0
@@ -39,10 +40,13 @@ OVER_NOTHING = 3.0
 PAIR_PRICE = 4.0
 #: ... and so much more where both are of one family: the second may mend the template of the first.
 KIN_PRICE = 8.0
-#: A cause is named where its own probability is this at least.
-LEAST_NAMED = 0.8
+#: A cause is named where its own probability is this at least, the second of two from the lower one on.
+LEAST_NAMED, LEAST_OF_TWO = 0.92, 0.8
 #: False alarms allowed in closing a case: structure that is left, and amplitudes that differ between parts.
 LEFT_SHARE, PARTS_SHARE = 5e-3, 3e-3
+#: Where what is left would look like that by chance in fewer cases, beyond what a template leaves, nothing is named:
+#: something else may be at work.
+UNEASY = 0.05
 #: A line in raw records has paid for its search: it is there.
 VIBRATION_PROBABILITY = 0.98
 #: So many of the candidates that stand are closed at most.
@@ -123,8 +127,9 @@ def judge(
         imitated, causes = True, (*causes, "oil_temperature")
     named = len(standing) == 1 and not imitated
     if named and len(causes) > 1:
-        causes = tuple(slug for slug in causes if probabilities[slug] >= LEAST_NAMED) or causes[:1]
-    named = named and probabilities[causes[0]] >= LEAST_NAMED
+        causes = tuple(slug for slug in causes if probabilities[slug] >= LEAST_OF_TWO) or causes[:1]
+    easy = first.statistics["closure_p_value"] * np.exp(min(slack, 50.0)) >= UNEASY
+    named = named and easy and probabilities[causes[0]] >= LEAST_NAMED
     return Judgement(
         verdict=Verdict.CAUSE_NAMED if named else Verdict.CAUSE_AMBIGUOUS,
         causes=causes,
@@ -265,7 +270,7 @@ def probabilities_of(
     def cooled(lead: float, differing: float) -> float:
         return lead / (1.0 + 0.5 * TOLERANCE * differing)
 
-    logs = [cooled(max(structure - AXES_PRICE, 0.0) - value(best), best.drop)]
+    logs = [cooled(max(structure, 0.0) - value(best), best.drop)]
     logs += [cooled(value(each) - value(best), unshared(best, each, singles)) for each in hypotheses]
     weights = np.exp(np.array(logs) - logsumexp(logs))
     found: dict[str, float] = {}

@@ -3,22 +3,18 @@
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, Tried
 from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
 
 #: Blocks whose energies differ by less tell no severity.
 _LEAST_SPREAD = 0.03
-LOGGED, UNLOGGED = 0.0, 1.0
 
 
 def _grid(facts: Facts) -> tuple[Tried, ...]:
     if facts.duty_energies.size > 1 and np.ptp(np.log(facts.duty_energies)) > _LEAST_SPREAD:
-        return (Tried(shape=(LOGGED, 0.0)),)
-    if facts.states.size < 5 or facts.duty_energies.size:
-        return ()
-    inner = [low for low, _, _ in facts.onsets[1:]]
-    return tuple(Tried(shape=(UNLOGGED, onset), log_weight=-float(np.log(len(inner)))) for onset in inner)
+        return (Tried(shape=()),)
+    return ()
 
 
 def effective_cycles(cycles: FloatArray, facts: Facts, exponent: float) -> FloatArray:
@@ -32,12 +28,8 @@ def effective_cycles(cycles: FloatArray, facts: Facts, exponent: float) -> Float
     return np.asarray(np.interp(cycles, ends, grown) + beyond, dtype=np.float64)
 
 
-def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
-    cycles = scene.points.cycles
-    if shape[0] == LOGGED:
-        counted = effective_cycles(cycles, scene.facts, amplitude)
-    else:
-        counted = cycles + np.clip(amplitude, -0.9, 5.0) * np.maximum(cycles - shape[1], 0.0)
+def _change(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
+    counted = effective_cycles(scene.points.cycles, scene.facts, amplitude)
     return scene.curve_at(cycles=counted) - scene.curve
 
 
@@ -45,7 +37,7 @@ EFFECT = Effect(
     slug="load_severity",
     title="Some duty was harder than other",
     physics="The rate of eq. 6's kinetics grows with the energy of an engagement: harder blocks age the clutch faster.",
-    formula="S(ζ_e) - S(ζ), ζ_e = Σ (E/E_usual)^m, or from an unlogged cycle on ζ_e = ζ + a (ζ - ζ_k)",
+    formula="S(ζ_e) - S(ζ), ζ_e = Σ (E/E_usual)^m over the engagements whose energy was sent",
     source="models.degradation: dD/dζ = -k Dⁿ with k by the load's severity",
     family=Family.HISTORY,
     kind=Kind.COURSE,
@@ -55,10 +47,7 @@ EFFECT = Effect(
     prior_sd=0.7,
     positive=True,
     scale=1.0,
-    shapes=(
-        ShapeParameter(name="logged or not", unit="-", lowest=0.0, highest=1.0),
-        ShapeParameter(name="onset", unit="cycles", lowest=0.0, highest=float("inf")),
-    ),
+    shapes=(),
     grid=_grid,
     change=_change,
     before_lag=True,

@@ -165,13 +165,9 @@ def test_alternatives_count_by_their_probability(warm):
 
 
 def test_logged_severity_is_counted_and_then_no_course(warm):
-    logged = extension_of(warm, ("load_severity", 0.8, (0.0, 0.0)))
+    logged = extension_of(warm, ("load_severity", 0.8, ()))
     assert logged.severity_exponent == 0.8
     assert not logged.course(CYCLES, PRESSURE, VELOCITY).any()
-    # the controls: not logged it is a course; without courses nothing of it is followed; others count nothing
-    unlogged = extension_of(warm, ("load_severity", 0.8, (1.0, ONSET)))
-    assert unlogged.severity_exponent is None
-    assert unlogged.course(CYCLES, PRESSURE, VELOCITY)[3].all()
-    assert not unlogged.course(CYCLES, PRESSURE, VELOCITY)[0].any()
-    assert extension_of(warm, ("load_severity", 0.8, (0.0, 0.0)), courses=False).severity_exponent is None
+    # the controls: without courses nothing of it is followed; others count nothing
+    assert extension_of(warm, ("load_severity", 0.8, ()), courses=False).severity_exponent is None
     assert extension_of(warm, WEAR).severity_exponent is None
