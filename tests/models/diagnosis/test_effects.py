@@ -54,6 +54,8 @@ def test_no_amplitude_no_change_and_all_changes_are_finite(effect: Effect, scene
         assert np.abs(effect.change(scene, 0.0, tried.shape)).max() < 1e-9
         assert column.shape == scene.curve.shape
         assert np.isfinite(column).all()
+        one = effect.change(scene, 1e-3 * effect.prior_sd, tried.shape) / (1e-3 * effect.prior_sd)
+        np.testing.assert_allclose(column, one, rtol=1e-9, atol=1e-9 * np.abs(one).max())  # many at once, or each alone
         assert np.abs(column).max() > 0
         doubled = effect.change(scene, 2e-3 * effect.prior_sd, tried.shape) / (2e-3 * effect.prior_sd)
         moving = (

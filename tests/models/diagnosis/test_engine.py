@@ -156,3 +156,16 @@ def test_what_a_loud_vibration_leaves_in_averages_is_not_named_beside_it() -> No
         found = with_lines(judged, (ripple,))
         assert found.verdict is Verdict.CAUSE_NAMED
         assert found.causes == causes
+
+
+def test_structure_without_a_name_beside_a_vibration_counts_by_its_own_evidence() -> None:
+    """Beside a ripple of 60 nats, 8 nats without a name are its trace; 91 nats are not, however little of them an effect
+    explains."""
+    estimate = Estimate(name="ripple amplitude", value=0.1, sd=0.01, unit="Nm")
+    ripple = RawEvidence(effect="shaft_ripple", log_evidence=60.0, estimate=estimate, note="")
+    for nats, verdict in ((8.0, Verdict.CAUSE_NAMED), (91.0, Verdict.UNEXPLAINED_STRUCTURE)):
+        statistics = {"lambda": 0.03, "structure": nats, "tolerance": 0.0}
+        judged = Judgement(verdict=Verdict.UNEXPLAINED_STRUCTURE, statistics=statistics)
+        found = with_lines(judged, (ripple,))
+        assert found.verdict is verdict
+        assert found.causes == (("shaft_ripple",) if verdict is Verdict.CAUSE_NAMED else ())

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.arrays import FloatArray
-from models.diagnosis.contrasts import TORQUE
+from models.diagnosis import contrasts
 from models.diagnosis.correlation import Correlation
 from models.diagnosis.design import Design, build_design
 from models.diagnosis.misfits import axes_of
@@ -18,6 +18,8 @@ from models.stribeck import torque
 from tests.models.diagnosis.campaigns import Where, campaign
 from tests.models.diagnosis.fitted import study
 
+#: A sensor's wave [Nm].
+WAVE = 2.5
 SEED = 7
 
 
@@ -56,20 +58,39 @@ def test_a_swing_is_found_whatever_its_phase_in_each_run(design: Design, noise: 
     assert lines(design, noise, drawn(design, noise, 0) + 0.02 * swing).p_value > 0.01
 
 
+def test_pauses_and_odd_runs_do_not_hide_a_swing(design: Design, noise: Noise) -> None:
+    rows = design.rows
+    swing = 0.008 * design.torque * np.sin(2 * np.pi * rows.clock / 30.0 + rows.run) * rows.steady
+    residual = drawn(design, noise, 0) + swing
+    assert lines(design, noise, residual).raised
+    paused = np.where((rows.run == 0) & (rows.clock > 300.0), rows.clock + 12 * 3600.0, rows.clock)
+    slower = np.where(rows.run == 0, 4.0 * rows.clock, rows.clock)
+    for clock in (paused, slower):
+        assert lines(replace(design, rows=replace(rows, clock=clock)), noise, residual).raised
+    standing = replace(design, rows=replace(rows, clock=np.zeros_like(rows.clock)))
+    assert not lines(standing, noise, residual).raised
+
+
 def test_too_few_plateaus_show_no_line() -> None:
+    """Of one run the first 120 plateaus show the swing, the first 40 do not say so."""
     given = campaign(1)
-    few = build_design(replace(given, stationary=given.stationary[:1], dynamic=()))
-    short = replace(few, plateaus=20)
-    assert not lines(short, first_noise(few), few.torque).raised
+    one = build_design(replace(given, stationary=given.stationary[:1], dynamic=()))
+    known = replace(first_noise(one), deviation=0.01 * one.torque)
+    swing = 0.03 * one.torque * np.sin(2 * np.pi * one.rows.clock / 30.0)
+    assert lines(one, known, swing).raised
+    assert not lines(replace(one, plateaus=40, chains=one.chains), known, swing).raised
 
 
-def test_a_sensor_that_is_wavy_over_its_range_is_structure_on_its_reading() -> None:
+def test_a_sensor_that_is_wavy_over_its_range_is_structure_on_its_reading(monkeypatch: pytest.MonkeyPatch) -> None:
     def waves(at: Where) -> FloatArray:
-        return np.asarray(0.4 * np.sin(2 * np.pi * torque(at.velocity, at.parameters) / 6.0), dtype=np.float64)
+        return np.asarray(0.1 * np.sin(2 * np.pi * torque(at.velocity, at.parameters) / WAVE), dtype=np.float64)
 
     given = study(campaign(3, waves))
     known = given.baseline
-    view = view_of(given.design, known.noise, known.priors, known.fit, [])
-    first = axes_of(view, {})[0]
-    assert first.axis == TORQUE
-    assert first.strength > 10.0
+    found = {}
+    for most in (20, 4):
+        monkeypatch.setattr(contrasts, "TORQUE_WAVES", most)
+        view = view_of(given.design, known.noise, known.priors, known.fit, [])
+        found[most] = max((each.strength for each in axes_of(view, {}) if each.axis == contrasts.TORQUE), default=0.0)
+    assert found[20] > 20.0
+    assert found[4] < 0.2 * found[20], found  # the control: few waves hardly show it

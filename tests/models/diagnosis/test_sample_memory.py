@@ -45,6 +45,37 @@ def test_memory_is_found_beside_a_loop_and_over_gaps() -> None:
     np.testing.assert_allclose(np.mean(found, axis=0), [0.48, 0.288], atol=0.02)
 
 
+@pytest.mark.parametrize("seed", [1, 2, 4])
+def test_what_a_loop_is_is_not_taken_for_noise_that_remembers(seed: int) -> None:
+    """Independent noise of 0.3 %: the loop turns sharply next to standstill, three times as far off its low harmonics."""
+    told = build_design(campaign(seed, noise=0.003)).bins_remember
+    assert told is not None
+    assert max(told) < 0.05
+
+
+def test_times_that_repeat_do_no_harm() -> None:
+    given = campaign(1)
+    floored = [
+        replace(run, record=replace(run.record, time=np.floor(10 * run.record.time) / 10)) for run in given.dynamic
+    ]
+    told = build_design(replace(given, dynamic=tuple(floored))).bins_remember
+    assert told is not None
+    assert max(told) < 0.05
+
+
+def test_loops_sampled_otherwise_do_not_mix() -> None:
+    """The same noise, remembered for 50 ms, in bins of 0.16 s sampled at 40 and at 1000 a second."""
+
+    def sampled(rate: float) -> Memory:
+        return Memory(one=np.exp(-20 / rate), two=np.exp(-40 / rate), to_a_bin=0.16 * rate)
+
+    alone = [sampled(rate).of_bins()[0] for rate in (40.0, 1000.0)]
+    both = bins_remember([sampled(40.0), sampled(1000.0)])
+    assert both is not None
+    assert both[0] == pytest.approx(np.mean(alone))
+    assert alone[0] == pytest.approx(alone[1], abs=0.05)
+
+
 def test_too_few_samples_tell_nothing() -> None:
     phase = np.linspace(0.0, 2 * np.pi, 3000)
     everything = np.ones(phase.size, dtype=np.bool_)

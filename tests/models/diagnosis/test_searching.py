@@ -76,6 +76,13 @@ def test_what_is_no_better_than_nothing_does_not_stand_beside_the_best() -> None
     assert standing(best, close, candidate("inertia_torque", evidence=-0.1)) == {("oil_change",), ("running_in",)}
 
 
+def test_candidates_stand_beside_the_best_up_to_a_hundredth_of_its_weight() -> None:
+    """4.6 nats are ln 100."""
+    best = candidate("oil_change", evidence=20.0)
+    assert len(standing(best, candidate("running_in", evidence=15.7))) == 2
+    assert len(standing(best, candidate("running_in", evidence=15.2))) == 1
+
+
 def test_pairs_must_be_closer_than_single_effects_to_stand_beside_the_best() -> None:
     assert len(standing(candidate("oil_change", evidence=30.0), candidate("running_in", evidence=26.5))) == 2
     pair, rival = ("oil_change", "inertia_torque"), ("oil_change", "squeeze_film")
