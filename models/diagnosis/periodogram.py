@@ -24,7 +24,6 @@ LINES_SHARE = 0.001
 _FIRST, _NEIGHBOURS = 4, 61
 #: Fewer plateaus in all, or in the longest run, show no line.
 _FEWEST, _FEWEST_IN_A_RUN = 64, 32
-
 #: Frequencies at most, and gaps between plateaus, in usual steps, beyond which a pause is taken for one of that length.
 _MOST, _LONGEST_GAP = 4000, 5.0
 _NOTHING = Lead(value=0.0, threshold=np.inf, p_value=1.0, index=-1)
