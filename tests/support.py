@@ -1,14 +1,16 @@
 """What several tests need: bodies to post, and a service to post them to."""
 
 import math
+import multiprocessing
 import os
 import signal
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
@@ -60,59 +62,92 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-class Server:
-    """A service in a process of its own, over a real socket."""
+def wait_until_ready(url: str, ended: Callable[[], bool]) -> None:
+    """Wait for a service that has just been started."""
+    deadline = time.monotonic() + 60
+    with httpx2.Client(base_url=url, timeout=5) as http:  # one for all: each loads the certificates anew
+        while time.monotonic() < deadline:
+            try:
+                if http.get("/readyz").status_code == 200:
+                    return
+            except httpx2.TransportError:
+                assert not ended(), "the service ended before it was ready"
+            time.sleep(0.05)
+    raise TimeoutError("the service was not ready within 60 s")
 
-    def __init__(self, database: Path, *, port: int | None = None) -> None:
+
+#: Forks services off a process that has loaded the library already, which is most of what a start takes.
+_LOADED = multiprocessing.get_context("forkserver")
+_LOADED.set_forkserver_preload(["service.cli.main", "service.app"])
+
+
+def _run(arguments: list[str], environment: dict[str, str]) -> None:
+    """The command in the forked process."""
+    from service.cli.main import app
+
+    os.environ.clear()
+    os.environ.update(environment)
+    app(arguments)
+
+
+class Server:
+    """A service in a process of its own, over a real socket; `loaded`: forked, where its start and memory are no matter."""
+
+    def __init__(self, database: Path, *, port: int | None = None, loaded: bool = False) -> None:
         self.database = database
         self.port = port or free_port()
+        self.loaded = loaded
         self.url = f"http://127.0.0.1:{self.port}"
-        self.process: subprocess.Popen[bytes] | None = None
+        self.process: subprocess.Popen[bytes] | BaseProcess | None = None
 
     def start(self) -> None:
         """Start and wait until it is ready."""
-        command = [
-            sys.executable,
-            "-m",
-            "service.cli.main",
-            "serve",
-            "--port",
-            str(self.port),
-            "--log-level",
-            "warning",
-        ]
-        self.process = subprocess.Popen([*command, "--database", f"sqlite:///{self.database}"])
-        deadline = time.monotonic() + 60
-        while time.monotonic() < deadline:
-            try:
-                if httpx2.get(f"{self.url}/readyz", timeout=5).status_code == 200:
-                    return
-            except httpx2.TransportError:
-                assert self.process.poll() is None, "the service ended before it was ready"
-                time.sleep(0.05)
-        raise TimeoutError("the service was not ready within 60 s")
+        arguments = ["serve", "--port", str(self.port), "--log-level", "warning"]
+        arguments += ["--database", f"sqlite:///{self.database}"]
+        if self.loaded:
+            self.process = _LOADED.Process(target=_run, args=(arguments, dict(os.environ)), daemon=True)
+            self.process.start()
+        else:
+            self.process = subprocess.Popen([sys.executable, "-m", "service.cli.main", *arguments])
+        wait_until_ready(self.url, lambda: self.exit_code() is not None)
+
+    @property
+    def pid(self) -> int:
+        """The process's number."""
+        assert self.process is not None
+        assert self.process.pid is not None
+        return self.process.pid
+
+    def exit_code(self, within: float = 0.0) -> int | None:
+        """What the process ended with, below 0 for a signal, or None if it is still there after some seconds."""
+        if isinstance(self.process, subprocess.Popen):
+            with suppress(subprocess.TimeoutExpired):
+                self.process.wait(timeout=within)
+            return self.process.returncode
+        assert self.process is not None
+        self.process.join(within)
+        return self.process.exitcode
 
     def kill(self) -> None:
         """As a power cut would."""
-        assert self.process is not None
-        os.kill(self.process.pid, signal.SIGKILL)
-        self.process.wait()
+        os.kill(self.pid, signal.SIGKILL)
+        assert self.exit_code(30) == -signal.SIGKILL
 
     def stop(self) -> int:
         """As an operator would; returns the exit code."""
-        assert self.process is not None
-        self.process.terminate()
-        return self.process.wait(timeout=30)
+        os.kill(self.pid, signal.SIGTERM)
+        code = self.exit_code(30)
+        assert code is not None, "the service was asked to stop and is there after 30 s"
+        return code
 
 
 @contextmanager
-def serving(database: Path) -> Iterator[Server]:
+def serving(database: Path, *, loaded: bool = False) -> Iterator[Server]:
     """A running service on that database, stopped at the end whatever happens."""
-    server = Server(database)
+    server = Server(database, loaded=loaded)
     server.start()
     try:
         yield server
     finally:
-        assert server.process is not None
-        if server.process.poll() is None:
+        if server.exit_code() is None:
             server.stop()

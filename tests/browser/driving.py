@@ -3,17 +3,15 @@
 import os
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import httpx2
 from playwright.sync_api import Browser, BrowserType, Page, sync_playwright
 
 from tests.browser import find
-from tests.support import free_port
+from tests.support import free_port, wait_until_ready
 
 #: Software rendering, so that 3D charts are drawn on a machine without a graphics card.
 ARGUMENTS = (
@@ -114,14 +112,7 @@ def serving_with_engine(database: Path, engine: str) -> Iterator[str]:
     )
     url = f"http://127.0.0.1:{port}"
     try:
-        deadline = time.monotonic() + 60
-        while time.monotonic() < deadline:
-            try:
-                if httpx2.get(f"{url}/readyz", timeout=5).status_code == 200:
-                    break
-            except httpx2.TransportError:
-                assert process.poll() is None, "the service ended before it was ready"
-                time.sleep(0.05)
+        wait_until_ready(url, lambda: process.poll() is not None)
         yield url
     finally:
         process.terminate()

@@ -14,7 +14,7 @@ from tests.support import Server, serving
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[Server]:
     """A running service with an empty database."""
-    with serving(tmp_path / "clutchlife.db") as found:
+    with serving(tmp_path / "clutchlife.db", loaded=True) as found:
         yield found
 
 

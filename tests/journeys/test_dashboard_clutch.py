@@ -39,7 +39,7 @@ CHARTS = {
 @pytest.fixture(scope="module")
 def life(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """The demo's life as sim-1, with an oil change beside what the simulation gives."""
-    with serving(tmp_path_factory.mktemp("life") / "clutchlife.db") as server:
+    with serving(tmp_path_factory.mktemp("life") / "clutchlife.db", loaded=True) as server:
         with httpx2.Client(base_url=server.url, timeout=60) as http:
             clutch_id = demo(http)
             note = "<img src=x onerror=alert(1)>"
@@ -185,7 +185,10 @@ def test_pressure_and_view_are_chosen_by_keyboard(watched: Watched) -> None:
 
 
 def test_a_run_posted_while_the_page_is_open_appears(browser: Browser, tmp_path: Path) -> None:
-    with serving(tmp_path / "clutchlife.db") as server, httpx2.Client(base_url=server.url, timeout=60) as http:
+    with (
+        serving(tmp_path / "clutchlife.db", loaded=True) as server,
+        httpx2.Client(base_url=server.url, timeout=60) as http,
+    ):
         http.post("/v1/clutches", json={"clutch_id": "live"})
         watched = Watched(browser, server.url)
         page = watched.open("/clutches/live")
@@ -207,7 +210,7 @@ def test_a_run_posted_while_the_page_is_open_appears(browser: Browser, tmp_path:
 
 
 def test_a_file_is_dropped_and_its_receipt_appears(browser: Browser, tmp_path: Path) -> None:
-    with serving(tmp_path / "clutchlife.db") as server:
+    with serving(tmp_path / "clutchlife.db", loaded=True) as server:
         watched = Watched(browser, server.url)
         page = watched.open("/")
         page.get_by_role("heading", name="No clutch is known yet").wait_for()

@@ -18,7 +18,7 @@ PAGES = ("/", "/clutches/bench3-017")
 def http(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx2.Client]:
     """A client of an empty service."""
     with (
-        serving(tmp_path_factory.mktemp("files") / "clutchlife.db") as server,
+        serving(tmp_path_factory.mktemp("files") / "clutchlife.db", loaded=True) as server,
         httpx2.Client(base_url=server.url, timeout=60) as found,
     ):
         yield found

@@ -19,7 +19,7 @@ expect.set_options(timeout=20_000)
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """A worn-out clutch, an ageing one, a new one and one without a run."""
-    with serving(tmp_path_factory.mktemp("fleet") / "clutchlife.db") as server:
+    with serving(tmp_path_factory.mktemp("fleet") / "clutchlife.db", loaded=True) as server:
         with httpx2.Client(base_url=server.url, timeout=60) as http:
             worn(http, "ageing", last=4000)
             for name, last in (("worn-out", 19_000), ("new", 500)):
@@ -190,7 +190,7 @@ def test_a_hidden_tab_asks_nothing(watched: Watched) -> None:
 
 
 def test_a_service_that_goes_away_and_comes_back(browser: Browser, tmp_path: Path) -> None:
-    with serving(tmp_path / "clutchlife.db") as server:
+    with serving(tmp_path / "clutchlife.db", loaded=True) as server:
         httpx2.post(f"{server.url}/v1/clutches", json={"clutch_id": "kept"})
         watched = Watched(browser, server.url)
         page = watched.open("/")
@@ -214,7 +214,7 @@ def test_with_keys_the_page_asks_for_one(browser: Browser, tmp_path: Path) -> No
     from storage import keys
     from storage.database import open_database
 
-    with serving(tmp_path / "clutchlife.db") as server:
+    with serving(tmp_path / "clutchlife.db", loaded=True) as server:
         httpx2.post(f"{server.url}/v1/clutches", json={"clutch_id": "secret"})
         text, row = security.make_key("read", "", created_at="2026-01-01T00:00:00Z")
         database = open_database(f"sqlite:///{tmp_path / 'clutchlife.db'}")

@@ -37,7 +37,7 @@ _LIGHT = "circles => circles.map((c) => c.getBoundingClientRect()).map((r) => [r
 
 @pytest.fixture(scope="module")
 def life(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with serving(tmp_path_factory.mktemp("light") / "clutchlife.db") as server:
+    with serving(tmp_path_factory.mktemp("light") / "clutchlife.db", loaded=True) as server:
         with httpx2.Client(base_url=server.url, timeout=60) as http:
             worn(http, "bench", last=6000)
         yield server

@@ -31,7 +31,7 @@ def finished(http: httpx2.Client, path: str) -> dict[str, object]:
 
 
 def test_a_kill_during_a_diagnosis_leaves_a_sane_state(tmp_path: Path) -> None:
-    server = Server(tmp_path / "clutchlife.db")
+    server = Server(tmp_path / "clutchlife.db", loaded=True)
     server.start()
     with httpx2.Client(base_url=server.url, timeout=60) as http:
         post_tests(http, 0, 1000, 2000, 3000)
@@ -75,7 +75,10 @@ def _readable(path: Path) -> bool:
 
 
 def test_a_stop_does_not_wait_for_a_diagnosis(tmp_path: Path) -> None:
-    with serving(tmp_path / "clutchlife.db") as server, httpx2.Client(base_url=server.url, timeout=60) as http:
+    with (
+        serving(tmp_path / "clutchlife.db", loaded=True) as server,
+        httpx2.Client(base_url=server.url, timeout=60) as http,
+    ):
         post_tests(http, 0, 1000, 2000)
         http.post(f"{BASE}/diagnoses", json={}, headers={"Prefer": "wait=0"})
         began = time.monotonic()
@@ -88,7 +91,7 @@ def test_a_stop_does_not_wait_for_a_diagnosis(tmp_path: Path) -> None:
 def commanded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """What `clutchlife diagnose` prints of four tests, for a person and as JSON; and what `export` writes."""
     folder = tmp_path_factory.mktemp("commanded")
-    with serving(folder / "clutchlife.db") as server:
+    with serving(folder / "clutchlife.db", loaded=True) as server:
         with httpx2.Client(base_url=server.url, timeout=60) as http:
             post_tests(http, 0, 1000, 2000, 3000)
         said = clutchlife("diagnose", "c1", "--url", server.url)

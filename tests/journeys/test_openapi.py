@@ -22,7 +22,7 @@ EXCLUDED = [checks.positive_data_acceptance]
 @pytest.fixture(scope="module")
 def api(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """A service that knows one clutch with three tests."""
-    with serving(tmp_path_factory.mktemp("api") / "clutchlife.db") as server:
+    with serving(tmp_path_factory.mktemp("api") / "clutchlife.db", loaded=True) as server:
         httpx2.post(f"{server.url}/v1/clutches", json={"clutch_id": "c1"})
         for cycles in (0, 1000, 2000):
             httpx2.post(f"{server.url}/v1/clutches/c1/runs", json=stationary(cycles, run_id=f"r{cycles}"))

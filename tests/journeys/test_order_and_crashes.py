@@ -31,7 +31,10 @@ def test_the_order_of_arrival_does_not_matter(tmp_path: Path) -> None:
     answers = []
     for seed in (None, 1, 2):
         order = np.arange(len(bodies)) if seed is None else np.random.default_rng(seed).permutation(len(bodies))
-        with serving(tmp_path / f"{seed}.db") as server, httpx2.Client(base_url=server.url, timeout=60) as http:
+        with (
+            serving(tmp_path / f"{seed}.db", loaded=True) as server,
+            httpx2.Client(base_url=server.url, timeout=60) as http,
+        ):
             http.post("/v1/clutches", json={"clutch_id": "c1"})
             for index in order:
                 assert http.post(f"{BASE}/runs", json=bodies[index]).status_code == 201
@@ -135,7 +138,7 @@ def test_a_rebuild_starts_a_new_life(http: httpx2.Client) -> None:
 
 @pytest.mark.parametrize("delay", [0.002, 0.01, 0.02, 0.05])
 def test_a_kill_loses_nothing_that_was_acknowledged(tmp_path: Path, delay: float) -> None:
-    server = Server(tmp_path / "clutchlife.db")
+    server = Server(tmp_path / "clutchlife.db", loaded=True)
     server.start()
     acknowledged: list[str] = []
     with httpx2.Client(base_url=server.url, timeout=60) as http:

@@ -41,7 +41,7 @@ def test_what_cannot_be_read_cannot_be_headed(client: TestClient) -> None:
 
 def test_over_a_socket_the_connection_stays_usable(tmp_path: Path) -> None:
     """A body that was announced and sent would be read as the next answer."""
-    with serving(tmp_path / "a.db") as server, httpx2.Client(base_url=server.url, timeout=30) as http:
+    with serving(tmp_path / "a.db", loaded=True) as server, httpx2.Client(base_url=server.url, timeout=30) as http:
         for _ in range(3):
             head = http.head("/v1/clutches")
             assert (head.status_code, head.content) == (200, b"")

@@ -36,9 +36,8 @@ class Watched:
     """A service that runs, with a clutch that has a run, and the memory that its processes take."""
 
     def __init__(self, server: Server, client: httpx2.Client) -> None:
-        assert server.process is not None
         self.http = client
-        self._pid = server.process.pid
+        self._pid = server.pid
         client.post("/v1/clutches", json={"clutch_id": "c1"})
         client.post(f"{CLUTCH}/runs", json=stationary(0, run_id="known"))
         self.before = self.state()
