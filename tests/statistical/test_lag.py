@@ -47,18 +47,18 @@ def _made(law: Law, parameters: StribeckParameters, value: float) -> np.ndarray:
 
 
 def _loops(law: Law, records: int, rng: np.random.Generator) -> Iterator[tuple]:
-    """The lag, the true curve, the samples and the swing of records of both curves by turns."""
+    """The lag, the true curve, its torque, the samples and the swing of records of both curves by turns."""
     for i in range(records):
         parameters = (FALLING, RISING)[i % 2]
         value = float(np.exp(rng.uniform(*np.log([50.0, 500.0] if law is ATTRACTOR else [0.02, 0.3]))))
-        time, speed, measured = _dirty(_made(law, parameters, value), rng)
+        torque = _made(law, parameters, value)
+        time, speed, measured = _dirty(torque, rng)
         cycle = fit_cycle(time, speed)
-        yield value, parameters, clean_samples(cycle, time, measured), cycle
+        yield value, parameters, torque, clean_samples(cycle, time, measured), cycle
 
 
 def _records(law: Law, records: int) -> Iterator[tuple]:
-    for value, parameters, samples, cycle in _loops(law, records, np.random.default_rng(SEED)):
-        torque = _made(law, parameters, value)
+    for value, parameters, torque, samples, cycle in _loops(law, records, np.random.default_rng(SEED)):
         area = float(np.trapezoid(torque[PERIOD], velocity(FINE)[PERIOD]))
         curve = StationaryCurve(parameters=parameters)
         yield value, area, area_of(cycle, samples), fit_lag(law, cycle, samples.phase, samples.torque, curve)
@@ -94,7 +94,7 @@ def test_intervals_hold_what_they_promise_with_curves_that_were_fitted(law, reco
     rng = np.random.default_rng([SEED, 2])
     speeds = GEOMETRY.sliding_velocity(np.arange(20.0, 1971.0, 50.0) * np.pi / 30)
     held: dict[str, list[bool]] = {"determined": [], "undetermined": [], "taken for exact": []}
-    for number, (value, law_of, samples, cycle) in enumerate(_loops(law, records, rng)):
+    for number, (value, law_of, _, samples, cycle) in enumerate(_loops(law, records, rng)):
         truth = 1 / value if law is ATTRACTOR else value
         noise = np.exp(rng.uniform(*np.log([0.003, 0.01]))) * rng.standard_normal(speeds.size)
         stationary = Curve(
