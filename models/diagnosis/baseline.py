@@ -1,6 +1,7 @@
 """The pooled baseline: every run of a campaign predicted by one parameter vector.
 
-    prediction = S(v; p, ζ) at plateaus,   the GMS attractor's periodic torque behind S in loops
+    prediction = S(v; p, ζ) at plateaus,   the GMS attractor's periodic torque behind S in loops,
+                 the open clutch's drag where there is no pressure
 
 with derivatives in closed form. `models.diagnosis.fitting` fits it.
 """
@@ -12,7 +13,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis.design import Design
 from models.diagnosis.lagging import Lag, lag_of
-from models.diagnosis.laws import BLOCK, DRIFT, LOG_DECAY, RATIO, Frame, Laws, Scene, scene_of
+from models.diagnosis.laws import BLOCK, DRIFT, LOG_DECAY, OPEN_DRAG, POWERS, RATIO, Frame, Laws, Scene, scene_of
 from models.diagnosis.loop_bins import PHASES
 
 
@@ -46,22 +47,24 @@ class Prediction:
         columns = np.zeros((rows.run.size, laws.theta.size))
         columns[:, :LOG_DECAY] = (by_parameters[:, :, None] * slopes).reshape(-1, 4 * BLOCK)
         columns[:, LOG_DECAY] = by_parameters[:, RATIO] * by_decay
+        columns[:, OPEN_DRAG] = design.to_rows(self.scene.open_powers)
         if self.lag is not None:
             slowness = design.to_rows(np.append(np.zeros(design.plateaus), self.lag.by_log_attractor))
             looping = slice(design.plateaus, None)
             weights = laws.log_attractor(rows.pressure[looping], rows.cycles[looping])[1]
-            columns[looping, DRIFT:] = slowness[looping, None] * weights
+            columns[looping, DRIFT:-POWERS] = slowness[looping, None] * weights
         return columns
 
 
 def frame_of(design: Design) -> Frame:
     """The frame of a design's laws."""
-    pressures = np.unique(design.level)
+    pressures, looping = design.levels, design.closed[design.plateaus :]
+    of_loops = np.unique(design.level[design.plateaus :][looping])
     return Frame(
         lowest=float(pressures[0]),
         highest=float(pressures[-1]),
         last=float(design.facts.states[-1]),
-        loop_pressures=np.unique(design.level[design.plateaus :]),
+        loop_pressures=of_loops if of_loops.size or not design.loops else pressures[:1],
         reference_velocity=0.5 * float(design.rows.velocity.max()),
     )
 
@@ -77,4 +80,5 @@ def predict(design: Design, laws: Laws) -> Prediction:
         frequency = points.angular_frequency[first]
         lag = lag_of(scene.curve[start:].reshape(design.loops, PHASES), attractor[:, None], frequency)
         at_points = np.concatenate([scene.curve[:start], lag.torque.ravel()])
+    at_points = at_points + scene.open_powers @ laws.theta[OPEN_DRAG]
     return Prediction(torque=design.to_rows(at_points), scene=scene, lag=lag)

@@ -1,12 +1,13 @@
 """Smooth contrasts: shapes of structure that any unknown cause might have, each on the axes on which it lives.
 
 They are relative to the predicted torque (structure in friction scales with it) and are products of cosines over the
-ranges of pressure, speed, clock and torque and over the rank of life, bumps in speed, waves over a loop's phase, and single
-states. Axes are public channel names, or `test_clock_s`, `cycles`, `loop_phase`.
+ranges of pressure, speed, clock and torque and over the rank of life, bumps and bends in speed, waves over a loop's
+phase, and single states. Axes are public channel names, or `test_clock_s`, `cycles`, `loop_phase`.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 from typing import TypeAlias
 
 import numpy as np
@@ -35,11 +36,12 @@ class Contrasts:
 
 def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
     """Every contrast that the design can show."""
-    rows, torque = design.rows, np.abs(prediction.torque)
+    rows = design.rows
+    torque = rows.engaged * np.abs(prediction.torque)  # with the clutch open there is no friction to be wrong
     steady, looping = rows.steady.astype(np.float64), 1.0 - rows.steady
     speed, pressure = _unit(rows.velocity), _unit(rows.pressure)
     life = _rank(rows.cycles)
-    states, levels = design.facts.states.size, np.unique(design.level).size
+    states, levels = design.facts.states.size, design.levels.size
     lives, presses = min(states - 1, 3), min(levels - 1, 2)
     columns: list[FloatArray] = []
     axes: list[str] = []
@@ -55,12 +57,14 @@ def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
             add(SPEED if s > p + 1 else PRESSURE, _cosine(s, speed) * _cosine(p, pressure) * steady)
         for z in range(1, lives + 1):
             add(SPEED if s > z + 1 else CYCLES, _cosine(s, speed) * _cosine(z, life) * steady)
-    for centre in np.linspace(0.06, 0.94, 9):
-        for width in (0.06, 0.14):
-            bump = np.exp(-0.5 * ((speed - centre) / width) ** 2)
-            add(SPEED, bump)
-            if lives:
-                add(SPEED, bump * _cosine(1, life))
+    for p, z, s in product(range(1, presses + 1), range(1, min(lives, 2) + 1), range(1, 4)):
+        add(SPEED if s > max(p, z) else PRESSURE, _cosine(s, speed) * _cosine(p, pressure) * _cosine(z, life))
+    for centre in np.linspace(0.06, 0.94, 13):
+        for width in (0.05, 0.11):
+            add(SPEED, _bump(speed, centre, width))
+        add(SPEED, (speed - centre) * _bump(speed, centre, 0.08))
+        if lives:
+            add(SPEED, _bump(speed, centre, 0.1) * _cosine(1, life))
     for p in range(1, min(levels - 1, 6) + 1):
         add(PRESSURE, _cosine(p, pressure))
         for z in range(1, lives + 1):
@@ -73,8 +77,9 @@ def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
         add(CYCLES, here.astype(np.float64))
         for s in (1, 2):
             add(CYCLES, here * _cosine(s, speed) * steady)
+    reading = _unit(np.where(design.closed, torque, torque[design.closed].min()))
     for t in range(1, TORQUE_WAVES + 1):
-        add(TORQUE, _cosine(t, _unit(torque)))
+        add(TORQUE, _cosine(t, reading))
     _add_clock(design, add, steady)
     if design.loops:
         _add_loops(design, add, np.asarray(looping, dtype=np.float64), lives, presses)
@@ -119,9 +124,13 @@ def _add_loops(design: Design, add: Add, looping: FloatArray, lives: int, presse
     for s in range(4):
         add(PHASE, rising * _cosine(s, _unit(rows.velocity)))
     for way in (1.0, -1.0):
-        for centre in np.linspace(0.1, 0.9, 5):
-            bump = np.exp(-0.5 * ((_unit(rows.velocity) - centre) / 0.1) ** 2)
-            add(PHASE, bump * looping * (way * rows.acceleration > 0))
+        one_way = looping * (way * rows.acceleration > 0)
+        for centre, width in product(np.linspace(0.06, 0.94, 9), (0.06, 0.12)):
+            add(PHASE, _bump(_unit(rows.velocity), centre, width) * one_way)
+
+
+def _bump(unit: FloatArray, centre: float, width: float) -> FloatArray:
+    return np.asarray(np.exp(-0.5 * ((unit - centre) / width) ** 2), dtype=np.float64)
 
 
 def _cosine(order: int, unit: FloatArray) -> FloatArray:

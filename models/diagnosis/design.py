@@ -17,28 +17,30 @@ from models.diagnosis.campaign import Campaign, StationaryRun
 from models.diagnosis.facts import Facts, facts_of
 from models.diagnosis.loop_bins import BINS, PHASES, BinnedLoop, binned_loops
 from models.diagnosis.sample_memory import bins_remember
+from models.diagnosis.thinning import MOST_PLATEAUS, thinned
 from models.runs import pressure_levels
 
 #: Time on one plateau [s] where nothing else is known (the reference's section 2.3.3).
 PLATEAU_DURATION = 5.0
-#: A run keeps at most this many plateaus (evenly taken), a campaign about this many rows (states evenly taken).
-MOST_PLATEAUS, MOST_ROWS = 2000, 40_000
-#: Loops of so many states (evenly taken, the first and the last among them) say what more would say.
-MOST_LOOP_STATES = 12
+#: Below this share of the highest pressure the clutch is open: no lining touches.
+OPEN = 0.01
 
 IntArray = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Points:
-    """Columns [n]: run (index into Design.runs), cycles, pressure [Pa], velocity [m/s] >= 0, sign ±1, acceleration
-    [m/s²] (of the folded velocity), temperature of the oil [K] (NaN where not measured), clock [s] since the test began,
-    moment [s] (NaN where unknown), angular_frequency [rad/s] (0 at plateaus), phase [rad], loop (index, -1 at plateaus)
-    and previous (the index of the plateau before it in the same run, -1 where there is none)."""
+    """Columns [n]: run (index into Design.runs), cycles, pressure [Pa], engaged (1, or 0 where the clutch is open; the
+    pressure there is the campaign's lowest closed one, for laws are asked for none beyond, and what they say is no friction
+    that acts), velocity [m/s] >= 0, sign ±1, acceleration [m/s²] (of the folded velocity), temperature of the oil [K] (NaN
+    where not measured), clock [s] since the test began, moment [s] (NaN where unknown), angular_frequency [rad/s] (0 at
+    plateaus), phase [rad], loop (index, -1 at plateaus) and previous (the index of the plateau before it in the same run,
+    -1 where there is none)."""
 
     run: IntArray
     cycles: FloatArray
     pressure: FloatArray
+    engaged: FloatArray
     velocity: FloatArray
     sign: FloatArray
     acceleration: FloatArray
@@ -73,11 +75,11 @@ class RunInfo:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Design:
     """Points [P] (plateaus first, then PHASES points a loop), rows [N] (plateaus first, then the loops' bins), measured
-    torque [N] Nm (folded), `samples` [N] averaged in each row, `torque_sd` [N] Nm as sent (NaN where not), `level` [N]
-    Pa the pressure level, `curve` [N] an index that run and level share, `bins` [N - plateaus] which bin of the flat
-    (loop, bin) order each loop row is, `chains` [b, n] rows that follow each other in a run or loop, those of one length
-    together, `bins_remember` the correlations of neighbouring bins, and of those next but one, that the loops' samples tell
-    (None: they do not), `notes` what was left out."""
+    torque [N] Nm (folded), `samples` [N] averaged in each row, `torque_sd` [N] Nm as sent (NaN where not), `level` [N] Pa
+    the pressure level (0 where the clutch is open), `curve` [N] an index that run and level share, `bins` [N - plateaus]
+    which bin of the flat (loop, bin) order each loop row is, `chains` [b, n] rows that follow each other in a run or loop,
+    those of one length together, `bins_remember` the correlations of neighbouring bins, and of those next but one, that the
+    loops' samples tell (None: they do not), `notes` what was left out."""
 
     points: Points
     rows: Points
@@ -95,6 +97,21 @@ class Design:
     facts: Facts
     notes: tuple[str, ...]
 
+    @property
+    def closed(self) -> NDArray[np.bool_]:
+        """[N] whether the clutch is closed: there is friction, and its pressure means something."""
+        return self.rows.engaged > 0
+
+    @property
+    def levels(self) -> FloatArray:
+        """The distinct pressure levels [l] Pa of the closed clutch, ascending."""
+        return np.unique(self.level[self.closed])
+
+    @property
+    def usual_torque(self) -> float:
+        """The median of the closed clutch's torque [Nm], kept off 0."""
+        return max(float(np.median(np.abs(self.torque[self.closed]))) if self.closed.any() else 0.0, 1e-12)
+
     def to_rows(self, at_points: FloatArray) -> FloatArray:
         """[P, ...] at points -> [N, ...] at rows: bins are the means of their points."""
         if not self.loops:
@@ -109,7 +126,7 @@ class Design:
 def build_design(campaign: Campaign) -> Design:
     """All rows of a campaign. Never raises on a campaign that checked itself; may have no rows."""
     notes: list[str] = []
-    kept = _thinned(campaign, notes)
+    kept = thinned(campaign, notes)
     runs: list[RunInfo] = []
     blocks: list[Points] = []
     torques, deviations, samples = [], [], []
@@ -149,7 +166,7 @@ def _assembled(
     campaign: Campaign,
     notes: tuple[str, ...],
 ) -> Design:
-    points = _joined(blocks)
+    points = _opened(_joined(blocks))
     filled = np.concatenate([loop.samples for loop in loops]) if loops else np.zeros(0)
     bins = np.flatnonzero(filled > 0)
     per_bin = PHASES // BINS
@@ -159,7 +176,8 @@ def _assembled(
         torques = [*torques, np.concatenate([loop.torque for loop in loops])[bins]]
         samples = [*samples, filled[bins]]
         deviations = [*deviations, np.full(bins.size, np.nan)]
-    level = pressure_levels(rows.pressure) if rows.run.size else np.zeros(0)
+    level, closed = np.zeros(rows.run.size), rows.engaged > 0
+    level[closed] = pressure_levels(rows.pressure[closed]) if closed.any() else 0.0
     _, curve = np.unique(np.stack([rows.run, level]), axis=1, return_inverse=True)
     return Design(
         points=points,
@@ -180,6 +198,13 @@ def _assembled(
     )
 
 
+def _opened(points: Points) -> Points:
+    """With what is measured below the share OPEN of the highest pressure marked as open."""
+    closed = points.pressure > OPEN * points.pressure.max(initial=0.0)
+    lowest = float(points.pressure[closed].min()) if closed.any() else 1.0
+    return replace(points, engaged=closed.astype(np.float64), pressure=np.where(closed, points.pressure, lowest))
+
+
 def _chains(rows: Points) -> tuple[IntArray, ...]:
     """Rows [b, n] that follow each other in runs of plateaus, then in loops, those of one length together."""
     owner = np.where(rows.steady, rows.run, rows.loop + int(rows.run.max(initial=0)) + 1)
@@ -194,50 +219,14 @@ def _chains(rows: Points) -> tuple[IntArray, ...]:
     return tuple(found)
 
 
-def _thinned(campaign: Campaign, notes: list[str]) -> Campaign:
-    """The campaign with states left out evenly where it is too large; the first and the last stay."""
-    campaign = _with_fewer_loops(campaign, notes)
-    states = np.unique([*(run.cycles for run in campaign.stationary), *(run.cycles for run in campaign.dynamic)])
-    size = sum(min(run.plateaus.torque.size, MOST_PLATEAUS) for run in campaign.stationary)
-    size += sum(8 * BINS for _ in campaign.dynamic)
-    if size <= MOST_ROWS or states.size < 3:
-        return campaign
-    keep = _evenly(states, max(2, int(states.size * MOST_ROWS / size)))
-    notes.append(
-        f"{states.size - len(keep)} of {states.size} states were left out, evenly: the campaign is very large."
-    )
-    return Campaign(
-        geometry=campaign.geometry,
-        oil=campaign.oil,
-        cof_fraction=campaign.cof_fraction,
-        stationary=tuple(run for run in campaign.stationary if run.cycles in keep),
-        dynamic=tuple(run for run in campaign.dynamic if run.cycles in keep),
-        duty=campaign.duty,
-        maintenance=campaign.maintenance,
-    )
-
-
-def _with_fewer_loops(campaign: Campaign, notes: list[str]) -> Campaign:
-    states = np.unique([run.cycles for run in campaign.dynamic])
-    if states.size <= MOST_LOOP_STATES:
-        return campaign
-    keep = _evenly(states, MOST_LOOP_STATES)
-    notes.append(f"Dynamic tests of {len(keep)} of {states.size} states were taken, evenly: there are very many.")
-    return replace(campaign, dynamic=tuple(run for run in campaign.dynamic if run.cycles in keep))
-
-
-def _evenly(states: FloatArray, count: int) -> set[float]:
-    return set(states[np.linspace(0, states.size - 1, count).round().astype(int)].tolist())
-
-
 def _plateaus(
     run: StationaryRun, campaign: Campaign, index: int, offset: int, notes: list[str]
 ) -> tuple[Points, FloatArray, FloatArray]:
-    """Points, folded torque and torque_sd of a run's plateaus that have pressure; `offset` is its first row."""
+    """Points, folded torque and torque_sd of a run's plateaus in motion; `offset` is its first row."""
     table = run.plateaus
-    usable = np.flatnonzero((table.pressure > 0) & (table.speed != 0))
+    usable = np.flatnonzero(table.speed != 0)
     if usable.size < table.torque.size:
-        notes.append(f"{run.run_id}: {table.torque.size - usable.size} plateaus at rest or without pressure left out.")
+        notes.append(f"{run.run_id}: {table.torque.size - usable.size} plateaus at rest left out.")
     if usable.size > MOST_PLATEAUS:
         notes.append(f"{run.run_id}: {MOST_PLATEAUS} of {usable.size} plateaus taken, evenly.")
         usable = usable[np.linspace(0, usable.size - 1, MOST_PLATEAUS).round().astype(int)]
@@ -253,6 +242,7 @@ def _plateaus(
         run=np.full(count, index, dtype=np.intp),
         cycles=np.full(count, float(run.cycles)),
         pressure=table.pressure[usable],
+        engaged=np.ones(count),
         velocity=np.abs(velocity),
         sign=sign,
         acceleration=np.zeros(count),
@@ -273,6 +263,7 @@ def _loop_points(loop: BinnedLoop, run: int, number: int, cycles: float, moment:
         run=np.full(count, run, dtype=np.intp),
         cycles=np.full(count, float(cycles)),
         pressure=np.full(count, loop.pressure),
+        engaged=np.ones(count),
         velocity=loop.velocity,
         sign=np.full(count, loop.sign),
         acceleration=loop.acceleration,

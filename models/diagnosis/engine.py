@@ -101,13 +101,13 @@ def _diagnosed(campaign: Campaign, design: Design, without: frozenset[str], rng:
 
 def missing_for_baseline(design: Design) -> str:
     """What is missing for a pooled baseline, or nothing."""
-    if design.plateaus < FEWEST_ROWS:
-        return f"there are {design.plateaus} plateaus of stationary tests, and at least {FEWEST_ROWS} are needed."
-    steady = design.rows.velocity[: design.plateaus]
+    steady = design.rows.velocity[design.closed & design.rows.steady]
+    if steady.size < FEWEST_ROWS:
+        return f"there are {steady.size} plateaus of stationary tests, and at least {FEWEST_ROWS} are needed."
     speeds = np.unique(np.round(steady / float(steady.max()), 3)).size
     if speeds < FEWEST_SPEEDS:
         return f"there are {speeds} distinct speeds, and at least {FEWEST_SPEEDS} are needed for a Stribeck curve."
-    usual, largest = float(np.median(np.abs(design.torque))), float(np.abs(design.torque).max())
+    usual, largest = design.usual_torque, float(np.abs(design.torque).max())
     if not (usual > LEAST_TORQUE and largest < MOST_TORQUE):
         return f"torques of {usual:.3g} Nm in the median and {largest:.3g} Nm at most are no clutch's."
     return ""

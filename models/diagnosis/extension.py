@@ -21,7 +21,7 @@ from models.diagnosis.design import Points, build_design
 from models.diagnosis.effect import Kind
 from models.diagnosis.facts import Facts, facts_of
 from models.diagnosis.fitting import Fit
-from models.diagnosis.laws import Frame, Laws, scene_of
+from models.diagnosis.laws import ATTRACTOR, POWERS, Frame, Laws, scene_of
 from models.runs import Plateaus
 
 #: Plateaus are handed on in parts of this many: a design takes no more of one run.
@@ -191,7 +191,9 @@ def _stored(weight: float, fit: Fit, deviations: Sequence[float]) -> dict[str, A
 def _laws(alternative: Mapping[str, Any]) -> Laws:
     frame = alternative["frame"]
     at = Frame(**(frame | {"loop_pressures": np.array(frame["loop_pressures"], dtype=np.float64)}))
-    return Laws(theta=np.array(alternative["theta"], dtype=np.float64), frame=at)
+    theta = np.array(alternative["theta"], dtype=np.float64)
+    older = ATTRACTOR + at.loop_pressures.size + POWERS - theta.size  # stored before the open clutch had a drag
+    return Laws(theta=np.append(theta, np.zeros(older)), frame=at)
 
 
 def _steady_points(cycles: FloatArray, pressure: FloatArray, velocity: FloatArray) -> Points:
@@ -203,6 +205,7 @@ def _steady_points(cycles: FloatArray, pressure: FloatArray, velocity: FloatArra
         run=whole,
         cycles=cycles,
         pressure=pressure,
+        engaged=np.ones(count),
         velocity=velocity,
         sign=np.ones(count),
         acceleration=zero,

@@ -15,11 +15,13 @@ from models.diagnosis import amplitude
 from models.diagnosis.baseline import Prediction, predict
 from models.diagnosis.design import Design
 from models.diagnosis.effect import Effect, Shape
-from models.diagnosis.laws import ATTRACTOR, BLOCK, DRIFT, LOG_DECAY, Frame, Laws
+from models.diagnosis.laws import ATTRACTOR, BLOCK, DRIFT, KAPPA, LOG_DECAY, OPEN_DRAG, POWERS, Frame, Laws
 from models.diagnosis.whitening import Noise, gains_of, whitened, without_gains
 
 #: How alike the two shares of one law are expected to drift [-].
 ALIKE_SD = 0.1
+#: The open clutch's drag is expected to be some such share of the usual torque.
+_DRAG_SD = 0.3
 _LARGEST_STEP = 1.5
 #: Columns [N, m] with noise and gains whitened.
 Whiten: TypeAlias = Callable[[FloatArray], FloatArray]
@@ -61,7 +63,7 @@ class Fit:
 def priors_of(design: Design, start: FloatArray, frame: Frame) -> Priors:
     """Weak priors around scales of the data, and what cannot be told at all held fast."""
     size = start.size
-    level = max(float(np.median(np.abs(design.torque))), 1e-12)
+    level = design.usual_torque
     fastest = float(design.rows.velocity.max())
     sds, means = np.full(size, np.nan), start.copy()
     spreads = {0: 10 * level, 1: 3.0, 2: 3 * fastest, 3: 10 * level}
@@ -71,7 +73,8 @@ def priors_of(design: Design, start: FloatArray, frame: Frame) -> Priors:
         means[block + 2 : block + BLOCK] = [0.0, 0.0, np.log(0.5 * design.facts.life), np.log(0.8)]
     sds[LOG_DECAY], means[LOG_DECAY] = 0.7, np.log(0.6 * frame.span)
     sds[DRIFT:ATTRACTOR], means[DRIFT:ATTRACTOR] = (0.6, 0.2, 0.3), 0.0
-    sds[ATTRACTOR:], means[ATTRACTOR:] = 1.5, np.log(12 * level)
+    sds[KAPPA], means[KAPPA] = 1.5, np.log(12 * level)
+    sds[OPEN_DRAG], means[OPEN_DRAG] = _DRAG_SD * level, 0.0
     rows = np.diag(1 / sds)
     alike = np.zeros((4, size))
     for k in range(4):
@@ -84,8 +87,9 @@ def priors_of(design: Design, start: FloatArray, frame: Frame) -> Priors:
 
 
 def _free(design: Design, size: int) -> NDArray[np.bool_]:
-    states, levels = design.facts.states.size, np.unique(design.level).size
-    loop_states = np.unique(design.rows.cycles[design.plateaus :]).size
+    closed = design.closed
+    states, levels = np.unique(design.rows.cycles[closed]).size, design.levels.size
+    loop_states = np.unique(design.rows.cycles[design.plateaus :][closed[design.plateaus :]]).size
     free = np.ones(size, dtype=np.bool_)
     for k in range(4):
         block = k * BLOCK
@@ -94,6 +98,7 @@ def _free(design: Design, size: int) -> NDArray[np.bool_]:
         free[block + 4 : block + 6] = states > 2
     free[LOG_DECAY] = levels > 2
     free[DRIFT:ATTRACTOR] = loop_states > 1, loop_states > 2, loop_states > 1 and levels > 1
+    free[OPEN_DRAG] = not closed.all()
     return free
 
 
@@ -240,7 +245,7 @@ def _moved(state: Fit, priors: Priors, step: FloatArray) -> tuple[Laws, tuple[Fi
     for k in range(4):
         block = k * BLOCK
         move[block + 2 : block + BLOCK] = np.clip(move[block + 2 : block + BLOCK], -_LARGEST_STEP, _LARGEST_STEP)
-    move[LOG_DECAY:] = np.clip(move[LOG_DECAY:], -_LARGEST_STEP, _LARGEST_STEP)
+    move[LOG_DECAY:-POWERS] = np.clip(move[LOG_DECAY:-POWERS], -_LARGEST_STEP, _LARGEST_STEP)
     theta = state.laws.theta + move
     for k in range(4):
         theta[k * BLOCK + 4 : k * BLOCK + 6] = np.clip(theta[k * BLOCK + 4 : k * BLOCK + 6], -3.0, 25.0)

@@ -21,9 +21,12 @@ from models.diagnosis.baseline import Prediction, predict
 from models.diagnosis.bending import BEND, bends
 from models.diagnosis.design import Design, Points
 from models.diagnosis.fitting import Fit, Fitted, Priors, effect_columns, effect_precisions, effect_rows
+from models.diagnosis.laws import OPEN_DRAG
 from models.diagnosis.projection import Gram, gram_of, project
 from models.diagnosis.whitening import Noise
 
+#: Noise without torque is at least this share of the usual: what was measured under torque only says little of it.
+LEAST_NOISE = 0.2
 #: A shape within this share of its range of a bound is at it.
 AT_BOUND = 0.01
 _RANGES = ("velocity", "cycles", "clock")
@@ -43,6 +46,9 @@ class Foretold:
     """Distances of candidates, on what was measured and with rows to come."""
 
     def __init__(self, design: Design, noise: Noise, priors: Priors, fits: tuple[Fit, ...]) -> None:
+        free = priors.free.copy()
+        free[OPEN_DRAG] = True  # a trial with the clutch open brings a drag that nobody knows yet
+        priors = replace(priors, free=free)
         self._design, self._noise, self._priors, self._fits = design, noise, priors, fits
         view = _Rows(
             design=design,
@@ -137,7 +143,8 @@ def _joined(first: Gram, second: Gram) -> Gram:
 
 
 def _noise_law(design: Design, noise: Noise, torque: FloatArray) -> FloatArray:
-    """(a², b²) [2, 2] of plateaus and of loops, σ² = (a² + b² M²)/n as `models.diagnosis.noise` has it."""
+    """(a², b²) [2, 2] of plateaus and of loops, σ² = (a² + b² M²)/n as `models.diagnosis.noise` has it; a² is no less than
+    LEAST_NOISE has it."""
     steady = np.arange(design.torque.size) < design.plateaus
     variance = noise.deviation**2 * design.samples
     found = []
@@ -145,7 +152,8 @@ def _noise_law(design: Design, noise: Noise, torque: FloatArray) -> FloatArray:
         part = part if part.any() else ~part
         columns = np.stack([np.ones(int(part.sum())), torque[part] ** 2], axis=1) / variance[part, None]
         scale = columns.mean(axis=0)
-        found.append(nnls(columns / scale, np.ones(columns.shape[0]))[0] / scale)
+        law = nnls(columns / scale, np.ones(columns.shape[0]))[0] / scale
+        found.append([max(law[0], LEAST_NOISE**2 * float(np.median(variance[part]))), law[1]])
     return np.array(found)
 
 

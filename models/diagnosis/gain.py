@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from models.diagnosis.design import Design
 from models.diagnosis.fitting import Fit, Priors, effect_columns, effect_precisions, fit
-from models.diagnosis.laws import ATTRACTOR, Laws
+from models.diagnosis.laws import KAPPA, Laws
 from models.diagnosis.report import Gain
 from models.diagnosis.whitening import Noise, gains_of, whitened, without_gains
 
@@ -79,20 +79,21 @@ def measure_gain(
 
 def _folds(design: Design) -> list[BoolArray]:
     folds = []
-    states, levels = np.unique(design.rows.cycles), np.unique(design.level)
+    # readings of the open clutch hold no friction to foretell: they are never left out
+    states, levels = np.unique(design.rows.cycles[design.closed]), design.levels
     if states.size >= 3:
         inner = min(STATE_FOLDS, states.size)
         # neighbouring states go into different folds
-        folds += [np.isin(design.rows.cycles, states[start::inner]) for start in range(inner)]
+        folds += [design.closed & np.isin(design.rows.cycles, states[start::inner]) for start in range(inner)]
     if levels.size >= 4:
         folds += [np.isin(design.level, levels[1:][start::PRESSURE_FOLDS]) for start in range(PRESSURE_FOLDS)]
     return folds
 
 
 def _ahead(design: Design) -> BoolArray | None:
-    states = np.unique(design.rows.cycles)
+    states = np.unique(design.rows.cycles[design.closed])
     count = max(1, round(FORWARD_SHARE * states.size))
-    return design.rows.cycles >= states[-count] if states.size >= 4 else None
+    return design.closed & (design.rows.cycles >= states[-count]) if states.size >= 4 else None
 
 
 def _without(noise: Noise, out: BoolArray) -> Noise:
@@ -149,7 +150,7 @@ def _bridged(laws: Laws, design: Design, out: BoolArray) -> Laws:
     if known.all() or not known.any():
         return laws
     theta = laws.theta.copy()
-    theta[ATTRACTOR:] = np.interp(nodes, nodes[known], theta[ATTRACTOR:][known])
+    theta[KAPPA] = np.interp(nodes, nodes[known], theta[KAPPA][known])
     return replace(laws, theta=theta)
 
 

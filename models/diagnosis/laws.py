@@ -7,6 +7,7 @@ highest pressure,
     w         = (P⁺ - p)/(P⁺ - P⁻)                               for M_s, V_S, C_v: straight lines in pressure
     w         = (e^{-(p - P⁻)/p_0} - E)/(1 - E),  E = e^{-(P⁺ - P⁻)/p_0}      for M̄_c: c_∞ + a e^{-p/p_0}
     log C          = κ(p) + d_1 x + d_2 x² + d_3 x (p - p̄)/(P⁺ - P⁻),       x = ζ/ζ_last
+    open clutch    = Σ_k o_k (v/v_0)^k,  k = 1 ... 4                           whatever oil it drags along, and no friction
 
 (φ, ε) stand in θ as (log h, log ε) with h the half-life, D(h) = 1/2: φ = h/(2^{1/ε} - 1). Data tell h far better than φ.
 u⁻, u⁺ are the fresh values at the two ends of the pressures; intercept and slope (asymptote and excess) drift each by its
@@ -29,10 +30,13 @@ from models.stribeck import GAMMA
 #: The laws of eq. 6 over pressure, in the order of `models.stribeck.PARAMETER_NAMES`; each has six places in θ.
 BLOCK = 6
 #: θ: four blocks of (low end, high end, share low, share high, log h, log ε); log p_0;
-#: d_1, d_2, d_3; then κ at each pressure of the loops.
+#: d_1, d_2, d_3; then κ at each pressure of the loops; then o_1 ... o_4 of the open clutch.
 LOG_DECAY = 4 * BLOCK
 DRIFT = LOG_DECAY + 1
 ATTRACTOR = DRIFT + 3
+#: Drag that rises and falls again is followed to a percent by so many powers; with two, what is left would pass for a zero.
+POWERS = 4
+KAPPA, OPEN_DRAG = slice(ATTRACTOR, -POWERS), slice(-POWERS, None)
 RATIO = 1  # the place of M̄_c among the four
 _LEAST_VELOCITY = 1e-3
 
@@ -56,7 +60,7 @@ class Frame:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Laws:
-    """theta [ATTRACTOR + loop pressures] and the frame that it is in."""
+    """theta [ATTRACTOR + loop pressures + POWERS] and the frame that it is in."""
 
     theta: FloatArray
     frame: Frame
@@ -118,7 +122,7 @@ class Laws:
         x = cycles / max(self.frame.last, 1.0)
         tilt = (pressure - 0.5 * (self.frame.lowest + self.frame.highest)) / self.frame.span
         columns = np.concatenate([np.stack([x, x * x, x * tilt], axis=-1), weights], axis=-1)
-        return columns @ self.theta[DRIFT:], columns
+        return columns @ self.theta[DRIFT:-POWERS], columns
 
 
 def falling_weight(high: FloatArray, span: float, log_decay: float) -> tuple[FloatArray, FloatArray]:
@@ -154,7 +158,8 @@ def curve(velocity: FloatArray, parameters: FloatArray) -> FloatArray:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
     """Points and what the baseline says there, all [P]: curve S [Nm]; parameters [P, 4] and gradient [P, 4] = ∂S by them;
-    decay e = exp(-V_S/v); by_velocity ∂S/∂v [Nm s/m]."""
+    decay e = exp(-V_S/v); by_velocity ∂S/∂v [Nm s/m]. With the clutch open there is no friction: all but parameters
+    and e is 0."""
 
     points: Points
     facts: Facts
@@ -174,7 +179,15 @@ class Scene:
     @property
     def viscous(self) -> FloatArray:
         """The viscous part C_v v^γ [P] Nm."""
-        return np.asarray(self.parameters[:, 3] * self.points.velocity**GAMMA, dtype=np.float64)
+        carried = self.points.engaged * self.parameters[:, 3] * self.points.velocity**GAMMA
+        return np.asarray(carried, dtype=np.float64)
+
+    @property
+    def open_powers(self) -> FloatArray:
+        """(v/v_0)^k [P, POWERS] with the clutch open, 0 elsewhere: what its drag is made of."""
+        relative = self.points.velocity / self.laws.frame.reference_velocity
+        powers = relative[:, None] ** np.arange(1, POWERS + 1)
+        return np.asarray((1.0 - self.points.engaged)[:, None] * powers, dtype=np.float64)
 
     def curve_at(
         self,
@@ -188,7 +201,7 @@ class Scene:
         at = self.parameters
         if cycles is not None or pressure is not None:
             at = self.laws.parameters(p, self.points.cycles if cycles is None else cycles)
-        return curve(self.points.velocity if velocity is None else velocity, at)
+        return self.points.engaged * curve(self.points.velocity if velocity is None else velocity, at)
 
 
 def gradient_of(velocity: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -203,8 +216,9 @@ def scene_of(laws: Laws, points: Points, facts: Facts) -> Scene:
     """What the laws say at the points."""
     values = laws.parameters(points.pressure, points.cycles)
     gradient, decay = gradient_of(points.velocity, values)
+    gradient *= points.engaged[:, None]
     falling = gradient[:, 2] * values[:, 2] / points.velocity
-    by_velocity = -falling + GAMMA * values[:, 3] * points.velocity ** (GAMMA - 1.0)
+    rising = points.engaged * GAMMA * values[:, 3] * points.velocity ** (GAMMA - 1.0)
     return Scene(
         points=points,
         facts=facts,
@@ -213,5 +227,5 @@ def scene_of(laws: Laws, points: Points, facts: Facts) -> Scene:
         curve=np.asarray(values[:, 0] * gradient[:, 0] + values[:, 3] * gradient[:, 3], dtype=np.float64),
         gradient=gradient,
         decay=decay,
-        by_velocity=np.asarray(by_velocity, dtype=np.float64),
+        by_velocity=np.asarray(rising - falling, dtype=np.float64),
     )

@@ -52,7 +52,8 @@ class BinnedLoop:
 
 
 def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], list[str]]:
-    """The loops of a record that can be evaluated, and a sentence for each that cannot."""
+    """The loops of a record that can be evaluated, those without pressure too, and a sentence for each that cannot (a pause
+    between pressures is none)."""
     order = np.argsort(record.time, kind="stable")
     time, pressure = record.time[order], record.pressure[order]
     velocity, torque = geometry.sliding_velocity(record.speed[order]), record.torque[order]
@@ -61,14 +62,13 @@ def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], 
     notes: list[str] = []
     before: Cycle | None = None
     for stretch in pressure_stretches(time, pressure):
-        if stretch.pressure <= 0:
-            continue
         step = max(1, (stretch.stop - stretch.start) // MOST_SAMPLES)
         rows = slice(stretch.start, stretch.stop, step)
         sign = -1.0 if np.median(velocity[rows]) < 0 else 1.0
         cycle = _swing(time[rows], sign * velocity[rows], before)
         if isinstance(cycle, str):
-            notes.append(f"{stretch.pressure / 1e5:.3g} bar: {cycle}")
+            if stretch.pressure > 0:
+                notes.append(f"{stretch.pressure / 1e5:.3g} bar: {cycle}")
             continue
         before = cycle
         mean = float("nan") if temperature is None else float(temperature[rows].mean())

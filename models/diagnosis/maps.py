@@ -15,8 +15,8 @@ SHOWN = 3
 
 
 def residual_maps(design: Design, noise: Noise, baseline: Fit, extended: Fit | None) -> Maps | None:
-    """Means of residual over noise on plateaus (on loops where there are no plateaus); None without rows."""
-    rows = np.arange(design.plateaus) if design.plateaus else np.arange(design.torque.size)
+    """Means of residual over noise on plateaus (on loops where there are no plateaus) of the closed clutch; None without."""
+    rows = np.flatnonzero(design.closed & (design.rows.steady | (design.plateaus == 0)))
     if rows.size == 0:
         return None
     speed = design.rows.velocity[rows] / design.facts.geometry.mean_radius
@@ -59,7 +59,7 @@ def _means(values: FloatArray, row: IntArray, column: IntArray, shape: tuple[int
 def loop_traces(design: Design, baseline: Fit, extended: Fit | None) -> tuple[LoopTrace, ...]:
     """A few loops, fresh to worn and low to high pressure: a period's bins, as measured and as both models have it."""
     number = design.rows.loop
-    loops = np.unique(number[design.plateaus :])
+    loops = np.unique(number[design.plateaus :][design.closed[design.plateaus :]])
     if loops.size == 0:
         return ()
     first = np.array([np.flatnonzero(number == loop)[0] for loop in loops])

@@ -48,7 +48,7 @@ class _Piece:
 
 def first_noise(design: Design) -> Noise:
     """Before anything is fitted: the assumed share of the torque."""
-    level = float(np.median(np.abs(design.torque)))
+    level = design.usual_torque
     deviation = (ASSUMED * np.abs(design.torque) + 0.2 * ASSUMED * level + 1e-12) / np.sqrt(
         np.minimum(design.samples, 30)
     )

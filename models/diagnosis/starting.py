@@ -7,7 +7,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.degradation import progress_fraction
 from models.diagnosis.design import Design
-from models.diagnosis.laws import ATTRACTOR, BLOCK, LOG_DECAY, RATIO, Frame, Laws, falling_weight
+from models.diagnosis.laws import ATTRACTOR, BLOCK, KAPPA, LOG_DECAY, POWERS, RATIO, Frame, Laws, falling_weight
 from models.identification import fit_curves
 from models.runs import Curve
 
@@ -23,9 +23,8 @@ _DECAYS = (0.25, 0.6, 1.5)
 def starting_laws(design: Design, frame: Frame) -> Laws:
     """Laws through the curves' own fits."""
     pressure, cycles, values, deviations = _curve_values(design)
-    theta = np.zeros(ATTRACTOR + frame.loop_pressures.size)
-    level = max(float(np.median(np.abs(design.torque))), 1e-12)
-    theta[ATTRACTOR:] = np.log(12 * level)
+    theta = np.zeros(ATTRACTOR + frame.loop_pressures.size + POWERS)
+    theta[KAPPA] = np.log(12 * design.usual_torque)
     high = (pressure - frame.lowest) / frame.span
     theta[LOG_DECAY] = np.log(0.6 * frame.span)
     for k in range(4):
@@ -89,12 +88,12 @@ def _along(
 
 def _curve_values(design: Design) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Pressure [c], cycles [c], the four parameters [c, 4] and their deviations [c, 4] of the curves of a few runs."""
-    plateaus = slice(0, design.plateaus)
+    plateaus = np.flatnonzero(design.closed[: design.plateaus])
     runs = np.unique(design.rows.run[plateaus])
     chosen = runs[np.unique(np.linspace(0, runs.size - 1, min(MOST_RUNS, runs.size)).round().astype(int))]
     curves, cycles = [], []
     for index in np.unique(design.curve[plateaus]):
-        rows = np.flatnonzero(design.curve[plateaus] == index)
+        rows = plateaus[design.curve[plateaus] == index]
         if design.rows.run[rows[0]] not in chosen:
             continue
         level = float(design.level[rows[0]])

@@ -4,13 +4,15 @@ A trial is made after the last state unless it goes on to later ones. Its torque
 what it would tell hangs on where it measures.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, MaintenanceEvent, StationaryRun
-from models.diagnosis.design import PLATEAU_DURATION
+from models.diagnosis.design import OPEN, PLATEAU_DURATION
 from models.runs import Plateaus, Record, pressure_levels
 
 #: The dynamic test of the reference (section 2.3.4): a swing of 1000 rpm about 1000 rpm, sampled at 200 a period.
@@ -19,6 +21,12 @@ _SAMPLES, _PERIODS = 200, 10
 _HOUR = 3600.0
 #: Light pressures of loops, as multiples: far enough apart to be told from each other.
 LIGHT = (1.0, 1.5, 2.0)
+#: Sweeps over the speeds in a run with the clutch open: there is one pressure only, none.
+PASSES = 5
+#: Pressures of at least this share of the highest are the usual ones.
+USUAL = 0.75
+
+Run = TypeVar("Run", StationaryRun, DynamicRun)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,7 +35,8 @@ class Trial:
 
     loops: a dynamic test at `frequency` [Hz]; else a stationary test, with speeds `falling`. Either with the oil at
     `temperature` [K] (None: as usual), pressures times `pressure` [-] (of loops at LIGHT times that of the lowest one,
-    where it is not 1); `times` over, each as the first. `later`: how many usual distances between states it lies ahead,
+    where it is not 1; 0: the clutch is open, one sweep of the speeds PASSES times over, or ten periods, as one
+    run); `times` over, each as the first. `later`: how many usual distances between states it lies ahead,
     with `energy` [-] times the usual energy of an engagement up to there. `rest` [s]: a pause before the first test and
     every second one after it. `parts`: keys of the trials that it consists of, and nothing else.
     """
@@ -47,6 +56,8 @@ class Trial:
 
 _LOOPS = "dynamic test at 0.3 Hz, ten periods a pressure, 60 samples a second, 1000 ± 1000 rpm"
 _LIGHT_SWEEP = "stationary test at a quarter of the usual pressures"
+_OPEN_SWEEP = "stationary test with the clutch open (no pressure), at the usual speeds, five times over"
+_OPEN_LOOPS = "dynamic test at 0.3 Hz with the clutch open, ten periods"
 _LIGHT = "at a quarter, three eighths and a half of the lowest usual pressure"
 
 TRIALS: dict[str, Trial] = {
@@ -69,6 +80,18 @@ TRIALS: dict[str, Trial] = {
         text=f"{_LIGHT_SWEEP}, and {_LOOPS}: at the usual pressures, then {_LIGHT}, then there once more with the oil "
         "at 60 °C",
         parts=("light_sweep", "loops_0.3hz", "light_loops", "light_loops_60c"),
+    ),
+    "open_sweep": Trial(text=_OPEN_SWEEP, pressure=0.0),
+    "open_loops": Trial(text="", loops=True, frequency=0.3, pressure=0.0),
+    "open_clutch": Trial(text=f"{_OPEN_SWEEP}, and {_OPEN_LOOPS}", parts=("open_sweep", "open_loops")),
+    "open_clutch_and_light": Trial(
+        text=f"{_OPEN_SWEEP}, and {_OPEN_LOOPS}; then {_LIGHT_SWEEP}, and {_LOOPS}, {_LIGHT}",
+        parts=("open_sweep", "open_loops", "light_sweep", "light_loops"),
+    ),
+    "all_loads_and_open": Trial(
+        text=f"{_LIGHT_SWEEP}, and {_LOOPS}, at the usual pressures and then {_LIGHT}; then {_OPEN_SWEEP}, and "
+        f"{_OPEN_LOOPS}",
+        parts=("light_sweep", "loops_0.3hz", "light_loops", "open_sweep", "open_loops"),
     ),
     "sweep_60c": Trial(text="stationary test with the oil at 60 °C", temperature=333.15),
     "sweeps_60c": Trial(text="stationary test with the oil at 60 °C, three times", temperature=333.15, times=3),
@@ -100,21 +123,21 @@ TRIALS: dict[str, Trial] = {
 
 
 def runs_of(key: str) -> float:
-    """How much work a trial is, in runs: pressures that were not tried before are as much as two more, another oil
-    temperature (hours of settling, and all changes that oil changes) as ten, a state of use as three, unusual
-    engagements as four, a pause as one."""
+    """How much work a trial is, in runs: pressures that were not tried before are as much as two more (none at all is not),
+    another oil temperature (hours of settling, and all changes that oil changes) as ten, a state of use as three,
+    unusual engagements as four, a pause as one."""
     trial = TRIALS[key]
     if trial.parts:
         return sum(runs_of(part) for part in trial.parts)
     made = 3.0 * trial.later if trial.later else float(trial.times)
-    made += 2.0 * (trial.pressure != 1.0) + 4.0 * (trial.energy != 1.0) + 1.0 * (trial.rest > 0)
+    made += 2.0 * (trial.pressure not in {0.0, 1.0}) + 4.0 * (trial.energy != 1.0) + 1.0 * (trial.rest > 0)
     return made + 10.0 * (trial.temperature is not None)
 
 
 def with_trial(campaign: Campaign, key: str) -> Campaign | None:
     """The campaign with the trial's runs added at its end (torques 0), the first of those that are alike; None where the
     campaign has no pattern for it."""
-    trial, pattern = TRIALS[key], campaign.stationary[-1] if campaign.stationary else None
+    trial, pattern = TRIALS[key], _usual([(run, run.plateaus) for run in campaign.stationary])
     if trial.parts:
         whole: Campaign | None = campaign
         for part in trial.parts:
@@ -125,8 +148,8 @@ def with_trial(campaign: Campaign, key: str) -> Campaign | None:
         return None
     last = float(states[-1])
     if trial.loops:
-        run = _loops(campaign, trial, last) if campaign.dynamic else None
-        return None if run is None else replace(campaign, dynamic=(*campaign.dynamic, run))
+        swung = _usual([(run, run.record) for run in campaign.dynamic])
+        return None if swung is None else replace(campaign, dynamic=(*campaign.dynamic, _loops(swung, trial, last)))
     if pattern is None:
         return None
     step = _distance(states) if trial.later else 0.0
@@ -152,6 +175,13 @@ def with_trial(campaign: Campaign, key: str) -> Campaign | None:
     return replace(added, maintenance=(*campaign.maintenance, *rests))
 
 
+def _usual(runs: Sequence[tuple[Run, Plateaus | Record]]) -> Run | None:
+    """The last run under the usual pressures, not one of those that a trial at light pressures or none has added."""
+    highest = max((float(table.pressure.max()) for _, table in runs), default=0.0)
+    usual = [run for run, table in runs if 0.0 < USUAL * highest <= float(table.pressure.max())]
+    return usual[-1] if usual else None
+
+
 def _distance(states: FloatArray) -> float:
     """The usual distance [cycles] of two states [s >= 2] late in life."""
     return float(np.median(np.diff(states[max(0, min(states.size // 2, states.size - 2)) :])))
@@ -164,6 +194,9 @@ def _sweep(pattern: StationaryRun, trial: Trial, cycles: float, number: int, res
     rows = np.arange(table.torque.size)
     if trial.falling:
         rows = np.lexsort((-table.speed, levels))
+    if trial.pressure == 0.0:
+        closed = np.unique(levels[levels > OPEN * levels.max()])
+        rows = np.tile(rows[levels == closed[closed.size // 2]], PASSES)
     oil = table.oil_temperature
     if trial.temperature is not None:
         oil = np.full(rows.size, trial.temperature)
@@ -182,12 +215,13 @@ def _sweep(pattern: StationaryRun, trial: Trial, cycles: float, number: int, res
     )
 
 
-def _loops(campaign: Campaign, trial: Trial, cycles: float) -> DynamicRun:
-    """The pressures of the last dynamic test, or a share of them, at another frequency."""
-    record = campaign.dynamic[-1].record
+def _loops(pattern: DynamicRun, trial: Trial, cycles: float) -> DynamicRun:
+    """The pressures of a dynamic test, or a share of them, at another frequency."""
+    record = pattern.record
     levels = np.unique(pressure_levels(record.pressure[:: max(1, record.pressure.size // 5000)]))
+    levels = levels[levels > OPEN * levels.max()]
     if trial.pressure != 1.0:
-        levels = trial.pressure * float(levels[0]) * np.array(LIGHT)
+        levels = trial.pressure * float(levels[0]) * np.array(LIGHT if trial.pressure > 0.0 else LIGHT[:1])
     count = _SAMPLES * _PERIODS + 1
     step = 1.0 / (trial.frequency * _SAMPLES)
     phase = 2 * np.pi * np.arange(count) / _SAMPLES

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from tests.blind.rig.hide import hide
 from tests.blind.rig.loudness import UnreachableError, listen
 from tests.blind.rig.makers import ALL, CATALOGUED, OUTSIDE
-from tests.blind.rig.more import ASKED, TOGETHER, with_test
+from tests.blind.rig.more import ASKED, TOGETHER, drag_of, with_test
 from tests.blind.rig.plan import RADIUS, RPM
 from tests.blind.rig.refit import LEAST_GAIN, spreads, theta_at
 from tests.blind.rig.sensor import Whitening
@@ -215,3 +215,35 @@ def test_an_advised_test_is_made_with_the_same_secret(key: str) -> None:
     assert all(run.cycles >= before.stationary[-1].cycles for run in new)
     for was, now in zip(before.stationary, after.stationary, strict=False):
         np.testing.assert_array_equal(was.plateaus.torque, now.plateaus.torque)
+
+
+@pytest.mark.parametrize("slug", ["inertia_torque", "torque_zero_shift", "squeeze_film", "hydrodynamic_drag"])
+def test_an_open_clutch_has_its_own_drag_and_what_is_no_friction(slug: str) -> None:
+    hidden = hide((5, 7), (slug,), 50.0, states=4)
+    after = with_test(hidden, "open_clutch")
+    effect, amplitude = hidden.effects[0]
+    bare = replace(after, effects=())
+    sweep, loops = after.plan.sites[-2:]
+    assert not sweep.bar.any()
+    assert not loops.bar.any()
+    np.testing.assert_array_equal(sweep.clock[0], 5.0 * (np.arange(sweep.rpm.shape[1]) + 0.5))
+    drag = drag_of(hidden.seed)
+    told = read(after.plan, after.clutch, after.effects, drag=drag)[-2:]
+    for site, torque, none in zip((sweep, loops), told, read(bare.plan, bare.clutch, drag=drag)[-2:], strict=True):
+        np.testing.assert_array_equal(none, drag(site.v))
+        left = torque - none
+        assert np.abs(left).max() == 0 or effect.reading is not None
+        if slug == "torque_zero_shift":
+            assert np.abs(left).max() > 0.1 * amplitude
+        elif slug == "inertia_torque" and site is loops:
+            assert np.abs(left).max() > amplitude * 100
+    # the control: without the test nothing is drawn, and campaigns stay what they were
+    np.testing.assert_array_equal(hidden.measured[0], hide((5, 7), (slug,), 50.0, states=4).measured[0])
+    assert drag_of((5, 7))(np.array([6.0])) == drag(np.array([6.0])) != drag_of((5, 8))(np.array([6.0]))
+
+
+def test_gains_and_noise_of_an_open_clutch_are_those_of_its_little_torque() -> None:
+    after = with_test(hide((5, 6), (), states=4), "open_clutch")
+    error = after.measured[-2] - drag_of(after.seed)(after.plan.sites[-2].v)
+    sigma = after.sensor.sigma(after.plan.sites[-2], drag_of(after.seed)(after.plan.sites[-2].v))
+    assert 0.7 < error.std() / np.sqrt(np.mean(sigma**2)) < 1.4

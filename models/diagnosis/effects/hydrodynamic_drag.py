@@ -28,7 +28,8 @@ def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     logs = log_viscosity_ratio(scene.points.temperature, scene.facts.reference_temperature, scene.facts.oil)
     relative = scene.points.velocity / scene.laws.frame.reference_velocity
     share = relative**power * (1.0 + rupture) / (1.0 + rupture * relative**2)
-    return np.asarray(amplitude * share * np.exp(thinning * logs), dtype=np.float64)
+    # an open clutch drags through another gap: that is the baseline's (`Scene.open_powers`), and tells nothing of this one
+    return np.asarray(amplitude * scene.points.engaged * share * np.exp(thinning * logs), dtype=np.float64)
 
 
 EFFECT = Effect(
@@ -56,8 +57,8 @@ EFFECT = Effect(
     before_lag=None,
     bends=(Bend.SPEED, Bend.MOTION),
     tests={
-        "viscous_exponent": "a sweep with the clutch open, which shows the drag alone",
-        "interface_heating": "a sweep with the clutch open, where there is no frictional heat",
-        "baseline": "a sweep with the clutch open",
+        "viscous_exponent": "a sweep at a quarter of the usual pressures: the viscous term falls, drag stays",
+        "interface_heating": "a sweep at a quarter of the usual pressures, where there is little frictional heat",
+        "baseline": "a sweep at a quarter of the usual pressures (an open clutch's drag is that of another gap)",
     },
 )

@@ -36,8 +36,8 @@ EFFECT = Effect(
     before_lag=False,
     bends=(),
     tests={
-        "squeeze_film": "loops at 0.5 Hz, or the same swing with the clutch open: inertia stays",
-        "channel_delay": "the same swing with the clutch open: inertia stays, a delay of no torque is nothing",
-        "baseline": "the same swing with the clutch open",
+        "squeeze_film": "loops at 0.3 Hz with the clutch open: inertia stays, a film has nothing to carry",
+        "channel_delay": "loops at 0.3 Hz with the clutch open: inertia stays, a delay of no torque is nothing",
+        "baseline": "loops at 0.3 Hz with the clutch open",
     },
 )

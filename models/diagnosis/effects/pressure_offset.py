@@ -55,7 +55,7 @@ EFFECT = Effect(
     before_lag=True,
     bends=(Bend.LIFE,),
     tests={
-        "torque_zero_shift": "a second gauge at the piston, or an unloaded torque reading",
+        "torque_zero_shift": "a second gauge at the piston, or a sweep with the clutch open: a zero stays",
         "baseline": "a second gauge at the piston for one test",
     },
 )

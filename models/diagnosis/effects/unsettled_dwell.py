@@ -28,6 +28,7 @@ def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
         difference = scene.curve[before] - scene.curve
     if shape[0] != TORQUE:
         known = known & (np.abs(points.pressure[before] - points.pressure) < 0.02 * points.pressure)
+    known = known & (points.engaged * points.engaged[before] > 0)  # what an open clutch drags is no friction's memory
     return np.asarray(amplitude * np.where(known, difference, 0.0), dtype=np.float64)
 
 

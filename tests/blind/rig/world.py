@@ -11,6 +11,7 @@ from tests.blind.rig.plan import Plan, Site
 
 Friction = Callable[[float, Site, Law], FloatArray]
 Reading = Callable[[float, Site, FloatArray], FloatArray]
+Drag = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -48,21 +49,34 @@ def follow(site: Site, curve: FloatArray, attractor: FloatArray) -> FloatArray:
     return told
 
 
+def _rubbed(site: Site, clutch: Clutch, effects: Sequence[tuple[Effect, float]]) -> FloatArray:
+    """Torque [Nm] of friction, with the effects that are friction, followed by the attractor law."""
+    law = clutch.law(site.bar, site.cycles)
+    torque = law.torque(site.v)
+    for effect, amplitude in effects:
+        if effect.friction is not None:
+            torque = torque + effect.friction(amplitude, site, law)
+    if site.kind == "stationary":
+        return torque
+    return follow(site, torque, clutch.attractor(site.bar, site.cycles))
+
+
 def read(
-    plan: Plan, clutch: Clutch, effects: Sequence[tuple[Effect, float]] = (), only: Sequence[str] | None = None
+    plan: Plan,
+    clutch: Clutch,
+    effects: Sequence[tuple[Effect, float]] = (),
+    only: Sequence[str] | None = None,
+    drag: Drag | None = None,
 ) -> list[FloatArray]:
-    """Torque [Nm] at every site of the plan, without noise; `only` names the kinds of sites that are wanted."""
+    """Torque [Nm] at every site of the plan, without noise; `only` names the kinds of sites that are wanted. Where there is
+    no pressure no lining touches: what there is of torque is `drag` at v [m/s], and what is added to the reading."""
     readings = []
     for site in plan.sites:
         if only is not None and site.kind not in only:
             continue
-        law = clutch.law(site.bar, site.cycles)
-        torque = law.torque(site.v)
-        for effect, amplitude in effects:
-            if effect.friction is not None:
-                torque = torque + effect.friction(amplitude, site, law)
-        if site.kind != "stationary":
-            torque = follow(site, torque, clutch.attractor(site.bar, site.cycles))
+        torque = np.zeros_like(site.v) if drag is None else drag(site.v)
+        if site.bar.any():
+            torque = _rubbed(site, clutch, effects)
         for effect, amplitude in effects:
             if effect.reading is not None:
                 torque = torque + effect.reading(amplitude, site, torque)

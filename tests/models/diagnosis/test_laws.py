@@ -6,7 +6,7 @@ import pytest
 from models.diagnosis.baseline import frame_of, predict
 from models.diagnosis.design import build_design
 from models.diagnosis.fitting import fit, priors_of
-from models.diagnosis.laws import Laws, curve
+from models.diagnosis.laws import KAPPA, Laws, curve
 from models.diagnosis.noise import first_noise
 from models.diagnosis.starting import starting_laws
 from models.lag import attractor_torque
@@ -44,7 +44,7 @@ def test_loops_are_the_attractor_law_in_its_periodic_state(attractor: float) -> 
     design = build_design(campaign(2, cycles=(0.0,), noise=0.0, gain=0.0))
     laws = starting_laws(design, frame_of(design))
     theta = laws.theta.copy()
-    theta[-laws.frame.loop_pressures.size :] = np.log(attractor)
+    theta[KAPPA] = np.log(attractor)
     prediction = predict(design, Laws(theta=theta, frame=laws.frame))
     assert prediction.lag is not None
     points = prediction.scene.points
