@@ -58,7 +58,7 @@ def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
         for z in range(1, lives + 1):
             add(SPEED if s > z + 1 else CYCLES, _cosine(s, speed) * _cosine(z, life) * steady)
     for p, z, s in product(range(1, presses + 1), range(1, min(lives, 2) + 1), range(1, 4)):
-        add(SPEED if s > max(p, z) else PRESSURE, _cosine(s, speed) * _cosine(p, pressure) * _cosine(z, life))
+        add(SPEED if s > max(p, z) else PRESSURE, _cosine(s, np.sqrt(speed)) * _cosine(p, pressure) * _cosine(z, life))
     for centre in np.linspace(0.06, 0.94, 13):
         for width in (0.05, 0.11):
             add(SPEED, _bump(speed, centre, width))
@@ -125,7 +125,7 @@ def _add_loops(design: Design, add: Add, looping: FloatArray, lives: int, presse
         add(PHASE, rising * _cosine(s, _unit(rows.velocity)))
     for way in (1.0, -1.0):
         one_way = looping * (way * rows.acceleration > 0)
-        for centre, width in product(np.linspace(0.06, 0.94, 9), (0.06, 0.12)):
+        for centre, width in product(np.linspace(0.06, 0.94, 11), (0.06, 0.12)):
             add(PHASE, _bump(_unit(rows.velocity), centre, width) * one_way)
 
 

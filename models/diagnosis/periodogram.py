@@ -63,7 +63,7 @@ def lines(design: Design, noise: Noise, residual: FloatArray) -> Lead:
     # a line stands out of its neighbourhood: noise that remembers otherwise than was thought does not
     middle = float(gamma.ppf(0.5, len(kept)))
     for column in power.T:
-        column /= np.maximum(median_filter(column, size=_NEIGHBOURS, mode="nearest") / middle, 1.0)
+        column /= np.maximum(median_filter(column, size=_NEIGHBOURS, mode="reflect") / middle, 1.0)
     index = int(np.argmax(power))
     highest = float(power.ravel()[index])
     tests = 1.5 * power.size

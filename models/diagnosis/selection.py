@@ -70,12 +70,13 @@ def columns_of(effects: list[Effect], grids: list[tuple[Tried, ...]]) -> list[Co
             kinds: dict[Shape, list[float]] = {}
             for tried in grid:
                 kinds.setdefault(_stiff(effect, tried.shape), []).append(tried.log_weight - total)
+            around = {kind: float(logsumexp(logs)) for kind, logs in kinds.items()}
             found += [
                 Column(
                     effect=effect,
                     shape=tried.shape,
                     log_weight=tried.log_weight - total,
-                    log_weight_around=float(logsumexp(kinds[_stiff(effect, tried.shape)])),
+                    log_weight_around=around[_stiff(effect, tried.shape)],
                 )
                 for tried in grid
             ]

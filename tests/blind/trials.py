@@ -30,7 +30,7 @@ class Trial:
     lam: float = 0.0
     without: frozenset[str] = frozenset()
     wanted: dict[str, Any] = field(default_factory=dict)
-    follow: bool = False  # make the advised test where the verdict is ambiguous
+    follow: int = 0  # so many advised tests at most are made, one after the other, while the verdict is ambiguous
 
     def hidden(self) -> Hidden:
         return hide(self.seed, self.slugs, self.lam, **self.wanted)
@@ -56,7 +56,7 @@ class Outcome:
     seconds: float  # of one core
     statistics: dict[str, float]
     error: str = ""
-    advised: "Outcome | None" = None  # what was said after the first advised test had been made
+    advised: tuple["Outcome", ...] = ()  # what was said after each advised test that was made
 
     @property
     def truth(self) -> frozenset[str]:
@@ -96,11 +96,13 @@ def judge(trial: Trial, diagnose: Diagnose | None = None) -> Outcome:
         hidden = trial.hidden()
     except UnreachableError as failure:
         return nothing(trial, UNREACHABLE, str(failure))
-    outcome = judged(trial, hidden, campaign(hidden), diagnose)
-    if trial.follow and outcome.verdict == "cause_ambiguous" and outcome.advice:
-        after = with_test(hidden, outcome.advice[0])
-        return replace(outcome, advised=judged(trial, after, campaign(after), diagnose))
-    return outcome
+    first = last = judged(trial, hidden, campaign(hidden), diagnose)
+    advised: list[Outcome] = []
+    while len(advised) < trial.follow and last.verdict == "cause_ambiguous" and last.advice:
+        hidden = with_test(hidden, last.advice[0])
+        last = judged(trial, hidden, campaign(hidden), diagnose)
+        advised.append(last)
+    return replace(first, advised=tuple(advised))
 
 
 def nothing(trial: Trial, verdict: str, error: str, axes: frozenset[str] = frozenset()) -> Outcome:

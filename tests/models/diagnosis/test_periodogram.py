@@ -46,6 +46,15 @@ def test_noise_alone_has_no_line(design: Design, noise: Noise) -> None:
     assert 1 <= sum(each.p_value < 0.05 for each in found) <= 20
 
 
+def test_a_line_that_is_nearly_as_slow_as_a_test_stands_out(design: Design, noise: Noise) -> None:
+    """At the lower end of the frequencies its own flanks are no neighbourhood."""
+    rows = design.rows
+    longest = float(rows.clock[rows.steady].max())
+    for cycles in (2.3, 2.6, 3.1):
+        wave = np.sin(2 * np.pi * cycles * rows.clock / longest + rows.run) * rows.steady
+        assert lines(design, noise, drawn(design, noise, 0) + 0.006 * wave * np.median(design.torque)).raised
+
+
 @pytest.mark.parametrize("share", [False, True], ids=["so many Nm", "a share of the torque"])
 def test_a_swing_is_found_whatever_its_phase_in_each_run(design: Design, noise: Noise, share: bool) -> None:
     rows = design.rows
