@@ -119,9 +119,9 @@ class SampledChannels:
         return self._si("oil_temperature_c") if "oil_temperature_c" in self.channels else None
 
 
-def stationary_plateaus(channels: Mapping[str, FloatArray]) -> Plateaus:
-    """The loaded plateaus of a stationary test in SI units, rows in the order they were sent."""
-    loaded = channels["pressure_bar"] * CHANNELS["pressure_bar"].factor >= UNLOADED
+def stationary_plateaus(channels: Mapping[str, FloatArray], *, unloaded: bool = False) -> Plateaus:
+    """The loaded plateaus of a stationary test in SI units, rows in the order they were sent; all where `unloaded`."""
+    loaded = (channels["pressure_bar"] * CHANNELS["pressure_bar"].factor >= UNLOADED) | unloaded
     si = {name: CHANNELS[name].to_si(values[loaded]) for name, values in channels.items()}
     deviation = si.get("torque_sd_nm")
     if deviation is not None:

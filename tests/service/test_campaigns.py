@@ -8,6 +8,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from models.diagnosis.campaign import Campaign, EventKind
+from models.diagnosis.design import build_design
 from models.runs import Record
 from service.workflows import campaigns
 from service.workflows.campaigns import Stored, read_campaign, thinned
@@ -58,6 +59,26 @@ def test_each_kind_of_run_arrives_in_si_units(client: TestClient, database_url: 
     assert [(each.cycles, each.event) for each in found.maintenance] == [(500.0, EventKind.OIL_CHANGE)]
     assert (found.oil.viscosity_40, found.oil.viscosity_100) == (pytest.approx(56e-6), pytest.approx(9.3e-6))
     assert (found.geometry.mean_radius, found.cof_fraction) == (pytest.approx(0.058), 0.5)
+
+
+def test_readings_without_pressure_are_evidence_and_no_curve(client: TestClient, database_url: str) -> None:
+    told = stationary(0, run_id="s0")
+    open_speeds = [20.0, 500.0, 1000.0, 1970.0]
+    added = {"pressure_bar": [0.0, 0.0, 0.02, 0.01], "speed_rpm": open_speeds, "torque_nm": [0.01, 0.05, 0.1, 0.2]}
+    told["channels"] = {name: [*values, *added[name]] for name, values in told["channels"].items()}
+    loops = dynamic_record()
+    nothing = {"pressure_bar": [0.0] * len(loops["pressure_bar"]), "torque_nm": [0.1 * t for t in loops["torque_nm"]]}
+    post(client, told, {"kind": "dynamic_stribeck", "cycles": 0, "run_id": "idle", "channels": loops | nothing})
+    found = campaign(database_url).campaign
+    assert found.stationary[0].plateaus.pressure.size == len(PRESSURES_BAR) * len(SPEEDS_RPM) + len(open_speeds)
+    design = build_design(found)
+    assert (~design.closed & design.rows.steady).sum() == len(open_speeds)
+    assert (~design.closed & ~design.rows.steady).any()
+    # no curve is fitted to them, and that is said
+    sweep, idle = (client.get(f"{RUNS}/{name}").json() for name in ("s0", "idle"))
+    assert [fit["pressure_bar"] for fit in sweep["fits"]] == sorted(set(PRESSURES_BAR))
+    assert any(each["code"] == "unloaded_plateaus" for each in sweep["warnings"])
+    assert all(loop["attractor_nm_s"] is None for loop in idle["loops"])
 
 
 def test_only_the_present_life_counts_from_its_rebuild_on(client: TestClient, database_url: str) -> None:
