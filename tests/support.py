@@ -55,6 +55,11 @@ def stationary(
     return body if run_id is None else body | {"run_id": run_id}
 
 
+#: Asks once what needs no client of its own. It loads the certificates once for all, gives a busy machine time, and keeps no
+#: connection, for services come and go.
+ONCE = httpx2.Client(timeout=120, limits=httpx2.Limits(max_keepalive_connections=0))
+
+
 def free_port() -> int:
     """A port that was free a moment ago."""
     with socket.socket() as probe:
@@ -64,7 +69,7 @@ def free_port() -> int:
 
 def wait_until_ready(url: str, ended: Callable[[], bool]) -> None:
     """Wait for a service that has just been started."""
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 120
     with httpx2.Client(base_url=url, timeout=5) as http:  # one for all: each loads the certificates anew
         while time.monotonic() < deadline:
             try:
@@ -73,7 +78,7 @@ def wait_until_ready(url: str, ended: Callable[[], bool]) -> None:
             except httpx2.TransportError:
                 assert not ended(), "the service ended before it was ready"
             time.sleep(0.05)
-    raise TimeoutError("the service was not ready within 60 s")
+    raise TimeoutError("the service was not ready within 120 s")
 
 
 #: Forks services off a process that has loaded the library already, which is most of what a start takes.

@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, Locator, Page, expect
 from tests.browser.driving import Watched, launched
 from tests.browser.lives import demo, post
 from tests.browser.pixels import seen
-from tests.support import Server, serving, stationary
+from tests.support import ONCE, Server, serving, stationary
 
 pytestmark = pytest.mark.browser
 expect.set_options(timeout=20_000)
@@ -129,7 +129,7 @@ def test_a_violation_of_the_policy_would_be_noticed(watched: Watched) -> None:
 
 def test_what_the_page_says_is_what_the_service_says(watched: Watched) -> None:
     page = opened(watched)
-    said = httpx2.get(f"{watched.url}/v1/clutches/sim-1/remaining-useful-life").json()
+    said = ONCE.get(f"{watched.url}/v1/clutches/sim-1/remaining-useful-life").json()
     assert f"{round(100 * said['current']['health'])} %" in page.locator(".tiles").inner_text()
     assert f"{said['as_of_cycles']:,}" in page.locator(".tiles").inner_text()
     assert page.locator("h1 .tag").inner_text() == "simulated"
@@ -160,7 +160,7 @@ def test_every_chart_has_a_table_a_png_and_a_csv(watched: Watched) -> None:
     with page.expect_download() as sheet:
         page.locator("#chart-fan").get_by_role("button", name="CSV").click()
     rows = list(csv.DictReader(io.StringIO(Path(sheet.value.path()).read_bytes().decode())))
-    pooled = httpx2.get(f"{watched.url}/v1/clutches/sim-1/degradation").json()["items"][0]["measured"]
+    pooled = ONCE.get(f"{watched.url}/v1/clutches/sim-1/degradation").json()["items"][0]["measured"]
     measured = [float(row["mean COF"]) for row in rows if row["kind"] == "measured"]
     assert measured == pooled["value"]
 
@@ -236,7 +236,7 @@ def test_a_file_is_dropped_and_its_receipt_appears(browser: Browser, tmp_path: P
 
 def test_what_is_wrong_with_a_file_is_told_by_row(watched: Watched) -> None:
     page = opened(watched)
-    runs = httpx2.get(f"{watched.url}/v1/clutches/sim-1").json()["runs"]
+    runs = ONCE.get(f"{watched.url}/v1/clutches/sim-1").json()["runs"]
     drop(page, "sweep.csv", "pressure_bar,speed_rpm,torque_nm\n5,20,21\n5,120,abc\n5,520,21.5\n5,1020,\n5,1970,20\n")
     dialog = page.get_by_role("dialog", name="Send a run")
     dialog.get_by_label("Duty cycles since new").fill("30000")
@@ -246,7 +246,7 @@ def test_what_is_wrong_with_a_file_is_told_by_row(watched: Watched) -> None:
     assert [row[0] for row in table] == ["2", "4"]
     assert table[0][1:3] == ["/channels/torque_nm/1", "abc"]
     assert "must be a number" in table[0][3]
-    assert httpx2.get(f"{watched.url}/v1/clutches/sim-1").json()["runs"] == runs
+    assert ONCE.get(f"{watched.url}/v1/clutches/sim-1").json()["runs"] == runs
     dialog.get_by_role("button", name="Close").click()
     assert [line for line in watched.errors() if "422" not in line] == []
     watched.said.clear()

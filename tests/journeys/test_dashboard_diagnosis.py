@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Page, expect
 from tests.browser.driving import Watched, serving_with_engine
 from tests.browser.lives import post, worn
 from tests.browser.pixels import seen
-from tests.support import stationary
+from tests.support import ONCE, stationary
 
 pytestmark = pytest.mark.browser
 expect.set_options(timeout=30_000)
@@ -27,7 +27,7 @@ def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 def told(url: str, path: str) -> dict[str, Any]:
-    found: dict[str, Any] = httpx2.get(f"{url}/v1/clutches/bench{path}", timeout=60).json()
+    found: dict[str, Any] = ONCE.get(f"{url}/v1/clutches/bench{path}", timeout=60).json()
     return found
 
 
@@ -91,7 +91,7 @@ def maps_are_drawn(browser: Browser, page: Page) -> None:
 
 
 def test_a_rebuild_ends_what_a_diagnosis_said(browser: Browser, url: str) -> None:
-    httpx2.post(f"{url}/v1/clutches/bench/diagnoses", json={"adopt": False}, timeout=60).raise_for_status()
+    ONCE.post(f"{url}/v1/clutches/bench/diagnoses", json={"adopt": False}, timeout=60).raise_for_status()
     watched = Watched(browser, url)
     page = watched.open("/")
     row = page.locator("tr[data-clutch='bench']")

@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.driving import Watched
 from tests.browser.lives import post, worn
-from tests.support import Server, serving, stationary
+from tests.support import ONCE, Server, serving, stationary
 
 pytestmark = pytest.mark.browser
 expect.set_options(timeout=20_000)
@@ -54,7 +54,7 @@ def test_an_empty_service_says_what_to_do_and_fills_by_itself(browser: Browser, 
     page.get_by_text("copied", exact=True).wait_for()
     assert page.evaluate("navigator.clipboard.readText()").startswith("clutchlife simulate")
     page.evaluate("window.same = true")
-    httpx2.post(f"{server.url}/v1/clutches", json={"clutch_id": "first"})
+    ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "first"})
     page.get_by_role("link", name="first").wait_for()
     assert page.evaluate("window.same")
     page.get_by_role("link", name="first").click()
@@ -69,7 +69,7 @@ def test_the_worst_comes_first_with_all_that_is_asked_of_a_row(watched: Watched)
     first = page.locator("tr[data-clutch='worn-out']")
     assert first.locator(".state").inner_text().split("\n") == ["Failure", "end of life reached"]
     ageing = page.locator("tr[data-clutch='ageing']")
-    said = httpx2.get(f"{watched.url}/v1/clutches/ageing").json()
+    said = ONCE.get(f"{watched.url}/v1/clutches/ageing").json()
     assert f"{100 * said['summary']['current']['health']:.0f} %" in ageing.inner_text()
     assert " to " in ageing.locator("td[data-label='Remaining']").inner_text()
     for drawing in (".spark polyline", ".interval .median", ".health .fill"):
@@ -191,7 +191,7 @@ def test_a_hidden_tab_asks_nothing(watched: Watched) -> None:
 
 def test_a_service_that_goes_away_and_comes_back(browser: Browser, tmp_path: Path) -> None:
     with serving(tmp_path / "clutchlife.db", loaded=True) as server:
-        httpx2.post(f"{server.url}/v1/clutches", json={"clutch_id": "kept"})
+        ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "kept"})
         watched = Watched(browser, server.url)
         page = watched.open("/")
         page.get_by_role("link", name="kept").wait_for()
@@ -202,7 +202,7 @@ def test_a_service_that_goes_away_and_comes_back(browser: Browser, tmp_path: Pat
         assert "next try in" in waits
         expect(page.locator(".asof")).to_contain_text(re.compile("next try in [56] s"))  # it asked every 3 s before
         server.start()
-        httpx2.post(f"{server.url}/v1/clutches", json={"clutch_id": "after"})
+        ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "after"})
         page.get_by_role("link", name="after").wait_for(timeout=60_000)  # it had backed off
         page.get_by_text("Live, as of").wait_for()
         assert watched.violations() == []
@@ -215,7 +215,7 @@ def test_with_keys_the_page_asks_for_one(browser: Browser, tmp_path: Path) -> No
     from storage.database import open_database
 
     with serving(tmp_path / "clutchlife.db", loaded=True) as server:
-        httpx2.post(f"{server.url}/v1/clutches", json={"clutch_id": "secret"})
+        ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "secret"})
         text, row = security.make_key("read", "", created_at="2026-01-01T00:00:00Z")
         database = open_database(f"sqlite:///{tmp_path / 'clutchlife.db'}")
         with database.writing() as connection:

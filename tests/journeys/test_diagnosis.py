@@ -20,16 +20,6 @@ def post_tests(http: httpx2.Client, *cycles: float) -> None:
         assert http.post(f"{BASE}/runs", json=stationary(each, run_id=f"r{each:g}")).status_code == 201
 
 
-def finished(http: httpx2.Client, path: str) -> dict[str, object]:
-    deadline = time.monotonic() + 240
-    while time.monotonic() < deadline:
-        found: dict[str, object] = http.get(path).json()
-        if found["status"] != "running":
-            return found
-        time.sleep(0.2)
-    raise TimeoutError(path)
-
-
 def test_a_kill_during_a_diagnosis_leaves_a_sane_state(tmp_path: Path) -> None:
     server = Server(tmp_path / "clutchlife.db", loaded=True)
     server.start()

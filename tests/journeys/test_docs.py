@@ -6,10 +6,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import httpx2
 import pytest
 
-from tests.support import Server
+from tests.support import ONCE, Server
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
@@ -48,7 +47,7 @@ def test_commands_that_are_named_are_there(path: Path) -> None:
 
 
 def test_every_address_is_documented(server: Server) -> None:
-    described = httpx2.get(f"{server.url}/openapi.json").json()
+    described = ONCE.get(f"{server.url}/openapi.json").json()
     text = (ROOT / "docs" / "api.md").read_text(encoding="utf-8") + (ROOT / "docs" / "operations.md").read_text(
         encoding="utf-8"
     )

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 
-import httpx2
 import pytest
 import schemathesis
 from hypothesis import HealthCheck, given, settings
@@ -11,7 +10,7 @@ from schemathesis.schemas import APIOperation
 
 from service.app import create_app
 from service.settings import Settings
-from tests.support import Server, serving, stationary
+from tests.support import ONCE, Server, serving, stationary
 
 SCHEMA = schemathesis.openapi.from_dict(create_app(Settings()).openapi())
 OPERATIONS = [found.ok() for found in SCHEMA.get_all_operations()]
@@ -23,9 +22,9 @@ EXCLUDED = [checks.positive_data_acceptance]
 def api(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """A service that knows one clutch with three tests."""
     with serving(tmp_path_factory.mktemp("api") / "clutchlife.db", loaded=True) as server:
-        httpx2.post(f"{server.url}/v1/clutches", json={"clutch_id": "c1"})
+        ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "c1"})
         for cycles in (0, 1000, 2000):
-            httpx2.post(f"{server.url}/v1/clutches/c1/runs", json=stationary(cycles, run_id=f"r{cycles}"))
+            ONCE.post(f"{server.url}/v1/clutches/c1/runs", json=stationary(cycles, run_id=f"r{cycles}"))
         yield server
 
 

@@ -3,10 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-import httpx2
-
 from tests.journeys.test_command_line import clutchlife
-from tests.support import Server
+from tests.support import ONCE, Server
 
 
 def test_campaigns_of_records_are_pushed_without_a_word_on_kind_and_cycles(server: Server, tmp_path: Path) -> None:
@@ -16,7 +14,7 @@ def test_campaigns_of_records_are_pushed_without_a_word_on_kind_and_cycles(serve
         push = ("push", folder, "--clutch", form, "--url", server.url, "--spool", tmp_path / "spool")
         assert "3 stored, 0 known already, 0 refused" in clutchlife(*push)
         assert "0 stored, 3 known already, 0 refused" in clutchlife(*push)
-        items = httpx2.get(f"{server.url}/v1/clutches/{form}/runs").json()["items"]
+        items = ONCE.get(f"{server.url}/v1/clutches/{form}/runs").json()["items"]
         runs: dict[str, dict[str, Any]] = {run["kind"]: run for run in items}
         assert set(runs) == {"run_in", "stationary_stribeck", "dynamic_stribeck"}
         assert {(run["origin"], run["cycles"]) for run in items} == {("simulated", 0)}
