@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
 from models.diagnosis.facts import Facts
-from models.diagnosis.laws import Scene
+from models.diagnosis.laws import Laws, Scene, gradient_of
 from models.stribeck import GAMMA
 
 #: Pressure to which the amplitude refers [Pa].
@@ -17,6 +17,8 @@ REFERENCE_PRESSURE = 5e5
 FIRST_ORDER, FILM = 0.0, 1.0
 #: A film is followed for this share of a period before its course is taken: it forgets where it began.
 _BEFORE = 1 / 3
+#: Points of a swing that tell a film's usual slope.
+_SWING = 24
 
 
 def _grid(_facts: Facts) -> tuple[Tried, ...]:
@@ -60,9 +62,7 @@ def _over_film(scene: Scene, looping: NDArray[np.intp], amplitude: FloatArray, s
     the film thins."""
     points, middle = scene.points, scene.laws.frame.reference_velocity
     power, thin, least, sheared = shapes[:4]
-    carried = (scene.viscous / points.velocity)[looping]
-    falling = scene.by_velocity[looping] - GAMMA * carried
-    slope = np.array([float(np.median(share * carried - falling)) for share in sheared])
+    slope = usual_slope(scene.laws, sheared)
     real = slope > 0
     phases = np.flatnonzero(np.diff(points.loop[looping], append=-2))[0] + 1
     v = np.ascontiguousarray(points.velocity[looping].reshape(-1, phases).T)[:, :, None]
@@ -88,6 +88,19 @@ def _over_film(scene: Scene, looping: NDArray[np.intp], amplitude: FloatArray, s
     dry = m_s * (m_c - 1.0) * (np.exp(-np.minimum(v_s / w, 700.0)) - scene.decay[looping, None])
     thinner = np.expm1(np.clip(sheared * np.log(speed / w), -3.0, 3.0))
     return np.asarray(np.where(real, dry + scene.viscous[looping, None] * thinner, 0.0), dtype=np.float64)
+
+
+def usual_slope(laws: Laws, sheared: FloatArray) -> FloatArray:
+    """-∂S/∂w [m] Nm s/m of films at rest with exponents `sheared` [m] of shear: the median over the usual swing, under the
+    loops' pressures, half through life. One number for one θ, whatever rows are asked for."""
+    frame = laws.frame
+    swing = frame.reference_velocity * (1.0 - np.cos(2 * np.pi * (np.arange(_SWING) + 0.5) / _SWING))
+    pressures = frame.loop_pressures if frame.loop_pressures.size else np.array([frame.lowest, frame.highest])
+    pressure, velocity = np.repeat(pressures, _SWING), np.tile(swing, pressures.size)
+    at = laws.parameters(pressure, np.full(pressure.size, 0.5 * frame.last))
+    dry = -gradient_of(velocity, at)[0][:, 2] * at[:, 2] / velocity
+    carried = at[:, 3] * velocity ** (GAMMA - 1.0)
+    return np.asarray(np.median(sheared[:, None] * carried - dry, axis=1), dtype=np.float64)
 
 
 EFFECT = Effect(

@@ -11,7 +11,7 @@ from models.diagnosis.baseline import frame_of, predict
 from models.diagnosis.campaign import Campaign, EventKind, MaintenanceEvent
 from models.diagnosis.catalogue import BY_SLUG
 from models.diagnosis.design import build_design
-from models.diagnosis.effects.squeeze_film import FILM, FIRST_ORDER
+from models.diagnosis.effects.squeeze_film import FILM, FIRST_ORDER, usual_slope
 from models.diagnosis.facts import facts_of
 from models.diagnosis.laws import GAMMA, Scene, curve
 from models.diagnosis.starting import starting_laws
@@ -70,14 +70,31 @@ def test_a_test_before_the_pause_at_the_same_cycles_has_not_rested() -> None:
     assert np.abs(change[here & ~scene.points.steady]).max() > 1e-3
 
 
+def test_a_film_is_the_same_whatever_rows_are_asked_for() -> None:
+    """One amplitude means one film time: loops of one pressure alone show what they show among the others."""
+    scene = scene_of_all(campaign(1))
+    shape = (0.3, 0.8, 0.2, 0.5, FILM, 0.0)
+    change = BY_SLUG["squeeze_film"].change(scene, 0.5, shape)
+    some = scene.points.loop == scene.points.loop.max()
+    alone = replace(
+        scene,
+        points=scene.points.take(some),
+        **{name: getattr(scene, name)[some] for name in ("parameters", "curve", "gradient", "decay", "by_velocity")},
+    )
+    assert np.abs(change[some]).max() > 0.01
+    np.testing.assert_allclose(BY_SLUG["squeeze_film"].change(alone, 0.5, shape), change[some], rtol=1e-12)
+
+
 @pytest.mark.parametrize(("thin", "least", "sheared"), [(0.8, 0.2, 0.5), (1.4, 0.3, 0.7)])
 def test_a_film_follows_its_equation(thin: float, least: float, sheared: float) -> None:
     """Against a general solver, two periods long, on the torque of one loop; and to first order where the film is fast."""
     scene = scene_of_all(campaign(1))
     effect, points, middle = BY_SLUG["squeeze_film"], scene.points, scene.laws.frame.reference_velocity
     looping = points.loop >= 0
+    slope = float(usual_slope(scene.laws, np.array([sheared]))[0])
     carried = scene.viscous / points.velocity
-    slope = float(np.median((sheared * carried - scene.by_velocity + GAMMA * carried)[looping]))
+    seen = float(np.median((sheared * carried - scene.by_velocity + GAMMA * carried)[looping]))
+    assert 0.7 < slope / seen < 1.4  # about that of the loops at hand
     time = 0.08  # of the film at mid speed and 5 bar [s]
     change = effect.change(scene, time * slope, (0.0, thin, least, sheared, FILM, 0.0))
     one = np.flatnonzero(points.loop == points.loop[looping][0])
