@@ -1,0 +1,90 @@
+"""What stands between evidence and a name: structure that has none, a remainder that is an oddity, a probability."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.arrays import FloatArray
+from models.diagnosis import verdict
+from models.diagnosis.projection import GAINS, gram_of, project
+from models.diagnosis.refitting import Hypothesis, null_of, refitted
+from models.diagnosis.report import Verdict
+from models.diagnosis.verdict import Closing, Judgement
+from tests.models.diagnosis.campaigns import Where, campaign
+from tests.models.diagnosis.fitted import Study, study
+from tests.models.diagnosis.test_engine import late
+
+Judge = Callable[..., Judgement]
+
+
+def little(at: Where) -> FloatArray:
+    """A share of the plateau before, a third of what the engine's own tests plant."""
+    return np.asarray(late(at) / 3, dtype=np.float64)
+
+
+@pytest.fixture(scope="module")
+def given() -> Study:
+    return study(campaign(4, little))
+
+
+@pytest.fixture(scope="module")
+def best(given: Study) -> Hypothesis:
+    """The planted effect alone, refitted."""
+    known = given.baseline
+    null = null_of(given.design, known.noise, known.priors, known.fit)
+    effects = given.extended(("unsettled_dwell", 0.05, (0.0,))).effects
+    return refitted(given.design, known.noise, known.priors, null, known.fit.laws, effects, 0.0, (0.0, 0.0))
+
+
+@pytest.fixture
+def judged(given: Study, best: Hypothesis) -> Judge:
+    def judged(structure: float = 0.0) -> Judgement:
+        known, rng = given.baseline, np.random.default_rng(1)
+        return verdict.judge(given.design, known.noise, known.priors, [best], structure, -np.inf, rng)
+
+    return judged
+
+
+def test_structure_without_a_name_must_lead_by_the_price_of_the_axes(judged: Judge, best: Hypothesis) -> None:
+    beyond = verdict.AXES_PRICE + verdict.GENERIC * max(best.drop - verdict.CLEAR, 0.0)
+    assert best.evidence > 5.0
+    assert judged(0.0).verdict is Verdict.CAUSE_NAMED
+    assert judged(best.evidence + beyond - 0.1).verdict is not Verdict.UNEXPLAINED_STRUCTURE
+    assert judged(best.evidence + beyond + 0.1).verdict is Verdict.UNEXPLAINED_STRUCTURE
+
+
+def test_a_cause_is_named_from_its_own_probability_on(judged: Judge, best: Hypothesis) -> None:
+    """Where structure comes near it, the cause stands alone but is no longer named."""
+    told = {lead: judged(best.evidence - lead) for lead in np.arange(0.0, 12.0, 0.5)}
+    for each in told.values():
+        named = each.probabilities["unsettled_dwell"] >= verdict.LEAST_NAMED
+        assert each.causes == ("unsettled_dwell",)
+        assert each.verdict is (Verdict.CAUSE_NAMED if named else Verdict.CAUSE_AMBIGUOUS)
+    assert len({each.verdict for each in told.values()}) == 2
+
+
+@pytest.mark.parametrize(("p_value", "expected"), [(0.06, Verdict.CAUSE_NAMED), (1e-4, Verdict.CAUSE_AMBIGUOUS)])
+def test_a_cause_that_leaves_an_oddity_is_not_named(
+    judged: Judge, monkeypatch: pytest.MonkeyPatch, p_value: float, expected: Verdict
+) -> None:
+    close = verdict.close
+
+    def odd(*arguments: object) -> Closing:
+        closing = close(*arguments)  # type: ignore[arg-type] # handed on as they are
+        return replace(closing, statistics={**closing.statistics, "closure_p_value": p_value})
+
+    monkeypatch.setattr(verdict, "close", odd)
+    assert judged().verdict is expected
+
+
+def test_gains_that_scatter_much_are_less_likely_than_those_that_hardly_do(given: Study) -> None:
+    """Without any run to tell them, their prior is left: narrower above the usual scatter than below."""
+    known = given.baseline
+    gram = gram_of(given.design, known.noise, known.priors, known.fit, np.zeros((given.design.torque.size, 0)))
+    untold = replace(gram, along=0.0 * gram.along, squares=0.0 * gram.squares)
+    evidence = np.array([project(untold, float(gain)).evidence for gain in GAINS])
+    below, usual, above = np.interp(np.log([0.0025 / 4, 0.0025, 0.0025 * 4]), np.log(GAINS), evidence)
+    assert above < below - 1.0 < usual
+    assert above > usual - 5.0  # unlikely, not impossible
