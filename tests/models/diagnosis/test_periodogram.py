@@ -50,7 +50,7 @@ def test_a_line_that_is_nearly_as_slow_as_a_test_stands_out(design: Design, nois
     """At the lower end of the frequencies its own flanks are no neighbourhood."""
     rows = design.rows
     longest = float(rows.clock[rows.steady].max())
-    for cycles in (2.3, 2.6, 3.1):
+    for cycles in (2.5, 2.8, 3.1):
         wave = np.sin(2 * np.pi * cycles * rows.clock / longest + rows.run) * rows.steady
         assert lines(design, noise, drawn(design, noise, 0) + 0.006 * wave * np.median(design.torque)).raised
 
@@ -65,6 +65,18 @@ def test_a_swing_is_found_whatever_its_phase_in_each_run(design: Design, noise: 
     assert found.raised
     assert found.p_value < 1e-3
     assert lines(design, noise, drawn(design, noise, 0) + 0.02 * swing).p_value > 0.01
+
+
+def test_structure_that_grows_the_slower_it_is_has_no_line(design: Design, noise: Noise) -> None:
+    """As much of it, in every run its own, as a line that is seen."""
+    rows = design.rows
+    unit = rows.clock / rows.clock[rows.steady].max() - 0.5
+    size = np.random.default_rng(SEED).standard_normal((2, len(design.runs)))[:, rows.run]
+    slow = 0.03 * design.torque * rows.steady * (size[0] * unit + 2.0 * size[1] * (unit**2 - 1 / 12))
+    wave = 0.006 * design.torque * rows.steady * np.sin(2 * np.pi * 2.6 * (unit + 0.5) + rows.run)
+    assert np.square(slow).sum() > np.square(wave).sum()
+    assert not lines(design, noise, drawn(design, noise, 0) + slow).raised
+    assert lines(design, noise, drawn(design, noise, 0) + wave).raised
 
 
 def test_pauses_and_odd_runs_do_not_hide_a_swing(design: Design, noise: Noise) -> None:
