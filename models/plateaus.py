@@ -60,7 +60,7 @@ def cut_plateaus(record: Sampled) -> PlateauCut:
 
     Steps of speed and pressure may come in any order and direction; samples may be missing, their times jitter, single
     samples spike, signals be quantised. Raises ValueError on fewer than 16 samples, a clock that does not advance or
-    falls back, and a record without any steady dwell under pressure and in motion.
+    falls back, and a record without any steady dwell in motion, and under pressure where there is any.
     """
     kept = cleaning(record)
     blocks = average(record, kept)

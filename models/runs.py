@@ -4,7 +4,7 @@ A stationary Stribeck test holds pressure and speed on a plateau and measures to
 the rows of one pressure level. Measured pressures scatter about their level, so levels are found, not assumed.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from models.clutch import Geometry
 #: Pressures further apart than this belong to different levels: 0.12 bar, or 2.5 % of the pressure where that is more.
 LEVEL_GAP = 0.12e5
 LEVEL_GAP_SHARE = 0.025
+#: Below this [Pa] the clutch is open: what is read says nothing of the lining's friction.
+UNLOADED = 0.05e5
 #: A level within 0.02 bar of a multiple of 0.05 bar is called by that multiple.
 LEVEL_STEP = 0.05e5
 LEVEL_SNAP = 0.02e5
@@ -21,7 +23,7 @@ LEVEL_SNAP = 0.02e5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plateaus:
-    """Steady plateaus, one row each: pressure [n] Pa > 0, speed [n] rad/s, torque [n] Nm.
+    """Steady plateaus, one row each: pressure [n] Pa, speed [n] rad/s, torque [n] Nm.
 
     `torque_sd` [n] Nm is the deviation of each torque where it is known, `oil_temperature` [n] K where it is measured.
     Raises ValueError on unequal lengths, no rows or values that are not finite.
@@ -81,6 +83,15 @@ def _require_columns(columns: Plateaus | Record, names: tuple[str, ...]) -> None
             raise ValueError(f"{name} must have the shape of torque {rows}, got {column.shape}")
         if not np.isfinite(column).all():
             raise ValueError(f"{name} must be finite")
+
+
+def loaded(plateaus: Plateaus) -> Plateaus | None:
+    """The plateaus through which curves go, those of UNLOADED or more; None where the clutch was open on all."""
+    rows = plateaus.pressure >= UNLOADED
+    if not rows.any():
+        return None
+    columns = {each.name: getattr(plateaus, each.name) for each in fields(Plateaus)}
+    return replace(plateaus, **{name: column[rows] for name, column in columns.items() if column is not None})
 
 
 def pressure_levels(pressure: FloatArray) -> FloatArray:

@@ -2,9 +2,11 @@
 
 The record is averaged over blocks of some 10 ms. A block is steady where the means of 0.2 s after it and of 0.2 s before
 it agree within six deviations of their difference, in speed and in pressure; runs of steady blocks are dwells, widened
-again up to where speed or pressure leaves the level.
+again up to where speed or pressure leaves the level. Where the clutch is open throughout, pressure is its sensor's noise:
+the dwells are those of speed.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +14,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.cleaning import Cleaning, Note, Sampled
+from models.runs import UNLOADED
 
 #: A block [s].
 BLOCK = 0.01
@@ -94,22 +97,22 @@ def average(record: Sampled, cleaning: Cleaning) -> Blocks:
 
 
 def find_dwells(blocks: Blocks) -> tuple[list[Dwell], list[Note]]:
-    """The dwells under pressure and in motion, in the order of time, and notes on those that were left out."""
+    """The dwells in motion, and under pressure where there is any, in the order of time, and notes on those left out."""
     if blocks.time.size < SHORTEST:
         return [], []
     window = max(FEWEST_BLOCKS, round(WINDOW / blocks.duration))
     pressure, speed = _Channel(blocks.pressure, window), _Channel(blocks.speed, window)
-    active = (np.abs(blocks.pressure) > NO_PRESSURE * pressure.highest) & (
-        np.abs(blocks.speed) > STANDSTILL * speed.highest
-    )
+    idle = pressure.highest < UNLOADED
+    channels, least = ((speed,), -math.inf) if idle else ((pressure, speed), NO_PRESSURE * pressure.highest)
+    active = (np.abs(blocks.pressure) > least) & (np.abs(blocks.speed) > STANDSTILL * speed.highest)
     steady = ~blocks.gap
-    for channel in (pressure, speed):
+    for channel in channels:
         channel.judge(active)
         steady &= channel.steady
     edges = np.flatnonzero(np.diff(np.concatenate([[False], steady, [False]]).astype(np.int8)))
     cores = [(int(a), int(b)) for a, b in edges.reshape(-1, 2) if b - a >= 2]
-    cores = _merged(cores, blocks, (pressure, speed))
-    return _sorted_out(_widened(cores, blocks, (pressure, speed)), blocks, pressure, speed)
+    cores = _merged(cores, blocks, channels)
+    return _sorted_out(_widened(cores, blocks, channels), blocks, channels, least)
 
 
 class _Channel:
@@ -188,19 +191,21 @@ def _reach(off: FloatArray, tolerance: float) -> int:
 
 
 def _sorted_out(
-    found: list[Dwell], blocks: Blocks, pressure: _Channel, speed: _Channel
+    found: list[Dwell], blocks: Blocks, channels: tuple[_Channel, ...], least: float
 ) -> tuple[list[Dwell], list[Note]]:
+    """Those worth a mean; the last of `channels` is speed, `least` a pressure [Pa] below which there is none."""
     kept: list[Dwell] = []
+    speed = channels[-1]
     left: dict[str, list[float]] = {"no_pressure": [], "standstill": [], "dwell_too_short": [], "not_steady": []}
     for dwell in found:
         where = slice(dwell.start, dwell.stop)
-        if float(blocks.pressure[where].mean()) <= NO_PRESSURE * pressure.highest:
+        if float(blocks.pressure[where].mean()) <= least:
             reason = "no_pressure"
         elif abs(float(blocks.speed[where].mean())) <= STANDSTILL * speed.highest:
             reason = "standstill"
         elif dwell.stop - dwell.start < SHORTEST:
             reason = "dwell_too_short"
-        elif _ramps(speed, where) or _ramps(pressure, where):
+        elif any(_ramps(channel, where) for channel in channels):
             reason = "not_steady"
         else:
             kept.append(dwell)

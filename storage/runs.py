@@ -3,10 +3,10 @@
 from dataclasses import dataclass, fields
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Row, bindparam, func, or_, select, tuple_, update
+from sqlalchemy import Connection, Row, bindparam, exists, func, or_, select, tuple_, update
 
 from storage.json_text import Json, to_object, to_text
-from storage.tables import run
+from storage.tables import fit, run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,9 +61,8 @@ _ordered = (
     .order_by(run.c.cycles, run.c.run_id)
     .limit(bindparam("most"))
 )
-_ordered_after = _ordered.where(
-    tuple_(run.c.cycles, run.c.run_id) > tuple_(bindparam("after_cycles"), bindparam("after_id"))
-)
+_after = tuple_(run.c.cycles, run.c.run_id) > tuple_(bindparam("after_cycles"), bindparam("after_id"))
+_fitted = exists().where(fit.c.run_key == run.c.run_key)
 _LIGHT = tuple(field.name for field in fields(RunInOrder))
 _light = (
     select(
@@ -104,14 +103,18 @@ def page(
     limit: int | None = None,
     after: tuple[float, str] | None = None,
     kind: str | None = None,
+    fitted: bool = False,
 ) -> list[RunRow]:
-    """Runs of a clutch in order, of one kind or all, at most `limit`; `after` is the last (cycles, run_id) seen."""
-    values = {"of_clutch": clutch_id, "of_kind": kind, "most": -1 if limit is None else limit}
-    if after is None:
-        found = connection.execute(_ordered, values)
-    else:
-        found = connection.execute(_ordered_after, {**values, "after_cycles": after[0], "after_id": after[1]})
-    return [_row(each) for each in found]
+    """Runs of a clutch in order, of one kind or all, at most `limit`; `after` is the last (cycles, run_id) seen.
+
+    `fitted`: those alone through which a curve was fitted.
+    """
+    values: dict[str, object] = {"of_clutch": clutch_id, "of_kind": kind, "most": -1 if limit is None else limit}
+    query = _ordered.where(_fitted) if fitted else _ordered
+    if after is not None:
+        query = query.where(_after)
+        values |= {"after_cycles": after[0], "after_id": after[1]}
+    return [_row(each) for each in connection.execute(query, values)]
 
 
 def in_order(connection: Connection, clutch_id: str) -> list[RunInOrder]:

@@ -18,7 +18,7 @@ from models.diagnosis.facts import Facts, facts_of
 from models.diagnosis.loop_bins import BINS, PHASES, BinnedLoop, binned_loops
 from models.diagnosis.sample_memory import bins_remember
 from models.diagnosis.thinning import MOST_PLATEAUS, thinned
-from models.runs import pressure_levels
+from models.runs import UNLOADED, pressure_levels
 
 #: Time on one plateau [s] where nothing else is known (the reference's section 2.3.3).
 PLATEAU_DURATION = 5.0
@@ -199,8 +199,8 @@ def _assembled(
 
 
 def _opened(points: Points) -> Points:
-    """With what is measured below the share OPEN of the highest pressure marked as open."""
-    closed = points.pressure > OPEN * points.pressure.max(initial=0.0)
+    """With what is measured below UNLOADED, or below the share OPEN of the highest pressure, marked as open."""
+    closed = (points.pressure > OPEN * points.pressure.max(initial=0.0)) & (points.pressure >= UNLOADED)
     lowest = float(points.pressure[closed].min()) if closed.any() else 1.0
     return replace(points, engaged=closed.astype(np.float64), pressure=np.where(closed, points.pressure, lowest))
 

@@ -9,13 +9,11 @@ from typing import Any
 import numpy as np
 
 from models.arrays import FloatArray
-from models.runs import Plateaus, Record, pressure_levels
+from models.runs import UNLOADED, Plateaus, Record, pressure_levels
 from service.errors import FieldError, InvalidError
 from service.formats.units import CHANNELS
 from service.schemas.base import whole
 
-#: Below this a plateau counts as unloaded: it says nothing of the lining's friction.
-UNLOADED = 0.05e5
 #: No mean torque is known better than to this share of the torque: a smaller deviation counts as this.
 SHARPEST = 1e-4
 #: More pressure levels than any protocol has: a continuous pressure is no stationary test.
@@ -49,7 +47,7 @@ def name_run(
     """A run with its content's hash, and its name derived from that where none was given.
 
     The hash covers everything but the name: kind, cycles, time, origin, details and every bit of every channel.
-    Raises InvalidError where a stationary test holds nothing that a curve could be fitted to.
+    Raises InvalidError where a stationary test says nothing: no curve could be fitted to it, nor is it of an open clutch.
     """
     said = [kind, whole(cycles), started_at, origin, dict(details)]
     digest = hashlib.sha256(json.dumps(said, sort_keys=True, allow_nan=False).encode())
@@ -68,7 +66,7 @@ def name_run(
         details=details,
     )
     if kind == "stationary_stribeck" and "time_s" not in channels:
-        _require_curve(channels)
+        _require_readings(channels)
     return run
 
 
@@ -119,13 +117,14 @@ class SampledChannels:
         return self._si("oil_temperature_c") if "oil_temperature_c" in self.channels else None
 
 
-def stationary_plateaus(channels: Mapping[str, FloatArray], *, unloaded: bool = False) -> Plateaus:
-    """The loaded plateaus of a stationary test in SI units, rows in the order they were sent; all where `unloaded`."""
-    loaded = (channels["pressure_bar"] * CHANNELS["pressure_bar"].factor >= UNLOADED) | unloaded
-    si = {name: CHANNELS[name].to_si(values[loaded]) for name, values in channels.items()}
+def stationary_plateaus(channels: Mapping[str, FloatArray]) -> Plateaus:
+    """The plateaus of a stationary test in SI units, rows in the order they were sent."""
+    si = {name: CHANNELS[name].to_si(values) for name, values in channels.items()}
     deviation = si.get("torque_sd_nm")
     if deviation is not None:
-        deviation = np.maximum(deviation, SHARPEST * float(np.sqrt(np.mean(si["torque_nm"] ** 2))))
+        under_load = si["pressure_bar"] >= UNLOADED
+        torque = si["torque_nm"][under_load] if under_load.any() else si["torque_nm"]
+        deviation = np.maximum(deviation, SHARPEST * float(np.sqrt(np.mean(torque**2))))
     return Plateaus(
         pressure=si["pressure_bar"],
         speed=si["speed_rpm"],
@@ -135,19 +134,24 @@ def stationary_plateaus(channels: Mapping[str, FloatArray], *, unloaded: bool = 
     )
 
 
-def _require_curve(channels: Mapping[str, FloatArray]) -> None:
-    """Refuse what no Stribeck curve passes through: one point, one speed, no torque, no pressure."""
+def _require_readings(channels: Mapping[str, FloatArray]) -> None:
+    """Refuse what says nothing: no torque, an open clutch at rest, under pressure what no Stribeck curve passes through."""
     torque, speed, pressure = channels["torque_nm"], channels["speed_rpm"], channels["pressure_bar"]
+    if (pressure * CHANNELS["pressure_bar"].factor >= UNLOADED).any():
+        _require_curve(torque, speed, pressure)
+    elif not speed.any():
+        _refuse("speed_rpm", speed, "open_at_rest", "at least one plateau must turn where none is loaded")
+    if not torque.any():
+        _refuse("torque_nm", torque, "torque_all_zero", "at least one torque must differ from zero")
+
+
+def _require_curve(torque: FloatArray, speed: FloatArray, pressure: FloatArray) -> None:
     if torque.size == 1:
         _refuse("torque_nm", torque, "too_few_points", "a Stribeck curve needs more than one point")
-    if not (pressure * CHANNELS["pressure_bar"].factor >= UNLOADED).any():
-        _refuse("pressure_bar", pressure, "unloaded", "at least one plateau must be loaded with 0.05 bar or more")
     if np.unique(pressure_levels(pressure * CHANNELS["pressure_bar"].factor)).size > MOST_LEVELS:
         _refuse("pressure_bar", pressure, "too_many_levels", f"a test may have at most {MOST_LEVELS} pressure levels")
     if (speed == speed[0]).all():
         _refuse("speed_rpm", speed, "speeds_all_equal", "a Stribeck curve needs more than one speed")
-    if not torque.any():
-        _refuse("torque_nm", torque, "torque_all_zero", "at least one torque must differ from zero")
 
 
 def _refuse(name: str, column: FloatArray, code: str, rule: str) -> None:

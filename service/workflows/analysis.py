@@ -11,9 +11,9 @@ from models.clutch import Geometry
 from models.identification import FitStatus, StribeckFit, fit_curves, mean_torques
 from models.plateaus import cut_plateaus
 from models.protocol import protocol_speeds
-from models.runs import Plateaus, curves_by_pressure
+from models.runs import UNLOADED, Plateaus, curves_by_pressure, loaded
 from service.errors import FieldError, InvalidError
-from service.formats.incoming import UNLOADED, IncomingRun, SampledChannels, stationary_plateaus
+from service.formats.incoming import IncomingRun, SampledChannels, stationary_plateaus
 from service.formats.units import PASCALS_PER_BAR
 
 #: Warnings that hang on what was known when the run arrived: cycles before those of an earlier run, other pressures.
@@ -50,7 +50,7 @@ class LevelFit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Analysis:
-    """What one run says by itself; `speed_range` [rad/s] is None for a run that holds no stationary test."""
+    """What one run says by itself; `speed_range` [rad/s] is None for a run that holds no stationary test under pressure."""
 
     fits: tuple[LevelFit, ...] = ()
     speed_range: tuple[float, float] | None = None
@@ -58,7 +58,8 @@ class Analysis:
 
 
 def analyse(run: IncomingRun, geometry: Geometry) -> Analysis:
-    """Fit a stationary test's curves, from its plateaus or from its sampled record; other kinds are kept as they are.
+    """Fit a stationary test's curves, from its plateaus or from its sampled record; other kinds are kept as they are, and
+    so is what was read with the clutch open.
 
     Raises InvalidError where a sampled record holds no steady plateau.
     """
@@ -87,13 +88,17 @@ def levels_of(plateaus: Plateaus, geometry: Geometry) -> tuple[LevelFit, ...]:
 
 
 def _analyse_stationary(plateaus: Plateaus, geometry: Geometry, noticed: Sequence[Warned]) -> Analysis:
-    levels = levels_of(plateaus, geometry)
-    speed = np.abs(plateaus.speed)
+    under_load = loaded(plateaus)
+    noticed = [*_unloaded(plateaus, under_load), *noticed]
+    if under_load is None:
+        return Analysis(warnings=tuple(noticed))
+    levels = levels_of(under_load, geometry)
+    speed = np.abs(under_load.speed)
     low, high = float(speed.min()), float(speed.max())
     telling = low < high and mean_cofs(levels, geometry.sliding_velocity(protocol_speeds(low, high)), geometry)
     warnings = [
         *noticed,
-        *(warned for level in levels for warned in _level_warnings(level, plateaus)),
+        *(warned for level in levels for warned in _level_warnings(level, under_load)),
         *(warned for level in levels for warned in _fit_warnings(level.fit)),
     ]
     if not telling:
@@ -129,12 +134,20 @@ def _level_warnings(level: LevelFit, plateaus: Plateaus) -> list[Warned]:
     return [Warned(code="wide_level", message=message)]
 
 
+def _unloaded(plateaus: Plateaus, under_load: Plateaus | None) -> list[Warned]:
+    below = f"below {UNLOADED / PASCALS_PER_BAR:g} bar"
+    if under_load is None:
+        message = (
+            f"the clutch was open, all pressures lie {below}: no curve is fitted, no track uses it; a diagnosis does"
+        )
+        return [Warned(code="open_clutch", message=message)]
+    left_out = plateaus.torque.size - under_load.torque.size
+    message = f"{left_out} plateaus {below} were left out of the fits"
+    return [Warned(code="unloaded_plateaus", message=message)] if left_out else []
+
+
 def _row_warnings(run: IncomingRun, plateaus: Plateaus) -> list[Warned]:
     found = []
-    unloaded = run.channels["torque_nm"].size - plateaus.torque.size
-    if unloaded:
-        message = f"{unloaded} plateaus below {UNLOADED / PASCALS_PER_BAR:g} bar were left out of the fits"
-        found.append(Warned(code="unloaded_plateaus", message=message))
     if "torque_sd_nm" in run.channels and plateaus.torque_sd is None:
         message = "torque_sd_nm holds zeros, which no sensor has: the fits were not weighted by it"
         found.append(Warned(code="torque_sd_ignored", message=message))

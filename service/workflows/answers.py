@@ -128,13 +128,13 @@ def one_run(database: Database, clutch_id: str, run_id: str) -> dict[str, Any]:
 def stribeck_page(
     database: Database, remembered: Remembered, clutch_id: str, *, limit: int, after: Place | None
 ) -> tuple[list[Any], Place | None]:
-    """Stationary tests by cycles: their fits and the pressure laws through them."""
+    """Stationary tests by cycles: their fits and the pressure laws through them. An open clutch has neither."""
     with database.reading() as connection:
         row = stored.clutch(connection, clutch_id)
         key = (clutch_id, row.revision, "stribeck", limit, after)
         found: tuple[list[Any], Place | None] | None = remembered.find(key)
         if found is None:
-            rows = runs.page(connection, clutch_id, limit=limit + 1, after=after, kind="stationary_stribeck")
+            rows = runs.page(connection, clutch_id, limit=limit + 1, after=after, fitted=True)
             levels = stored.levels(connection, clutch_id)
     if found is None:
         found = _page([_stribeck_item(each, levels.get(each.run_id, [])) for each in rows[:limit]], rows, limit)

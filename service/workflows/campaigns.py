@@ -148,7 +148,7 @@ def without_record(row: RunRow, origin: float) -> Taken:
 
 def _stationary(columns: Mapping[str, FloatArray], keep_record: bool, said: dict[str, Any]) -> StationaryRun:
     if "time_s" not in columns:
-        return StationaryRun(**said, plateaus=stationary_plateaus(columns, unloaded=True))
+        return StationaryRun(**said, plateaus=stationary_plateaus(columns))
     record = sampled_record(columns)
     cut = cut_plateaus(record)
     return StationaryRun(

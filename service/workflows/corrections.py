@@ -7,7 +7,7 @@ one point stand in, for to cut all of them at every new run would cost more than
 
 import logging
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 from sqlalchemy import Connection
@@ -15,8 +15,7 @@ from sqlalchemy import Connection
 from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, StationaryRun
 from models.diagnosis.extension import Extension
-from models.runs import Plateaus
-from service.formats.incoming import UNLOADED
+from models.runs import loaded
 from service.schemas.clutch import ClutchIn
 from service.workflows import stored
 from service.workflows.analysis import Value, levels_of, mean_cofs
@@ -71,18 +70,11 @@ def corrected(
         artefact = _artefact(extension, test, campaign_of(record, known[: place[test.run_id]]))
         if artefact is None:
             continue
-        freed = _loaded(replace(test.plateaus, torque=test.plateaus.torque - artefact))
-        cofs = mean_cofs(levels_of(freed, geometry), velocities, geometry)
+        freed = loaded(replace(test.plateaus, torque=test.plateaus.torque - artefact))
+        cofs = {} if freed is None else mean_cofs(levels_of(freed, geometry), velocities, geometry)
         if cofs:
             found[test.run_id] = cofs
     return found
-
-
-def _loaded(plateaus: Plateaus) -> Plateaus:
-    """Without what was read with the clutch open, through which no curve is fitted."""
-    rows = plateaus.pressure >= UNLOADED
-    columns = {each.name: getattr(plateaus, each.name) for each in fields(Plateaus)}
-    return replace(plateaus, **{name: column[rows] for name, column in columns.items() if column is not None})
 
 
 def _artefact(extension: Extension, run: StationaryRun, before: Campaign) -> FloatArray | None:

@@ -113,6 +113,15 @@ def test_both_directions_of_rotation():
     assert (np.sign(cut.plateaus.torque) == np.sign(speed)).all()
 
 
+def test_an_open_clutch_is_cut_by_its_speed():
+    made = make(np.full(TENTH.size, 5e5), TENTH, np.random.default_rng(9), idle=8.0)
+    for noise in (0.0, 1000.0):
+        pressure = 500.0 + noise * np.random.default_rng(10).standard_normal(made.record.time.size)
+        cut = cut_plateaus(replace(made.record, pressure=pressure))
+        assert of(cut, made).tolist() == list(range(TENTH.size))
+        assert (np.abs(off(cut, made)) < 5).all()
+
+
 @pytest.mark.parametrize("gap", [False, True])
 def test_lost_samples(reference, gap):
     record = lose(reference.record, 0.01, np.random.default_rng(10), gap=gap)
@@ -258,8 +267,8 @@ def test_a_constant_record_is_one_plateau(n):
         (plain(time=np.tile(0.001 * np.arange(2500), 2)), "time must run forwards"),
         (plain(time=1e-9 * np.arange(5000)), "s apart"),
         (plain(torque=np.full(5000, 1e300)), "torque must lie within"),
-        (plain(pressure=np.zeros(5000)), "without pressure"),
-        (plain(speed=np.zeros(5000)), "at standstill"),
+        (plain(pressure=np.where(np.arange(5000) < 60, 5e5, 0.0)), "without pressure"),
+        (plain(pressure=np.zeros(5000), speed=np.zeros(5000)), "at standstill"),
         (plain(speed=np.linspace(0, 200, 5000)), "no steady dwell"),
     ],
 )

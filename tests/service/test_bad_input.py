@@ -58,7 +58,7 @@ CASES = [
     (stationary(0) | {"started_at": "2026-11-02T08:00:00"}, "/started_at", None, None, "timezone_aware"),
     (stationary(0, pressures=(5.0,), speeds=(500,)), "/channels/torque_nm/0", 1, None, "too_few_points"),
     (stationary(0, speeds=(500,)), "/channels/speed_rpm/0", 1, "500", "speeds_all_equal"),
-    (stationary(0, pressures=(0.0,)), "/channels/pressure_bar/0", 1, "0", "unloaded"),
+    (stationary(0, pressures=(0.0, 0.02), speeds=(0,)), "/channels/speed_rpm/0", 1, "0", "open_at_rest"),
     (stationary(0) | {"started_at": 5}, "/started_at", None, "5", None),
     (
         stationary(0, pressures=tuple(4 + 0.5 * i for i in range(101))),
