@@ -103,7 +103,7 @@ def missing_for_baseline(design: Design) -> str:
     """What is missing for a pooled baseline, or nothing."""
     steady = design.rows.velocity[design.closed & design.rows.steady]
     if steady.size < FEWEST_ROWS:
-        return f"there are {steady.size} plateaus of stationary tests, and at least {FEWEST_ROWS} are needed."
+        return f"there are {steady.size} plateaus of stationary tests under pressure, and at least {FEWEST_ROWS} are needed."
     speeds = np.unique(np.round(steady / float(steady.max()), 3)).size
     if speeds < FEWEST_SPEEDS:
         return f"there are {speeds} distinct speeds, and at least {FEWEST_SPEEDS} are needed for a Stribeck curve."

@@ -8,10 +8,12 @@ from models.diagnosis.campaign import Oil
 from models.diagnosis.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.design import build_design
 from models.diagnosis.effect import Effect, Kind, unit_changes
+from models.diagnosis.effects.oil_temperature import HERSEY
 from models.diagnosis.effects.torque_zero_shift import STRAIGHT
 from models.diagnosis.laws import Scene
 from models.diagnosis.starting import starting_laws
-from models.diagnosis.viscosity import viscosity
+from models.diagnosis.viscosity import log_viscosity_ratio, viscosity
+from models.stribeck import GAMMA
 from tests.models.diagnosis.campaigns import campaign
 
 SLUGS = [
@@ -84,6 +86,17 @@ def test_units_of_a_few(scene: Scene) -> None:
     zero = BY_SLUG["torque_zero_shift"].change(scene, 0.5, (0.0, 2000.0, *STRAIGHT))
     assert set(np.unique(zero)) == {0.0, 0.5}
     assert (zero[scene.points.cycles > 2000.0] == 0.5).all()
+
+
+def test_friction_that_hangs_on_speed_times_viscosity_is_within_reach(scene: Scene) -> None:
+    """Hersey's similarity, exactly: oil of ν for ν_ref is a speed of v ν/ν_ref, whatever the pressure and the state."""
+    points = scene.points
+    steady = points.steady
+    thinner = np.exp(log_viscosity_ratio(points.temperature, scene.facts.reference_temperature, scene.facts.oil))
+    expected = scene.curve_at(velocity=points.velocity * thinner) - scene.curve
+    change = BY_SLUG["oil_temperature"].change(scene, GAMMA, (HERSEY,))
+    assert np.abs(expected[steady]).max() > 0.01
+    np.testing.assert_allclose(change[steady], expected[steady], atol=1e-9)
 
 
 def test_a_delay_is_the_torque_of_a_moment_before(scene: Scene) -> None:
