@@ -67,7 +67,9 @@ def cut_plateaus(record: Sampled) -> PlateauCut:
     dwells, left_out = find_dwells(blocks)
     if not dwells:
         reasons = " ".join(sentence for _, sentence in left_out)
-        raise ValueError(f"the record has no steady dwell under pressure and in motion. {reasons}".rstrip())
+        raise ValueError(
+            f"the record has no steady dwell in motion and, where it has any, under pressure. {reasons}".rstrip()
+        )
     duration = np.array([blocks.time[one.stop - 1] - blocks.time[one.start] + blocks.duration for one in dwells])
     transients = fit_transients(_stretches(blocks, dwells), blocks.duration)
     drop = dropped(transients, duration, deviations(_stretches(blocks, dwells)).mean)

@@ -102,7 +102,7 @@ def find_dwells(blocks: Blocks) -> tuple[list[Dwell], list[Note]]:
         return [], []
     window = max(FEWEST_BLOCKS, round(WINDOW / blocks.duration))
     pressure, speed = _Channel(blocks.pressure, window), _Channel(blocks.speed, window)
-    idle = pressure.highest < UNLOADED
+    idle = _highest(blocks.pressure, window) < UNLOADED
     channels, least = ((speed,), -math.inf) if idle else ((pressure, speed), NO_PRESSURE * pressure.highest)
     active = (np.abs(blocks.pressure) > least) & (np.abs(blocks.speed) > STANDSTILL * speed.highest)
     steady = ~blocks.gap
@@ -113,6 +113,13 @@ def find_dwells(blocks: Blocks) -> tuple[list[Dwell], list[Note]]:
     cores = [(int(a), int(b)) for a, b in edges.reshape(-1, 2) if b - a >= 2]
     cores = _merged(cores, blocks, channels)
     return _sorted_out(_widened(cores, blocks, channels), blocks, channels, least)
+
+
+def _highest(pressure: FloatArray, window: int) -> float:
+    """What means [Pa] over a window of blocks hardly ever reach: a gauge's noise and its negative offset are no pressure."""
+    size = min(window, pressure.size)
+    total = np.concatenate([[0.0], np.cumsum(pressure)])
+    return float(np.quantile((total[size:] - total[:-size]) / size, 0.995))
 
 
 class _Channel:

@@ -65,7 +65,7 @@ def frame_of(design: Design) -> Frame:
         highest=float(pressures[-1]),
         last=float(design.facts.states[-1]),
         loop_pressures=of_loops if of_loops.size or not design.loops else pressures[:1],
-        reference_velocity=0.5 * float(design.rows.velocity.max()),
+        reference_velocity=0.5 * float(design.rows.velocity[design.closed].max(initial=1e-3)),
     )
 
 

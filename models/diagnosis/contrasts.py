@@ -11,6 +11,7 @@ from itertools import product
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline import Prediction
@@ -39,7 +40,7 @@ def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
     rows = design.rows
     torque = rows.engaged * np.abs(prediction.torque)  # with the clutch open there is no friction to be wrong
     steady, looping = rows.steady.astype(np.float64), 1.0 - rows.steady
-    speed, pressure = _unit(rows.velocity), _unit(rows.pressure)
+    speed, pressure = _unit(rows.velocity, design.closed), _unit(rows.pressure, design.closed)
     life = _rank(rows.cycles)
     states, levels = design.facts.states.size, design.levels.size
     lives, presses = min(states - 1, 3), min(levels - 1, 2)
@@ -77,7 +78,7 @@ def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
         add(CYCLES, here.astype(np.float64))
         for s in (1, 2):
             add(CYCLES, here * _cosine(s, speed) * steady)
-    reading = _unit(np.where(design.closed, torque, torque[design.closed].min()))
+    reading = _unit(torque, design.closed)
     for t in range(1, TORQUE_WAVES + 1):
         add(TORQUE, _cosine(t, reading))
     _add_clock(design, add, steady)
@@ -100,7 +101,7 @@ def _none(design: Design) -> Contrasts:
 
 def _add_clock(design: Design, add: Add, steady: FloatArray) -> None:
     rows = design.rows
-    clock = rows.clock / max(float(rows.clock[rows.steady].max(initial=1.0)), 1e-9)
+    clock = rows.clock / max(float(rows.clock[rows.steady & design.closed].max(initial=1.0)), 1e-9)
     for t in range(1, 7):
         add(CLOCK, _cosine(t, clock) * steady)
         if design.facts.states.size > 1:
@@ -109,7 +110,8 @@ def _add_clock(design: Design, add: Add, steady: FloatArray) -> None:
 
 def _add_loops(design: Design, add: Add, looping: FloatArray, lives: int, presses: int) -> None:
     rows = design.rows
-    life, pressure = _rank(rows.cycles), _unit(rows.pressure)
+    life, pressure = _rank(rows.cycles), _unit(rows.pressure, design.closed)
+    speed = _unit(rows.velocity, design.closed)
     for h in range(1, 7):
         for wave in (np.cos(h * rows.phase), np.sin(h * rows.phase)):
             add(PHASE, wave * looping)
@@ -122,11 +124,11 @@ def _add_loops(design: Design, add: Add, looping: FloatArray, lives: int, presse
     add(PHASE, looping)
     rising = np.sign(rows.acceleration) * looping
     for s in range(4):
-        add(PHASE, rising * _cosine(s, _unit(rows.velocity)))
+        add(PHASE, rising * _cosine(s, speed))
     for way in (1.0, -1.0):
         one_way = looping * (way * rows.acceleration > 0)
         for centre, width in product(np.linspace(0.06, 0.94, 11), (0.06, 0.12)):
-            add(PHASE, _bump(_unit(rows.velocity), centre, width) * one_way)
+            add(PHASE, _bump(speed, centre, width) * one_way)
 
 
 def _bump(unit: FloatArray, centre: float, width: float) -> FloatArray:
@@ -137,10 +139,10 @@ def _cosine(order: int, unit: FloatArray) -> FloatArray:
     return np.cos(np.pi * order * unit)
 
 
-def _unit(values: FloatArray) -> FloatArray:
-    """To 0 ... 1 by range."""
-    low, high = float(values.min()), float(values.max())
-    return (values - low) / max(high - low, 1e-300)
+def _unit(values: FloatArray, among: NDArray[np.bool_]) -> FloatArray:
+    """To 0 ... 1 by the range of those `among` them."""
+    low, high = float(values[among].min()), float(values[among].max())
+    return (np.clip(values, low, high) - low) / max(high - low, 1e-300)
 
 
 def _rank(values: FloatArray) -> FloatArray:

@@ -22,8 +22,6 @@ from models.runs import UNLOADED, pressure_levels
 
 #: Time on one plateau [s] where nothing else is known (the reference's section 2.3.3).
 PLATEAU_DURATION = 5.0
-#: Below this share of the highest pressure the clutch is open: no lining touches.
-OPEN = 0.01
 
 IntArray = NDArray[np.intp]
 
@@ -199,8 +197,8 @@ def _assembled(
 
 
 def _opened(points: Points) -> Points:
-    """With what is measured below UNLOADED, or below the share OPEN of the highest pressure, marked as open."""
-    closed = (points.pressure > OPEN * points.pressure.max(initial=0.0)) & (points.pressure >= UNLOADED)
+    """With what is measured below UNLOADED marked as open."""
+    closed = points.pressure >= UNLOADED
     lowest = float(points.pressure[closed].min()) if closed.any() else 1.0
     return replace(points, engaged=closed.astype(np.float64), pressure=np.where(closed, points.pressure, lowest))
 

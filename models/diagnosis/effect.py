@@ -88,7 +88,6 @@ class Effect:
     bends: along what its form is uncertain (`models.diagnosis.bending`); an exact law has none.
     several(scene, settings) -> [P, m] Nm is the same for many (amplitude, shape) at once, where that is cheaper.
     tails: degrees of freedom of the amplitude's prior (`models.diagnosis.amplitude`), infinite for a normal one.
-    tests: what parts it from its neighbours, slug -> a test in words ("baseline": from none).
     """
 
     slug: str
@@ -109,7 +108,6 @@ class Effect:
     change: Callable[[Scene, float, Shape], FloatArray]
     before_lag: bool | None
     bends: tuple[Bend, ...]
-    tests: dict[str, str]
     tails: float = 2.0
     several: Callable[[Scene, Sequence[tuple[float, Shape]]], FloatArray] | None = None
 

@@ -8,6 +8,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, Oil, StationaryRun
+from models.runs import UNLOADED, Plateaus, Record
 
 #: The oil temperature to which everything refers where none was measured: the middle of the reference's 80 to 90 °C [K].
 REFERENCE_TEMPERATURE = 273.15 + 85.0
@@ -22,9 +23,9 @@ MOST_ONSETS = 20
 class Facts:
     """What effects ask beside the rows. Cycles and moments as in the campaign.
 
-    states [s]: the distinct cycles at which friction was tested, ascending; oil_changes, sensor_zeros and rests: cycles
-    of maintenance (a rest is also a long gap in the moments); rest_moments: when the pause ended, rest_lengths
-    [s]: how long it was, NaN where unknown.
+    states [s]: the distinct cycles at which friction was tested (not those where the clutch was open only), ascending;
+    oil_changes, sensor_zeros and rests: cycles of maintenance (a rest is also a long gap in the moments); rest_moments: when
+    the pause ended, rest_lengths [s]: how long it was, NaN where unknown.
     duty_ends [d], duty_energies [d] J an engagement: blocks whose energy is known, ascending.
     """
 
@@ -61,21 +62,18 @@ class Facts:
 
 def facts_of(campaign: Campaign) -> Facts:
     """Read off the campaign."""
-    tests: list[StationaryRun | DynamicRun] = [*campaign.stationary, *campaign.dynamic]
+    tests: list[tuple[float, Plateaus | Record]] = [(run.cycles, run.plateaus) for run in campaign.stationary]
+    tests += [(run.cycles, run.record) for run in campaign.dynamic]
+    under_load = [(cycles, table, table.pressure >= UNLOADED) for cycles, table in tests]
     temperatures = [
-        channel
-        for channel in (
-            *(run.plateaus.oil_temperature for run in campaign.stationary),
-            *(run.record.oil_temperature for run in campaign.dynamic),
-        )
-        if channel is not None
+        table.oil_temperature[rows] for _, table, rows in under_load if table.oil_temperature is not None and rows.any()
     ]
     pauses = _pauses(campaign)
     known = [duty for duty in campaign.duty if duty.energy is not None and duty.energy > 0]
     return Facts(
         geometry=campaign.geometry,
         oil=campaign.oil,
-        states=np.unique(np.array([run.cycles for run in tests], dtype=np.float64)),
+        states=np.unique(np.array([cycles for cycles, _, rows in under_load if rows.any()], dtype=np.float64)),
         temperature_measured=bool(temperatures),
         reference_temperature=float(np.median(np.concatenate(temperatures))) if temperatures else REFERENCE_TEMPERATURE,
         oil_changes=_events(campaign, EventKind.OIL_CHANGE),

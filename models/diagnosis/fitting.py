@@ -64,7 +64,7 @@ def priors_of(design: Design, start: FloatArray, frame: Frame) -> Priors:
     """Weak priors around scales of the data, and what cannot be told at all held fast."""
     size = start.size
     level = design.usual_torque
-    fastest = float(design.rows.velocity.max())
+    fastest = 2.0 * frame.reference_velocity
     sds, means = np.full(size, np.nan), start.copy()
     spreads = {0: 10 * level, 1: 3.0, 2: 3 * fastest, 3: 10 * level}
     for k, spread in spreads.items():

@@ -73,10 +73,10 @@ def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], 
         before = cycle
         mean = float("nan") if temperature is None else float(temperature[rows].mean())
         loop = _binned(cycle, time[rows], sign * torque[rows], stretch.pressure, sign, mean, float(time[0]))
-        if isinstance(loop, str):
-            notes.append(f"{stretch.pressure / 1e5:.3g} bar: {loop}")
-        else:
+        if not isinstance(loop, str):
             found.append(loop)
+        elif stretch.pressure > 0:
+            notes.append(f"{stretch.pressure / 1e5:.3g} bar: {loop}")
     return found, notes
 
 

@@ -20,8 +20,9 @@ from models.diagnosis.whitening import Noise, whitened
 
 #: False alarms allowed.
 LINES_SHARE = 0.001
-#: Steps are half a cycle a test: it starts at two and a half cycles, and a neighbourhood is so many steps.
-_FIRST, _NEIGHBOURS = 5, 61
+#: Steps are half a cycle a test: it starts at two and a half cycles, so many steps are looked at before, and a neighbourhood
+#: is so many.
+_FIRST, _SLOWER, _NEIGHBOURS = 5, 3, 61
 #: Fewer plateaus in all, or in the longest run, show no line.
 _FEWEST, _FEWEST_IN_A_RUN = 64, 32
 #: Frequencies at most, and gaps between plateaus, in usual steps, beyond which a pause is taken for one of that length.
@@ -59,13 +60,14 @@ def lines(design: Design, noise: Noise, residual: FloatArray) -> Lead:
     last = min(int(duration / step), _MOST) if step > 0.0 else 0
     if last < _FEWEST_IN_A_RUN:
         return _NOTHING
-    power = np.sum([run.power(_FIRST - 1, last, np.pi / duration) for run in kept], axis=0)
+    power = np.sum([run.power(_FIRST - _SLOWER, last, np.pi / duration) for run in kept], axis=0)
     # a line stands out of its neighbourhood: noise that remembers otherwise than was thought does not
     middle = float(gamma.ppf(0.5, len(kept)))
     for column in power.T:
         column /= np.maximum(median_filter(column, size=_NEIGHBOURS, mode="reflect") / middle, 1.0)
-    # ... and above what is slower: structure that grows the slower it is has no period
-    power = np.where(power[1:] >= power[:-1], power[1:], 0.0)
+    # ... and above all that is slower: structure that grows the slower it is has no period
+    slower = np.maximum.accumulate(power, axis=0)[_SLOWER - 1 : -1]
+    power = np.where(power[_SLOWER:] >= slower, power[_SLOWER:], 0.0)
     index = int(np.argmax(power))
     highest = float(power.ravel()[index])
     tests = 1.5 * power.size

@@ -105,7 +105,6 @@ def _effect(k: int, column: Callable[[Points], FloatArray], *, before_lag: bool)
         change=change,
         before_lag=before_lag,
         bends=(),
-        tests={},
         tails=float("inf"),
     )
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, MaintenanceEvent, StationaryRun
-from models.diagnosis.design import OPEN, PLATEAU_DURATION
-from models.runs import Plateaus, Record, pressure_levels
+from models.diagnosis.design import PLATEAU_DURATION
+from models.runs import UNLOADED, Plateaus, Record, pressure_levels
 
 #: The dynamic test of the reference (section 2.3.4): a swing of 1000 rpm about 1000 rpm, sampled at 200 a period.
 SWING = 1000 * 2 * np.pi / 60
@@ -137,7 +137,8 @@ def runs_of(key: str) -> float:
 def with_trial(campaign: Campaign, key: str) -> Campaign | None:
     """The campaign with the trial's runs added at its end (torques 0), the first of those that are alike; None where the
     campaign has no pattern for it."""
-    trial, pattern = TRIALS[key], _usual([(run, run.plateaus) for run in campaign.stationary])
+    trial = TRIALS[key]
+    pattern = _usual([(run, run.plateaus) for run in campaign.stationary], trial)
     if trial.parts:
         whole: Campaign | None = campaign
         for part in trial.parts:
@@ -148,7 +149,7 @@ def with_trial(campaign: Campaign, key: str) -> Campaign | None:
         return None
     last = float(states[-1])
     if trial.loops:
-        swung = _usual([(run, run.record) for run in campaign.dynamic])
+        swung = _usual([(run, run.record) for run in campaign.dynamic], trial)
         return None if swung is None else replace(campaign, dynamic=(*campaign.dynamic, _loops(swung, trial, last)))
     if pattern is None:
         return None
@@ -175,11 +176,16 @@ def with_trial(campaign: Campaign, key: str) -> Campaign | None:
     return replace(added, maintenance=(*campaign.maintenance, *rests))
 
 
-def _usual(runs: Sequence[tuple[Run, Plateaus | Record]]) -> Run | None:
-    """The last run under the usual pressures, not one of those that a trial at light pressures or none has added."""
+def _usual(runs: Sequence[tuple[Run, Plateaus | Record]], trial: Trial) -> Run | None:
+    """The last run under the usual pressures, not one of those that a trial at light pressures or none has added; none where
+    the trial's share of its lowest pressure would leave the clutch open."""
     highest = max((float(table.pressure.max()) for _, table in runs), default=0.0)
-    usual = [run for run, table in runs if 0.0 < USUAL * highest <= float(table.pressure.max())]
-    return usual[-1] if usual else None
+    usual = [each for each in runs if max(USUAL * highest, UNLOADED) <= float(each[1].pressure.max())]
+    if not usual:
+        return None
+    run, table = usual[-1]
+    lowest = trial.pressure * float(table.pressure[table.pressure >= UNLOADED].min())
+    return run if trial.pressure == 0.0 or lowest >= UNLOADED else None
 
 
 def _distance(states: FloatArray) -> float:
@@ -195,7 +201,7 @@ def _sweep(pattern: StationaryRun, trial: Trial, cycles: float, number: int, res
     if trial.falling:
         rows = np.lexsort((-table.speed, levels))
     if trial.pressure == 0.0:
-        closed = np.unique(levels[levels > OPEN * levels.max()])
+        closed = np.unique(levels[levels >= UNLOADED])
         rows = np.tile(rows[levels == closed[closed.size // 2]], PASSES)
     oil = table.oil_temperature
     if trial.temperature is not None:
@@ -219,7 +225,7 @@ def _loops(pattern: DynamicRun, trial: Trial, cycles: float) -> DynamicRun:
     """The pressures of a dynamic test, or a share of them, at another frequency."""
     record = pattern.record
     levels = np.unique(pressure_levels(record.pressure[:: max(1, record.pressure.size // 5000)]))
-    levels = levels[levels > OPEN * levels.max()]
+    levels = levels[levels >= UNLOADED]
     if trial.pressure != 1.0:
         levels = trial.pressure * float(levels[0]) * np.array(LIGHT if trial.pressure > 0.0 else LIGHT[:1])
     count = _SAMPLES * _PERIODS + 1

@@ -115,8 +115,8 @@ def test_both_directions_of_rotation():
 
 def test_an_open_clutch_is_cut_by_its_speed():
     made = make(np.full(TENTH.size, 5e5), TENTH, np.random.default_rng(9), idle=8.0)
-    for noise in (0.0, 1000.0):
-        pressure = 500.0 + noise * np.random.default_rng(10).standard_normal(made.record.time.size)
+    for offset, noise in ((500.0, 0.0), (500.0, 1000.0), (0.0, 3000.0), (-4000.0, 3000.0), (-6000.0, 0.0)):
+        pressure = offset + noise * np.random.default_rng(10).standard_normal(made.record.time.size)
         cut = cut_plateaus(replace(made.record, pressure=pressure))
         assert of(cut, made).tolist() == list(range(TENTH.size))
         assert (np.abs(off(cut, made)) < 5).all()

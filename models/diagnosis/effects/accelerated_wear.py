@@ -46,10 +46,4 @@ EFFECT = Effect(
     change=_change,
     before_lag=True,
     bends=(Bend.SPEED, Bend.LIFE),
-    tests={
-        "load_severity": "two more states at the usual load, with the energy of each engagement recorded",
-        "oil_change": "two more states: a loss goes on, a step stays",
-        "running_in": "two more states: a late loss goes on",
-        "baseline": "two more states, close together",
-    },
 )

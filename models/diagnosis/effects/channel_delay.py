@@ -52,9 +52,4 @@ EFFECT = Effect(
     change=_change,
     before_lag=True,
     bends=(),
-    tests={
-        "squeeze_film": "loops at 0.05 and 0.5 Hz: a delay's loop goes with frequency at every pressure alike",
-        "inertia_torque": "loops at 0.5 Hz: inertia grows with acceleration, a delay with the slope of the curve",
-        "baseline": "loops at 0.5 Hz",
-    },
 )

@@ -56,9 +56,4 @@ EFFECT = Effect(
     change=_change,
     before_lag=None,
     bends=(Bend.SPEED, Bend.MOTION),
-    tests={
-        "viscous_exponent": "a sweep at a quarter of the usual pressures: the viscous term falls, drag stays",
-        "interface_heating": "a sweep at a quarter of the usual pressures, where there is little frictional heat",
-        "baseline": "a sweep at a quarter of the usual pressures (an open clutch's drag is that of another gap)",
-    },
 )

@@ -35,9 +35,4 @@ EFFECT = Effect(
     change=_change,
     before_lag=False,
     bends=(),
-    tests={
-        "squeeze_film": "loops at 0.3 Hz with the clutch open: inertia stays, a film has nothing to carry",
-        "channel_delay": "loops at 0.3 Hz with the clutch open: inertia stays, a delay of no torque is nothing",
-        "baseline": "loops at 0.3 Hz with the clutch open",
-    },
 )

@@ -86,9 +86,4 @@ EFFECT = Effect(
     change=_change,
     before_lag=True,
     bends=(Bend.SPEED, Bend.MOTION),
-    tests={
-        "viscous_exponent": "the same sweep with falling instead of rising speed and with pauses: heat has a memory",
-        "hydrodynamic_drag": "a sweep at a quarter of the usual pressures, where heat is small and drag is not",
-        "baseline": "a sweep with long pauses between plateaus",
-    },
 )

@@ -52,9 +52,4 @@ EFFECT = Effect(
     change=_change,
     before_lag=True,
     bends=(Bend.LIFE,),
-    tests={
-        "accelerated_wear": "a block at half the energy: severity slows the ageing, late wear does not care",
-        "oil_change": "the energy of each engagement, recorded",
-        "baseline": "a block at twice the energy with a test before and after",
-    },
 )

@@ -53,10 +53,4 @@ EFFECT = Effect(
     change=_change,
     before_lag=True,
     bends=(Bend.SPEED, Bend.LIFE),
-    tests={
-        "accelerated_wear": "an oil sample, or the maintenance log; two more states tell a step from a growing loss",
-        "load_severity": "the maintenance log, or an oil sample",
-        "torque_zero_shift": "a sweep with the clutch open: a zero stays, friction does not",
-        "baseline": "an oil sample",
-    },
 )

@@ -49,8 +49,4 @@ EFFECT = Effect(
     change=_change,
     before_lag=True,
     bends=(Bend.SPEED, Bend.MOTION),
-    tests={
-        "torque_zero_shift": "one sweep at 60 °C oil temperature: a shifted zero does not follow it",
-        "baseline": "one sweep at 60 °C and one at 95 °C oil temperature",
-    },
 )

@@ -54,8 +54,4 @@ EFFECT = Effect(
     change=_change,
     before_lag=True,
     bends=(Bend.LIFE,),
-    tests={
-        "torque_zero_shift": "a second gauge at the piston, or a sweep with the clutch open: a zero stays",
-        "baseline": "a second gauge at the piston for one test",
-    },
 )

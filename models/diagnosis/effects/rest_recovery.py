@@ -68,5 +68,4 @@ EFFECT = Effect(
     change=_change,
     before_lag=True,
     bends=(Bend.SPEED, Bend.LIFE, Bend.CLOCK),
-    tests={"baseline": "the same sweep twice right after a rest of a day: the second is back on its course"},
 )

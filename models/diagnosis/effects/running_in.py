@@ -46,9 +46,4 @@ EFFECT = Effect(
     change=_change,
     before_lag=True,
     bends=(Bend.SPEED, Bend.LIFE),
-    tests={
-        "oil_change": "no test can be made in a past life: of the next clutch, four tests in the first 1000 cycles",
-        "load_severity": "of the next clutch, four tests in the first 1000 cycles at one load",
-        "baseline": "of the next clutch, four tests in the first 1000 cycles",
-    },
 )

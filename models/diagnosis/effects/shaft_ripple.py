@@ -22,8 +22,4 @@ EFFECT = Effect(
     change=unchanged,
     before_lag=False,
     bends=(),
-    tests={
-        "stick_slip": "a raw record at two speeds: ripple follows the shaft, stick-slip keeps its frequency",
-        "baseline": "a raw record of one sweep at 200 Hz or more",
-    },
 )

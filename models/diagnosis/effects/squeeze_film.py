@@ -132,9 +132,4 @@ EFFECT = Effect(
     several=_changes,
     before_lag=None,
     bends=(Bend.SPEED,),
-    tests={
-        "inertia_torque": "loops at 0.3 Hz with the clutch open: a film's torque goes, inertia stays",
-        "channel_delay": "loops at 0.5 Hz about several mean speeds",
-        "baseline": "loops at 0.3 and 0.5 Hz",
-    },
 )

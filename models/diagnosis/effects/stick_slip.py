@@ -21,8 +21,4 @@ EFFECT = Effect(
     change=unchanged,
     before_lag=False,
     bends=(),
-    tests={
-        "shaft_ripple": "a raw record at two speeds: stick-slip keeps its frequency, ripple follows the shaft",
-        "baseline": "a raw record of one sweep at 200 Hz or more",
-    },
 )

@@ -71,9 +71,4 @@ EFFECT = Effect(
     change=_change,
     before_lag=False,
     bends=(Bend.LIFE, Bend.CLOCK),
-    tests={
-        "oil_temperature": "one sweep at 60 °C oil temperature, and one with the clutch open, whose zero is no friction's",
-        "pressure_offset": "a sweep with the clutch open: no pressure, and the zero stays",
-        "baseline": "a sweep with the clutch open after each test",
-    },
 )

@@ -52,8 +52,4 @@ EFFECT = Effect(
     change=_change,
     before_lag=False,
     bends=(Bend.SPEED,),
-    tests={
-        "baseline": "the raw record of one sweep, or the same sweep with plateaus of 15 s",
-        "oil_temperature": "the same sweep with falling speed: what was not settled changes its sign",
-    },
 )

@@ -38,9 +38,4 @@ EFFECT = Effect(
     change=_change,
     before_lag=True,
     bends=(Bend.SPEED,),
-    tests={
-        "hydrodynamic_drag": "a sweep at a quarter of the usual pressures: drag stays, the viscous term falls",
-        "interface_heating": "the same sweep with pauses between plateaus: heat has a memory, an exponent has none",
-        "baseline": "a sweep to higher speed",
-    },
 )
