@@ -147,9 +147,18 @@ def counts() -> list[Count]:
         Count("… named and wrong", "one/", lambda one: one.wrong, most=0.02),
         Count("… ambiguous, and named rightly after the first advised test", "one/", _resolved(1), among=_ambiguous),
         Count(
-            f"… … after {MOST_ADVISED} advised tests at most, one by one", "one/", _resolved(), 0.80, among=_ambiguous
+            f"… ambiguous, and named rightly after {MOST_ADVISED} advised tests at most, one by one",
+            "one/",
+            _resolved(),
+            0.80,
+            among=_ambiguous,
         ),
-        Count("… … and named wrongly", "one/", lambda o: any(a.wrong for a in o.advised), among=_ambiguous),
+        Count(
+            "… ambiguous, and named wrongly after one of them",
+            "one/",
+            lambda o: any(a.wrong for a in o.advised),
+            among=_ambiguous,
+        ),
         Count("… ambiguous without any advice", "one/", lambda one: not one.advice, among=_ambiguous),
         Count("λ = 50, 12 states: top candidate", "twelve/", lambda one: one.top, 0.95),
         Count("… named and wrong", "twelve/", lambda one: one.wrong, most=0.02),
