@@ -45,8 +45,8 @@ LEAST_NAMED, LEAST_OF_TWO = 0.92, 0.8
 #: False alarms allowed in closing a case: structure that is left, and amplitudes that differ between parts.
 LEFT_SHARE, PARTS_SHARE = 5e-3, 3e-3
 #: Where what is left would look like that by chance in fewer cases, beyond what a template leaves, nothing is named:
-#: something else may be at work.
-UNEASY = 0.05
+#: something else may be at work. However loud it is, the right template leaves hardly more [nats] than the second says.
+UNEASY, MOST_LEFT = 0.05, 3.0
 #: A line in raw records has paid for its search: it is there.
 VIBRATION_PROBABILITY = 0.98
 #: So many of the candidates that stand are closed at most.
@@ -128,7 +128,7 @@ def judge(
     named = len(standing) == 1 and not imitated
     if named and len(causes) > 1:
         causes = tuple(slug for slug in causes if probabilities[slug] >= LEAST_OF_TWO) or causes[:1]
-    easy = first.statistics["closure_p_value"] * np.exp(min(slack, 50.0)) >= UNEASY
+    easy = first.statistics["closure_p_value"] * np.exp(min(slack, MOST_LEFT)) >= UNEASY
     named = named and easy and probabilities[causes[0]] >= LEAST_NAMED
     return Judgement(
         verdict=Verdict.CAUSE_NAMED if named else Verdict.CAUSE_AMBIGUOUS,
