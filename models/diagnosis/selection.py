@@ -22,6 +22,8 @@ from models.diagnosis.projection import Projected
 BoolArray: TypeAlias = NDArray[np.bool_]
 IntArray: TypeAlias = NDArray[np.intp]
 
+#: Twice λ [nats] of an effect of usual size: what shows less is no half of a pair.
+LEAST_SEEN = 0.01
 #: An effect is looked for from so many of its shapes, of which no two share more than this of what is visible of them.
 STARTS, ALIKE = 4, 0.9
 
@@ -184,7 +186,8 @@ def screen_pairs(columns: list[Column], projections: list[Projected]) -> list[Sc
 
 
 def _values(projected: Projected, sd: FloatArray, positive: BoolArray) -> FloatArray:
-    """Evidence [m, m] nats of every two columns with normal priors, -inf where a sign is wrong or a size unheard of."""
+    """Evidence [m, m] nats of every two columns with normal priors, -inf where a sign is wrong, a size unheard of, or one of
+    them shows nothing."""
     scale = sd[:, None] * sd
     unit = projected.info[: sd.size, : sd.size] * scale
     u = projected.score[: sd.size] * sd
@@ -193,6 +196,8 @@ def _values(projected: Projected, sd: FloatArray, positive: BoolArray) -> FloatA
     drop = 0.5 * (u[:, None] ** 2 * one + u**2 * one[:, None] - 2 * u[:, None] * u * unit) / determinant
     first = (u[:, None] * one - unit * u) / determinant
     wrong = (positive[:, None] & (first < 0)) | (positive & (first.T < 0)) | (np.abs(first) > 4) | (np.abs(first.T) > 4)
+    hidden = np.diag(unit) < LEAST_SEEN
+    wrong |= hidden[:, None] | hidden
     return np.where(wrong, -np.inf, drop - 0.5 * np.log(determinant))
 
 

@@ -11,7 +11,7 @@ from models.diagnosis.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.fitting import _inside
 from models.diagnosis.refitting import Hypothesis
 from models.diagnosis.searching import hypotheses_of
-from models.diagnosis.selection import columns_of
+from models.diagnosis.selection import columns_of, screen_pairs
 from models.diagnosis.viewing import view_of
 from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.fitted import Study, study
@@ -88,3 +88,14 @@ def test_pairs_must_be_closer_than_single_effects_to_stand_beside_the_best() -> 
     pair, rival = ("oil_change", "inertia_torque"), ("oil_change", "squeeze_film")
     assert len(standing(candidate(*pair, evidence=60.0), candidate(*rival, evidence=56.5))) == 1
     assert len(standing(candidate(*pair, evidence=60.0), candidate(*rival, evidence=57.5))) == 2
+
+
+def test_what_shows_nothing_is_no_half_of_a_pair() -> None:
+    """Without loops nothing of a delay, of inertia or of a film is seen: beside what is there they would stand for free."""
+    given = study(campaign(6, lambda at: np.full_like(at.velocity, 0.6 if at.cycles > 4000 else 0.0), loops=False))
+    known = given.baseline
+    columns = columns_of(list(CATALOGUE), [effect.grid(given.design.facts) for effect in CATALOGUE])
+    view = view_of(given.design, known.noise, known.priors, known.fit, columns)
+    found = {effect.slug for pair in screen_pairs(view.columns, view.projections) for effect in pair.effects}
+    assert "torque_zero_shift" in found
+    assert not found & {"channel_delay", "inertia_torque", "squeeze_film"}
