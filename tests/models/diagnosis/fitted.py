@@ -5,12 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
+from models.diagnosis.baseline import predict
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.catalogue import BY_SLUG
 from models.diagnosis.design import Design, build_design
 from models.diagnosis.effect import Shape
 from models.diagnosis.engine import Baseline, fit_baseline
 from models.diagnosis.fitting import Fit, Fitted, fit
+from models.diagnosis.laws import Laws
 from tests.models.diagnosis.campaigns import Where
 
 
@@ -43,3 +45,19 @@ def bump(at: Where) -> FloatArray:
     """Three percent more torque about 3 m/s: outside of the catalogue."""
     level = at.pressure / 4e5 * 20
     return np.asarray(0.02 * level * np.exp(-0.5 * ((at.velocity - 3.0) / 0.8) ** 2), dtype=np.float64)
+
+
+def checked_jacobian(design: Design, laws: Laws) -> FloatArray:
+    """The baseline's sensitivities, after they were found to be those of central differences."""
+    jacobian = predict(design, laws).jacobian(design)
+    for k in range(laws.theta.size):
+        step = 1e-5 * max(abs(laws.theta[k]), 0.1)
+        ends = []
+        for side in (1, -1):
+            theta = laws.theta.copy()
+            theta[k] += side * step
+            ends.append(predict(design, Laws(theta=theta, frame=laws.frame)).torque)
+        numeric = (ends[0] - ends[1]) / (2 * step)
+        # in loops a change of S goes through the continuous law, differences through its steps: 1 % of the largest
+        assert np.abs(numeric - jacobian[:, k]).max() <= 0.01 * np.abs(numeric).max() + 1e-9, k
+    return jacobian

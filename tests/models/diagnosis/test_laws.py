@@ -12,22 +12,13 @@ from models.diagnosis.starting import starting_laws
 from models.lag import attractor_torque
 from models.stribeck import StribeckParameters, torque
 from tests.models.diagnosis.campaigns import campaign
+from tests.models.diagnosis.fitted import checked_jacobian
 
 
 def test_the_jacobian_is_that_of_central_differences() -> None:
     design = build_design(campaign(1, cycles=(0.0, 2000.0, 9000.0)))
     laws = starting_laws(design, frame_of(design))
-    jacobian = predict(design, laws).jacobian(design)
-    for k in range(laws.theta.size):
-        step = 1e-5 * max(abs(laws.theta[k]), 0.1)
-        ends = []
-        for side in (1, -1):
-            theta = laws.theta.copy()
-            theta[k] += side * step
-            ends.append(predict(design, Laws(theta=theta, frame=laws.frame)).torque)
-        numeric = (ends[0] - ends[1]) / (2 * step)
-        # in loops a change of S goes through the continuous law, differences through its steps: 1 % of the largest
-        assert np.abs(numeric - jacobian[:, k]).max() <= 0.01 * np.abs(numeric).max() + 1e-9, k
+    checked_jacobian(design, laws)
 
 
 def test_the_curve_is_that_of_eq_3() -> None:

@@ -22,7 +22,7 @@ from models.diagnosis.starting import starting_laws
 from models.diagnosis.trials import PASSES, TRIALS, runs_of, with_trial
 from models.diagnosis.viewing import blocks_of
 from tests.models.diagnosis.campaigns import CYCLES, SPEEDS, Where, campaign
-from tests.models.diagnosis.fitted import Study, study
+from tests.models.diagnosis.fitted import Study, checked_jacobian, study
 
 INERTIA = 0.004
 STATES = CYCLES[:4]
@@ -131,16 +131,7 @@ def test_severity_leaves_an_open_clutch_alone(given: Study) -> None:
 def test_the_jacobian_is_that_of_central_differences(given: Study) -> None:
     design = given.design
     laws = started(design)
-    jacobian = predict(design, laws).jacobian(design)
-    for k in range(laws.theta.size):
-        step = 1e-5 * max(abs(laws.theta[k]), 0.1)
-        ends = []
-        for side in (1, -1):
-            theta = laws.theta.copy()
-            theta[k] += side * step
-            ends.append(predict(design, Laws(theta=theta, frame=laws.frame)).torque)
-        numeric = (ends[0] - ends[1]) / (2 * step)
-        assert np.abs(numeric - jacobian[:, k]).max() <= 0.01 * np.abs(numeric).max() + 1e-9, k
+    jacobian = checked_jacobian(design, laws)
     assert np.abs(jacobian[~design.closed][:, : OPEN_DRAG.start]).max() == 0.0
     assert np.abs(jacobian[design.closed][:, OPEN_DRAG]).max() == 0.0
 
