@@ -7,6 +7,7 @@ the rows of one pressure level. Measured pressures scatter about their level, so
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
@@ -37,6 +38,11 @@ class Plateaus:
 
     def __post_init__(self) -> None:
         _require_columns(self, ("pressure", "speed", "torque", "torque_sd", "oil_temperature"))
+
+    def take(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> "Plateaus":
+        """Those rows, at least one."""
+        columns = {each.name: getattr(self, each.name) for each in fields(self)}
+        return replace(self, **{name: column[rows] for name, column in columns.items() if column is not None})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,8 +96,7 @@ def loaded(plateaus: Plateaus) -> Plateaus | None:
     rows = plateaus.pressure >= UNLOADED
     if not rows.any():
         return None
-    columns = {each.name: getattr(plateaus, each.name) for each in fields(Plateaus)}
-    return replace(plateaus, **{name: column[rows] for name, column in columns.items() if column is not None})
+    return plateaus.take(rows)
 
 
 def pressure_levels(pressure: FloatArray) -> FloatArray:

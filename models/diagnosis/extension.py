@@ -22,7 +22,6 @@ from models.diagnosis.effect import Kind
 from models.diagnosis.facts import Facts, facts_of
 from models.diagnosis.fitting import Fit
 from models.diagnosis.laws import ATTRACTOR, POWERS, Frame, Laws, scene_of
-from models.runs import Plateaus
 
 #: Plateaus are handed on in parts of this many: a design takes no more of one run.
 _PART = 2000
@@ -53,13 +52,7 @@ class Extension:
         return found
 
     def _on(self, run: StationaryRun, rows: np.ndarray[Any, np.dtype[np.intp]], campaign: Campaign) -> FloatArray:
-        table = run.plateaus
-        part = Plateaus(
-            pressure=table.pressure[rows],
-            speed=table.speed[rows],
-            torque=table.torque[rows],
-            oil_temperature=None if table.oil_temperature is None else table.oil_temperature[rows],
-        )
+        part = run.plateaus.take(rows)
         clock = None if run.time is None else tuple(np.asarray(run.time)[rows].tolist())
         alone = replace(campaign, stationary=(replace(run, plateaus=part, time=clock, record=None),), dynamic=())
         points = build_design(alone).points
