@@ -79,6 +79,23 @@ def test_a_cause_that_leaves_an_oddity_is_not_named(
     assert judged().verdict is expected
 
 
+@pytest.mark.parametrize(("p_value", "expected"), [(0.01, Verdict.CAUSE_NAMED), (1e-4, Verdict.CAUSE_AMBIGUOUS)])
+def test_however_loud_a_cause_is_it_may_leave_a_little_only(
+    given: Study, best: Hypothesis, monkeypatch: pytest.MonkeyPatch, p_value: float, expected: Verdict
+) -> None:
+    """Of a thousand nats a template may be wrong by fifty; what is named leaves no more than three."""
+    close, known = verdict.close, given.baseline
+
+    def odd(*arguments: object) -> Closing:
+        closing = close(*arguments)  # type: ignore[arg-type] # handed on as they are
+        return replace(closing, statistics={**closing.statistics, "closure_p_value": p_value})
+
+    monkeypatch.setattr(verdict, "close", odd)
+    loud, rng = replace(best, evidence=1000.0, drop=1000.0), np.random.default_rng(1)
+    found = verdict.judge(given.design, known.noise, known.priors, [loud], 0.0, -np.inf, rng)
+    assert found.verdict is expected
+
+
 def test_gains_that_scatter_much_are_less_likely_than_those_that_hardly_do(given: Study) -> None:
     """Without any run to tell them, their prior is left: narrower above the usual scatter than below."""
     known = given.baseline
