@@ -35,14 +35,17 @@ PERIODIC = 0.15
 #: holds away from the swing's ends, where a sine does not linger.
 _REST_SHARE, _REST_INSIDE, _INSIDE = 0.1, 0.02, (0.1, 0.9)
 _SWING_SHARE, _MOST_SHARE = 0.02, 0.05
+#: Where speed at a record's ends is further off the swing than OUTLIER deviations and this share of its amplitude, it does
+#: not swing yet, or no more; ends are cut so many times at most.
+_OFF_SWING, _CUTS = 0.02, 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cycle:
     """A fitted swing: frequency [Hz], origin t_0 [s], mean v_0, cosine and sine [h], in the unit of what was fitted.
 
-    `covariance` [2h, 2h] is that of (cosine, sine) with f free; `noise` the deviation of a sample; the whole periods
-    are those of start <= t < stop [s]; `outliers` samples were left out.
+    `covariance` [2h, 2h] is that of (cosine, sine) with f free; `noise` the deviation of a sample; the swing begins at
+    `begin` [s], its last whole periods are those of start <= t < stop [s]; `outliers` samples were left out.
     """
 
     frequency: float
@@ -53,6 +56,7 @@ class Cycle:
     covariance: FloatArray
     noise: float
     periods: int
+    begin: float
     start: float
     stop: float
     outliers: int
@@ -107,12 +111,39 @@ def fit_cycle(time: FloatArray, value: FloatArray, count: int = SPEED_HARMONICS)
         return "The speed does not move."
     frequency = _coarse_frequency(t, y)
     fitted: Cycle | str = "The speed does not swing periodically."
-    for harmonic in (1, count):
+    for harmonic in (1, *(count,) * _CUTS):
         fitted = _refine(t, y, frequency, harmonic)
         if isinstance(fitted, str):
             return fitted
         frequency = fitted.frequency
+        if harmonic == count:
+            following = _following(t, y, fitted)
+            if following == slice(0, t.size):
+                break
+            t, y = t[following], y[following]
+    if isinstance(fitted, Cycle) and not (
+        fitted.noise < PERIODIC * fitted.amplitude and fitted.outliers <= 0.2 * t.size
+    ):
+        miss = fitted.noise / max(fitted.amplitude, 1e-3 * fitted.noise, 1e-300)
+        return f"The speed does not swing periodically: it misses its best fit by {miss:.0%} of its swing."
     return fitted
+
+
+def _following(time: FloatArray, value: FloatArray, cycle: Cycle) -> slice:
+    """Without the ends that do not follow the swing: holds between two pressures, the way back to where the next begins."""
+    residual = value - cycle.value(cycle.phase(time))
+    usual = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
+    smooth = median_filter(residual, size=min(_NEIGHBOURS, residual.size), mode="nearest")
+    off = np.abs(smooth) > max(OUTLIER * usual, _OFF_SWING * cycle.amplitude)
+    before, after = leading(off), leading(off[::-1])
+    return slice(before, off.size - after) if before + after < off.size else slice(0, off.size)
+
+
+def leading(off: NDArray[np.bool_]) -> int:
+    """How many of `off` [n] at the beginning are, up to the last before most that follow are not."""
+    share = np.cumsum(off) / np.arange(1, off.size + 1)
+    rows = np.flatnonzero(off & (share > 0.5))
+    return int(rows[-1]) + 1 if rows.size else 0
 
 
 def _without_rest(time: FloatArray, value: FloatArray) -> slice:
@@ -196,10 +227,7 @@ def _refine(time: FloatArray, value: FloatArray, frequency: float, count: int) -
             keep = inliers(residual, value)
         elif abs(move) < 1e-12:
             break
-    amplitude = float(np.hypot(coefficients[1], coefficients[1 + count]))
     noise = math.sqrt(float((residual[keep] ** 2).sum()) / max(int(keep.sum()) - 2 * count - 2, 1))
-    if not noise < PERIODIC * amplitude or keep.sum() < 0.8 * time.size:
-        return f"The speed does not swing periodically: it misses its best fit by {noise / amplitude:.0%} of its swing."
     return _cycle(time, frequency, origin, coefficients, inverse[1:-1, 1:-1] * noise**2, noise, int((~keep).sum()))
 
 
@@ -229,6 +257,7 @@ def _cycle(
         covariance=covariance,
         noise=noise,
         periods=periods,
+        begin=float(time[0]),
         start=stop - periods / frequency,
         stop=stop,
         outliers=outliers,

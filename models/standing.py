@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from models.arrays import FloatArray
-from models.periods import sample_interval
+from models.periods import leading, sample_interval
 from models.runs import LEVEL_GAP, LEVEL_GAP_SHARE
 
 #: The pressure is looked at in medians over this long [s]; a level lasts so many of them or more.
@@ -94,15 +94,8 @@ def _standing(smooth: FloatArray, start: int, stop: int, gap: float) -> tuple[in
         level = float(np.median(middle))
         wander = 1.4826 * float(np.median(np.abs(middle - level)))
         off = np.abs(smooth[start:stop] - level) > max(_OFF_LEVEL * wander, _OFF_SHARE * gap)
-        before, after = _run_of(off), _run_of(off[::-1])
+        before, after = leading(off), leading(off[::-1])
         if before + after == 0 or before + after >= off.size:
             break
         start, stop = start + before, stop - after
     return start, stop
-
-
-def _run_of(off: NDArray[np.bool_]) -> int:
-    """How many rows at the beginning are off, up to the last before most of the rows that follow are not."""
-    share = np.cumsum(off) / np.arange(1, off.size + 1)
-    rows = np.flatnonzero(off & (share > 0.5))
-    return int(rows[-1]) + 1 if rows.size else 0

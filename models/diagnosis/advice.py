@@ -129,10 +129,11 @@ def _bare(fit: Fit) -> Fit:
 
 def _made(campaign: Campaign, design: Design, foretold: Foretold) -> dict[str, list[list[Gram]]]:
     """By trial what its runs would tell, a run each; those that the campaign has a pattern for. Without a thermometer none
-    is made at another temperature."""
+    is made at another temperature, without a loop that could be evaluated none is foretold."""
     single = {}
     for key, trial in TRIALS.items():
-        if not trial.parts and (design.facts.temperature_measured or trial.temperature is None):
+        tellable = design.facts.temperature_measured or trial.temperature is None
+        if not trial.parts and tellable and (design.loops > 0 or not trial.loops):
             added = _added(campaign, design, key)
             if added is not None:
                 single[key] = [foretold.ahead(added)] * trial.times

@@ -15,6 +15,7 @@ from models.diagnosis.laws import Laws
 from models.diagnosis.misfits import FIXED_LINE, axes_of
 from models.diagnosis.noise import estimate_noise, first_noise
 from models.diagnosis.periodogram import lines
+from models.diagnosis.projection import gram_of, likely_curve_gain
 from models.diagnosis.raw import RawEvidence, raw_evidence
 from models.diagnosis.refitting import Hypothesis, finite
 from models.diagnosis.report import Report, Verdict
@@ -34,6 +35,8 @@ LEAST_LINE = 14.0
 #: An alarm that neither an effect nor an axis of structure confirms must be so much [nats] beyond its threshold: about
 #: five times rarer by chance.
 UNCONFIRMED = 1.6
+#: Gauss-Newton steps after which starts are compared.
+ROUGH = 12
 #: So many plateaus determine every curve: one start is enough.
 MANY_PLATEAUS = 8000
 #: A slow vibration leaves something in averages too: up to this share of its own evidence nothing else is named, and up
@@ -121,10 +124,16 @@ def fit_baseline(design: Design) -> Baseline:
     priors = priors_of(design, start.theta, frame)
     noise = first_noise(design)
     starts = (start, sober(design, start)) if design.plateaus < MANY_PLATEAUS else (start,)
-    fitted = min((fit(design, noise, each, priors, steps=12) for each in starts), key=lambda each: each.cost)
-    assumed = False
-    for _ in range(2):
-        noise, assumed = estimate_noise(design, fitted.residual, fitted.torque, noise)
+    fitted = min((fit(design, noise, each, priors, steps=ROUGH) for each in starts), key=lambda each: each.cost)
+    noise, assumed = estimate_noise(design, fitted.residual, fitted.torque, noise)
+    # with a noise that was only assumed a fit may have gone down a wrong valley
+    again = (fit(design, noise, each, priors, steps=ROUGH) for each in (*starts, fitted.laws))
+    fitted = fit(design, noise, min(again, key=lambda each: each.cost).laws, priors)
+    noise, assumed = estimate_noise(design, fitted.residual, fitted.torque, noise)
+    fitted = fit(design, noise, fitted.laws, priors)
+    curve_gain = likely_curve_gain(gram_of(design, noise, priors, fitted, np.zeros((design.torque.size, 0))))
+    if curve_gain > 0.0:
+        noise = replace(noise, curve_gain=curve_gain)
         fitted = fit(design, noise, fitted.laws, priors)
     if assumed:
         notes.append("Too few rows to tell noise: 1 % of the torque is assumed.")

@@ -23,6 +23,8 @@ ALIKE_SD = 0.1
 #: The open clutch's drag is expected to be some such share of the usual torque.
 _DRAG_SD = 0.3
 _LARGEST_STEP = 1.5
+#: A shape within this share of its range of a bound is at it.
+AT_BOUND = 0.01
 #: Columns [N, m] with noise and gains whitened.
 Whiten: TypeAlias = Callable[[FloatArray], FloatArray]
 _SMALL = 0.01  # nats: when the cost falls by less the fit has converged
@@ -216,6 +218,13 @@ def effect_precisions(fitted: Fitted) -> FloatArray:
     """1/sd² of the priors on (amplitude, smooth shapes) [1 + s]; that of the amplitude where it is."""
     smooth = [0.5 * (shape.highest - shape.lowest) for shape in fitted.effect.shapes if shape.smooth]
     return np.array([amplitude.precision(fitted.effect, fitted.amplitude), *(width**-2.0 for width in smooth)])
+
+
+def free_shapes(fitted: Fitted) -> NDArray[np.bool_]:
+    """Which of (amplitude, smooth shapes) [1 + s] a refit may move: shapes at a bound stay there."""
+    known = [(value, each) for value, each in zip(fitted.shape, fitted.effect.shapes, strict=True) if each.smooth]
+    margins = [min(value - each.lowest, each.highest - value) / (each.highest - each.lowest) for value, each in known]
+    return np.array([True, *(margin > AT_BOUND for margin in margins)])
 
 
 def effect_columns(design: Design, prediction: Prediction, fitted: Fitted) -> FloatArray:

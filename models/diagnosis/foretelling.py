@@ -13,22 +13,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline import Prediction, predict
 from models.diagnosis.bending import BEND, bends
 from models.diagnosis.design import Design, Points
-from models.diagnosis.fitting import Fit, Fitted, Priors, effect_columns, effect_precisions, effect_rows
+from models.diagnosis.fitting import Fit, Fitted, Priors, effect_columns, effect_precisions, effect_rows, free_shapes
 from models.diagnosis.laws import OPEN_DRAG
 from models.diagnosis.projection import Gram, gram_of, project
 from models.diagnosis.whitening import Noise
 
 #: Noise without torque is at least this share of the usual: what was measured under torque only says little of it.
 LEAST_NOISE = 0.2
-#: A shape within this share of its range of a bound is at it.
-AT_BOUND = 0.01
 _RANGES = ("velocity", "cycles", "clock")
 
 
@@ -77,7 +74,7 @@ class Foretold:
         grams = self._known
         for more in ahead:
             grams = [_joined(gram, each) for gram, each in zip(grams, more, strict=True)]
-        found = [project(gram, self._noise.run_gain) for gram in grams]
+        found = [project(gram, self._noise.run_gain, self._noise.curve_gain) for gram in grams]
         columns = [0.5 * np.maximum(np.diag(each.info), 0.0) for each in found]
         return np.stack(columns, axis=1), np.array([each.evidence - each.profile for each in found])
 
@@ -89,7 +86,7 @@ class Foretold:
         for each in fit.effects:
             changes = effect_rows(view.design, prediction, each)
             bent = changes[:, None] * _bends(self._design, view.design, each)
-            free = _free(each)
+            free = free_shapes(each)
             own += [effect_columns(view.design, prediction, each)[:, free], bent]
             precisions += [*effect_precisions(each)[free], *[BEND**-2.0] * bent.shape[1]]
         apart = np.stack([torque - view.torques[rival] for torque in view.torques], axis=1)
@@ -121,13 +118,6 @@ def _bends(known: Design, rows: Design, fitted: Fitted) -> FloatArray:
         each.name: np.concatenate([getattr(known.rows, each.name), getattr(cut, each.name)]) for each in fields(Points)
     }
     return bends(replace(known, rows=Points(**joined)), fitted.effect)[-count:]
-
-
-def _free(fitted: Fitted) -> NDArray[np.bool_]:
-    """Which of amplitude and smooth shapes a refit may move: shapes at a bound stay there."""
-    known = [(value, each) for value, each in zip(fitted.shape, fitted.effect.shapes, strict=True) if each.smooth]
-    margins = [min(value - each.lowest, each.highest - value) / (each.highest - each.lowest) for value, each in known]
-    return np.array([True, *(margin > AT_BOUND for margin in margins)])
 
 
 def _joined(first: Gram, second: Gram) -> Gram:

@@ -18,8 +18,9 @@ from models.standing import pressure_stretches
 PHASES, BINS = 120, 60
 #: Rows slower than this share of the loop's highest speed are left out: sticking, or next to it.
 LEAST_SPEED = 0.012
-#: This share of a period passes before the loop is in its periodic state; all that follows is used, whole periods or not.
-START = 0.06
+#: This share of a period and at least so long [s] passes before the loop is in its periodic state (friction lags by S/C,
+#: about 0.1 s), less where no whole period would follow; all that does is used, whole periods or not.
+START, SETTLING = 0.06, 0.6
 #: Slower than this share of the highest is as good as standing.
 SLOWEST = 1e-5
 #: A speed that falls below minus this share of its highest reverses.
@@ -101,6 +102,7 @@ def _swing(time: FloatArray, velocity: FloatArray, before: Cycle | None) -> Cycl
                 cosine=np.asarray(found[1 : SPEED_HARMONICS + 1], dtype=np.float64),
                 sine=np.asarray(found[SPEED_HARMONICS + 1 :], dtype=np.float64),
                 periods=periods,
+                begin=float(t[0]),
                 start=stop - periods / before.frequency,
                 stop=stop,
             )
@@ -116,7 +118,8 @@ def _binned(
     fastest = float(fitted.max())
     if not fastest > 0 or float(fitted.min()) < -REVERSES * fastest:
         return "the speed changes sign; the loop was left out."
-    inside = (time >= time[0] + START / cycle.frequency) & (time < cycle.stop)
+    settled = cycle.begin + max(min(SETTLING, cycle.stop - cycle.begin - 1 / cycle.frequency), START / cycle.frequency)
+    inside = (time >= settled) & (time < cycle.stop)
     inside[inside] = inliers(torque[inside] - median_filter(torque[inside], size=5, mode="nearest"), torque[inside])
     turned = np.mod(cycle.phase(time), 2 * math.pi)
     number = np.floor(turned[inside] * (BINS / (2 * math.pi))).astype(np.intp) % BINS

@@ -1,6 +1,7 @@
 """How well a fit does, and on which axes what it leaves lives.
 
-The scatter of the runs' gains is no misfit: each run's gain is taken out of its residual at its best linear prediction,
+The scatter of gains is no misfit: each run's gain, and in the same way each curve's, is taken out of its residual at its
+best linear prediction,
 
     r - M ĝ,     ĝ = σ_g² Mᵀ V⁻¹ r / (1 + σ_g² Mᵀ V⁻¹ M)
 
@@ -27,7 +28,7 @@ from models.diagnosis.fitting import Fit
 from models.diagnosis.raw import RawEvidence
 from models.diagnosis.report import Misfit, Where
 from models.diagnosis.viewing import View
-from models.diagnosis.whitening import Noise, whitened
+from models.diagnosis.whitening import Noise, by_curve, gains_of, whitened
 
 #: Deviations τ of a contrast's coefficient that are averaged over, as shares of the torque.
 SIZES = (0.001, 0.003, 0.01, 0.03)
@@ -37,8 +38,8 @@ _LARGEST_DEVIATE = 1e9
 
 
 def misfit_of(design: Design, noise: Noise, fitted: Fit, where: Sequence[Where] = ()) -> Misfit:
-    """The misfit of a fit: rmse and noise [Nm], the runs' gains taken out."""
-    left = without_run_gains(design, noise, fitted) / noise.deviation
+    """The misfit of a fit: rmse and noise [Nm], the gains taken out."""
+    left = without_likely_gains(design, noise, fitted) / noise.deviation
     actual = float((left**2).mean())
     unit = float(np.sqrt((noise.deviation**-2.0).mean()))
     return Misfit(
@@ -49,14 +50,16 @@ def misfit_of(design: Design, noise: Noise, fitted: Fit, where: Sequence[Where] 
     )
 
 
-def without_run_gains(design: Design, noise: Noise, fitted: Fit) -> FloatArray:
-    """The residual [N] Nm less what the runs' gains make of it."""
-    white = whitened(np.column_stack([fitted.residual, fitted.torque]), design, noise)
-    run = design.rows.run
-    along = np.bincount(run, weights=white[:, 0] * white[:, 1])
-    squares = np.bincount(run, weights=white[:, 1] ** 2)
-    gains = noise.run_gain**2 * along / (1 + noise.run_gain**2 * squares)
-    return np.asarray(fitted.residual - fitted.torque * gains[run], dtype=np.float64)
+def without_likely_gains(design: Design, noise: Noise, fitted: Fit) -> FloatArray:
+    """The residual [N] Nm less what the likeliest gains of runs and curves make of it."""
+    gains = gains_of(design, fitted.torque, noise)
+    white = whitened(fitted.residual[:, None], design, noise)
+    along = by_curve(white, gains)[:, 0]
+    freed = 1 / (1 + noise.curve_gain**2 * gains.squares)
+    squares, told = gains.by_run(freed * gains.squares), gains.by_run(freed * along)
+    of_run = (noise.run_gain**2 * told / (1 + noise.run_gain**2 * squares))[gains.run_of_curve]
+    of_curve = noise.curve_gain**2 * freed * (along - gains.squares * of_run)
+    return np.asarray(fitted.residual - fitted.torque * (of_run + of_curve)[gains.curve], dtype=np.float64)
 
 
 def axes_of(view: View, leads: dict[str, Lead], raw: Sequence[RawEvidence] = ()) -> tuple[Where, ...]:

@@ -1,7 +1,8 @@
 """What is visible of a change of torque once the baseline, the noise and the gains have had their say.
 
 All columns (the baseline's sensitivities J, the changes g, the residual r) meet in one Gram matrix of whitened rows. For
-any scatter σ_g of the runs' gains it follows by a small correction (Woodbury), and projecting J off is one solve:
+any scatter of the gains, σ_g of the runs and σ_c of the curves, it follows by small corrections (Woodbury), and projecting
+J off is one solve:
 
     info = Gᵀ V⁻¹ (1 - P) G,     score = Gᵀ V⁻¹ (1 - P) r
 
@@ -9,7 +10,7 @@ z = score/√info is standard normal where there is no effect; ½ info a² is λ
 an effect of amplitude a.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,6 +26,11 @@ from models.diagnosis.whitening import Noise, by_curve, gains_of, whitened
 #: repeats itself that badly would not be used; what swings by more from test to test is structure.
 GAINS: FloatArray = np.geomspace(2e-4, 2e-2, 13)
 _USUAL, _BELOW, _ABOVE = 2.5e-3, 1.0, 0.6
+#: Scatter of the curves' gains within a run, and the size from which it is thought less and less likely [-].
+CURVE_GAINS = (0.0, 4e-4, 1e-3, 2.5e-3, 6e-3)
+_SMALL = 1e-3
+#: What it must be likelier by [nats] than none to be looked at, and up to which multiple of it more are.
+CLEARER, MORE = 0.5, 2.6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,17 +44,23 @@ class Gram:
     run_of_curve: IntArray
     base: int
 
-    def by_run(self) -> tuple[FloatArray, FloatArray]:
-        """Directions [r, m] and squares [r] of the runs' gains."""
+    def with_gains(self, run_gain: float, curve_gain: float) -> tuple[FloatArray, float]:
+        """The matrix with gains that scatter so, and the log determinant of what they add [nats, twice]."""
+        freed = 1 / (1 + curve_gain**2 * self.squares)  # of each curve's direction, what its own gain leaves
         member = np.zeros((int(self.run_of_curve.max()) + 1, self.run_of_curve.size))
-        member[self.run_of_curve, np.arange(self.run_of_curve.size)] = 1.0
-        return member @ self.along, member @ self.squares
+        member[self.run_of_curve, np.arange(self.run_of_curve.size)] = freed
+        along, squares = member @ self.along, member @ self.squares
+        weight = run_gain**2 / (1 + run_gain**2 * squares)
+        matrix = self.matrix - along.T @ (weight[:, None] * along)
+        if curve_gain > 0.0:
+            matrix -= self.along.T @ ((curve_gain**2 * freed)[:, None] * self.along)
+        return matrix, float(np.log1p(run_gain**2 * squares).sum() - np.log(freed).sum())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Projected:
     """info [m, m], score [m] of the changes, and `whole` [m], what info's diagonal were if nothing of them was taken up;
-    `miss` rᵀV⁻¹(1 - P)r; `evidence` [nats] of the gains' scatter, and `profile`
+    `miss` rᵀV⁻¹(1 - P)r; `evidence` [nats] of the gains' scatter (`run_gain`, `curve_gain`), and `profile`
     [nats] the same without the price of what is fitted."""
 
     info: FloatArray
@@ -57,6 +69,12 @@ class Projected:
     miss: float
     evidence: float
     profile: float
+    run_gain: float
+    curve_gain: float
+
+    def noise(self, noise: Noise) -> Noise:
+        """The noise with this scatter of the gains."""
+        return replace(noise, run_gain=self.run_gain, curve_gain=self.curve_gain)
 
 
 def gram_of(design: Design, noise: Noise, priors: Priors, fit: Fit, changes: FloatArray, *, held: bool = True) -> Gram:
@@ -92,11 +110,23 @@ def gram_of(design: Design, noise: Noise, priors: Priors, fit: Fit, changes: Flo
     )
 
 
-def project(gram: Gram, run_gain: float) -> Projected:
-    """With the runs' gains scattering by `run_gain`."""
-    along, squares = gram.by_run()
-    weight = run_gain**2 / (1 + run_gain**2 * squares)
-    full = gram.matrix - along.T @ (weight[:, None] * along)
+def projections_of(gram: Gram, noise: Noise) -> list[Projected]:
+    """With every scatter of the gains that is considered: of the runs', and of the curves' up to what the noise has or next
+    above. Where the data ask for none of the latter without an effect, they do not with one."""
+    curves = [each for each in CURVE_GAINS if each <= MORE * noise.curve_gain]
+    return [project(gram, gain, curve) for curve in curves for gain in GAINS.tolist()]
+
+
+def likely_curve_gain(gram: Gram) -> float:
+    """The likeliest scatter of the curves' gains; none where another is not clearly likelier."""
+    best = [max(project(gram, gain, curve).evidence for gain in GAINS.tolist()) for curve in CURVE_GAINS]
+    likeliest = int(np.argmax(best))
+    return CURVE_GAINS[likeliest] if best[likeliest] > best[0] + CLEARER else 0.0
+
+
+def project(gram: Gram, run_gain: float, curve_gain: float) -> Projected:
+    """With the runs' gains scattering by `run_gain`, those of the curves by `curve_gain` besides."""
+    full, swell = gram.with_gains(run_gain, curve_gain)
     base = gram.base
     corner = full[:base, :base]
     scale = 1 / np.sqrt(np.maximum(np.diag(corner), 1e-300))
@@ -106,8 +136,8 @@ def project(gram: Gram, run_gain: float) -> Projected:
     fitted = float(np.log(np.diag(factor)).sum() - np.log(scale).sum())
     miss = float(left[-1, -1])
     off = float(np.log(run_gain / _USUAL))
-    prior = -0.5 * (off / (_BELOW if off < 0 else _ABOVE)) ** 2
-    profile = -0.5 * (miss + float(np.log1p(run_gain**2 * squares).sum())) + prior
+    prior = -0.5 * (off / (_BELOW if off < 0 else _ABOVE)) ** 2 - float(np.log1p((curve_gain / _SMALL) ** 2))
+    profile = -0.5 * (miss + swell) + prior
     return Projected(
         info=left[:-1, :-1],
         score=left[:-1, -1],
@@ -115,6 +145,8 @@ def project(gram: Gram, run_gain: float) -> Projected:
         miss=miss,
         evidence=profile - fitted,
         profile=profile,
+        run_gain=run_gain,
+        curve_gain=curve_gain,
     )
 
 

@@ -4,15 +4,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import erfcx, logsumexp
 
+from models.arrays import FloatArray
 from models.diagnosis.amplitude import log_peak
 from models.diagnosis.bending import BEND, bends
 from models.diagnosis.design import Design
 from models.diagnosis.effect import Effect
-from models.diagnosis.fitting import Fit, Fitted, Priors, effect_precisions, fit
+from models.diagnosis.fitting import Fit, Fitted, Priors, effect_precisions, fit, free_shapes
 from models.diagnosis.laws import Laws
-from models.diagnosis.projection import GAINS, gram_of, project
+from models.diagnosis.projection import Gram, Projected, gram_of, projections_of
 from models.diagnosis.whitening import Noise
 
 #: Gauss-Newton steps that a candidate is given, and one that is worth following to its end.
@@ -35,6 +36,10 @@ class Hypothesis:
     def slugs(self) -> tuple[str, ...]:
         """Public names."""
         return tuple(effect.slug for effect in self.effects)
+
+    def less(self, evidence: float, drop: float) -> "Hypothesis":
+        """Against a baseline that is so much [nats] better."""
+        return replace(self, evidence=self.evidence - evidence, drop=max(self.drop - drop, 0.0))
 
     def seen_raw(self, evidence: Mapping[str, float]) -> "Hypothesis":
         """With what raw records say of its effects [nats]."""
@@ -86,19 +91,38 @@ def laplace(design: Design, noise: Noise, priors: Priors, fitted: Fit) -> tuple[
     """Log marginal likelihood [nats] about a fit up to a constant, the gains' scatter summed over; and log likelihood at the
     gains' likeliest scatter."""
     gram = gram_of(design, noise, priors, fitted, np.zeros((design.torque.size, 0)))
+    gram, outward = _held_at_bounds(gram, int(priors.free.sum()), fitted)
     price = sum(
         log_peak(each.effect) + 0.5 * float(np.log(effect_precisions(each)[1:]).sum()) for each in fitted.effects
     )
     price -= np.log(BEND) * sum(bends(design, each.effect).shape[1] for each in fitted.effects)
     sided = np.log(2.0) * sum(each.effect.positive for each in fitted.effects)
-    projections = [project(gram, float(gain)) for gain in GAINS]
-    marginal = float(logsumexp([each.evidence for each in projections]) + price + sided)
-    return marginal, max(each.profile for each in projections)
+    projections = projections_of(gram, noise)
+    marginal = logsumexp([each.evidence + _beside_bounds(each, outward) for each in projections])
+    return float(marginal + price + sided), max(each.profile for each in projections)
 
 
-def at_gain(noise: Noise, run_gain: float) -> Noise:
-    """The noise with another scatter of the runs' gains."""
-    return replace(noise, run_gain=run_gain)
+def _held_at_bounds(gram: Gram, first: int, fitted: Fit) -> tuple[Gram, FloatArray]:
+    """The Gram matrix with shapes at a bound among the changes [h], and which way is out for each [h] ±1; the effects'
+    columns begin at `first`."""
+    ways: list[float] = []  # 0 for what is free
+    for each in fitted.effects:
+        smooth = [(x, known) for x, known in zip(each.shape, each.effect.shapes, strict=True) if known.smooth]
+        out = np.array([1.0, *(1.0 if 2 * x > known.lowest + known.highest else -1.0 for x, known in smooth)])
+        ways += np.where(free_shapes(each), 0.0, out).tolist()
+    outward = np.array(ways)
+    held = first + np.flatnonzero(outward)
+    order = np.concatenate([np.setdiff1d(np.arange(gram.base), held), held, np.arange(gram.base, gram.matrix.shape[0])])
+    matrix, along = gram.matrix[np.ix_(order, order)], gram.along[:, order]
+    return replace(gram, matrix=matrix, along=along, base=gram.base - held.size), outward[outward != 0]
+
+
+def _beside_bounds(projected: Projected, outward: FloatArray) -> float:
+    """What the shapes at a bound add to the evidence [nats]: all of their prior lies on one side, and where the data would
+    have them beyond it falls off there (twice the half of a normal one that it would be where they would not)."""
+    info = np.maximum(np.diag(projected.info), 1e-300)
+    slope = np.maximum(outward * projected.score, 0.0) / np.sqrt(2 * info)
+    return float((np.log(erfcx(slope)) - 0.5 * np.log(info)).sum())
 
 
 def finite(hypothesis: Hypothesis) -> bool:

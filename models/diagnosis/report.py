@@ -30,13 +30,15 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
-    """An effect that competed: its slug, probability [0, 1] and gain in log evidence over the baseline [nats]."""
+    """An effect that competed: its slug, probability [0, 1] and gain in log evidence over the baseline [nats], both in the
+    fit that it was part of: with the effects `beside` it."""
 
     effect: str
     title: str
     probability: float
     log_evidence_gain: float
     estimate: Estimate
+    beside: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -152,6 +152,7 @@ def _candidates(
     for slug, probability in judgement.probabilities.items():
         if probability < LEAST_PROBABILITY and slug not in judgement.causes:
             continue
+        beside: tuple[str, ...] = ()
         first = next((each for each in (*judgement.standing, *alone, *hypotheses) if slug in each.slugs), None)
         if first is None or first.fit is None:
             effect = BY_SLUG[slug]
@@ -162,6 +163,7 @@ def _candidates(
             deviation = amplitude_deviations(design, noise, priors, first.fit)[place]
             estimate = _estimate(slug, first.fit.effects[place].amplitude, deviation)
             evidence = first.evidence
+            beside = tuple(each for each in first.slugs if each != slug)
         found.append(
             Candidate(
                 effect=slug,
@@ -169,6 +171,7 @@ def _candidates(
                 probability=probability,
                 log_evidence_gain=_finite(evidence),
                 estimate=estimate,
+                beside=beside,
             )
         )
     return tuple(found)

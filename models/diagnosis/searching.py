@@ -12,9 +12,9 @@ import numpy as np
 from models.diagnosis.design import Design
 from models.diagnosis.fitting import Fit, Fitted, Priors, fit
 from models.diagnosis.laws import Laws
-from models.diagnosis.projection import GAINS, Projected, gram_of, project
+from models.diagnosis.projection import Projected, gram_of, project
 from models.diagnosis.raw import RawEvidence
-from models.diagnosis.refitting import MOST_STEPS, STEPS, Hypothesis, Null, at_gain, finite, null_of, refitted
+from models.diagnosis.refitting import MOST_STEPS, STEPS, Hypothesis, Null, finite, null_of, refitted
 from models.diagnosis.selection import Column, Screened, linear_drop, screen, screen_pairs
 from models.diagnosis.viewing import View, columns_at_rows
 from models.diagnosis.whitening import Noise
@@ -25,7 +25,7 @@ SINGLES, PAIRS = 5, 4
 MARGIN, MARGIN_SHARE = 9.0, 0.2
 #: So many of them are looked for from other shapes as well, and from other laws where so much [nats] of them would be there
 #: to be seen if the baseline did not take it up: so far off, nothing is linear.
-RESTARTED, SWALLOWED = 3, 1000.0
+RESTARTED, SWALLOWED = 1, 1000.0
 #: Gauss-Newton steps after which starts are compared, and how many of them go on each time.
 ROUGH = ((3, 3), (3, 1))
 #: Pairs of the linear screen must promise this much [nats] over the best single.
@@ -45,7 +45,7 @@ def hypotheses_of(
     first = max((*singles[:1], *pairs[:1]), key=lambda each: each.evidence, default=None)
     if first is None:
         return noise, []
-    noise = at_gain(noise, float(GAINS[first.gain]))
+    noise = view.projections[first.gain].noise(noise)
     null = null_of(design, noise, priors, fit(design, noise, baseline.laws, priors))
     search = _Search(
         design=design, noise=noise, priors=priors, start=start, null=null, view=view,
@@ -58,6 +58,8 @@ def hypotheses_of(
     seconds += [search.from_screen(each) for each in linear if frozenset(_slugs(each)) not in held]
     found = search.without_partners(found, seconds)
     known = {each.slugs for each in found}
+    off = search.better_null([*found, *seconds])
+    found, seconds = ([each.less(*off) for each in some] for some in (found, seconds))
     rest = [
         Hypothesis(effects=each.effects, evidence=each.evidence, drop=0.0, fit=None)
         for each in singles
@@ -194,8 +196,20 @@ class _Search:
                     alone[known.slugs] = again
         return list(alone.values())
 
+    def better_null(self, hypotheses: list[Hypothesis]) -> tuple[float, float]:
+        """By how much evidence and likelihood [nats] of nothing at all are better than was thought, seen from where the
+        best hypothesis has the baseline: no effect is praised for a valley that the baseline had missed."""
+        best = max((each for each in hypotheses if finite(each)), key=lambda each: each.evidence, default=None)
+        if best is None or best.fit is None or best.evidence < SECOND_PROMISE:
+            return 0.0, 0.0
+        again = fit(self.design, self.noise, best.fit.laws, self.priors, steps=STEPS)
+        if again.cost > self.null.fit.cost:
+            return 0.0, 0.0
+        found = null_of(self.design, self.noise, self.priors, again)
+        return max(found.evidence - self.null.evidence, 0.0), max(found.profile - self.null.profile, 0.0)
+
 
 def beside(design: Design, noise: Noise, priors: Priors, fitted: Fit, columns: list[Column]) -> Projected:
     """The catalogue's columns projected off a fit with its effects, at the noise's scatter of the gains."""
     gram = gram_of(design, noise, priors, fitted, columns_at_rows(design, fitted.prediction, columns))
-    return project(gram, noise.run_gain)
+    return project(gram, noise.run_gain, noise.curve_gain)

@@ -115,7 +115,7 @@ def _size(design: Design, noise: Noise, priors: Priors, baseline: Fit, effects: 
     changes = change_columns(
         design, prediction, [(each.change(prediction.scene, 1.0, ()), each.lags(())) for each in effects]
     )
-    projected = project(gram_of(design, noise, priors, baseline, changes), noise.run_gain)
+    projected = project(gram_of(design, noise, priors, baseline, changes), noise.run_gain, noise.curve_gain)
     unit = np.array([each.prior_sd for each in effects])
     worth = []
     for size in SIZES:

@@ -12,6 +12,8 @@ from models.diagnosis.report import Advice, Candidate, Estimate, Gain, Misfit, V
 _SPOKEN, _RIVAL, _TOLD = 3, 0.001, 3
 #: An effect beyond so many deviations of its prior is stronger than one would expect.
 _STRONG = 2.0
+#: A share [%] below which its size is not told.
+_LEAST_PERCENT = 0.1
 #: Digits after the point at most.
 _DIGITS = 5
 
@@ -94,9 +96,12 @@ def _named(found: Findings) -> list[str]:
     parts += [f"{_physics(each.effect)} Here: {_estimate(each.estimate)}." for each in chosen]
     best = max((each.log_evidence_gain for each in chosen), default=0.0)
     rivals = [
-        each  # one that is as good stood beside the cause, not against it
+        each  # one that is as good or was fitted with the cause stood beside it, not against it
         for each in found.candidates
-        if each.effect not in found.causes and each.probability > _RIVAL and each.log_evidence_gain < best - 1.0
+        if each.effect not in found.causes
+        and each.probability > _RIVAL
+        and each.log_evidence_gain < best - 1.0
+        and not set(each.beside) & set(found.causes)
     ]
     if rivals and chosen:
         told = [f"{_name(each.effect)} by {_number(best - each.log_evidence_gain)} nats" for each in rivals[:_SPOKEN]]
@@ -133,7 +138,8 @@ def _insufficient(_: Findings) -> list[str]:
 def _misses(found: Findings) -> str:
     if found.baseline is None:
         return ""
-    share = f"{_number(100 * found.baseline.unexplained_share)} % of the squared residual"
+    percent = 100 * found.baseline.unexplained_share
+    share = f"{'less than 0.1' if percent < _LEAST_PERCENT else _number(percent)} % of the squared residual"
     where = _axes(found.baseline.where)
     return (
         f"The baseline misses the data by {_number(found.baseline.rmse)} Nm where noise alone would make "
@@ -174,11 +180,13 @@ def _next(found: Findings) -> list[str]:
         return []
     best = found.advice[0]
     nats = f"about {_number(best.nats)} nats"
-    if best.other == "baseline":
-        return [f"To confirm it: {best.test}. That would add {nats} for or against it."]
     pair = f"{_name(best.effect)} and {_name(best.other)}"
+    if best.other == "baseline":
+        pair = f"{_name(best.effect)} and nothing at all"
     if best.nats < WORTH:
         return [f"No single test would decide; the most telling is: {best.test} ({nats} between {pair})."]
+    if best.other == "baseline":
+        return [f"To confirm it: {best.test}. That would add {nats} for or against it."]
     return [f"What would decide: {best.test}. It would part {pair} by {nats}."]
 
 

@@ -27,7 +27,7 @@ _WAVES = 4
 def temperature_evidence(design: Design, noise: Noise, priors: Priors, fitted: Fit) -> float:
     """Evidence [nats] of unmeasured courses of oil temperature over none."""
     columns, between, within = _courses(design, fitted)
-    projected = project(gram_of(design, noise, priors, fitted, columns), noise.run_gain)
+    projected = project(gram_of(design, noise, priors, fitted, columns), noise.run_gain, noise.curve_gain)
     logs = [_marginal(projected, (USUAL * (b * between + w * within)) ** 2) for b in BETWEEN for w in WITHIN]
     return float(logsumexp(logs) - np.log(len(logs)))
 

@@ -41,7 +41,7 @@ PAIR_PRICE = 4.0
 #: ... and so much more where both are of one family: the second may mend the template of the first.
 KIN_PRICE = 8.0
 #: A cause is named where its own probability is this at least, the second of two from the lower one on.
-LEAST_NAMED, LEAST_OF_TWO = 0.92, 0.8
+LEAST_NAMED, LEAST_OF_TWO = 0.85, 0.8
 #: False alarms allowed in closing a case: structure that is left, and amplitudes that differ between parts.
 LEFT_SHARE, PARTS_SHARE = 5e-3, 3e-3
 #: Where what is left would look like that by chance in fewer cases, beyond what a template leaves, nothing is named:

@@ -12,7 +12,7 @@ from models.diagnosis.contrasts import Contrasts, contrasts_of
 from models.diagnosis.design import Design
 from models.diagnosis.effect import unit_changes
 from models.diagnosis.fitting import Fit, Priors, effect_columns
-from models.diagnosis.projection import GAINS, Gram, Projected, change_columns, gram_of, project
+from models.diagnosis.projection import Gram, Projected, change_columns, gram_of, projections_of
 from models.diagnosis.selection import Column
 from models.diagnosis.whitening import Noise
 
@@ -61,7 +61,7 @@ def view_of(design: Design, noise: Noise, priors: Priors, fitted: Fit, columns: 
         contrasts=contrasts,
         blocks=blocks.shape[1],
         gram=gram,
-        projections=[project(gram, float(gain)) for gain in GAINS],
+        projections=projections_of(gram, noise),
     )
 
 
@@ -93,10 +93,7 @@ def blocks_of(design: Design, fitted: Fit) -> FloatArray:
 def amplitude_deviations(design: Design, noise: Noise, priors: Priors, fitted: Fit) -> list[float]:
     """Standard deviations of the amplitudes of the fit's effects, everything else free."""
     gram = gram_of(design, noise, priors, fitted, np.zeros((design.torque.size, 0)))
-    along, squares = gram.by_run()
-    along = along[:, : gram.base]
-    weight = noise.run_gain**2 / (1 + noise.run_gain**2 * squares)
-    corner = gram.matrix[: gram.base, : gram.base] - along.T @ (weight[:, None] * along)
+    corner = gram.with_gains(noise.run_gain, noise.curve_gain)[0][: gram.base, : gram.base]
     scale = 1 / np.sqrt(np.maximum(np.diag(corner), 1e-300))
     inverse = np.linalg.pinv(corner * scale[:, None] * scale, hermitian=True) * scale[:, None] * scale
     sizes = [1 + sum(shape.smooth for shape in each.effect.shapes) for each in fitted.effects]

@@ -34,13 +34,15 @@ class Amplitude(Answer):
 
 
 class CandidateOut(Answer):
-    """An effect that competed, its probability and its gain in log evidence over the baseline [nats]."""
+    """An effect that competed, its probability and its gain in log evidence over the baseline [nats]; evidence and estimate
+    are of the fit together with the effects `beside` it."""
 
     effect: str
     title: str
     probability: Number
     log_evidence_gain: Number
     estimate: Amplitude
+    beside: list[str] = Field(default_factory=list)
 
 
 class WhereOut(Answer):

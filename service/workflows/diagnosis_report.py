@@ -57,6 +57,7 @@ def public(
                     "sd": finite(each.estimate.sd),
                     "unit": each.estimate.unit,
                 },
+                "beside": list(each.beside),
             }
             for each in report.candidates
         ],

@@ -177,6 +177,17 @@ def test_standing_before_and_after_is_left_out():
     assert loop.area == pytest.approx(closed_form(), rel=0.01)  # the ends' first and last hundredth are blurred
 
 
+def test_held_between_two_pressures_and_brought_back_is_left_out():
+    swing = record([lagging], [5e5], duration=21.0)
+    way = swing.speed[-1] + (SWING - swing.speed[-1]) * np.linspace(0, 1, 80)
+    speed = np.concatenate([np.full(200, SWING), swing.speed, way])
+    torque = np.concatenate([np.full(200, 24.0), swing.torque, np.full(80, 24.0)])
+    held = Record(time=np.arange(speed.size) / 100, pressure=np.full(speed.size, 5e5), speed=speed, torque=torque)
+    loop = only(evaluate_loops(held, GEOMETRY, None))
+    assert loop.periods == 2
+    assert loop.area == pytest.approx(closed_form(), rel=0.015)  # the end is blurred, and so are two periods' ends
+
+
 def test_a_reversing_speed_has_area_and_no_law():
     swing = record([lagging], [5e5])
     back = replace(swing, speed=swing.speed - SWING)

@@ -77,7 +77,8 @@ def micro_loops() -> list[Row]:
     for name, t, x, f in _tens():
         place = _position(t, x)
         work, lag = loop_area(place, t, f), loop_area(_speed_of(place), t, f)
-        v = np.gradient(x, t)
+        whole = (t >= place.start) & (t < place.stop)
+        v = np.gradient(x, t)[whole]
         rows.append(
             {
                 "cycles": name,
@@ -85,8 +86,8 @@ def micro_loops() -> list[Row]:
                 "its deviation": lag.area_sd,
                 "∮F dx [mJ]": work.area,
                 "deviation of that": work.area_sd,
-                "∮F dv by trapezoids": float(np.trapezoid(f, v)) / 10,
-                "∮F dx by trapezoids": float(np.trapezoid(f, x)) / 10,
+                "∮F dv by trapezoids": float(np.trapezoid(f[whole], v)) / place.periods,
+                "∮F dx by trapezoids": float(np.trapezoid(f[whole], x[whole])) / place.periods,
             }
         )
     return rows
@@ -115,7 +116,7 @@ def _tens() -> Iterator[tuple[str, FloatArray, FloatArray, FloatArray]]:
     whole = _position(time, position)
     length = 1 / whole.frequency
     for first in range(0, whole.periods - 9, 10):
-        inside = (time >= time[0] + first * length) & (time < time[0] + (first + 10) * length)
+        inside = (time >= whole.start + first * length) & (time < whole.start + (first + 10) * length)
         yield f"{first + 1} to {first + 10}", time[inside], position[inside], force[inside]
 
 

@@ -15,6 +15,9 @@ from models.stribeck import GAMMA
 REFERENCE_PRESSURE = 5e5
 #: How the film is followed: to first order by powers of speed, or by its own equation.
 FIRST_ORDER, FILM = 0.0, 1.0
+#: To first order torque falls faster with speed than the film's lag does, for fewer asperities touch: by this power more. A
+#: film of any other kind would be the same at all speeds, as inertia is.
+FEWER = 0.5
 #: A film is followed for this share of a period before its course is taken: it forgets where it began.
 _BEFORE = 1 / 3
 #: Points of a swing that tell a film's usual slope.
@@ -22,7 +25,7 @@ _SWING = 24
 
 
 def _grid(_facts: Facts) -> tuple[Tried, ...]:
-    powers = [(x, y, f, 0.5, FIRST_ORDER, 0.0) for x in (0.0, 0.6) for y in (0.6, 1.0, 1.5) for f in (0.02, 0.06, 0.15)]
+    powers = [(x, y, f, 0.5, FIRST_ORDER, 0.0) for x in (0.0, 0.6) for y in (0.5, 1.0, 1.5) for f in (0.02, 0.06, 0.15)]
     films = [
         (0.4, y, f, sheared, FILM, lags)
         for y in (0.4, 0.8, 1.2)
@@ -49,7 +52,7 @@ def _changes(scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArra
     for i, (amplitude, (power, thin, least, _, form, _)) in enumerate(settings):
         if form == FIRST_ORDER:
             strength = amplitude * points.engaged * (points.pressure / REFERENCE_PRESSURE) ** power
-            out[:, i] = strength * points.acceleration / (speed + least) ** thin
+            out[:, i] = strength * points.acceleration / (speed + least) ** (thin + FEWER)
     if films:
         amplitudes, shapes = np.array([settings[i][0] for i in films]), np.array([settings[i][1] for i in films])
         out[looping[:, None], films] = _over_film(scene, looping, amplitudes, shapes.T)
@@ -108,7 +111,7 @@ EFFECT = Effect(
     title="A squeezed film lags behind the speed",
     physics="While speed rises the film is still thin from before and more asperities carry: torque is higher than "
     "stationary, also where the curve rises; the GMS attractor cannot give that.",
-    formula="a (p/5 bar)^x v̇ / (v/v_0 + f)^y, eq. 7's film to first order; or S(w) for S(v) with C_v v^γ (v/w)^s, "
+    formula="a (p/5 bar)^x v̇ / (v/v_0 + f)^(y + 1/2), eq. 7's film to first order; or S(w) for S(v) with C_v v^γ (v/w)^s, "
     "ẇ = (v - w)(w/v_0 + f)^y/τ",
     source="Ompusunggu et al. 2013, eq. 7 and section 3.2",
     family=Family.DYNAMIC,

@@ -209,11 +209,12 @@ def _stationary(rng: np.random.Generator, life: Life, order: FloatArray, wish: W
 
 def _loops(rng: np.random.Generator, life: Life, pressures: FloatArray, frequency: float, rate: float) -> Site:
     n = life.cycles.size
-    count = round(1.5 / frequency * rate)
+    swing = _swing(rng, frequency, rate)
+    count = swing.size
     time = np.arange(count) / rate
     series = n * pressures.size
     start = np.tile(np.arange(pressures.size) * (time[-1] + 3.0), n)[:, None]
-    rpm = np.broadcast_to(1000 + 1000 * np.sin(2 * np.pi * frequency * time), (series, count))
+    rpm = np.broadcast_to(swing, (series, count))
     bar = np.tile(pressures * (1 + 0.002 * rng.standard_normal(pressures.size)), n)[:, None] + np.zeros((1, count))
     effort = np.full(8, 0.5)
     level = [oil_course(rng, np.linspace(0, 120, 8), effort) for _ in range(n)]
@@ -222,3 +223,17 @@ def _loops(rng: np.random.Generator, life: Life, pressures: FloatArray, frequenc
     )
     state = np.repeat(np.arange(n), pressures.size)
     return Site("loop", state, bar, rpm, start + time, oil, life, 1 / rate, None, frequency)
+
+
+def _swing(rng: np.random.Generator, frequency: float, rate: float) -> FloatArray:
+    """Speed [rpm] at one pressure: one and a half periods as the reference has it, or other numbers of them with the speed
+    held before, brought back to where it was held, and held again until the pressure moves on."""
+    held = rng.random() < 0.5
+    periods = rng.choice([1.5, 2.0, 2.1, 3.0]) if held else 1.5
+    sine = 1000 + 1000 * np.sin(2 * np.pi * frequency * np.arange(round(periods / frequency * rate)) / rate)
+    if not held:
+        return sine
+    way = np.linspace(0, 1, round(rng.uniform(0.3, 1.5) * rate))
+    back = sine[-1] + (1000 - sine[-1]) * way**2 * (3 - 2 * way)
+    before, after = (np.full(round(rng.uniform(*ends) * rate), 1000.0) for ends in ((0.3, 3.0), (0.0, 1.0)))
+    return np.concatenate([before, sine, back, after])

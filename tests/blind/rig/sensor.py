@@ -1,7 +1,7 @@
 """Noise of the blind rig, and the same noise taken out again (whitened) to say what an oracle could see.
 
-σ² = (s M)² + f² a sample, remembering from sample to sample with ρ; every run has a gain of its own (deviation g); the
-recorder rounds. A plateau that was averaged on the rig is one sample.
+σ² = (s M)² + f² a sample, remembering from sample to sample with ρ; every run has a gain of its own (deviation g), on
+some rigs every pressure of a run once more (c); the recorder rounds. A plateau that was averaged on the rig is one sample.
 """
 
 from dataclasses import dataclass, replace
@@ -26,6 +26,7 @@ class Sensor:
     count: float  # Nm
     misjudged: float | None
     thinned: float = 1.0
+    curve: float = 0.0  # scatter of the gain from pressure to pressure of a run
 
     def sigma(self, site: Site, torque: FloatArray) -> FloatArray:
         if site.kind == "stationary":
@@ -57,7 +58,14 @@ def draw_sensor(rng: np.random.Generator, *, misjudged: float | None = None) -> 
         gain=rng.uniform(0.0, 0.005),
         count=float(rng.choice([0.001, 0.01])),
         misjudged=misjudged if misjudged is not None else factor,
+        curve=float(rng.uniform(0.0, 0.003)) if rng.random() < 0.4 else 0.0,
     )
+
+
+def curves(plan: Plan, site: Site, shape: tuple[int, ...]) -> np.ndarray:
+    """Which pressure of which state each sample of a site [series, samples] is at, as one number."""
+    level = np.abs(site.bar[..., None] - plan.pressures).argmin(axis=-1)
+    return np.broadcast_to(level + plan.pressures.size * site.state[:, None], shape)
 
 
 def measure(rng: np.random.Generator, plan: Plan, sensor: Sensor, truth: list[FloatArray]) -> list[FloatArray]:
@@ -68,7 +76,11 @@ def measure(rng: np.random.Generator, plan: Plan, sensor: Sensor, truth: list[Fl
         white = rng.standard_normal(torque.shape)
         white[:, 1:] *= np.sqrt(1 - rho**2)
         noise = sensor.sigma(site, torque) * lfilter([1.0], [1.0, -rho], white, axis=1)
-        gain = 1 + sensor.gain * rng.standard_normal(plan.life.cycles.size)[site.state][:, None]
+        states = plan.life.cycles.size
+        gain = 1 + sensor.gain * rng.standard_normal(states)[site.state][:, None]
+        if sensor.curve > 0:
+            each = rng.standard_normal(states * plan.pressures.size)
+            gain = gain * (1 + sensor.curve * each[curves(plan, site, torque.shape)])
         told.append(np.round((torque * gain + noise) / sensor.count) * sensor.count)
     return told
 
@@ -85,21 +97,44 @@ class Whitening:
             sigma, rho = sensor.sigma(site, torque), sensor.rho(site)
             if site.kind != "stationary":
                 sigma = np.where(site.rpm < slowest, 1e9, sigma)
-            u = uncorrelated(sensor.gain * torque / sigma, rho)
-            runs = [(rows, u[rows].ravel()) for k in range(plan.life.cycles.size) if (rows := site.state == k).any()]
-            self._sites.append((1 / sigma, rho, [(rows, gain, float(gain @ gain)) for rows, gain in runs]))
+            u = uncorrelated(torque / sigma, rho)
+            numbers = curves(plan, site, torque.shape)
+            here = [rows for k in range(plan.life.cycles.size) if (rows := site.state == k).any()]
+            runs = [_Gains(rows, u[rows].ravel(), numbers[rows].ravel(), sensor) for rows in here]
+            self._sites.append((1 / sigma, rho, runs))
 
     def __call__(self, changes: list[FloatArray]) -> FloatArray:
         """Changes in deviations, uncorrelated: one vector over all sites."""
         out = []
         for change, (weight, rho, runs) in zip(changes, self._sites, strict=True):
             y = uncorrelated(change * weight, rho)
-            for rows, gain, square in runs:
-                part = y[rows].ravel()
-                if square > 1e-12:
-                    part = part - (1 - 1 / np.sqrt(1 + square)) / square * (gain @ part) * gain
-                out.append(part)
+            out += [run.without(y[run.rows].ravel()) for run in runs]
         return np.concatenate(out)
+
+
+class _Gains:
+    """The gains of a run's curves and of the run, to be taken out of its samples; `torque` in deviations."""
+
+    def __init__(self, rows: np.ndarray, torque: FloatArray, numbers: np.ndarray, sensor: Sensor) -> None:
+        self.rows, self._torque = rows, torque
+        _, self._curve = np.unique(numbers, return_inverse=True)
+        self._share = _taken(sensor.curve**2 * np.bincount(self._curve, weights=torque**2))
+        self._share /= np.maximum(np.bincount(self._curve, weights=torque**2), 1e-300)
+        self._run = sensor.gain * self._without_curves(torque)
+        square = float(self._run @ self._run)
+        self._off = float(_taken(np.array(square))) / square if square > 1e-12 else 0.0
+
+    def without(self, y: FloatArray) -> FloatArray:
+        y = self._without_curves(y)
+        return y - self._off * (self._run @ y) * self._run
+
+    def _without_curves(self, y: FloatArray) -> FloatArray:
+        along = np.bincount(self._curve, weights=self._torque * y)
+        return y - self._torque * (self._share * along)[self._curve]
+
+
+def _taken(square: FloatArray) -> FloatArray:
+    return np.asarray(1 - 1 / np.sqrt(1 + square))
 
 
 def uncorrelated(x: FloatArray, rho: float) -> FloatArray:

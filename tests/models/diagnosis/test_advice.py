@@ -251,3 +251,19 @@ def test_a_distance_is_what_a_refit_leaves(swung):
     null = fit(made, noise, swung.baseline.fit.laws, priors)
     whole = fit(made, noise, first.laws, priors, first.effects)
     assert distances[0, 2] == pytest.approx(null.cost - whole.cost, rel=0.25)
+
+
+def test_loops_are_not_foretold_where_none_could_be_evaluated():
+    """All dynamic tests stood still: what a loop would tell hangs on an attractor that nobody has seen."""
+    moving_oil = campaign(22, warmth)
+    still = [
+        replace(run, record=replace(run.record, speed=np.full_like(run.record.speed, 100.0)))
+        for run in moving_oil.dynamic
+    ]
+    given = study(replace(moving_oil, dynamic=tuple(still)))
+    assert given.design.loops == 0
+    found = advised(
+        given, given.extended(("oil_temperature", 0.1, (0.0,))), given.extended(("viscous_exponent", 0.1, ()))
+    )
+    assert found
+    assert not any(moving(each.key) for each in found)

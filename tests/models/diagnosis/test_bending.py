@@ -53,7 +53,7 @@ def test_a_bend_takes_up_what_a_template_misses_as_far_as_its_prior_allows(given
         residual = baseline.fit.residual * 0 + by * BEND * extra
         model = replace(baseline.fit, effects=(each,), torque=baseline.fit.torque + change, residual=residual)
         nothing = np.zeros((residual.size, 0))
-        return project(gram_of(given.design, baseline.noise, baseline.priors, model, nothing), 1e-3).miss
+        return project(gram_of(given.design, baseline.noise, baseline.priors, model, nothing), 1e-3, 0.0).miss
 
     nothing = left(fitted, 0.0)
     assert left(stiff, 1.0) - left(stiff, 0.0) > 100.0

@@ -46,7 +46,7 @@ def test_a_contrast_sees_its_share_of_what_is_visible(
     view = view_of(plain.design, known.noise, known.priors, known.fit, [])
     structures = np.stack([shape(rows, at) for at in PLACES], axis=1) * known.fit.torque[:, None]
     columns = np.column_stack([structures, view.contrasts.columns])
-    info = project(gram_of(plain.design, known.noise, known.priors, known.fit, columns), known.noise.run_gain).info
+    info = project(gram_of(plain.design, known.noise, known.priors, known.fit, columns), known.noise.run_gain, 0.0).info
     scale = np.sqrt(np.maximum(np.diag(info), 1e-300))
     shares = (info / scale[:, None] / scale)[: PLACES.size, PLACES.size :] ** 2
     assert shares.max(axis=1).min() > least

@@ -1,14 +1,20 @@
 """Noise from within the data: right where it is white or remembers, and blind to what is smooth."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from models.arrays import FloatArray
+from models.diagnosis.campaign import Campaign
 from models.diagnosis.correlation import Correlation, arma
 from models.diagnosis.design import Design, build_design
+from models.diagnosis.engine import diagnose, fit_baseline
 from models.diagnosis.noise import estimate_noise, first_noise
+from models.diagnosis.report import Verdict
 from models.diagnosis.whitening import Noise, gains_of, whitened, without_gains
-from tests.models.diagnosis.campaigns import campaign
+from tests.models.diagnosis.campaigns import PRESSURES, campaign
 
 SEED = 20
 
@@ -81,3 +87,31 @@ def test_whitening_is_the_inverse_root_of_the_covariance(design: Design) -> None
     expected = probe[rows].T @ np.linalg.solve(covariance, probe[rows])
     # the filter starts from a row's own past that is not known: a part in hundred
     np.testing.assert_allclose(white.T @ white, expected, rtol=0.02, atol=0.02 * expected[0, 0])
+
+
+def scattered(given: Campaign, scatter: float) -> Campaign:
+    """Each pressure of each test with a gain of its own."""
+    rng = np.random.default_rng(SEED)
+
+    def gains(pressure: FloatArray) -> FloatArray:
+        each = 1 + scatter * rng.standard_normal(PRESSURES.size)
+        return each[np.abs(pressure[:, None] - PRESSURES).argmin(axis=1)]
+
+    stationary = [
+        replace(run, plateaus=replace(run.plateaus, torque=run.plateaus.torque * gains(run.plateaus.pressure)))
+        for run in given.stationary
+    ]
+    dynamic = [
+        replace(run, record=replace(run.record, torque=run.record.torque * gains(run.record.pressure)))
+        for run in given.dynamic
+    ]
+    return replace(given, stationary=tuple(stationary), dynamic=tuple(dynamic))
+
+
+@pytest.mark.parametrize(("scatter", "least", "most"), [(0.0, 0.0, 4e-4), (0.001, 4e-4, 2.5e-3), (0.004, 2.5e-3, 6e-3)])
+def test_gains_that_scatter_from_pressure_to_pressure_are_no_structure(
+    scatter: float, least: float, most: float
+) -> None:
+    given = scattered(campaign(3), scatter)
+    assert least <= fit_baseline(build_design(given)).noise.curve_gain <= most
+    assert diagnose(given, rng=np.random.default_rng(0)).verdict is Verdict.MODEL_ADEQUATE

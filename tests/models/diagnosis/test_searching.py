@@ -2,17 +2,19 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
-from models.diagnosis import searching, verdict
+from models.diagnosis import verdict
 from models.diagnosis.catalogue import BY_SLUG, CATALOGUE
-from models.diagnosis.fitting import _inside
-from models.diagnosis.refitting import Hypothesis
+from models.diagnosis.fitting import Fitted, _inside, fit
+from models.diagnosis.projection import Projected
+from models.diagnosis.refitting import Hypothesis, null_of, refitted
 from models.diagnosis.searching import hypotheses_of
 from models.diagnosis.selection import columns_of, screen_pairs
-from models.diagnosis.viewing import view_of
+from models.diagnosis.viewing import View, view_of
 from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.fitted import Study, study
 
@@ -33,15 +35,26 @@ def found(given: Study, slug: str) -> Hypothesis:
     return next(each for each in hypotheses if each.slugs == (slug,))
 
 
-def test_a_zero_that_the_baseline_swallowed_is_found_from_laws_that_nothing_bent(
-    wandering: Study, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    several = found(wandering, "torque_zero_shift")
-    assert several.fit is not None
-    assert several.fit.effects[0].amplitude < 0.0
-    monkeypatch.setattr(searching, "RESTARTED", 0)
-    once = found(wandering, "torque_zero_shift")
-    assert several.evidence > once.evidence + 100.0
+def test_a_zero_that_the_baseline_swallowed_is_found_with_its_sign(wandering: Study) -> None:
+    zero = found(wandering, "torque_zero_shift")
+    assert zero.fit is not None
+    assert zero.fit.effects[0].amplitude < 0.0
+    assert zero.evidence > 200.0
+
+
+def test_no_effect_is_praised_for_a_valley_that_the_baseline_missed(wandering: Study) -> None:
+    """A trifle beside the baseline where it belongs, against one that ended too soon: what the latter missed is taken off."""
+    known = wandering.baseline
+    given = wandering.design, known.noise, known.priors
+    early = null_of(*given, fit(wandering.design, known.noise, known.start, known.priors, steps=1))
+    trifle = Fitted(effect=BY_SLUG["viscous_exponent"], amplitude=0.0, shape=())
+    praised = refitted(*given, early, known.fit.laws, (trifle,), 0.0, (0.0, 0.0))
+    assert praised.evidence > 50.0
+    search = searching._Search(
+        design=wandering.design, noise=known.noise, priors=known.priors, start=known.start, null=early,
+        view=cast(View, None), projected=cast(Projected, None),
+    )  # fmt: skip
+    assert praised.less(*search.better_null([praised])).evidence < 5.0
 
 
 def test_a_shape_at_its_bound_is_held_while_the_rest_moves(wandering: Study) -> None:

@@ -90,9 +90,11 @@ def test_every_verdict_has_a_paragraph(found):
 def test_what_is_named_is_explained_and_what_it_beat_is_said():
     found = findings(Verdict.CAUSE_NAMED, "oil_temperature")
     rival = candidate("torque_zero_shift", 0.01, evidence=12.3)
-    said = summarise(replace(found, candidates=(*found.candidates, rival)))
+    helper = replace(candidate("viscous_exponent", 0.02, evidence=14.0), beside=("oil_temperature",))
+    said = summarise(replace(found, candidates=(*found.candidates, rival, helper)))
     assert BY_SLUG["oil_temperature"].physics in said
     assert "better than torque zero shift by 17.7 nats" in said
+    assert "viscous exponent" not in said  # it was fitted with the cause, not against it
     assert (
         "0.149 Nm against 0.161 Nm (7.5 ± 0.9 % less)" in said or "0.149 Nm against 0.161 Nm (7.4 ± 0.9 % less)" in said
     )

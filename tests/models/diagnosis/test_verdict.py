@@ -101,7 +101,7 @@ def test_gains_that_scatter_much_are_less_likely_than_those_that_hardly_do(given
     known = given.baseline
     gram = gram_of(given.design, known.noise, known.priors, known.fit, np.zeros((given.design.torque.size, 0)))
     untold = replace(gram, along=0.0 * gram.along, squares=0.0 * gram.squares)
-    evidence = np.array([project(untold, float(gain)).evidence for gain in GAINS])
+    evidence = np.array([project(untold, float(gain), 0.0).evidence for gain in GAINS])
     below, usual, above = np.interp(np.log([0.0025 / 4, 0.0025, 0.0025 * 4]), np.log(GAINS), evidence)
     assert above < below - 1.0 < usual
     assert above > usual - 5.0  # unlikely, not impossible

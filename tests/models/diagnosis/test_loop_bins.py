@@ -1,0 +1,74 @@
+"""Loops in phase bins: what of a record belongs to the swing, and from when on friction follows it."""
+
+import numpy as np
+import pytest
+
+from models.arrays import FloatArray
+from models.clutch import Geometry
+from models.diagnosis.loop_bins import BINS, PHASES, BinnedLoop, binned_loops
+from models.lag import attractor_torque
+from models.runs import Record
+from models.stribeck import StribeckParameters
+
+GEOMETRY = Geometry()
+RPM = 2 * np.pi / 60
+RATE = 50.0
+CURVE = StribeckParameters(static_torque=25.0, coulomb_ratio=0.75, stribeck_velocity=5.0, viscous_coefficient=1.3)
+
+
+def torque_at(velocity: FloatArray) -> FloatArray:
+    return np.asarray(21.0 + 0.8 * velocity - 0.11 * velocity**2, dtype=np.float64)
+
+
+def speed_of(frequency: float, periods: float, held: float, back: float) -> FloatArray:
+    """[rpm]: 1000 held, a sine of 960 about it, and brought back to 1000 in `back` seconds."""
+    sine = 1000 + 960 * np.sin(2 * np.pi * frequency * np.arange(round(periods / frequency * RATE)) / RATE)
+    way = np.linspace(0.0, 1.0, round(back * RATE))
+    return np.concatenate([np.full(round(held * RATE), 1000.0), sine, sine[-1] + (1000 - sine[-1]) * way])
+
+
+def missed(loop: BinnedLoop, expected: FloatArray) -> float:
+    """The largest share by which a bin's torque is not what is expected [PHASES] Nm there."""
+    used = loop.samples > 0
+    return float(np.abs(loop.torque / expected.reshape(BINS, PHASES // BINS).mean(axis=1) - 1)[used].max())
+
+
+@pytest.mark.parametrize(
+    ("periods", "held", "back"), [(1.5, 0.0, 0.0), (2.1, 2.0, 0.8), (2.0, 5.0, 0.0), (1.3, 1.0, 0.5), (2.1, 3.0, 1.5)]
+)
+def test_only_the_swing_is_binned(periods: float, held: float, back: float) -> None:
+    """A record of three pressures, between which speed is held and brought back; torque hangs on speed alone."""
+    speed = speed_of(0.1, periods, held, back)
+    pressures = np.repeat([4e5, 5e5, 6e5], speed.size)
+    rpm = np.tile(speed, 3)
+    velocity = GEOMETRY.sliding_velocity(rpm * RPM)
+    record = Record(
+        time=np.arange(rpm.size) / RATE,
+        pressure=pressures,
+        speed=rpm * RPM,
+        torque=torque_at(velocity) * pressures / 5e5,
+    )
+    loops, notes = binned_loops(record, GEOMETRY)
+    assert [loop.pressure for loop in loops] == [4e5, 5e5, 6e5]
+    assert not notes
+    for loop in loops:
+        assert loop.angular_frequency == pytest.approx(2 * np.pi * 0.1, rel=2e-3)
+        # a bin is some 5 samples wide, and falls on them as it happens: 1 % where the curve is steep
+        assert missed(loop, torque_at(loop.velocity) * loop.pressure / 5e5) < 0.01
+
+
+def test_friction_has_settled_when_a_fast_swing_counts() -> None:
+    """At 0.5 Hz a twentieth of a period is no time for friction that lags by a quarter of a second; four periods are."""
+    speed = speed_of(0.5, 4.2, 2.0, 0.0)
+    time = np.arange(speed.size) / RATE
+    torque = attractor_torque(time, GEOMETRY.sliding_velocity(speed * RPM), CURVE, 100.0)
+    record = Record(time=time, pressure=np.full(time.size, 5e5), speed=speed * RPM, torque=torque)
+    (loop,), _ = binned_loops(record, GEOMETRY)
+    turns = np.arange(0.0, 20.0, 1 / 600)
+    swung = GEOMETRY.sliding_velocity((1000 + 960 * np.sin(np.pi * turns)) * RPM)
+    rising = (turns > 17.5) & (turns < 18.5)
+    settled = attractor_torque(turns, swung, CURVE, 100.0)[rising]
+    faster = loop.acceleration > 0.3 * loop.acceleration.max()
+    wanted = np.interp(loop.velocity[faster], swung[rising], settled)
+    found = np.repeat(loop.torque, PHASES // BINS)[faster]
+    assert np.abs(found / wanted - 1).max() < 0.005
