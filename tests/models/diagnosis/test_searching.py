@@ -7,9 +7,10 @@ from typing import cast
 import numpy as np
 import pytest
 
-from models.diagnosis import verdict
+from models.diagnosis import searching, verdict
 from models.diagnosis.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.fitting import Fitted, _inside, fit
+from models.diagnosis.noise import first_noise
 from models.diagnosis.projection import Projected
 from models.diagnosis.refitting import Hypothesis, null_of, refitted
 from models.diagnosis.searching import hypotheses_of
@@ -43,15 +44,17 @@ def test_a_zero_that_the_baseline_swallowed_is_found_with_its_sign(wandering: St
 
 
 def test_no_effect_is_praised_for_a_valley_that_the_baseline_missed(wandering: Study) -> None:
-    """A trifle beside the baseline where it belongs, against one that ended too soon: what the latter missed is taken off."""
-    known = wandering.baseline
-    given = wandering.design, known.noise, known.priors
-    early = null_of(*given, fit(wandering.design, known.noise, known.start, known.priors, steps=1))
+    """A trifle beside the baseline in one valley, against the baseline in another: what that missed is taken off."""
+    known, design = wandering.baseline, wandering.design
+    given = design, known.noise, known.priors
+    other = fit(*given[:2], fit(design, first_noise(design), known.start, known.priors, steps=12).laws, known.priors)
+    missed, better = sorted((known.fit, other), key=lambda each: -each.cost)
+    null = null_of(*given, missed)
     trifle = Fitted(effect=BY_SLUG["viscous_exponent"], amplitude=0.0, shape=())
-    praised = refitted(*given, early, known.fit.laws, (trifle,), 0.0, (0.0, 0.0))
+    praised = refitted(*given, null, better.laws, (trifle,), 0.0, (0.0, 0.0))
     assert praised.evidence > 50.0
     search = searching._Search(
-        design=wandering.design, noise=known.noise, priors=known.priors, start=known.start, null=early,
+        design=design, noise=known.noise, priors=known.priors, start=known.start, null=null,
         view=cast(View, None), projected=cast(Projected, None),
     )  # fmt: skip
     assert praised.less(*search.better_null([praised])).evidence < 5.0
