@@ -22,10 +22,9 @@ LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --
 demo: $(VENV)/.runs
 	$(BIN)/clutchlife demo $(ARGS)
 
-# three at a time: on two cores one of them waits for a browser, a socket or a timer
 test: $(VENV)/.tests
 	$(BIN)/python -m tests.browser
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist worksteal $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal $(ARGS)
 
 check: $(VENV)/.tests
 	$(BIN)/ruff format --check .
