@@ -127,8 +127,8 @@ def fit_baseline(design: Design) -> Baseline:
     fitted = min((fit(design, noise, each, priors, steps=ROUGH) for each in starts), key=lambda each: each.cost)
     noise, assumed = estimate_noise(design, fitted.residual, fitted.torque, noise)
     # with a noise that was only assumed a fit may have gone down a wrong valley
-    again = (fit(design, noise, each, priors, steps=ROUGH) for each in (*starts, fitted.laws))
-    fitted = fit(design, noise, min(again, key=lambda each: each.cost).laws, priors)
+    again = min((fit(design, noise, each, priors, steps=ROUGH) for each in starts), key=lambda each: each.cost)
+    fitted = min((fit(design, noise, each.laws, priors) for each in (fitted, again)), key=lambda each: each.cost)
     noise, assumed = estimate_noise(design, fitted.residual, fitted.torque, noise)
     fitted = fit(design, noise, fitted.laws, priors)
     curve_gain = likely_curve_gain(gram_of(design, noise, priors, fitted, np.zeros((design.torque.size, 0))))

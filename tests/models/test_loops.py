@@ -13,7 +13,6 @@ from models.loop_area import Direction, loop_area
 from models.loops import LoopStatus, evaluate_loops
 from models.periods import fit_cycle
 from models.runs import Record
-from models.standing import pressure_stretches
 from tests.models.dynamic_records import FALLING, GEOMETRY, SWING, attractor, curve, record, velocity
 from tests.real.lag import MICRO_LOOPS, micro_loops
 
@@ -274,17 +273,6 @@ def test_measured_loops_against_trapezoids():
     for row in micro_loops():
         assert row["∮F dv [N mm/s]"] == pytest.approx(row["∮F dv by trapezoids"], rel=0.02)
         assert row["∮F dx [mJ]"] == pytest.approx(row["∮F dx by trapezoids"], rel=0.003)
-
-
-def test_stretches_of_pressure():
-    time = np.arange(4000) / 100
-    pressure = np.concatenate([np.full(1500, 4e5), np.linspace(4e5, 4.5e5, 200), np.full(2300, 4.5e5)])
-    pressure = pressure + 2e3 * np.random.default_rng(0).standard_normal(4000)
-    found = list(pressure_stretches(time, pressure))
-    assert [round(s.pressure / 1e5, 1) for s in found] == [4.0, 4.5]
-    assert abs(found[0].stop - 1500) < 60
-    assert abs(found[1].start - 1700) < 60
-    assert (found[0].start, found[1].stop) == (0, 4000)
 
 
 @settings(max_examples=60, deadline=None)

@@ -106,3 +106,14 @@ def test_levels_closer_than_a_gap_are_cut_without_harm(step: float, count: int) 
     pressure = np.repeat(0.4e5 + step * np.arange(count), 2001)
     found = list(pressure_stretches(np.arange(pressure.size) / 60, pressure))
     assert all(0 <= each.start < each.stop <= pressure.size for each in found)
+
+
+def test_stretches_of_pressure():
+    time = np.arange(4000) / 100
+    pressure = np.concatenate([np.full(1500, 4e5), np.linspace(4e5, 4.5e5, 200), np.full(2300, 4.5e5)])
+    pressure = pressure + 2e3 * np.random.default_rng(0).standard_normal(4000)
+    found = list(pressure_stretches(time, pressure))
+    assert [round(s.pressure / 1e5, 1) for s in found] == [4.0, 4.5]
+    assert abs(found[0].stop - 1500) < 60
+    assert abs(found[1].start - 1700) < 60
+    assert (found[0].start, found[1].stop) == (0, 4000)

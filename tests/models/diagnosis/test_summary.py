@@ -125,6 +125,16 @@ def test_a_test_that_decides_little_is_not_oversold():
     assert "decide" not in summarise(replace(found, advice=()))
 
 
+def test_a_test_of_a_nat_confirms_nothing_and_hardly_any_structure_is_no_percentage():
+    found = findings(Verdict.CAUSE_NAMED, "oil_temperature")
+    weak = replace(found.advice[0], other="baseline", nats=0.8)
+    said = summarise(replace(found, advice=(weak,), baseline=replace(MISFIT, unexplained_share=1e-5)))
+    assert "To confirm it" not in said
+    assert "No single test would decide" in said
+    assert "less than 0.1 % of the squared residual" in said
+    assert "To confirm it" in summarise(replace(found, advice=(replace(weak, nats=50.0),)))
+
+
 def test_what_was_not_measured_cannot_be_excluded():
     found = findings(Verdict.CAUSE_AMBIGUOUS, "torque_zero_shift")
     said = summarise(replace(found, causes=("torque_zero_shift", "oil_temperature")))
