@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.lag_fit import NINETY
-from models.periods import Cycle, harmonics, inliers
+from models.outliers import inliers
+from models.periods import Cycle, harmonics
 from models.stribeck import GAMMA
 
 #: Harmonics of the torque, where there are samples for them.

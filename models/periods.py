@@ -4,7 +4,7 @@ A dynamic Stribeck test holds the pressure and swings the speed, 15 s at 0.1 Hz 
 loop closes after whole periods only, so half a period must be left out; the *last* whole periods are kept, for the
 first half holds the start. The swing is fitted by
 
-    v(t) = v_0 + Σ_h a_h cos hθ + b_h sin hθ,    θ = 2π f (t - t_0),    h = 1 ... 4
+    v(t) = v_0 + Σ_h a_h cos hθ + b_h sin hθ,    θ = 2π f (t - t_0),    h = 1 ... 4, or up to 32 where ramps have corners
 
 with f free (Gauss-Newton on all of the level's samples, outliers left out), so that nothing is asked of the clock's
 evenness, of the rate, or of a period being a whole number of samples.
@@ -20,13 +20,10 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from models.arrays import FloatArray
+from models.outliers import NEIGHBOURS, OUTLIER, beside, near
 
 #: Harmonics of the speed.
 SPEED_HARMONICS = 4
-#: A sample further off a fit than this many deviations, and than this share of the largest value, is an outlier.
-OUTLIER = 6.0
-OUTLIER_SHARE = 0.005
-_NEIGHBOURS = 5
 #: A period counts as whole where this share of it was sampled: a fit of harmonics bridges the rest.
 WHOLE = 0.99
 #: A speed that misses its fit by more than this share of its swing (rms) does not swing periodically.
@@ -38,6 +35,12 @@ _SWING_SHARE, _MOST_SHARE = 0.02, 0.05
 #: Where speed at a record's ends is further off the swing than OUTLIER deviations and this share of its amplitude, it does
 #: not swing yet, or no more; ends are cut so many times at most.
 _OFF_SWING, _CUTS = 0.02, 6
+#: A frequency is known to so much of 1/duration where the first harmonic alone looks for it, and at last.
+_NEAR, _EXACT = 1e-3, 1e-10
+#: Harmonics of motions with corners, tried one after the other while what is missed (rms) is more than such a share of the
+#: swing and falls to this share.
+CORNERS = (8, 16, 32)
+_FOLLOWED, _TAKEN = 0.002, 0.7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,42 +101,67 @@ def sample_interval(time: FloatArray) -> float:
     return float(np.median(np.diff(time))) if time.size > 1 else 0.0
 
 
-def fit_cycle(time: FloatArray, value: FloatArray, count: int = SPEED_HARMONICS) -> Cycle | str:
+def fit_cycle(time: FloatArray, value: FloatArray) -> Cycle | str:
     """The swing of value [n] over time [n] s (ascending), and its last whole periods; a sentence where there is none.
 
-    `count` harmonics: 4 for a motor told to follow a sine, more for motions with corners.
+    SPEED_HARMONICS for a motor told to follow a sine, more for motions with corners.
     """
     moving = _without_rest(time, value)
     t, y = time[moving], value[moving]
-    if t.size < 4 * (2 * count + 2) or t[-1] <= t[0]:
+    if t.size < 4 * (2 * SPEED_HARMONICS + 2) or t[-1] <= t[0]:
         return f"The speed moves for {t.size} samples only: too few for a period."
     if not (np.ptp(y) > 0 and np.isfinite(np.ptp(y))):
         return "The speed does not move."
-    frequency = _coarse_frequency(t, y)
-    fitted: Cycle | str = "The speed does not swing periodically."
-    for harmonic in (1, *(count,) * _CUTS):
-        fitted = _refine(t, y, frequency, harmonic)
-        if isinstance(fitted, str):
-            return fitted
-        frequency = fitted.frequency
-        if harmonic == count:
-            following = _following(t, y, fitted)
-            if following == slice(0, t.size):
-                break
-            t, y = t[following], y[following]
-    if isinstance(fitted, Cycle) and not (
-        fitted.noise < PERIODIC * fitted.amplitude and fitted.outliers <= 0.2 * t.size
-    ):
+    fitted = _refine(t, y, _coarse_frequency(t, y), 1, _NEAR)
+    if not isinstance(fitted, str):
+        fitted = _without_ends(t, y, fitted.frequency, SPEED_HARMONICS)
+    if isinstance(fitted, str):
+        return fitted
+    if not (fitted.noise < PERIODIC * fitted.amplitude and fitted.outliers <= 0.2 * t.size):
         miss = fitted.noise / max(fitted.amplitude, 1e-3 * fitted.noise, 1e-300)
         return f"The speed does not swing periodically: it misses its best fit by {miss:.0%} of its swing."
+    return _with_corners(t, y, fitted)
+
+
+def _without_ends(time: FloatArray, value: FloatArray, frequency: float, count: int) -> Cycle | str:
+    """A fit of `count` harmonics to what follows the swing."""
+    fitted: Cycle | str = ""
+    for _ in range(_CUTS):
+        fitted = _refine(time, value, frequency, count, _EXACT)
+        if isinstance(fitted, str):
+            return fitted
+        following = _following(time, value, fitted)
+        if following == slice(0, time.size):
+            break
+        frequency, time, value = fitted.frequency, time[following], value[following]
     return fitted
+
+
+def _with_corners(time: FloatArray, value: FloatArray, cycle: Cycle) -> Cycle:
+    """With more harmonics while they take away much of what is missed: ramps have corners, a sine has none."""
+    inside = (time >= cycle.begin) & (time < cycle.stop)
+    t, y = time[inside], value[inside]
+    most = t.size / (3 * max((t[-1] - t[0]) * cycle.frequency, 1.0))
+    richer = cycle
+    for count in CORNERS:
+        if richer.noise < _FOLLOWED * cycle.amplitude or count > most or t.size < 4 * (2 * count + 2):
+            break
+        again = _refine(t, y, richer.frequency, count, _EXACT)
+        if isinstance(again, str) or again.noise > _TAKEN * richer.noise:
+            break
+        richer = again
+    if richer is cycle:
+        return cycle
+    # a corner at an end may have been taken for no part of the swing
+    whole = _without_ends(time, value, richer.frequency, richer.cosine.size)
+    return richer if isinstance(whole, str) else whole
 
 
 def _following(time: FloatArray, value: FloatArray, cycle: Cycle) -> slice:
     """Without the ends that do not follow the swing: holds between two pressures, the way back to where the next begins."""
     residual = value - cycle.value(cycle.phase(time))
     usual = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
-    smooth = median_filter(residual, size=min(_NEIGHBOURS, residual.size), mode="nearest")
+    smooth = median_filter(residual, size=min(NEIGHBOURS, residual.size), mode="nearest")
     off = np.abs(smooth) > max(OUTLIER * usual, _OFF_SWING * cycle.amplitude)
     before, after = leading(off), leading(off[::-1])
     return slice(before, off.size - after) if before + after < off.size else slice(0, off.size)
@@ -175,38 +203,32 @@ def _coarse_frequency(time: FloatArray, value: FloatArray) -> float:
     step = max(1, points // 1024) if peak * duration < 100 else 1
     candidates = np.linspace(peak - 0.8 / duration, peak + 0.8 / duration, 65)
     candidates = candidates[candidates > 0.4 / duration]
-    misses = [_sine_miss(grid[::step], y[::step], float(f)) for f in candidates]
-    return float(candidates[int(np.argmin(misses))])
+    return float(candidates[int(np.argmax(_explained(grid[::step], y[::step], candidates)))])
 
 
-def _sine_miss(time: FloatArray, value: FloatArray, frequency: float) -> float:
-    basis = np.column_stack([np.ones_like(time), harmonics(2 * math.pi * frequency * time, 1)])
-    gram = basis.T @ basis
-    projected = basis.T @ value
-    return -float(projected @ np.linalg.solve(gram + 1e-12 * time.size * np.eye(3), projected))
+def _explained(time: FloatArray, value: FloatArray, frequencies: FloatArray) -> FloatArray:
+    """How much of the squares of value [n] a mean and a sine of each frequency [m] Hz explain: [m]."""
+    turn = np.exp(2j * math.pi * frequencies[:, np.newaxis] * time)
+    once, twice, along = turn.sum(axis=1), (turn**2).sum(axis=1), turn @ value
+    gram = np.empty((frequencies.size, 3, 3))
+    gram[:, 0, 0] = time.size
+    gram[:, 0, 1] = gram[:, 1, 0] = once.real
+    gram[:, 0, 2] = gram[:, 2, 0] = once.imag
+    gram[:, 1, 1], gram[:, 2, 2] = 0.5 * (time.size + twice.real), 0.5 * (time.size - twice.real)
+    gram[:, 1, 2] = gram[:, 2, 1] = 0.5 * twice.imag
+    projected = np.stack([np.full(frequencies.size, value.sum()), along.real, along.imag], axis=1)
+    solved = np.linalg.solve(gram + 1e-12 * time.size * np.eye(3), projected[..., np.newaxis])[..., 0]
+    return np.asarray((projected * solved).sum(axis=1), dtype=np.float64)
 
 
-def inliers(residual: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
-    """[n]: value [n], ordered in time, that is near the fit *or* near its neighbours' median: a spike is neither.
-
-    Near is within OUTLIER deviations (from the median absolute one), or within OUTLIER_SHARE of the largest value. What
-    a fit only bends around (a cusp) stays in.
-    """
-    share = OUTLIER_SHARE * float(np.abs(value).max())
-    near = np.zeros(value.size, dtype=np.bool_)
-    for off in (residual, value - median_filter(value, size=min(_NEIGHBOURS, value.size), mode="nearest")):
-        distance = np.abs(off - np.median(off))
-        near |= distance <= max(OUTLIER * 1.4826 * float(np.median(distance)), share)
-    return near
-
-
-def _refine(time: FloatArray, value: FloatArray, frequency: float, count: int) -> Cycle | str:
-    """Gauss-Newton on frequency, mean and `count` harmonics; outliers judged anew in the first steps."""
+def _refine(time: FloatArray, value: FloatArray, frequency: float, count: int, tolerance: float) -> Cycle | str:
+    """Gauss-Newton on frequency, mean and `count` harmonics until the frequency moves by less than `tolerance`/duration;
+    outliers judged anew in the first steps."""
     origin, duration = 0.5 * float(time[0] + time[-1]), float(time[-1] - time[0])
-    order = np.arange(1, count + 1)
-    keep = np.ones(time.size, dtype=np.bool_)
+    order, highest = np.arange(1, count + 1), 0.5 / max(sample_interval(time), 1e-12)
+    keep, steady = np.ones(time.size, dtype=np.bool_), beside(value)
     coefficients: FloatArray = np.zeros(2 * count + 1)
-    inverse: FloatArray = np.zeros((0, 0))
+    gram: FloatArray = np.zeros((0, 0))
     residual: FloatArray = value
     for step in range(25):
         basis = harmonics(2 * math.pi * frequency * (time - origin), count)
@@ -218,16 +240,17 @@ def _refine(time: FloatArray, value: FloatArray, frequency: float, count: int) -
         by_frequency = 2 * math.pi * (time - origin) / duration * slope  # per cycle over the record
         residual = np.asarray(value - design @ coefficients, dtype=np.float64)
         full = np.column_stack([design, by_frequency])[keep]
-        inverse = np.asarray(np.linalg.pinv(full.T @ full, hermitian=True), dtype=np.float64)
-        move = float((inverse @ (full.T @ residual[keep]))[-1])
+        gram = full.T @ full
+        move = float(np.linalg.lstsq(gram, full.T @ residual[keep], rcond=None)[0][-1])
         frequency += float(np.clip(move, -0.2, 0.2)) / duration
-        if not 0.2 / duration < frequency < 0.5 / max(sample_interval(time), 1e-12):
+        if not 0.2 / duration < frequency < highest:
             return "The speed does not swing periodically."
         if step < 4:
-            keep = inliers(residual, value)
-        elif abs(move) < 1e-12:
+            keep = near(residual, value) | steady
+        elif abs(move) < tolerance:
             break
     noise = math.sqrt(float((residual[keep] ** 2).sum()) / max(int(keep.sum()) - 2 * count - 2, 1))
+    inverse = np.asarray(np.linalg.pinv(gram, hermitian=True), dtype=np.float64)
     return _cycle(time, frequency, origin, coefficients, inverse[1:-1, 1:-1] * noise**2, noise, int((~keep).sum()))
 
 

@@ -75,9 +75,10 @@ class Design:
     """Points [P] (plateaus first, then PHASES points a loop), rows [N] (plateaus first, then the loops' bins), measured
     torque [N] Nm (folded), `samples` [N] averaged in each row, `torque_sd` [N] Nm as sent (NaN where not), `level` [N] Pa
     the pressure level (0 where the clutch is open), `curve` [N] an index that run and level share, `bins` [N - plateaus]
-    which bin of the flat (loop, bin) order each loop row is, `chains` [b, n] rows that follow each other in a run or loop,
-    those of one length together, `bins_remember` the correlations of neighbouring bins, and of those next but one, that the
-    loops' samples tell (None: they do not), `notes` what was left out."""
+    which bin of the flat (loop, bin) order each loop row is, `past` [N - plateaus] how far past that bin's middle (in bins)
+    its samples lie, `chains` [b, n] rows that follow each other in a run or loop, those of one length together,
+    `bins_remember` the correlations of neighbouring bins, and of those next but one, that the loops' samples tell (None:
+    they do not), `notes` what was left out."""
 
     points: Points
     rows: Points
@@ -87,6 +88,7 @@ class Design:
     level: FloatArray
     curve: IntArray
     bins: IntArray
+    past: FloatArray
     chains: tuple[IntArray, ...]
     plateaus: int
     loops: int
@@ -111,13 +113,14 @@ class Design:
         return max(float(np.median(np.abs(self.torque[self.closed]))) if self.closed.any() else 0.0, 1e-12)
 
     def to_rows(self, at_points: FloatArray) -> FloatArray:
-        """[P, ...] at points -> [N, ...] at rows: bins are the means of their points."""
+        """[P, ...] at points -> [N, ...] at rows: bins lie between their two points, where their samples do."""
         if not self.loops:
             return at_points
         out = np.empty((self.torque.size, *at_points.shape[1:]))
         out[: self.plateaus] = at_points[: self.plateaus]
-        loops = at_points[self.plateaus :].reshape(self.loops * BINS, PHASES // BINS, *at_points.shape[1:])
-        np.take(loops.mean(axis=1), self.bins, axis=0, out=out[self.plateaus :], mode="clip")
+        first, second = (at_points[self.plateaus + k :: PHASES // BINS][self.bins] for k in range(PHASES // BINS))
+        later = (0.5 + 2.0 * self.past).reshape(-1, *(1,) * (at_points.ndim - 1))
+        out[self.plateaus :] = first + later * (second - first)
         return out
 
 
@@ -165,7 +168,10 @@ def _assembled(
     notes: tuple[str, ...],
 ) -> Design:
     points = _opened(_joined(blocks))
-    filled = np.concatenate([loop.samples for loop in loops]) if loops else np.zeros(0)
+    filled, past = (
+        np.concatenate([getattr(loop, name) for loop in loops]) if loops else np.zeros(0)
+        for name in ("samples", "past")
+    )
     bins = np.flatnonzero(filled > 0)
     per_bin = PHASES // BINS
     middle = plateaus + bins * per_bin + per_bin // 2
@@ -186,6 +192,7 @@ def _assembled(
         level=level,
         curve=np.asarray(curve, dtype=np.intp).reshape(-1),
         bins=np.asarray(bins, dtype=np.intp),
+        past=past[bins],
         chains=_chains(rows),
         plateaus=plateaus,
         loops=len(loops),

@@ -75,9 +75,13 @@ def priors_of(design: Design, start: FloatArray, frame: Frame) -> Priors:
         means[block + 2 : block + BLOCK] = [0.0, 0.0, np.log(0.5 * design.facts.life), np.log(0.8)]
     sds[LOG_DECAY], means[LOG_DECAY] = 0.7, np.log(0.6 * frame.span)
     sds[DRIFT:ATTRACTOR], means[DRIFT:ATTRACTOR] = (0.6, 0.2, 0.3), 0.0
-    sds[KAPPA], means[KAPPA] = 1.5, np.log(12 * level)
+    # friction may follow at once: one doubt for all pressures, not one for each
+    sds[KAPPA], means[KAPPA] = 1.0, 0.0
+    sds[KAPPA.start], means[KAPPA.start] = 3.0, np.log(12 * level)
     sds[OPEN_DRAG], means[OPEN_DRAG] = _DRAG_SD * level, 0.0
     rows = np.diag(1 / sds)
+    nodes = np.arange(size)[KAPPA]
+    rows[nodes[1:], nodes[:-1]] = -1.0
     alike = np.zeros((4, size))
     for k in range(4):
         alike[k, k * BLOCK + 2], alike[k, k * BLOCK + 3] = 1 / ALIKE_SD, -1 / ALIKE_SD

@@ -10,9 +10,11 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.diagnosis.sample_memory import LEAST_SPEED as MEMORY_SPEED
 from models.diagnosis.sample_memory import Memory, memory_of
-from models.periods import SPEED_HARMONICS, Cycle, fit_cycle, harmonics, inliers
+from models.outliers import inliers
+from models.periods import SPEED_HARMONICS, Cycle, fit_cycle, harmonics
 from models.runs import Record
 from models.standing import pressure_stretches
+from models.stribeck import GAMMA
 
 #: Phases at which a loop is computed, and bins in which it is compared; a bin holds a whole number of phases.
 PHASES, BINS = 120, 60
@@ -20,7 +22,9 @@ PHASES, BINS = 120, 60
 LEAST_SPEED = 0.012
 #: This share of a period and at least so long [s] passes before the loop is in its periodic state (friction lags by S/C,
 #: about 0.1 s), less where no whole period would follow; all that does is used, whole periods or not.
-START, SETTLING = 0.06, 0.6
+START, SETTLING = 0.06, 1.0
+#: Phases looked at about each.
+_ABOUT = 10
 #: Slower than this share of the highest is as good as standing.
 SLOWEST = 1e-5
 #: A speed that falls below minus this share of its highest reverses.
@@ -36,7 +40,8 @@ _AS_BEFORE = 1.3
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BinnedLoop:
     """One pressure of a dynamic test [Pa]. At PHASES phases: phase [rad], velocity [m/s] >= 0, acceleration [m/s²],
-    clock [s]. In BINS bins: torque [Nm] (folded) and how many samples it is the mean of, 0 where the bin is not used.
+    clock [s]. In BINS bins: torque [Nm] (folded), how many samples it is the mean of, 0 where the bin is not used, and how
+    far past the bin's middle [of a bin] these lie on average (where the rate is a multiple of the swing's, always as far).
     temperature [K], NaN where not measured; angular_frequency [rad/s]; sign ±1. `memory` of its samples, where known."""
 
     pressure: float
@@ -49,6 +54,7 @@ class BinnedLoop:
     clock: FloatArray
     torque: FloatArray
     samples: FloatArray
+    past: FloatArray
     memory: Memory | None
 
 
@@ -66,14 +72,15 @@ def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], 
         step = max(1, (stretch.stop - stretch.start) // MOST_SAMPLES)
         rows = slice(stretch.start, stretch.stop, step)
         sign = -1.0 if np.median(velocity[rows]) < 0 else 1.0
-        cycle = _swing(time[rows], sign * velocity[rows], before)
+        swing = sign * velocity[rows]
+        cycle = _swing(time[rows], swing, before)
         if isinstance(cycle, str):
             if stretch.pressure > 0:
                 notes.append(f"{stretch.pressure / 1e5:.3g} bar: {cycle}")
             continue
         before = cycle
         mean = float("nan") if temperature is None else float(temperature[rows].mean())
-        loop = _binned(cycle, time[rows], sign * torque[rows], stretch.pressure, sign, mean, float(time[0]))
+        loop = _binned(cycle, time[rows], swing, sign * torque[rows], stretch.pressure, sign, mean, float(time[0]))
         if not isinstance(loop, str):
             found.append(loop)
         elif stretch.pressure > 0:
@@ -83,11 +90,13 @@ def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], 
 
 def _swing(time: FloatArray, velocity: FloatArray, before: Cycle | None) -> Cycle | str:
     """The stretch's swing: that of the stretch before where its frequency fits here as well, else found anew."""
-    step = max(1, time.size // SWING_SAMPLES)
+    cornered = before is not None and before.cosine.size > SPEED_HARMONICS
+    step = 1 if cornered else max(1, time.size // SWING_SAMPLES)
     t, v = time[::step], velocity[::step]
-    if before is not None and t.size > 4 * SPEED_HARMONICS:
+    count = SPEED_HARMONICS if before is None else before.cosine.size
+    if before is not None and t.size > 4 * count:
         origin = 0.5 * float(t[0] + t[-1])
-        basis = harmonics(2 * math.pi * before.frequency * (t - origin), SPEED_HARMONICS)
+        basis = harmonics(2 * math.pi * before.frequency * (t - origin), count)
         design = np.column_stack([np.ones_like(t), basis])
         found = np.linalg.lstsq(design, v, rcond=None)[0]
         noise = float(np.sqrt(((v - design @ found) ** 2).mean()))
@@ -99,18 +108,45 @@ def _swing(time: FloatArray, velocity: FloatArray, before: Cycle | None) -> Cycl
                 before,
                 origin=origin,
                 mean=float(found[0]),
-                cosine=np.asarray(found[1 : SPEED_HARMONICS + 1], dtype=np.float64),
-                sine=np.asarray(found[SPEED_HARMONICS + 1 :], dtype=np.float64),
+                cosine=np.asarray(found[1 : count + 1], dtype=np.float64),
+                sine=np.asarray(found[count + 1 :], dtype=np.float64),
                 periods=periods,
                 begin=float(t[0]),
                 start=stop - periods / before.frequency,
                 stop=stop,
             )
-    return fit_cycle(t, v)
+    cycle = fit_cycle(t, v)
+    if step > 1 and not isinstance(cycle, str) and cycle.cosine.size > SPEED_HARMONICS:
+        return fit_cycle(time, velocity)  # corners want every sample
+    return cycle
+
+
+def _carrying(cycle: Cycle, time: FloatArray, velocity: FloatArray, slowest: float) -> FloatArray:
+    """The velocity [PHASES] m/s whose v^γ is the mean about each phase: where a swing comes down to rest, S has a cusp that
+    friction, which lags, remembers for a while. Corners are taken as they were measured, not as harmonics round them."""
+    about: FloatArray = 2 * math.pi / (PHASES * _ABOUT) * (np.arange(PHASES * _ABOUT, dtype=np.float64) + 0.5)
+    swing = cycle.value(about)
+    if cycle.cosine.size > SPEED_HARMONICS:
+        began = float(cycle.phase(np.array([cycle.start]))[0])
+        when = (
+            cycle.start
+            + (np.mod(about - began, 2 * math.pi) / (2 * math.pi) + np.arange(cycle.periods)[:, None]) / cycle.frequency
+        )
+        good = inliers(velocity - cycle.value(cycle.phase(time)), velocity)
+        swing = np.interp(when, time[good], velocity[good]).mean(axis=0)
+    powers = np.maximum(swing, slowest) ** GAMMA
+    return np.asarray(powers.reshape(PHASES, _ABOUT).mean(axis=1) ** (1 / GAMMA), dtype=np.float64)
 
 
 def _binned(
-    cycle: Cycle, time: FloatArray, torque: FloatArray, pressure: float, sign: float, temperature: float, begin: float
+    cycle: Cycle,
+    time: FloatArray,
+    velocity: FloatArray,
+    torque: FloatArray,
+    pressure: float,
+    sign: float,
+    temperature: float,
+    begin: float,
 ) -> BinnedLoop | str:
     width = 2 * math.pi / PHASES
     phase = np.asarray(width * (np.arange(PHASES) + 0.5), dtype=np.float64)
@@ -122,7 +158,8 @@ def _binned(
     inside = (time >= settled) & (time < cycle.stop)
     inside[inside] = inliers(torque[inside] - median_filter(torque[inside], size=5, mode="nearest"), torque[inside])
     turned = np.mod(cycle.phase(time), 2 * math.pi)
-    number = np.floor(turned[inside] * (BINS / (2 * math.pi))).astype(np.intp) % BINS
+    at = turned[inside] * (BINS / (2 * math.pi))
+    number = np.minimum(at.astype(np.intp), BINS - 1)
     count = np.bincount(number, minlength=BINS).astype(np.float64)
     count[fitted.reshape(BINS, -1).min(axis=1) < LEAST_SPEED * fastest] = 0.0
     if np.count_nonzero(count) < FEWEST_BINS:
@@ -138,10 +175,11 @@ def _binned(
         temperature=temperature,
         angular_frequency=angular,
         phase=phase,
-        velocity=np.maximum(fitted, SLOWEST * fastest),
+        velocity=_carrying(cycle, time, velocity, SLOWEST * fastest),
         acceleration=angular * cycle.gradient(phase),
         clock=np.asarray(cycle.origin + (phase / (2 * math.pi) + first) / cycle.frequency - begin, dtype=np.float64),
         torque=np.bincount(number, weights=torque[inside], minlength=BINS) / np.maximum(count, 1.0),
         samples=count,
+        past=np.bincount(number, weights=at - number - 0.5, minlength=BINS) / np.maximum(count, 1.0),
         memory=memory_of(torque, turned, used, to_a_bin),
     )

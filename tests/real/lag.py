@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 
 from models.arrays import FloatArray
 from models.lag import attractor_area, attractor_torque, film_time_at, squeeze_film_torque
-from models.loop_area import TORQUE_HARMONICS, loop_area
+from models.loop_area import loop_area
 from models.periods import Cycle, fit_cycle
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
 from models.stribeck import StribeckParameters
@@ -121,7 +121,7 @@ def _tens() -> Iterator[tuple[str, FloatArray, FloatArray, FloatArray]]:
 
 
 def _position(time: np.ndarray, position: np.ndarray) -> Cycle:
-    cycle = fit_cycle(time, position, TORQUE_HARMONICS)
+    cycle = fit_cycle(time, position)
     if isinstance(cycle, str):
         raise TypeError(cycle)
     return cycle

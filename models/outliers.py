@@ -1,0 +1,34 @@
+"""Samples of a record that no fit should heed: spikes."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from models.arrays import FloatArray
+
+#: A sample further off a fit than this many deviations, and than this share of the largest value, is an outlier.
+OUTLIER = 6.0
+OUTLIER_SHARE = 0.005
+#: Samples whose median a sample is held against.
+NEIGHBOURS = 5
+
+
+def inliers(residual: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
+    """[n]: value [n], ordered in time, that is near the fit *or* near its neighbours' median: a spike is neither.
+
+    Near is within OUTLIER deviations (from the median absolute one), or within OUTLIER_SHARE of the largest value. What
+    a fit only bends around (a cusp) stays in.
+    """
+    return near(residual, value) | beside(value)
+
+
+def beside(value: FloatArray) -> NDArray[np.bool_]:
+    """[n]: value [n] near its neighbours' median."""
+    return near(value - median_filter(value, size=min(NEIGHBOURS, value.size), mode="nearest"), value)
+
+
+def near(off: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
+    """[n]: value [n] no further `off` [n] something than is usual."""
+    distance = np.abs(off - np.median(off))
+    share = OUTLIER_SHARE * float(np.abs(value).max())
+    return np.asarray(distance <= max(OUTLIER * 1.4826 * float(np.median(distance)), share), dtype=np.bool_)
