@@ -7,7 +7,8 @@ over the samples) within. So a loop is a few rows however fast it was sampled, a
 Everything is folded to v >= 0 (the model is odd): `sign` says which way the clutch turned.
 """
 
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,49 +17,13 @@ from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, StationaryRun
 from models.diagnosis.facts import Facts, facts_of
 from models.diagnosis.loop_bins import BINS, PHASES, BinnedLoop, binned_loops
+from models.diagnosis.points import IntArray, Points, joined, opened
 from models.diagnosis.sample_memory import bins_remember
 from models.diagnosis.thinning import MOST_PLATEAUS, thinned
-from models.runs import UNLOADED, pressure_levels
+from models.runs import pressure_levels
 
 #: Time on one plateau [s] where nothing else is known (the reference's section 2.3.3).
 PLATEAU_DURATION = 5.0
-
-IntArray = NDArray[np.intp]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Points:
-    """Columns [n]: run (index into Design.runs), cycles, pressure [Pa], engaged (1, or 0 where the clutch is open; the
-    pressure there is the campaign's lowest closed one, for laws are asked for none beyond, and what they say is no friction
-    that acts), velocity [m/s] >= 0, sign ±1, acceleration [m/s²] (of the folded velocity), temperature of the oil [K] (NaN
-    where not measured), clock [s] since the test began, moment [s] (NaN where unknown), angular_frequency [rad/s] (0 at
-    plateaus), phase [rad], loop (index, -1 at plateaus) and previous (the index of the plateau before it in the same run,
-    -1 where there is none)."""
-
-    run: IntArray
-    cycles: FloatArray
-    pressure: FloatArray
-    engaged: FloatArray
-    velocity: FloatArray
-    sign: FloatArray
-    acceleration: FloatArray
-    temperature: FloatArray
-    clock: FloatArray
-    moment: FloatArray
-    angular_frequency: FloatArray
-    phase: FloatArray
-    loop: IntArray
-    previous: IntArray
-
-    @property
-    def steady(self) -> NDArray[np.bool_]:
-        """[n] whether it is a plateau."""
-        return self.loop < 0
-
-    def take(self, index: IntArray | NDArray[np.bool_]) -> "Points":
-        """Those points; `previous` is cut (-1), for its rows may be gone."""
-        columns = {each.name: getattr(self, each.name)[index] for each in fields(self)}
-        return Points(**{**columns, "previous": np.full(columns["run"].size, -1, dtype=np.intp)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +41,8 @@ class Design:
     torque [N] Nm (folded), `samples` [N] averaged in each row, `torque_sd` [N] Nm as sent (NaN where not), `level` [N] Pa
     the pressure level (0 where the clutch is open), `curve` [N] an index that run and level share, `bins` [N - plateaus]
     which bin of the flat (loop, bin) order each loop row is, `past` [N - plateaus] how far past that bin's middle (in bins)
-    its samples lie, `chains` [b, n] rows that follow each other in a run or loop, those of one length together,
+    its samples lie, `repeats` rows [n] of a loop and what a further period of it differs by there [n] Nm, as if each were
+    one sample, `chains` [b, n] rows that follow each other in a run or loop, those of one length together,
     `bins_remember` the correlations of neighbouring bins, and of those next but one, that the loops' samples tell (None:
     they do not), `notes` what was left out."""
 
@@ -89,6 +55,7 @@ class Design:
     curve: IntArray
     bins: IntArray
     past: FloatArray
+    repeats: tuple[tuple[IntArray, FloatArray], ...]
     chains: tuple[IntArray, ...]
     plateaus: int
     loops: int
@@ -167,7 +134,7 @@ def _assembled(
     campaign: Campaign,
     notes: tuple[str, ...],
 ) -> Design:
-    points = _opened(_joined(blocks))
+    points = opened(joined(blocks))
     filled, past = (
         np.concatenate([getattr(loop, name) for loop in loops]) if loops else np.zeros(0)
         for name in ("samples", "past")
@@ -193,6 +160,7 @@ def _assembled(
         curve=np.asarray(curve, dtype=np.intp).reshape(-1),
         bins=np.asarray(bins, dtype=np.intp),
         past=past[bins],
+        repeats=tuple(_repeats(loops, bins, plateaus)),
         chains=_chains(rows),
         plateaus=plateaus,
         loops=len(loops),
@@ -203,11 +171,12 @@ def _assembled(
     )
 
 
-def _opened(points: Points) -> Points:
-    """With what is measured below UNLOADED marked as open."""
-    closed = points.pressure >= UNLOADED
-    lowest = float(points.pressure[closed].min()) if closed.any() else 1.0
-    return replace(points, engaged=closed.astype(np.float64), pressure=np.where(closed, points.pressure, lowest))
+def _repeats(loops: list[BinnedLoop], bins: IntArray, plateaus: int) -> Iterator[tuple[IntArray, FloatArray]]:
+    for number, loop in enumerate(loops):
+        first, last = np.searchsorted(bins, [number * BINS, (number + 1) * BINS])
+        for differs in loop.repeats[:, bins[first:last] - number * BINS]:
+            known = np.isfinite(differs)
+            yield np.asarray(plateaus + first + np.flatnonzero(known), dtype=np.intp), differs[known]
 
 
 def _chains(rows: Points) -> tuple[IntArray, ...]:
@@ -280,16 +249,3 @@ def _loop_points(loop: BinnedLoop, run: int, number: int, cycles: float, moment:
         loop=np.full(count, number, dtype=np.intp),
         previous=np.full(count, -1, dtype=np.intp),
     )
-
-
-def _joined(blocks: list[Points]) -> Points:
-    def column(name: str) -> list[FloatArray]:
-        return [getattr(block, name) for block in blocks] or [np.zeros(0)]
-
-    integers = {name: np.concatenate(column(name)).astype(np.intp) for name in ("run", "loop", "previous")}
-    rest = {
-        each.name: np.concatenate(column(each.name)).astype(np.float64)
-        for each in fields(Points)
-        if each.name not in integers
-    }
-    return Points(**integers, **rest)  # type: ignore[arg-type] # names are the fields' own

@@ -33,8 +33,9 @@ FEWEST_ROWS, FEWEST_SPEEDS = 24, 6
 #: A line of one frequency at all speeds is structure from so much evidence [nats] on: nothing else need confirm it.
 LEAST_LINE = 14.0
 #: An alarm that neither an effect nor an axis of structure confirms must be so much [nats] beyond its threshold: about
-#: five times rarer by chance.
-UNCONFIRMED = 1.6
+#: five times rarer by chance. That of the effects more: where no effect comes to anything once it is refitted, the shape
+#: that raised it was one of many.
+UNCONFIRMED, UNCONFIRMED_EFFECTS = 1.6, 6.0
 #: Gauss-Newton steps after which starts are compared.
 ROUGH = 12
 #: So many plateaus determine every curve: one start is enough.
@@ -155,7 +156,11 @@ def alarms(design: Design, baseline: Baseline, view: View, rng: np.random.Genera
 def confirmed(leads: dict[str, Lead], hypotheses: list[Hypothesis], otherwise: float) -> bool:
     """Whether an alarm holds: an effect has evidence, or something else has (`otherwise` nats), or it is loud."""
     evidence = max((each.evidence for each in hypotheses if finite(each)), default=-np.inf)
-    loud = any(each.value > each.threshold + UNCONFIRMED for each in leads.values() if each.raised)
+    loud = any(
+        each.value > each.threshold + (UNCONFIRMED_EFFECTS if name == "effects" else UNCONFIRMED)
+        for name, each in leads.items()
+        if each.raised
+    )
     return loud or max(evidence, otherwise) >= OVER_NOTHING
 
 

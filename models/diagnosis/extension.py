@@ -17,11 +17,12 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.diagnosis.campaign import Campaign, Oil, StationaryRun
 from models.diagnosis.catalogue import BY_SLUG
-from models.diagnosis.design import Points, build_design
+from models.diagnosis.design import build_design
 from models.diagnosis.effect import Kind
 from models.diagnosis.facts import Facts, facts_of
 from models.diagnosis.fitting import Fit
 from models.diagnosis.laws import ATTRACTOR, POWERS, Frame, Laws, scene_of
+from models.diagnosis.points import Points
 
 #: Plateaus are handed on in parts of this many: a design takes no more of one run.
 _PART = 2000

@@ -18,9 +18,10 @@ from scipy.optimize import nnls
 from models.arrays import FloatArray
 from models.diagnosis.baseline import Prediction, predict
 from models.diagnosis.bending import BEND, bends
-from models.diagnosis.design import Design, Points
+from models.diagnosis.design import Design
 from models.diagnosis.fitting import Fit, Fitted, Priors, effect_columns, effect_precisions, effect_rows, free_shapes
 from models.diagnosis.laws import OPEN_DRAG
+from models.diagnosis.points import Points
 from models.diagnosis.projection import Gram, gram_of, project
 from models.diagnosis.whitening import Noise
 

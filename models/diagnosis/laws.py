@@ -6,7 +6,7 @@ highest pressure,
     parameter = u⁻ (1 + s⁻ D) w(p) + u⁺ (1 + s⁺ D) (1 - w(p))
     w         = (P⁺ - p)/(P⁺ - P⁻)                               for M_s, V_S, C_v: straight lines in pressure
     w         = (e^{-(p - P⁻)/p_0} - E)/(1 - E),  E = e^{-(P⁺ - P⁻)/p_0}      for M̄_c: c_∞ + a e^{-p/p_0}
-    log C          = κ(p) + d_1 x + d_2 x² + d_3 x (p - p̄)/(P⁺ - P⁻),       x = ζ/ζ_last
+    log C          = κ(p) + d_1 x + d_2 x (1 + ξ)/(x + ξ) + d_3 x (p - p̄)/(P⁺ - P⁻),       x = ζ/ζ_last,  ξ = 0.15
     open clutch    = Σ_k o_k (v/v_0)^k,  k = 1 ... 4                           whatever oil it drags along, and no friction
 
 (φ, ε) stand in θ as (log h, log ε) with h the half-life, D(h) = 1/2: φ = h/(2^{1/ε} - 1). Data tell h far better than φ.
@@ -23,8 +23,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.design import Points
 from models.diagnosis.facts import Facts
+from models.diagnosis.points import Points
 from models.stribeck import GAMMA
 
 #: The laws of eq. 6 over pressure, in the order of `models.stribeck.PARAMETER_NAMES`; each has six places in θ.
@@ -38,6 +38,8 @@ ATTRACTOR = DRIFT + 3
 POWERS = 4
 KAPPA, OPEN_DRAG = slice(ATTRACTOR, -POWERS), slice(-POWERS, None)
 RATIO = 1  # the place of M̄_c among the four
+#: Half of what log C drifts by early is done after this share of the life measured, as eq. 6 has it.
+EARLY = 0.15
 _LEAST_VELOCITY = 1e-3
 
 
@@ -121,7 +123,8 @@ class Laws:
         weights = np.stack([np.interp(pressure, levels, unit) for unit in np.eye(levels.size)], axis=-1)
         x = cycles / max(self.frame.last, 1.0)
         tilt = (pressure - 0.5 * (self.frame.lowest + self.frame.highest)) / self.frame.span
-        columns = np.concatenate([np.stack([x, x * x, x * tilt], axis=-1), weights], axis=-1)
+        early = x * (1.0 + EARLY) / (x + EARLY)
+        columns = np.concatenate([np.stack([x, early, x * tilt], axis=-1), weights], axis=-1)
         return columns @ self.theta[DRIFT:-POWERS], columns
 
 

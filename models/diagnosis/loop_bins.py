@@ -8,6 +8,7 @@ from scipy.ndimage import median_filter
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
+from models.diagnosis.repeats import repeats_of
 from models.diagnosis.sample_memory import LEAST_SPEED as MEMORY_SPEED
 from models.diagnosis.sample_memory import Memory, memory_of
 from models.outliers import inliers
@@ -42,6 +43,7 @@ class BinnedLoop:
     """One pressure of a dynamic test [Pa]. At PHASES phases: phase [rad], velocity [m/s] >= 0, acceleration [m/s²],
     clock [s]. In BINS bins: torque [Nm] (folded), how many samples it is the mean of, 0 where the bin is not used, and how
     far past the bin's middle [of a bin] these lie on average (where the rate is a multiple of the swing's, always as far).
+    `repeats` [p, BINS] Nm is what each further period differs by (`models.diagnosis.repeats`).
     temperature [K], NaN where not measured; angular_frequency [rad/s]; sign ±1. `memory` of its samples, where known."""
 
     pressure: float
@@ -55,6 +57,7 @@ class BinnedLoop:
     torque: FloatArray
     samples: FloatArray
     past: FloatArray
+    repeats: FloatArray
     memory: Memory | None
 
 
@@ -181,5 +184,6 @@ def _binned(
         torque=np.bincount(number, weights=torque[inside], minlength=BINS) / np.maximum(count, 1.0),
         samples=count,
         past=np.bincount(number, weights=at - number - 0.5, minlength=BINS) / np.maximum(count, 1.0),
+        repeats=repeats_of(torque[inside], number, (time[inside] - settled) * cycle.frequency, BINS),
         memory=memory_of(torque, turned, used, to_a_bin),
     )

@@ -3,8 +3,9 @@
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.design import Design, IntArray
+from models.diagnosis.design import Design
 from models.diagnosis.fitting import Fit
+from models.diagnosis.points import IntArray
 from models.diagnosis.report import LoopTrace, Maps
 from models.diagnosis.whitening import Noise
 

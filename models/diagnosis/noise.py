@@ -28,6 +28,7 @@ FEWEST = 12
 USUAL_GAIN = 0.002
 _DEGREE, _HARMONICS = 4, 5
 _LONGEST = 120
+_LEAST_REPEATED = 8
 _SPIKE = 5.5
 _STEPS = (0.2, 0.35, 0.5, 0.65, 0.8, 0.9)
 _SHARES = (0.15, 0.3, 0.5, 0.75, 1.0)
@@ -71,13 +72,24 @@ def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, bef
         variance = _variance(pieces, residual, torque, design.samples)
         deviation[part] = np.sqrt(variance[part])
         told = design.bins_remember if part[-1] else None  # loops stand last
-        correlation, scale = _correlation(pieces, residual, np.sqrt(variance), told)
+        correlation, scale = _correlation(pieces, residual, np.sqrt(variance), told, _repeated(design, variance, part))
         deviation[part] *= scale
         correlations.append(correlation)
     spiky = np.abs(residual) > _SPIKE * deviation
     if spiky.mean() < 0.02:
         deviation = np.where(spiky & _isolated(design, residual, deviation), np.abs(residual), deviation)
     return replace(before, deviation=deviation, plateaus=correlations[0], loops=correlations[1]), assumed
+
+
+def _repeated(
+    design: Design, variance: FloatArray, part: np.ndarray[tuple[int], np.dtype[np.bool_]]
+) -> list[FloatArray]:
+    """What further periods of the loops differ by, in deviations [n] of a sample; nothing for plateaus."""
+    return [
+        differs / np.sqrt(variance[rows] * design.samples[rows])
+        for rows, differs in design.repeats
+        if rows.size >= _LEAST_REPEATED and part[rows[0]]
+    ]
 
 
 def _isolated(
@@ -142,7 +154,11 @@ def _variance(pieces: list[_Piece], residual: FloatArray, torque: FloatArray, sa
 
 
 def _correlation(
-    pieces: list[_Piece], residual: FloatArray, deviation: FloatArray, told: tuple[float, float] | None
+    pieces: list[_Piece],
+    residual: FloatArray,
+    deviation: FloatArray,
+    told: tuple[float, float] | None,
+    repeated: list[FloatArray],
 ) -> tuple[Correlation, float]:
     """(w, ρ) by restricted likelihood, averaged over a grid, and the factor by which the deviations are off.
 
@@ -158,6 +174,9 @@ def _correlation(
     if told is not None:
         tried = [usual, *tried]
     few = len(groups) > 40  # loops whose bins all differ: their correlation is not looked for
+    whole = {size: np.eye(size) for size in {each.size for each in repeated}}
+    for each in repeated:
+        groups.setdefault(id(whole[each.size]), (whole[each.size], []))[1].append(np.clip(each, -_SPIKE, _SPIKE))
     logs, scales = [], []
     for correlation in tried[: 1 if few else None]:
         likelihood, scale = _restricted(correlation, groups)

@@ -18,8 +18,9 @@ from models.arrays import FloatArray
 from models.diagnosis import amplitude
 from models.diagnosis.baseline import Prediction
 from models.diagnosis.bending import BEND, bent_columns
-from models.diagnosis.design import Design, IntArray
+from models.diagnosis.design import Design
 from models.diagnosis.fitting import Fit, Priors, effect_columns, effect_precisions
+from models.diagnosis.points import IntArray
 from models.diagnosis.whitening import Noise, by_curve, gains_of, whitened
 
 #: Scatter of the gain that is considered [-], and its prior: log-normal about a usual one, narrower above it, for a rig that

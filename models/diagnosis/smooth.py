@@ -14,10 +14,11 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis.baseline import Prediction
 from models.diagnosis.contrasts import CLOCK, CYCLES, PHASE, PRESSURE, SPEED, TEMPERATURE
-from models.diagnosis.design import Design, Points
+from models.diagnosis.design import Design
 from models.diagnosis.effect import Effect, Family, Kind, Shape
 from models.diagnosis.fitting import Fit, Fitted, Priors, fit
 from models.diagnosis.laws import Scene
+from models.diagnosis.points import Points
 from models.diagnosis.projection import change_columns, gram_of, project
 from models.diagnosis.whitening import Noise
 

@@ -17,6 +17,13 @@ _LEAST_PERCENT = 0.1
 #: Digits after the point at most.
 _DIGITS = 5
 
+#: What a negative amplitude of an effect means where its physics has another way in mind.
+_OTHERWISE = {
+    "channel_delay": "Torque is ahead of the speed: it is the speed's channel that a filter or the recorder delays."
+}
+#: More evidence than this [nats] decides as well.
+_PLENTY = 100.0
+
 _AXES = {
     "pressure_bar": "pressure",
     "torque_nm": "the torque itself",
@@ -93,7 +100,7 @@ def _named(found: Findings) -> list[str]:
     several = len(found.causes) > 1
     causes = " together with ".join(_name(slug) for slug in found.causes)
     parts = [_misses(found), f"The cause{'s are' if several else ' is'} {causes}."]
-    parts += [f"{_physics(each.effect)} Here: {_estimate(each.estimate)}." for each in chosen]
+    parts += [f"{_physics(each)} Here: {_estimate(each.estimate)}." for each in chosen]
     best = max((each.log_evidence_gain for each in chosen), default=0.0)
     rivals = [
         each  # one that is as good or was fitted with the cause stood beside it, not against it
@@ -141,6 +148,11 @@ def _misses(found: Findings) -> str:
     percent = 100 * found.baseline.unexplained_share
     share = f"{'less than 0.1' if percent < _LEAST_PERCENT else _number(percent)} % of the squared residual"
     where = _axes(found.baseline.where)
+    if found.baseline.rmse <= found.baseline.noise:
+        return (
+            f"The baseline misses the data by {_number(found.baseline.rmse)} Nm, no more than noise alone would; what it "
+            f"misses goes together all the same{where}."
+        )
     return (
         f"The baseline misses the data by {_number(found.baseline.rmse)} Nm where noise alone would make "
         f"{_number(found.baseline.noise)} Nm; {share} is structure{where}."
@@ -148,7 +160,7 @@ def _misses(found: Findings) -> str:
 
 
 def _axes(where: Sequence[Where]) -> str:
-    told = [_AXES.get(each.axis, each.axis) for each in where[:2]]
+    told = [_AXES.get(each.axis, each.axis) for each in where[:2] if each.strength > 0]
     return f", which lives on {' and '.join(told)}" if told else ""
 
 
@@ -164,11 +176,11 @@ def _gained(found: Findings) -> list[str]:
     }.get(found.verdict, "the extended model")
     told = (
         f"On runs that were held out, {model} misses by {_number(gain.rmse_after)} Nm against "
-        f"{_number(gain.rmse_before)} Nm ({change} {way}), noise included; "
+        f"{_number(gain.rmse_before)} Nm ({change} {way}), noise and gains that scatter included; "
         f"the part beyond noise is {_number(gain.excess_after)} Nm against {_number(gain.excess_before)} Nm."
     )
     ahead = (
-        "It also foretells the last states better from the first ones."
+        f"It {'also foretells' if gain.reduction_percent > 0 else 'foretells'} the last states better from the first ones."
         if gain.remaining > 0
         else "It foretells the last states from the first ones no better: for remaining life it is no gain."
     )
@@ -179,7 +191,7 @@ def _next(found: Findings) -> list[str]:
     if not found.advice or found.verdict not in {Verdict.CAUSE_NAMED, Verdict.CAUSE_AMBIGUOUS}:
         return []
     best = found.advice[0]
-    nats = f"about {_number(best.nats)} nats"
+    nats = f"about {_number(best.nats)} nats" if best.nats <= _PLENTY else f"more than {_number(_PLENTY)} nats"
     pair = f"{_name(best.effect)} and {_name(best.other)}"
     if best.other == "baseline":
         pair = f"{_name(best.effect)} and nothing at all"
@@ -206,8 +218,10 @@ def _name(slug: str) -> str:
     return slug.replace("_", " ")
 
 
-def _physics(slug: str) -> str:
-    return BY_SLUG[slug].physics if slug in BY_SLUG else ""
+def _physics(candidate: Candidate) -> str:
+    if candidate.estimate.value < 0 and candidate.effect in _OTHERWISE:
+        return _OTHERWISE[candidate.effect]
+    return BY_SLUG[candidate.effect].physics if candidate.effect in BY_SLUG else ""
 
 
 def _listed(slugs: Sequence[str]) -> str:

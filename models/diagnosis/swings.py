@@ -25,6 +25,8 @@ from models.cleaning import clean
 from models.runs import LEVEL_GAP, LEVEL_GAP_SHARE, Record
 from models.standing import pressure_stretches
 
+#: A speed that goes this share of its highest the other way reverses; torque has settled so long [s] after.
+REVERSES, TURNED = 0.03, 1.0
 #: Samples that may be missing in a row.
 GAP = 5
 #: Records are averaged down to about this rate [Hz].
@@ -93,7 +95,8 @@ def swings(record: Record, spans: FloatArray | None = None) -> Swings | None:
     step = count * period
     pieces = [
         _averaged(cleaned, first, stop, count)
-        for first, stop in _whole(cleaned, spans, period)
+        for begin, end in _whole(cleaned, spans, period)
+        for first, stop in _one_way(cleaned.speed, begin, end, round(TURNED / period))
         if (stop - first) * period >= SHORTEST and stop - first >= FEWEST * count
     ]
     if not pieces:
@@ -138,6 +141,19 @@ def _at_one_pressure(record: Record, first: int, stop: int) -> Iterator[tuple[in
         return
     for each in pressure_stretches(record.time[first:stop], pressure):
         yield first + each.start, first + each.stop
+
+
+def _one_way(speed: FloatArray, first: int, stop: int, turned: int) -> Iterator[tuple[int, int]]:
+    """Rows of [first, stop) between reversals of the speed, `turned` after each: where the clutch turns over torque jumps,
+    at the same angle of the shaft each time, and that is no swing."""
+    own = speed[first:stop]
+    if min(own.max(initial=0.0), -own.min(initial=0.0)) <= REVERSES * np.abs(own).max(initial=0.0):
+        yield first, stop
+        return
+    turns = np.flatnonzero(np.diff(np.signbit(own))) + 1
+    yield first, first + int(turns[0])
+    for begin, end in itertools.pairwise([*turns.tolist(), own.size]):
+        yield first + begin + turned, first + end
 
 
 def _averaged(record: Record, first: int, stop: int, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -53,6 +53,8 @@ VIBRATION_PROBABILITY = 0.98
 MOST_CLOSED = 4
 #: What oil temperature could imitate where it was not measured.
 LIKE_TEMPERATURE = frozenset({"torque_zero_shift", "pressure_offset"})
+#: ... and what else it could where no maintenance says that it was done: warmer oil is thinner, as fresh oil may be.
+UNLESS_LOGGED = frozenset({"oil_change"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,6 +79,11 @@ class Judgement:
         if verdict is Verdict.UNEXPLAINED_STRUCTURE:
             causes = ()
         return replace(self, verdict=verdict, causes=causes, probabilities=probabilities)
+
+    def unsure(self) -> "Judgement":
+        """With no cause named, for two effects that foretell what they have not seen worse than none are a description."""
+        named = self.verdict is Verdict.CAUSE_NAMED
+        return replace(self, verdict=Verdict.CAUSE_AMBIGUOUS if named else self.verdict)
 
 
 def judge(
@@ -123,21 +130,29 @@ def judge(
             probabilities={slug: doubt * each for slug, each in probabilities.items()},
             statistics=statistics,
         )
-    elif unmeasured > -np.inf and LIKE_TEMPERATURE & set(causes):
+    elif unmeasured > -np.inf and like_temperature(design) & set(causes):
         imitated, causes = True, (*causes, "oil_temperature")
-    named = len(standing) == 1 and not imitated
-    if named and len(causes) > 1:
-        causes = tuple(slug for slug in causes if probabilities[slug] >= LEAST_OF_TWO) or causes[:1]
     easy = first.statistics["closure_p_value"] * np.exp(min(slack, MOST_LEFT)) >= UNEASY
-    named = named and easy and probabilities[causes[0]] >= LEAST_NAMED
+    likely = () if imitated or len(standing) > 1 or not easy else _likely(causes, probabilities)
+    named = bool(likely) and probabilities[likely[0]] >= LEAST_NAMED
     return Judgement(
         verdict=Verdict.CAUSE_NAMED if named else Verdict.CAUSE_AMBIGUOUS,
-        causes=causes,
+        causes=likely if named else causes,
         standing=standing,
         view=first.view,
         probabilities=probabilities,
         statistics=statistics,
     )
+
+
+def like_temperature(design: Design) -> frozenset[str]:
+    """What an oil temperature that was not measured could pass for in this campaign."""
+    return LIKE_TEMPERATURE if design.facts.oil_changes else LIKE_TEMPERATURE | UNLESS_LOGGED
+
+
+def _likely(causes: tuple[str, ...], probabilities: dict[str, float]) -> tuple[str, ...]:
+    """One cause, or of two those that are likely enough."""
+    return causes if len(causes) == 1 else tuple(each for each in causes if probabilities[each] >= LEAST_OF_TWO)
 
 
 def _standing(

@@ -15,7 +15,8 @@ from scipy.sparse import csr_array
 
 from models.arrays import FloatArray
 from models.diagnosis.correlation import Correlation, arma
-from models.diagnosis.design import Design, IntArray
+from models.diagnosis.design import Design
+from models.diagnosis.points import IntArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

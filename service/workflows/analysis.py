@@ -25,6 +25,8 @@ NOTICED_ON_ARRIVAL = (LATE, OTHER_PRESSURES)
 FEWEST_SPEEDS = 4
 #: A level whose pressures lie further apart than this share is worth a warning.
 WIDE_LEVEL = 0.06
+#: A fit that misses by less than this share of the static torque (rms) is no poor one, whatever eq. 5 makes of a flat curve.
+POOR = 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,7 +160,8 @@ def _fit_warnings(fit: StribeckFit) -> list[Warned]:
     at = f"at {fit.pressure / PASCALS_PER_BAR:g} bar"
     if fit.status is FitStatus.UNDETERMINED:
         return [Warned(code="undetermined", message=f"{at}: {fit.message}")]
-    if not fit.acceptable and fit.mse_percent is not None:
+    missed = fit.rmse > POOR * float(fit.parameters.static_torque)
+    if not fit.acceptable and fit.mse_percent is not None and missed:
         message = f"{at}: the percentage MSE is {fit.mse_percent:.3g} %, 5 % or more, with an RMSE of {fit.rmse:.3g} Nm"
         return [Warned(code="poor_fit", message=message)]
     return []

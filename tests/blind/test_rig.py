@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
-from tests.blind.rig.hide import hide
+from tests.blind.rig.hide import Hidden, hide
 from tests.blind.rig.loudness import UnreachableError, listen
 from tests.blind.rig.makers import ALL, CATALOGUED, OUTSIDE
 from tests.blind.rig.more import ASKED, TOGETHER, drag_of, with_test
@@ -205,10 +205,14 @@ def test_the_campaign_holds_what_the_runs_say() -> None:
     assert {run["cycles"] for run in told if run["kind"] == "dynamic_stribeck"} == {run.cycles for run in seen.dynamic}
 
 
+@pytest.fixture(scope="module")
+def shifted() -> Hidden:
+    return hide((5, 6), ("torque_zero_shift",), 20.0, states=4)
+
+
 @pytest.mark.parametrize("key", sorted({*ASKED, *TOGETHER}))
-def test_an_advised_test_is_made_with_the_same_secret(key: str) -> None:
-    hidden = hide((5, 6), ("torque_zero_shift",), 20.0, states=4)
-    before, after = campaign(hidden), campaign(with_test(hidden, key))
+def test_an_advised_test_is_made_with_the_same_secret(shifted: Hidden, key: str) -> None:
+    before, after = campaign(shifted), campaign(with_test(shifted, key))
     old = {run.run_id for run in (*before.stationary, *before.dynamic)}
     new = [run for run in (*after.stationary, *after.dynamic) if run.run_id not in old]
     assert new

@@ -28,7 +28,7 @@ def diagnosed(http: httpx2.Client, hidden: Hidden) -> dict[str, Any]:
     return report
 
 
-@pytest.mark.parametrize("slug", ["oil_temperature", "unsettled_dwell", "squeeze_film"])
+@pytest.mark.parametrize("slug", ["oil_temperature", "squeeze_film"])
 def test_a_hidden_effect_is_found(http: httpx2.Client, slug: str) -> None:
     """λ = 100: an oracle sees it beyond any doubt. Whatever else stands in the set, the truth leads it."""
     report = diagnosed(http, hide((31, 1), (slug,), 100.0))

@@ -61,6 +61,7 @@ class Clutch:
     theta: FloatArray
     span: float
     pressures: FloatArray  # bar, at which an attractor is defined
+    soon: float = 0.0  # the attractor's drift bends after this share of the span, as eq. 6 does; 0: it is straight
 
     def law(self, bar: FloatArray, cycles: FloatArray) -> Law:
         """The laws at a pressure [bar] after `cycles`."""
@@ -80,7 +81,9 @@ class Clutch:
     def attractor(self, bar: FloatArray, cycles: FloatArray) -> FloatArray:
         """C [Nm/s] of the attractor law at a pressure [bar] after `cycles`."""
         fresh = np.interp(bar, self.pressures, self.theta[-self.pressures.size - 1 : -1])
-        return np.exp(fresh + self.theta[-1] * cycles / self.span)
+        x = cycles / self.span
+        course = x if self.soon == 0.0 else (1 - (1 + x / self.soon) ** -1.2) / (1 - (1 + 1 / self.soon) ** -1.2)
+        return np.exp(fresh + self.theta[-1] * course)
 
     def nudged(self, index: int, by: float) -> "Clutch":
         """One entry of theta moved."""
@@ -108,4 +111,7 @@ def draw_clutch(rng: np.random.Generator, pressures: FloatArray, span: float) ->
     theta += [floor, excess, np.log(decay), *course(-0.4, -0.15)]
     attractor = np.log(grip * rng.uniform(80, 300)) + rng.uniform(-0.3, 0.8) * np.log(pressures / 5)
     attractor = attractor + 0.05 * rng.standard_normal(pressures.size)
-    return Clutch(np.array([*theta, *attractor, rng.uniform(-0.3, 0.3)]), span, pressures)
+    drift = rng.uniform(-0.3, 0.3)
+    aside = rng.spawn(1)[0]  # what is drawn here changes nothing that is drawn later
+    soon = float(aside.choice([0.0, aside.uniform(0.05, 0.5)]))
+    return Clutch(np.array([*theta, *attractor, drift]), span, pressures, soon)

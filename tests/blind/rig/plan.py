@@ -14,6 +14,8 @@ from models.arrays import FloatArray
 RADIUS = 0.058
 RPM = 2 * np.pi / 60
 DWELL = 5.0
+#: This share of rigs drives up and down by ramps.
+RAMPS = 0.2
 
 
 @dataclass(frozen=True)
@@ -227,10 +229,11 @@ def _loops(rng: np.random.Generator, life: Life, pressures: FloatArray, frequenc
 
 def _swing(rng: np.random.Generator, frequency: float, rate: float) -> FloatArray:
     """Speed [rpm] at one pressure: one and a half periods as the reference has it, or other numbers of them with the speed
-    held before, brought back to where it was held, and held again until the pressure moves on."""
+    held before, ramped or swung, brought back to where it was held, and held again until the pressure moves on."""
     held = rng.random() < 0.5
     periods = rng.choice([1.5, 2.0, 2.1, 3.0]) if held else 1.5
-    sine = 1000 + 1000 * np.sin(2 * np.pi * frequency * np.arange(round(periods / frequency * rate)) / rate)
+    sine = np.sin(2 * np.pi * frequency * np.arange(round(periods / frequency * rate)) / rate)
+    sine = 1000 + (1800 / np.pi * np.arcsin(sine) if rng.spawn(1)[0].random() < RAMPS else 1000 * sine)
     if not held:
         return sine
     way = np.linspace(0, 1, round(rng.uniform(0.3, 1.5) * rate))

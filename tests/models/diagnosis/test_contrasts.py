@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.arrays import FloatArray
-from models.diagnosis.design import Points
+from models.diagnosis.points import Points
 from models.diagnosis.projection import gram_of, project
 from models.diagnosis.viewing import view_of
 from tests.models.diagnosis.campaigns import campaign

@@ -95,7 +95,7 @@ def design() -> Design:
 
 def swells(design: Design, memory: float, told: tuple[float, float] | None) -> list[float]:
     """Of noise of the bins that remembers from bin to bin, in ten draws."""
-    given, found = replace(design, bins_remember=told), []
+    given, found = replace(design, bins_remember=told, repeats=()), []
     for seed in range(10):
         noise = remembering(1.0, memory, design.torque.size, seed)
         residual = 0.01 * design.torque * noise / np.sqrt(design.samples)

@@ -99,7 +99,7 @@ def test_what_is_named_is_explained_and_what_it_beat_is_said():
         "0.149 Nm against 0.161 Nm (7.5 ± 0.9 % less)" in said or "0.149 Nm against 0.161 Nm (7.4 ± 0.9 % less)" in said
     )
     assert "foretells the last states better" in said
-    assert "1,234 nats" in said or "1,235 nats" in said
+    assert "by more than 100 nats" in said  # some 1,234
 
 
 def test_a_cause_without_a_rival_of_the_catalogue_may_be_none_of_it():
