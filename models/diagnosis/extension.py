@@ -165,7 +165,7 @@ def facts_from(stored: Mapping[str, Any]) -> Facts:
     """The inverse of `facts_to`."""
     found: dict[str, Any] = dict(stored) | {"geometry": Geometry(**stored["geometry"]), "oil": Oil(**stored["oil"])}
     for each in fields(Facts):
-        value = found.get(each.name, [])  # what an older build did not store
+        value = found.get(each.name, None if each.default is None else [])  # what an older build did not store
         if isinstance(value, list):
             numbers = [math.nan if x is None else x for x in value]
             found[each.name] = np.array(numbers, dtype=np.float64) if each.type is FloatArray else tuple(numbers)

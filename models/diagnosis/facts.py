@@ -26,7 +26,8 @@ class Facts:
     states [s]: the distinct cycles at which friction was tested (not those where the clutch was open only), ascending;
     oil_changes, sensor_zeros and rests: cycles of maintenance (a rest is also a long gap in the moments); rest_moments: when
     the pause ended, rest_lengths [s]: how long it was, NaN where unknown.
-    duty_ends [d], duty_energies [d] J an engagement: blocks whose energy is known, ascending.
+    duty_ends [d], duty_energies [d] J an engagement: blocks whose energy is known, ascending. first_moment and last_moment
+    [s] of the tests that were timed, None where fewer than two were.
     """
 
     geometry: Geometry
@@ -41,6 +42,8 @@ class Facts:
     rest_lengths: tuple[float, ...]
     duty_ends: FloatArray
     duty_energies: FloatArray
+    first_moment: float | None = None
+    last_moment: float | None = None
 
     @property
     def life(self) -> float:
@@ -69,6 +72,9 @@ def facts_of(campaign: Campaign) -> Facts:
         table.oil_temperature[rows] for _, table, rows in under_load if table.oil_temperature is not None and rows.any()
     ]
     pauses = _pauses(campaign)
+    moments = [*(run.moment for run in campaign.stationary), *(run.moment for run in campaign.dynamic)]
+    timed = [moment for moment in moments if moment is not None]
+    spread = bool(timed) and max(timed) > min(timed)
     known = [duty for duty in campaign.duty if duty.energy is not None and duty.energy > 0]
     return Facts(
         geometry=campaign.geometry,
@@ -83,6 +89,8 @@ def facts_of(campaign: Campaign) -> Facts:
         rest_lengths=tuple(length for _, length in pauses.values()),
         duty_ends=np.array([duty.cycles for duty in known], dtype=np.float64),
         duty_energies=np.array([duty.energy for duty in known], dtype=np.float64),
+        first_moment=min(timed) if spread else None,
+        last_moment=max(timed) if spread else None,
     )
 
 

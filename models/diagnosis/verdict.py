@@ -163,13 +163,15 @@ def _standing(
     tested: "_Tested",
 ) -> tuple[Hypothesis, ...]:
     """What is better than nothing and cannot be told from the best, best first; none where no case among them closes."""
-    pool = [each for each in usable if len(each.effects) == len(best.effects)]
+    # against a single effect stand pairs without it too; with it they are its own story told at length
+    pool = [each for each in usable if len(each.effects) == len(best.effects) or not set(best.slugs) & set(each.slugs)]
+    pool = [each for each in pool if len(each.effects) >= len(best.effects)]
     pool.sort(key=lambda each: price(each) - each.evidence)
-    margin = CLOSE if len(best.effects) == 1 else CLOSE_PAIRS
 
     def stands(each: Hypothesis) -> bool:
         worth = each.evidence - price(each)
         lead = best.evidence - price(best) - worth
+        margin = CLOSE if len(each.effects) == 1 else CLOSE_PAIRS
         return (each is best or worth > 0.0) and lead <= margin + RIVAL * unshared(best, each, singles)
 
     near = [each for each in pool if stands(each)][:MOST_CLOSED]
