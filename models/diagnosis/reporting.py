@@ -57,7 +57,7 @@ def report_of(
             design, noise, priors, view.fit, [each.axis for each in where if each.axis in SMOOTH_AXES]
         )
     gain = None if extended is None else measure_gain(design, noise, priors, view.fit, extended, rng)
-    if judgement.standing and len(judgement.standing[0].effects) > 1 and harmful(gain):
+    if harmful(gain):
         judgement = judgement.unsure()
     candidates = _candidates(design, noise, priors, judgement, hypotheses, raw)
     baseline = misfit_of(design, noise, view.fit, where)

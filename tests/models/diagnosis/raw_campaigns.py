@@ -46,6 +46,18 @@ def swinging(rng: np.random.Generator, memory: float = 0.8) -> Record:
     )
 
 
+def reversing(
+    rng: np.random.Generator, *, frequency: float = 0.1, rate: float = 100.0, deviation: float = 0.05
+) -> Record:
+    """A speed that swings about rest at three pressures, 40 s each; friction turns with it, within 5 cm/s of rest; white
+    noise."""
+    size = int(40 * rate)
+    speed = np.tile(1000 * RPM * np.sin(2 * np.pi * frequency * np.arange(size) / rate), 3)
+    pressure = np.repeat(np.linspace(4e5, 7e5, 3), size)
+    torque = np.tanh(speed * RADIUS / 0.05) * friction(speed, pressure) + deviation * rng.standard_normal(speed.size)
+    return Record(time=np.arange(speed.size) / rate, pressure=pressure, speed=speed, torque=torque)
+
+
 def loops(
     rng: np.random.Generator,
     *,
@@ -90,8 +102,8 @@ def ragged(record: Record, rng: np.random.Generator, jitter: float, lost: float)
     return Record(time=time[kept], pressure=record.pressure[kept], speed=record.speed[kept], torque=record.torque[kept])
 
 
-def with_ripple(record: Record, amplitude: float, order: float) -> Record:
-    angle = np.cumsum(record.speed) / RATE
+def with_ripple(record: Record, amplitude: float, order: float, rate: float = RATE) -> Record:
+    angle = np.cumsum(record.speed) / rate
     return _added(record, amplitude * np.sin(order * angle + 1.0))
 
 

@@ -1,5 +1,7 @@
 """Every effect of the catalogue: what its change looks like, its units and its limits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from models.diagnosis.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.design import build_design
 from models.diagnosis.effect import Effect, Kind, unit_changes
 from models.diagnosis.effects.oil_temperature import HERSEY
-from models.diagnosis.effects.torque_zero_shift import STRAIGHT
+from models.diagnosis.effects.torque_zero_shift import DAYS, STRAIGHT
 from models.diagnosis.laws import Scene
 from models.diagnosis.starting import starting_laws
 from models.diagnosis.viscosity import log_viscosity_ratio, viscosity
@@ -85,6 +87,22 @@ def test_units_of_a_few(scene: Scene) -> None:
     zero = BY_SLUG["torque_zero_shift"].change(scene, 0.5, (0.0, 2000.0, *STRAIGHT))
     assert set(np.unique(zero)) == {0.0, 0.5}
     assert (zero[scene.points.cycles > 2000.0] == 0.5).all()
+
+
+def test_a_zero_creeps_by_days_where_tests_are_timed(scene: Scene) -> None:
+    """Not by cycles: half of the days may have gone at a tenth of them; without moments it is by cycles."""
+    points, facts = scene.points, scene.facts
+    days = np.where(points.cycles > facts.states[0], 0.5, 0.0) + np.where(points.cycles == facts.states[-1], 0.5, 0.0)
+    timed = replace(
+        scene, facts=replace(facts, first_moment=1e9, last_moment=2e9), points=replace(points, moment=1e9 * (1 + days))
+    )
+    zero = BY_SLUG["torque_zero_shift"]
+    np.testing.assert_allclose(zero.change(timed, 0.4, (DAYS, 1.0, *STRAIGHT)), 0.4 * days, atol=1e-12)
+    untimed = replace(scene, facts=replace(facts, first_moment=None, last_moment=None))
+    by_cycles = 0.4 * (points.cycles - facts.states[0]) / facts.life
+    np.testing.assert_allclose(zero.change(untimed, 0.4, (DAYS, 1.0, *STRAIGHT)), by_cycles, atol=1e-12)
+    courses = [{tried.shape[0] for tried in zero.grid(each.facts)} for each in (timed, untimed)]
+    assert (DAYS in courses[0], DAYS in courses[1]) == (True, False)
 
 
 def test_friction_that_hangs_on_speed_times_viscosity_is_within_reach(scene: Scene) -> None:

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.diagnosis.alarm import Lead
 from models.diagnosis.campaign import Campaign, MaintenanceEvent
 from models.diagnosis.campaign import EventKind as Event
-from models.diagnosis.engine import diagnose, with_lines
+from models.diagnosis.engine import confirmed, diagnose, with_lines
 from models.diagnosis.raw import RawEvidence
 from models.diagnosis.report import Estimate, Report, Verdict
 from models.diagnosis.verdict import Judgement
@@ -169,3 +170,17 @@ def test_structure_without_a_name_beside_a_vibration_counts_by_its_own_evidence(
         found = with_lines(judged, (ripple,))
         assert found.verdict is verdict
         assert found.causes == (("shaft_ripple",) if verdict is Verdict.CAUSE_NAMED else ())
+
+
+@pytest.mark.parametrize(
+    ("name", "beyond", "holds"),
+    [("effects", 3.0, False), ("effects", 7.0, True), ("contrasts", 3.0, True), ("contrasts", 1.0, False)],
+)
+def test_an_alarm_that_nothing_confirms_must_be_loud_that_of_the_effects_more_so(
+    name: str, beyond: float, holds: bool
+) -> None:
+    """Where no effect comes to anything once it is refitted, the shape that raised the alarm was one of many."""
+    calm = Lead(value=5.0, threshold=10.0, p_value=0.5, index=0)
+    leads = {**dict.fromkeys(("effects", "contrasts", "lines"), calm), name: replace(calm, value=10.0 + beyond)}
+    assert confirmed(leads, [], -np.inf) is holds
+    assert confirmed(leads, [], 3.5)

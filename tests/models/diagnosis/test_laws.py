@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
+from models.degradation import progress_fraction
 from models.diagnosis.baseline import frame_of, predict
 from models.diagnosis.design import build_design
 from models.diagnosis.fitting import fit, priors_of
-from models.diagnosis.laws import KAPPA, Laws, curve
+from models.diagnosis.laws import ATTRACTOR, KAPPA, POWERS, Frame, Laws, curve
 from models.diagnosis.noise import first_noise
 from models.diagnosis.starting import starting_laws
 from models.lag import attractor_torque
@@ -57,3 +59,26 @@ def test_a_bare_truth_is_fitted_to_a_thousandth() -> None:
     start = starting_laws(design, frame_of(design))
     found = fit(design, first_noise(design), start, priors_of(design, start.theta, start.frame))
     assert np.sqrt(np.mean(found.residual**2)) < 1e-3 * np.median(design.torque)
+
+
+@pytest.mark.parametrize("exponent", [0.5, 0.8, 1.0, 1.5])
+@pytest.mark.parametrize("half", [0.05, 0.1, 0.15, 0.2])
+def test_what_c_drifts_early_in_life_is_followed(exponent: float, half: float) -> None:
+    """Eq. 6, half of what it does within the test done after `half` of it: rms at six states, by two courses."""
+
+    def done(x: np.ndarray | float, log_scale: float) -> np.ndarray:
+        return progress_fraction(x, float(np.exp(log_scale)), exponent)
+
+    scale = brentq(lambda each: float(done(half, each) - 0.5 * done(1.0, each)), -9.0, 9.0)
+    x, last = np.linspace(0.0, 1.0, 6), 20_000.0
+    drift = done(x, scale) / done(1.0, scale)
+    frame = Frame(lowest=4e5, highest=7e5, last=last, loop_pressures=np.array([5e5]), reference_velocity=6.0)
+    laws = Laws(theta=np.zeros(ATTRACTOR + 1 + POWERS), frame=frame)
+    courses = laws.log_attractor(np.full(x.size, 5e5), last * x)[1][:, :2]
+
+    def missed(columns: np.ndarray) -> float:
+        return float(np.sqrt(np.mean((columns @ np.linalg.lstsq(columns, drift, rcond=None)[0] - drift) ** 2)))
+
+    assert missed(courses) < 0.03
+    # the control: a parabola of cycles
+    assert missed(np.stack([x, x * x], axis=1)) > 0.045

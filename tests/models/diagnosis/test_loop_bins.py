@@ -1,14 +1,19 @@
 """Loops in phase bins: what of a record belongs to the swing, and from when on friction follows it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
+from models.diagnosis.campaign import Campaign, DynamicRun
+from models.diagnosis.design import Design, build_design
+from models.diagnosis.lagging import lag_of
 from models.diagnosis.loop_bins import BINS, PHASES, BinnedLoop, binned_loops
 from models.lag import attractor_torque
 from models.runs import Record
-from models.stribeck import StribeckParameters
+from models.stribeck import GAMMA, StribeckParameters, torque
 
 GEOMETRY = Geometry()
 RPM = 2 * np.pi / 60
@@ -72,3 +77,62 @@ def test_friction_has_settled_when_a_fast_swing_counts() -> None:
     wanted = np.interp(loop.velocity[faster], swung[rising], settled)
     found = np.repeat(loop.torque, PHASES // BINS)[faster]
     assert np.abs(found / wanted - 1).max() < 0.005
+
+
+def designed(time: FloatArray, speed: FloatArray, measured: FloatArray) -> Design:
+    """Of one dynamic test at 5 bar, speed in rad/s."""
+    record = Record(time=time, pressure=np.full(time.size, 5e5), speed=speed, torque=measured)
+    return build_design(Campaign(dynamic=(DynamicRun(run_id="d", cycles=0.0, record=record),)))
+
+
+def triangle(turns: FloatArray) -> FloatArray:
+    """[rad/s] of ramps between rest, at whole turns, and 1900 rpm."""
+    return np.asarray(1900 * RPM * (1 - np.abs(2 * np.mod(turns, 1) - 1)), dtype=np.float64)
+
+
+@pytest.mark.parametrize(("attractor", "share"), [(30.0, 1e-4), (60.0, 1e-4), (250.0, 2e-4)])
+@pytest.mark.parametrize(("frequency", "rate", "first"), [(0.05, 100.0, 0.0), (0.1, 50.0, 0.3), (0.2, 100.0, 0.25)])
+def test_ramps_down_to_rest_are_what_the_lag_law_says(
+    attractor: float, share: float, frequency: float, rate: float, first: float
+) -> None:
+    """A permille was asked; corners that four harmonics round cost a percent, S as it is amid a phase's cusp 2e-4."""
+    fine, before = 50, 2 / frequency  # two periods to settle in, 50 steps a sample
+    time = np.arange(round((before + 1.6 / frequency) * rate) * fine) / (rate * fine) - before
+    speed = triangle(first + frequency * time)
+    lagged = attractor_torque(time, np.maximum(GEOMETRY.sliding_velocity(speed), 1e-7), CURVE, attractor)
+    sent = slice(round(before * rate) * fine, None, fine)
+    design = designed(time[sent], speed[sent], lagged[sent])
+    points = design.points
+    lag = lag_of(torque(points.velocity, CURVE)[None], np.array([[attractor]]), points.angular_frequency[:1])
+    off = design.to_rows(lag.torque[0]) - design.torque
+    assert np.abs(off).max() < share * np.abs(design.torque).max()
+    width = np.linspace(-0.5, 0.5, 201)[:, None] / PHASES
+    about = GEOMETRY.sliding_velocity(triangle(first + frequency * points.clock + width))
+    wanted = (about**GAMMA).mean(axis=0) ** (1 / GAMMA)
+    assert np.abs(points.velocity - wanted).max() < 1e-3 * wanted.max()
+
+
+def wave(phase: FloatArray) -> FloatArray:
+    return np.asarray(20 + 3 * np.sin(phase) + np.cos(2 * phase + 0.5), dtype=np.float64)
+
+
+@pytest.mark.parametrize(("rate", "samples"), [(100.0, 845), (60.0, 507), (120.0, 1012)])
+def test_samples_beside_a_bins_middle_are_no_delay(rate: float, samples: int) -> None:
+    """At a multiple of the swing's 0.5 Hz the samples of a bin lie beside its middle, period after period."""
+    time = np.arange(samples) / rate
+    design = designed(time, (1000 - 960 * np.cos(np.pi * time)) * RPM, wave(np.pi * time))
+    known = wave(np.pi * design.points.clock)
+    turning = np.gradient(known, np.pi * design.points.clock)
+
+    def off(design: Design) -> tuple[float, float]:
+        """The most [Nm], and the delay [s] that it looks like."""
+        left, rise = design.torque - design.to_rows(known), design.to_rows(turning)
+        return float(np.abs(left).max()), abs(float(left @ rise / (rise @ rise))) / np.pi
+
+    most, delay = off(design)
+    assert most < 0.005
+    assert delay < 1e-5
+    # the control: as if they lay in the middle
+    most, delay = off(replace(design, past=0 * design.past))
+    assert most > 0.04
+    assert delay > 1e-3

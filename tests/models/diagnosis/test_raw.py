@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from models.diagnosis import swings
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.raw import raw_evidence
 from models.runs import Record
@@ -13,6 +14,7 @@ from tests.models.diagnosis.raw_campaigns import (
     campaign,
     loops,
     ragged,
+    reversing,
     stepped,
     swinging,
     with_bursts,
@@ -103,6 +105,30 @@ def test_ripple_stands_lost_samples_and_a_clock_that_jitters() -> None:
     rng = np.random.default_rng(10)
     records = [ragged(with_wandering_ripple(loops(rng), rng, 0.05, 1.0), rng, 0.1, 0.02) for _ in range(6)]
     assert found(campaign([], records)).keys() == {"shaft_ripple"}
+
+
+@pytest.mark.parametrize(("frequency", "rate"), [(0.05, 50.0), (0.1, 100.0), (0.1, 200.0)])
+def test_torque_that_turns_with_the_clutch_is_no_ripple(
+    frequency: float, rate: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It jumps at the same angle of the shaft in every swing: taken as they are, records that reverse show a ripple of
+    half a newton metre and more."""
+    rng = np.random.default_rng(1)
+    given = campaign([], [reversing(rng, frequency=frequency, rate=rate) for _ in range(4)])
+    assert found(given) == {}
+    monkeypatch.setattr(swings, "REVERSES", 2.0)
+    assert "shaft_ripple" in found(given)
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0])
+def test_ripple_is_found_between_slow_reversals(order: float) -> None:
+    rng = np.random.default_rng(11)
+    records = [reversing(rng, frequency=0.05, deviation=0.2) for _ in range(4)]
+    given = campaign([], [with_ripple(record, 0.05, order, 100.0) for record in records])
+    (evidence,) = raw_evidence(given)
+    assert evidence.effect == "shaft_ripple"
+    assert f"{order:g} times a revolution" in evidence.note
+    assert evidence.estimate.value == pytest.approx(0.05, rel=0.25)
 
 
 def test_dwells_that_end_before_torque_settles() -> None:

@@ -167,3 +167,56 @@ def test_any_amplitude_can_be_told():
         assert told is not None
         number = float(told.group(1).replace(",", "").rstrip("."))
         assert abs(number - value) <= max(0.006 * abs(value), 0.06 * estimate.sd)
+
+
+def test_a_torque_that_is_ahead_is_not_told_as_delayed():
+    found = findings(Verdict.CAUSE_NAMED, "channel_delay")
+    ahead = replace(found.candidates[0], estimate=replace(found.candidates[0].estimate, value=-0.012, sd=0.002))
+    said = summarise(replace(found, candidates=(ahead,)))
+    assert "Torque is ahead of the speed" in said
+    assert "−0.0120 ± 0.0020" in said
+    assert BY_SLUG["channel_delay"].physics not in said
+    late = summarise(found)
+    assert BY_SLUG["channel_delay"].physics in late
+    assert "ahead" not in late
+    other = findings(Verdict.CAUSE_NAMED, "torque_zero_shift")
+    below = replace(other.candidates[0], estimate=replace(other.candidates[0].estimate, value=-0.4))
+    assert BY_SLUG["torque_zero_shift"].physics in summarise(replace(other, candidates=(below,)))
+
+
+@pytest.mark.parametrize(
+    ("strengths", "told"),
+    [((31.0, 4.0), ", which lives on oil temperature and cycles."), ((31.0, 0.0), ", which lives on oil temperature.")],
+)
+def test_axes_that_show_nothing_are_not_spoken_of(strengths, told):
+    where = tuple(replace(each, strength=nats) for each, nats in zip(MISFIT.where, strengths, strict=True))
+    found = findings(Verdict.UNEXPLAINED_STRUCTURE)
+    assert f"is structure{told}" in summarise(replace(found, baseline=replace(MISFIT, where=where)))
+    silent = tuple(replace(each, strength=0.0) for each in where)
+    assert "is structure. " in summarise(replace(found, baseline=replace(MISFIT, where=silent)))
+
+
+@pytest.mark.parametrize(("nats", "told"), [(99.0, "about 99 nats"), (101.0, "more than 100 nats")])
+@pytest.mark.parametrize("other", ["running_in", "baseline"])
+def test_evidence_beyond_doubt_is_not_counted(nats, told, other):
+    found = findings(Verdict.CAUSE_AMBIGUOUS, "oil_change", "running_in")
+    said = summarise(replace(found, advice=(replace(found.advice[0], nats=nats, other=other),)))
+    assert told in said
+    assert said.count(" nats") == 1
+
+
+def test_a_baseline_that_misses_no_more_than_noise_is_not_said_to():
+    found = findings(Verdict.CAUSE_AMBIGUOUS, "squeeze_film")
+    said = summarise(replace(found, baseline=replace(MISFIT, rmse=0.0987)))
+    assert "misses the data by 0.0987 Nm, no more than noise alone would" in said
+    assert "goes together all the same, which lives on oil temperature" in said
+    assert "is structure" not in said
+    assert "no more than noise" not in summarise(found)
+
+
+def test_the_last_states_are_foretold_also_better_only_where_something_else_is():
+    found = findings(Verdict.CAUSE_NAMED, "oil_change")
+    assert "It also foretells the last states better" in summarise(found)
+    worse = summarise(replace(found, gain=replace(GAIN, reduction_percent=-2.0)))
+    assert "It foretells the last states better" in worse
+    assert "noise and gains that scatter included" in worse

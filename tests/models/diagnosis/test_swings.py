@@ -1,5 +1,7 @@
 """The matched filter: noise comes out even whatever its memory, and a swing as loud as it is."""
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy.special import i0e
@@ -7,7 +9,7 @@ from scipy.special import i0e
 from models.diagnosis.incoherent import amplitude, rice
 from models.diagnosis.swings import Swings, swings
 from models.runs import Record
-from tests.models.diagnosis.raw_campaigns import loops, with_ripple
+from tests.models.diagnosis.raw_campaigns import loops, reversing, with_ripple
 
 
 def demodulated(of: Swings, hertz: float) -> tuple[np.ndarray, np.ndarray]:
@@ -63,3 +65,16 @@ def test_records_that_are_too_slow_or_still_have_none() -> None:
     assert swings(slow) is None
     assert swings(still) is None
     assert swings(with_ripple(record, 0.1, 1.0)) is not None
+
+
+def test_what_reverses_is_cut_where_it_does_and_settles_before_it_counts() -> None:
+    """Three pressures of two swings of 20 s: four ways of 10 s each, all but the first without their first second
+    at least."""
+    found = swings(reversing(np.random.default_rng(14), frequency=0.05))
+    assert found is not None
+    pieces = [slice(*ends) for ends in itertools.pairwise(found.starts)]
+    assert len(pieces) == 3 * 4
+    for number, piece in enumerate(pieces):
+        way = found.speed[piece]
+        assert np.abs(np.sign(way[1:]) - (-1) ** number).max() == 0.0
+        assert 790 < way.size <= (1001 if number % 4 == 0 else 901)

@@ -2,16 +2,19 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 import pytest
 
 from models.arrays import FloatArray
 from models.diagnosis import verdict
+from models.diagnosis.catalogue import BY_SLUG
 from models.diagnosis.projection import GAINS, gram_of, project
 from models.diagnosis.refitting import Hypothesis, null_of, refitted
 from models.diagnosis.report import Verdict
 from models.diagnosis.verdict import Closing, Judgement
+from models.diagnosis.viewing import View
 from tests.models.diagnosis.campaigns import Where, campaign
 from tests.models.diagnosis.fitted import Study, study
 from tests.models.diagnosis.test_engine import late
@@ -105,3 +108,59 @@ def test_gains_that_scatter_much_are_less_likely_than_those_that_hardly_do(given
     below, usual, above = np.interp(np.log([0.0025 / 4, 0.0025, 0.0025 * 4]), np.log(GAINS), evidence)
     assert above < below - 1.0 < usual
     assert above > usual - 5.0  # unlikely, not impossible
+
+
+@pytest.mark.parametrize(
+    ("slugs", "uneven", "expected"),
+    [
+        (("oil_change", "running_in"), verdict.UNEASY / 2, Verdict.CAUSE_AMBIGUOUS),
+        (("oil_change", "running_in"), verdict.UNEASY * 2, Verdict.CAUSE_NAMED),
+        (("oil_change",), verdict.UNEASY / 2, Verdict.CAUSE_NAMED),
+    ],
+)
+def test_two_causes_of_other_sizes_in_parts_stand_and_are_not_named(
+    slugs: tuple[str, ...], uneven: float, expected: Verdict
+) -> None:
+    standing = Hypothesis(effects=tuple(BY_SLUG[slug] for slug in slugs), evidence=30.0, drop=40.0, fit=None)
+    named = Judgement(
+        verdict=Verdict.CAUSE_NAMED, causes=slugs, standing=(standing,), statistics={"parts_p_value": uneven}
+    )
+    assert named.unsure() == replace(named, verdict=expected)
+    for told in set(Verdict) - {Verdict.CAUSE_NAMED}:
+        assert replace(named, verdict=told).unsure().verdict is told
+
+
+@pytest.mark.parametrize("logged", [(), (4500.0,)])
+@pytest.mark.parametrize("slug", ["oil_change", "torque_zero_shift", "pressure_offset", "viscous_exponent"])
+def test_oil_that_was_warm_may_pass_for_fresh_unless_the_log_says_so(
+    given: Study, best: Hypothesis, slug: str, logged: tuple[float, ...]
+) -> None:
+    design, known = replace(given.design, facts=replace(given.design.facts, oil_changes=logged)), given.baseline
+    imitates = slug in verdict.LIKE_TEMPERATURE or (slug == "oil_change" and not logged)
+    assert (slug in verdict.like_temperature(design)) == imitates
+    called, rng = replace(best, effects=(BY_SLUG[slug],)), np.random.default_rng(1)
+    found = verdict.judge(design, known.noise, known.priors, [called], 0.0, -5.0, rng)
+    assert found.causes == ((slug, "oil_temperature") if imitates else (slug,))
+    assert found.verdict is (Verdict.CAUSE_AMBIGUOUS if imitates else Verdict.CAUSE_NAMED)
+    measured = verdict.judge(design, known.noise, known.priors, [called], 0.0, -np.inf, rng)
+    assert measured.verdict is Verdict.CAUSE_NAMED
+
+
+def test_a_pair_without_the_best_single_may_stand_beside_it(best: Hypothesis) -> None:
+    """Two causes nearly as good as one other are its rivals; two of which it is one tell its own story at length."""
+
+    def closed(_: Hypothesis) -> Closing:
+        return Closing(closed=True, excess=-1.0, view=cast(View, None), statistics={})
+
+    def price(each: Hypothesis) -> float:
+        return verdict.PAIR_PRICE * (len(each.effects) - 1)
+
+    def stands(*slugs: str, lead: float) -> bool:
+        pair = replace(
+            best, effects=tuple(BY_SLUG[slug] for slug in slugs), evidence=best.evidence + verdict.PAIR_PRICE - lead
+        )
+        return pair in verdict._standing(best, [best, pair], [best], price, cast(verdict._Tested, closed))
+
+    assert stands("oil_temperature", "inertia_torque", lead=verdict.CLOSE_PAIRS - 0.5)
+    assert not stands("oil_temperature", "inertia_torque", lead=verdict.CLOSE + 0.5)
+    assert not stands(best.slugs[0], "inertia_torque", lead=verdict.CLOSE_PAIRS - 0.5)
