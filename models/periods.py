@@ -31,6 +31,7 @@ PERIODIC = 0.15
 #: Standing still for longer than this share of the record, before or after, is not part of the swing; the lower share
 #: holds away from the swing's ends, where a sine does not linger.
 _REST_SHARE, _REST_INSIDE, _INSIDE = 0.1, 0.02, (0.1, 0.9)
+_LINGERS, _STILL = 1.6, 1e-3
 _SWING_SHARE, _MOST_SHARE = 0.02, 0.05
 #: Where speed at a record's ends is further off the swing than OUTLIER deviations and this share of its amplitude, it does
 #: not swing yet, or no more; ends are cut so many times at most.
@@ -106,7 +107,7 @@ def fit_cycle(time: FloatArray, value: FloatArray) -> Cycle | str:
 
     SPEED_HARMONICS for a motor told to follow a sine, more for motions with corners.
     """
-    moving = _without_rest(time, value)
+    moving = _without_rest(time, value, float(time[-1] - time[0]) if time.size else 0.0)
     t, y = time[moving], value[moving]
     if t.size < 4 * (2 * SPEED_HARMONICS + 2) or t[-1] <= t[0]:
         return f"The speed moves for {t.size} samples only: too few for a period."
@@ -114,6 +115,8 @@ def fit_cycle(time: FloatArray, value: FloatArray) -> Cycle | str:
         return "The speed does not move."
     fitted = _refine(t, y, _coarse_frequency(t, y), 1, _NEAR)
     if not isinstance(fitted, str):
+        moving = _without_rest(t, y, min(1 / fitted.frequency, float(t[-1] - t[0])))
+        t, y = t[moving], y[moving]
         fitted = _without_ends(t, y, fitted.frequency, SPEED_HARMONICS)
     if isinstance(fitted, str):
         return fitted
@@ -174,21 +177,27 @@ def leading(off: NDArray[np.bool_]) -> int:
     return int(rows[-1]) + 1 if rows.size else 0
 
 
-def _without_rest(time: FloatArray, value: FloatArray) -> slice:
-    """Without standing still before and after, where that lasts."""
+def _without_rest(time: FloatArray, value: FloatArray, period: float) -> slice:
+    """Without standing still before and after, where that lasts for a swing of this period [s] at most."""
     smooth = median_filter(value, size=min(3, value.size), mode="nearest")
-    swing = float(np.ptp(smooth))
-    least = min(_SWING_SHARE * swing + 4 * float(np.median(np.abs(value - smooth))), _MOST_SHARE * swing)
-    duration, lowest = time[-1] - time[0], float(smooth.min())
-    longest = []
-    for rest in (smooth[0], smooth[-1]):
-        inside = _INSIDE[0] * swing < rest - lowest < _INSIDE[1] * swing
-        longest.append((_REST_INSIDE if inside else _REST_SHARE) * duration)
-    moved = np.flatnonzero(np.abs(smooth - smooth[0]) > least)
-    start = int(moved[0]) if moved.size and time[moved[0]] - time[0] > longest[0] else 0
-    moved = np.flatnonzero(np.abs(smooth - smooth[-1]) > least)
-    stop = int(moved[-1]) + 1 if moved.size and time[-1] - time[moved[-1]] > longest[1] else time.size
-    return slice(start, stop) if stop > start else slice(0, time.size)
+    swing, noise = float(np.ptp(smooth)), float(np.median(np.abs(value - smooth)))
+    least = min(_SWING_SHARE * swing + 4 * noise, _MOST_SHARE * swing)
+    # so long does a sine stay so near an end of its swing, where the record begins or stops there
+    lingers = _LINGERS * math.acos(1 - 2 * least / swing) / (2 * math.pi) if swing > 0 else _REST_SHARE
+    lowest, still = float(smooth.min()), max(4 * noise, _STILL * swing)
+
+    def rest(course: FloatArray, passed: FloatArray) -> int:
+        """Samples of the course that stand still at its beginning, `passed` [n] s being its clock."""
+        off = np.abs(course - course[0])
+        inside = _INSIDE[0] * swing < course[0] - lowest < _INSIDE[1] * swing
+        moved = np.flatnonzero(off > least)
+        longest = _REST_INSIDE * (time[-1] - time[0]) if inside else min(_REST_SHARE, lingers) * period
+        if not moved.size or passed[moved[0]] <= longest:
+            return 0
+        return int(moved[0]) if inside else int(np.flatnonzero(off[: moved[0]] <= still)[-1]) + 1
+
+    start, after = rest(smooth, time - time[0]), rest(smooth[::-1], (time[-1] - time)[::-1])
+    return slice(start, time.size - after) if start + after < time.size else slice(0, time.size)
 
 
 def _coarse_frequency(time: FloatArray, value: FloatArray) -> float:
