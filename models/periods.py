@@ -28,8 +28,8 @@ SPEED_HARMONICS = 4
 WHOLE = 0.99
 #: A speed that misses its fit by more than this share of its swing (rms) does not swing periodically.
 PERIODIC = 0.15
-#: Standing still for longer than this share of the record, before or after, is not part of the swing; the lower share
-#: holds away from the swing's ends, where a sine does not linger.
+#: Standing still for longer than this share of a period, or so many times as long as a sine lingers (standing is within so
+#: much of the swing), before or after, is no part of the swing; away from its ends the lower share of the record holds.
 _REST_SHARE, _REST_INSIDE, _INSIDE = 0.1, 0.02, (0.1, 0.9)
 _LINGERS, _STILL = 1.6, 1e-3
 _SWING_SHARE, _MOST_SHARE = 0.02, 0.05
@@ -42,6 +42,8 @@ _NEAR, _EXACT = 1e-3, 1e-10
 #: swing and falls to this share.
 CORNERS = (8, 16, 32)
 _FOLLOWED, _TAKEN = 0.002, 0.7
+#: They are fitted to so many samples at most, evenly taken.
+_MOST_WITH_CORNERS = 8000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,7 +109,7 @@ def fit_cycle(time: FloatArray, value: FloatArray) -> Cycle | str:
 
     SPEED_HARMONICS for a motor told to follow a sine, more for motions with corners.
     """
-    moving = _without_rest(time, value, float(time[-1] - time[0]) if time.size else 0.0)
+    moving = _without_rest(time, value, float(time[-1] - time[0])) if time.size else slice(0)
     t, y = time[moving], value[moving]
     if t.size < 4 * (2 * SPEED_HARMONICS + 2) or t[-1] <= t[0]:
         return f"The speed moves for {t.size} samples only: too few for a period."
@@ -142,6 +144,8 @@ def _without_ends(time: FloatArray, value: FloatArray, frequency: float, count: 
 
 def _with_corners(time: FloatArray, value: FloatArray, cycle: Cycle) -> Cycle:
     """With more harmonics while they take away much of what is missed: ramps have corners, a sine has none."""
+    step = max(1, time.size // _MOST_WITH_CORNERS)
+    time, value = time[::step], value[::step]
     inside = (time >= cycle.begin) & (time < cycle.stop)
     t, y = time[inside], value[inside]
     most = t.size / (3 * max((t[-1] - t[0]) * cycle.frequency, 1.0))
@@ -157,7 +161,7 @@ def _with_corners(time: FloatArray, value: FloatArray, cycle: Cycle) -> Cycle:
         return cycle
     # a corner at an end may have been taken for no part of the swing
     whole = _without_ends(time, value, richer.frequency, richer.cosine.size)
-    return richer if isinstance(whole, str) else whole
+    return richer if isinstance(whole, str) or whole.noise > richer.noise / _TAKEN else whole
 
 
 def _following(time: FloatArray, value: FloatArray, cycle: Cycle) -> slice:

@@ -77,9 +77,15 @@ class Extension:
         return mean.reshape(shape).mean(axis=2), deviation.reshape(shape).mean(axis=2)
 
     def _facts(self, campaign: Campaign) -> Facts:
-        """The campaign's facts, with the temperature and the states that the diagnosis referred to."""
+        """The campaign's facts, with the temperature, the states and the days that the diagnosis referred to."""
         kept = facts_from(self.content["facts"])
-        return replace(facts_of(campaign), reference_temperature=kept.reference_temperature, states=kept.states)
+        return replace(
+            facts_of(campaign),
+            reference_temperature=kept.reference_temperature,
+            states=kept.states,
+            first_moment=kept.first_moment,
+            last_moment=kept.last_moment,
+        )
 
     def _mean(self, points: Points, facts: Facts, kinds: set[Kind]) -> tuple[FloatArray, FloatArray]:
         """Weighted over the alternatives: change [P] Nm and its deviation [P] Nm."""

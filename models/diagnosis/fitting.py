@@ -75,7 +75,7 @@ def priors_of(design: Design, start: FloatArray, frame: Frame) -> Priors:
         means[block + 2 : block + BLOCK] = [0.0, 0.0, np.log(0.5 * design.facts.life), np.log(0.8)]
     sds[LOG_DECAY], means[LOG_DECAY] = 0.7, np.log(0.6 * frame.span)
     sds[DRIFT:ATTRACTOR], means[DRIFT:ATTRACTOR] = (0.6, 0.4, 0.3), 0.0
-    # friction may follow at once: one doubt for all pressures, not one for each
+    # friction may follow at once: one wide doubt, and a step of 1 from pressure to pressure
     sds[KAPPA], means[KAPPA] = 1.0, 0.0
     sds[KAPPA.start], means[KAPPA.start] = 3.0, np.log(12 * level)
     sds[OPEN_DRAG], means[OPEN_DRAG] = _DRAG_SD * level, 0.0

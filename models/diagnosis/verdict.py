@@ -81,9 +81,9 @@ class Judgement:
         return replace(self, verdict=verdict, causes=causes, probabilities=probabilities)
 
     def unsure(self) -> "Judgement":
-        """With no cause named where two effects, which foretell what they have not seen worse than none, ask for other sizes
-        in parts of the data: they are a description."""
-        pair = self.verdict is Verdict.CAUSE_NAMED and bool(self.standing) and len(self.standing[0].effects) > 1
+        """With no cause named where two that foretell worse than none ask for other sizes in parts of the data."""
+        both = self.standing[0].slugs if self.standing else ()
+        pair = self.verdict is Verdict.CAUSE_NAMED and len(both) > 1 and set(both) <= set(self.causes)
         uneven = self.statistics.get("parts_p_value", 1.0) < UNEASY
         return replace(self, verdict=Verdict.CAUSE_AMBIGUOUS) if pair and uneven else self
 

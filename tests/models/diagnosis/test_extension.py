@@ -9,7 +9,7 @@ import pytest
 from models.diagnosis.campaign import Campaign, DutyRun, StationaryRun
 from models.diagnosis.catalogue import BY_SLUG
 from models.diagnosis.design import MOST_PLATEAUS
-from models.diagnosis.effects.torque_zero_shift import STRAIGHT
+from models.diagnosis.effects.torque_zero_shift import DAYS, STRAIGHT
 from models.diagnosis.extension import Extension, build_extension, facts_from, facts_to
 from models.diagnosis.fitting import Fit, Fitted
 from models.diagnosis.viscosity import log_viscosity_ratio
@@ -171,3 +171,17 @@ def test_logged_severity_is_counted_and_then_no_course(warm):
     # the controls: without courses nothing of it is followed; others count nothing
     assert extension_of(warm, ("load_severity", 0.8, ()), courses=False).severity_exponent is None
     assert extension_of(warm, WEAR).severity_exponent is None
+
+
+def test_a_zero_that_creeps_by_days_keeps_the_days_of_its_diagnosis(warm):
+    """A later test does not stretch them: what was taken off stays, and the next test is beyond the last."""
+    campaign = warm.campaign
+    timed = tuple(replace(run, moment=1e9 + 1e5 * k) for k, run in enumerate(campaign.stationary))
+    study_of = replace(campaign, stationary=timed, dynamic=())
+    facts = replace(warm.design.facts, first_moment=1e9, last_moment=1e9 + 1e5 * (len(timed) - 1))
+    kept = replace(warm, campaign=study_of, design=replace(warm.design, facts=facts))
+    built = extension_of(kept, ("torque_zero_shift", 0.5, (DAYS, 1.0, *STRAIGHT)))
+    seen = replace(study_of, stationary=timed[:-1])
+    for run, share in ((timed[1], 1 / (len(timed) - 1)), (timed[-1], 1.0)):
+        found = built.artefact(run, seen)
+        assert found[0] == pytest.approx(0.5 * share, rel=0.02)

@@ -19,13 +19,13 @@ PERIOD, RATE, DEVIATION = 1.7, 100.0, 0.2
 
 
 def test_three_periods_by_hand() -> None:
-    """Bin 0 is met in the first two periods, bin 1 in the first and last, bin 2 in the last only."""
-    torque = np.array([1.0, 3.0, 5.0, 6.0, 8.0, 9.0])
-    bins = np.array([0, 0, 1, 0, 1, 2])
-    turns = np.array([0.1, 0.2, 0.5, 1.1, 2.4, 2.9])
+    """Bin 0 is met by two samples, by two and by one, which is too few; bin 1 in the first and last, bin 2 in the last."""
+    torque = np.array([1.0, 3.0, 5.0, 6.0, 8.0, 70.0, 8.0, 9.0])
+    bins = np.array([0, 0, 1, 0, 0, 0, 1, 2])
+    turns = np.array([0.1, 0.2, 0.5, 1.1, 1.2, 2.1, 2.4, 2.9])
     found = repeats_of(torque, bins, turns, 3)
     nan = np.nan
-    expected = [[(6 - 2) / np.sqrt(1 / 1 + 1 / 2), nan, nan], [nan, (8 - 5) / np.sqrt(1 / 1 + 1 / 1), nan]]
+    expected = [[(7 - 2) / np.sqrt(1 / 2 + 1 / 2), nan, nan], [nan, (8 - 5) / np.sqrt(1 / 1 + 1 / 1), nan]]
     np.testing.assert_allclose(found, expected, rtol=1e-12)
     assert repeats_of(torque[:3], bins[:3], turns[:3], 3).shape == (0, 3)
 
@@ -33,7 +33,7 @@ def test_three_periods_by_hand() -> None:
 def test_white_samples_give_white_differences_and_a_loop_gives_none() -> None:
     """Linear in the samples, with rows that are orthonormal and blind to what every period has."""
     rng = np.random.default_rng(3)
-    turns = np.sort(rng.uniform(0.0, 4.3, 60))
+    turns = np.arange(0.0, 4.3, 0.061)
     bins = np.floor(5 * np.mod(turns, 1)).astype(np.intp)
     rows = np.stack([repeats_of(unit, bins, turns, 5).ravel() for unit in np.eye(turns.size)], axis=1)
     rows = rows[np.isfinite(rows).all(axis=1)]
