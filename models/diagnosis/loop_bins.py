@@ -4,14 +4,13 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.diagnosis.repeats import repeats_of
 from models.diagnosis.sample_memory import LEAST_SPEED as MEMORY_SPEED
 from models.diagnosis.sample_memory import Memory, memory_of
-from models.outliers import inliers
+from models.outliers import beside, inliers
 from models.periods import SPEED_HARMONICS, Cycle, fit_cycle, harmonics
 from models.runs import Record
 from models.standing import pressure_stretches
@@ -93,10 +92,9 @@ def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], 
 
 def _swing(time: FloatArray, velocity: FloatArray, before: Cycle | None) -> Cycle | str:
     """The stretch's swing: that of the stretch before where its frequency fits here as well, else found anew."""
-    cornered = before is not None and before.cosine.size > SPEED_HARMONICS
-    step = 1 if cornered else max(1, time.size // SWING_SAMPLES)
-    t, v = time[::step], velocity[::step]
     count = SPEED_HARMONICS if before is None else before.cosine.size
+    step = 1 if count > SPEED_HARMONICS else max(1, time.size // SWING_SAMPLES)
+    t, v = time[::step], velocity[::step]
     if before is not None and t.size > 4 * count:
         origin = 0.5 * float(t[0] + t[-1])
         basis = harmonics(2 * math.pi * before.frequency * (t - origin), count)
@@ -159,7 +157,7 @@ def _binned(
         return "the speed changes sign; the loop was left out."
     settled = cycle.begin + max(min(SETTLING, cycle.stop - cycle.begin - 1 / cycle.frequency), START / cycle.frequency)
     inside = (time >= settled) & (time < cycle.stop)
-    inside[inside] = inliers(torque[inside] - median_filter(torque[inside], size=5, mode="nearest"), torque[inside])
+    inside[inside] = beside(torque[inside])
     turned = np.mod(cycle.phase(time), 2 * math.pi)
     at = turned[inside] * (BINS / (2 * math.pi))
     number = np.minimum(at.astype(np.intp), BINS - 1)
