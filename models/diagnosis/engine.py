@@ -83,22 +83,22 @@ def _diagnosed(campaign: Campaign, design: Design, without: frozenset[str], rng:
     view = view_of(design, baseline.noise, baseline.priors, baseline.fit, columns)
     raw = tuple(each for each in raw_evidence(campaign) if each.effect not in without)
     leads = alarms(design, baseline, view, rng)
-    noise, hypotheses = baseline.noise, list[Hypothesis]()
+    noise, hypotheses, stranger = baseline.noise, list[Hypothesis](), None
     judgement = Judgement(verdict=Verdict.MODEL_ADEQUATE)
     if any(each.raised for each in leads.values()) or any(
         each.effect in BY_SLUG for each in raw if not _vibrates(each)
     ):
-        noise, hypotheses = hypotheses_of(
-            design, baseline.noise, baseline.priors, baseline.start, baseline.fit, view, raw
-        )
+        found = hypotheses_of(design, baseline.noise, baseline.priors, baseline.start, baseline.fit, view, raw)
+        noise, hypotheses, stranger = found.noise, found.hypotheses, found.stranger
         unmeasured = -np.inf
         if not design.facts.temperature_measured and "oil_temperature" not in without:
             unmeasured = temperature_evidence(design, noise, baseline.priors, baseline.fit)
         structure = max((each.strength for each in axes_of(view, leads, raw)), default=0.0)
-        if confirmed(leads, hypotheses, max(structure, unmeasured)):
-            judgement = judge(design, noise, baseline.priors, hypotheses, structure, unmeasured, rng)
+        strange = -np.inf if stranger is None else stranger.evidence
+        if confirmed(leads, hypotheses, max(structure, strange, unmeasured)):
+            judgement = judge(design, noise, baseline.priors, hypotheses, structure, strange, unmeasured, rng)
     return report_of(
-        campaign, design, noise, baseline.priors, view, with_lines(judgement, raw), hypotheses, raw, leads,
+        campaign, design, noise, baseline.priors, view, with_lines(judgement, raw), hypotheses, stranger, raw, leads,
         baseline.notes, rng,
     )  # fmt: skip
 

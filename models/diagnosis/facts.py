@@ -2,6 +2,7 @@
 
 import itertools
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -15,8 +16,14 @@ REFERENCE_TEMPERATURE = 273.15 + 85.0
 #: A gap between runs that is longer than this [s] and than so many usual gaps is a pause.
 LEAST_PAUSE = 8 * 3600.0
 PAUSE_RATIO = 4.0
+#: Fewer runs that were timed tell of no pauses.
+FEWEST_TIMED = 4
+#: Engagements take what they took in this share of the blocks at most: in others the rig rested as well.
+BRISK = 0.2
 #: So many change points are tried: further ones between them would look the same.
 MOST_ONSETS = 20
+
+Timed: TypeAlias = StationaryRun | DynamicRun | DutyRun
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,18 +105,46 @@ def _events(campaign: Campaign, kind: EventKind) -> tuple[float, ...]:
     return tuple(sorted({event.cycles for event in campaign.maintenance if event.event is kind}))
 
 
+def _gaps(campaign: Campaign) -> list[tuple[float, float, float]]:
+    """When long pauses began [s], how long they were [s] and the cycles of the run after them: the time between two runs
+    less what the engagements between them took, at the pace of the brisk ones."""
+    runs: list[Timed] = [*campaign.stationary, *campaign.dynamic, *campaign.duty]
+    timed = [(run.moment, run) for run in runs if run.moment is not None]
+    timed.sort(key=lambda each: (each[0], each[1].cycles))
+    if len(timed) < FEWEST_TIMED:
+        return []
+    gaps = np.diff(np.array([moment for moment, _ in timed]))
+    # some rigs say when a block began, some when it was over: it took the gap in which engagements were never hurried
+    idle = max((_idle(gaps, timed, blocks_first) for blocks_first in (True, False)), key=lambda each: each[0])[1]
+    least = max(LEAST_PAUSE, PAUSE_RATIO * float(np.median(idle)))
+    return [
+        (float(moment - length), float(length), run.cycles)
+        for length, (before, _), (moment, run) in zip(idle, timed[:-1], timed[1:], strict=True)
+        if length > least and np.isfinite(before)
+    ]
+
+
+def _idle(gaps: FloatArray, timed: list[tuple[float, Timed]], blocks_first: bool) -> tuple[float, FloatArray]:
+    """Seconds that an engagement takes, and what is left of the gaps [n] s: a block's engagements lie in the gap after its
+    moment, or in the one before it; those that nobody sent lie between two tests."""
+    busy = np.zeros(gaps.size)
+    for i, ((_, one), (_, other)) in enumerate(itertools.pairwise(timed)):
+        block = one if blocks_first else other
+        if isinstance(block, DutyRun):
+            busy[i] = max(block.engagements, 0.0)
+        elif not isinstance(one, DutyRun) and not isinstance(other, DutyRun):
+            busy[i] = max(other.cycles - one.cycles, 0.0)
+    worked = (busy > 0) & np.isfinite(gaps)
+    pace = float(np.quantile(gaps[worked] / busy[worked], BRISK)) if worked.any() else 0.0
+    return pace, np.maximum(gaps - pace * busy, 0.0)
+
+
 def _pauses(campaign: Campaign) -> dict[float, tuple[float, float]]:
     """Cycles of the pauses, ascending, with their ends [s] and lengths [s]: gaps between the moments of the runs, and
     maintenance that calls itself rest, which lasts from its own moment to the next run's."""
     found: dict[float, tuple[float, float]] = {}
-    runs: list[StationaryRun | DynamicRun | DutyRun] = [*campaign.stationary, *campaign.dynamic, *campaign.duty]
-    timed = sorted((run.moment, run.cycles) for run in runs if run.moment is not None)
-    if len(timed) >= 4:
-        gaps = np.diff(np.array([moment for moment, _ in timed]))
-        least = max(LEAST_PAUSE, PAUSE_RATIO * float(np.median(gaps)))
-        for gap, (before, _), (moment, cycles) in zip(gaps.tolist(), timed[:-1], timed[1:], strict=True):
-            if gap > least and np.isfinite(before):
-                found.setdefault(cycles, (moment, gap))
+    for begin, length, cycles in _gaps(campaign):
+        found.setdefault(cycles, (begin + length, length))
     tests: list[StationaryRun | DynamicRun] = [*campaign.stationary, *campaign.dynamic]
     tested = sorted(run.moment for run in tests if run.moment is not None)
     for event in campaign.maintenance:

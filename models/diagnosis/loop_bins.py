@@ -166,7 +166,9 @@ def _binned(
     if np.count_nonzero(count) < FEWEST_BINS:
         return "too few samples lie in whole periods."
     angular = 2 * math.pi * cycle.frequency
-    first = math.ceil((cycle.start - cycle.origin) * cycle.frequency)
+    # a bin's samples are of several periods: its clock is their mean
+    turns = np.floor(cycle.phase(time[inside]) / (2 * math.pi))
+    passed = np.bincount(number, weights=turns, minlength=BINS) / np.maximum(np.bincount(number, minlength=BINS), 1)
     lasting = float(time[inside][-1] - time[inside][0])
     to_a_bin = np.count_nonzero(inside) / (max(lasting * cycle.frequency, 0.1) * BINS)
     used = inside & (cycle.value(turned) > MEMORY_SPEED * fastest)
@@ -178,7 +180,10 @@ def _binned(
         phase=phase,
         velocity=_carrying(cycle, time, velocity, SLOWEST * fastest),
         acceleration=angular * cycle.gradient(phase),
-        clock=np.asarray(cycle.origin + (phase / (2 * math.pi) + first) / cycle.frequency - begin, dtype=np.float64),
+        clock=np.asarray(
+            cycle.origin + (phase / (2 * math.pi) + np.repeat(passed, PHASES // BINS)) / cycle.frequency - begin,
+            dtype=np.float64,
+        ),
         torque=np.bincount(number, weights=torque[inside], minlength=BINS) / np.maximum(count, 1.0),
         samples=count,
         past=np.bincount(number, weights=at - number - 0.5, minlength=BINS) / np.maximum(count, 1.0),

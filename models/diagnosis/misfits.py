@@ -26,7 +26,9 @@ from models.diagnosis.contrasts import CLOCK
 from models.diagnosis.design import Design
 from models.diagnosis.fitting import Fit
 from models.diagnosis.raw import RawEvidence
+from models.diagnosis.refitting import Hypothesis
 from models.diagnosis.report import Misfit, Where
+from models.diagnosis.strangers import STRANGE
 from models.diagnosis.viewing import View
 from models.diagnosis.whitening import Noise, by_curve, gains_of, whitened
 
@@ -62,8 +64,11 @@ def without_likely_gains(design: Design, noise: Noise, fitted: Fit) -> FloatArra
     return np.asarray(fitted.residual - fitted.torque * (of_run + of_curve)[gains.curve], dtype=np.float64)
 
 
-def axes_of(view: View, leads: dict[str, Lead], raw: Sequence[RawEvidence] = ()) -> tuple[Where, ...]:
-    """Where structure lives, most evidence first; `raw` holds lines of one frequency, which are no effect's."""
+def axes_of(
+    view: View, leads: dict[str, Lead], raw: Sequence[RawEvidence] = (), stranger: Hypothesis | None = None
+) -> tuple[Where, ...]:
+    """Where structure lives, most evidence first; `raw` holds lines of one frequency, which are no effect's, `stranger` is
+    what the catalogue does not hold (`models.diagnosis.strangers`)."""
     projected, axes = view.likely, np.array(view.contrasts.axes)
     info = projected.info[view.smooth, view.smooth]
     score = projected.score[view.smooth]
@@ -80,6 +85,11 @@ def axes_of(view: View, leads: dict[str, Lead], raw: Sequence[RawEvidence] = ())
         slow = found.get(CLOCK, Where(axis=CLOCK, strength=0.0, p_value=1.0))
         strength = max(-float(np.log(max(line.p_value, 1e-300))), slow.strength)
         found[CLOCK] = Where(axis=CLOCK, strength=strength, p_value=min(line.p_value, slow.p_value))
+    if stranger is not None:
+        axis = STRANGE[stranger.slugs[0]].axis
+        known, p_value = found.get(axis), float(np.exp(-np.clip(stranger.evidence, 0.0, 700.0)))
+        if known is None or stranger.evidence > known.strength:
+            found[axis] = Where(axis=axis, strength=stranger.evidence, p_value=p_value)
     for each in raw:
         if each.effect == FIXED_LINE:
             p_value = float(np.exp(-np.clip(each.log_evidence, 0.0, 700.0)))

@@ -30,6 +30,8 @@ _DEGREE, _HARMONICS = 4, 5
 _LONGEST = 120
 _LEAST_REPEATED = 8
 _SPIKE = 5.5
+#: Rows that stand off their neighbours are spikes while they are fewer than this share.
+_MOST_SPIKES = 0.02
 _STEPS = (0.2, 0.35, 0.5, 0.65, 0.8, 0.9)
 _SHARES = (0.15, 0.3, 0.5, 0.75, 1.0)
 #: What a correlation must gain [nats] to be believed, and a power of the swell of slow noise by which it is held back: what
@@ -75,9 +77,9 @@ def estimate_noise(design: Design, residual: FloatArray, torque: FloatArray, bef
         correlation, scale = _correlation(pieces, residual, np.sqrt(variance), told, _repeated(design, variance, part))
         deviation[part] *= scale
         correlations.append(correlation)
-    spiky = np.abs(residual) > _SPIKE * deviation
-    if spiky.mean() < 0.02:
-        deviation = np.where(spiky & _isolated(design, residual, deviation), np.abs(residual), deviation)
+    spiky = (np.abs(residual) > _SPIKE * deviation) & _isolated(design, residual, deviation)
+    if spiky.mean() < _MOST_SPIKES:
+        deviation = np.where(spiky, np.abs(residual), deviation)
     return replace(before, deviation=deviation, plateaus=correlations[0], loops=correlations[1]), assumed
 
 
@@ -95,15 +97,28 @@ def _repeated(
 def _isolated(
     design: Design, residual: FloatArray, deviation: FloatArray
 ) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Rows that stand off their neighbours on the same curve as well."""
-    near = 0.5 * (np.roll(residual, 1) + np.roll(residual, -1))
-    alone = (np.roll(design.curve, 1) == design.curve) & (np.roll(design.curve, -1) == design.curve)
-    return np.asarray(alone & (np.abs(residual - near) > _SPIKE * deviation), dtype=np.bool_)
+    """Rows that stand off both neighbours in speed on the same curve (in phase on the same loop) as well, at its ends off
+    the one that there is."""
+    owner = _owners(design)
+    order = np.lexsort((np.where(design.rows.steady, design.rows.velocity, design.rows.phase), owner))
+    off, owner = residual[order], owner[order]
+    step = np.abs(np.diff(off))
+    step[owner[1:] != owner[:-1]] = np.inf  # the next one is on another curve
+    aside = np.minimum(np.append(step, np.inf), np.append(np.inf, step))
+    found = np.empty(order.size, dtype=np.bool_)
+    found[order] = np.isfinite(aside) & (aside > _SPIKE * deviation[order])
+    return found
+
+
+def _owners(design: Design) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+    """The number [N] of each row's curve or loop."""
+    loops = design.curve.max(initial=0) + 1 + design.rows.loop
+    return np.asarray(np.where(design.rows.steady, design.curve, loops), dtype=np.intp)
 
 
 def _pieces(design: Design, part: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[_Piece]:
     """Curves (loops) with rows enough, long ones cut."""
-    owner = np.where(design.rows.steady, design.curve, design.curve.max(initial=0) + 1 + design.rows.loop)
+    owner = _owners(design)
     found = []
     indices = np.flatnonzero(part)
     order = indices[np.argsort(owner[indices], kind="stable")]

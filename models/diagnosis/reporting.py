@@ -19,8 +19,9 @@ from models.diagnosis.refitting import Hypothesis, finite
 from models.diagnosis.report import Candidate, Estimate, Gain, Report, Verdict, Visible
 from models.diagnosis.smooth import AXES as SMOOTH_AXES
 from models.diagnosis.smooth import smooth_fit
+from models.diagnosis.strangers import STRANGE
 from models.diagnosis.summary import Findings, summarise
-from models.diagnosis.verdict import Judgement
+from models.diagnosis.verdict import CLOSE, OVER_NOTHING, Judgement
 from models.diagnosis.viewing import View, amplitude_deviations
 from models.diagnosis.whitening import Noise
 
@@ -43,6 +44,7 @@ def report_of(
     view: View,
     judgement: Judgement,
     hypotheses: Sequence[Hypothesis],
+    stranger: Hypothesis | None,
     raw: Sequence[RawEvidence],
     leads: dict[str, Lead],
     notes: tuple[str, ...],
@@ -50,7 +52,7 @@ def report_of(
 ) -> Report:
     """Assemble it: candidates, misfits, gain, advice, maps, loops, extension, summary."""
     fits = [each.fit for each in judgement.standing if each.fit is not None]
-    where = axes_of(view, leads, raw)
+    where = axes_of(view, leads, raw, stranger)
     extended = fits[0] if fits else None
     if judgement.verdict is Verdict.UNEXPLAINED_STRUCTURE:
         extended = smooth_fit(
@@ -83,6 +85,7 @@ def report_of(
         notes=said,
         tests=len(design.runs),
         states=int(design.facts.states.size),
+        looks=_looks(judgement, hypotheses, stranger),
     )
     return Report(
         verdict=judgement.verdict,
@@ -100,6 +103,14 @@ def report_of(
         notes=said,
         statistics=_statistics(leads, judgement),
     )
+
+
+def _looks(judgement: Judgement, hypotheses: Sequence[Hypothesis], stranger: Hypothesis | None) -> str:
+    """What is not in the catalogue and does about as well as the best that is, if it comes to anything."""
+    if stranger is None or judgement.verdict not in {Verdict.CAUSE_AMBIGUOUS, Verdict.UNEXPLAINED_STRUCTURE}:
+        return ""
+    least = max((each.evidence - CLOSE for each in hypotheses if finite(each)), default=0.0)
+    return STRANGE[stranger.slugs[0]].looks if stranger.evidence >= max(least, OVER_NOTHING) else ""
 
 
 def _race(judgement: Judgement, hypotheses: Sequence[Hypothesis]) -> tuple[list[Rival], list[Rival]]:

@@ -15,7 +15,8 @@ from models.diagnosis.laws import Laws
 from models.diagnosis.projection import Projected, gram_of, project
 from models.diagnosis.raw import RawEvidence
 from models.diagnosis.refitting import MOST_STEPS, STEPS, Hypothesis, Null, finite, null_of, refitted
-from models.diagnosis.selection import Column, Screened, linear_drop, screen, screen_pairs
+from models.diagnosis.selection import Column, Screened, columns_of, linear_drop, screen, screen_pairs
+from models.diagnosis.strangers import STRANGERS
 from models.diagnosis.viewing import View, columns_at_rows
 from models.diagnosis.whitening import Noise
 
@@ -33,18 +34,33 @@ PAIR_PROMISE = -1.0
 #: A second effect is looked for beside so many of the best singles, so many of each are refitted, and each must promise
 #: this much [nats].
 FIRSTS, SECONDS, SECOND_PROMISE = 2, 3, 3.0
+#: A pair is refitted from its other half as well where that promises so much [nats] less than is known at most.
+AGAIN = 6.0
+#: Gauss-Newton steps that one half of the best pair is given alone before other partners are looked for.
+STEPS_BESIDE = 2
+#: So many of what the catalogue does not hold are refitted at most, where they promise to come near the best.
+STRANGE = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Found:
+    """The noise with the likely gains; hypotheses, best first; and the best of what is not in the catalogue, its evidence
+    less what the choice among so many costs (None where none comes near)."""
+
+    noise: Noise
+    hypotheses: list[Hypothesis]
+    stranger: Hypothesis | None = None
 
 
 def hypotheses_of(
     design: Design, noise: Noise, priors: Priors, start: Laws, baseline: Fit, view: View, raw: tuple[RawEvidence, ...]
-) -> tuple[Noise, list[Hypothesis]]:
-    """Singles and pairs refitted, and the rest as screened, best first; the noise with the likely gains. `start`: laws that
-    no effect has bent."""
+) -> Found:
+    """Singles and pairs refitted, and the rest as screened. `start`: laws that no effect has bent."""
     singles = screen(view.columns, view.projections)
     pairs = screen_pairs(view.columns, view.projections)[:PAIRS]
     first = max((*singles[:1], *pairs[:1]), key=lambda each: each.evidence, default=None)
     if first is None:
-        return noise, []
+        return Found(noise=noise, hypotheses=[])
     noise = view.projections[first.gain].noise(noise)
     null = null_of(design, noise, priors, fit(design, noise, baseline.laws, priors))
     search = _Search(
@@ -56,22 +72,33 @@ def hypotheses_of(
     linear = [each for each in pairs if each.evidence > singles[0].evidence + PAIR_PROMISE]
     held = {frozenset(each.slugs) for each in seconds}
     seconds += [search.from_screen(each) for each in linear if frozenset(_slugs(each)) not in held]
-    found = search.without_partners(found, seconds)
+    found, seconds = search.from_the_best_pair(found, seconds, singles)
     known = {each.slugs for each in found}
-    off = search.better_null([*found, *seconds])
-    found, seconds = ([each.less(*off) for each in some] for some in (found, seconds))
-    rest = [
-        Hypothesis(effects=each.effects, evidence=each.evidence, drop=0.0, fit=None)
-        for each in singles
-        if _slugs(each) not in known
-    ]
+    strange = search.strangers(max(each.evidence for each in (*found, *seconds)))
+    off = search.better_null([*found, *seconds, *strange])
+    found, seconds, strange = ([each.less(*off) for each in some] for some in (found, seconds, strange))
+    rest = [_unfitted(each) for each in singles if _slugs(each) not in known]
     seen = {each.effect: each.log_evidence for each in raw}
     told = [each.seen_raw(seen) for each in (*found, *seconds, *rest)]
-    return noise, sorted(told, key=lambda each: -each.evidence)
+    return Found(
+        noise=noise,
+        hypotheses=sorted(told, key=lambda each: -each.evidence),
+        stranger=max(filter(finite, strange), key=lambda each: each.evidence, default=None),
+    )
 
 
 def _evidence(hypothesis: Hypothesis) -> float:
     return hypothesis.evidence if finite(hypothesis) else -np.inf
+
+
+def _unfitted(screened: Screened) -> Hypothesis:
+    return Hypothesis(
+        effects=screened.effects,
+        evidence=screened.evidence,
+        drop=0.0,
+        fit=None,
+        shape_evidence=screened.shape_evidence,
+    )
 
 
 def _slugs(screened: Screened) -> tuple[str, ...]:
@@ -173,28 +200,55 @@ class _Search:
         projected = beside(self.design, self.noise, self.priors, one.fit, others)
         for second in screen(others, [projected])[:SECONDS]:
             slugs = frozenset((*one.slugs, *_slugs(second)))
-            if second.evidence < SECOND_PROMISE or slugs in pairs:
+            promised, known = one.evidence + second.evidence, pairs.get(slugs)
+            if second.evidence < SECOND_PROMISE or (known is not None and promised < known.evidence - AGAIN):
                 continue
             amplitudes, drop = linear_drop(others, projected, second)
             added = Fitted(effect=second.effects[0], amplitude=float(amplitudes[0]), shape=second.shapes[0])
             shape_evidence = one.shape_evidence + second.shape_evidence
-            linear = (one.evidence + second.evidence, one.drop + drop)
-            pairs[slugs] = self.refitted(one.fit.laws, (*one.fit.effects, added), shape_evidence, linear, STEPS)
+            linear = (promised, one.drop + drop)
+            again = self.refitted(one.fit.laws, (*one.fit.effects, added), shape_evidence, linear, STEPS)
+            if known is None or (finite(again) and again.evidence > _evidence(known)):
+                pairs[slugs] = again
 
-    def without_partners(self, found: list[Hypothesis], pairs: list[Hypothesis]) -> list[Hypothesis]:
-        """Singles looked for once more from where the best pair has them: what is missed alone may be found in company."""
+    def strangers(self, best: float) -> list[Hypothesis]:
+        """What is not in the catalogue and comes near the best [nats], refitted."""
+        effects = [each.effect for each in STRANGERS]
+        columns = columns_of(effects, [effect.grid(self.design.facts) for effect in effects])
+        fitted = self.null.fit
+        projected = beside(self.design, self.noise, self.priors, fitted, columns)
+        near = [each for each in screen(columns, [projected]) if each.evidence > best - MARGIN - MARGIN_SHARE * best]
+        found = []
+        for each in near[:STRANGE]:
+            amplitudes, drop = linear_drop(columns, projected, each)
+            added = Fitted(effect=each.effects[0], amplitude=float(amplitudes[0]), shape=each.shapes[0])
+            linear = (each.evidence, drop)
+            found.append(self.refitted(fitted.laws, (added,), each.shape_evidence, linear, STEPS))
+        return [each.less(float(np.log(len(STRANGERS))), 0.0) for each in found]
+
+    def from_the_best_pair(
+        self, found: list[Hypothesis], pairs: list[Hypothesis], screened: list[Screened]
+    ) -> tuple[list[Hypothesis], list[Hypothesis]]:
+        """Singles looked for once more from where the best pair has them, for what is missed alone may be found in company;
+        and other partners beside those that are better so, for a pair may have ended in a wrong valley."""
         best = max((each for each in pairs if finite(each)), key=lambda each: each.evidence, default=None)
         if best is None or best.fit is None:
-            return found
+            return found, pairs
         alone = {each.slugs: each for each in found}
+        others = {frozenset(each.slugs): each for each in pairs}
+        linear = {_slugs(each): _unfitted(each) for each in screened}
         for each in best.fit.effects:
-            known = alone.get((each.effect.slug,))
-            if known is not None and known.evidence < best.evidence:
-                linear = (known.evidence, known.drop)
-                again = self.refitted(best.fit.laws, (each,), known.shape_evidence, linear, MOST_STEPS)
-                if finite(again) and again.evidence > known.evidence:
-                    alone[known.slugs] = again
-        return list(alone.values())
+            slugs = (each.effect.slug,)
+            known = alone.get(slugs, linear[slugs])
+            if known.evidence >= best.evidence:
+                continue
+            shown = (known.evidence, known.drop)
+            given = best.fit.laws, (each,), known.shape_evidence, shown
+            if slugs in alone:
+                again = self.refitted(*given, MOST_STEPS)
+                alone[slugs] = again if finite(again) and again.evidence > known.evidence else known
+            self._add_seconds(self.refitted(*given, STEPS_BESIDE), others)  # before it leaves that valley
+        return list(alone.values()), list(others.values())
 
     def better_null(self, hypotheses: list[Hypothesis]) -> tuple[float, float]:
         """By how much evidence and likelihood [nats] of nothing at all are better than was thought, seen from where the

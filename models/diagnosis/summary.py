@@ -53,6 +53,7 @@ class Findings:
     notes: tuple[str, ...]
     tests: int
     states: int
+    looks: str = ""  # what is not in the catalogue and does as well
 
 
 def summarise(found: Findings) -> str:
@@ -126,8 +127,10 @@ def _ambiguous(found: Findings) -> list[str]:
         else:
             told.append(f"{_name(slug)} (not measured, so it cannot be excluded)")
     if len(told) == 1:
-        return [_misses(found), f"The cause may be {told[0]}, or something that the catalogue does not hold."]
-    return [_misses(found), f"These data cannot tell which of these is the cause: {', '.join(told)}."]
+        such = f", such as {found.looks}" if found.looks else ""
+        return [_misses(found), f"The cause may be {told[0]}, or something that the catalogue does not hold{such}."]
+    none = f" It may be none of them: {found.looks} would do as well." if found.looks else ""
+    return [_misses(found), f"These data cannot tell which of these is the cause: {', '.join(told)}.{none}"]
 
 
 def _unexplained(found: Findings) -> list[str]:
@@ -135,6 +138,7 @@ def _unexplained(found: Findings) -> list[str]:
         _misses(found),
         "No effect of the catalogue accounts for it, alone or with another: either something beyond noise would be left, "
         "or different parts of the data would ask for different sizes of the effect. So no cause is named.",
+        f"It looks most like {found.looks}." if found.looks else "",
     ]
 
 

@@ -94,11 +94,13 @@ def judge(
     priors: Priors,
     hypotheses: list[Hypothesis],
     structure: float,
+    strange: float,
     unmeasured: float,
     rng: np.random.Generator,
 ) -> Judgement:
     """The verdict on hypotheses, best first; `structure` is the evidence [nats] of smooth structure without a name on the
-    axis that shows most of it, `unmeasured` that of an oil temperature that was not measured (-inf where it was)."""
+    axis that shows most of it, `strange` that of what is known and not in the catalogue, `unmeasured` that of an oil
+    temperature that was not measured (-inf where there is none)."""
     usable = [each for each in hypotheses if finite(each)]
     singles = [each for each in usable if len(each.effects) == 1]
     if not singles:
@@ -115,16 +117,14 @@ def judge(
         "standing": float(len(standing)),
         **first.statistics,
     }
-    probabilities = probabilities_of(hypotheses, best, singles, price, tested, structure)
+    probabilities = probabilities_of(hypotheses, best, singles, price, tested, max(structure, strange))
+    unnamed = max(structure - AXES_PRICE, strange) - GENERIC * max(best.drop - CLEAR, 0.0)
     causes = tuple(dict.fromkeys(slug for each in standing for slug in each.slugs))
     imitated = unmeasured > max(best.evidence - CLOSE - slack, OVER_NOTHING)
     if imitated:
         probabilities = with_unmeasured(probabilities, unmeasured, best.evidence, slack)
         causes = tuple(dict.fromkeys(("oil_temperature", *causes)))
-    elif (
-        best.evidence - price(best) < max(OVER_NOTHING, structure - AXES_PRICE - GENERIC * max(best.drop - CLEAR, 0.0))
-        or not standing
-    ):
+    elif best.evidence - price(best) < max(OVER_NOTHING, unnamed) or not standing:
         doubt = doubted(best, tested(best))
         return Judgement(
             verdict=Verdict.UNEXPLAINED_STRUCTURE,

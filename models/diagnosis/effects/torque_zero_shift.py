@@ -11,6 +11,8 @@ from models.diagnosis.laws import Scene
 #: or by the days that it took.
 STEP, CLOCK, SETTLING, LIFE, DAYS = 0.0, 1.0, 2.0, 3.0, 4.0
 _HOUR = 3600.0
+#: Times [s] after which a zero has settled to 1/e, each refined by the factor e^x, x the first of the knots below.
+TIMES = (120.0, 400.0)
 #: A zero that wanders along the life is off its straight course by so many amplitudes at knots between its ends.
 KNOTS, STRAIGHT = (0.0, 1 / 3, 2 / 3, 1.0), (0.0, 0.0)
 
@@ -18,7 +20,8 @@ KNOTS, STRAIGHT = (0.0, 1 / 3, 2 / 3, 1.0), (0.0, 0.0)
 def _grid(facts: Facts) -> tuple[Tried, ...]:
     zeroed = facts.sensor_zeros
     tried = [Tried(shape=(STEP, -1.0, *STRAIGHT), log_weight=-1.0), Tried(shape=(CLOCK, 0.0, *STRAIGHT))]
-    tried += [Tried(shape=(SETTLING, tau, *STRAIGHT), log_weight=-0.7) for tau in (120.0, 400.0)]
+    weight = -float(np.log(len(TIMES)))
+    tried += [Tried(shape=(SETTLING, tau, *STRAIGHT), log_weight=weight) for tau in TIMES]
     for low, onset, high in facts.onsets:
         logged = any(low <= cycles <= high for cycles in zeroed)
         weight = 0.0 if logged else -float(np.log(len(facts.onsets)))
@@ -42,7 +45,7 @@ def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     elif course == CLOCK:
         share = clock / _HOUR * 2.0
     elif course == SETTLING:
-        share = -np.expm1(-np.maximum(clock, 0.0) / value)
+        share = -np.expm1(-np.maximum(clock, 0.0) / (value * np.exp(off[0])))
     else:
         life = np.maximum(_gone(scene) if course == DAYS else (cycles - scene.facts.states[0]) / scene.facts.life, 0.0)
         share = life**value + np.interp(life, KNOTS, [0.0, *off, 0.0])
@@ -80,7 +83,11 @@ EFFECT = Effect(
         ShapeParameter(name="onset or settling time", unit="cycles or s", lowest=-1.0, highest=float("inf")),
         *(
             ShapeParameter(
-                name=f"off its course at {share:.0%} of life", unit="-", lowest=-0.8, highest=0.8, smooth=True
+                name=f"off its course at {share:.0%} of life, or log of the settling time's factor",
+                unit="-",
+                lowest=-0.8,
+                highest=0.8,
+                smooth=True,
             )
             for share in KNOTS[1:-1]
         ),

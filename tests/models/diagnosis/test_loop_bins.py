@@ -11,6 +11,7 @@ from models.diagnosis.campaign import Campaign, DynamicRun
 from models.diagnosis.design import Design, build_design
 from models.diagnosis.lagging import lag_of
 from models.diagnosis.loop_bins import BINS, PHASES, BinnedLoop, binned_loops
+from models.diagnosis.points import Points
 from models.lag import attractor_torque
 from models.runs import Record
 from models.stribeck import GAMMA, StribeckParameters, torque
@@ -90,6 +91,16 @@ def triangle(turns: FloatArray) -> FloatArray:
     return np.asarray(1900 * RPM * (1 - np.abs(2 * np.mod(turns, 1) - 1)), dtype=np.float64)
 
 
+def turned(points: Points, frequency: float, time: FloatArray) -> FloatArray:
+    """Periods since time 0 at the points of a loop: phases count from about the middle of the record, and the clock of bins
+    that were passed a whole number of times on the average says from where."""
+    turns = points.phase / (2 * np.pi)
+    middle = frequency * 0.5 * (time[0] + time[-1])
+    off = frequency * points.clock - turns - middle
+    off -= np.round(off)
+    return np.asarray(turns + middle + np.median(off[np.abs(off) < 0.02]), dtype=np.float64)
+
+
 @pytest.mark.parametrize(("attractor", "share"), [(30.0, 1e-4), (60.0, 1e-4), (250.0, 2e-4)])
 @pytest.mark.parametrize(("frequency", "rate", "first"), [(0.05, 100.0, 0.0), (0.1, 50.0, 0.3), (0.2, 100.0, 0.25)])
 def test_ramps_down_to_rest_are_what_the_lag_law_says(
@@ -107,7 +118,7 @@ def test_ramps_down_to_rest_are_what_the_lag_law_says(
     off = design.to_rows(lag.torque[0]) - design.torque
     assert np.abs(off).max() < share * np.abs(design.torque).max()
     width = np.linspace(-0.5, 0.5, 201)[:, None] / PHASES
-    about = GEOMETRY.sliding_velocity(triangle(first + frequency * points.clock + width))
+    about = GEOMETRY.sliding_velocity(triangle(first + turned(points, frequency, time[sent]) + width))
     wanted = (about**GAMMA).mean(axis=0) ** (1 / GAMMA)
     assert np.abs(points.velocity - wanted).max() < 1e-3 * wanted.max()
 
@@ -121,8 +132,9 @@ def test_samples_beside_a_bins_middle_are_no_delay(rate: float, samples: int) ->
     """At a multiple of the swing's 0.5 Hz the samples of a bin lie beside its middle, period after period."""
     time = np.arange(samples) / rate
     design = designed(time, (1000 - 960 * np.cos(np.pi * time)) * RPM, wave(np.pi * time))
-    known = wave(np.pi * design.points.clock)
-    turning = np.gradient(known, np.pi * design.points.clock)
+    phase = 2 * np.pi * turned(design.points, 0.5, time)
+    known = wave(phase)
+    turning = np.gradient(known, phase)
 
     def off(design: Design) -> tuple[float, float]:
         """The most [Nm], and the delay [s] that it looks like."""
@@ -136,3 +148,18 @@ def test_samples_beside_a_bins_middle_are_no_delay(rate: float, samples: int) ->
     most, delay = off(replace(design, past=0 * design.past))
     assert most > 0.04
     assert delay > 1e-3
+
+
+@pytest.mark.parametrize("periods", [1.0, 1.5, 2.4, 3.0])
+def test_a_bin_was_measured_when_its_samples_were(periods: float) -> None:
+    """A torque that only grows with the clock: however many periods a bin's samples are of."""
+    speed = speed_of(0.1, periods, 0.0, 0.0)
+    time = np.arange(speed.size) / RATE
+    record = Record(time=time + 40.0, pressure=np.full_like(time, 5e5), speed=speed * RPM, torque=20.0 + 0.01 * time)
+    loops, _ = binned_loops(record, GEOMETRY)
+    assert len(loops) == 1
+    loop = loops[0]
+    assert loop.clock.max() - loop.clock.min() < 10.0 * periods
+    clock = loop.clock.reshape(BINS, -1).mean(axis=1)
+    used = loop.samples > 1
+    assert np.abs(loop.torque - 20.0 - 0.01 * clock)[used].max() < 0.01 * 0.15  # half a bin is 0.1 s

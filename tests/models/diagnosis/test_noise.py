@@ -115,3 +115,26 @@ def test_gains_that_scatter_from_pressure_to_pressure_are_no_structure(
     given = scattered(campaign(3), scatter)
     assert least <= fit_baseline(build_design(given)).noise.curve_gain <= most
     assert diagnose(given, rng=np.random.default_rng(0)).verdict is Verdict.MODEL_ADEQUATE
+
+
+@pytest.mark.parametrize("order", ["rising speed", "random"])
+@pytest.mark.parametrize("place", ["first", "middle", "last"])
+def test_a_spike_weighs_nothing_wherever_it_stands_on_its_curve(order: str, place: str) -> None:
+    """It is 40 deviations; everything around it is off by a fifth of a spike, as where it has bent the fit."""
+    given = campaign(1, loops=False)
+    if order == "random":
+        shuffle = np.random.default_rng(SEED).permutation(given.stationary[0].plateaus.torque.size)
+        runs = [replace(run, plateaus=run.plateaus.take(shuffle)) for run in given.stationary]
+        given = replace(given, stationary=tuple(runs))
+    design = build_design(given)
+    deviation = 0.01 * design.torque
+    residual = deviation * np.random.default_rng(SEED).standard_normal(design.torque.size)
+    curve = np.flatnonzero(design.curve == 7)
+    curve = curve[np.argsort(design.rows.velocity[curve])]
+    residual[curve] += 8 * deviation[curve]
+    spike = curve[{"first": 0, "middle": 9, "last": -1}[place]]
+    residual[spike] -= 48 * deviation[spike]
+    noise, _ = estimate_noise(design, residual, design.torque, first_noise(design))
+    lighter = np.flatnonzero(noise.deviation > 3 * 0.01 * np.abs(design.torque))
+    assert lighter.tolist() == [spike]
+    assert noise.deviation[spike] == pytest.approx(abs(residual[spike]))

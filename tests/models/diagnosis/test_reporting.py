@@ -55,7 +55,7 @@ def test_two_causes_that_foretell_worse_than_none_are_not_named(
         statistics={"parts_p_value": 0.001},
     )
     report: Report = reporting.report_of(
-        given.campaign, given.design, known.noise, known.priors, view, judgement, [standing], (), {}, (),
+        given.campaign, given.design, known.noise, known.priors, view, judgement, [standing], None, (), {}, (),
         np.random.default_rng(1),
     )  # fmt: skip
     assert report.verdict is verdict

@@ -1,5 +1,6 @@
 """What a rest's length and a film's own equation do, against reckonings of another kind."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 from models.diagnosis.baseline import frame_of, predict
-from models.diagnosis.campaign import Campaign, EventKind, MaintenanceEvent
+from models.diagnosis.campaign import Campaign, DutyRun, EventKind, MaintenanceEvent, StationaryRun
 from models.diagnosis.catalogue import BY_SLUG
 from models.diagnosis.design import build_design
 from models.diagnosis.effects.squeeze_film import FILM, FIRST_ORDER, usual_slope
@@ -40,10 +41,30 @@ def rested(*hours: float) -> Campaign:
 
 def test_a_rest_lasts_from_its_own_moment_to_the_next_test() -> None:
     facts = facts_of(rested(2.0, 10.0))
-    assert facts.rests[:2] == (1000.0, 3000.0)
-    np.testing.assert_allclose(facts.rest_lengths[:2], [2 * HOUR, 10 * HOUR])
-    np.testing.assert_allclose(facts.rest_moments[:2], [1e9 + DAY, 1e9 + 2 * DAY])
-    np.testing.assert_allclose(facts.rest_lengths[2:], DAY - 2000.0)  # nothing is logged: the gap since the test before
+    assert facts.rests == (1000.0, 3000.0)
+    np.testing.assert_allclose(facts.rest_lengths, [2 * HOUR, 10 * HOUR])
+    np.testing.assert_allclose(facts.rest_moments, [1e9 + DAY, 1e9 + 2 * DAY])
+
+
+@pytest.mark.parametrize("told", ["at the beginning", "at the end", "not at all"])
+def test_a_pause_is_what_the_engagements_between_two_tests_leave(told: str) -> None:
+    """20 s an engagement, whether a block is timed by when it began, by when it was over or not sent; the clutch rests for
+    12 h before the one from 1000 cycles and for 30 h before that from 6000."""
+    rests = {1000.0: 12 * HOUR, 6000.0: 30 * HOUR}
+    given, moment, tests, blocks = campaign(1, loops=False), 1e9, list[StationaryRun](), list[DutyRun]()
+    for number, (test, after) in enumerate(itertools.pairwise(given.stationary)):
+        tests.append(replace(test, moment=moment))
+        engagements = after.cycles - test.cycles
+        begun = moment + 0.5 * HOUR + rests.get(test.cycles, 0.0)
+        over = begun + 20.0 * engagements
+        block = DutyRun(run_id=f"block-{number}", cycles=after.cycles, engagements=engagements)
+        if told != "not at all":
+            blocks.append(replace(block, moment=begun if told == "at the beginning" else over - 60.0))
+        moment = over
+    tests.append(replace(given.stationary[-1], moment=moment))
+    facts = facts_of(replace(given, stationary=tuple(tests), duty=tuple(blocks)))
+    assert facts.rests == (3000.0, 10000.0)
+    np.testing.assert_allclose(facts.rest_lengths, [12 * HOUR, 30 * HOUR], atol=1.2 * HOUR)
 
 
 def test_friction_recovers_with_the_logarithm_of_the_rest_where_the_power_is_one() -> None:
@@ -55,8 +76,7 @@ def test_friction_recovers_with_the_logarithm_of_the_rest_where_the_power_is_one
         shares[power] = [float(change[first & (scene.points.cycles == at)].max()) for at in (1000.0, 3000.0)]
     kept = shares[0.0][0]  # of the cycles and the clock, the same for both
     assert shares[0.0] == pytest.approx([kept, kept])
-    longest = np.log1p((DAY - 2000.0) / HOUR)
-    assert shares[1.0] == pytest.approx([kept * np.log(3.0) / longest, kept * np.log(11.0) / longest])
+    assert shares[1.0] == pytest.approx([kept * np.log(3.0) / np.log(11.0), kept])
 
 
 def test_a_test_before_the_pause_at_the_same_cycles_has_not_rested() -> None:

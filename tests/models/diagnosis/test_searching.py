@@ -32,7 +32,7 @@ def found(given: Study, slug: str) -> Hypothesis:
     known = given.baseline
     columns = columns_of(list(CATALOGUE), [effect.grid(given.design.facts) for effect in CATALOGUE])
     view = view_of(given.design, known.noise, known.priors, known.fit, columns)
-    _, hypotheses = hypotheses_of(given.design, known.noise, known.priors, known.start, known.fit, view, ())
+    hypotheses = hypotheses_of(given.design, known.noise, known.priors, known.start, known.fit, view, ()).hypotheses
     return next(each for each in hypotheses if each.slugs == (slug,))
 
 

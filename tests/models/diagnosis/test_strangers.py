@@ -1,0 +1,109 @@
+"""What rigs do that the catalogue does not hold is not called by the name of what resembles it."""
+
+import numpy as np
+import pytest
+
+from models.diagnosis.baseline import frame_of, predict
+from models.diagnosis.catalogue import BY_SLUG
+from models.diagnosis.design import build_design
+from models.diagnosis.engine import diagnose
+from models.diagnosis.laws import Scene
+from models.diagnosis.report import Verdict
+from models.diagnosis.starting import starting_laws
+from models.diagnosis.strangers import STRANGE, STRANGERS, way
+from models.stribeck import StribeckParameters, torque
+from tests.models.diagnosis.campaigns import Planted, Where, campaign
+
+
+def settling_gain(at: Where) -> np.ndarray:
+    """The sensor's gain is 2.5 % low when a stationary test begins."""
+    share = 0.0 if at.dynamic else -0.025 * np.exp(-at.clock / 110.0)
+    return np.asarray(share * torque(at.velocity, at.parameters), dtype=np.float64)
+
+
+def other_gain(at: Where) -> np.ndarray:
+    """Calibrated anew after 4000 cycles."""
+    return np.asarray((0.04 if at.cycles > 4000 else 0.0) * torque(at.velocity, at.parameters), dtype=np.float64)
+
+
+def other_encoder(at: Where) -> np.ndarray:
+    """Speed is a quarter higher than it says after 4000 cycles."""
+    factor = 1.25 if at.cycles > 4000 else 1.0
+    return torque(factor * at.velocity, at.parameters) - torque(at.velocity, at.parameters)
+
+
+def other_lining(at: Where) -> np.ndarray:
+    """The static torque is 4 % higher after 4000 cycles."""
+    p = at.parameters
+    factor = 1.04 if at.cycles > 4000 else 1.0
+    stepped = StribeckParameters(
+        static_torque=factor * np.asarray(p.static_torque),
+        coulomb_ratio=p.coulomb_ratio,
+        stribeck_velocity=p.stribeck_velocity,
+        viscous_coefficient=p.viscous_coefficient,
+    )
+    return torque(at.velocity, stepped) - torque(at.velocity, p)
+
+
+@pytest.mark.parametrize(
+    ("planted", "slug"),
+    [
+        (settling_gain, "gain_with_clock"),
+        (other_gain, "gain_with_life"),
+        (other_encoder, "speed_scale_step"),
+        (other_lining, "static_torque_step"),
+    ],
+)
+def test_what_no_catalogue_holds_is_unexplained_and_told_by_its_looks(planted: Planted, slug: str) -> None:
+    report = diagnose(campaign(3, planted, noise=0.004, gain=0.001), rng=np.random.default_rng(1))
+    assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
+    assert report.baseline is not None
+    assert report.baseline.where[0].axis == STRANGE[slug].axis
+    assert STRANGE[slug].looks in report.summary
+    assert not {each.effect for each in report.candidates} & STRANGE.keys()
+
+
+def test_a_zero_that_settles_is_still_a_zero() -> None:
+    def settling_zero(at: Where) -> np.ndarray:
+        return np.asarray(-0.5 * np.exp(-at.clock / 110.0), dtype=np.float64)
+
+    report = diagnose(campaign(3, settling_zero, noise=0.004, gain=0.001), rng=np.random.default_rng(1))
+    assert (report.verdict, report.causes) == (Verdict.CAUSE_NAMED, ("torque_zero_shift",))
+    assert not [each.looks for each in STRANGERS if each.looks in report.summary]
+
+
+def test_strangers_have_names_of_their_own() -> None:
+    assert len(STRANGE) == len(STRANGERS)
+    assert not STRANGE.keys() & BY_SLUG.keys()
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    design = build_design(campaign(1, loops=False))
+    return predict(design, starting_laws(design, frame_of(design))).scene
+
+
+@pytest.mark.parametrize("stranger", STRANGERS, ids=[each.effect.slug for each in STRANGERS])
+def test_every_change_is_proportional_to_its_size(stranger, scene: Scene) -> None:
+    tried = stranger.effect.grid(scene.facts)
+    assert tried
+    for each in tried:
+        one, three = (stranger.effect.change(scene, size, each.shape) for size in (0.01, 0.03))
+        np.testing.assert_allclose(three, 3 * one)
+        assert np.isfinite(one).all()
+    assert any(np.abs(stranger.effect.change(scene, 0.01, each.shape)).max() > 0 for each in tried)
+
+
+@pytest.mark.parametrize(
+    ("values", "breaks", "told"),
+    [
+        ([1.0, 1.0, 2.0, 2.0, 2.001, 1.0, 1.0], [0], [0, 0, 1, 1, 1, -1, -1]),
+        ([1.0, 2.0, 1.0, 1.0, 2.0], [0, 2], [0, 1, 0, 0, 1]),
+        ([3.0], [0], [0]),
+    ],
+)
+def test_the_way_is_that_of_the_last_change(values: list[float], breaks: list[int], told: list[int]) -> None:
+    """A run begins at each of the breaks."""
+    previous = np.arange(-1, len(values) - 1)
+    previous[breaks] = -1
+    assert way(np.array(values), previous).tolist() == told
