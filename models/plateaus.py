@@ -20,6 +20,8 @@ from models.steps import Blocks, Dwell, average, find_dwells, listed
 
 #: A drift of more deviations than this is worth a note.
 DRIFTING = 4.0
+#: What is dropped had made the means look less sure than they are, so that more may have to be: so often at most.
+ROUNDS = 4
 #: No mean is known better than to this share of itself.
 LEAST_SHARE = 1e-9
 SLOW_NOISE = (
@@ -72,9 +74,14 @@ def cut_plateaus(record: Sampled) -> PlateauCut:
         )
     duration = np.array([blocks.time[one.stop - 1] - blocks.time[one.start] + blocks.duration for one in dwells])
     transients = fit_transients(_stretches(blocks, dwells), blocks.duration)
-    drop = dropped(transients, duration, deviations(_stretches(blocks, dwells)).mean)
-    used = [_used(blocks, one, float(drop[row])) for row, one in enumerate(dwells)]
-    told = deviations(_stretches(blocks, used))
+    used, drop, told = dwells, np.zeros(duration.size), deviations(_stretches(blocks, dwells))
+    for _ in range(ROUNDS):
+        further = np.maximum(drop, dropped(transients, duration, told.mean))
+        if (further == drop).all():
+            break
+        drop = further
+        used = [_used(blocks, one, float(drop[row])) for row, one in enumerate(dwells)]
+        told = deviations(_stretches(blocks, used))
     settled = ~(
         np.hypot(transients.amplitude, transients.amplitude_sd) * np.exp(-duration / transients.time_constant)
         > told.mean
