@@ -96,6 +96,12 @@ def average(record: Sampled, cleaning: Cleaning) -> Blocks:
     )
 
 
+#: A crest is shorter than this share of the dwell that follows, and off its level by this share of the step to it at most.
+CREST, OVERSHOOT = 0.25, 0.3
+#: So many of them may follow each other.
+CRESTS = 4
+
+
 def find_dwells(blocks: Blocks) -> tuple[list[Dwell], list[Note]]:
     """The dwells in motion, and under pressure where there is any, in the order of time, and notes on those left out."""
     if blocks.time.size < SHORTEST:
@@ -203,9 +209,14 @@ def _sorted_out(
     """Those worth a mean; the last of `channels` is speed, `least` a pressure [Pa] below which there is none."""
     kept: list[Dwell] = []
     speed = channels[-1]
-    left: dict[str, list[float]] = {"no_pressure": [], "standstill": [], "dwell_too_short": [], "not_steady": []}
-    for dwell in found:
+    left: dict[str, list[float]] = {code: [] for code in _SENTENCES}
+    settled: Dwell | None = None
+    for row, dwell in enumerate(found):
         where = slice(dwell.start, dwell.stop)
+        if settled is not None and _crest(channels, settled, dwell, found[row + 1 : row + 1 + CRESTS]):
+            left["overshoot"].append(float(blocks.time[dwell.start]))
+            continue
+        settled = dwell
         if float(blocks.pressure[where].mean()) <= least:
             reason = "no_pressure"
         elif abs(float(blocks.speed[where].mean())) <= STANDSTILL * speed.highest:
@@ -223,7 +234,22 @@ def _sorted_out(
     ]
 
 
+def _crest(channels: tuple[_Channel, ...], before: Dwell, dwell: Dwell, following: list[Dwell]) -> bool:
+    """Whether a dwell is no more than a crest (or trough) of an overshoot on the way from the one before to the first long
+    one of those that follow."""
+    long = (each for each in following if dwell.stop - dwell.start < CREST * (each.stop - each.start))
+    after = next(long, None)
+    if after is None:
+        return False
+    for channel in channels:
+        first, here, last = (float(channel.values[each.start : each.stop].mean()) for each in (before, dwell, after))
+        if abs(here - last) > OVERSHOOT * abs(last - first) + channel.threshold:
+            return False
+    return True
+
+
 _SENTENCES = {
+    "overshoot": "{n} crests of overshoots left out, from {at} s.",
     "no_pressure": "{n} stretches without pressure left out, from {at} s.",
     "standstill": "{n} stretches at standstill left out, from {at} s.",
     "dwell_too_short": "{n} dwells of fewer than 8 averages left out, from {at} s.",

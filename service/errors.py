@@ -56,6 +56,13 @@ class ConflictError(ServiceError):
     title = "Other content is known under this name"
 
 
+class NothingToAdoptError(ConflictError):
+    """A diagnosis has no extension that could be adopted, or is of another life."""
+
+    slug = "nothing-to-adopt"
+    title = "There is nothing to adopt"
+
+
 class TooLargeError(ServiceError):
     """The request is larger than the service takes."""
 

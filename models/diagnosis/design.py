@@ -110,13 +110,19 @@ def build_design(campaign: Campaign) -> Design:
             offset += torque.size
     loops: list[BinnedLoop] = []
     of_run: list[int] = []
+    mute: list[str] = []
     for dynamic in kept.dynamic:
         found, said = binned_loops(dynamic.record, kept.geometry)
         notes.extend(f"{dynamic.run_id}: {sentence}" for sentence in said)
+        mute += said[:1] if not found else []
         if found:
             loops.extend(found)
             of_run.extend([len(runs)] * len(found))
             runs.append(RunInfo(run_id=dynamic.run_id, cycles=dynamic.cycles, dynamic=True))
+    if mute:
+        notes.append(
+            f"{len(mute)} of {len(kept.dynamic)} dynamic tests could not be evaluated and say nothing: {mute[0]}"
+        )
     moments = {run.run_id: run.moment for run in kept.dynamic}
     for number, (loop, index) in enumerate(zip(loops, of_run, strict=True)):
         blocks.append(_loop_points(loop, index, number, runs[index].cycles, moments[runs[index].run_id]))

@@ -90,10 +90,10 @@ def _lines(records: list[Swings]) -> list[RawEvidence]:
     elif line.evidence > order.evidence > SEEN:
         order = best_order(records, line)
     found = []
-    if order.evidence > SEEN:
+    if order.evidence > SEEN and order.amplitude > 0:
         note = f"torque swings {order.at:g} times a revolution at every speed"
         found.append(_seen("shaft_ripple", order, "ripple amplitude", note))
-    if line.evidence > SEEN:
+    if line.evidence > SEEN and line.amplitude > 0:
         where = f"below {100 * line.share:.0f} % of the highest speed and not above" if slow else "at all speeds alike"
         note = f"torque swings at {line.at:.3g} Hz {where}"
         found.append(_seen("stick_slip" if slow else "fixed_line", line, "line amplitude", note))

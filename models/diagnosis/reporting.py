@@ -14,6 +14,7 @@ from models.diagnosis.fitting import Fit, Priors
 from models.diagnosis.gain import measure_gain
 from models.diagnosis.maps import loop_traces, residual_maps
 from models.diagnosis.misfits import axes_of, misfit_of
+from models.diagnosis.odd_runs import odd_run
 from models.diagnosis.raw import RawEvidence
 from models.diagnosis.refitting import Hypothesis, finite
 from models.diagnosis.report import Candidate, Estimate, Gain, Report, Verdict, Visible
@@ -33,7 +34,10 @@ LEAST_PROBABILITY = 1e-3
 MOST_WORSE = 1.02
 #: Hypotheses so much [nats] behind may come back when another test is made.
 NEARBY = 8.0
-WITHHELD = "The extension is not proposed: runs that it had not seen were foretold worse with it than without."
+#: Verdicts that leave something to be found out.
+OPEN = {Verdict.CAUSE_AMBIGUOUS, Verdict.UNEXPLAINED_STRUCTURE}
+WITHHELD = "The extension is not proposed: runs that it had not seen were {}."
+MISSED, UNLIKELY = "missed by more with it than without", "less probable with it than without, by {:.0f} nats"
 
 
 def report_of(
@@ -71,8 +75,10 @@ def report_of(
     visible = visible_of(view)
     extension = _extension(design, noise, priors, judgement, gain)
     said = (*notes, *(f"{each.effect}: {each.note}." for each in raw))
+    if judgement.verdict in OPEN:
+        said = (*said, *filter(None, [odd_run(design, noise, view.fit)]))
     if extension is not None and harmful(gain):
-        extension, said = None, (*said, WITHHELD)
+        extension, said = None, (*said, withheld(gain))
     findings = Findings(
         verdict=judgement.verdict,
         causes=judgement.causes,
@@ -107,7 +113,7 @@ def report_of(
 
 def _looks(judgement: Judgement, hypotheses: Sequence[Hypothesis], stranger: Hypothesis | None) -> str:
     """What is not in the catalogue and does about as well as the best that is, if it comes to anything."""
-    if stranger is None or judgement.verdict not in {Verdict.CAUSE_AMBIGUOUS, Verdict.UNEXPLAINED_STRUCTURE}:
+    if stranger is None or judgement.verdict not in OPEN:
         return ""
     least = max((each.evidence - CLOSE for each in hypotheses if finite(each)), default=0.0)
     return STRANGE[stranger.slugs[0]].looks if stranger.evidence >= max(least, OVER_NOTHING) else ""
@@ -170,7 +176,8 @@ def _candidates(
         if first is None or first.fit is None:
             effect = BY_SLUG[slug]
             estimate = _sound(seen[slug].estimate) if slug in seen else _estimate(slug, 0.0, effect.prior_sd)
-            evidence = seen[slug].log_evidence if slug in seen else (first.evidence if first else 0.0)
+            known = first.evidence if first else judgement.statistics.get(f"{slug}_unmeasured", 0.0)
+            evidence = seen[slug].log_evidence if slug in seen else known
         else:
             place = first.slugs.index(slug)
             deviation = amplitude_deviations(design, noise, priors, first.fit)[place]
@@ -207,6 +214,13 @@ def _sound(told: Estimate) -> Estimate:
 def harmful(gain: Gain | None) -> bool:
     """Whether an extension foretells what it has not seen worse than the baseline does."""
     return gain is not None and (gain.rmse_after > MOST_WORSE * gain.rmse_before or gain.log_score_gain < 0)
+
+
+def withheld(gain: Gain | None) -> str:
+    """Why an extension that foretells worse is not proposed."""
+    if gain is None or gain.rmse_after > MOST_WORSE * gain.rmse_before:
+        return WITHHELD.format(MISSED)
+    return WITHHELD.format(UNLIKELY.format(-gain.log_score_gain))
 
 
 def visible_of(view: View) -> tuple[Visible, ...]:

@@ -239,8 +239,8 @@ class _Search:
         linear = {_slugs(each): _unfitted(each) for each in screened}
         for each in best.fit.effects:
             slugs = (each.effect.slug,)
-            known = alone.get(slugs, linear[slugs])
-            if known.evidence >= best.evidence:
+            known = alone.get(slugs, linear.get(slugs))
+            if known is None or known.evidence >= best.evidence:
                 continue
             shown = (known.evidence, known.drop)
             given = best.fit.laws, (each,), known.shape_evidence, shown

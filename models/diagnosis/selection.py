@@ -22,7 +22,7 @@ from models.diagnosis.projection import Projected
 BoolArray: TypeAlias = NDArray[np.bool_]
 IntArray: TypeAlias = NDArray[np.intp]
 
-#: Twice λ [nats] of an effect of usual size: what shows less is no half of a pair.
+#: Twice λ [nats] of an effect of usual size: what shows less cannot be judged.
 LEAST_SEEN = 0.01
 #: An effect is looked for from so many of its shapes, of which no two share more than this of what is visible of them.
 STARTS, ALIKE = 4, 0.9
@@ -91,7 +91,7 @@ def _stiff(effect: Effect, shape: Shape) -> Shape:
 
 
 def screen(columns: list[Column], projections: list[Projected]) -> list[Screened]:
-    """Every effect alone, best first."""
+    """Every effect alone that the data could show, best first."""
     null = float(logsumexp([each.evidence for each in projections]))
     sd = np.array([column.effect.prior_sd for column in columns])
     positive = np.array([column.effect.positive for column in columns])
@@ -110,6 +110,8 @@ def screen(columns: list[Column], projections: list[Projected]) -> list[Screened
     found = []
     for effect in dict.fromkeys(column.effect.slug for column in columns):
         mine = np.array([i for i, column in enumerate(columns) if column.effect.slug == effect])
+        if not (np.diag(likely.info)[mine] * sd[mine] ** 2 >= LEAST_SEEN).any():
+            continue
         best, *others = _unlike(stacked, mine, likely)
         whole = float(logsumexp(stacked[:, mine]))
         around = [columns[place].log_weight_around for place in (best, *others)]

@@ -10,6 +10,10 @@ from models.diagnosis.report import Advice, Candidate, Estimate, Gain, Misfit, V
 
 #: Rivals that are spoken of and from which probability on, effects whose visible amplitude is told.
 _SPOKEN, _RIVAL, _TOLD = 3, 0.001, 3
+#: From this probability on a cause is sure, and what keeps it from being named is what it leaves.
+_SURE = 0.85
+#: What was fitted beside a cause and not named is told from this probability on.
+_COMPANION = 0.3
 #: An effect beyond so many deviations of its prior is stronger than one would expect.
 _STRONG = 2.0
 #: A share [%] below which its size is not told.
@@ -102,6 +106,13 @@ def _named(found: Findings) -> list[str]:
     causes = " together with ".join(_name(slug) for slug in found.causes)
     parts = [_misses(found), f"The cause{'s are' if several else ' is'} {causes}."]
     parts += [f"{_physics(each)} Here: {_estimate(each.estimate)}." for each in chosen]
+    second = [
+        each for each in found.candidates if each.effect not in found.causes and set(each.beside) & set(found.causes)
+    ]
+    second = [each for each in second if each.probability >= _COMPANION]
+    if second:
+        told = [f"{_name(each.effect)} (probability {_probability(each.probability)})" for each in second]
+        parts.append(f"Something else is at work beside it, which these data do not tell: {' or '.join(told)}.")
     best = max((each.log_evidence_gain for each in chosen), default=0.0)
     rivals = [
         each  # one that is as good or was fitted with the cause stood beside it, not against it
@@ -121,11 +132,19 @@ def _ambiguous(found: Findings) -> list[str]:
     known = {each.effect: each for each in found.candidates}
     told = []
     for slug in found.causes:
-        if slug in known:
-            each = known[slug]
+        each = known.get(slug)
+        if each is not None and each.estimate.value == 0.0:
+            told.append(f"{_name(slug)} (probability {_probability(each.probability)}; not measured)")
+        elif each is not None:
             told.append(f"{_name(slug)} (probability {_probability(each.probability)}; {_estimate(each.estimate)})")
         else:
             told.append(f"{_name(slug)} (not measured, so it cannot be excluded)")
+    sure = [each for each in known.values() if each.probability >= _SURE and each.estimate.value != 0.0]
+    if len(told) == 1 and found.causes[0] in {each.effect for each in sure}:
+        return [
+            _misses(found),
+            f"It looks like {told[0]}, but what that leaves is not quite noise: something else may be at work too.",
+        ]
     if len(told) == 1:
         such = f", such as {found.looks}" if found.looks else ""
         return [_misses(found), f"The cause may be {told[0]}, or something that the catalogue does not hold{such}."]
@@ -211,7 +230,8 @@ def _noted(notes: Sequence[str]) -> list[str]:
     single = [note for note in notes if " " not in note.split(":")[0] and ":" in note and not _on_effect(note)]
     told = [note if note.endswith(".") else f"{note}." for note in notes if note not in single]
     told = [note[0].upper() + note[1:].replace("_", " ") if _on_effect(note) else note for note in told]
-    return [*told, f"{_count(len(single), 'note')} on single runs stand in the report."] if single else told
+    stand = "stands" if len(single) == 1 else "stand"
+    return [*told, f"{_count(len(single), 'note')} on single runs {stand} in the report."] if single else told
 
 
 def _on_effect(note: str) -> bool:

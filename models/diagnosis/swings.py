@@ -168,11 +168,11 @@ def _averaged(record: Record, first: int, stop: int, count: int) -> tuple[FloatA
 
 def _pace(speed: FloatArray, step: float) -> float:
     """The period [s] of the swing of a speed; infinite where it stands."""
-    rest = speed - speed.mean()
-    if np.abs(rest).max() <= STANDS * np.abs(speed).max():
+    window = np.hanning(speed.size)
+    power = np.abs(np.fft.rfft((speed - speed.mean()) * window))
+    if 2 * power.max() <= STANDS * np.abs(speed).max() * window.sum():  # an encoder's noise is no swing
         return np.inf
-    power = np.abs(np.fft.rfft(rest * np.hanning(rest.size)))
-    return float(rest.size * step / max(1, int(power.argmax())))
+    return float(speed.size * step / max(1, int(power.argmax())))
 
 
 def _whitened(

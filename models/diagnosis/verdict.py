@@ -124,6 +124,7 @@ def judge(
     if imitated:
         probabilities = with_unmeasured(probabilities, unmeasured, best.evidence, slack)
         causes = tuple(dict.fromkeys(("oil_temperature", *causes)))
+        statistics["oil_temperature_unmeasured"] = unmeasured
     elif best.evidence - price(best) < max(OVER_NOTHING, unnamed) or not standing:
         doubt = doubted(best, tested(best))
         return Judgement(

@@ -16,7 +16,7 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.diagnosis.extension import Extension
 from models.prognosis import HORIZON
-from service.errors import ConflictError, NotFoundError
+from service.errors import NotFoundError, NothingToAdoptError
 from service.workflows import stored
 from service.workflows.adopted import BASELINE, Adopted, Course
 from service.workflows.basis import ALL_PRESSURES
@@ -38,7 +38,7 @@ def adopt(connection: Connection, clutch_id: str, diagnosis_id: str | None, *, a
     """Adopt a diagnosis's extension, or return to the baseline; all is tracked anew. Returns the model as it is answered.
 
     What is in force already stays and makes no version. Raises NotFoundError for an unknown clutch or diagnosis,
-    ConflictError where there is nothing to adopt or another life was diagnosed; then nothing was written.
+    NothingToAdoptError where there is nothing to adopt or another life was diagnosed; then nothing was written.
     """
     clutch = stored.clutch(connection, clutch_id)
     if diagnosis_id is not None:
@@ -59,9 +59,9 @@ def _require_adoptable(connection: Connection, clutch_id: str, diagnosis_id: str
         raise NotFoundError(f"clutch {clutch_id!r} has no diagnosis {diagnosis_id!r}")
     if row.extension is None:
         said = "has not finished" if row.report is None else "found nothing to adopt"
-        raise ConflictError(f"diagnosis {diagnosis_id!r} {said}")
+        raise NothingToAdoptError(f"diagnosis {diagnosis_id!r} {said}")
     if row.life != present_life(connection, clutch_id):
-        raise ConflictError(f"diagnosis {diagnosis_id!r} is of a life that a rebuild has ended")
+        raise NothingToAdoptError(f"diagnosis {diagnosis_id!r} is of a life that a rebuild has ended")
 
 
 def model(database: Database, clutch_id: str) -> dict[str, Any]:

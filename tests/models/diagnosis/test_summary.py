@@ -103,7 +103,7 @@ def test_what_is_named_is_explained_and_what_it_beat_is_said():
 
 
 def test_a_cause_without_a_rival_of_the_catalogue_may_be_none_of_it():
-    said = summarise(findings(Verdict.CAUSE_AMBIGUOUS, "squeeze_film"))
+    said = ambiguous(candidate("squeeze_film", 0.7))
     assert "The cause may be squeeze film (probability" in said
     assert "or something that the catalogue does not hold." in said
 
@@ -220,3 +220,42 @@ def test_the_last_states_are_foretold_also_better_only_where_something_else_is()
     worse = summarise(replace(found, gain=replace(GAIN, reduction_percent=-2.0)))
     assert "It foretells the last states better" in worse
     assert "noise and gains that scatter included" in worse
+
+
+def ambiguous(*told: Candidate, looks: str = "") -> str:
+    causes = tuple(each.effect for each in told)
+    return summarise(replace(findings(Verdict.CAUSE_AMBIGUOUS, *causes), candidates=told, looks=looks))
+
+
+def test_a_sure_cause_that_is_not_named_says_what_keeps_it_from_being() -> None:
+    assert "It looks like rest recovery" in ambiguous(candidate("rest_recovery", 0.99))
+    said = ambiguous(candidate("rest_recovery", 0.6))
+    assert "The cause may be rest recovery" in said
+    assert "or something that the catalogue does not hold." in said
+
+
+def test_what_the_catalogue_does_not_hold_is_told_by_its_looks() -> None:
+    looks = "a gain that steps"
+    assert "does not hold, such as a gain that steps." in ambiguous(candidate("oil_change", 0.6), looks=looks)
+    both = candidate("oil_change", 0.4), candidate("running_in", 0.3)
+    assert "It may be none of them: a gain that steps would do as well." in ambiguous(*both, looks=looks)
+    assert "none of them" not in ambiguous(*both)
+    said = summarise(replace(findings(Verdict.UNEXPLAINED_STRUCTURE), looks=looks))
+    assert "It looks most like a gain that steps." in said
+
+
+def test_an_oil_temperature_that_nobody_measured_has_no_size() -> None:
+    nobody = replace(candidate("oil_temperature", 0.995), estimate=Estimate(name="β", value=0.0, sd=0.7, unit="-"))
+    said = ambiguous(nobody, candidate("oil_change", 0.1))
+    assert "oil temperature (probability above 0.99; not measured)" in said
+    assert "0.7" not in said
+
+
+def test_what_was_fitted_beside_a_named_cause_is_told() -> None:
+    found = findings(Verdict.CAUSE_NAMED, "oil_change")
+    film = replace(candidate("squeeze_film", 0.6), beside=("oil_change",))
+    told = "Something else is at work beside it, which these data do not tell: squeeze film (probability 0.60)."
+    assert told in summarise(replace(found, candidates=(*found.candidates, film)))
+    assert told not in summarise(replace(found, candidates=(*found.candidates, replace(film, beside=()))))
+    faint = replace(film, probability=0.1)
+    assert "beside it" not in summarise(replace(found, candidates=(*found.candidates, faint)))

@@ -1,6 +1,7 @@
 """The matched filter: noise comes out even whatever its memory, and a swing as loud as it is."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from scipy.special import i0e
 from models.diagnosis.incoherent import amplitude, rice
 from models.diagnosis.swings import Swings, swings
 from models.runs import Record
-from tests.models.diagnosis.raw_campaigns import loops, reversing, with_ripple
+from tests.models.diagnosis.raw_campaigns import loops, reversing, stepped, with_ripple
 
 
 def demodulated(of: Swings, hertz: float) -> tuple[np.ndarray, np.ndarray]:
@@ -78,3 +79,19 @@ def test_what_reverses_is_cut_where_it_does_and_settles_before_it_counts() -> No
         way = found.speed[piece]
         assert np.abs(np.sign(way[1:]) - (-1) ** number).max() == 0.0
         assert 790 < way.size <= (1001 if number % 4 == 0 else 901)
+
+
+@pytest.mark.parametrize("encoder", [0.0, 1.0, 3.0])
+def test_an_encoders_noise_is_no_swing_of_the_speed(encoder: float) -> None:
+    """Dwells from 20 rpm on, a line of 9 Hz: it is seen however the encoder scatters [rpm]."""
+    rng = np.random.default_rng(3)
+    record = stepped(rng)
+    record = replace(
+        record,
+        speed=record.speed + encoder * 2 * np.pi / 60 * rng.standard_normal(record.time.size),
+        torque=record.torque + 0.1 * np.sin(2 * np.pi * 9.0 * record.time),
+    )
+    spans = np.stack([np.arange(0.0, 200.0, 5.0) + 1.0, np.arange(5.0, 205.0, 5.0)], axis=1)
+    here = swings(record, spans)
+    assert here is not None
+    assert amplitude(*demodulated(here, 9.0)) == pytest.approx(0.1, rel=0.15)
