@@ -93,10 +93,9 @@ def _diagnosed(campaign: Campaign, design: Design, without: frozenset[str], rng:
         unmeasured = -np.inf
         if not design.facts.temperature_measured and "oil_temperature" not in without:
             unmeasured = temperature_evidence(design, noise, baseline.priors, baseline.fit)
-        structure = max((each.strength for each in axes_of(view, leads, raw)), default=0.0)
-        strange = -np.inf if stranger is None else stranger.evidence
-        if confirmed(leads, hypotheses, max(structure, strange, unmeasured)):
-            judgement = judge(design, noise, baseline.priors, hypotheses, structure, strange, unmeasured, rng)
+        structure = max((each.strength for each in axes_of(view, leads, raw, stranger)), default=0.0)
+        if confirmed(leads, hypotheses, max(structure, unmeasured)):
+            judgement = judge(design, noise, baseline.priors, hypotheses, structure, unmeasured, rng)
     return report_of(
         campaign, design, noise, baseline.priors, view, with_lines(judgement, raw), hypotheses, stranger, raw, leads,
         baseline.notes, rng,

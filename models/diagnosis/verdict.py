@@ -94,13 +94,12 @@ def judge(
     priors: Priors,
     hypotheses: list[Hypothesis],
     structure: float,
-    strange: float,
     unmeasured: float,
     rng: np.random.Generator,
 ) -> Judgement:
-    """The verdict on hypotheses, best first; `structure` is the evidence [nats] of smooth structure without a name on the
-    axis that shows most of it, `strange` that of what is known and not in the catalogue, `unmeasured` that of an oil
-    temperature that was not measured (-inf where there is none)."""
+    """The verdict on hypotheses, best first; `structure` is the evidence [nats] of what is not in the catalogue: smooth
+    structure without a name on the axis that shows most of it, or the best of the strangers; `unmeasured` that of an oil
+    temperature that was not measured (-inf where it was)."""
     usable = [each for each in hypotheses if finite(each)]
     singles = [each for each in usable if len(each.effects) == 1]
     if not singles:
@@ -117,8 +116,8 @@ def judge(
         "standing": float(len(standing)),
         **first.statistics,
     }
-    probabilities = probabilities_of(hypotheses, best, singles, price, tested, max(structure, strange))
-    unnamed = max(structure - AXES_PRICE, strange) - GENERIC * max(best.drop - CLEAR, 0.0)
+    probabilities = probabilities_of(hypotheses, best, singles, price, tested, structure)
+    unnamed = structure - AXES_PRICE - GENERIC * max(best.drop - CLEAR, 0.0)
     causes = tuple(dict.fromkeys(slug for each in standing for slug in each.slugs))
     imitated = unmeasured > max(best.evidence - CLOSE - slack, OVER_NOTHING)
     if imitated:

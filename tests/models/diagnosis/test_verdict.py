@@ -45,7 +45,7 @@ def best(given: Study) -> Hypothesis:
 def judged(given: Study, best: Hypothesis) -> Judge:
     def judged(structure: float = 0.0) -> Judgement:
         known, rng = given.baseline, np.random.default_rng(1)
-        return verdict.judge(given.design, known.noise, known.priors, [best], structure, -np.inf, -np.inf, rng)
+        return verdict.judge(given.design, known.noise, known.priors, [best], structure, -np.inf, rng)
 
     return judged
 
@@ -95,7 +95,7 @@ def test_however_loud_a_cause_is_it_may_leave_a_little_only(
 
     monkeypatch.setattr(verdict, "close", odd)
     loud, rng = replace(best, evidence=1000.0, drop=1000.0), np.random.default_rng(1)
-    found = verdict.judge(given.design, known.noise, known.priors, [loud], 0.0, -np.inf, -np.inf, rng)
+    found = verdict.judge(given.design, known.noise, known.priors, [loud], 0.0, -np.inf, rng)
     assert found.verdict is expected
 
 
@@ -139,10 +139,10 @@ def test_oil_that_was_warm_may_pass_for_fresh_unless_the_log_says_so(
     imitates = slug in verdict.LIKE_TEMPERATURE or (slug == "oil_change" and not logged)
     assert (slug in verdict.like_temperature(design)) == imitates
     called, rng = replace(best, effects=(BY_SLUG[slug],)), np.random.default_rng(1)
-    found = verdict.judge(design, known.noise, known.priors, [called], 0.0, -np.inf, -5.0, rng)
+    found = verdict.judge(design, known.noise, known.priors, [called], 0.0, -5.0, rng)
     assert found.causes == ((slug, "oil_temperature") if imitates else (slug,))
     assert found.verdict is (Verdict.CAUSE_AMBIGUOUS if imitates else Verdict.CAUSE_NAMED)
-    measured = verdict.judge(design, known.noise, known.priors, [called], 0.0, -np.inf, -np.inf, rng)
+    measured = verdict.judge(design, known.noise, known.priors, [called], 0.0, -np.inf, rng)
     assert measured.verdict is Verdict.CAUSE_NAMED
 
 
