@@ -76,7 +76,7 @@ def cut_plateaus(record: Sampled) -> PlateauCut:
     transients = fit_transients(_stretches(blocks, dwells), blocks.duration)
     used, drop, told = dwells, np.zeros(duration.size), deviations(_stretches(blocks, dwells))
     for _ in range(ROUNDS):
-        further = np.maximum(drop, dropped(transients, duration, told.mean))
+        further = np.maximum(drop, dropped(transients, duration, told.mean * np.sqrt(1 - drop / duration)))
         if (further == drop).all():
             break
         drop = further

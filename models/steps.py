@@ -35,6 +35,10 @@ PIECES = 6
 #: Blocks below which a dwell is not worth a mean.
 SHORTEST = 8
 
+#: A crest is shorter than this share of the dwell that follows, and off its level by this share of the step to it at most;
+#: so many may follow each other.
+CREST, OVERSHOOT, CRESTS = 0.25, 0.3, 4
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Blocks:
@@ -94,12 +98,6 @@ def average(record: Sampled, cleaning: Cleaning) -> Blocks:
         oil_temperature=None if oil is None else mean(oil),
         gap=gap,
     )
-
-
-#: A crest is shorter than this share of the dwell that follows, and off its level by this share of the step to it at most.
-CREST, OVERSHOOT = 0.25, 0.3
-#: So many of them may follow each other.
-CRESTS = 4
 
 
 def find_dwells(blocks: Blocks) -> tuple[list[Dwell], list[Note]]:
@@ -213,7 +211,10 @@ def _sorted_out(
     settled: Dwell | None = None
     for row, dwell in enumerate(found):
         where = slice(dwell.start, dwell.stop)
-        if settled is not None and _crest(channels, settled, dwell, found[row + 1 : row + 1 + CRESTS]):
+        following = [
+            each for each in found[row + 1 : row + 1 + CRESTS] if not blocks.gap[dwell.stop : each.start].any()
+        ]
+        if settled is not None and _crest(channels, settled, dwell, following):
             left["overshoot"].append(float(blocks.time[dwell.start]))
             continue
         settled = dwell
@@ -235,17 +236,20 @@ def _sorted_out(
 
 
 def _crest(channels: tuple[_Channel, ...], before: Dwell, dwell: Dwell, following: list[Dwell]) -> bool:
-    """Whether a dwell is no more than a crest (or trough) of an overshoot on the way from the one before to the first long
-    one of those that follow."""
+    """Whether a dwell is no more than a crest of an overshoot, or the trough after it, on the way from the one before to the
+    first long one of those that follow: the way led beyond that one's level."""
     long = (each for each in following if dwell.stop - dwell.start < CREST * (each.stop - each.start))
     after = next(long, None)
     if after is None:
         return False
+    beyond = False
     for channel in channels:
         first, here, last = (float(channel.values[each.start : each.stop].mean()) for each in (before, dwell, after))
         if abs(here - last) > OVERSHOOT * abs(last - first) + channel.threshold:
             return False
-    return True
+        on_the_way = np.copysign(1.0, last - first) * (channel.values[before.stop : dwell.stop] - last)
+        beyond |= abs(last - first) > 2 * channel.threshold and bool(on_the_way.max() > channel.threshold)
+    return beyond
 
 
 _SENTENCES = {

@@ -120,9 +120,8 @@ def build_design(campaign: Campaign) -> Design:
             of_run.extend([len(runs)] * len(found))
             runs.append(RunInfo(run_id=dynamic.run_id, cycles=dynamic.cycles, dynamic=True))
     if mute:
-        notes.append(
-            f"{len(mute)} of {len(kept.dynamic)} dynamic tests could not be evaluated and say nothing: {mute[0]}"
-        )
+        told = f"{len(mute)} of {len(kept.dynamic)} ({mute[0].rstrip('.')})"
+        notes.append(f"Dynamic tests that could not be evaluated and tell nothing: {told}.")
     moments = {run.run_id: run.moment for run in kept.dynamic}
     for number, (loop, index) in enumerate(zip(loops, of_run, strict=True)):
         blocks.append(_loop_points(loop, index, number, runs[index].cycles, moments[runs[index].run_id]))

@@ -20,6 +20,8 @@ PAUSE_RATIO = 4.0
 FEWEST_TIMED = 4
 #: Engagements take what they took in this share of the blocks at most: in others the rig rested as well.
 BRISK = 0.2
+#: Fewer blocks tell no pace, and no engagement takes longer than this [s].
+FEWEST_BLOCKS, LONGEST_ENGAGEMENT = 3, 120.0
 #: So many change points are tried: further ones between them would look the same.
 MOST_ONSETS = 20
 
@@ -106,7 +108,7 @@ def _events(campaign: Campaign, kind: EventKind) -> tuple[float, ...]:
 
 
 def _gaps(campaign: Campaign) -> list[tuple[float, float, float]]:
-    """When long pauses began [s], how long they were [s] and the cycles of the run after them: the time between two runs
+    """When long pauses ended [s], how long they were [s] and the cycles of the run after them: the time between two runs
     less what the engagements between them took, at the pace of the brisk ones."""
     runs: list[Timed] = [*campaign.stationary, *campaign.dynamic, *campaign.duty]
     timed = [(run.moment, run) for run in runs if run.moment is not None]
@@ -118,7 +120,7 @@ def _gaps(campaign: Campaign) -> list[tuple[float, float, float]]:
     idle = max((_idle(gaps, timed, blocks_first) for blocks_first in (True, False)), key=lambda each: each[0])[1]
     least = max(LEAST_PAUSE, PAUSE_RATIO * float(np.median(idle)))
     return [
-        (float(moment - length), float(length), run.cycles)
+        (float(moment), float(length), run.cycles)
         for length, (before, _), (moment, run) in zip(idle, timed[:-1], timed[1:], strict=True)
         if length > least and np.isfinite(before)
     ]
@@ -135,7 +137,9 @@ def _idle(gaps: FloatArray, timed: list[tuple[float, Timed]], blocks_first: bool
         elif not isinstance(one, DutyRun) and not isinstance(other, DutyRun):
             busy[i] = max(other.cycles - one.cycles, 0.0)
     worked = (busy > 0) & np.isfinite(gaps)
-    pace = float(np.quantile(gaps[worked] / busy[worked], BRISK)) if worked.any() else 0.0
+    if np.count_nonzero(worked) < FEWEST_BLOCKS:
+        return 0.0, gaps
+    pace = min(float(np.quantile(gaps[worked] / busy[worked], BRISK)), LONGEST_ENGAGEMENT)
     return pace, np.maximum(gaps - pace * busy, 0.0)
 
 
@@ -143,8 +147,8 @@ def _pauses(campaign: Campaign) -> dict[float, tuple[float, float]]:
     """Cycles of the pauses, ascending, with their ends [s] and lengths [s]: gaps between the moments of the runs, and
     maintenance that calls itself rest, which lasts from its own moment to the next run's."""
     found: dict[float, tuple[float, float]] = {}
-    for begin, length, cycles in _gaps(campaign):
-        found.setdefault(cycles, (begin + length, length))
+    for end, length, cycles in _gaps(campaign):
+        found.setdefault(cycles, (end, length))
     tests: list[StationaryRun | DynamicRun] = [*campaign.stationary, *campaign.dynamic]
     tested = sorted(run.moment for run in tests if run.moment is not None)
     for event in campaign.maintenance:

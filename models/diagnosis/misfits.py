@@ -89,6 +89,7 @@ def axes_of(
         axis = STRANGE[stranger.slugs[0]].axis
         known, p_value = found.get(axis), float(np.exp(-np.clip(stranger.evidence, 0.0, 700.0)))
         if known is None or stranger.evidence > known.strength:
+            p_value = p_value if known is None else min(p_value, known.p_value)
             found[axis] = Where(axis=axis, strength=stranger.evidence, p_value=p_value)
     for each in raw:
         if each.effect == FIXED_LINE:

@@ -10,8 +10,8 @@ from models.diagnosis.fitting import Fit
 from models.diagnosis.misfits import without_likely_gains
 from models.diagnosis.whitening import Noise
 
-#: A run is odd that makes this share of all that is missed beyond noise, among so many runs at least, and misses by so many
-#: deviations.
+#: A run is odd that makes this share of all that is missed beyond noise, among so many runs at least, and is missed by so
+#: many deviations beyond noise.
 SHARE, FEWEST, MISSES = 0.6, 4, 2.0
 
 

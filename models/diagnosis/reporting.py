@@ -37,7 +37,7 @@ NEARBY = 8.0
 #: Verdicts that leave something to be found out.
 OPEN = {Verdict.CAUSE_AMBIGUOUS, Verdict.UNEXPLAINED_STRUCTURE}
 WITHHELD = "The extension is not proposed: runs that it had not seen were {}."
-MISSED, UNLIKELY = "missed by more with it than without", "less probable with it than without, by {:.0f} nats"
+MISSED, UNLIKELY = "missed by more with it than without", "less probable with it than without, by {:.2g} nats"
 
 
 def report_of(
@@ -78,7 +78,7 @@ def report_of(
     if judgement.verdict in OPEN:
         said = (*said, *filter(None, [odd_run(design, noise, view.fit)]))
     if extension is not None and harmful(gain):
-        extension, said = None, (*said, withheld(gain))
+        extension, said = None, (*said, *([] if gain is None else [withheld(gain)]))
     findings = Findings(
         verdict=judgement.verdict,
         causes=judgement.causes,
@@ -216,9 +216,9 @@ def harmful(gain: Gain | None) -> bool:
     return gain is not None and (gain.rmse_after > MOST_WORSE * gain.rmse_before or gain.log_score_gain < 0)
 
 
-def withheld(gain: Gain | None) -> str:
+def withheld(gain: Gain) -> str:
     """Why an extension that foretells worse is not proposed."""
-    if gain is None or gain.rmse_after > MOST_WORSE * gain.rmse_before:
+    if gain.rmse_after > MOST_WORSE * gain.rmse_before:
         return WITHHELD.format(MISSED)
     return WITHHELD.format(UNLIKELY.format(-gain.log_score_gain))
 

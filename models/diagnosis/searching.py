@@ -69,12 +69,13 @@ def hypotheses_of(
     )  # fmt: skip
     found = search.singles(singles, first)
     seconds = search.pairs(found)
-    linear = [each for each in pairs if each.evidence > singles[0].evidence + PAIR_PROMISE]
+    alone = singles[0].evidence if singles else 0.0
+    linear = [each for each in pairs if each.evidence > alone + PAIR_PROMISE]
     held = {frozenset(each.slugs) for each in seconds}
     seconds += [search.from_screen(each) for each in linear if frozenset(_slugs(each)) not in held]
     found, seconds = search.from_the_best_pair(found, seconds, singles)
     known = {each.slugs for each in found}
-    strange = search.strangers(max(each.evidence for each in (*found, *seconds)))
+    strange = search.strangers(max((_evidence(each) for each in (*found, *seconds)), default=0.0))
     off = search.better_null([*found, *seconds, *strange])
     found, seconds, strange = ([each.less(*off) for each in some] for some in (found, seconds, strange))
     rest = [_unfitted(each) for each in singles if _slugs(each) not in known]
@@ -187,7 +188,7 @@ class _Search:
         for one in usable[:FIRSTS]:
             self._add_seconds(one, pairs)
         if pairs:  # what the best pair brought in may have a better partner
-            best = max(pairs.values(), key=lambda each: each.evidence)
+            best = max(pairs.values(), key=_evidence)
             for one in usable[FIRSTS:]:
                 if one.slugs[0] in best.slugs:
                     self._add_seconds(one, pairs)
@@ -217,7 +218,8 @@ class _Search:
         columns = columns_of(effects, [effect.grid(self.design.facts) for effect in effects])
         fitted = self.null.fit
         projected = beside(self.design, self.noise, self.priors, fitted, columns)
-        near = [each for each in screen(columns, [projected]) if each.evidence > best - MARGIN - MARGIN_SHARE * best]
+        least = max(best, 0.0) * (1.0 - MARGIN_SHARE) - MARGIN
+        near = [each for each in screen(columns, [projected]) if each.evidence > least]
         found = []
         for each in near[:STRANGE]:
             amplitudes, drop = linear_drop(columns, projected, each)

@@ -21,6 +21,8 @@ from models.diagnosis.laws import Scene
 USUAL = 0.02
 #: A pressure or speed that differs by less than this share from the one before was held.
 _HELD = 0.01
+#: Where fewer plateaus than this share were come to from above (from below), the way is only another name for the level.
+_RETURNING = 0.1
 _HALF_HOUR = 1800.0
 _STEP = 0.0
 _TIMES = (60.0, 150.0, 400.0)
@@ -132,16 +134,24 @@ def way(values: FloatArray, previous: np.ndarray[tuple[int], np.dtype[np.intp]])
     return np.asarray(np.sign(change)[last], dtype=np.float64)
 
 
+def _both_ways(scene: Scene, values: FloatArray) -> FloatArray:
+    """`way` [P], or 0 where a campaign goes one way only."""
+    found = way(values, scene.points.previous)
+    least = _RETURNING * np.count_nonzero(scene.points.steady)
+    both = min(np.count_nonzero(found > 0), np.count_nonzero(found < 0)) >= max(least, 1.0)
+    return found if both else np.zeros_like(found)
+
+
 def _gauge_lags(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
     """± p ∂S/∂p, by the way in which pressure was last changed."""
     pressure = scene.points.pressure
-    turned = way(pressure, scene.points.previous) * pressure * scene.by_pressure
+    turned = _both_ways(scene, pressure) * pressure * scene.by_pressure
     return np.asarray(amplitude * turned, dtype=np.float64)
 
 
 def _friction_remembers(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
     """± S, by the way in which speed was last changed."""
-    return np.asarray(amplitude * way(scene.points.velocity, scene.points.previous) * scene.curve, dtype=np.float64)
+    return np.asarray(amplitude * _both_ways(scene, scene.points.velocity) * scene.curve, dtype=np.float64)
 
 
 STRANGERS: tuple[Stranger, ...] = (

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from models.diagnosis.advice import WORTH
 from models.diagnosis.catalogue import BY_SLUG
 from models.diagnosis.report import Advice, Candidate, Estimate, Gain, Misfit, Verdict, Visible, Where
+from models.diagnosis.verdict import LEAST_NAMED
 
 #: Rivals that are spoken of and from which probability on, effects whose visible amplitude is told.
 _SPOKEN, _RIVAL, _TOLD = 3, 0.001, 3
-#: From this probability on a cause is sure, and what keeps it from being named is what it leaves.
-_SURE = 0.85
 #: What was fitted beside a cause and not named is told from this probability on.
 _COMPANION = 0.3
 #: An effect beyond so many deviations of its prior is stronger than one would expect.
@@ -112,7 +111,7 @@ def _named(found: Findings) -> list[str]:
     second = [each for each in second if each.probability >= _COMPANION]
     if second:
         told = [f"{_name(each.effect)} (probability {_probability(each.probability)})" for each in second]
-        parts.append(f"Something else is at work beside it, which these data do not tell: {' or '.join(told)}.")
+        parts.append(f"Something else may be at work beside it, which these data do not tell: {' or '.join(told)}.")
     best = max((each.log_evidence_gain for each in chosen), default=0.0)
     rivals = [
         each  # one that is as good or was fitted with the cause stood beside it, not against it
@@ -139,7 +138,7 @@ def _ambiguous(found: Findings) -> list[str]:
             told.append(f"{_name(slug)} (probability {_probability(each.probability)}; {_estimate(each.estimate)})")
         else:
             told.append(f"{_name(slug)} (not measured, so it cannot be excluded)")
-    sure = [each for each in known.values() if each.probability >= _SURE and each.estimate.value != 0.0]
+    sure = [each for each in known.values() if each.probability >= LEAST_NAMED and each.estimate.value != 0.0]
     if len(told) == 1 and found.causes[0] in {each.effect for each in sure}:
         return [
             _misses(found),

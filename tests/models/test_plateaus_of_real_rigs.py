@@ -56,11 +56,24 @@ def test_the_crest_of_an_overshoot_is_no_plateau(rate: float, natural: float, da
     assert np.abs(cut.plateaus.torque - wanted).max() < 0.04
 
 
-def test_a_short_dwell_that_is_no_crest_stays() -> None:
-    """Half a second at 600 rpm on the way from 200 to 1000."""
-    told = np.concatenate([np.full(5000, 200.0), np.full(500, 600.0), np.full(5000, 1000.0)]) * RPM
+@pytest.mark.parametrize("short", [600.0, 800.0, 900.0])
+def test_a_short_dwell_that_is_no_crest_stays(short: float) -> None:
+    """One second on the way from 200 to 1000 rpm."""
+    told = np.concatenate([np.full(5000, 200.0), np.full(1000, short), np.full(5000, 1000.0)]) * RPM
     record, _ = recorded(np.array([200.0]) * RPM, told, 0.02, 0.02, 200.0, 1)
-    assert np.round(cut_plateaus(record).plateaus.speed / RPM, -2).tolist() == [200.0, 600.0, 1000.0]
+    assert np.round(cut_plateaus(record).plateaus.speed / RPM, -2).tolist() == [200.0, short, 1000.0]
+
+
+def test_a_dwell_that_lost_samples_is_no_crest() -> None:
+    """A second of the dwell, then a gap, then the rest of it."""
+    told = np.concatenate([np.full(5000, 200.0), np.full(6000, 1000.0)]) * RPM
+    record, _ = recorded(np.array([200.0]) * RPM, told, 0.02, 0.02, 200.0, 1)
+    keep = (record.time < 6.0) | (record.time > 6.4)
+    cut = cut_plateaus(
+        Record(**{name: getattr(record, name)[keep] for name in ("time", "pressure", "speed", "torque")})
+    )
+    assert "overshoot" not in {code for code, _ in cut.notes}
+    assert np.round(cut.plateaus.speed / RPM, -2).tolist() == [200.0, 1000.0, 1000.0]
 
 
 @pytest.mark.parametrize("lag", [0.2, 0.4])

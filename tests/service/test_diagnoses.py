@@ -182,6 +182,7 @@ def test_nothing_to_adopt_is_refused(client: TestClient) -> None:
     assert (report["verdict"], report["adopted"], report["as_of_cycles"]) == ("model_adequate", False, None)
     refused = client.put(f"{BASE}/model", json={"diagnosis_id": report["diagnosis_id"]})
     assert (refused.status_code, refused.headers["Content-Type"]) == (409, "application/problem+json")
+    assert refused.json()["title"] == "There is nothing to adopt"
     assert client.get(f"{BASE}/model").json()["versions"] == []
 
 

@@ -1,9 +1,12 @@
 """What rigs do that the catalogue does not hold is not called by the name of what resembles it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from models.diagnosis.baseline import frame_of, predict
+from models.diagnosis.campaign import Campaign
 from models.diagnosis.catalogue import BY_SLUG
 from models.diagnosis.design import build_design
 from models.diagnosis.engine import diagnose
@@ -77,9 +80,45 @@ def test_strangers_have_names_of_their_own() -> None:
     assert not STRANGE.keys() & BY_SLUG.keys()
 
 
+def bent_pressure(at: Where) -> np.ndarray:
+    """M_s is no straight line in pressure."""
+    x = (at.pressure - 4e5) / 3e5
+    return np.asarray(-0.24 * x * (x - 1) * torque(at.velocity, at.parameters), dtype=np.float64)
+
+
+def test_no_hysteresis_is_told_of_where_nothing_was_ever_lowered() -> None:
+    report = diagnose(campaign(3, bent_pressure, noise=0.004, gain=0.001, loops=False), rng=np.random.default_rng(1))
+    assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
+    assert report.baseline is not None
+    assert report.baseline.where[0].axis == "pressure_bar"
+    assert "lowered" not in report.summary
+
+
+def shuffled(given: Campaign) -> Campaign:
+    """Each test in an order of its own."""
+    rng = np.random.default_rng(4)
+    runs = [
+        replace(run, plateaus=run.plateaus.take(rng.permutation(run.plateaus.torque.size))) for run in given.stationary
+    ]
+    return replace(given, stationary=tuple(runs))
+
+
+def test_a_gauges_hysteresis_is_told_of_where_pressure_goes_both_ways() -> None:
+    """Every test in random order; the gauge is 1.5 % behind."""
+    given = shuffled(campaign(3, noise=0.004, gain=0.001, loops=False))
+    runs = []
+    for run in given.stationary:
+        pressure = run.plateaus.pressure
+        behind = 1 + 0.015 * np.sign(np.diff(pressure, prepend=pressure[0]))
+        runs.append(replace(run, plateaus=replace(run.plateaus, torque=run.plateaus.torque * behind)))
+    report = diagnose(replace(given, stationary=tuple(runs)), rng=np.random.default_rng(1))
+    assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
+    assert STRANGE["gauge_hysteresis"].looks in report.summary
+
+
 @pytest.fixture(scope="module")
 def scene() -> Scene:
-    design = build_design(campaign(1, loops=False))
+    design = build_design(shuffled(campaign(1, loops=False)))
     return predict(design, starting_laws(design, frame_of(design))).scene
 
 

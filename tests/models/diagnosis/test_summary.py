@@ -254,7 +254,7 @@ def test_an_oil_temperature_that_nobody_measured_has_no_size() -> None:
 def test_what_was_fitted_beside_a_named_cause_is_told() -> None:
     found = findings(Verdict.CAUSE_NAMED, "oil_change")
     film = replace(candidate("squeeze_film", 0.6), beside=("oil_change",))
-    told = "Something else is at work beside it, which these data do not tell: squeeze film (probability 0.60)."
+    told = "Something else may be at work beside it, which these data do not tell: squeeze film (probability 0.60)."
     assert told in summarise(replace(found, candidates=(*found.candidates, film)))
     assert told not in summarise(replace(found, candidates=(*found.candidates, replace(film, beside=()))))
     faint = replace(film, probability=0.1)
