@@ -37,7 +37,7 @@ NEARBY = 8.0
 #: Verdicts that leave something to be found out.
 OPEN = {Verdict.CAUSE_AMBIGUOUS, Verdict.UNEXPLAINED_STRUCTURE}
 WITHHELD = "The extension is not proposed: runs that it had not seen were {}."
-MISSED, UNLIKELY = "missed by more with it than without", "less probable with it than without, by {:.2g} nats"
+MISSED, UNLIKELY = "missed by more with it than without", "less probable with it than without, by {:.3g} nats"
 
 
 def report_of(

@@ -163,3 +163,24 @@ def test_a_bin_was_measured_when_its_samples_were(periods: float) -> None:
     clock = loop.clock.reshape(BINS, -1).mean(axis=1)
     used = loop.samples > 1
     assert np.abs(loop.torque - 20.0 - 0.01 * clock)[used].max() < 0.01 * 0.15  # half a bin is 0.1 s
+
+
+def test_dynamic_tests_that_tell_nothing_are_counted() -> None:
+    time = np.arange(750) / RATE
+    swinging = speed_of(0.1, 1.5, 0.0, 0.0) * RPM
+    tests = [
+        DynamicRun(
+            run_id=f"d{number}",
+            cycles=0.0,
+            record=Record(time=time, pressure=np.full(time.size, 5e5), speed=speed, torque=np.full(time.size, 20.0)),
+        )
+        for number, speed in enumerate((swinging, np.full(time.size, 100.0)))
+    ]
+    told = [each for each in build_design(Campaign(dynamic=tuple(tests))).notes if each.startswith("Dynamic tests")]
+    assert len(told) == 1
+    assert told[0].startswith(
+        "Dynamic tests that could not be evaluated and tell nothing: 1 of 2 (5 bar: The speed does not "
+    )
+    assert not [
+        each for each in build_design(Campaign(dynamic=tuple(tests[:1]))).notes if each.startswith("Dynamic tests")
+    ]

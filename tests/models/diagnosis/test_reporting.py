@@ -61,3 +61,10 @@ def test_two_causes_that_foretell_worse_than_none_are_not_named(
     assert report.verdict is verdict
     assert report.causes == standing.slugs
     assert ("cannot tell" in report.summary) == (verdict is Verdict.CAUSE_AMBIGUOUS)
+
+
+def test_why_an_extension_is_not_proposed_is_told_by_what_went_wrong() -> None:
+    missed = replace(GAIN, rmse_after=1.1 * GAIN.rmse_before)
+    assert "missed by more with it" in reporting.withheld(missed)
+    unlikely = replace(GAIN, rmse_after=0.9 * GAIN.rmse_before, log_score_gain=-825.0)
+    assert "less probable with it than without, by 825 nats" in reporting.withheld(unlikely)

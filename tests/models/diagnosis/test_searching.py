@@ -14,7 +14,7 @@ from models.diagnosis.noise import first_noise
 from models.diagnosis.projection import Projected
 from models.diagnosis.refitting import Hypothesis, null_of, refitted
 from models.diagnosis.searching import hypotheses_of
-from models.diagnosis.selection import columns_of, screen_pairs
+from models.diagnosis.selection import columns_of, screen, screen_pairs
 from models.diagnosis.viewing import View, view_of
 from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.fitted import Study, study
@@ -115,3 +115,14 @@ def test_what_shows_nothing_is_no_half_of_a_pair() -> None:
     found = {effect.slug for pair in screen_pairs(view.columns, view.projections) for effect in pair.effects}
     assert "torque_zero_shift" in found
     assert not found & {"channel_delay", "inertia_torque", "squeeze_film"}
+
+
+def test_what_the_data_could_not_show_is_not_judged() -> None:
+    """A film, a delay and a mass act in loops only."""
+    given = study(campaign(2, loops=False))
+    known, design = given.baseline, given.design
+    columns = columns_of(list(CATALOGUE), [effect.grid(design.facts) for effect in CATALOGUE])
+    view = view_of(design, known.noise, known.priors, known.fit, columns)
+    judged = {each.effects[0].slug for each in screen(view.columns, view.projections)}
+    assert not judged & {"squeeze_film", "channel_delay", "inertia_torque"}
+    assert {"oil_temperature", "torque_zero_shift", "oil_change"} <= judged
