@@ -48,7 +48,7 @@ def judged(trials: list[Trial]) -> list[Outcome]:
 
 @pytest.fixture(scope="module")
 def nothing() -> list[Outcome]:
-    return judged([Trial("none", (SEED, 0, k)) for k in range(16)])
+    return judged([Trial("none", (SEED, 0, k)) for k in range(12)])
 
 
 @pytest.fixture(scope="module")

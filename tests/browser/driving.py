@@ -56,6 +56,7 @@ class Watched:
         self.asked: list[str] = []
         self.said: list[str] = []
         self.page.set_default_timeout(20_000)
+        self.page.set_default_navigation_timeout(60_000)  # a busy machine takes its time
         self.page.on("request", lambda request: self.asked.append(request.url))
         self.page.on("console", lambda message: self.said.append(f"{message.type}: {message.text}"))
         self.page.on("pageerror", lambda error: self.said.append(f"error: {error}"))

@@ -3,7 +3,6 @@
 from typing import Any
 
 import httpx2
-import pytest
 
 from tests.blind.rig.hide import Hidden, hide
 from tests.blind.rig.told import runs
@@ -28,9 +27,9 @@ def diagnosed(http: httpx2.Client, hidden: Hidden) -> dict[str, Any]:
     return report
 
 
-@pytest.mark.parametrize("slug", ["oil_temperature", "squeeze_film"])
-def test_a_hidden_effect_is_found(http: httpx2.Client, slug: str) -> None:
+def test_a_hidden_effect_is_found(http: httpx2.Client) -> None:
     """λ = 100: an oracle sees it beyond any doubt. Whatever else stands in the set, the truth leads it."""
+    slug = "squeeze_film"
     report = diagnosed(http, hide((31, 1), (slug,), 100.0))
     assert report["verdict"] in {"cause_named", "cause_ambiguous"}
     assert slug in report["causes"]

@@ -14,7 +14,7 @@ from models.diagnosis.laws import Scene
 from models.diagnosis.report import Verdict
 from models.diagnosis.starting import starting_laws
 from models.diagnosis.strangers import STRANGE, STRANGERS, way
-from models.stribeck import StribeckParameters, torque
+from models.stribeck import torque
 from tests.models.diagnosis.campaigns import Planted, Where, campaign
 
 
@@ -24,37 +24,17 @@ def settling_gain(at: Where) -> np.ndarray:
     return np.asarray(share * torque(at.velocity, at.parameters), dtype=np.float64)
 
 
-def other_gain(at: Where) -> np.ndarray:
-    """Calibrated anew after 4000 cycles."""
-    return np.asarray((0.04 if at.cycles > 4000 else 0.0) * torque(at.velocity, at.parameters), dtype=np.float64)
-
-
 def other_encoder(at: Where) -> np.ndarray:
     """Speed is a quarter higher than it says after 4000 cycles."""
     factor = 1.25 if at.cycles > 4000 else 1.0
     return torque(factor * at.velocity, at.parameters) - torque(at.velocity, at.parameters)
 
 
-def other_lining(at: Where) -> np.ndarray:
-    """The static torque is 4 % higher after 4000 cycles."""
-    p = at.parameters
-    factor = 1.04 if at.cycles > 4000 else 1.0
-    stepped = StribeckParameters(
-        static_torque=factor * np.asarray(p.static_torque),
-        coulomb_ratio=p.coulomb_ratio,
-        stribeck_velocity=p.stribeck_velocity,
-        viscous_coefficient=p.viscous_coefficient,
-    )
-    return torque(at.velocity, stepped) - torque(at.velocity, p)
-
-
 @pytest.mark.parametrize(
     ("planted", "slug"),
     [
         (settling_gain, "gain_with_clock"),
-        (other_gain, "gain_with_life"),
         (other_encoder, "speed_scale_step"),
-        (other_lining, "static_torque_step"),
     ],
 )
 def test_what_no_catalogue_holds_is_unexplained_and_told_by_its_looks(planted: Planted, slug: str) -> None:
