@@ -77,8 +77,8 @@ def report_of(
     said = (*notes, *(f"{each.effect}: {each.note}." for each in raw))
     if judgement.verdict in OPEN:
         said = (*said, *filter(None, [odd_run(design, noise, view.fit)]))
-    if extension is not None and harmful(gain):
-        extension, said = None, (*said, *([] if gain is None else [withheld(gain)]))
+    if extension is not None and gain is not None and harmful(gain):
+        extension, said = None, (*said, withheld(gain))
     findings = Findings(
         verdict=judgement.verdict,
         causes=judgement.causes,
