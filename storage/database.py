@@ -20,7 +20,8 @@ from sqlalchemy import URL, Connection, Engine, create_engine, event
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool, QueuePool
 
 from storage.backups import copy
-from storage.errors import DatabaseBusy, StorageError, StorageUnavailable, translated
+from storage.driver_errors import translated
+from storage.errors import DatabaseBusy, StorageError, StorageUnavailable
 from storage.migrations.upgrade import current, head, upgrade
 
 #: Seconds that a writer waits for the lock before it gives up.

@@ -24,7 +24,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.facts import Facts
-from models.diagnosis.points import Points
+from models.diagnosis.points import IntArray, Points
 from models.stribeck import GAMMA
 
 #: The laws of eq. 6 over pressure, in the order of `models.stribeck.PARAMETER_NAMES`; each has six places in θ.
@@ -69,12 +69,15 @@ class Laws:
 
     def parameters(self, pressure: FloatArray, cycles: FloatArray) -> FloatArray:
         """M_s, M̄_c, V_S, C_v [n, 4] at pressure [n] Pa and cycles [n]. V_S is kept above nothing, the rest is as fitted."""
-        return self._values(pressure, cycles, None)[0]
+        begins, repeats = _stretches(pressure, cycles)
+        return np.repeat(self._values(pressure[begins], cycles[begins], None)[0], repeats, axis=0)
 
     def with_gradient(self, pressure: FloatArray, cycles: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Parameters [n, 4], their derivatives by θ's blocks [n, 4, BLOCK], and that of M̄_c by log p_0 [n]."""
-        slopes = np.empty((pressure.size, 4, BLOCK))
-        values, by_decay = self._values(pressure, cycles, slopes)
+        begins, repeats = _stretches(pressure, cycles)
+        slopes = np.empty((begins.size, 4, BLOCK))
+        values, by_decay = self._values(pressure[begins], cycles[begins], slopes)
+        values, slopes, by_decay = (np.repeat(each, repeats, axis=0) for each in (values, slopes, by_decay))
         return values, slopes, by_decay
 
     def _values(
@@ -85,8 +88,8 @@ class Laws:
         by_decay = np.zeros(pressure.size)
         high = (pressure - self.frame.lowest) / self.frame.span
         # rows of one test stand together: eq. 6 is worked out once for each
-        begins = np.flatnonzero(np.diff(cycles, prepend=np.nan))
-        states, repeats = cycles[begins], np.diff(begins, append=cycles.size)
+        begins, repeats = _stretches(cycles)
+        states = cycles[begins]
         fall, by_fall = falling_weight(high, self.frame.span, float(self.theta[LOG_DECAY]))
         for k in range(4):
             first, second, share_1, share_2, log_half, log_exponent = self.theta[k * BLOCK : (k + 1) * BLOCK].tolist()
@@ -126,6 +129,13 @@ class Laws:
         early = x * (1.0 + EARLY) / (x + EARLY)
         columns = np.concatenate([np.stack([x, early, x * tilt], axis=-1), weights], axis=-1)
         return columns @ self.theta[DRIFT:-POWERS], columns
+
+
+def _stretches(*keys: FloatArray) -> tuple[IntArray, IntArray]:
+    """Where rows [n] begin that are the same in all keys as those that follow them, and how many follow: a loop is one."""
+    changes = np.any([np.diff(each, prepend=np.nan) != 0.0 for each in keys], axis=0)
+    begins = np.flatnonzero(changes)
+    return begins, np.diff(begins, append=changes.size)
 
 
 def falling_weight(high: FloatArray, span: float, log_decay: float) -> tuple[FloatArray, FloatArray]:
@@ -188,9 +198,11 @@ class Scene:
     @property
     def open_powers(self) -> FloatArray:
         """(v/v_0)^k [P, POWERS] with the clutch open, 0 elsewhere: what its drag is made of."""
-        relative = self.points.velocity / self.laws.frame.reference_velocity
-        powers = relative[:, None] ** np.arange(1, POWERS + 1)
-        return np.asarray((1.0 - self.points.engaged)[:, None] * powers, dtype=np.float64)
+        powers = np.zeros((self.points.engaged.size, POWERS))
+        where = np.flatnonzero(self.points.engaged < 1.0)
+        relative = self.points.velocity[where] / self.laws.frame.reference_velocity
+        powers[where] = (1.0 - self.points.engaged[where])[:, None] * relative[:, None] ** np.arange(1, POWERS + 1)
+        return powers
 
     def curve_at(
         self,
@@ -221,7 +233,7 @@ def scene_of(laws: Laws, points: Points, facts: Facts) -> Scene:
     gradient, decay = gradient_of(points.velocity, values)
     gradient *= points.engaged[:, None]
     falling = gradient[:, 2] * values[:, 2] / points.velocity
-    rising = points.engaged * GAMMA * values[:, 3] * points.velocity ** (GAMMA - 1.0)
+    rising = GAMMA * values[:, 3] * gradient[:, 3] / points.velocity
     return Scene(
         points=points,
         facts=facts,

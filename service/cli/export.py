@@ -11,8 +11,6 @@ from rich.progress import Progress
 from service.cli.client import RefusedError, Service, ServiceAwayError, connect
 from service.cli.options import EX_DATAERR, EX_TEMPFAIL, URL, Key, Patience, Url, err, fail, out, told
 from service.formats import run_files
-from service.schemas.clutch import ClutchIn
-from service.schemas.life import Method
 
 _SENT = ("run_id", "kind", "cycles", "started_at", "origin", "duty", "event", "note", "channels")
 
@@ -25,6 +23,8 @@ def export(
     patience: Patience = 10.0,
 ) -> None:
     """Write a clutch's record, its runs with their raw channels, and all results."""
+    from service.schemas.clutch import ClutchIn  # what only this command needs is loaded by it alone
+
     with told():
         results = out_folder / "results"
         results.mkdir(parents=True, exist_ok=True)
@@ -68,6 +68,8 @@ def _pages(service: Service, path: str, **params: Any) -> Iterator[dict[str, Any
 
 
 def _results(service: Service, clutch: str, folder: Path) -> None:
+    from service.schemas.life import Method
+
     base = f"/v1/clutches/{clutch}"
     for method in get_args(Method):
         _write(

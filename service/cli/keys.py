@@ -7,9 +7,6 @@ from typing import Annotated
 import typer
 
 from service.cli.options import DATABASE, EX_USAGE, Database, existing, fail, out, told
-from service.security import SCOPES, make_key
-from storage import keys
-from storage.database import open_database
 
 app = typer.Typer(help="Keys for the service.", no_args_is_help=True)
 
@@ -25,6 +22,10 @@ def create(
     database: Database = DATABASE,
 ) -> None:
     """Print a new key, once; only its hash is stored."""
+    from service.security import SCOPES, make_key  # loaded by the commands that need it
+    from storage import keys
+    from storage.database import open_database
+
     if scope not in SCOPES:
         fail(f"scope must be one of {', '.join(SCOPES)}, got {scope!r}", EX_USAGE)
     secret, row = make_key(scope, note, created_at=_now())
@@ -36,6 +37,8 @@ def create(
 @app.command(name="list")
 def list_keys(database: Database = DATABASE) -> None:
     """All keys: name, scope, when made, when revoked."""
+    from storage import keys
+
     with existing(database) as opened, opened.reading() as connection:
         found = keys.all_keys(connection)
     for row in found:
@@ -46,6 +49,8 @@ def list_keys(database: Database = DATABASE) -> None:
 @app.command()
 def revoke(key_id: str, database: Database = DATABASE) -> None:
     """End a key by its name (the eight digits after `clutchlife_`)."""
+    from storage import keys
+
     with existing(database) as opened, opened.writing() as connection:
         done = keys.revoke(connection, key_id, _now())
     if not done:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import httpx2
 import typer
@@ -12,9 +12,10 @@ from rich.console import Console
 from service.cli.spool import default_folder
 from service.errors import NotFoundError
 from service.settings import DEFAULT_DATABASE, DEFAULT_URL
-from storage.database import Database as Opened
-from storage.database import open_database, path_of
 from storage.errors import StorageError
+
+if TYPE_CHECKING:
+    from storage.database import Database as Opened
 
 #: sysexits.h: the input is wrong, the service is away (try again later), the call is wrong.
 EX_DATAERR, EX_TEMPFAIL, EX_USAGE = 65, 75, 64
@@ -48,8 +49,10 @@ def told() -> Iterator[None]:
 
 
 @contextmanager
-def existing(url: str) -> Iterator[Opened]:
+def existing(url: str) -> Iterator["Opened"]:
     """An open database that is there already: a mistyped address makes no new one."""
+    from storage.database import open_database, path_of  # most commands open none
+
     with told():
         path = path_of(url)
         if not path.exists():

@@ -9,10 +9,7 @@ import uvicorn
 from threadpoolctl import threadpool_limits
 
 from service.cli.options import DATABASE, EX_USAGE, Database, err, fail, told
-from service.security import is_loopback
 from service.settings import Settings
-from storage import keys
-from storage.database import open_database
 
 LOOPBACK = "127.0.0.1"
 
@@ -26,6 +23,10 @@ def serve(
     """Run the service."""
     if log_level not in uvicorn.config.LOG_LEVELS:
         fail(f"log-level must be one of {', '.join(uvicorn.config.LOG_LEVELS)}, got {log_level!r}", EX_USAGE)
+    from service.security import is_loopback  # what only this command needs is loaded by it alone
+    from storage import keys
+    from storage.database import open_database
+
     with told():
         settings = Settings.from_environment(database)
         with closing(open_database(settings.database)) as opened, opened.reading() as connection:
@@ -37,7 +38,7 @@ def serve(
             soft_wrap=True,
         )
         host = LOOPBACK
-    from service.app import create_app  # what only this command needs is loaded by it alone
+    from service.app import create_app
 
     # the arrays are small: BLAS threads that wait for each other cost more than they bring
     threadpool_limits(limits=1, user_api="blas")

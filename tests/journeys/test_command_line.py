@@ -57,6 +57,14 @@ def test_a_campaign_is_pushed_exported_and_pushed_again(campaign: Path, server: 
         assert ONCE.get(second.url + address).json() == first
 
 
+def test_the_command_starts_without_database_and_numerics() -> None:
+    """They take more than a second to load; only commands that need them do."""
+    heavy = ("alembic", "fastapi", "numpy", "pydantic", "scipy", "sqlalchemy")
+    looked = f"import sys, service.cli.main; print([name for name in {heavy!r} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", looked], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
 def test_push_waits_in_the_spool_while_the_service_is_away(tmp_path: Path) -> None:
     run, spool = tmp_path / "run.json", tmp_path / "spool"
     run.write_text(json.dumps(stationary(0, run_id="r0")))
