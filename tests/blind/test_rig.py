@@ -33,6 +33,8 @@ ALLOWED = {
 }
 #: What lives besides need: the service as whoever uses it sees it, and scores.
 IN_USE = {"models.scoring", "service.app", "service.settings"}
+#: Loops say nothing of them that plateaus do not, and make the refits long.
+STEADY = {"running_in", "accelerated_wear", "pressure_offset", "torque_zero_shift", "interface_heating", "seasons"}
 CONTRACT = {
     "oil_temperature", "interface_heating", "viscous_exponent", "hydrodynamic_drag", "torque_zero_shift",
     "pressure_offset", "unsettled_dwell", "channel_delay", "inertia_torque", "squeeze_film", "shaft_ripple",
@@ -67,7 +69,7 @@ def test_all_of_the_contract_can_be_hidden_and_more() -> None:
 
 
 def test_the_same_seed_hides_the_same() -> None:
-    one, again, other = (runs(hide((4, k), ("oil_change",), 20.0)) for k in (1, 1, 2))
+    one, again, other = (runs(hide((4, k), ("oil_change",), 20.0, loops=False)) for k in (1, 1, 2))
     assert one == again
     assert one != other
 
@@ -101,7 +103,7 @@ def test_the_noise_is_what_the_sensor_says(seed: int) -> None:
 
 @pytest.mark.parametrize("slug", sorted(ALL))
 def test_an_effect_of_no_size_is_none_and_a_louder_one_is_larger(slug: str) -> None:
-    hidden = hide((8, 1), (slug,), 20.0)
+    hidden = hide((8, 1), (slug,), 20.0, loops=slug not in STEADY)
     effect, amplitude = hidden.effects[0]
     ear = listen(hidden.plan, hidden.clutch, hidden.sensor)
     for none, torque in zip(read(hidden.plan, hidden.clutch, [(effect, 1e-9)]), ear.base, strict=True):
