@@ -172,6 +172,12 @@ def _added(campaign: Campaign, design: Design, key: str) -> Design | None:
         return None
     stationary, dynamic = then.stationary[len(campaign.stationary) :], then.dynamic[len(campaign.dynamic) :]
     known = design.facts
-    facts = replace(facts_of(then), states=known.states, reference_temperature=known.reference_temperature)
+    facts = replace(
+        facts_of(then),
+        states=known.states,
+        reference_temperature=known.reference_temperature,
+        usual_torque=known.usual_torque,
+        usual_pressure=known.usual_pressure,
+    )
     added = replace(build_design(replace(then, stationary=stationary, dynamic=dynamic)), facts=facts)
     return added if added.torque.size else None

@@ -7,14 +7,14 @@ constant, an exponent) bend. Amplitude 0 is no effect. Adding an effect is addin
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TypeAlias
 
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.facts import Facts
+from models.diagnosis.facts import USUAL_PRESSURE, USUAL_TORQUE, Facts
 from models.diagnosis.laws import Scene
 
 #: Values of an effect's shape parameters, in the order of `Effect.shapes`.
@@ -41,6 +41,13 @@ class Family(StrEnum):
     DYNAMIC = "dynamic"
     VIBRATION = "vibration"
     HISTORY = "history"
+
+
+class Measure(StrEnum):
+    """What the usual size of an effect grows with: a clutch of ten times the torque has a sensor of ten times the zero."""
+
+    TORQUE = "torque"
+    PRESSURE = "pressure"
 
 
 class Bend(StrEnum):
@@ -79,7 +86,8 @@ class Effect:
 
     slug and title are public; physics is a sentence; formula the change of torque; source where it is from.
     channels: what must have been measured or sent for it to be judged (public names). amplitude, unit: the name and unit
-    of the amplitude; prior_sd: its prior deviation in that unit (zero mean, either sign unless `positive`);
+    of the amplitude; prior_sd: its prior deviation in that unit (zero mean, either sign unless `positive`), for a clutch of
+    the reference's size where it `grows_with` something (`sized`);
     `scale` turns the SI amplitude into `unit`.
     grid(facts) gives the shapes to be tried, none where the campaign cannot tell the effect.
     change(scene, amplitude, shape) -> [P] Nm at the scene's points. before_lag: whether it changes the stationary curve,
@@ -110,6 +118,7 @@ class Effect:
     bends: tuple[Bend, ...]
     tails: float = 2.0
     several: Callable[[Scene, Sequence[tuple[float, Shape]]], FloatArray] | None = None
+    grows_with: Measure | None = None
 
     def changes(self, scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:
         """The changes [P, m] Nm of several (amplitude, shape)."""
@@ -120,6 +129,17 @@ class Effect:
     def lags(self, shape: Shape) -> bool:
         """Whether friction in loops lags behind what the effect changes."""
         return shape[-1] > 0.5 if self.before_lag is None else self.before_lag
+
+
+def sized(effect: Effect, facts: Facts) -> Effect:
+    """The effect with the prior that fits this campaign's clutch."""
+    factor = {
+        Measure.TORQUE: facts.usual_torque / USUAL_TORQUE,
+        Measure.PRESSURE: facts.usual_pressure / USUAL_PRESSURE,
+    }
+    return (
+        effect if effect.grows_with is None else replace(effect, prior_sd=effect.prior_sd * factor[effect.grows_with])
+    )
 
 
 def unit_changes(effect: Effect, scene: Scene, shapes: Sequence[Shape]) -> FloatArray:

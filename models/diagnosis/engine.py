@@ -9,7 +9,7 @@ from models.diagnosis.baseline import frame_of
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.design import Design, build_design
-from models.diagnosis.effect import Kind
+from models.diagnosis.effect import Kind, sized
 from models.diagnosis.fitting import Fit, Priors, fit, priors_of
 from models.diagnosis.laws import Laws
 from models.diagnosis.misfits import FIXED_LINE, axes_of
@@ -20,8 +20,8 @@ from models.diagnosis.raw import RawEvidence, raw_evidence
 from models.diagnosis.refitting import Hypothesis, finite
 from models.diagnosis.report import Report, Verdict
 from models.diagnosis.reporting import insufficient, report_of
-from models.diagnosis.searching import hypotheses_of
-from models.diagnosis.selection import columns_of
+from models.diagnosis.searching import Found, hypotheses_of
+from models.diagnosis.selection import Column, columns_of
 from models.diagnosis.starting import sober, starting_laws
 from models.diagnosis.unmeasured import temperature_evidence
 from models.diagnosis.verdict import CLOSE, OVER_NOTHING, Judgement, judge
@@ -78,28 +78,40 @@ def _diagnosed(campaign: Campaign, design: Design, without: frozenset[str], rng:
     baseline = fit_baseline(design)
     if not np.isfinite(baseline.fit.cost):
         return insufficient("no finite torque can be fitted to these numbers.", design)
-    effects = [effect for effect in CATALOGUE if effect.slug not in without]
+    effects = [sized(effect, design.facts) for effect in CATALOGUE if effect.slug not in without]
     columns = columns_of(effects, [effect.grid(design.facts) for effect in effects])
-    view = view_of(design, baseline.noise, baseline.priors, baseline.fit, columns)
     raw = tuple(each for each in raw_evidence(campaign) if each.effect not in without)
-    leads = alarms(design, baseline, view, rng)
-    noise, hypotheses, stranger = baseline.noise, list[Hypothesis](), None
+    view, leads, found = _looked(design, baseline, columns, raw, rng)
+    if found is not None and found.better is not None:  # what the baseline had missed raised the alarm, or hid what did
+        baseline = replace(baseline, fit=found.better)
+        view, leads, found = _looked(design, baseline, columns, raw, rng)
     judgement = Judgement(verdict=Verdict.MODEL_ADEQUATE)
-    if any(each.raised for each in leads.values()) or any(
-        each.effect in BY_SLUG for each in raw if not _vibrates(each)
-    ):
-        found = hypotheses_of(design, baseline.noise, baseline.priors, baseline.start, baseline.fit, view, raw)
-        noise, hypotheses, stranger = found.noise, found.hypotheses, found.stranger
+    if found is None:
+        found = Found(noise=baseline.noise, hypotheses=[])
+    else:
         unmeasured = -np.inf
         if not design.facts.temperature_measured and "oil_temperature" not in without:
-            unmeasured = temperature_evidence(design, noise, baseline.priors, baseline.fit)
-        structure = max((each.strength for each in axes_of(view, leads, raw, stranger)), default=0.0)
-        if confirmed(leads, hypotheses, max(structure, unmeasured)):
-            judgement = judge(design, noise, baseline.priors, hypotheses, structure, unmeasured, rng)
+            unmeasured = temperature_evidence(design, found.noise, baseline.priors, baseline.fit)
+        structure = max((each.strength for each in axes_of(view, leads, raw, found.stranger)), default=0.0)
+        if confirmed(leads, found.hypotheses, max(structure, unmeasured)):
+            judgement = judge(design, found.noise, baseline.priors, found.hypotheses, structure, unmeasured, rng)
     return report_of(
-        campaign, design, noise, baseline.priors, view, with_lines(judgement, raw), hypotheses, stranger, raw, leads,
-        baseline.notes, rng,
+        campaign, design, found.noise, baseline.priors, view, with_lines(judgement, raw), found.hypotheses,
+        found.stranger, raw, leads, baseline.notes, rng,
     )  # fmt: skip
+
+
+def _looked(
+    design: Design, baseline: Baseline, columns: list[Column], raw: tuple[RawEvidence, ...], rng: np.random.Generator
+) -> tuple[View, dict[str, Lead], Found | None]:
+    """The view from a baseline, its alarms, and what was found where there is any, or raw records show more than swings."""
+    view = view_of(design, baseline.noise, baseline.priors, baseline.fit, columns)
+    leads = alarms(design, baseline, view, rng)
+    beside = any(each.effect in BY_SLUG and not _vibrates(each) for each in raw)
+    if not (beside or any(each.raised for each in leads.values())):
+        return view, leads, None
+    found = hypotheses_of(design, baseline.noise, baseline.priors, baseline.start, baseline.fit, view, raw)
+    return view, leads, found
 
 
 def missing_for_baseline(design: Design) -> str:

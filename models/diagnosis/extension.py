@@ -8,7 +8,7 @@ the threshold's first passage is looked for. Where the cause is ambiguous, every
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import MISSING, asdict, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -85,6 +85,8 @@ class Extension:
             states=kept.states,
             first_moment=kept.first_moment,
             last_moment=kept.last_moment,
+            usual_torque=kept.usual_torque,
+            usual_pressure=kept.usual_pressure,
         )
 
     def _mean(self, points: Points, facts: Facts, kinds: set[Kind]) -> tuple[FloatArray, FloatArray]:
@@ -171,7 +173,9 @@ def facts_from(stored: Mapping[str, Any]) -> Facts:
     """The inverse of `facts_to`."""
     found: dict[str, Any] = dict(stored) | {"geometry": Geometry(**stored["geometry"]), "oil": Oil(**stored["oil"])}
     for each in fields(Facts):
-        value = found.get(each.name, None if each.default is None else [])  # what an older build did not store
+        value = found.setdefault(
+            each.name, [] if each.default is MISSING else each.default
+        )  # an older build's lacks some
         if isinstance(value, list):
             numbers = [math.nan if x is None else x for x in value]
             found[each.name] = np.array(numbers, dtype=np.float64) if each.type is FloatArray else tuple(numbers)

@@ -13,6 +13,8 @@ from models.runs import UNLOADED, Plateaus, Record
 
 #: The oil temperature to which everything refers where none was measured: the middle of the reference's 80 to 90 °C [K].
 REFERENCE_TEMPERATURE = 273.15 + 85.0
+#: The torque [Nm] and the pressure [Pa] of the clutch in whose sizes the effects' priors are given: the reference's.
+USUAL_TORQUE, USUAL_PRESSURE = 25.0, 5e5
 #: A gap between runs that is longer than this [s] and than so many usual gaps is a pause.
 LEAST_PAUSE = 8 * 3600.0
 PAUSE_RATIO = 4.0
@@ -36,7 +38,8 @@ class Facts:
     oil_changes, sensor_zeros and rests: cycles of maintenance (a rest is also a long gap in the moments); rest_moments: when
     the pause ended, rest_lengths [s]: how long it was, NaN where unknown.
     duty_ends [d], duty_energies [d] J an engagement: blocks whose energy is known, ascending. first_moment and last_moment
-    [s] of the tests that were timed, None where fewer than two were.
+    [s] of the tests that were timed, None where fewer than two were. usual_torque [Nm] and usual_pressure [Pa]: medians of
+    the closed clutch's.
     """
 
     geometry: Geometry
@@ -53,6 +56,8 @@ class Facts:
     duty_energies: FloatArray
     first_moment: float | None = None
     last_moment: float | None = None
+    usual_torque: float = USUAL_TORQUE
+    usual_pressure: float = USUAL_PRESSURE
 
     @property
     def life(self) -> float:
@@ -84,6 +89,10 @@ def facts_of(campaign: Campaign) -> Facts:
     moments = [*(run.moment for run in campaign.stationary), *(run.moment for run in campaign.dynamic)]
     timed = [moment for moment in moments if moment is not None]
     spread = bool(timed) and max(timed) > min(timed)
+    torques, pressures = (
+        np.concatenate([np.abs(getattr(table, name)[rows]) for _, table, rows in under_load] or [np.zeros(0)])
+        for name in ("torque", "pressure")
+    )
     known = [duty for duty in campaign.duty if duty.energy is not None and duty.energy > 0]
     return Facts(
         geometry=campaign.geometry,
@@ -100,7 +109,13 @@ def facts_of(campaign: Campaign) -> Facts:
         duty_energies=np.array([duty.energy for duty in known], dtype=np.float64),
         first_moment=min(timed) if spread else None,
         last_moment=max(timed) if spread else None,
+        usual_torque=_median(torques, USUAL_TORQUE),
+        usual_pressure=_median(pressures, USUAL_PRESSURE),
     )
+
+
+def _median(values: FloatArray, otherwise: float) -> float:
+    return max(float(np.median(values)), 1e-9) if values.size else otherwise
 
 
 def _events(campaign: Campaign, kind: EventKind) -> tuple[float, ...]:

@@ -98,10 +98,11 @@ class Advice:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Visible:
-    """The smallest amplitude of an effect that these data would have shown with 90 % power."""
+    """The smallest amplitude of an effect that these data would have shown with 90 % power, and its usual size."""
 
     effect: str
     amplitude: float
+    usual: float
     unit: str
 
 

@@ -9,6 +9,7 @@ from models.diagnosis.alarm import Lead
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.catalogue import BY_SLUG
 from models.diagnosis.design import Design
+from models.diagnosis.effect import sized
 from models.diagnosis.extension import Extension, build_extension
 from models.diagnosis.fitting import Fit, Priors
 from models.diagnosis.gain import measure_gain
@@ -174,8 +175,8 @@ def _candidates(
         beside: tuple[str, ...] = ()
         first = next((each for each in (*judgement.standing, *alone, *hypotheses) if slug in each.slugs), None)
         if first is None or first.fit is None:
-            effect = BY_SLUG[slug]
-            estimate = _sound(seen[slug].estimate) if slug in seen else _estimate(slug, 0.0, effect.prior_sd)
+            usual = sized(BY_SLUG[slug], design.facts).prior_sd
+            estimate = _sound(seen[slug].estimate) if slug in seen else _estimate(slug, 0.0, usual)
             known = first.evidence if first else judgement.statistics.get(f"{slug}_unmeasured", 0.0)
             evidence = seen[slug].log_evidence if slug in seen else known
         else:
@@ -230,10 +231,12 @@ def visible_of(view: View) -> tuple[Visible, ...]:
     for i, column in enumerate(view.columns):
         if not info[i] > 0:
             continue
-        amplitude = float(np.sqrt(2 * SEEN / info[i])) * column.effect.scale
-        slug = column.effect.slug
+        effect = column.effect
+        slug, amplitude = effect.slug, float(np.sqrt(2 * SEEN / info[i])) * effect.scale
         if np.isfinite(amplitude) and (slug not in found or amplitude < found[slug].amplitude):
-            found[slug] = Visible(effect=slug, amplitude=amplitude, unit=column.effect.unit)
+            found[slug] = Visible(
+                effect=slug, amplitude=amplitude, usual=effect.prior_sd * effect.scale, unit=effect.unit
+            )
     return tuple(found.values())
 
 

@@ -38,18 +38,22 @@ FIRSTS, SECONDS, SECOND_PROMISE = 2, 3, 3.0
 AGAIN = 6.0
 #: Gauss-Newton steps that one half of the best pair is given alone before other partners are looked for.
 STEPS_BESIDE = 2
+#: A baseline that is better by so much [nats] is another one.
+CLEARLY = 1.0
 #: So many of what the catalogue does not hold are refitted at most, where they promise to come near the best.
 STRANGE = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Found:
-    """The noise with the likely gains; hypotheses, best first; and the best of what is not in the catalogue, its evidence
-    less what the choice among so many costs (None where none comes near)."""
+    """The noise with the likely gains; hypotheses, best first; the best of what is not in the catalogue, its evidence
+    less what the choice among so many costs (None where none comes near); and the baseline seen from where the best of all
+    has it, where that is better by CLEARLY."""
 
     noise: Noise
     hypotheses: list[Hypothesis]
     stranger: Hypothesis | None = None
+    better: Fit | None = None
 
 
 def hypotheses_of(
@@ -76,7 +80,8 @@ def hypotheses_of(
     found, seconds = search.from_the_best_pair(found, seconds, singles)
     known = {each.slugs for each in found}
     strange = search.strangers(max((_evidence(each) for each in (*found, *seconds)), default=0.0))
-    off = search.better_null([*found, *seconds, *strange])
+    better = search.better_null([*found, *seconds, *strange])
+    off = search.better_by(better)
     found, seconds, strange = ([each.less(*off) for each in some] for some in (found, seconds, strange))
     rest = [_unfitted(each) for each in singles if _slugs(each) not in known]
     seen = {each.effect: each.log_evidence for each in raw}
@@ -85,6 +90,7 @@ def hypotheses_of(
         noise=noise,
         hypotheses=sorted(told, key=lambda each: -each.evidence),
         stranger=max(filter(finite, strange), key=lambda each: each.evidence, default=None),
+        better=None if better is None or off[0] < CLEARLY else better.fit,
     )
 
 
@@ -252,16 +258,19 @@ class _Search:
             self._add_seconds(self.refitted(*given, STEPS_BESIDE), others)  # before it leaves that valley
         return list(alone.values()), list(others.values())
 
-    def better_null(self, hypotheses: list[Hypothesis]) -> tuple[float, float]:
-        """By how much evidence and likelihood [nats] of nothing at all are better than was thought, seen from where the
-        best hypothesis has the baseline: no effect is praised for a valley that the baseline had missed."""
+    def better_null(self, hypotheses: list[Hypothesis]) -> Null | None:
+        """Nothing at all, seen from where the best hypothesis has the baseline, if it fits better there: no effect is
+        praised for a valley that the baseline had missed."""
         best = max((each for each in hypotheses if finite(each)), key=lambda each: each.evidence, default=None)
         if best is None or best.fit is None or best.evidence < SECOND_PROMISE:
-            return 0.0, 0.0
+            return None
         again = fit(self.design, self.noise, best.fit.laws, self.priors, steps=STEPS)
-        if again.cost > self.null.fit.cost:
+        return null_of(self.design, self.noise, self.priors, again) if again.cost <= self.null.fit.cost else None
+
+    def better_by(self, found: Null | None) -> tuple[float, float]:
+        """By how much evidence and likelihood [nats] of nothing at all are better than was thought."""
+        if found is None:
             return 0.0, 0.0
-        found = null_of(self.design, self.noise, self.priors, again)
         return max(found.evidence - self.null.evidence, 0.0), max(found.profile - self.null.profile, 0.0)
 
 

@@ -90,8 +90,7 @@ def _adequate(found: Findings) -> list[str]:
 
 
 def _within_reach(visible: Visible) -> bool:
-    effect = BY_SLUG[visible.effect]
-    return visible.amplitude <= _STRONG * effect.prior_sd * abs(effect.scale)
+    return visible.amplitude <= _STRONG * visible.usual
 
 
 def _seen_from(visible: Visible) -> str:

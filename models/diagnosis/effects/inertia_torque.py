@@ -3,7 +3,7 @@
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.effect import Effect, Family, Kind, Shape, Tried
+from models.diagnosis.effect import Effect, Family, Kind, Measure, Shape, Tried
 from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
 
@@ -33,6 +33,7 @@ EFFECT = Effect(
     shapes=(),
     grid=_grid,
     change=_change,
+    grows_with=Measure.TORQUE,
     before_lag=False,
     bends=(),
 )

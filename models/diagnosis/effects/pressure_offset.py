@@ -3,7 +3,7 @@
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effect import Bend, Effect, Family, Kind, Measure, Shape, ShapeParameter, Tried
 from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
 
@@ -52,6 +52,7 @@ EFFECT = Effect(
     ),
     grid=_grid,
     change=_change,
+    grows_with=Measure.PRESSURE,
     before_lag=True,
     bends=(Bend.LIFE,),
 )

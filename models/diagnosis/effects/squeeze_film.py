@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effect import Bend, Effect, Family, Kind, Measure, Shape, ShapeParameter, Tried
 from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Laws, Scene, gradient_of
 from models.stribeck import GAMMA
@@ -133,6 +133,7 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     several=_changes,
+    grows_with=Measure.TORQUE,
     before_lag=None,
     bends=(Bend.SPEED,),
 )

@@ -3,7 +3,7 @@
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effect import Bend, Effect, Family, Kind, Measure, Shape, ShapeParameter, Tried
 from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
 
@@ -94,6 +94,7 @@ EFFECT = Effect(
     ),
     grid=_grid,
     change=_change,
+    grows_with=Measure.TORQUE,
     before_lag=False,
     bends=(Bend.LIFE, Bend.CLOCK),
 )

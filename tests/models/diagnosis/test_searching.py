@@ -57,7 +57,7 @@ def test_no_effect_is_praised_for_a_valley_that_the_baseline_missed(wandering: S
         design=design, noise=known.noise, priors=known.priors, start=known.start, null=null,
         view=cast(View, None), projected=cast(Projected, None),
     )  # fmt: skip
-    assert praised.less(*search.better_null([praised])).evidence < 0.1 * praised.evidence
+    assert praised.less(*search.better_by(search.better_null([praised]))).evidence < 0.1 * praised.evidence
 
 
 def test_a_shape_at_its_bound_is_held_while_the_rest_moves(wandering: Study) -> None:

@@ -42,6 +42,13 @@ def candidate(slug: str, probability: float, evidence: float = 30.0) -> Candidat
     )
 
 
+def visible(slug: str, sizes: float) -> Visible:
+    """An effect that so many of its usual sizes would have shown."""
+    effect = BY_SLUG[slug]
+    usual = effect.scale * effect.prior_sd
+    return Visible(effect=slug, amplitude=sizes * usual, usual=usual, unit=effect.unit)
+
+
 def findings(verdict: Verdict, *causes: str) -> Findings:
     advice = Advice(
         key="repeat", test="stationary test with the oil at 60 °C", effect="oil_change", other="running_in", nats=1234.5
@@ -54,9 +61,7 @@ def findings(verdict: Verdict, *causes: str) -> Findings:
         extended=MISFIT,
         gain=GAIN,
         advice=(advice,),
-        visible=tuple(
-            Visible(effect=each.slug, amplitude=0.2 * each.scale * each.prior_sd, unit=each.unit) for each in CATALOGUE
-        ),
+        visible=tuple(visible(each.slug, 0.2) for each in CATALOGUE),
         notes=(),
         tests=12,
         states=6,
@@ -143,7 +148,7 @@ def test_what_was_not_measured_cannot_be_excluded():
 
 def test_effects_out_of_reach_are_said_to_be():
     found = findings(Verdict.MODEL_ADEQUATE)
-    weak = Visible(effect="pressure_offset", amplitude=1e4 * BY_SLUG["pressure_offset"].prior_sd, unit="bar")
+    weak = visible("pressure_offset", 10.0)
     said = summarise(replace(found, visible=(weak,)))
     assert "hidden behind the baseline for: pressure offset" in said
     assert "hidden" not in summarise(found)
