@@ -8,8 +8,8 @@ from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, ShapePara
 from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
 
-#: The power to which the amplitude refers [W per Nm of the usual torque]: 4 kW for the reference's 25 Nm.
-REFERENCE_POWER = 160.0
+#: The power to which the amplitude refers, as a multiple of the usual torque at mid speed: 4 kW on the reference's rig.
+USUAL_POWER = 1.5
 #: What weakens: all of the friction, or the oil's shear.
 WHOLE, VISCOUS = 0.0, 1.0
 
@@ -26,8 +26,8 @@ def _grid(_facts: Facts) -> tuple[Tried, ...]:
 def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     log_settling, part, saturation = shape
     settling = float(np.exp(log_settling))
-    usual = REFERENCE_POWER * scene.facts.usual_torque
-    heat = np.abs(scene.curve) * scene.points.velocity / scene.facts.geometry.mean_radius / usual
+    usual = USUAL_POWER * scene.facts.usual_torque * scene.laws.frame.reference_velocity
+    heat = np.abs(scene.curve) * scene.points.velocity / usual
     heat = heat * (1.0 + saturation) / (1.0 + saturation * heat)
     warmth = _around(_along(heat, scene, settling), scene, settling)
     carried = scene.curve if part == WHOLE else scene.viscous
@@ -68,7 +68,7 @@ EFFECT = Effect(
     title="Frictional heat at the interface lowers the torque",
     physics="The interface is hotter than the oil by the power that it turns into heat; the boundary film and the oil "
     "there lose strength.",
-    formula="-S (1 - e^{-a w}), w the power |S| ω over the usual one, saturating by s and lagging by τ; S or its "
+    formula="-S (1 - e^{-a w}), w the power |S| v over the usual one, saturating by s and lagging by τ; S or its "
     "viscous part",
     source="Marklund and Larsson, Tribology Int. 41 (2008) 824: friction of wet clutches by interface temperature",
     family=Family.THERMAL,

@@ -13,8 +13,11 @@ from models.stribeck import GAMMA
 
 #: Pressure to which the amplitude refers [Pa].
 REFERENCE_PRESSURE = 5e5
-#: How the film is followed: to first order by powers of speed, or by its own equation.
-FIRST_ORDER, FILM = 0.0, 1.0
+#: How the film is followed: to first order by powers of speed, by its own equation, or as a thickness that relaxes and
+#: whose strength and time have nothing to do with each other.
+FIRST_ORDER, FILM, THICKNESS = 0.0, 1.0, 2.0
+#: The least time of such a thickness [s], and the power of speed that it stays below: with more it would be inertia.
+LEAST_TIME, MOST_POWER = 0.15, 0.55
 #: To first order torque falls faster with speed than the film's lag does, for fewer asperities touch: by this power more. A
 #: film of any other kind would be the same at all speeds, as inertia is.
 FEWER = 0.5
@@ -33,8 +36,12 @@ def _grid(_facts: Facts) -> tuple[Tried, ...]:
         for sheared in (0.2, 0.7)
         for lags in (0.0, 1.0)
     ]
-    each = float(np.log(len(powers) / len(films)))
-    return (*(Tried(shape=shape) for shape in powers), *(Tried(shape=shape, log_weight=each) for shape in films))
+    layers = [(0.1, y, f, time, THICKNESS, 0.0) for y in (0.5, 1.2) for f in (0.03, 0.15) for time in (0.2, 0.8)]
+    return tuple(
+        Tried(shape=shape, log_weight=-float(np.log(len(shapes))))
+        for shapes in (powers, films, layers)
+        for shape in shapes
+    )
 
 
 def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
@@ -53,6 +60,8 @@ def _changes(scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArra
         if form == FIRST_ORDER:
             strength = amplitude * points.engaged * (points.pressure / REFERENCE_PRESSURE) ** power
             out[:, i] = strength * points.acceleration / (speed + least) ** (thin + FEWER)
+        elif form == THICKNESS and looping.size:
+            out[looping, i] = _over_thickness(scene, looping, amplitude, settings[i][1])
     if films:
         amplitudes, shapes = np.array([settings[i][0] for i in films]), np.array([settings[i][1] for i in films])
         out[looping[:, None], films] = _over_film(scene, looping, amplitudes, shapes.T)
@@ -93,6 +102,22 @@ def _over_film(scene: Scene, looping: NDArray[np.intp], amplitude: FloatArray, s
     return np.asarray(np.where(real, dry + scene.viscous[looping, None] * thinner, 0.0), dtype=np.float64)
 
 
+def _over_thickness(scene: Scene, looping: NDArray[np.intp], amplitude: float, shape: Shape) -> FloatArray:
+    """Loops' points [n]: what h = (v/v_0 + f)^q lacks of its stationary value while it relaxes by τ, harmonic by harmonic;
+    asperities carry what the film does not, and carry more under pressure."""
+    power, thin, least, time = shape[:4]
+    points, middle = scene.points, scene.laws.frame.reference_velocity
+    phases = np.flatnonzero(np.diff(points.loop[looping], append=-2))[0] + 1
+    q, tau = MOST_POWER / (1.0 + thin), LEAST_TIME * 10.0**time
+    height = (points.velocity[looping].reshape(-1, phases) / middle + least) ** q
+    waves = np.fft.rfft(height, axis=1)
+    swing = 1j * np.arange(waves.shape[1]) * points.angular_frequency[looping].reshape(-1, phases)[:, :1] * tau
+    missing = np.fft.irfft(waves * swing / (1.0 + swing), phases, axis=1)
+    strength = amplitude * middle / (tau * q * (1.0 + least) ** (q - 1.0))
+    pressed = (points.pressure[looping] / REFERENCE_PRESSURE) ** (0.75 + 0.5 * power)
+    return np.asarray(strength * pressed * missing.ravel(), dtype=np.float64)
+
+
 def usual_slope(laws: Laws, sheared: FloatArray) -> FloatArray:
     """-∂S/∂w [m] Nm s/m of films at rest with exponents `sheared` [m] of shear: the median over the usual swing, under the
     loops' pressures, half through life. One number for one θ, whatever rows are asked for."""
@@ -112,7 +137,8 @@ EFFECT = Effect(
     physics="While speed rises the film is still thin from before and more asperities carry: torque is higher than "
     "stationary, also where the curve rises; the GMS attractor cannot give that.",
     formula="a (p/5 bar)^x v̇ / (v/v_0 + f)^(y + 1/2), eq. 7's film to first order; or S(w) for S(v) with C_v v^γ (v/w)^s, "
-    "ẇ = (v - w)(w/v_0 + f)^y/τ",
+    "ẇ = (v - w)(w/v_0 + f)^y/τ; or a' (p/5 bar)^((1.5 + x)/2) (H - h), τ ḣ = H - h, "
+    "H = (v/v_0 + f)^(0.55/(1 + y))",
     source="Ompusunggu et al. 2013, eq. 7 and section 3.2",
     family=Family.DYNAMIC,
     kind=Kind.LAG,
@@ -126,8 +152,8 @@ EFFECT = Effect(
         ShapeParameter(name="power of pressure x", unit="-", lowest=-0.5, highest=1.5, smooth=True),
         ShapeParameter(name="power of speed y", unit="-", lowest=0.4, highest=1.8, smooth=True),
         ShapeParameter(name="least film f", unit="-", lowest=0.003, highest=0.3, smooth=True),
-        ShapeParameter(name="power of shear s", unit="-", lowest=0.0, highest=1.2, smooth=True),
-        ShapeParameter(name="how the film is followed", unit="-", lowest=0.0, highest=1.0),
+        ShapeParameter(name="power of shear s, or log10 of τ/0.15 s", unit="-", lowest=0.0, highest=1.2, smooth=True),
+        ShapeParameter(name="how the film is followed", unit="-", lowest=0.0, highest=2.0),
         ShapeParameter(name="whether friction lags behind it", unit="-", lowest=0.0, highest=1.0),
     ),
     grid=_grid,

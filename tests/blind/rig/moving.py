@@ -44,8 +44,12 @@ def inertia_torque(rng: np.random.Generator, _: Plan) -> Effect:
 
 
 def squeeze_film(rng: np.random.Generator, _: Plan) -> Effect:
-    """The film's height follows dh/dt = (h_s(v) - h)/τ, faster where it is thick; contact and shear go with the height."""
+    """The film's height follows dh/dt = (h_s(v) - h)/τ, faster where it is thick; contact and shear go with the height. Or
+    its time is one and its strength another."""
     order, shear, hasten = rng.uniform(0.5, 0.75), rng.uniform(0.2, 0.7), rng.uniform(0.5, 2.0)
+    aside = rng.spawn(1)[0]  # what is drawn here changes nothing that is drawn later
+    if aside.random() < 0.3:
+        return _film_of_its_own_strength(aside)
 
     def friction(a: float, site: Site, law: Law) -> FloatArray:
         if site.kind == "stationary":
@@ -64,6 +68,22 @@ def squeeze_film(rng: np.random.Generator, _: Plan) -> Effect:
         return dry.torque(v, film=w) - dry.torque(v) + sheared
 
     return Effect("squeeze_film", 0.1, 20.0, friction)
+
+
+def _film_of_its_own_strength(rng: np.random.Generator) -> Effect:
+    """Contact e^{-h/s} of a film that lags by a time that falls with the load, against that of the film at rest."""
+    order, time = rng.uniform(0.4, 0.7), np.exp(rng.uniform(np.log(0.15), np.log(1.5)))
+    soft, load = rng.uniform(0.5, 2.0), rng.uniform(0.6, 1.0)
+
+    def reading(a: float, site: Site, torque: FloatArray) -> FloatArray:
+        if site.kind == "stationary":
+            return np.zeros_like(torque)
+        rest = (np.maximum(site.v, 0.0) / 6.0) ** order
+        late = time * (5.0 / site.bar[:, :1]) ** 0.5
+        film = np.concatenate([lagged(row[None], site.step, tau) for row, tau in zip(rest, late[:, 0], strict=True)])
+        return a * (site.bar / 5.0) ** load * (np.exp(-film / soft) - np.exp(-rest / soft))
+
+    return Effect("squeeze_film", 1.0, 200.0, reading=reading)
 
 
 def shaft_ripple(rng: np.random.Generator, _: Plan) -> Effect:

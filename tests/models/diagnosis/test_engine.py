@@ -5,12 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.diagnosis import engine
 from models.diagnosis.alarm import Lead
 from models.diagnosis.campaign import Campaign, MaintenanceEvent
 from models.diagnosis.campaign import EventKind as Event
 from models.diagnosis.engine import confirmed, diagnose, with_lines
+from models.diagnosis.fitting import Fit
 from models.diagnosis.raw import RawEvidence
 from models.diagnosis.report import Estimate, Report, Verdict
+from models.diagnosis.searching import Found
 from models.diagnosis.verdict import Judgement
 from models.runs import Plateaus
 from models.stribeck import StribeckParameters, torque
@@ -170,6 +173,30 @@ def test_structure_without_a_name_beside_a_vibration_counts_by_its_own_evidence(
         found = with_lines(judged, (ripple,))
         assert found.verdict is verdict
         assert found.causes == (("shaft_ripple",) if verdict is Verdict.CAUSE_NAMED else ())
+
+
+def test_a_better_baseline_is_looked_at_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What an effect's fit shows the baseline to have missed is no effect: the alarm is raised, or not, from there."""
+    seen: list[Fit] = []
+    search = engine.hypotheses_of
+
+    def found(*given: object) -> Found:
+        seen.append(given[4])  # type: ignore[arg-type]
+        first = search(*given)  # type: ignore[arg-type]
+        return first if len(seen) > 1 else replace(first, better=calm)
+
+    given = campaign(7, PLANTED["torque_zero_shift"], loops=False)
+    expected = look(given).baseline
+    calm = engine.fit_baseline(engine.build_design(given)).fit
+    bent = replace(calm, residual=calm.residual + 0.02 * calm.torque * (calm.prediction.scene.points.cycles > 4000))
+    fitted = engine.fit_baseline
+    monkeypatch.setattr(engine, "fit_baseline", lambda design: replace(fitted(design), fit=bent))
+    monkeypatch.setattr(engine, "hypotheses_of", found)
+    report = look(given)
+    assert [each is other for each, other in zip(seen, (bent, calm), strict=True)] == [True, True]
+    assert report.baseline is not None
+    assert expected is not None
+    assert report.baseline.rmse == pytest.approx(expected.rmse, rel=1e-9)
 
 
 @pytest.mark.parametrize(

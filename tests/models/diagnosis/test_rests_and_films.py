@@ -12,7 +12,7 @@ from models.diagnosis.baseline import frame_of, predict
 from models.diagnosis.campaign import Campaign, DutyRun, EventKind, MaintenanceEvent, StationaryRun
 from models.diagnosis.catalogue import BY_SLUG
 from models.diagnosis.design import build_design
-from models.diagnosis.effects.squeeze_film import FILM, FIRST_ORDER, usual_slope
+from models.diagnosis.effects.squeeze_film import FILM, FIRST_ORDER, LEAST_TIME, MOST_POWER, THICKNESS, usual_slope
 from models.diagnosis.facts import facts_of
 from models.diagnosis.laws import GAMMA, Scene, curve
 from models.diagnosis.starting import starting_laws
@@ -133,3 +133,32 @@ def test_a_film_follows_its_equation(thin: float, least: float, sheared: float) 
     np.testing.assert_allclose(change[one][moving], expected[moving], atol=0.02 * np.abs(expected[moving]).max())
     by_powers = effect.change(scene, time * slope, (0.0, thin, least, sheared, FIRST_ORDER, 0.0))[one]
     assert np.abs(by_powers - expected)[moving].max() > 0.1 * np.abs(expected[moving]).max()  # the control
+
+
+@pytest.mark.parametrize(("power", "thin", "least", "time"), [(0.5, 0.5, 0.1, 0.3), (0.0, 1.5, 0.05, 0.9)])
+def test_a_film_of_its_own_strength_relaxes(power: float, thin: float, least: float, time: float) -> None:
+    """τ ḣ = H - h by a general solver; its slope at mid speed is the amplitude where it is fast; nothing on plateaus."""
+    scene = scene_of_all(campaign(1))
+    points, middle = scene.points, scene.laws.frame.reference_velocity
+    change = BY_SLUG["squeeze_film"].change(scene, 0.5, (power, thin, least, time, THICKNESS, 0.0))
+    assert np.abs(change[points.steady]).max() == 0.0
+    one = np.flatnonzero(points.loop == points.loop.max())
+    step, tau, q = (
+        2 * np.pi / (one.size * points.angular_frequency[one][0]),
+        LEAST_TIME * 10**time,
+        MOST_POWER / (1 + thin),
+    )
+    height = (points.velocity[one] / middle + least) ** q
+    course = CubicSpline(step * np.arange(one.size + 1), np.append(height, height[0]), bc_type="periodic")
+    period = step * one.size
+    told = solve_ivp(
+        lambda t, h: (course(t % period) - h) / tau,
+        (0.0, 4 * period),
+        [height.mean()],
+        t_eval=3 * period + step * np.arange(one.size),
+        max_step=step,
+        rtol=1e-8,
+    )
+    strength = 0.5 * (points.pressure[one] / 5e5) ** (0.75 + 0.5 * power) * middle / (tau * q * (1 + least) ** (q - 1))
+    expected = strength * (height - told.y[0])
+    np.testing.assert_allclose(change[one], expected, atol=0.02 * np.abs(expected).max())
