@@ -31,8 +31,7 @@ TOLERANCE, PARTS_TOLERANCE = 0.05, 0.15
 #: Structure without a name may have so much more evidence, as a share of λ beyond CLEAR nats: below, no template's error
 #: shows.
 GENERIC, CLEAR = 0.05, 20.0
-#: ... and so many nats more in any case: it is the best of some eight axes. (A probability reckons without: what nobody
-#: wrote down comes in more kinds than the catalogue.)
+#: ... and so many nats more in any case, for the choice among some eight axes (a probability reckons without).
 AXES_PRICE = 2.0
 #: A cause is named where it has this many nats over nothing.
 OVER_NOTHING = 3.0
@@ -44,8 +43,8 @@ KIN_PRICE = 8.0
 LEAST_NAMED, LEAST_OF_TWO = 0.85, 0.8
 #: False alarms allowed in closing a case: structure that is left, and amplitudes that differ between parts.
 LEFT_SHARE, PARTS_SHARE = 5e-3, 3e-3
-#: Where what is left would look like that by chance in fewer cases, beyond what a template leaves, nothing is named:
-#: something else may be at work. However loud it is, the right template leaves hardly more [nats] than the second says.
+#: Where what is left (of two causes the parts, too) would look like that by chance in fewer cases, beyond what a template
+#: leaves, nothing is named. However loud it is, the right template leaves hardly more [nats] than the second says.
 UNEASY, MOST_LEFT = 0.05, 3.0
 #: A line in raw records has paid for its search: it is there.
 VIBRATION_PROBABILITY = 0.98
@@ -134,7 +133,8 @@ def judge(
         )
     elif unmeasured > -np.inf and like_temperature(design) & set(causes):
         imitated, causes = True, (*causes, "oil_temperature")
-    easy = first.statistics["closure_p_value"] * np.exp(min(slack, MOST_LEFT)) >= UNEASY
+    left = min(first.statistics[f"{name}_p_value"] for name in ("closure", "parts")[: len(best.effects)])
+    easy = left * np.exp(min(slack, MOST_LEFT)) >= UNEASY
     likely = () if imitated or len(standing) > 1 or not easy else _likely(causes, probabilities)
     named = bool(likely) and probabilities[likely[0]] >= LEAST_NAMED
     return Judgement(
