@@ -133,3 +133,18 @@ def test_viscosity_meets_its_two_points_and_one_of_the_reference() -> None:
     expected = 10**10 ** (8.2404 - 3.2040 * np.log10([353.15, 363.15])) - 0.7
     np.testing.assert_allclose(found[2:] * 1e6, expected, rtol=0.01)
     assert 0.2 < 1 - found[3] / found[2] < 0.24  # 22 % over the reference's 80 to 90 °C
+
+
+def test_a_dwell_that_is_far_too_short_is_remembered_for_several(scene: Scene) -> None:
+    """x_i = S_i + k a (x_{i-1} - S_i) plateau by plateau, against what the effect says at once; small shares forget at once."""
+    effect, points = BY_SLUG["unsettled_dwell"], scene.points
+    for share, carried in ((0.3, 1.0), (0.4, 0.5)):
+        told = effect.change(scene, share, (0.0, carried))
+        ends = scene.curve.copy()
+        expected = np.zeros_like(ends)
+        for i in np.flatnonzero(points.previous >= 0):
+            before = ends[points.previous[i]]
+            expected[i] = share * (before - scene.curve[i])
+            ends[i] += carried * expected[i]
+        np.testing.assert_allclose(told, expected, atol=1e-9)
+    assert np.abs(effect.change(scene, 0.3, (0.0, 1.0)) - effect.change(scene, 0.3, (0.0, 0.0))).max() > 0.1
