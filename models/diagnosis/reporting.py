@@ -93,6 +93,7 @@ def report_of(
         tests=len(design.runs),
         states=int(design.facts.states.size),
         looks=_looks(judgement, hypotheses, stranger),
+        scatter=noise.run_gain,
     )
     return Report(
         verdict=judgement.verdict,

@@ -9,8 +9,8 @@ from models.diagnosis.catalogue import BY_SLUG
 from models.diagnosis.report import Advice, Candidate, Estimate, Gain, Misfit, Verdict, Visible, Where
 from models.diagnosis.verdict import LEAST_NAMED
 
-#: Rivals that are spoken of and from which probability on, effects whose visible amplitude is told.
-_SPOKEN, _RIVAL, _TOLD = 3, 0.001, 3
+#: Rivals that are spoken of and between which probabilities, effects whose visible amplitude is told.
+_SPOKEN, _RIVAL, _OPEN, _TOLD = 3, 0.001, 0.1, 3
 #: What was fitted beside a cause and not named is told from this probability on.
 _COMPANION = 0.3
 #: An effect beyond so many deviations of its prior is stronger than one would expect.
@@ -24,8 +24,8 @@ _DIGITS = 5
 _OTHERWISE = {
     "channel_delay": "Torque is ahead of the speed: it is the speed's channel that a filter or the recorder delays."
 }
-#: More evidence than this [nats] decides as well.
-_PLENTY = 100.0
+#: More evidence than this [nats] decides as well; less than that is none.
+_PLENTY, _LEAST_NATS = 100.0, 1.0
 
 _AXES = {
     "pressure_bar": "pressure",
@@ -57,6 +57,7 @@ class Findings:
     tests: int
     states: int
     looks: str = ""  # what is not in the catalogue and does as well
+    scatter: float = 0.0  # of the runs' gains [-]
 
 
 def summarise(found: Findings) -> str:
@@ -75,8 +76,10 @@ def summarise(found: Findings) -> str:
 
 def _adequate(found: Findings) -> list[str]:
     noise = "" if found.baseline is None else f" of {_number(found.baseline.noise)} Nm"
+    scatter = f" ({_number(100 * found.scatter)} % of the torque)" if found.scatter > 0 else ""
     parts = [
-        f"Nothing stands out of the noise{noise} and the scatter from run to run: the model is adequate for these data."
+        f"Nothing stands out of the noise{noise} and the scatter from run to run{scatter}: the model is adequate for these "
+        "data."
     ]
     told = [each for each in found.visible if each.effect in BY_SLUG and _within_reach(each)]
     if told:
@@ -116,7 +119,7 @@ def _named(found: Findings) -> list[str]:
         each  # one that is as good or was fitted with the cause stood beside it, not against it
         for each in found.candidates
         if each.effect not in found.causes
-        and each.probability > _RIVAL
+        and _RIVAL < each.probability < _OPEN
         and each.log_evidence_gain < best - 1.0
         and not set(each.beside) & set(found.causes)
     ]
@@ -129,25 +132,25 @@ def _named(found: Findings) -> list[str]:
 def _ambiguous(found: Findings) -> list[str]:
     known = {each.effect: each for each in found.candidates}
     told = []
-    for slug in found.causes:
+    for slug in sorted(found.causes, key=lambda slug: -known[slug].probability if slug in known else 0.0):
         each = known.get(slug)
-        if each is not None and each.estimate.value == 0.0:
-            told.append(f"{_name(slug)} (probability {_probability(each.probability)}; not measured)")
-        elif each is not None:
+        if each is not None and each.estimate.value != 0.0:
             told.append(f"{_name(slug)} (probability {_probability(each.probability)}; {_estimate(each.estimate)})")
         else:
             told.append(f"{_name(slug)} (not measured, so it cannot be excluded)")
-    sure = [each for each in known.values() if each.probability >= LEAST_NAMED and each.estimate.value != 0.0]
-    if len(told) == 1 and found.causes[0] in {each.effect for each in sure}:
+    sure = [each.effect for each in known.values() if each.probability >= LEAST_NAMED and each.estimate.value != 0.0]
+    if set(found.causes) <= set(sure):
+        left = "what that leaves is not quite noise, or parts of the data ask for other sizes"
         return [
             _misses(found),
-            f"It looks like {told[0]}, but what that leaves is not quite noise: something else may be at work too.",
+            f"It looks like {' together with '.join(told)}, but {left}: something else may be at work too.",
         ]
     if len(told) == 1:
         such = f", such as {found.looks}" if found.looks else ""
         return [_misses(found), f"The cause may be {told[0]}, or something that the catalogue does not hold{such}."]
     none = f" It may be none of them: {found.looks} would do as well." if found.looks else ""
-    return [_misses(found), f"These data cannot tell which of these is the cause: {', '.join(told)}.{none}"]
+    which = "These data cannot tell which of these is the cause, the likeliest first"
+    return [_misses(found), f"{which}: {', '.join(told)}.{none}"]
 
 
 def _unexplained(found: Findings) -> list[str]:
@@ -192,14 +195,17 @@ def _gained(found: Findings) -> list[str]:
     change = f"{abs(gain.reduction_percent):.1f} ± {gain.reduction_sd:.1f} %"
     way = "less" if gain.reduction_percent >= 0 else "more"
     model = {
-        Verdict.CAUSE_AMBIGUOUS: "the model extended by the most probable of them",
+        Verdict.CAUSE_AMBIGUOUS: "the model extended by the likeliest that could be fitted",
         Verdict.UNEXPLAINED_STRUCTURE: "the model with a smooth correction",
     }.get(found.verdict, "the extended model")
+    beyond = f"; the part beyond noise is {_number(gain.excess_after)} Nm against {_number(gain.excess_before)} Nm"
     told = (
         f"On runs that were held out, {model} misses by {_number(gain.rmse_after)} Nm against "
-        f"{_number(gain.rmse_before)} Nm ({change} {way}), noise and gains that scatter included; "
-        f"the part beyond noise is {_number(gain.excess_after)} Nm against {_number(gain.excess_before)} Nm."
+        f"{_number(gain.rmse_before)} Nm ({change} {way}), noise and gains that scatter included"
+        f"{beyond if max(gain.excess_after, gain.excess_before) > 0 else ''}."
     )
+    if gain.rmse_after > gain.rmse_before and gain.log_score_gain < 0:
+        told += " So it is of no use there."
     ahead = (
         f"It {'also foretells' if gain.reduction_percent > 0 else 'foretells'} the last states better from the first ones."
         if gain.remaining > 0
@@ -216,6 +222,8 @@ def _next(found: Findings) -> list[str]:
     pair = f"{_name(best.effect)} and {_name(best.other)}"
     if best.other == "baseline":
         pair = f"{_name(best.effect)} and nothing at all"
+    if best.nats < _LEAST_NATS:
+        return ["No test that was considered would tell more."]
     if best.nats < WORTH:
         return [f"No single test would decide; the most telling is: {best.test} ({nats} between {pair})."]
     if best.other == "baseline":

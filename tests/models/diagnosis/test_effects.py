@@ -136,7 +136,7 @@ def test_viscosity_meets_its_two_points_and_one_of_the_reference() -> None:
 
 
 def test_a_dwell_that_is_far_too_short_is_remembered_for_several(scene: Scene) -> None:
-    """x_i = S_i + k a (x_{i-1} - S_i) plateau by plateau, against what the effect says at once; small shares forget at once."""
+    """x_i = S_i + k a (x_{i-1} - S_i) plateau by plateau, against what the effect says of all at once."""
     effect, points = BY_SLUG["unsettled_dwell"], scene.points
     for share, carried in ((0.3, 1.0), (0.4, 0.5)):
         told = effect.change(scene, share, (0.0, carried))

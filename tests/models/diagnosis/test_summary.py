@@ -123,7 +123,7 @@ def test_no_gain_is_said_as_none():
 def test_a_test_that_decides_little_is_not_oversold():
     found = findings(Verdict.CAUSE_AMBIGUOUS, "oil_change", "running_in")
     assert "What would decide: " in summarise(found)
-    weak = replace(found.advice[0], nats=0.6)
+    weak = replace(found.advice[0], nats=1.6)
     assert "No single test would decide" in summarise(replace(found, advice=(weak,)))
     alone = replace(found.advice[0], other="baseline")
     assert "To confirm it: " in summarise(replace(found, advice=(alone,)))
@@ -135,7 +135,7 @@ def test_a_test_of_a_nat_confirms_nothing_and_hardly_any_structure_is_no_percent
     weak = replace(found.advice[0], other="baseline", nats=0.8)
     said = summarise(replace(found, advice=(weak,), baseline=replace(MISFIT, unexplained_share=1e-5)))
     assert "To confirm it" not in said
-    assert "No single test would decide" in said
+    assert "No test that was considered would tell more." in said
     assert "less than 0.1 % of the squared residual" in said
     assert "To confirm it" in summarise(replace(found, advice=(replace(weak, nats=50.0),)))
 
@@ -252,7 +252,7 @@ def test_what_the_catalogue_does_not_hold_is_told_by_its_looks() -> None:
 def test_an_oil_temperature_that_nobody_measured_has_no_size() -> None:
     nobody = replace(candidate("oil_temperature", 0.995), estimate=Estimate(name="β", value=0.0, sd=0.7, unit="-"))
     said = ambiguous(nobody, candidate("oil_change", 0.1))
-    assert "oil temperature (probability above 0.99; not measured)" in said
+    assert "oil temperature (not measured, so it cannot be excluded)" in said
     assert "0.7" not in said
 
 
@@ -264,3 +264,25 @@ def test_what_was_fitted_beside_a_named_cause_is_told() -> None:
     assert told not in summarise(replace(found, candidates=(*found.candidates, replace(film, beside=()))))
     faint = replace(film, probability=0.1)
     assert "beside it" not in summarise(replace(found, candidates=(*found.candidates, faint)))
+
+
+def test_two_sure_causes_that_do_not_close_are_no_choice() -> None:
+    said = ambiguous(candidate("unsettled_dwell", 0.99), candidate("hydrodynamic_drag", 0.98))
+    assert "It looks like unsettled dwell" in said
+    assert "together with hydrodynamic drag" in said
+    assert "cannot tell which" not in said
+
+
+def test_the_likeliest_comes_first_and_a_correction_of_no_use_is_told_so() -> None:
+    said = ambiguous(candidate("oil_change", 0.03), candidate("inertia_torque", 0.8))
+    assert said.index("inertia torque (") < said.index("oil change (")
+    assert "So it is of no use there." not in said
+    found = findings(Verdict.UNEXPLAINED_STRUCTURE)
+    worse = replace(GAIN, rmse_after=2 * GAIN.rmse_before, reduction_percent=-100.0, log_score_gain=-9.0)
+    assert "So it is of no use there." in summarise(replace(found, gain=worse))
+
+
+def test_how_much_runs_scatter_is_told_where_the_model_is_adequate() -> None:
+    found = findings(Verdict.MODEL_ADEQUATE)
+    assert "from run to run (2.1 % of the torque)" in summarise(replace(found, scatter=0.021))
+    assert "from run to run: the model" in summarise(found)
