@@ -64,7 +64,7 @@ def test_open_tests_are_no_states_and_tell_no_usual_temperature(closed: Study) -
 
 @pytest.mark.parametrize(
     ("slug", "amplitude", "shape"),
-    [("torque_zero_shift", 0.4, (CLOCK, 0.0, *STRAIGHT)), ("unsettled_dwell", 0.2, (0.0,))],
+    [("torque_zero_shift", 0.4, (CLOCK, 0.0, *STRAIGHT)), ("unsettled_dwell", 0.2, (0.0, 0.5))],
 )
 def test_a_correction_is_what_the_diagnosis_saw_where_some_plateaus_are_open(
     closed: Study, slug: str, amplitude: float, shape: tuple[float, ...]

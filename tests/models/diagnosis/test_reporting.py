@@ -15,7 +15,7 @@ from tests.models.diagnosis.fitted import Study, study
 from tests.models.diagnosis.test_engine import late
 from tests.models.diagnosis.test_summary import GAIN
 
-PLANTED = ("unsettled_dwell", 0.1, (0.0,))
+PLANTED = ("unsettled_dwell", 0.1, (0.0, 0.5))
 BESIDE = ("viscous_exponent", 0.01, ())
 WORSE = replace(GAIN, log_score_gain=-1.0)
 
@@ -60,7 +60,7 @@ def test_two_causes_that_foretell_worse_than_none_are_not_named(
     )  # fmt: skip
     assert report.verdict is verdict
     assert report.causes == standing.slugs
-    assert ("cannot tell" in report.summary) == (verdict is Verdict.CAUSE_AMBIGUOUS)
+    assert ("something else may be at work too" in report.summary) == (verdict is Verdict.CAUSE_AMBIGUOUS)
 
 
 def test_why_an_extension_is_not_proposed_is_told_by_what_went_wrong() -> None:

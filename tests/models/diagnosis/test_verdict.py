@@ -37,7 +37,7 @@ def best(given: Study) -> Hypothesis:
     """The planted effect alone, refitted."""
     known = given.baseline
     null = null_of(given.design, known.noise, known.priors, known.fit)
-    effects = given.extended(("unsettled_dwell", 0.05, (0.0,))).effects
+    effects = given.extended(("unsettled_dwell", 0.05, (0.0, 0.5))).effects
     return refitted(given.design, known.noise, known.priors, null, known.fit.laws, effects, 0.0, (0.0, 0.0))
 
 
