@@ -173,9 +173,8 @@ def facts_from(stored: Mapping[str, Any]) -> Facts:
     """The inverse of `facts_to`."""
     found: dict[str, Any] = dict(stored) | {"geometry": Geometry(**stored["geometry"]), "oil": Oil(**stored["oil"])}
     for each in fields(Facts):
-        value = found.setdefault(
-            each.name, [] if each.default is MISSING else each.default
-        )  # an older build's lacks some
+        lacking = [] if each.default is MISSING else each.default
+        value = found.setdefault(each.name, lacking)  # what an older build did not store
         if isinstance(value, list):
             numbers = [math.nan if x is None else x for x in value]
             found[each.name] = np.array(numbers, dtype=np.float64) if each.type is FloatArray else tuple(numbers)
