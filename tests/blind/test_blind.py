@@ -68,7 +68,7 @@ def catalogued() -> list[Outcome]:
 @pytest.fixture(scope="module")
 def uncatalogued() -> list[Outcome]:
     slugs = ("speed_bump", "clock_wobble", "resonance")
-    return judged([Trial("outside", (SEED, 2, k), (slug,), 50.0) for slug in slugs for k in range(3)])
+    return judged([Trial("outside", (SEED, 2, k), (slug,), 50.0) for slug in slugs for k in range(2)])
 
 
 def right(outcomes: list[Outcome]) -> int:

@@ -8,8 +8,8 @@ from models.diagnosis.effect import Bend, Effect, Family, Kind, Shape, ShapePara
 from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
 
-#: The power to which the amplitude refers, as a multiple of the usual torque at mid speed: 4 kW on the reference's rig.
-USUAL_POWER = 1.5
+#: The heat flux to which the amplitude refers [W/m²]: the reference's 20 Nm at 1970 rpm and some, on two faces.
+REFERENCE_FLUX = 0.32e6
 #: What weakens: all of the friction, or the oil's shear.
 WHOLE, VISCOUS = 0.0, 1.0
 
@@ -26,8 +26,9 @@ def _grid(_facts: Facts) -> tuple[Tried, ...]:
 def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     log_settling, part, saturation = shape
     settling = float(np.exp(log_settling))
-    usual = USUAL_POWER * scene.facts.usual_torque * scene.laws.frame.reference_velocity
-    heat = np.abs(scene.curve) * scene.points.velocity / usual
+    geometry = scene.facts.geometry
+    power = np.abs(scene.curve) * scene.points.velocity / geometry.mean_radius
+    heat = power / (geometry.friction_faces * geometry.lining_area * REFERENCE_FLUX)
     heat = heat * (1.0 + saturation) / (1.0 + saturation * heat)
     warmth = _around(_along(heat, scene, settling), scene, settling)
     carried = scene.curve if part == WHOLE else scene.viscous
@@ -68,13 +69,13 @@ EFFECT = Effect(
     title="Frictional heat at the interface lowers the torque",
     physics="The interface is hotter than the oil by the power that it turns into heat; the boundary film and the oil "
     "there lose strength.",
-    formula="-S (1 - e^{-a w}), w the power |S| v over the usual one, saturating by s and lagging by τ; S or its "
+    formula="-S (1 - e^{-a w}), w the heat flux |S| ω/A over 0.32 W/mm², saturating by s and lagging by τ; S or its "
     "viscous part",
     source="Marklund and Larsson, Tribology Int. 41 (2008) 824: friction of wet clutches by interface temperature",
     family=Family.THERMAL,
     kind=Kind.ARTEFACT,
     channels=(),
-    amplitude="loss of torque at the usual power",
+    amplitude="loss of torque at 0.32 W/mm²",
     unit="%",
     prior_sd=0.1,
     positive=True,

@@ -18,6 +18,8 @@ REFERENCE_PRESSURE = 5e5
 FIRST_ORDER, FILM, THICKNESS = 0.0, 1.0, 2.0
 #: The least time of such a thickness [s], and the power of speed that it stays below: with more it would be inertia.
 LEAST_TIME, MOST_POWER = 0.15, 0.55
+#: The log of its prior weight: eq. 7 ties strength and time together.
+UNTIED = -1.0
 #: To first order torque falls faster with speed than the film's lag does, for fewer asperities touch: by this power more. A
 #: film of any other kind would be the same at all speeds, as inertia is.
 FEWER = 0.5
@@ -36,10 +38,10 @@ def _grid(_facts: Facts) -> tuple[Tried, ...]:
         for sheared in (0.2, 0.7)
         for lags in (0.0, 1.0)
     ]
-    layers = [(0.1, y, f, time, THICKNESS, 0.0) for y in (0.5, 1.2) for f in (0.03, 0.15) for time in (0.2, 0.8)]
+    layers = [(-0.2, y, f, time, THICKNESS, 0.0) for y in (0.5, 1.2) for f in (0.03, 0.15) for time in (0.2, 0.8)]
     return tuple(
-        Tried(shape=shape, log_weight=-float(np.log(len(shapes))))
-        for shapes in (powers, films, layers)
+        Tried(shape=shape, log_weight=weight - float(np.log(len(shapes))))
+        for shapes, weight in ((powers, 0.0), (films, 0.0), (layers, UNTIED))
         for shape in shapes
     )
 
@@ -114,7 +116,7 @@ def _over_thickness(scene: Scene, looping: NDArray[np.intp], amplitude: float, s
     swing = 1j * np.arange(waves.shape[1]) * points.angular_frequency[looping].reshape(-1, phases)[:, :1] * tau
     missing = np.fft.irfft(waves * swing / (1.0 + swing), phases, axis=1)
     strength = amplitude * middle / (tau * q * (1.0 + least) ** (q - 1.0))
-    pressed = (points.pressure[looping] / REFERENCE_PRESSURE) ** (0.75 + 0.5 * power)
+    pressed = (points.pressure[looping] / REFERENCE_PRESSURE) ** (1.0 + 0.5 * power)
     return np.asarray(strength * pressed * missing.ravel(), dtype=np.float64)
 
 
@@ -137,7 +139,7 @@ EFFECT = Effect(
     physics="While speed rises the film is still thin from before and more asperities carry: torque is higher than "
     "stationary, also where the curve rises; the GMS attractor cannot give that.",
     formula="a (p/5 bar)^x v̇ / (v/v_0 + f)^(y + 1/2), eq. 7's film to first order; or S(w) for S(v) with C_v v^γ (v/w)^s, "
-    "ẇ = (v - w)(w/v_0 + f)^y/τ; or a' (p/5 bar)^((1.5 + x)/2) (H - h), τ ḣ = H - h, "
+    "ẇ = (v - w)(w/v_0 + f)^y/τ; or a' (p/5 bar)^(1 + x/2) (H - h), τ ḣ = H - h, "
     "H = (v/v_0 + f)^(0.55/(1 + y))",
     source="Ompusunggu et al. 2013, eq. 7 and section 3.2",
     family=Family.DYNAMIC,

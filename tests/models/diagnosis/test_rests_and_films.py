@@ -159,6 +159,6 @@ def test_a_film_of_its_own_strength_relaxes(power: float, thin: float, least: fl
         max_step=step,
         rtol=1e-8,
     )
-    strength = 0.5 * (points.pressure[one] / 5e5) ** (0.75 + 0.5 * power) * middle / (tau * q * (1 + least) ** (q - 1))
+    strength = 0.5 * (points.pressure[one] / 5e5) ** (1.0 + 0.5 * power) * middle / (tau * q * (1 + least) ** (q - 1))
     expected = strength * (height - told.y[0])
     np.testing.assert_allclose(change[one], expected, atol=0.02 * np.abs(expected).max())
