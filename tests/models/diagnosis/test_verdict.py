@@ -82,6 +82,37 @@ def test_a_cause_that_leaves_an_oddity_is_not_named(
     assert judged().verdict is expected
 
 
+@pytest.mark.parametrize(
+    ("slugs", "p_value", "expected"),
+    [
+        (("unsettled_dwell", "inertia_torque"), 1e-3, Verdict.CAUSE_AMBIGUOUS),
+        (("unsettled_dwell", "inertia_torque"), 0.5, Verdict.CAUSE_NAMED),
+        (("unsettled_dwell",), 1e-3, Verdict.CAUSE_NAMED),
+    ],
+)
+def test_two_causes_must_agree_in_their_parts_to_be_named(
+    given: Study,
+    best: Hypothesis,
+    monkeypatch: pytest.MonkeyPatch,
+    slugs: tuple[str, ...],
+    p_value: float,
+    expected: Verdict,
+) -> None:
+    """Parts may differ by what one template errs by; two templates could share a misfit between them."""
+    close, known = verdict.close, given.baseline
+
+    def uneven(*arguments: object) -> Closing:
+        closing = close(*arguments)  # type: ignore[arg-type] # handed on as they are
+        return replace(closing, statistics={**closing.statistics, "closure_p_value": 0.9, "parts_p_value": p_value})
+
+    monkeypatch.setattr(verdict, "close", uneven)
+    told = replace(best, effects=tuple(BY_SLUG[slug] for slug in slugs), evidence=best.evidence + 40.0)
+    among = [told, best] if len(slugs) > 1 else [told]
+    found = verdict.judge(given.design, known.noise, known.priors, among, 0.0, -np.inf, np.random.default_rng(1))
+    assert found.standing == (told,)
+    assert found.verdict is expected
+
+
 @pytest.mark.parametrize(("p_value", "expected"), [(0.01, Verdict.CAUSE_NAMED), (1e-4, Verdict.CAUSE_AMBIGUOUS)])
 def test_however_loud_a_cause_is_it_may_leave_a_little_only(
     given: Study, best: Hypothesis, monkeypatch: pytest.MonkeyPatch, p_value: float, expected: Verdict
