@@ -13,7 +13,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis.design import Design
 from models.diagnosis.lagging import Lag, lag_of
-from models.diagnosis.laws import BLOCK, DRIFT, LOG_DECAY, OPEN_DRAG, POWERS, RATIO, Frame, Laws, Scene, scene_of
+from models.diagnosis.laws import BLOCK, DRIFT, FALL, LOG_DECAY, OPEN_DRAG, POWERS, RATIO, Frame, Laws, Scene, scene_of
 from models.diagnosis.loop_bins import PHASES
 
 
@@ -43,10 +43,10 @@ class Prediction:
         laws, rows = self.scene.laws, design.rows
         by_parameters = self.change_at_rows(design, self.scene.gradient, before_lag=True)
         # a loop has one pressure and one state: how the parameters go with θ is the same at its rows as at its points
-        _, slopes, by_decay = laws.with_gradient(rows.pressure, rows.cycles)
+        _, slopes, by_fall = laws.with_gradient(rows.pressure, rows.cycles)
         columns = np.zeros((rows.run.size, laws.theta.size))
         columns[:, :LOG_DECAY] = (by_parameters[:, :, None] * slopes).reshape(-1, 4 * BLOCK)
-        columns[:, LOG_DECAY] = by_parameters[:, RATIO] * by_decay
+        columns[:, FALL] = by_parameters[:, RATIO, None] * by_fall
         columns[:, OPEN_DRAG] = design.to_rows(self.scene.open_powers)
         if self.lag is not None:
             slowness = design.to_rows(np.append(np.zeros(design.plateaus), self.lag.by_log_attractor))

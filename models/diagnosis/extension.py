@@ -21,7 +21,7 @@ from models.diagnosis.design import build_design
 from models.diagnosis.effect import Kind
 from models.diagnosis.facts import Facts, facts_of
 from models.diagnosis.fitting import Fit
-from models.diagnosis.laws import ATTRACTOR, POWERS, Frame, Laws, scene_of
+from models.diagnosis.laws import ATTRACTOR, EXPONENTIAL, LOG_BEND, POWERS, Frame, Laws, scene_of
 from models.diagnosis.points import Points
 
 #: Plateaus are handed on in parts of this many: a design takes no more of one run.
@@ -195,8 +195,11 @@ def _laws(alternative: Mapping[str, Any]) -> Laws:
     frame = alternative["frame"]
     at = Frame(**(frame | {"loop_pressures": np.array(frame["loop_pressures"], dtype=np.float64)}))
     theta = np.array(alternative["theta"], dtype=np.float64)
-    older = ATTRACTOR + at.loop_pressures.size + POWERS - theta.size  # stored before the open clutch had a drag
-    return Laws(theta=np.append(theta, np.zeros(older)), frame=at)
+    size = ATTRACTOR + at.loop_pressures.size + POWERS
+    # before it had a bend M̄_c's law was an exponential, and before that the open clutch had no drag
+    if theta.size in (size - 1, size - 1 - POWERS):
+        theta = np.insert(theta, LOG_BEND, np.log(EXPONENTIAL))
+    return Laws(theta=np.append(theta, np.zeros(size - theta.size)), frame=at)
 
 
 def _steady_points(cycles: FloatArray, pressure: FloatArray, velocity: FloatArray) -> Points:

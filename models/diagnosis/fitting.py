@@ -15,7 +15,21 @@ from models.diagnosis import amplitude
 from models.diagnosis.baseline import Prediction, predict
 from models.diagnosis.design import Design
 from models.diagnosis.effect import Effect, Shape
-from models.diagnosis.laws import ATTRACTOR, BLOCK, DRIFT, KAPPA, LOG_DECAY, OPEN_DRAG, POWERS, Frame, Laws
+from models.diagnosis.laws import (
+    ATTRACTOR,
+    BENDS,
+    BLOCK,
+    DRIFT,
+    FALL,
+    KAPPA,
+    LOG_BEND,
+    LOG_DECAY,
+    OPEN_DRAG,
+    POWERS,
+    USUAL_BEND,
+    Frame,
+    Laws,
+)
 from models.diagnosis.whitening import Noise, gains_of, whitened, without_gains
 
 #: How alike the two shares of one law are expected to drift [-].
@@ -73,7 +87,7 @@ def priors_of(design: Design, start: FloatArray, frame: Frame) -> Priors:
         block = k * BLOCK
         sds[block : block + BLOCK] = [spread, spread, 1.5, 1.5, 1.5, 0.7]
         means[block + 2 : block + BLOCK] = [0.0, 0.0, np.log(0.5 * design.facts.life), np.log(0.8)]
-    sds[LOG_DECAY], means[LOG_DECAY] = 0.7, np.log(0.6 * frame.span)
+    sds[FALL], means[FALL] = (0.7, 1.2), (np.log(0.6 * frame.span), np.log(USUAL_BEND))
     sds[DRIFT:ATTRACTOR], means[DRIFT:ATTRACTOR] = (0.6, 0.4, 0.3), 0.0
     # friction may follow at once: one wide doubt, and a step of 1 from pressure to pressure
     sds[KAPPA], means[KAPPA] = 1.0, 0.0
@@ -102,7 +116,7 @@ def _free(design: Design, size: int) -> NDArray[np.bool_]:
         free[block + 1] = levels > 1
         free[block + 2 : block + 4] = states > 1, states > 1 and levels > 1
         free[block + 4 : block + 6] = states > 2
-    free[LOG_DECAY] = levels > 2
+    free[FALL] = levels > 2, levels > 3
     free[DRIFT:ATTRACTOR] = loop_states > 1, loop_states > 2, loop_states > 1 and levels > 1
     free[OPEN_DRAG] = not closed.all()
     return free
@@ -260,6 +274,7 @@ def _moved(state: Fit, priors: Priors, step: FloatArray) -> tuple[Laws, tuple[Fi
         move[block + 2 : block + BLOCK] = np.clip(move[block + 2 : block + BLOCK], -_LARGEST_STEP, _LARGEST_STEP)
     move[LOG_DECAY:-POWERS] = np.clip(move[LOG_DECAY:-POWERS], -_LARGEST_STEP, _LARGEST_STEP)
     theta = state.laws.theta + move
+    theta[LOG_BEND] = np.clip(theta[LOG_BEND], *np.log(BENDS))
     for k in range(4):
         theta[k * BLOCK + 4 : k * BLOCK + 6] = np.clip(theta[k * BLOCK + 4 : k * BLOCK + 6], -3.0, 25.0)
     at, effects = count, []

@@ -5,14 +5,15 @@ highest pressure,
 
     parameter = u⁻ (1 + s⁻ D) w(p) + u⁺ (1 + s⁺ D) (1 - w(p))
     w         = (P⁺ - p)/(P⁺ - P⁻)                               for M_s, V_S, C_v: straight lines in pressure
-    w         = (e^{-(p - P⁻)/p_0} - E)/(1 - E),  E = e^{-(P⁺ - P⁻)/p_0}      for M̄_c: c_∞ + a e^{-p/p_0}
+    w         = (g(p) - g(P⁺))/(1 - g(P⁺)),  g = (1 + b (p - P⁻)/p_0)^{-1/b}  for M̄_c: fast or slowly to its asymptote
     log C          = κ(p) + d_1 x + d_2 x (1 + ξ)/(x + ξ) + d_3 x (p - p̄)/(P⁺ - P⁻),       x = ζ/ζ_last,  ξ = 0.15
     open clutch    = Σ_k o_k (v/v_0)^k,  k = 1 ... 4                           whatever oil it drags along, and no friction
 
 (φ, ε) stand in θ as (log h, log ε) with h the half-life, D(h) = 1/2: φ = h/(2^{1/ε} - 1). Data tell h far better than φ.
 u⁻, u⁺ are the fresh values at the two ends of the pressures; intercept and slope (asymptote and excess) drift each by its
-own share: whether eq. 6 multiplies a law as a whole (s⁻ = s⁺) or not is left to the data. κ is free at every
-pressure of the loops and straight between them.
+own share: whether eq. 6 multiplies a law as a whole (s⁻ = s⁺) or not is left to the data. Fig. 9 shows that M̄_c falls to an
+asymptote and not how: b → 0 is c_∞ + a e^{-p/p_0}, b = 1 with p_0 = P⁻ is c_∞ + a/p; below P⁻ its
+tangent. κ is free at every pressure of the loops and straight between them.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, eqs. 2, 3, 6, figs. 9 and 10; the bilinear form and the
 course of C are this project's.
@@ -29,15 +30,22 @@ from models.stribeck import GAMMA
 
 #: The laws of eq. 6 over pressure, in the order of `models.stribeck.PARAMETER_NAMES`; each has six places in θ.
 BLOCK = 6
-#: θ: four blocks of (low end, high end, share low, share high, log h, log ε); log p_0;
+#: θ: four blocks of (low end, high end, share low, share high, log h, log ε); log p_0, log b;
 #: d_1, d_2, d_3; then κ at each pressure of the loops; then o_1 ... o_4 of the open clutch.
 LOG_DECAY = 4 * BLOCK
-DRIFT = LOG_DECAY + 1
+LOG_BEND = LOG_DECAY + 1
+FALL = slice(LOG_DECAY, LOG_BEND + 1)
+DRIFT = LOG_BEND + 1
 ATTRACTOR = DRIFT + 3
 #: Drag that rises and falls again is followed to a percent by so many powers; with two, what is left would pass for a zero.
 POWERS = 4
 KAPPA, OPEN_DRAG = slice(ATTRACTOR, -POWERS), slice(-POWERS, None)
 RATIO = 1  # the place of M̄_c among the four
+#: b where nothing tells it: between an exponential and a hyperbola.
+USUAL_BEND = 0.25
+#: b of what is as good as an exponential, and the bounds of b.
+EXPONENTIAL = 1e-3
+BENDS = (EXPONENTIAL, 5.0)
 #: Half of what log C drifts by early is done after this share of the life measured, as eq. 6 has it.
 EARLY = 0.15
 _LEAST_VELOCITY = 1e-3
@@ -73,24 +81,24 @@ class Laws:
         return np.repeat(self._values(pressure[begins], cycles[begins], None)[0], repeats, axis=0)
 
     def with_gradient(self, pressure: FloatArray, cycles: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Parameters [n, 4], their derivatives by θ's blocks [n, 4, BLOCK], and that of M̄_c by log p_0 [n]."""
+        """Parameters [n, 4], their derivatives by θ's blocks [n, 4, BLOCK], and those of M̄_c by FALL [n, 2]."""
         begins, repeats = _stretches(pressure, cycles)
         slopes = np.empty((begins.size, 4, BLOCK))
-        values, by_decay = self._values(pressure[begins], cycles[begins], slopes)
-        values, slopes, by_decay = (np.repeat(each, repeats, axis=0) for each in (values, slopes, by_decay))
-        return values, slopes, by_decay
+        values, by_fall = self._values(pressure[begins], cycles[begins], slopes)
+        values, slopes, by_fall = (np.repeat(each, repeats, axis=0) for each in (values, slopes, by_fall))
+        return values, slopes, by_fall
 
     def _values(
         self, pressure: FloatArray, cycles: FloatArray, slopes: FloatArray | None
     ) -> tuple[FloatArray, FloatArray]:
-        """Parameters [n, 4] and dM̄_c/dlog p_0 [n]; fills `slopes` [n, 4, BLOCK] where it is given."""
+        """Parameters [n, 4] and M̄_c's derivatives by FALL [n, 2]; fills `slopes` [n, 4, BLOCK] where it is given."""
         values = np.empty((pressure.size, 4))
-        by_decay = np.zeros(pressure.size)
+        by_fall = np.zeros((pressure.size, 2))
         high = (pressure - self.frame.lowest) / self.frame.span
         # rows of one test stand together: eq. 6 is worked out once for each
         begins, repeats = _stretches(cycles)
         states = cycles[begins]
-        fall, by_fall = falling_weight(high, self.frame.span, float(self.theta[LOG_DECAY]))
+        fall, fall_slopes = falling_weight(high, self.frame.span, self.theta[FALL])
         for k in range(4):
             first, second, share_1, share_2, log_half, log_exponent = self.theta[k * BLOCK : (k + 1) * BLOCK].tolist()
             weight_1, weight_2 = (fall, 1.0 - fall) if k == RATIO else (1.0 - high, high)
@@ -100,7 +108,7 @@ class Laws:
             lost = first * share_1 * weight_1 + second * share_2 * weight_2
             values[:, k] = first * weight_1 + second * weight_2 + lost * done
             if k == RATIO:
-                by_decay = by_fall * (first * (1.0 + share_1 * done) - second * (1.0 + share_2 * done))
+                by_fall = fall_slopes * (first * (1.0 + share_1 * done) - second * (1.0 + share_2 * done))[:, None]
             if slopes is not None:
                 slopes[:, k, 0] = weight_1 * (1.0 + share_1 * done)
                 slopes[:, k, 1] = weight_2 * (1.0 + share_2 * done)
@@ -112,7 +120,7 @@ class Laws:
         values[stuck, 2] = _LEAST_VELOCITY
         if slopes is not None:
             slopes[stuck, 2] = 0.0
-        return values, by_decay
+        return values, by_fall
 
     def by_pressure(self, pressure: FloatArray, cycles: FloatArray) -> FloatArray:
         """d(M_s, M̄_c, V_S, C_v)/dp [n, 4] 1/Pa."""
@@ -138,13 +146,22 @@ def _stretches(*keys: FloatArray) -> tuple[IntArray, IntArray]:
     return begins, np.diff(begins, append=changes.size)
 
 
-def falling_weight(high: FloatArray, span: float, log_decay: float) -> tuple[FloatArray, FloatArray]:
-    """w [n] of M̄_c's law and dw/dlog p_0 [n], at (p - P⁻)/(P⁺ - P⁻) = `high` [n] and log p_0 with p_0 in Pa."""
-    ratio = float(np.clip(span / np.exp(log_decay), 1e-3, 60.0))
-    last, here = np.exp(-ratio), np.exp(-ratio * high)
-    whole = 1.0 - last
-    by_decay = ((here * high - last) * whole + (here - last) * last) * ratio / whole**2
-    return (here - last) / whole, by_decay
+def falling_weight(high: FloatArray, span: float, fall: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """w [n] of M̄_c's law at (p - P⁻)/(P⁺ - P⁻) = `high` [n], and its derivatives [n, 2] by `fall`: log p_0, p_0 in Pa, and
+    log b, b within BENDS. Below P⁻ the law goes on by its tangent: a hyperbola has its pole there."""
+    ratio = float(np.clip(span / np.exp(fall[0]), 1e-3, 60.0))
+    bend = float(np.exp(np.clip(fall[1], *np.log(BENDS))))
+    at = np.append(high, 1.0)
+    stretched = 1.0 + bend * ratio * np.maximum(at, 0.0)
+    logs = np.log(stretched)
+    weight = np.exp(-logs / bend) - ratio * np.minimum(at, 0.0)
+    along = ratio * at / stretched
+    by_bend = (logs / bend - along) * np.exp(-logs / bend) * (at > 0.0)
+    by_decay = along * np.where(at > 0.0, np.exp(-logs / bend), 1.0)
+    slopes = np.stack([by_decay, by_bend], axis=-1)
+    whole = 1.0 - weight[-1]
+    by_fall = (slopes[:-1] - slopes[-1]) / whole + ((weight[:-1] - weight[-1]) / whole**2)[:, None] * slopes[-1]
+    return (weight[:-1] - weight[-1]) / whole, by_fall
 
 
 def _progress(cycles: FloatArray, log_half: float, log_exponent: float) -> tuple[FloatArray, FloatArray, FloatArray]:

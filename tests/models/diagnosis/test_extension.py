@@ -10,8 +10,9 @@ from models.diagnosis.campaign import Campaign, DutyRun, StationaryRun
 from models.diagnosis.catalogue import BY_SLUG
 from models.diagnosis.design import MOST_PLATEAUS
 from models.diagnosis.effects.torque_zero_shift import DAYS, STRAIGHT
-from models.diagnosis.extension import Extension, build_extension, facts_from, facts_to
+from models.diagnosis.extension import Extension, _laws, build_extension, facts_from, facts_to
 from models.diagnosis.fitting import Fit, Fitted
+from models.diagnosis.laws import EXPONENTIAL, FALL, LOG_BEND, POWERS, falling_weight
 from models.diagnosis.viscosity import log_viscosity_ratio
 from models.runs import Plateaus
 from tests.models.diagnosis.campaigns import campaign
@@ -185,3 +186,23 @@ def test_a_zero_that_creeps_by_days_keeps_the_days_of_its_diagnosis(warm):
     for run, share in ((timed[1], 1 / (len(timed) - 1)), (timed[-1], 1.0)):
         found = built.artefact(run, seen)
         assert found[0] == pytest.approx(0.5 * share, rel=0.02)
+
+
+@pytest.mark.parametrize("drag", [True, False])
+def test_what_was_stored_before_the_ratio_s_fall_had_a_bend_is_an_exponential_still(warm, drag):
+    built = extension_of(warm, TEMPERATURE, WEAR)
+    stored = json.loads(json.dumps(built.to_dict()))
+    for each in stored["content"]["alternatives"]:
+        theta = np.delete(np.array(each["theta"]), LOG_BEND)
+        each["theta"] = (theta if drag else theta[:-POWERS]).tolist()
+    told = _laws(Extension.from_dict(stored).content["alternatives"][0])
+    expected = _laws(built.content["alternatives"][0])
+    assert told.theta.size == expected.theta.size
+    assert told.theta[LOG_BEND] == pytest.approx(np.log(EXPONENTIAL))
+    kept = np.arange(told.theta.size) != LOG_BEND
+    assert np.array_equal(told.theta[kept][:-POWERS], expected.theta[kept][:-POWERS])
+    assert np.array_equal(told.theta[-POWERS:], expected.theta[-POWERS:] if drag else np.zeros(POWERS))
+    high, decay = np.linspace(0.0, 1.0, 5), np.exp(told.theta[LOG_BEND - 1])
+    fallen = np.exp(-high * told.frame.span / decay)
+    weight = falling_weight(high, told.frame.span, told.theta[FALL])[0]
+    assert np.allclose(weight, (fallen - fallen[-1]) / (1 - fallen[-1]), atol=5e-3)
