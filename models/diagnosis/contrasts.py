@@ -2,7 +2,8 @@
 
 They are relative to the predicted torque (structure in friction scales with it) and are products of cosines over the
 ranges of pressure, speed, clock and torque and over the rank of life, bumps and bends in speed, waves over a loop's
-phase, and single states. Axes are public channel names, or `test_clock_s`, `cycles`, `loop_phase`.
+phase, and single states; waves over speed go through the loops' lag, as friction does. Axes are public channel names, or
+`test_clock_s`, `cycles`, `loop_phase`.
 """
 
 from collections.abc import Callable
@@ -23,8 +24,9 @@ SPEED, PRESSURE, CYCLES = "speed_rpm", "pressure_bar", "cycles"
 TEMPERATURE, CLOCK, PHASE = "oil_temperature_c", "test_clock_s", "loop_phase"
 TORQUE = "torque_nm"
 
-#: A sensor that is not straight may be so in many waves over its range.
-TORQUE_WAVES = 20
+#: A sensor that is not straight may be so in many waves over its range; speed may have ripples (an encoder's, a mount's).
+TORQUE_WAVES, SPEED_WAVES = 20, range(4, 17)
+_SEEN_AT_ALL = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,6 +60,10 @@ def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
             add(SPEED if s > p + 1 else PRESSURE, _cosine(s, speed) * _cosine(p, pressure) * steady)
         for z in range(1, lives + 1):
             add(SPEED if s > z + 1 else CYCLES, _cosine(s, speed) * _cosine(z, life) * steady)
+    for wave in _speed_waves(design, prediction).T:
+        if np.abs(wave).max() > _SEEN_AT_ALL * torque.max():  # at even speeds a sine may be 0 at each
+            columns.append(wave)
+            axes.append(SPEED)
     for p, z, s in product(range(1, presses + 1), range(1, min(lives, 2) + 1), range(1, 4)):
         add(SPEED if s > max(p, z) else PRESSURE, _cosine(s, np.sqrt(speed)) * _cosine(p, pressure) * _cosine(z, life))
     for centre in np.linspace(0.06, 0.94, 13):
@@ -93,6 +99,15 @@ def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
         if lives:
             add(TEMPERATURE, warm * _cosine(1, life))
     return Contrasts(columns=np.stack(columns, axis=1), axes=tuple(axes)) if columns else _none(design)
+
+
+def _speed_waves(design: Design, prediction: Prediction) -> FloatArray:
+    """[N, m] Nm: ripples of friction over speed, which loops show with their lag."""
+    scene = prediction.scene
+    speed = _unit(scene.points.velocity, scene.points.engaged > 0)
+    orders = np.pi * np.array(SPEED_WAVES)
+    waves = np.concatenate([np.cos(orders * speed[:, None]), np.sin(orders * speed[:, None])], axis=1)
+    return prediction.change_at_rows(design, np.abs(scene.curve)[:, None] * waves, before_lag=True)
 
 
 def _none(design: Design) -> Contrasts:

@@ -18,8 +18,9 @@ from models.stribeck import GAMMA
 
 #: Phases at which a loop is computed, and bins in which it is compared; a bin holds a whole number of phases.
 PHASES, BINS = 120, 60
-#: Rows slower than this share of the loop's highest speed are left out: sticking, or next to it.
-LEAST_SPEED = 0.012
+#: Rows slower than this share of the loop's highest speed are left out: they stick, or are next to it. The second holds
+#: where the swing has corners: bins cannot follow how fast the cusp of S at rest is passed there.
+LEAST_SPEED, LEAST_WITH_CORNERS = 0.004, 0.012
 #: This share of a period and at least so long [s] passes before the loop is in its periodic state (friction lags by S/C,
 #: about 0.1 s), less where no whole period would follow; all that does is used, whole periods or not.
 START, SETTLING = 0.06, 1.0
@@ -162,7 +163,8 @@ def _binned(
     at = turned[inside] * (BINS / (2 * math.pi))
     number = np.minimum(at.astype(np.intp), BINS - 1)
     count = np.bincount(number, minlength=BINS).astype(np.float64)
-    count[fitted.reshape(BINS, -1).min(axis=1) < LEAST_SPEED * fastest] = 0.0
+    slowest = LEAST_SPEED if cycle.cosine.size <= SPEED_HARMONICS else LEAST_WITH_CORNERS
+    count[fitted.reshape(BINS, -1).min(axis=1) < slowest * fastest] = 0.0
     if np.count_nonzero(count) < FEWEST_BINS:
         return "too few samples lie in whole periods."
     angular = 2 * math.pi * cycle.frequency

@@ -50,3 +50,20 @@ def test_a_contrast_sees_its_share_of_what_is_visible(
     scale = np.sqrt(np.maximum(np.diag(info), 1e-300))
     shares = (info / scale[:, None] / scale)[: PLACES.size, PLACES.size :] ** 2
     assert shares.max(axis=1).min() > least
+
+
+@pytest.mark.parametrize("waves", [5.3, 8.4, 13.7])
+def test_ripples_over_speed_are_seen_through_the_lag_of_loops(plain: Study, waves: float) -> None:
+    """Half waves over the range of speeds, in between those that are looked for, and of any phase."""
+    known, points = plain.baseline, plain.design.points
+    view = view_of(plain.design, known.noise, known.priors, known.fit, [])
+    unit = points.velocity / points.velocity.max()
+    ripples = np.stack([np.cos(np.pi * waves * unit + phase) for phase in (0.0, 0.8, 1.6, 2.4)], axis=1)
+    prediction = known.fit.prediction
+    friction = prediction.scene.curve[:, None] * ripples
+    structures = prediction.change_at_rows(plain.design, friction, before_lag=True)
+    columns = np.column_stack([structures, view.contrasts.columns])
+    info = project(gram_of(plain.design, known.noise, known.priors, known.fit, columns), known.noise.run_gain, 0.0).info
+    scale = np.sqrt(np.maximum(np.diag(info), 1e-300))
+    shares = (info / scale[:, None] / scale)[:4, 4:] ** 2
+    assert shares.max(axis=1).min() > 0.45
