@@ -8,6 +8,7 @@ from models.diagnosis.facts import Facts
 from models.diagnosis.laws import Scene
 
 _HOUR, _MINUTE = 3600.0, 60.0
+WHOLE, STATIC = 0.0, 1.0
 
 
 def _grid(facts: Facts) -> tuple[Tried, ...]:
@@ -18,12 +19,15 @@ def _grid(facts: Facts) -> tuple[Tried, ...]:
     if np.isfinite(facts.rest_moments).any():
         courses += [(0.1 * gap, seconds) for seconds in (150.0, 600.0)]
     powers = (0.0, 1.0) if np.isfinite(facts.rest_lengths).sum() > 1 else (0.0,)
-    return tuple(Tried(shape=(*course, power)) for course in courses for power in powers)
+    return tuple(
+        Tried(shape=(*course, power, part)) for course in courses for power in powers for part in (WHOLE, STATIC)
+    )
 
 
 def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
-    length, seconds, power = shape
+    length, seconds, power, *part = shape
     points = scene.points
+    carried = scene.gradient[:, 0] * scene.parameters[:, 0] if part == [STATIC] else scene.curve
     share = np.zeros_like(points.cycles)
     strengths = _strengths(scene.facts) ** power
     for rest, moment, strength in zip(scene.facts.rests, scene.facts.rest_moments, strengths.tolist(), strict=True):
@@ -34,7 +38,7 @@ def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
             left = np.where(waited < -_MINUTE, 0.0, left)  # tested at the same cycles, but before the pause
             left = left * np.exp(-np.clip(waited, 0.0, 50 * seconds) / seconds)
         share = np.maximum(share, left)
-    return np.asarray(amplitude * scene.curve * share, dtype=np.float64)
+    return np.asarray(amplitude * carried * share, dtype=np.float64)
 
 
 def _strengths(facts: Facts) -> FloatArray:
@@ -49,7 +53,8 @@ EFFECT = Effect(
     title="Friction recovered during a rest",
     physics="While the clutch rests additives settle on the lining and oil drains: friction starts off its course and "
     "comes back within some cycles or minutes of sliding.",
-    formula="a S (ln(1 + rest/1 h)/ln(1 + longest/1 h))^r e^{-(ζ - ζ_rest)/ζ_c}, with the clock also e^{-(t - t_rest)/τ}",
+    formula="a S (ln(1 + rest/1 h)/ln(1 + longest/1 h))^r e^{-(ζ - ζ_rest)/ζ_c}, S or M_s ∂S/∂M_s; with the clock also "
+    "e^{-(t - t_rest)/τ}",
     source="boundary films of friction modifiers re-form at rest",
     family=Family.HISTORY,
     kind=Kind.COURSE,
@@ -63,6 +68,7 @@ EFFECT = Effect(
         ShapeParameter(name="length ζ_c", unit="cycles", lowest=1.0, highest=float("inf")),
         ShapeParameter(name="settling time τ", unit="s", lowest=0.0, highest=float("inf")),
         ShapeParameter(name="power of the rest's length r", unit="-", lowest=0.0, highest=2.0, smooth=True),
+        ShapeParameter(name="what is changed", unit="-", lowest=WHOLE, highest=STATIC),
     ),
     grid=_grid,
     change=_change,

@@ -3,6 +3,8 @@
 Every maker draws a shape and returns the effect; amplitudes are set by loudness later.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
@@ -133,14 +135,17 @@ def unsettled_dwell(rng: np.random.Generator, _: Plan) -> Effect:
 
 
 def rest_recovery(rng: np.random.Generator, plan: Plan) -> Effect:
-    """A rested lining grips differently: ever more with the pause (saturating in its logarithm), gone in the test."""
+    """A rested lining grips differently: ever more with the pause (saturating in its logarithm), gone in the test. What
+    grips is all of friction, or the asperities alone."""
     hours = rng.uniform(0.5, 3.0)
     longest = np.log1p(plan.life.pause.max() / 3600 / hours)
     gone, sign, order = rng.uniform(120, 700), rng.choice([-1.0, 1.0]), rng.uniform(0.7, 1.0)
+    as_a_whole = float(rng.random() < 0.5)
 
     def friction(a: float, site: Site, law: Law) -> FloatArray:
         late = site.clock + (DWELL * 250 if site.kind == "loop" else 0.0)  # loops come after the stationary test
         rested = np.log1p(site.life.pause[site.state][:, None] / 3600 / hours) / longest
-        return sign * a * rested * np.exp(-((late / gone) ** order)) * law.torque(site.v)
+        gripping = replace(law, viscous=as_a_whole * law.viscous).torque(site.v)
+        return sign * a * rested * np.exp(-((late / gone) ** order)) * gripping
 
     return Effect("rest_recovery", 0.02, 0.5, friction)

@@ -12,6 +12,7 @@ from models.diagnosis.baseline import frame_of, predict
 from models.diagnosis.campaign import Campaign, DutyRun, EventKind, MaintenanceEvent, StationaryRun
 from models.diagnosis.catalogue import BY_SLUG
 from models.diagnosis.design import build_design
+from models.diagnosis.effects.rest_recovery import STATIC, WHOLE
 from models.diagnosis.effects.squeeze_film import FILM, FIRST_ORDER, LEAST_TIME, MOST_POWER, THICKNESS, usual_slope
 from models.diagnosis.facts import facts_of
 from models.diagnosis.laws import GAMMA, Scene, curve
@@ -77,6 +78,19 @@ def test_friction_recovers_with_the_logarithm_of_the_rest_where_the_power_is_one
     kept = shares[0.0][0]  # of the cycles and the clock, the same for both
     assert shares[0.0] == pytest.approx([kept, kept])
     assert shares[1.0] == pytest.approx([kept * np.log(3.0) / np.log(11.0), kept])
+
+
+def test_what_recovers_is_friction_as_a_whole_or_its_static_torque() -> None:
+    scene = scene_of_all(rested(2.0, 10.0))
+    effect = BY_SLUG["rest_recovery"]
+    whole, static, older = (effect.change(scene, 0.01, (10.0, 0.0, 0.0, *part)) for part in ((WHOLE,), (STATIC,), ()))
+    some = whole > 0
+    np.testing.assert_array_equal(older, whole)  # as it was stored before there was a choice
+    sheared = np.where(np.arange(4) == 3, 0.0, scene.parameters)  # without C_v the curve is that of the asperities
+    share = curve(scene.points.velocity, sheared) / scene.curve
+    np.testing.assert_allclose(static[some], (whole * share)[some], rtol=1e-12)
+    assert np.ptp(share[some]) > 0.1
+    assert {one.shape[-1] for one in effect.grid(scene.facts)} == {WHOLE, STATIC}
 
 
 def test_a_test_before_the_pause_at_the_same_cycles_has_not_rested() -> None:
