@@ -10,6 +10,7 @@ z = score/√info is standard normal where there is no effect; ½ info a² is λ
 an effect of amplitude a.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -112,10 +113,15 @@ def gram_of(design: Design, noise: Noise, priors: Priors, fit: Fit, changes: Flo
 
 
 def projections_of(gram: Gram, noise: Noise) -> list[Projected]:
-    """With every scatter of the gains that is considered: of the runs', and of the curves' up to what the noise has or next
-    above. Where the data ask for none of the latter without an effect, they do not with one."""
+    """With every scatter of the gains that is considered, see `each_projection`."""
+    return list(each_projection(gram, noise))
+
+
+def each_projection(gram: Gram, noise: Noise) -> Iterator[Projected]:
+    """One after the other: of the runs' gains, and of the curves' up to what the noise has or next above. Where the data ask
+    for none of the latter without an effect, they do not with one."""
     curves = [each for each in CURVE_GAINS if each <= MORE * noise.curve_gain]
-    return [project(gram, gain, curve) for curve in curves for gain in GAINS.tolist()]
+    return (project(gram, gain, curve) for curve in curves for gain in GAINS.tolist())
 
 
 def likely_curve_gain(gram: Gram) -> float:

@@ -1,4 +1,4 @@
-"""Candidates refitted together with the whole baseline, and what that makes of their evidence."""
+"""Candidates refitted together with the whole baseline, what that makes of their evidence, pairs that undo each other."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -11,7 +11,7 @@ from models.diagnosis.amplitude import log_peak
 from models.diagnosis.bending import BEND, bends
 from models.diagnosis.design import Design
 from models.diagnosis.effect import Effect
-from models.diagnosis.fitting import Fit, Fitted, Priors, effect_precisions, fit, free_shapes
+from models.diagnosis.fitting import Fit, Fitted, Priors, effect_precisions, effect_rows, fit, free_shapes
 from models.diagnosis.laws import Laws
 from models.diagnosis.projection import Gram, Projected, gram_of, projections_of
 from models.diagnosis.whitening import Noise
@@ -128,3 +128,16 @@ def _beside_bounds(projected: Projected, outward: FloatArray) -> float:
 def finite(hypothesis: Hypothesis) -> bool:
     """Whether the refit came to anything."""
     return hypothesis.fit is not None and bool(np.isfinite(hypothesis.evidence))
+
+
+def undoing(design: Design, noise: Noise, priors: Priors, hypothesis: Hypothesis) -> float:
+    """How much more two effects would be worth by themselves than they are together, Σ λ_i/λ; 1 of one effect, or of less
+    than a nat. Where it is large, the difference of two templates follows structure that neither of them is."""
+    if hypothesis.fit is None or len(hypothesis.fit.effects) < 2:
+        return 1.0
+    found = hypothesis.fit
+    changes = [effect_rows(design, found.prediction, each) for each in found.effects]
+    gram = gram_of(design, noise, priors, replace(found, effects=()), np.stack(changes, axis=1))
+    info = max(projections_of(gram, noise), key=lambda each: each.evidence).info
+    alone, both = 0.5 * float(np.trace(info)), 0.5 * float(info.sum())
+    return alone / max(both, 1e-3 * alone) if alone > 1.0 else 1.0

@@ -6,16 +6,18 @@ is many columns and no amplitude that could be told, so it is judged by its marg
 
     evidence = ½ sᵀ (I + Λ⁻¹)⁻¹ s - ½ ln det(1 + Λ I)        (s the score, I the information, Λ the prior variances)
 
-averaged over how strongly temperature swings, from test to test and, by itself, within one.
+averaged over how strongly temperature swings, from test to test and, by itself, within one, and over the gains' scatter, as
+every other evidence is: what gains would do as well is no temperature's.
 """
 
 import numpy as np
+from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
 from models.arrays import FloatArray
 from models.diagnosis.design import Design
 from models.diagnosis.fitting import Fit, Priors
-from models.diagnosis.projection import Projected, gram_of, project
+from models.diagnosis.projection import Projected, each_projection, gram_of
 from models.diagnosis.whitening import Noise
 
 #: Deviation of ln ν in a test that swings by some 3 K, and the factors on it that are considered from test to test and
@@ -27,7 +29,14 @@ _WAVES = 4
 def temperature_evidence(design: Design, noise: Noise, priors: Priors, fitted: Fit) -> float:
     """Evidence [nats] of unmeasured courses of oil temperature over none."""
     columns, between, within = _courses(design, fitted)
-    projected = project(gram_of(design, noise, priors, fitted, columns), noise.run_gain, noise.curve_gain)
+    gram = gram_of(design, noise, priors, fitted, columns)
+    told = [(each.evidence, _averaged(each, between, within)) for each in each_projection(gram, noise)]
+    without, gained = np.array(told).T
+    return float(logsumexp(without + gained) - logsumexp(without))
+
+
+def _averaged(projected: Projected, between: FloatArray, within: FloatArray) -> float:
+    """Over the strengths."""
     logs = [_marginal(projected, (USUAL * (b * between + w * within)) ** 2) for b in BETWEEN for w in WITHIN]
     return float(logsumexp(logs) - np.log(len(logs)))
 
@@ -56,7 +65,14 @@ def _marginal(projected: Projected, variances: FloatArray) -> float:
     root = np.sqrt(variances)
     unit = root[:, None] * projected.info * root
     score = root * projected.score
-    values, vectors = np.linalg.eigh(0.5 * (unit + unit.T))
-    values = np.maximum(values, 0.0)
-    along = vectors.T @ score
-    return float(0.5 * (along**2 / (1 + values)).sum() - 0.5 * np.log1p(values).sum())
+    factor = np.linalg.cholesky(np.eye(root.size) + 0.5 * (unit + unit.T))
+    half = solve_triangular(factor, score, lower=True)
+    return float(0.5 * (half**2).sum() - np.log(np.diag(factor)).sum())
+
+
+def with_unmeasured(probabilities: dict[str, float], unmeasured: float, best: float, slack: float) -> dict[str, float]:
+    """The probabilities with an unmeasured oil temperature of evidence `unmeasured` [nats] beside the others;
+    `best` is that of the best candidate, `slack` what its template may be wrong by."""
+    share = float(1 / (1 + np.exp(-np.clip((unmeasured - best) / (1.0 + 0.5 * slack), -500, 500))))
+    found = {slug: (1 - share) * each for slug, each in probabilities.items() if slug != "oil_temperature"}
+    return dict(sorted({**found, "oil_temperature": share}.items(), key=lambda item: -item[1]))

@@ -17,8 +17,9 @@ from models.diagnosis.alarm import lead
 from models.diagnosis.design import Design
 from models.diagnosis.fitting import Priors
 from models.diagnosis.periodogram import lines
-from models.diagnosis.refitting import Hypothesis, finite
+from models.diagnosis.refitting import Hypothesis, finite, undoing
 from models.diagnosis.report import Verdict
+from models.diagnosis.unmeasured import with_unmeasured
 from models.diagnosis.viewing import View, view_of
 from models.diagnosis.whitening import Noise
 
@@ -46,6 +47,8 @@ LEFT_SHARE, PARTS_SHARE = 5e-3, 3e-3
 #: Where what is left (of two causes the parts, too) would look like that by chance in fewer cases, beyond what a template
 #: leaves, nothing is named. However loud it is, the right template leaves hardly more [nats] than the second says.
 UNEASY, MOST_LEFT = 0.05, 3.0
+#: Two effects worth so much more by themselves than together undo each other, and do not close by so many nats.
+MOST_UNDONE, UNDONE = 2.5, 8.0
 #: A line in raw records has paid for its search: it is there.
 VIBRATION_PROBABILITY = 0.98
 #: So many of the candidates that stand are closed at most.
@@ -196,7 +199,9 @@ def _leader(
         return PAIR_PRICE + slack + (KIN_PRICE if kin else 0.0)
 
     best = max(pairs, key=lambda each: each.evidence - price(each), default=alone)
-    return (best if best.evidence - price(best) > alone.evidence else alone), price
+    ahead = best.evidence - price(best) > alone.evidence
+    story = not ahead or tested(best).statistics["undoing"] <= MOST_UNDONE or not tested(alone).closed
+    return (best if ahead and story else alone), price
 
 
 class _Tested:
@@ -230,7 +235,7 @@ class Closing:
 
 
 def close(design: Design, noise: Noise, priors: Priors, hypothesis: Hypothesis, rng: np.random.Generator) -> Closing:
-    """Three tests on what is left: smooth contrasts, parts of the data, lines over the clock."""
+    """Three tests on what is left (smooth contrasts, parts of the data, lines over the clock), and one on a pair itself."""
     if hypothesis.fit is None:
         raise ValueError("a hypothesis must be fitted to be closed")
     slack = tolerance(hypothesis)
@@ -238,11 +243,13 @@ def close(design: Design, noise: Noise, priors: Priors, hypothesis: Hypothesis, 
     left = lead(view.projections, view.smooth, np.zeros(len(view.contrasts.axes)), LEFT_SHARE, rng)
     parts = lead(view.projections, view.inside, np.zeros(view.blocks), PARTS_SHARE, rng)
     line = lines(design, noise, hypothesis.fit.residual)
-    statistics: dict[str, float] = {}
+    statistics = {"undoing": undoing(design, noise, priors, hypothesis)}
     for name, found in (("closure", left), ("parts", parts), ("left_lines", line)):
         statistics |= {f"{name}_value": found.value, f"{name}_p_value": found.p_value}
     uneven = PARTS_TOLERANCE / TOLERANCE * slack
     excess = max(each.value - each.threshold - most for each, most in ((left, slack), (parts, uneven), (line, slack)))
+    if statistics["undoing"] > MOST_UNDONE:
+        excess = max(excess, UNDONE * (1.0 + 0.5 * slack))
     return Closing(closed=excess <= 0, excess=excess, view=view, statistics=statistics)
 
 
@@ -250,13 +257,6 @@ def doubted(best: Hypothesis, closing: Closing) -> float:
     """The share of its probability that a candidate keeps where its case does not close: something else competes."""
     cooled = closing.excess / (1.0 + 0.5 * tolerance(best))
     return float(0.5 / (1.0 + np.exp(np.clip(cooled, 0.0, 500.0)))) if closing.excess > 0 else 1.0
-
-
-def with_unmeasured(probabilities: dict[str, float], unmeasured: float, best: float, slack: float) -> dict[str, float]:
-    """The probabilities with an unmeasured oil temperature among what competes."""
-    share = float(1 / (1 + np.exp(-np.clip((unmeasured - best) / (1.0 + 0.5 * slack), -500, 500))))
-    found = {slug: (1 - share) * each for slug, each in probabilities.items() if slug != "oil_temperature"}
-    return dict(sorted({**found, "oil_temperature": share}.items(), key=lambda item: -item[1]))
 
 
 def tolerance(hypothesis: Hypothesis) -> float:
