@@ -226,19 +226,25 @@ def withheld(gain: Gain) -> str:
 
 
 def visible_of(view: View) -> tuple[Visible, ...]:
-    """The smallest amplitude of each effect that would have been seen, at the shape that shows best."""
+    """The smallest amplitude of each effect that would have been seen, at the middle one of the shapes that show at all, and
+    at the best of them."""
     info = np.diag(view.likely.info)
-    found: dict[str, Visible] = {}
-    for i, column in enumerate(view.columns):
-        if not info[i] > 0:
-            continue
-        effect = column.effect
-        slug, amplitude = effect.slug, float(np.sqrt(2 * SEEN / info[i])) * effect.scale
-        if np.isfinite(amplitude) and (slug not in found or amplitude < found[slug].amplitude):
-            found[slug] = Visible(
-                effect=slug, amplitude=amplitude, usual=effect.prior_sd * effect.scale, unit=effect.unit
-            )
-    return tuple(found.values())
+    sizes: dict[str, list[float]] = {}
+    effects = {column.effect.slug: column.effect for column in view.columns}
+    for column, seen in zip(view.columns, info[view.effects], strict=True):
+        size = float(np.sqrt(2 * SEEN / seen)) * column.effect.scale if seen > 0 else np.inf
+        if np.isfinite(size):
+            sizes.setdefault(column.effect.slug, []).append(size)
+    return tuple(
+        Visible(
+            effect=slug,
+            amplitude=float(np.quantile(each, 0.5, method="higher")),
+            least=min(each),
+            usual=effects[slug].prior_sd * effects[slug].scale,
+            unit=effects[slug].unit,
+        )
+        for slug, each in sizes.items()
+    )
 
 
 def _extension(

@@ -15,6 +15,8 @@ _SPOKEN, _RIVAL, _OPEN, _TOLD = 3, 0.001, 0.1, 3
 _COMPANION = 0.3
 #: An effect beyond so many deviations of its prior is stronger than one would expect.
 _STRONG = 2.0
+#: Fewer states say little of a course over life.
+_COURSE = 3
 #: A share [%] below which its size is not told.
 _LEAST_PERCENT = 0.1
 #: Digits after the point at most.
@@ -69,7 +71,8 @@ def summarise(found: Findings) -> str:
         Verdict.UNEXPLAINED_STRUCTURE: _unexplained,
         Verdict.INSUFFICIENT_DATA: _insufficient,
     }[found.verdict]
-    seen = f"{_count(found.tests, 'test')} at {_count(found.states, 'state')} of use were fitted at once."
+    fitted = "was fitted" if found.tests == 1 else "were fitted at once"
+    seen = f"{_count(found.tests, 'test')} at {_count(found.states, 'state')} of use {fitted}."
     parts = [seen, *tell(found), *_gained(found), *_next(found), *_noted(found.notes)]
     return " ".join(part for part in parts if part)
 
@@ -81,19 +84,20 @@ def _adequate(found: Findings) -> list[str]:
         f"Nothing stands out of the noise{noise} and the scatter from run to run{scatter}: the model is adequate for these "
         "data."
     ]
-    told = [each for each in found.visible if each.effect in BY_SLUG and _within_reach(each)]
+    told = [each for each in found.visible if each.effect in BY_SLUG and _within_reach(each, each.amplitude)]
     if told:
-        parts.append(
-            f"They would have shown, nine times in ten: {'; '.join(_seen_from(each) for each in told[:_TOLD])}."
-        )
-    hidden = [each.effect for each in found.visible if each.effect in BY_SLUG and not _within_reach(each)]
+        seen = "; ".join(_seen_from(each) for each in told[:_TOLD])
+        parts.append(f"These data would have shown, nine times in ten and each in its middle form: {seen}.")
+    hidden = [each.effect for each in found.visible if each.effect in BY_SLUG and not _within_reach(each, each.least)]
     if hidden:
         parts.append(f"Even a strong effect would have stayed hidden behind the baseline for: {_listed(hidden)}.")
+    if found.states < _COURSE:
+        parts.append(f"Of a course over life {_count(found.states, 'state')} of use can say little.")
     return parts
 
 
-def _within_reach(visible: Visible) -> bool:
-    return visible.amplitude <= _STRONG * visible.usual
+def _within_reach(visible: Visible, amplitude: float) -> bool:
+    return amplitude <= _STRONG * visible.usual
 
 
 def _seen_from(visible: Visible) -> str:
@@ -156,8 +160,8 @@ def _ambiguous(found: Findings) -> list[str]:
 def _unexplained(found: Findings) -> list[str]:
     return [
         _misses(found),
-        "No effect of the catalogue accounts for it, alone or with another: either something beyond noise would be left, "
-        "or different parts of the data would ask for different sizes of the effect. So no cause is named.",
+        "No effect of the catalogue accounts for it, alone or with another: something beyond noise would be left, parts of "
+        "the data would ask for different sizes of the effect, or two would have to undo each other. So no cause is named.",
         f"It looks most like {found.looks}." if found.looks else "",
     ]
 
@@ -174,8 +178,8 @@ def _misses(found: Findings) -> str:
     where = _axes(found.baseline.where)
     if found.baseline.rmse <= found.baseline.noise:
         return (
-            f"The baseline misses the data by {_number(found.baseline.rmse)} Nm, no more than noise alone would; what it "
-            f"misses goes together all the same{where}."
+            f"The baseline misses the data by {_number(found.baseline.rmse)} Nm, no more than noise alone would, but not by "
+            f"chance: what it misses goes together{where}."
         )
     return (
         f"The baseline misses the data by {_number(found.baseline.rmse)} Nm where noise alone would make "

@@ -99,7 +99,7 @@ class AdviceOut(Answer):
 
 
 class VisibleOut(Answer):
-    """The smallest amplitude of an effect that these data would have shown with 90 % power."""
+    """The smallest amplitude of an effect that these data would have shown with 90 % power in its middle shape."""
 
     effect: str
     amplitude: Number

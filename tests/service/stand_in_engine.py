@@ -98,7 +98,7 @@ def _report(campaign: Campaign, extension: Extension | None) -> Report:
                 nats=12.0,
             ),
         ),
-        visible=(Visible(effect="torque_zero_shift", amplitude=0.2, usual=0.5, unit="Nm"),),
+        visible=(Visible(effect="torque_zero_shift", amplitude=0.2, least=0.1, usual=0.5, unit="Nm"),),
         maps=Maps(
             pressure=np.array([4e5, 5e5]),
             speed=np.array([10.0, 20.0, 30.0]),

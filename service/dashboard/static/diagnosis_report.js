@@ -79,6 +79,6 @@ function notes({ notes: found = [] }) {
 function visible({ visible: found = [] }) {
   if (found.length === 0) return null;
   const rows = found.map((each) => [words(each.effect), significant(each.amplitude, 3), each.unit ?? ""]);
-  return h("details", { class: "part" }, h("summary", {}, "What these runs would show"), h("p", { class: "quiet" }, "The smallest amplitude that would be seen, worked out before any residual was looked at."),
+  return h("details", { class: "part" }, h("summary", {}, "What these runs would show"), h("p", { class: "quiet" }, "The smallest amplitude that would be seen, each effect in the middle one of its shapes, worked out before any residual was looked at."),
     h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": "Smallest visible amplitudes" }, table("Smallest visible amplitudes", ["Effect", "Amplitude", "Unit"], rows)));
 }

@@ -46,7 +46,7 @@ def visible(slug: str, sizes: float) -> Visible:
     """An effect that so many of its usual sizes would have shown."""
     effect = BY_SLUG[slug]
     usual = effect.scale * effect.prior_sd
-    return Visible(effect=slug, amplitude=sizes * usual, usual=usual, unit=effect.unit)
+    return Visible(effect=slug, amplitude=sizes * usual, least=sizes * usual / 2, usual=usual, unit=effect.unit)
 
 
 def findings(verdict: Verdict, *causes: str) -> Findings:
@@ -154,6 +154,16 @@ def test_effects_out_of_reach_are_said_to_be():
     assert "hidden" not in summarise(found)
 
 
+def test_of_a_course_over_life_two_states_say_little():
+    found = findings(Verdict.MODEL_ADEQUATE)
+    assert "Of a course over life 2 states of use can say little" in summarise(replace(found, states=2))
+    assert "1 test at 1 state of use was fitted. " in summarise(replace(found, tests=1, states=1))
+    assert "Of a course" not in summarise(found)
+    some = replace(visible("pressure_offset", 3.0), least=0.1)  # seen in one of its shapes, in most not
+    said = summarise(replace(found, visible=(some,)))
+    assert not any(told in said for told in ("would have shown", "hidden"))
+
+
 def test_notes_on_single_runs_are_counted():
     notes = ("sweep-003: 1 plateaus at rest left out.", "sweep-004: the same", "Nothing was known of the oil")
     said = summarise(replace(findings(Verdict.UNEXPLAINED_STRUCTURE), notes=notes))
@@ -214,7 +224,7 @@ def test_a_baseline_that_misses_no_more_than_noise_is_not_said_to():
     found = findings(Verdict.CAUSE_AMBIGUOUS, "squeeze_film")
     said = summarise(replace(found, baseline=replace(MISFIT, rmse=0.0987)))
     assert "misses the data by 0.0987 Nm, no more than noise alone would" in said
-    assert "goes together all the same, which lives on oil temperature" in said
+    assert "not by chance: what it misses goes together, which lives on oil temperature" in said
     assert "is structure" not in said
     assert "no more than noise" not in summarise(found)
 
