@@ -6,17 +6,17 @@ from contextlib import asynccontextmanager
 from fastapi import FastAPI
 from fastapi_offline import FastAPIOffline
 
-from service import problems
 from service.dashboard import assets
-from service.dashboard import routes as dashboard
-from service.metrics import Counting, Metrics
-from service.middleware import BodyLimit, Heads, SafeHeaders
-from service.routes import clutches, diagnoses, files, fleet, health, life, runs
-from service.routes.context import Context
+from service.dashboard import pages as dashboard
+from service.jobs.queue import Worker
+from service.queries.views import Remembered
 from service.settings import CODE_VERSION, Settings
-from service.worker import Worker
-from service.workflows.views import Remembered
-from storage.database import open_database
+from service.web import problems
+from service.web.context import Context
+from service.web.headers import BodyLimit, Heads, SafeHeaders
+from service.web.metrics import Counting, Metrics
+from service.web.routes import clutches, diagnoses, files, fleet, health, life, runs
+from storage.engine.database import open_database
 
 _DESCRIPTION = """Condition monitoring and prognostics of wet friction clutches.
 

@@ -1,4 +1,4 @@
-"""What can go wrong for a caller: one base, mapped to HTTP once (`service.problems`). Knows no web framework."""
+"""What can go wrong for a caller: one base, mapped to HTTP once (`service.web.problems`). Knows no web framework."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -26,7 +26,7 @@ class Settings:
     diagnosis_seconds: int = 300
     diagnosis_bytes: int = 4 * 2**30
     most_diagnoses: int = 16
-    engine: str = "models.diagnosis.engine:diagnose"
+    engine: str = "models.diagnosis.diagnose:diagnose"
 
     @classmethod
     def from_environment(cls, database: str | None = None) -> "Settings":

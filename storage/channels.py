@@ -8,9 +8,9 @@ import sqlalchemy as sa
 from numpy.typing import NDArray
 from sqlalchemy import Connection, bindparam, select
 
-from storage.codec import CODEC, decode, encode
-from storage.decimal_codec import DECIMAL_CODEC, decode_decimals, encode_decimals
-from storage.errors import DamagedData
+from storage.encoding.codec import CODEC, decode, encode
+from storage.encoding.decimals import DECIMAL_CODEC, decode_decimals, encode_decimals
+from storage.engine.errors import DamagedData
 from storage.tables import channel, run
 
 _insert = sa.insert(channel)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import sqlalchemy as sa
 from sqlalchemy import Connection, Row, bindparam, select, tuple_, update
 
-from storage.json_text import Json, to_object, to_text
+from storage.encoding.json_text import Json, to_object, to_text
 from storage.tables import clutch
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 import sqlalchemy as sa
 from sqlalchemy import Connection, Row, bindparam, select, update
 
-from storage.json_text import Json, to_object, to_text
+from storage.encoding.json_text import Json, to_object, to_text
 from storage.tables import diagnosis, run
 
 RUNNING, FINISHED, FAILED = "running", "finished", "failed"

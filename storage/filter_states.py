@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection, bindparam, delete, select
 from sqlalchemy.dialects.sqlite import insert
 
-from storage.codec import pack, unpack
-from storage.errors import DamagedData
+from storage.encoding.codec import pack, unpack
+from storage.engine.errors import DamagedData
 from storage.tables import filter_state
 
 

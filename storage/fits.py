@@ -7,7 +7,7 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy import Connection, Row, bindparam, delete, select
 
-from storage.json_text import to_list, to_text
+from storage.encoding.json_text import to_list, to_text
 from storage.tables import fit, run
 
 

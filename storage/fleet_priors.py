@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import sqlalchemy as sa
 from sqlalchemy import Connection, Row, bindparam, delete, func, select
 
-from storage.json_text import Json, to_list, to_object, to_text
+from storage.encoding.json_text import Json, to_list, to_object, to_text
 from storage.tables import fleet_prior
 
 #: Learned from all clutches of the kind.

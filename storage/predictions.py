@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from sqlalchemy import Connection, bindparam, delete, select
 from sqlalchemy.dialects.sqlite import insert
 
-from storage.json_text import Json, to_object, to_text
+from storage.encoding.json_text import Json, to_object, to_text
 from storage.tables import prediction
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 import sqlalchemy as sa
 from sqlalchemy import Connection, Row, bindparam, exists, func, or_, select, tuple_, update
 
-from storage.json_text import Json, to_object, to_text
+from storage.encoding.json_text import Json, to_object, to_text
 from storage.tables import fit, run
 
 

@@ -1,7 +1,7 @@
 """The tables. Everything that a request asks for is stored; raw channels are kept for ever and bit for bit.
 
 Units are SI (pressure in Pa; 0 stands for the mean over the reference pressures), cycles are duty cycles since new,
-times are ISO 8601 text that the caller makes. Columns that hold JSON are text, written by `storage.json_text`.
+times are ISO 8601 text that the caller makes. Columns that hold JSON are text, written by `storage.encoding.json_text`.
 """
 
 from sqlalchemy import (

@@ -7,7 +7,7 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, bindparam, select
 
 from storage.diagnoses import FINISHED
-from storage.json_text import to_object
+from storage.encoding.json_text import to_object
 from storage.tables import adopted_model, diagnosis
 
 

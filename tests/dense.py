@@ -5,7 +5,7 @@ import math
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from models.tracking.linear import Points
+from models.tracking.linear_model import Points
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
 

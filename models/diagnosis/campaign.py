@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from models.clutch import Geometry
-from models.runs import Plateaus, Record
+from models.records.runs import Plateaus, Record
 
 
 class EventKind(StrEnum):

@@ -15,14 +15,14 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
+from models.diagnosis.baseline.laws import ATTRACTOR, EXPONENTIAL, LOG_BEND, POWERS, Frame, Laws, scene_of
 from models.diagnosis.campaign import Campaign, Oil, StationaryRun
-from models.diagnosis.catalogue import BY_SLUG
-from models.diagnosis.design import build_design
-from models.diagnosis.effect import Kind
-from models.diagnosis.facts import Facts, facts_of
-from models.diagnosis.fitting import Fit
-from models.diagnosis.laws import ATTRACTOR, EXPONENTIAL, LOG_BEND, POWERS, Frame, Laws, scene_of
-from models.diagnosis.points import Points
+from models.diagnosis.design.design import build_design
+from models.diagnosis.design.facts import Facts, facts_of
+from models.diagnosis.design.points import Points
+from models.diagnosis.effects.catalogue import BY_SLUG
+from models.diagnosis.effects.effect import Kind
+from models.diagnosis.pooled_fit.gauss_newton import Fit
 
 #: Plateaus are handed on in parts of this many: a design takes no more of one run.
 _PART = 2000

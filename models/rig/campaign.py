@@ -14,14 +14,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.protocol import RPM
-from models.rig.engagement import Drive, engage
+from models.engagements.simulation import Drive, engage
+from models.friction.speed_protocol import RPM
+from models.records.runs import Record
 from models.rig.programme import CYCLE_ENERGY, QUICK, Ageing, Programme
 from models.rig.sampled import DynamicTest, engagement_record, sampled_test
 from models.rig.simulated_runs import DutyBlock, RunKind, SimulatedRun
 from models.rig.stationary import Sensor, stationary_test
 from models.rig.truth import SimulatedClutch, draw
-from models.runs import Record
 
 #: The streams of one seed: the clutch, and by cycles the stationary test, the dynamic test and the engagement.
 _CLUTCH, _TEST, _DYNAMIC, _ENGAGEMENT = 0, 1, 2, 3

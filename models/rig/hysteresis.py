@@ -1,6 +1,6 @@
 """How the simulated clutch's friction lags its speed: a film that is squeezed, an attractor, or both.
 
-The film time τ_1 of `models.lag` stands when new and is lost with use, the more the higher the pressure,
+The film time τ_1 of `models.loops.lag` stands when new and is lost with use, the more the higher the pressure,
 
     τ_1(p, ζ) = τ_0 e^{-λ(p) g(ζ)},    λ(p) = max(α + β p, 0),    g(ζ) = 1 - (1 + ζ/φ)^-ε
 
@@ -8,7 +8,7 @@ as a lining does that loses its pores: at high pressure its film no longer follo
 how steep the stationary curve is, which grows as that sinks. The nominal values are made so that the two together show
 figs. 14 and 17: areas near proportional to pressure when new, growing over life up to 6 bar, falling above, and in the
 end falling with pressure. The attractor C, where there is one, adds what its torque differs from the stationary one by:
-exact to the first order in both lags. Alone it gives loops of the wrong sign where curves rise (see `models.lag`).
+exact to the first order in both lags. Alone it gives loops of the wrong sign where curves rise (see `models.loops.lag`).
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, eq. 7 and section 3.2. The formulas of λ and g are this
 project's: the reference prints none.
@@ -20,10 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
-from models.degradation import progress_fraction
-from models.lag import attractor_torque, squeeze_film_torque
-from models.pressure import LinearLaw
-from models.stribeck import StribeckParameters, torque
+from models.degradation.general_order import progress_fraction
+from models.friction.pressure_laws import LinearLaw
+from models.friction.stribeck import StribeckParameters, torque
+from models.loops.lag import attractor_torque, squeeze_film_torque
 
 _LOSS = LinearLaw(intercept=-2.75, slope=0.7e-5)
 

@@ -15,10 +15,10 @@ from typing import TypeVar
 
 import numpy as np
 
+from models.friction.stribeck import torque
+from models.records.runs import Plateaus, Record
 from models.rig.stationary import OIL_TEMPERATURE
 from models.rig.truth import SimulatedClutch
-from models.runs import Plateaus, Record
-from models.stribeck import torque
 
 #: Vogel's B and C [K].
 _B, _C = 880.0, 170.0

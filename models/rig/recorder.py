@@ -12,9 +12,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from models.arrays import FloatArray
-from models.protocol import RPM
+from models.friction.speed_protocol import RPM
+from models.records.runs import Record
 from models.rig.stationary import Sensor, oil_temperature, rounded
-from models.runs import Record
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,12 +14,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from models.arrays import FloatArray
-from models.protocol import REFERENCE_SPEEDS, RPM
-from models.rig.engagement import Engagement
+from models.engagements.simulation import Engagement
+from models.friction.speed_protocol import REFERENCE_SPEEDS, RPM
+from models.records.runs import Record
 from models.rig.recorder import Recorder
 from models.rig.stationary import PLATEAU_DURATION, Sensor
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
-from models.runs import Record
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,8 +8,8 @@ from enum import StrEnum
 
 import numpy as np
 
+from models.records.runs import Plateaus, Record
 from models.rig.stationary import PLATEAU_DURATION
-from models.runs import Plateaus, Record
 
 
 class RunKind(StrEnum):

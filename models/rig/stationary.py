@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
-from models.protocol import REFERENCE_SPEEDS
+from models.friction.speed_protocol import REFERENCE_SPEEDS
+from models.friction.stribeck import torque
+from models.records.runs import Plateaus
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
-from models.runs import Plateaus
-from models.stribeck import torque
 
 #: Time on one plateau [s] (section 2.3.3).
 PLATEAU_DURATION = 5.0

@@ -21,12 +21,12 @@ from scipy.optimize import brentq
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
-from models.degradation import Degradation, value
-from models.pressure import AsymptoticLaw, LinearLaw
-from models.protocol import REFERENCE_SPEEDS
-from models.rig.engagement import Capacity
+from models.degradation.general_order import Degradation, value
+from models.engagements.simulation import Capacity
+from models.friction.pressure_laws import AsymptoticLaw, LinearLaw
+from models.friction.speed_protocol import REFERENCE_SPEEDS
+from models.friction.stribeck import StribeckParameters, torque
 from models.rig.hysteresis import FrictionLag
-from models.stribeck import StribeckParameters, torque
 
 #: The protocol's pressures (section 2.3.3): 4 to 7 bar by 0.5 bar [7] Pa; its 40 speeds are REFERENCE_SPEEDS.
 PROTOCOL_PRESSURES: FloatArray = np.linspace(4.0e5, 7.0e5, 7)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from models.arrays import FloatArray
-from models.tracking.protocol import Posterior
+from models.tracking.posterior import Posterior
 
 
 def systematic(weight: FloatArray, size: int, offset: float) -> NDArray[np.intp]:

@@ -9,9 +9,9 @@ from typing import Annotated, Any
 import typer
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from service.cli.client import RefusedError, Service, ServiceAwayError, connect
 from service.cli.diagnosis_view import shown
 from service.cli.options import EX_DATAERR, EX_TEMPFAIL, EX_USAGE, URL, Key, Patience, Url, err, fail, out, told
+from service.cli.sending.client import RefusedError, Service, ServiceAwayError, connect
 
 #: Seconds that one question waits for the report, and between two looks at it.
 _WAIT, _LOOK = 10, 0.5

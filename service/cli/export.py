@@ -8,9 +8,9 @@ from typing import Annotated, Any, get_args
 import typer
 from rich.progress import Progress
 
-from service.cli.client import RefusedError, Service, ServiceAwayError, connect
 from service.cli.options import EX_DATAERR, EX_TEMPFAIL, URL, Key, Patience, Url, err, fail, out, told
-from service.formats import run_files
+from service.cli.sending.client import RefusedError, Service, ServiceAwayError, connect
+from service.run_files import manifest
 
 _SENT = ("run_id", "kind", "cycles", "started_at", "origin", "duty", "event", "note", "channels")
 
@@ -34,11 +34,11 @@ def export(
             try:
                 found = service.get(f"/v1/clutches/{clutch}")
                 record = {name: value for name, value in found.items() if name in ClutchIn.model_fields}
-                run_files.write(out_folder / run_files.CLUTCH_FILE, record)
+                manifest.write(out_folder / manifest.CLUTCH_FILE, record)
                 count = 0
                 for receipt in _pages(service, f"/v1/clutches/{clutch}/runs"):
                     run = service.get(f"/v1/clutches/{clutch}/runs/{receipt['run_id']}")
-                    run_files.write(out_folder / f"{count:05d}-{_safe(receipt['run_id'])}.json", _as_sent(run))
+                    manifest.write(out_folder / f"{count:05d}-{_safe(receipt['run_id'])}.json", _as_sent(run))
                     count += 1
                     progress.advance(task)
                 _results(service, clutch, results)

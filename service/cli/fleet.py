@@ -15,7 +15,7 @@ def show(context: typer.Context, database: Database = DATABASE) -> None:
     """The newest version of every kind's prior."""
     if context.invoked_subcommand is not None:
         return
-    from service.workflows.fleet import current  # loaded by the commands that need it
+    from service.workflows.learn_fleet import current  # loaded by the commands that need it
 
     with existing(database) as opened:
         found = current(opened)
@@ -31,7 +31,7 @@ def refresh(
     quiet: Annotated[bool, typer.Option("--quiet", help="Say only what has changed")] = False,
 ) -> None:
     """Learn every kind's prior anew, and bring the predictions up to date with it."""
-    from service.workflows.fleet import refresh as refreshed
+    from service.workflows.learn_fleet import refresh as refreshed
 
     with existing(database) as opened:
         done = refreshed(opened, now=datetime.now(UTC).isoformat(timespec="seconds"))

@@ -22,9 +22,9 @@ def create(
     database: Database = DATABASE,
 ) -> None:
     """Print a new key, once; only its hash is stored."""
-    from service.security import SCOPES, make_key  # loaded by the commands that need it
+    from service.web.auth import SCOPES, make_key  # loaded by the commands that need it
     from storage import keys
-    from storage.database import open_database
+    from storage.engine.database import open_database
 
     if scope not in SCOPES:
         fail(f"scope must be one of {', '.join(SCOPES)}, got {scope!r}", EX_USAGE)

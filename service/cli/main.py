@@ -2,7 +2,9 @@
 
 import typer
 
-from service.cli import demo, diagnose, export, fleet, keys, maintain, push, score, serve, simulate
+from service.cli import diagnose, export, fleet, keys, maintain, score, serve, simulate
+from service.cli.demo import demo
+from service.cli.sending import push
 
 app = typer.Typer(
     name="clutchlife",

@@ -9,13 +9,13 @@ import httpx2
 import typer
 from rich.console import Console
 
-from service.cli.spool import default_folder
+from service.cli.sending.spool import default_folder
 from service.errors import NotFoundError
 from service.settings import DEFAULT_DATABASE, DEFAULT_URL
-from storage.errors import StorageError
+from storage.engine.errors import StorageError
 
 if TYPE_CHECKING:
-    from storage.database import Database as Opened
+    from storage.engine.database import Database as Opened
 
 #: sysexits.h: the input is wrong, the service is away (try again later), the call is wrong.
 EX_DATAERR, EX_TEMPFAIL, EX_USAGE = 65, 75, 64
@@ -51,7 +51,7 @@ def told() -> Iterator[None]:
 @contextmanager
 def existing(url: str) -> Iterator["Opened"]:
     """An open database that is there already: a mistyped address makes no new one."""
-    from storage.database import open_database, path_of  # most commands open none
+    from storage.engine.database import open_database, path_of  # most commands open none
 
     with told():
         path = path_of(url)

@@ -11,9 +11,9 @@ def score(
     method: Annotated[str, typer.Option(help="particle, ukf or grid")] = "particle", database: Database = DATABASE
 ) -> None:
     """Back-cast every life that came to its end: what would have been said at each test, and how right it was."""
-    from service.workflows import scores  # loaded by the one command that needs it
-    from service.workflows.tracks import METHODS
-    from service.workflows.views import Remembered
+    from service.lives.tracks import METHODS
+    from service.queries import scores  # loaded by the one command that needs it
+    from service.queries.views import Remembered
 
     if method not in METHODS:
         fail(f"method must be one of {', '.join(METHODS)}, got {method!r}", EX_USAGE)

@@ -23,9 +23,9 @@ def serve(
     """Run the service."""
     if log_level not in uvicorn.config.LOG_LEVELS:
         fail(f"log-level must be one of {', '.join(uvicorn.config.LOG_LEVELS)}, got {log_level!r}", EX_USAGE)
-    from service.security import is_loopback  # what only this command needs is loaded by it alone
+    from service.web.auth import is_loopback  # what only this command needs is loaded by it alone
     from storage import keys
-    from storage.database import open_database
+    from storage.engine.database import open_database
 
     with told():
         settings = Settings.from_environment(database)

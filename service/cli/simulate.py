@@ -7,12 +7,12 @@ import typer
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from service.cli.options import Seed, err, out, told
-from service.formats import run_files
+from service.run_files import manifest
 
 if TYPE_CHECKING:
     from models.rig.programme import Programme
     from models.rig.simulated_runs import SimulatedRun
-    from service.formats.record_files import RecordFormat
+    from service.run_files.record_writer import RecordFormat
 
 #: Where the campaign ends, as a share of the mean COF when new.
 _STOP = 0.45
@@ -35,15 +35,15 @@ def simulate(
     Run-in and duty blocks are JSON whatever the format. Tests in another one are listed in runs.json, which push reads.
     """
     from models.rig import campaign  # what only this command needs is loaded by it alone
-    from service.formats import record_files, simulated
+    from service.run_files import record_writer, simulated
 
     with told():
-        record_format = record_files.RecordFormat(form)
-        record_files.require_writer(record_format)
+        record_format = record_writer.RecordFormat(form)
+        record_writer.require_writer(record_format)
         programme = _programme(raw_rate if raw else None, dynamic, ageing)
         out_folder.mkdir(parents=True, exist_ok=True)
         clutch, clutch_id = campaign.simulated_clutch(seed), f"sim-{seed}"
-        run_files.write(out_folder / run_files.CLUTCH_FILE, simulated.simulated_clutch_body(clutch_id))
+        manifest.write(out_folder / manifest.CLUTCH_FILE, simulated.simulated_clutch_body(clutch_id))
         course: list[tuple[float, float]] = []
         listed: list[dict[str, Any]] = []
         with _progress() as progress:
@@ -55,7 +55,7 @@ def simulate(
                 listed += _write(out_folder, run, record_format)
                 course.append((run.wear, run.cycles))
         if listed:
-            run_files.write(out_folder / run_files.MANIFEST, listed)
+            manifest.write(out_folder / manifest.MANIFEST, listed)
         end = campaign.end_of_life(course, clutch)
         truth = "has not halved in this campaign" if end is None else f"has halved after {end:.0f} cycles"
         out.print(f"{len(course)} simulated runs of the simulated clutch {clutch_id} in {out_folder}", soft_wrap=True)
@@ -77,13 +77,13 @@ def _programme(raw_rate: float | None, dynamic: bool, ageing: str) -> "Programme
 
 def _write(folder: Path, run: "SimulatedRun", record_format: "RecordFormat") -> list[dict[str, Any]]:
     """One run into one file; what the manifest has to say of it, if it is no JSON."""
-    from service.formats import record_files, simulated
+    from service.run_files import record_writer, simulated
 
-    if record_format is record_files.RecordFormat.JSON or run.duty is not None:
-        run_files.write(folder / f"{run.run_id}.json", simulated.simulated_body(run))
+    if record_format is record_writer.RecordFormat.JSON or run.duty is not None:
+        manifest.write(folder / f"{run.run_id}.json", simulated.simulated_body(run))
         return []
     head, name = simulated.simulated_head(run), f"{run.run_id}{record_format.suffix}"
-    record_files.write_record(folder / name, record_format, simulated.simulated_channels(run), head)
+    record_writer.write_record(folder / name, record_format, simulated.simulated_channels(run), head)
     return [{"file": name} | head]
 
 

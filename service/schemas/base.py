@@ -19,7 +19,7 @@ Cycles = Annotated[float, Field(ge=0, le=1e12, allow_inf_nan=False, strict=True)
 PositiveNumber = Annotated[float, Field(gt=0, le=1e12, allow_inf_nan=False, strict=True)]
 NotNegativeNumber = Annotated[float, Field(ge=0, le=1e12, allow_inf_nan=False, strict=True)]
 
-#: A column is checked by `service.formats.columns`, which can say row and value for millions of them.
+#: A column is checked by `service.readers.checks`, which can say row and value for millions of them.
 Column = Annotated[
     list[Any],
     WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 1}),

@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from models.clutch import Geometry
-from models.severity import Severity, SeverityBasis
+from models.degradation.severity import Severity, SeverityBasis
 from service.schemas.base import Answer, Identifier, NotNegativeNumber, Origin, PositiveNumber, Schema
 from service.schemas.life import Current, ModelName
 

@@ -4,18 +4,18 @@ from typing import Any
 
 from sqlalchemy import Connection
 
-from service.formats.incoming import IncomingRun
+from service import records
+from service.lives.assumptions import ALL_PRESSURES
+from service.lives.incoming_run import IncomingRun
+from service.lives.loop_analysis import refresh_loops
+from service.lives.receipt import fit_receipt, receipt
+from service.lives.run_analysis import NOTICED_ON_ARRIVAL, Analysis, Warned, analyse
+from service.lives.surprise import OFF_TRACK
+from service.lives.tracks import CARRIED
 from service.settings import CODE_VERSION
-from service.workflows import stored
-from service.workflows.adoption import retrack_all
-from service.workflows.analysis import NOTICED_ON_ARRIVAL, Analysis, Warned, analyse
-from service.workflows.basis import ALL_PRESSURES
-from service.workflows.loops import refresh_loops
-from service.workflows.receipts import fit_receipt, receipt
-from service.workflows.surprise import OFF_TRACK
-from service.workflows.tracks import CARRIED
+from service.workflows.adopt_model import retrack_all
 from storage import channels, clutches, fits, predictions, runs
-from storage.database import Database
+from storage.engine.database import Database
 from storage.runs import RunRow
 
 
@@ -31,16 +31,16 @@ def replay_clutch(database: Database, clutch_id: str) -> int:
     The revision moves on only where a result has changed.
     """
     with database.writing() as connection:
-        clutch = stored.clutch(connection, clutch_id)
-        geometry = stored.record(clutch).geometry.to_model()
+        clutch = records.clutch(connection, clutch_id)
+        geometry = records.record(clutch).geometry.to_model()
         before = results(connection, clutch_id)
-        rows = stored.run_rows(connection, clutch_id)
+        rows = records.run_rows(connection, clutch_id)
         for row in rows:
-            incoming = stored.incoming(row, channels.read(connection, row.run_key))
+            incoming = records.incoming(row, channels.read(connection, row.run_key))
             analysis = analyse(incoming, geometry)
-            fits.write(connection, row.run_key, stored.fit_rows(analysis.fits, {}))
+            fits.write(connection, row.run_key, records.fit_rows(analysis.fits, {}))
             answer = _receipt(row, incoming, analysis)
-            runs.set_results(connection, row.run_key, stored.details(incoming, analysis), answer, CODE_VERSION)
+            runs.set_results(connection, row.run_key, records.details(incoming, analysis), answer, CODE_VERSION)
         events = retrack_all(connection, clutch)
         refresh_loops(connection, clutch_id, events, geometry)
         if results(connection, clutch_id) != before:
@@ -51,7 +51,7 @@ def replay_clutch(database: Database, clutch_id: str) -> int:
 def results(connection: Connection, clutch_id: str) -> list[Any]:
     """All that is said of a clutch."""
     said = [predictions.history(connection, clutch_id, method, ALL_PRESSURES) for method in CARRIED]
-    return [[row.receipt for row in stored.run_rows(connection, clutch_id)], said]
+    return [[row.receipt for row in records.run_rows(connection, clutch_id)], said]
 
 
 def _receipt(row: RunRow, incoming: IncomingRun, analysis: Analysis) -> dict[str, Any]:

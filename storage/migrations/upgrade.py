@@ -14,7 +14,7 @@ from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import Connection
 
-from storage.errors import DatabaseTooNew
+from storage.engine.errors import DatabaseTooNew
 
 # Alembic keeps the step that it runs in module globals: one at a time in a process.
 _one_at_a_time = threading.Lock()

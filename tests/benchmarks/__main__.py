@@ -15,16 +15,16 @@ import numpy as np
 from scipy.optimize import Bounds, least_squares, minimize
 
 from models.clutch import Geometry
-from models.identification import fit_curves
+from models.friction.identification import fit_curves
+from models.friction.stribeck import StribeckParameters, gradient, torque
+from models.records.runs import Curve, curves_by_pressure
 from models.rig import campaign
-from models.runs import Curve, curves_by_pressure
-from models.stribeck import StribeckParameters, gradient, torque
-from models.tracking.grid import Grid
+from models.tracking.filters.grid import Grid
+from models.tracking.filters.particle import Particle
+from models.tracking.filters.ukf import Ukf
 from models.tracking.measurement import Measurement
-from models.tracking.particle import Particle
 from models.tracking.prior import weak
-from models.tracking.ukf import Ukf
-from service.formats.simulated import simulated_body
+from service.run_files.simulated import simulated_body
 from tests.benchmarks.pages import pages
 from tests.benchmarks.records import records
 from tests.support import serving

@@ -10,12 +10,12 @@ from pathlib import Path
 import httpx2
 import numpy as np
 
-from models.diagnosis.engine import diagnose
+from models.diagnosis.diagnose import diagnose
 from models.rig import campaign
 from models.rig.oil_warmth import warmed
 from models.rig.programme import QUICK, WHOLE, Programme
 from models.rig.simulated_runs import SimulatedRun
-from service.formats.simulated import simulated_body
+from service.run_files.simulated import simulated_body
 from tests.blind.rig import told
 from tests.blind.rig.hide import hide
 from tests.blind.test_blind import FAMILIES

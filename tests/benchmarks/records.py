@@ -8,8 +8,8 @@ import httpx2
 import numpy as np
 
 from tests.benchmarks.memory import added, processor_seconds
-from tests.models.raw_records import RPM, make, protocol
-from tests.service.sample_files import UNITS, write_mdf, write_parquet, write_tdms
+from tests.models.records.raw_records import RPM, make, protocol
+from tests.service.readers.sample_files import UNITS, write_mdf, write_parquet, write_tdms
 from tests.support import Server, serving
 
 SEED = 20131113

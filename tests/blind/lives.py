@@ -16,7 +16,7 @@ import numpy as np
 from fastapi.testclient import TestClient
 
 from models.arrays import FloatArray
-from models.scoring import crps_of_quantiles
+from models.prognosis.scoring import crps_of_quantiles
 from service.app import create_app
 from service.settings import Settings
 from tests.blind.rig.hide import Hidden, hide

@@ -26,13 +26,13 @@ ALLOWED = {
     "models.arrays",
     "models.diagnosis",
     "models.diagnosis.campaign",
-    "models.diagnosis.engine",
-    "models.diagnosis.report",
-    "models.plateaus",
-    "models.runs",
+    "models.diagnosis.diagnose",
+    "models.diagnosis.report.report",
+    "models.records.plateaus",
+    "models.records.runs",
 }
 #: What lives besides need: the service as whoever uses it sees it, and scores.
-IN_USE = {"models.scoring", "service.app", "service.settings"}
+IN_USE = {"models.prognosis.scoring", "service.app", "service.settings"}
 #: Loops say nothing of them that plateaus do not, and make the refits long.
 STEADY = {"running_in", "accelerated_wear", "pressure_offset", "torque_zero_shift", "interface_heating", "seasons"}
 CONTRACT = {

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from models.diagnosis.report import Gain
+from models.diagnosis.report.report import Gain
 from tests.blind import __main__ as blind
 from tests.blind import table
 from tests.blind.rig.loudness import UnreachableError

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from models.diagnosis import engine
 from models.diagnosis.campaign import Campaign
-from models.diagnosis.report import Gain, Report
+from models.diagnosis.report.report import Gain, Report
 from tests.blind.rig.hide import Hidden, hide
 from tests.blind.rig.loudness import UnreachableError
 from tests.blind.rig.more import with_test
@@ -112,7 +111,7 @@ def nothing(trial: Trial, verdict: str, error: str, axes: frozenset[str] = froze
 
 def judged(trial: Trial, hidden: Hidden, seen: Campaign, diagnose: Diagnose | None = None) -> Outcome:
     """The same where the campaign is at hand."""
-    look = diagnose or engine.diagnose
+    look = diagnose or diagnose.diagnose
     axes = frozenset().union(*(effect.axes for effect, _ in hidden.effects))
     began = process_time()
     try:

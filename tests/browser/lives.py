@@ -8,8 +8,8 @@ from typing import Any
 import httpx2
 import numpy as np
 
-from service.cli import demo_life
-from service.formats import simulated
+from service.cli.demo import life as demo_life
+from service.run_files import simulated
 from tests.support import stationary, torque_nm
 
 JSON = {"Content-Type": "application/json"}

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from models.arrays import FloatArray
-from models.lag import attractor_torque, film_time_at, squeeze_film_torque
-from models.loops import Loop, evaluate_loops
+from models.friction.stribeck import torque
+from models.loops.lag import attractor_torque, film_time_at, squeeze_film_torque
+from models.loops.loops import Loop, evaluate_loops
 from models.rig.sampled import DynamicTest, sampled_test
 from models.rig.stationary import Sensor
 from models.rig.truth import SimulatedClutch
-from models.stribeck import torque
 from tests.figures.svg import COLOURS, Panel, Series, chart
 from tests.real.lag import ATTRACTOR, FILM_TIME, FREQUENCY, loop_signs
 

@@ -13,7 +13,7 @@ from tests.browser.lives import worn
 
 pytestmark = pytest.mark.browser
 
-ENGINE = "tests.service.stand_in_engine:diagnose"
+ENGINE = "tests.service.workflows.stand_in_engine:diagnose"
 PHONE = {"width": 390, "height": 844}
 WIDE = {"width": 1360, "height": 900}
 

@@ -15,7 +15,7 @@ from tests.support import ONCE, stationary
 pytestmark = pytest.mark.browser
 expect.set_options(timeout=30_000)
 
-ENGINE = "tests.service.stand_in_engine:diagnose"
+ENGINE = "tests.service.workflows.stand_in_engine:diagnose"
 
 
 @pytest.fixture

@@ -210,13 +210,13 @@ def test_a_service_that_goes_away_and_comes_back(browser: Browser, tmp_path: Pat
 
 
 def test_with_keys_the_page_asks_for_one(browser: Browser, tmp_path: Path) -> None:
-    from service import security
+    from service.web import auth
     from storage import keys
-    from storage.database import open_database
+    from storage.engine.database import open_database
 
     with serving(tmp_path / "clutchlife.db", loaded=True) as server:
         ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "secret"})
-        text, row = security.make_key("read", "", created_at="2026-01-01T00:00:00Z")
+        text, row = auth.make_key("read", "", created_at="2026-01-01T00:00:00Z")
         database = open_database(f"sqlite:///{tmp_path / 'clutchlife.db'}")
         with database.writing() as connection:
             keys.insert(connection, row)

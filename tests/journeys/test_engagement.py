@@ -5,7 +5,7 @@ import json
 import httpx2
 
 from models.rig import campaign
-from service.formats.simulated import simulated_body
+from service.run_files.simulated import simulated_body
 
 
 def test_a_tracked_clutch_engages_slower_as_it_wears(http: httpx2.Client) -> None:

@@ -11,10 +11,10 @@ import numpy as np
 
 from models.clutch import Geometry
 from models.diagnosis.campaign import Campaign, StationaryRun
-from models.diagnosis.engine import diagnose
-from models.diagnosis.report import Report
-from models.protocol import RPM
-from models.runs import Plateaus
+from models.diagnosis.diagnose import diagnose
+from models.diagnosis.report.report import Report
+from models.friction.speed_protocol import RPM
+from models.records.runs import Plateaus
 from tests.real.lag import table
 from tests.real.loaders import TRACTION_CLUTCH, traction_runs
 

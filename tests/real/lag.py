@@ -14,11 +14,11 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from models.arrays import FloatArray
-from models.lag import attractor_area, attractor_torque, film_time_at, squeeze_film_torque
-from models.loop_area import loop_area
-from models.periods import Cycle, fit_cycle
+from models.friction.stribeck import StribeckParameters
+from models.loops.lag import attractor_area, attractor_torque, film_time_at, squeeze_film_torque
+from models.loops.loop_area import loop_area
+from models.records.periods import Cycle, fit_cycle
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
-from models.stribeck import StribeckParameters
 from tests.real.loaders import FOLDER, TRACTION_SWEEPS
 
 MICRO_LOOPS = FOLDER / "micro_friction_loops" / "test_data_2.csv"

@@ -19,13 +19,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from models.arrays import FloatArray
-from models.fleet import FleetPrior, population, taught
-from models.prognosis import ends_of_life, weighted_quantiles
-from models.scoring import crps_of_sample
-from models.tracking.grid import Grid
+from models.prognosis.first_passage import ends_of_life, weighted_quantiles
+from models.prognosis.fleet import FleetPrior, population, taught
+from models.prognosis.scoring import crps_of_sample
+from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
+from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior, weak
-from models.tracking.protocol import Posterior
 from tests.real.lag import Row, table
 from tests.real.loaders import FOLDER
 

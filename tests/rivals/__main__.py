@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from models.scoring import crps_of_sample
-from models.tracking.grid import Grid
-from models.tracking.particle import Particle
+from models.prognosis.scoring import crps_of_sample
+from models.tracking.filters.grid import Grid
+from models.tracking.filters.particle import Particle
+from models.tracking.filters.ukf import Ukf
 from models.tracking.prior import weak
-from models.tracking.ukf import Ukf
 from tests.rivals.others import CAP, DRAWS, PlainUkf, Progpy, Sample, Surpyval, fitted
 from tests.score.table import written
 from tests.statistical.lives import STAGES, ends, typical

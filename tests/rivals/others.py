@@ -12,7 +12,7 @@ from scipy.optimize import curve_fit
 from surpyval import DegradationAnalysis
 from surpyval.degradation import PathModel
 
-from models.degradation import Degradation, first_passage, progress_fraction
+from models.degradation.general_order import Degradation, first_passage, progress_fraction
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
 from tests.statistical.lives import CAP

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from models.tracking.discrepancy import SIZES, log_size_weight
-from models.tracking.grid import Grid
+from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior, weak
 from tests.score.table import Score, percents, score

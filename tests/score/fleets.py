@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from models.degradation import Degradation, first_passage
-from models.fleet import learn
-from models.tracking.grid import Grid
+from models.degradation.general_order import Degradation, first_passage
+from models.prognosis.fleet import learn
+from models.tracking.filters.grid import Grid
 from models.tracking.prior import weak
 from tests.score.table import Scores
 from tests.statistical.lives import STAGES, Life

@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.prognosis import ends_of_life
 from models.prognosis import first_passage as foretold
+from models.prognosis.first_passage import ends_of_life
 from models.rig.truth import draw
 from models.tracking.discrepancy import FUTURE, PAST, SIZES, Discrepancy, log_size_weight
-from models.tracking.grid import Grid
+from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
+from models.tracking.posterior import Posterior
 from models.tracking.prior import weak
-from models.tracking.protocol import Posterior
 from tests.score.table import percents
 from tests.statistical.laws import LAWS, TESTS, followed
 from tests.statistical.lives import CAP, PRIOR

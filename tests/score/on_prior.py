@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from models.tracking.grid import Grid
-from models.tracking.particle import Particle
-from models.tracking.ukf import Ukf
+from models.tracking.filters.grid import Grid
+from models.tracking.filters.particle import Particle
+from models.tracking.filters.ukf import Ukf
 from tests.score.table import Scores, shares
 from tests.statistical.lives import PRIOR, STAGES, at_stages, exact, lives
 

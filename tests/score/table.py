@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from models.scoring import crps_of_sample, pit_histogram, pit_of_sample
-from models.tracking.protocol import Posterior
+from models.prognosis.scoring import crps_of_sample, pit_histogram, pit_of_sample
+from models.tracking.posterior import Posterior
 from tests.statistical.lives import ends, interval
 
 DOCS = Path(__file__).parents[2] / "docs" / "prognosis.md"

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from models.prognosis import first_passage
-from models.tracking.grid import Grid
+from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
 from tests.statistical.lives import CAP

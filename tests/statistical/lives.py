@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from models.degradation import Degradation, first_passage, value
-from models.prognosis import ends_of_life, weighted_quantiles
-from models.scoring import crps_of_sample
-from models.tracking import linear, sampling
+from models.degradation.general_order import Degradation, first_passage, value
+from models.prognosis.first_passage import ends_of_life, weighted_quantiles
+from models.prognosis.scoring import crps_of_sample
+from models.tracking import linear_model, sampling
+from models.tracking.data import History
 from models.tracking.discrepancy import PAST, SIZES, drawn, log_size_weight
-from models.tracking.history import History
-from models.tracking.linear import Points
+from models.tracking.filters.particle import ParticleState
+from models.tracking.linear_model import Points
 from models.tracking.measurement import Measurement
-from models.tracking.particle import ParticleState
+from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior, weak
-from models.tracking.protocol import Posterior
 from tests import dense
 
 LEVELS = np.array([0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95])
@@ -117,14 +117,14 @@ def sampled(
     )
     history = History.of(measurements, prior)
     rng = np.random.default_rng(1)
-    sums, terms = linear.pointwise(history, prior, kept)
-    given = linear.conditional(sums, prior)
+    sums, terms = linear_model.pointwise(history, prior, kept)
+    given = linear_model.conditional(sums, prior)
     pair = sampling.correlated_pair(
         rng.standard_normal((count, 2)), given.initial_variance, given.change_variance, given.covariance
     )
     initial, change = given.initial + pair[:, 0], given.change + pair[:, 1]
     normals = rng.standard_normal((count, PAST + history.steps.size))
-    further = linear.drawn_terms(terms, initial - prior.initial_mean, change, normals)
+    further = linear_model.drawn_terms(terms, initial - prior.initial_mean, change, normals)
     return Posterior(
         weight=np.full(count, 1.0 / count),
         initial=initial,

@@ -7,10 +7,10 @@ import pytest
 from scipy.optimize import Bounds, least_squares, minimize
 
 from models.arrays import FloatArray
-from models.identification import FitStatus, StribeckFit, fit_curves, mean_torque
-from models.runs import Curve
-from models.stribeck import PARAMETER_NAMES
-from tests.models.stribeck_curves import VELOCITY, clutch, curve, eq3, hard_curve
+from models.friction.identification import FitStatus, StribeckFit, fit_curves, mean_torque
+from models.friction.stribeck import PARAMETER_NAMES
+from models.records.runs import Curve
+from tests.models.friction.stribeck_curves import VELOCITY, clutch, curve, eq3, hard_curve
 
 pytestmark = pytest.mark.statistical
 

@@ -5,15 +5,15 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from models.identification import fit_curves
-from models.lag import attractor_torque, squeeze_film_torque
-from models.lag_fit import ATTRACTOR, NINETY, SQUEEZE_FILM, Law, StationaryCurve, fit_lag
-from models.loop_area import area_of, clean_samples
-from models.periods import fit_cycle
-from models.runs import Curve
-from models.stribeck import StribeckParameters
-from models.stribeck import torque as curve_torque
-from tests.models.dynamic_records import FALLING, GEOMETRY, RISING, SWING, velocity
+from models.friction.identification import fit_curves
+from models.friction.stribeck import StribeckParameters
+from models.friction.stribeck import torque as curve_torque
+from models.loops.lag import attractor_torque, squeeze_film_torque
+from models.loops.lag_fit import ATTRACTOR, NINETY, SQUEEZE_FILM, Law, StationaryCurve, fit_lag
+from models.loops.loop_area import area_of, clean_samples
+from models.records.periods import fit_cycle
+from models.records.runs import Curve
+from tests.models.loops.dynamic_records import FALLING, GEOMETRY, RISING, SWING, velocity
 
 pytestmark = pytest.mark.statistical
 

@@ -12,7 +12,7 @@ import pytest
 
 from models.prognosis import first_passage
 from models.rig.truth import draw
-from models.tracking.grid import Grid
+from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
 from tests.statistical.laws import LAWS, followed

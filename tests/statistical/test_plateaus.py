@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from models.arrays import FloatArray
-from models.identification import fit_curves, mean_torques
-from models.plateaus import cut_plateaus
-from models.runs import Plateaus, Record, curves_by_pressure
-from tests.models.raw_records import GEOMETRY, SPEEDS, Made, Sensors, jitter, lose, make, protocol, spike
+from models.friction.identification import fit_curves, mean_torques
+from models.records.plateaus import cut_plateaus
+from models.records.runs import Plateaus, Record, curves_by_pressure
+from tests.models.records.raw_records import GEOMETRY, SPEEDS, Made, Sensors, jitter, lose, make, protocol, spike
 
 pytestmark = pytest.mark.statistical
 
@@ -66,7 +66,7 @@ def test_deviations_cover_under_white_and_coloured_noise(rate: float, memory: fl
 
 @pytest.mark.parametrize(("rate", "memory"), [(10.0, 0.8), (10.0, 0.9), (100.0, 0.97)])
 def test_deviations_nearly_cover_under_noise_that_outlasts_the_dwells(rate: float, memory: float) -> None:
-    """Nine, nineteen and 66 samples of 50 and 500 are remembered: 45 to 80 % were held without `models.slow_noise`.
+    """Nine, nineteen and 66 samples of 50 and 500 are remembered: 45 to 80 % were held without `models.records.slow_noise`.
 
     All dwells of a record share one estimate of its memory, so that eight records scatter by more than their dwells'
     number says: ten points are allowed.

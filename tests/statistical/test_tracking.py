@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.degradation import Degradation, value
-from models.prognosis import weighted_quantiles
-from models.tracking import grid as grid_module
-from models.tracking.grid import Grid
+from models.degradation.general_order import Degradation, value
+from models.prognosis.first_passage import weighted_quantiles
+from models.tracking.filters import grid as grid_module
+from models.tracking.filters.grid import Grid
+from models.tracking.filters.particle import Particle
+from models.tracking.filters.ukf import Ukf
 from models.tracking.measurement import Measurement
-from models.tracking.particle import Particle
+from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior, weak
-from models.tracking.protocol import Posterior
-from models.tracking.ukf import Ukf
 from tests.statistical.lives import (
     LEVELS,
     PRIOR,

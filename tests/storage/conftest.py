@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from storage import database as database_module
-from storage.database import Database, open_database
+from storage.engine import database as database_module
+from storage.engine.database import Database, open_database
 
 
 @pytest.fixture

@@ -10,8 +10,8 @@ from sqlalchemy.exc import IntegrityError
 
 from storage import adopted_models, clutches, diagnoses, runs
 from storage.adopted_models import AdoptedRow
-from storage.database import Database, open_database
 from storage.diagnoses import FAILED, FINISHED, RUNNING, NewDiagnosis
+from storage.engine.database import Database, open_database
 from storage.migrations import upgrade as migrations
 from tests.storage.samples import clutch_row, integrity, new_run, store_run
 

@@ -6,7 +6,7 @@ import pytest
 from sqlalchemy.exc import IntegrityError
 
 from storage import fleet_priors
-from storage.database import Database
+from storage.engine.database import Database
 from storage.fleet_priors import NOBODY, FleetPriorRow
 
 PAPER = FleetPriorRow(

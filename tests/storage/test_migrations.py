@@ -10,19 +10,19 @@ from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 
 from storage import clutches
-from storage.database import Database, open_database
-from storage.errors import DatabaseTooNew, StorageUnavailable
+from storage.engine.database import Database, open_database
+from storage.engine.errors import DatabaseTooNew, StorageUnavailable
 from storage.migrations import upgrade as migrations
 from storage.tables import metadata
 from tests.storage.samples import child, clutch_row, integrity
 
 STARTER = """
 import sys
-import storage.database
-storage.database.preferred_journal_mode = lambda _: sys.argv[1]
+import storage.engine.database
+storage.engine.database.preferred_journal_mode = lambda _: sys.argv[1]
 print("loaded", flush=True)
 for line in sys.stdin:
-    database = storage.database.open_database(f"sqlite:///{line.strip()}")
+    database = storage.engine.database.open_database(f"sqlite:///{line.strip()}")
     print(database.ready(), flush=True)
     database.close()
 """
@@ -98,7 +98,7 @@ def test_a_step_that_breaks_references_is_undone(tmp_path: Path, monkeypatch: py
         migrations.upgrade(connection)  # type: ignore[arg-type]
         connection.exec_driver_sql("INSERT INTO prediction VALUES ('nobody', 'q', 0, 0, '{}', '')")  # type: ignore[attr-defined]
 
-    monkeypatch.setattr("storage.database.upgrade", breaking)
+    monkeypatch.setattr("storage.engine.database.upgrade", breaking)
     with pytest.raises(StorageUnavailable, match="refer to nothing"):
         open_database(f"sqlite:///{tmp_path}/a.db")
     monkeypatch.undo()

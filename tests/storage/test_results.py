@@ -7,8 +7,8 @@ import pytest
 from sqlalchemy.exc import IntegrityError
 
 from storage import clutches, filter_states, keys, predictions
-from storage.database import Database
-from storage.errors import DamagedData
+from storage.engine.database import Database
+from storage.engine.errors import DamagedData
 from storage.filter_states import FilterStateRow
 from storage.keys import KeyRow
 from storage.predictions import PredictionRow

@@ -8,8 +8,8 @@ import pytest
 from sqlalchemy.exc import IntegrityError
 
 from storage import channels, clutches, fits, runs
-from storage.database import Database
-from storage.errors import DamagedData
+from storage.engine.database import Database
+from storage.engine.errors import DamagedData
 from tests.storage.samples import clutch_row, columns, fit_row, new_run
 
 CLUTCH = "bench3-017"

@@ -5,8 +5,8 @@ import pytest
 from storage import adopted_models, clutches, diagnoses, verdicts
 from storage.adopted_models import AdoptedRow
 from storage.clutches import ClutchRow
-from storage.database import Database
 from storage.diagnoses import NewDiagnosis
+from storage.engine.database import Database
 from storage.verdicts import VerdictRow
 
 AT = "2026-11-02T10:00:00+00:00"

@@ -7,8 +7,8 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, MaintenanceEvent, StationaryRun
-from models.plateaus import cut_plateaus
-from models.runs import Plateaus, Record
+from models.records.plateaus import cut_plateaus
+from models.records.runs import Plateaus, Record
 from tests.blind.rig.hide import Hidden
 from tests.blind.rig.plan import RPM, Site
 

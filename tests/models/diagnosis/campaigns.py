@@ -11,10 +11,10 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
-from models.lag import attractor_torque
+from models.friction.stribeck import StribeckParameters, torque
+from models.loops.lag import attractor_torque
+from models.records.runs import Plateaus, Record
 from models.rig.truth import SimulatedClutch, draw
-from models.runs import Plateaus, Record
-from models.stribeck import StribeckParameters, torque
 
 RPM = 2 * np.pi / 60
 PRESSURES = np.linspace(4e5, 7e5, 5)

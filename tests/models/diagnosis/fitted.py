@@ -5,14 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.baseline import predict
+from models.diagnosis.baseline.laws import Laws
+from models.diagnosis.baseline.prediction import predict
 from models.diagnosis.campaign import Campaign
-from models.diagnosis.catalogue import BY_SLUG
-from models.diagnosis.design import Design, build_design
-from models.diagnosis.effect import Shape
-from models.diagnosis.engine import Baseline, fit_baseline
-from models.diagnosis.fitting import Fit, Fitted, fit
-from models.diagnosis.laws import Laws
+from models.diagnosis.design.design import Design, build_design
+from models.diagnosis.diagnose import Baseline, fit_baseline
+from models.diagnosis.effects.catalogue import BY_SLUG
+from models.diagnosis.effects.effect import Shape
+from models.diagnosis.pooled_fit.gauss_newton import Fit, Fitted, fit
 from tests.models.diagnosis.campaigns import Where
 
 

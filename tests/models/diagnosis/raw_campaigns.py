@@ -5,7 +5,7 @@ from scipy.signal import lfilter
 
 from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
-from models.runs import Plateaus, Record
+from models.records.runs import Plateaus, Record
 
 RPM = 2 * np.pi / 60
 RADIUS = 0.058

@@ -6,9 +6,9 @@ Writes them into the document, between their marks.
 import re
 from pathlib import Path
 
-from models.diagnosis.catalogue import CATALOGUE
-from models.diagnosis.effect import Kind
-from models.diagnosis.trials import TRIALS
+from models.diagnosis.effects.catalogue import CATALOGUE
+from models.diagnosis.effects.effect import Kind
+from models.diagnosis.experiments.candidates import TRIALS
 
 #: What an adopted effect does, by its kind.
 ADOPTED = {

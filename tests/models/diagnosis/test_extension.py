@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.diagnosis.baseline.laws import EXPONENTIAL, FALL, LOG_BEND, POWERS, falling_weight
 from models.diagnosis.campaign import Campaign, DutyRun, StationaryRun
-from models.diagnosis.catalogue import BY_SLUG
-from models.diagnosis.design import MOST_PLATEAUS
-from models.diagnosis.effects.torque_zero_shift import DAYS, STRAIGHT
+from models.diagnosis.design.design import MOST_PLATEAUS
+from models.diagnosis.effects.catalogue import BY_SLUG
+from models.diagnosis.effects.catalogued.torque_zero_shift import DAYS, STRAIGHT
+from models.diagnosis.effects.viscosity import log_viscosity_ratio
 from models.diagnosis.extension import Extension, _laws, build_extension, facts_from, facts_to
-from models.diagnosis.fitting import Fit, Fitted
-from models.diagnosis.laws import EXPONENTIAL, FALL, LOG_BEND, POWERS, falling_weight
-from models.diagnosis.viscosity import log_viscosity_ratio
-from models.runs import Plateaus
+from models.diagnosis.pooled_fit.gauss_newton import Fit, Fitted
+from models.records.runs import Plateaus
 from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.fitted import Study, study, warmth
 

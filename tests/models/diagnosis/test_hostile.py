@@ -8,9 +8,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, MaintenanceEvent, StationaryRun
-from models.diagnosis.engine import diagnose
-from models.diagnosis.report import Report, Verdict
-from models.runs import Plateaus, Record
+from models.diagnosis.diagnose import diagnose
+from models.diagnosis.report.report import Report, Verdict
+from models.records.runs import Plateaus, Record
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from models.diagnosis.catalogue import CATALOGUE
-from models.diagnosis.trials import TRIALS
+from models.diagnosis.effects.catalogue import CATALOGUE
+from models.diagnosis.experiments.candidates import TRIALS
 from tests.models.diagnosis.tables import catalogue_table, trials_table
 
 DOCUMENT = (Path(__file__).parents[3] / "docs" / "diagnosis.md").read_text(encoding="utf-8")

@@ -1,0 +1,174 @@
+"""Severity: what a clutch has been through, as cycles, as sliding distance or as dissipated energy.
+
+Eq. 6 is general-order kinetics, dD/dζ = -k Dⁿ, and the severity of the load enters through the rate k. A block of duty whose
+cycles are w times as severe as a reference cycle therefore counts w times:
+
+    ζ(N) = ∫ (w(n)/w_ref)^q dn
+
+with N the duty cycles, w the sliding distance or the energy [J] of one cycle and q an exponent. The distance is told as
+an angle [rad]: the mean radius, the same in all of a clutch's cycles, cancels. ζ stays in cycles: in
+cycles of the first block that says its severity. It is piecewise linear; beyond the last block it goes on as recent duty
+did, and so remaining cycles are cycles of recent duty.
+
+Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, eq. 6; J. F. Archard, J. Appl. Phys. 24 (1953) 981-988, for
+wear by work done.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.degradation.general_order import Number
+
+#: Recent duty: the blocks of the last share of the cycles so far, but of so many cycles at least.
+RECENT_SHARE, RECENT_CYCLES = 0.1, 1_000.0
+#: One cycle counts as so many reference cycles at least and at most: a slip of the pen must not end or stop a life.
+MILDEST, HARSHEST = 1e-3, 1e3
+#: Where a block does not say how long an engagement lasts, the speed is taken to fall evenly by this much, rad/s²: 2,000 rpm
+#: come to rest in about one second.
+DECELERATION = 200.0
+
+
+class SeverityBasis(StrEnum):
+    """What ζ counts."""
+
+    CYCLES = "cycles"
+    SLIDING_DISTANCE = "sliding_distance"
+    DISSIPATED_ENERGY = "dissipated_energy"
+
+
+#: The work of a standard cycle: about what the life test's engagements dissipate [J], and how far they slide [rad].
+STANDARD = {SeverityBasis.DISSIPATED_ENERGY: 20e3, SeverityBasis.SLIDING_DISTANCE: 100.0}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Block:
+    """Duty cycles that end at `end` cycles; the energy [J] of one, its initial speed [rad/s] and duration [s] where told.
+
+    Raises ValueError where `cycles` is not positive or another number is negative or not finite.
+    """
+
+    end: float
+    cycles: float
+    energy: float | None = None
+    speed: float | None = None
+    duration: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("end", "cycles", "energy", "speed", "duration"):
+            number = getattr(self, name)
+            if number is not None and not (np.isfinite(number) and number >= 0.0):
+                raise ValueError(f"{name} must be finite and not negative, got {number}")
+        if self.cycles == 0.0:
+            raise ValueError("cycles must be positive, got 0")
+
+    def since(self, origin: float) -> "Block":
+        """The same block with its cycles counted from `origin` < end."""
+        return replace(self, end=self.end - origin)
+
+    def work(self, basis: SeverityBasis) -> float | None:
+        """The energy [J] or the slid angle [rad] of one cycle; None where the block does not say it.
+
+        The speed falls evenly to rest, so the angle is ω t/2, with t = ω/DECELERATION where it is not told.
+        """
+        if basis is SeverityBasis.DISSIPATED_ENERGY:
+            return self.energy
+        if self.speed is None:
+            return None
+        return 0.5 * self.speed * (self.speed / DECELERATION if self.duration is None else self.duration)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Severity:
+    """What ζ counts, and the exponent q in [0, 10] by which severity enters."""
+
+    basis: SeverityBasis = SeverityBasis.CYCLES
+    exponent: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.exponent <= 10.0:
+            raise ValueError(f"exponent must lie between 0 and 10, got {self.exponent}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeverityMap:
+    """ζ over cycles: knots (cycles [k], zeta [k]), both ascending from 0, straight between, `rate` dζ/dN beyond.
+
+    A cycle of ζ is worth `unit` cycles of STANDARD work: by it the ζ of clutches can be compared.
+    """
+
+    cycles: FloatArray
+    zeta: FloatArray
+    rate: float
+    unit: float = 1.0
+
+    def progress(self, cycles: Number) -> FloatArray:
+        """ζ at cycles >= 0, any shape."""
+        at = np.asarray(cycles, dtype=np.float64)
+        beyond = np.maximum(at - self.cycles[-1], 0.0)
+        return np.asarray(np.interp(at, self.cycles, self.zeta) + self.rate * beyond)
+
+    def cycles_at(self, progress: Number) -> FloatArray:
+        """The inverse: cycles at ζ >= 0; inf where ζ is."""
+        at = np.asarray(progress, dtype=np.float64)
+        beyond = np.maximum(at - self.zeta[-1], 0.0)
+        return np.asarray(np.interp(at, self.zeta, self.cycles) + beyond / self.rate)
+
+
+#: ζ is the count of cycles.
+IDENTITY = SeverityMap(cycles=np.zeros(1), zeta=np.zeros(1), rate=1.0)
+
+
+def severity_map(severity: Severity, blocks: Sequence[Block]) -> SeverityMap:
+    """ζ over cycles for blocks in any order; cycles that no block tells of are as severe as the rest on average.
+
+    Where blocks overlap the one that ends first counts. The identity where ζ counts cycles, or no block says its severity.
+    """
+    if severity.basis is SeverityBasis.CYCLES:
+        return IDENTITY
+    ordered = sorted(blocks, key=lambda block: block.end)
+    pieces = _pieces(ordered, [block.work(severity.basis) for block in ordered])
+    reference = next((work for _, work in pieces if work), None)
+    if reference is None:
+        return IDENTITY
+    rates = [
+        None if work is None else min(max((work / reference) ** severity.exponent, MILDEST), HARSHEST)
+        for _, work in pieces
+    ]
+    lengths = np.array([length for length, _ in pieces])
+    told = np.array([rate is not None for rate in rates])
+    filled = np.array([math.nan if rate is None else rate for rate in rates])
+    filled[~told] = np.average(filled[told], weights=lengths[told])
+    return SeverityMap(
+        cycles=np.concatenate([[0.0], np.cumsum(lengths)]),
+        zeta=np.concatenate([[0.0], np.cumsum(lengths * filled)]),
+        rate=_recent(lengths, filled),
+        unit=(reference / STANDARD[severity.basis]) ** severity.exponent,
+    )
+
+
+def _pieces(ordered: Sequence[Block], works: Sequence[float | None]) -> list[tuple[float, float | None]]:
+    """Lengths [cycles] and works from 0 to the end of the last block, without overlaps; None where nothing is said."""
+    pieces: list[tuple[float, float | None]] = []
+    reached = 0.0
+    for block, work in zip(ordered, works, strict=True):
+        start = max(block.end - block.cycles, reached)
+        if start > reached:
+            pieces.append((start - reached, None))
+        if block.end > start:
+            pieces.append((block.end - start, work))
+        reached = max(reached, block.end)
+    return pieces
+
+
+def _recent(lengths: FloatArray, rates: FloatArray) -> float:
+    """The mean rate over the cycles that count as recent."""
+    total = float(lengths.sum())
+    window = min(total, max(RECENT_SHARE * total, RECENT_CYCLES))
+    ends = np.cumsum(lengths)
+    kept = np.clip(ends - (total - window), 0.0, lengths)
+    return float(kept @ rates / kept.sum())

@@ -1,0 +1,256 @@
+"""The rows of a campaign that the baseline and the effects are fitted to.
+
+A *point* is where torque is predicted: a plateau of a stationary test, or one of PHASES evenly spaced phases of a loop. A
+*row* is what is compared with data: a plateau again, or one of BINS phase bins of a loop, the mean over the points (and
+over the samples) within. So a loop is a few rows however fast it was sampled, and sixty states stay cheap.
+
+Everything is folded to v >= 0 (the model is odd): `sign` says which way the clutch turned.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from models.diagnosis.campaign import Campaign, StationaryRun
+from models.diagnosis.design.facts import Facts, facts_of
+from models.diagnosis.design.loop_bins import BINS, PHASES, BinnedLoop, binned_loops
+from models.diagnosis.design.points import IntArray, Points, joined, opened
+from models.diagnosis.design.sample_autocorrelation import bins_remember
+from models.diagnosis.design.thinning import MOST_PLATEAUS, thinned
+from models.records.runs import pressure_levels
+
+#: Time on one plateau [s] where nothing else is known (the reference's section 2.3.3).
+PLATEAU_DURATION = 5.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunInfo:
+    """A run that gave rows."""
+
+    run_id: str
+    cycles: float
+    dynamic: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Design:
+    """Points [P] (plateaus first, then PHASES points a loop), rows [N] (plateaus first, then the loops' bins), measured
+    torque [N] Nm (folded), `samples` [N] averaged in each row, `torque_sd` [N] Nm as sent (NaN where not), `level` [N] Pa
+    the pressure level (0 where the clutch is open), `curve` [N] an index that run and level share, `bins` [N - plateaus]
+    which bin of the flat (loop, bin) order each loop row is, `past` [N - plateaus] how far past that bin's middle (in bins)
+    its samples lie, `repeats` rows [n] of a loop and what a further period of it differs by there [n] Nm, as if each were
+    one sample, `chains` [b, n] rows that follow each other in a run or loop, those of one length together,
+    `bins_remember` the correlations of neighbouring bins, and of those next but one, that the loops' samples tell (None:
+    they do not), `notes` what was left out."""
+
+    points: Points
+    rows: Points
+    torque: FloatArray
+    samples: FloatArray
+    torque_sd: FloatArray
+    level: FloatArray
+    curve: IntArray
+    bins: IntArray
+    past: FloatArray
+    repeats: tuple[tuple[IntArray, FloatArray], ...]
+    chains: tuple[IntArray, ...]
+    plateaus: int
+    loops: int
+    bins_remember: tuple[float, float] | None
+    runs: tuple[RunInfo, ...]
+    facts: Facts
+    notes: tuple[str, ...]
+
+    @property
+    def closed(self) -> NDArray[np.bool_]:
+        """[N] whether the clutch is closed: there is friction, and its pressure means something."""
+        return self.rows.engaged > 0
+
+    @property
+    def levels(self) -> FloatArray:
+        """The distinct pressure levels [l] Pa of the closed clutch, ascending."""
+        return np.unique(self.level[self.closed])
+
+    @property
+    def usual_torque(self) -> float:
+        """The median of the closed clutch's torque [Nm], kept off 0."""
+        return max(float(np.median(np.abs(self.torque[self.closed]))) if self.closed.any() else 0.0, 1e-12)
+
+    def to_rows(self, at_points: FloatArray) -> FloatArray:
+        """[P, ...] at points -> [N, ...] at rows: bins lie between their two points, where their samples do."""
+        if not self.loops:
+            return at_points
+        out = np.empty((self.torque.size, *at_points.shape[1:]))
+        out[: self.plateaus] = at_points[: self.plateaus]
+        first, second = (at_points[self.plateaus + k :: PHASES // BINS][self.bins] for k in range(PHASES // BINS))
+        later = (0.5 + 2.0 * self.past).reshape(-1, *(1,) * (at_points.ndim - 1))
+        out[self.plateaus :] = first + later * (second - first)
+        return out
+
+
+def build_design(campaign: Campaign) -> Design:
+    """All rows of a campaign. Never raises on a campaign that checked itself; may have no rows."""
+    notes: list[str] = []
+    kept = thinned(campaign, notes)
+    runs: list[RunInfo] = []
+    blocks: list[Points] = []
+    torques, deviations, samples = [], [], []
+    offset = 0
+    for run in kept.stationary:
+        points, torque, sd = _plateaus(run, kept, len(runs), offset, notes)
+        if torque.size:
+            runs.append(RunInfo(run_id=run.run_id, cycles=run.cycles, dynamic=False))
+            blocks.append(points)
+            torques.append(torque)
+            deviations.append(sd)
+            samples.append(np.ones_like(torque))
+            offset += torque.size
+    loops: list[BinnedLoop] = []
+    of_run: list[int] = []
+    mute: list[str] = []
+    for dynamic in kept.dynamic:
+        found, said = binned_loops(dynamic.record, kept.geometry)
+        notes.extend(f"{dynamic.run_id}: {sentence}" for sentence in said)
+        mute += said[:1] if not found else []
+        if found:
+            loops.extend(found)
+            of_run.extend([len(runs)] * len(found))
+            runs.append(RunInfo(run_id=dynamic.run_id, cycles=dynamic.cycles, dynamic=True))
+    if mute:
+        told = f"{len(mute)} of {len(kept.dynamic)} ({mute[0].rstrip('.')})"
+        notes.append(f"Dynamic tests that could not be evaluated and tell nothing: {told}.")
+    moments = {run.run_id: run.moment for run in kept.dynamic}
+    for number, (loop, index) in enumerate(zip(loops, of_run, strict=True)):
+        blocks.append(_loop_points(loop, index, number, runs[index].cycles, moments[runs[index].run_id]))
+    return _assembled(blocks, torques, deviations, samples, loops, runs, offset, kept, tuple(notes))
+
+
+def _assembled(
+    blocks: list[Points],
+    torques: list[FloatArray],
+    deviations: list[FloatArray],
+    samples: list[FloatArray],
+    loops: list[BinnedLoop],
+    runs: list[RunInfo],
+    plateaus: int,
+    campaign: Campaign,
+    notes: tuple[str, ...],
+) -> Design:
+    points = opened(joined(blocks))
+    filled, past = (
+        np.concatenate([getattr(loop, name) for loop in loops]) if loops else np.zeros(0)
+        for name in ("samples", "past")
+    )
+    bins = np.flatnonzero(filled > 0)
+    per_bin = PHASES // BINS
+    middle = plateaus + bins * per_bin + per_bin // 2
+    rows = points.take(np.concatenate([np.arange(plateaus), middle]).astype(np.intp))
+    if loops:
+        torques = [*torques, np.concatenate([loop.torque for loop in loops])[bins]]
+        samples = [*samples, filled[bins]]
+        deviations = [*deviations, np.full(bins.size, np.nan)]
+    level, closed = np.zeros(rows.run.size), rows.engaged > 0
+    level[closed] = pressure_levels(rows.pressure[closed]) if closed.any() else 0.0
+    _, curve = np.unique(np.stack([rows.run, level]), axis=1, return_inverse=True)
+    return Design(
+        points=points,
+        rows=rows,
+        torque=np.concatenate(torques) if torques else np.zeros(0),
+        samples=np.concatenate(samples) if samples else np.zeros(0),
+        torque_sd=np.concatenate(deviations) if deviations else np.zeros(0),
+        level=level,
+        curve=np.asarray(curve, dtype=np.intp).reshape(-1),
+        bins=np.asarray(bins, dtype=np.intp),
+        past=past[bins],
+        repeats=tuple(_repeats(loops, bins, plateaus)),
+        chains=_chains(rows),
+        plateaus=plateaus,
+        loops=len(loops),
+        bins_remember=bins_remember([loop.memory for loop in loops]),
+        runs=tuple(runs),
+        facts=facts_of(campaign),
+        notes=notes,
+    )
+
+
+def _repeats(loops: list[BinnedLoop], bins: IntArray, plateaus: int) -> Iterator[tuple[IntArray, FloatArray]]:
+    for number, loop in enumerate(loops):
+        first, last = np.searchsorted(bins, [number * BINS, (number + 1) * BINS])
+        for differs in loop.repeats[:, bins[first:last] - number * BINS]:
+            known = np.isfinite(differs)
+            yield np.asarray(plateaus + first + np.flatnonzero(known), dtype=np.intp), differs[known]
+
+
+def _chains(rows: Points) -> tuple[IntArray, ...]:
+    """Rows [b, n] that follow each other in runs of plateaus, then in loops, those of one length together."""
+    owner = np.where(rows.steady, rows.run, rows.loop + int(rows.run.max(initial=0)) + 1)
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(owner)) + 1, [owner.size]])
+    starts, lengths = edges[:-1], np.diff(edges)
+    steady = np.append(rows.steady, False)[starts]
+    found = []
+    for mine in (steady, ~steady):
+        for length in np.unique(lengths[mine & (lengths > 0)]):
+            first = starts[mine & (lengths == length)]
+            found.append(np.asarray(first[:, None] + np.arange(length), dtype=np.intp))
+    return tuple(found)
+
+
+def _plateaus(
+    run: StationaryRun, campaign: Campaign, index: int, offset: int, notes: list[str]
+) -> tuple[Points, FloatArray, FloatArray]:
+    """Points, folded torque and torque_sd of a run's plateaus in motion; `offset` is its first row."""
+    table = run.plateaus
+    usable = np.flatnonzero(table.speed != 0)
+    if usable.size < table.torque.size:
+        notes.append(f"{run.run_id}: {table.torque.size - usable.size} plateaus at rest left out.")
+    if usable.size > MOST_PLATEAUS:
+        notes.append(f"{run.run_id}: {MOST_PLATEAUS} of {usable.size} plateaus taken, evenly.")
+        usable = usable[np.linspace(0, usable.size - 1, MOST_PLATEAUS).round().astype(int)]
+    velocity = campaign.geometry.sliding_velocity(table.speed[usable])
+    sign = np.copysign(1.0, velocity)
+    count = usable.size
+    known = PLATEAU_DURATION * (np.arange(table.torque.size) + 0.5) if run.time is None else np.array(run.time)
+    clock = np.asarray(known[usable], dtype=np.float64)
+    nan: FloatArray = np.full(count, np.nan, dtype=np.float64)
+    moment = nan if run.moment is None else np.asarray(run.moment + clock, dtype=np.float64)
+    consecutive = np.concatenate([[-1], np.where(np.diff(usable) == 1, offset + np.arange(count - 1), -1)])
+    points = Points(
+        run=np.full(count, index, dtype=np.intp),
+        cycles=np.full(count, float(run.cycles)),
+        pressure=table.pressure[usable],
+        engaged=np.ones(count),
+        velocity=np.abs(velocity),
+        sign=sign,
+        acceleration=np.zeros(count),
+        temperature=nan if table.oil_temperature is None else table.oil_temperature[usable],
+        clock=clock,
+        moment=moment,
+        angular_frequency=np.zeros(count),
+        phase=np.zeros(count),
+        loop=np.full(count, -1, dtype=np.intp),
+        previous=consecutive[:count].astype(np.intp),
+    )
+    return points, sign * table.torque[usable], nan if table.torque_sd is None else table.torque_sd[usable]
+
+
+def _loop_points(loop: BinnedLoop, run: int, number: int, cycles: float, moment: float | None) -> Points:
+    count = loop.velocity.size
+    return Points(
+        run=np.full(count, run, dtype=np.intp),
+        cycles=np.full(count, float(cycles)),
+        pressure=np.full(count, loop.pressure),
+        engaged=np.ones(count),
+        velocity=loop.velocity,
+        sign=np.full(count, loop.sign),
+        acceleration=loop.acceleration,
+        temperature=np.full(count, loop.temperature),
+        clock=loop.clock,
+        moment=np.full(count, np.nan) if moment is None else moment + loop.clock,
+        angular_frequency=np.full(count, loop.angular_frequency),
+        phase=loop.phase,
+        loop=np.full(count, number, dtype=np.intp),
+        previous=np.full(count, -1, dtype=np.intp),
+    )

@@ -1,0 +1,166 @@
+"""Smooth contrasts: shapes of structure that any unknown cause might have, each on the axes on which it lives.
+
+They are relative to the predicted torque (structure in friction scales with it) and are products of cosines over the
+ranges of pressure, speed, clock and torque and over the rank of life, bumps and bends in speed, waves over a loop's
+phase, and single states; waves over speed go through the loops' lag, as friction does. Axes are public channel names, or
+`test_clock_s`, `cycles`, `loop_phase`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from models.diagnosis.baseline.prediction import Prediction
+from models.diagnosis.design.design import Design
+
+#: Takes the axis and a column [N] relative to the torque.
+Add: TypeAlias = Callable[[str, FloatArray], None]
+SPEED, PRESSURE, CYCLES = "speed_rpm", "pressure_bar", "cycles"
+TEMPERATURE, CLOCK, PHASE = "oil_temperature_c", "test_clock_s", "loop_phase"
+TORQUE = "torque_nm"
+
+#: A sensor that is not straight may be so in many waves over its range; speed may have ripples (an encoder's, a mount's).
+TORQUE_WAVES, SPEED_WAVES = 20, range(4, 17)
+_SEEN_AT_ALL = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contrasts:
+    """columns [N, m] Nm at the rows, and the axis [m] on which each lives."""
+
+    columns: FloatArray
+    axes: tuple[str, ...]
+
+
+def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
+    """Every contrast that the design can show."""
+    rows = design.rows
+    torque = rows.engaged * np.abs(prediction.torque)  # with the clutch open there is no friction to be wrong
+    steady, looping = rows.steady.astype(np.float64), 1.0 - rows.steady
+    speed, pressure = _unit(rows.velocity, design.closed), _unit(rows.pressure, design.closed)
+    life = _rank(rows.cycles)
+    states, levels = design.facts.states.size, design.levels.size
+    lives, presses = min(states - 1, 3), min(levels - 1, 2)
+    columns: list[FloatArray] = []
+    axes: list[str] = []
+
+    def add(axis: str, column: FloatArray) -> None:
+        if float((column * column).sum()) > 0:
+            columns.append(column * torque)
+            axes.append(axis)
+
+    for s in range(1, 9):
+        add(SPEED, _cosine(s, speed) * steady)
+        for p in range(1, presses + 1):
+            add(SPEED if s > p + 1 else PRESSURE, _cosine(s, speed) * _cosine(p, pressure) * steady)
+        for z in range(1, lives + 1):
+            add(SPEED if s > z + 1 else CYCLES, _cosine(s, speed) * _cosine(z, life) * steady)
+    for wave in _speed_waves(design, prediction).T:
+        if np.abs(wave).max() > _SEEN_AT_ALL * torque.max():  # at even speeds a sine may be 0 at each
+            columns.append(wave)
+            axes.append(SPEED)
+    for p, z, s in product(range(1, presses + 1), range(1, min(lives, 2) + 1), range(1, 4)):
+        add(SPEED if s > max(p, z) else PRESSURE, _cosine(s, np.sqrt(speed)) * _cosine(p, pressure) * _cosine(z, life))
+    for centre in np.linspace(0.06, 0.94, 13):
+        for width in (0.05, 0.11):
+            add(SPEED, _bump(speed, centre, width))
+        add(SPEED, (speed - centre) * _bump(speed, centre, 0.08))
+        if lives:
+            add(SPEED, _bump(speed, centre, 0.1) * _cosine(1, life))
+    for p in range(1, min(levels - 1, 6) + 1):
+        add(PRESSURE, _cosine(p, pressure))
+        for z in range(1, lives + 1):
+            add(PRESSURE if p > 1 else CYCLES, _cosine(p, pressure) * _cosine(z, life))
+    for z in range(1, min(states - 1, 12) + 1):
+        add(CYCLES, _cosine(z, life))
+        add(CYCLES, _cosine(z, life) * steady)
+    for state in np.unique(rows.cycles)[:12]:
+        here = rows.cycles == state
+        add(CYCLES, here.astype(np.float64))
+        for s in (1, 2):
+            add(CYCLES, here * _cosine(s, speed) * steady)
+    reading = _unit(torque, design.closed)
+    for t in range(1, TORQUE_WAVES + 1):
+        add(TORQUE, _cosine(t, reading))
+    _add_clock(design, add, steady)
+    if design.loops:
+        _add_loops(design, add, np.asarray(looping, dtype=np.float64), lives, presses)
+    if np.isfinite(rows.temperature).any():
+        warm = np.where(np.isfinite(rows.temperature), rows.temperature - design.facts.reference_temperature, 0.0) / 3.0
+        for s in range(4):
+            add(TEMPERATURE, warm * _cosine(s, speed))
+        add(TEMPERATURE, warm**2)
+        add(TEMPERATURE, warm * _cosine(1, pressure))
+        if lives:
+            add(TEMPERATURE, warm * _cosine(1, life))
+    return Contrasts(columns=np.stack(columns, axis=1), axes=tuple(axes)) if columns else _none(design)
+
+
+def _speed_waves(design: Design, prediction: Prediction) -> FloatArray:
+    """[N, m] Nm: ripples of friction over speed, which loops show with their lag."""
+    scene = prediction.scene
+    speed = _unit(scene.points.velocity, scene.points.engaged > 0)
+    orders = np.pi * np.array(SPEED_WAVES)
+    waves = np.concatenate([np.cos(orders * speed[:, None]), np.sin(orders * speed[:, None])], axis=1)
+    return prediction.change_at_rows(design, np.abs(scene.curve)[:, None] * waves, before_lag=True)
+
+
+def _none(design: Design) -> Contrasts:
+    return Contrasts(columns=np.zeros((design.torque.size, 0)), axes=())
+
+
+def _add_clock(design: Design, add: Add, steady: FloatArray) -> None:
+    rows = design.rows
+    clock = rows.clock / max(float(rows.clock[rows.steady & design.closed].max(initial=1.0)), 1e-9)
+    for t in range(1, 7):
+        add(CLOCK, _cosine(t, clock) * steady)
+        if design.facts.states.size > 1:
+            add(CLOCK, _cosine(t, clock) * steady * _cosine(1, _rank(rows.cycles)))
+
+
+def _add_loops(design: Design, add: Add, looping: FloatArray, lives: int, presses: int) -> None:
+    rows = design.rows
+    life, pressure = _rank(rows.cycles), _unit(rows.pressure, design.closed)
+    speed = _unit(rows.velocity, design.closed)
+    for h in range(1, 7):
+        for wave in (np.cos(h * rows.phase), np.sin(h * rows.phase)):
+            add(PHASE, wave * looping)
+            if h > 4:
+                continue
+            for p in range(1, presses + 1):
+                add(PHASE, wave * looping * _cosine(p, pressure))
+            for z in range(1, min(lives, 2) + 1):
+                add(PHASE, wave * looping * _cosine(z, life))
+    add(PHASE, looping)
+    rising = np.sign(rows.acceleration) * looping
+    for s in range(4):
+        add(PHASE, rising * _cosine(s, speed))
+    for way in (1.0, -1.0):
+        one_way = looping * (way * rows.acceleration > 0)
+        for centre, width in product(np.linspace(0.06, 0.94, 11), (0.06, 0.12)):
+            add(PHASE, _bump(speed, centre, width) * one_way)
+
+
+def _bump(unit: FloatArray, centre: float, width: float) -> FloatArray:
+    return np.asarray(np.exp(-0.5 * ((unit - centre) / width) ** 2), dtype=np.float64)
+
+
+def _cosine(order: int, unit: FloatArray) -> FloatArray:
+    return np.cos(np.pi * order * unit)
+
+
+def _unit(values: FloatArray, among: NDArray[np.bool_]) -> FloatArray:
+    """To 0 ... 1 by the range of those `among` them."""
+    low, high = float(values[among].min()), float(values[among].max())
+    return (np.clip(values, low, high) - low) / max(high - low, 1e-300)
+
+
+def _rank(values: FloatArray) -> FloatArray:
+    """To 0 ... 1 by rank of the distinct values: states crowd early in life."""
+    distinct = np.unique(values)
+    return np.searchsorted(distinct, values) / max(distinct.size - 1, 1)

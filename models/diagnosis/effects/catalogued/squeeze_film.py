@@ -1,0 +1,167 @@
+"""The oil film needs time to be squeezed out and drawn in: more torque while accelerating, less while decelerating."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from models.diagnosis.baseline.laws import Laws, Scene, gradient_of
+from models.diagnosis.design.facts import Facts
+from models.diagnosis.effects.effect import Bend, Effect, Family, Kind, Measure, Shape, ShapeParameter, Tried
+from models.friction.stribeck import GAMMA
+
+#: Pressure to which the amplitude refers [Pa].
+REFERENCE_PRESSURE = 5e5
+#: How the film is followed: to first order by powers of speed, by its own equation, or as a thickness that relaxes and
+#: whose strength and time have nothing to do with each other.
+FIRST_ORDER, FILM, THICKNESS = 0.0, 1.0, 2.0
+#: The least time of such a thickness [s], and the power of speed that it stays below: with more it would be inertia.
+LEAST_TIME, MOST_POWER = 0.15, 0.55
+#: The log of its prior weight: eq. 7 ties strength and time together.
+UNTIED = -1.0
+#: To first order torque falls faster with speed than the film's lag does, for fewer asperities touch: by this power more. A
+#: film of any other kind would be the same at all speeds, as inertia is.
+FEWER = 0.5
+#: A film is followed for this share of a period before its course is taken: it forgets where it began.
+_BEFORE = 1 / 3
+#: Points of a swing that tell a film's usual slope.
+_SWING = 24
+
+
+def _grid(_facts: Facts) -> tuple[Tried, ...]:
+    powers = [(x, y, f, 0.5, FIRST_ORDER, 0.0) for x in (0.0, 0.6) for y in (0.5, 1.0, 1.5) for f in (0.02, 0.06, 0.15)]
+    films = [
+        (0.4, y, f, sheared, FILM, lags)
+        for y in (0.4, 0.8, 1.2)
+        for f in (0.05, 0.2)
+        for sheared in (0.2, 0.7)
+        for lags in (0.0, 1.0)
+    ]
+    layers = [(-0.2, y, f, time, THICKNESS, 0.0) for y in (0.5, 1.2) for f in (0.03, 0.15) for time in (0.2, 0.8)]
+    return tuple(
+        Tried(shape=shape, log_weight=weight - float(np.log(len(shapes))))
+        for shapes, weight in ((powers, 0.0), (films, 0.0), (layers, UNTIED))
+        for shape in shapes
+    )
+
+
+def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    return _changes(scene, [(amplitude, shape)])[:, 0]
+
+
+def _changes(scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:
+    points = scene.points
+    speed = points.velocity / scene.laws.frame.reference_velocity
+    out = np.zeros((speed.size, len(settings)))
+    looping = np.flatnonzero((points.loop >= 0) & (points.engaged > 0))  # an open clutch has no film to squeeze
+    films = [
+        i for i, (amplitude, shape) in enumerate(settings) if shape[4] == FILM and amplitude > 0.0 and looping.size
+    ]
+    for i, (amplitude, (power, thin, least, _, form, _)) in enumerate(settings):
+        if form == FIRST_ORDER:
+            strength = amplitude * points.engaged * (points.pressure / REFERENCE_PRESSURE) ** power
+            out[:, i] = strength * points.acceleration / (speed + least) ** (thin + FEWER)
+        elif form == THICKNESS and looping.size:
+            out[looping, i] = _over_thickness(scene, looping, amplitude, settings[i][1])
+    if films:
+        amplitudes, shapes = np.array([settings[i][0] for i in films]), np.array([settings[i][1] for i in films])
+        out[looping[:, None], films] = _over_film(scene, looping, amplitudes, shapes.T)
+    return out
+
+
+def _over_film(scene: Scene, looping: NDArray[np.intp], amplitude: FloatArray, shapes: FloatArray) -> FloatArray:
+    """Loops' points [n] by films [m]: w is the speed to which the present film belongs, ẇ = (v - w)(w/v_0 + f)^y/τ, a
+    step from phase to phase exact for a film whose time and a speed whose slope stay; asperities follow w, shear grows as
+    the film thins."""
+    points, middle = scene.points, scene.laws.frame.reference_velocity
+    power, thin, least, sheared = shapes[:4]
+    slope = usual_slope(scene.laws, sheared)
+    real = slope > 0
+    phases = np.flatnonzero(np.diff(points.loop[looping], append=-2))[0] + 1
+    v = np.ascontiguousarray(points.velocity[looping].reshape(-1, phases).T)[:, :, None]
+    pressure = points.pressure[looping].reshape(-1, phases)[:, :1]
+    step = 2 * np.pi / (phases * points.angular_frequency[looping].reshape(-1, phases)[:, :1])
+    time = (
+        amplitude / np.where(real, slope, 1.0) * (pressure / REFERENCE_PRESSURE) ** power
+    )  # of the film, mid speed [s]
+    rate = step / np.maximum(time, 1e-12)
+    change = v - np.roll(v, 1, axis=0)
+    film = np.empty((phases, *rate.shape))
+    behind = np.zeros_like(rate)  # v - w
+    last = now = np.broadcast_to(v[-round(_BEFORE * phases) - 1], rate.shape)
+    for k in range(-round(_BEFORE * phases), phases):
+        steps = rate * (np.maximum(1.5 * now - 0.5 * last, 0.0) / middle + least) ** thin
+        keep = np.exp(-steps)
+        behind = behind * keep + change[k] * (1 - keep) / steps
+        last, now = now, v[k] - behind
+        film[k] = now
+    speed = points.velocity[looping][:, None]
+    w = np.maximum(film.transpose(1, 0, 2).reshape(looping.size, -1), 1e-3 * speed)
+    m_s, m_c, v_s, _ = scene.parameters[looping].T[:, :, None]
+    dry = m_s * (m_c - 1.0) * (np.exp(-np.minimum(v_s / w, 700.0)) - scene.decay[looping, None])
+    thinner = np.expm1(np.clip(sheared * np.log(speed / w), -3.0, 3.0))
+    return np.asarray(np.where(real, dry + scene.viscous[looping, None] * thinner, 0.0), dtype=np.float64)
+
+
+def _over_thickness(scene: Scene, looping: NDArray[np.intp], amplitude: float, shape: Shape) -> FloatArray:
+    """Loops' points [n]: what h = (v/v_0 + f)^q lacks of its stationary value while it relaxes by τ, harmonic by harmonic;
+    asperities carry what the film does not, and carry more under pressure."""
+    power, thin, least, time = shape[:4]
+    points, middle = scene.points, scene.laws.frame.reference_velocity
+    phases = np.flatnonzero(np.diff(points.loop[looping], append=-2))[0] + 1
+    q, tau = MOST_POWER / (1.0 + thin), LEAST_TIME * 10.0**time
+    height = (points.velocity[looping].reshape(-1, phases) / middle + least) ** q
+    waves = np.fft.rfft(height, axis=1)
+    swing = 1j * np.arange(waves.shape[1]) * points.angular_frequency[looping].reshape(-1, phases)[:, :1] * tau
+    missing = np.fft.irfft(waves * swing / (1.0 + swing), phases, axis=1)
+    strength = amplitude * middle / (tau * q * (1.0 + least) ** (q - 1.0))
+    pressed = (points.pressure[looping] / REFERENCE_PRESSURE) ** (1.0 + 0.5 * power)
+    return np.asarray(strength * pressed * missing.ravel(), dtype=np.float64)
+
+
+def usual_slope(laws: Laws, sheared: FloatArray) -> FloatArray:
+    """-∂S/∂w [m] Nm s/m of films at rest with exponents `sheared` [m] of shear: the median over the usual swing, under the
+    loops' pressures, half through life. One number for one θ, whatever rows are asked for."""
+    frame = laws.frame
+    swing = frame.reference_velocity * (1.0 - np.cos(2 * np.pi * (np.arange(_SWING) + 0.5) / _SWING))
+    pressures = frame.loop_pressures if frame.loop_pressures.size else np.array([frame.lowest, frame.highest])
+    pressure, velocity = np.repeat(pressures, _SWING), np.tile(swing, pressures.size)
+    at = laws.parameters(pressure, np.full(pressure.size, 0.5 * frame.last))
+    dry = -gradient_of(velocity, at)[0][:, 2] * at[:, 2] / velocity
+    carried = at[:, 3] * velocity ** (GAMMA - 1.0)
+    return np.asarray(np.median(sheared[:, None] * carried - dry, axis=1), dtype=np.float64)
+
+
+EFFECT = Effect(
+    slug="squeeze_film",
+    title="A squeezed film lags behind the speed",
+    physics="While speed rises the film is still thin from before and more asperities carry: torque is higher than "
+    "stationary, also where the curve rises; the GMS attractor cannot give that.",
+    formula="a (p/5 bar)^x v̇ / (v/v_0 + f)^(y + 1/2), eq. 7's film to first order; or S(w) for S(v) with C_v v^γ (v/w)^s, "
+    "ẇ = (v - w)(w/v_0 + f)^y/τ; or a' (p/5 bar)^(1 + x/2) (H - h), τ ḣ = H - h, "
+    "H = (v/v_0 + f)^(0.55/(1 + y))",
+    source="Ompusunggu et al. 2013, eq. 7 and section 3.2",
+    family=Family.DYNAMIC,
+    kind=Kind.LAG,
+    channels=("time_s",),
+    amplitude="torque per acceleration at 5 bar and mid speed",
+    unit="Nm s²/m",
+    prior_sd=0.05,
+    positive=True,
+    scale=1.0,
+    shapes=(
+        ShapeParameter(name="power of pressure x", unit="-", lowest=-0.5, highest=1.5, smooth=True),
+        ShapeParameter(name="power of speed y", unit="-", lowest=0.4, highest=1.8, smooth=True),
+        ShapeParameter(name="least film f", unit="-", lowest=0.003, highest=0.3, smooth=True),
+        ShapeParameter(name="power of shear s, or log10 of τ/0.15 s", unit="-", lowest=0.0, highest=1.2, smooth=True),
+        ShapeParameter(name="how the film is followed", unit="-", lowest=0.0, highest=2.0),
+        ShapeParameter(name="whether friction lags behind it", unit="-", lowest=0.0, highest=1.0),
+    ),
+    grid=_grid,
+    change=_change,
+    several=_changes,
+    grows_with=Measure.TORQUE,
+    before_lag=None,
+    bends=(Bend.SPEED,),
+)

@@ -1,0 +1,158 @@
+"""What an effect of the catalogue is: one value that says what it is, what it needs and what it changes in torque.
+
+An effect changes the torque at every point of a scene (`baseline.laws.Scene`: the points and what the baseline
+says there) by an amount that one *amplitude*, in engineering units, scales, and *shapes* (a change point, a time
+constant, an exponent) bend. Amplitude 0 is no effect. Adding an effect is adding one file in `effects/` and its name in
+`catalogue.py`.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import TypeAlias
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.baseline.laws import Scene
+from models.diagnosis.design.facts import USUAL_PRESSURE, USUAL_TORQUE, Facts
+
+#: Values of an effect's shape parameters, in the order of `Effect.shapes`.
+Shape: TypeAlias = tuple[float, ...]
+
+
+class Kind(StrEnum):
+    """ARTEFACT: in the measurement or the test's conditions; COURSE: in the clutch's life; LAG: in loops only;
+    VIBRATION: seen in raw records."""
+
+    ARTEFACT = "artefact"
+    COURSE = "course"
+    LAG = "lag"
+    VIBRATION = "vibration"
+
+
+class Family(StrEnum):
+    """Effects that resemble each other most."""
+
+    THERMAL = "thermal"
+    SENSOR = "sensor"
+    VISCOUS = "viscous"
+    DWELL = "dwell"
+    DYNAMIC = "dynamic"
+    VIBRATION = "vibration"
+    HISTORY = "history"
+
+
+class Measure(StrEnum):
+    """What the usual size of an effect grows with: a clutch of ten times the torque has a sensor of ten times the zero."""
+
+    TORQUE = "torque"
+    PRESSURE = "pressure"
+
+
+class Bend(StrEnum):
+    """Along what a template may be bent, for nobody knows its form that well; MOTION: in loops against plateaus. How an
+    effect goes with pressure is what tells it from others, and is not bent."""
+
+    SPEED = "speed"
+    LIFE = "life"
+    CLOCK = "clock"
+    MOTION = "motion"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShapeParameter:
+    """A shape parameter: its name and unit, its bounds; `smooth` where the change may be differentiated in it (then it
+    is refined between grid values), else it is taken from the grid."""
+
+    name: str
+    unit: str
+    lowest: float
+    highest: float
+    smooth: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tried:
+    """One point of a shape grid and the log of its prior weight (weights need not sum to one)."""
+
+    shape: Shape
+    log_weight: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effect:
+    """An effect of the catalogue.
+
+    slug and title are public; physics is a sentence; formula the change of torque; source where it is from.
+    channels: what must have been measured or sent for it to be judged (public names). amplitude, unit: the name and unit
+    of the amplitude; prior_sd: its prior deviation in that unit (zero mean, either sign unless `positive`), for a clutch of
+    the reference's size where it `grows_with` something (`sized`);
+    `scale` turns the SI amplitude into `unit`.
+    grid(facts) gives the shapes to be tried, none where the campaign cannot tell the effect.
+    change(scene, amplitude, shape) -> [P] Nm at the scene's points. before_lag: whether it changes the stationary curve,
+    which friction in loops then lags behind, or the measured torque itself; None where nobody knows and the last shape
+    says (1 or 0).
+    bends: along what its form is uncertain (`effects.template_discrepancy`); an exact law has none.
+    several(scene, settings) -> [P, m] Nm is the same for many (amplitude, shape) at once, where that is cheaper.
+    tails: degrees of freedom of the amplitude's prior (`effects.amplitude_prior`), infinite for a normal one.
+    """
+
+    slug: str
+    title: str
+    physics: str
+    formula: str
+    source: str
+    family: Family
+    kind: Kind
+    channels: tuple[str, ...]
+    amplitude: str
+    unit: str
+    prior_sd: float
+    positive: bool
+    scale: float
+    shapes: tuple[ShapeParameter, ...]
+    grid: Callable[[Facts], tuple[Tried, ...]]
+    change: Callable[[Scene, float, Shape], FloatArray]
+    before_lag: bool | None
+    bends: tuple[Bend, ...]
+    tails: float = 2.0
+    several: Callable[[Scene, Sequence[tuple[float, Shape]]], FloatArray] | None = None
+    grows_with: Measure | None = None
+
+    def changes(self, scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:
+        """The changes [P, m] Nm of several (amplitude, shape)."""
+        if self.several is not None:
+            return self.several(scene, settings)
+        return np.stack([self.change(scene, amplitude, shape) for amplitude, shape in settings], axis=1)
+
+    def lags(self, shape: Shape) -> bool:
+        """Whether friction in loops lags behind what the effect changes."""
+        return shape[-1] > 0.5 if self.before_lag is None else self.before_lag
+
+
+def sized(effect: Effect, facts: Facts) -> Effect:
+    """The effect with the prior that fits this campaign's clutch."""
+    factor = {
+        Measure.TORQUE: facts.usual_torque / USUAL_TORQUE,
+        Measure.PRESSURE: facts.usual_pressure / USUAL_PRESSURE,
+    }
+    return (
+        effect if effect.grows_with is None else replace(effect, prior_sd=effect.prior_sd * factor[effect.grows_with])
+    )
+
+
+def unit_changes(effect: Effect, scene: Scene, shapes: Sequence[Shape]) -> FloatArray:
+    """The changes [P, m] Nm of a small amplitude, per unit: the columns that a linear screen works with."""
+    step = 1e-3 * effect.prior_sd
+    return effect.changes(scene, [(step, shape) for shape in shapes]) / step
+
+
+def untried(_facts: Facts) -> tuple[Tried, ...]:
+    """No shapes: what a smooth model does not show is judged on raw records (`detection.raw_records.evidence`)."""
+    return ()
+
+
+def unchanged(scene: Scene, _amplitude: float, _shape: Shape) -> FloatArray:
+    """No change [P] Nm of what is averaged over a plateau or a loop's bin."""
+    return np.zeros_like(scene.curve)

@@ -1,0 +1,260 @@
+"""Tests that a rig could make next, and the runs that they would add to a campaign.
+
+A trial is made after the last state unless it goes on to later ones. Its torques are not known beforehand and not needed:
+what it would tell hangs on where it measures.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, MaintenanceEvent, StationaryRun
+from models.diagnosis.design.design import PLATEAU_DURATION
+from models.records.runs import UNLOADED, Plateaus, Record, pressure_levels
+
+#: The dynamic test of the reference (section 2.3.4): a swing of 1000 rpm about 1000 rpm, sampled at 200 a period.
+SWING = 1000 * 2 * np.pi / 60
+_SAMPLES, _PERIODS = 200, 10
+_HOUR = 3600.0
+#: Light pressures of loops, as multiples: far enough apart to be told from each other.
+LIGHT = (1.0, 1.5, 2.0)
+#: Sweeps over the speeds in a run with the clutch open: there is one pressure only, none.
+PASSES = 5
+#: Pressures of at least this share of the highest are the usual ones.
+USUAL = 0.75
+
+Run = TypeVar("Run", StationaryRun, DynamicRun)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trial:
+    """What a test would be. `text` is for the engineer, empty where it is only made as a part of others.
+
+    loops: a dynamic test at `frequency` [Hz]; else a stationary test, with speeds `falling`. Either with the oil at
+    `temperature` [K] (None: as usual), pressures times `pressure` [-] (of loops at LIGHT times that of the lowest one,
+    where it is not 1; 0: the clutch is open, one sweep of the speeds PASSES times over, or ten periods, as one
+    run); `times` over, each as the first. `later`: how many usual distances between states it lies ahead,
+    with `energy` [-] times the usual energy of an engagement up to there. `rest` [s]: a pause before the first test and
+    every second one after it. `parts`: keys of the trials that it consists of, and nothing else.
+    """
+
+    text: str
+    loops: bool = False
+    frequency: float = 0.1
+    temperature: float | None = None
+    falling: bool = False
+    pressure: float = 1.0
+    times: int = 1
+    later: int = 0
+    energy: float = 1.0
+    rest: float = 0.0
+    parts: tuple[str, ...] = ()
+
+
+_LOOPS = "dynamic test at 0.3 Hz, ten periods a pressure, 60 samples a second, 1000 ± 1000 rpm"
+_LIGHT_SWEEP = "stationary test at a quarter of the usual pressures"
+_OPEN_SWEEP = "stationary test with the clutch open (no pressure), at the usual speeds, five times over"
+_OPEN_LOOPS = "dynamic test at 0.3 Hz with the clutch open, ten periods"
+_LIGHT = "at a quarter, three eighths and a half of the lowest usual pressure"
+
+TRIALS: dict[str, Trial] = {
+    "loops_0.3hz": Trial(text=f"{_LOOPS}, at the usual pressures", loops=True, frequency=0.3),
+    "light_loops": Trial(text="", loops=True, frequency=0.3, pressure=0.25),
+    "light_loops_60c": Trial(text="", loops=True, frequency=0.3, pressure=0.25, temperature=333.15),
+    "light_tests": Trial(text=f"{_LIGHT_SWEEP}, and {_LOOPS}, {_LIGHT}", parts=("light_sweep", "light_loops")),
+    "light_tests_60c": Trial(
+        text=f"{_LIGHT_SWEEP}, and {_LOOPS}, {_LIGHT}, with the oil at 60 °C", parts=("light_sweep", "light_loops_60c")
+    ),
+    "warm_and_cool": Trial(
+        text=f"{_LIGHT_SWEEP}, and {_LOOPS}, {_LIGHT}, first with the oil as usual, then at 60 °C",
+        parts=("light_sweep", "light_loops", "light_loops_60c"),
+    ),
+    "all_loads": Trial(
+        text=f"{_LIGHT_SWEEP}, and {_LOOPS}, at the usual pressures and then {_LIGHT}",
+        parts=("light_sweep", "loops_0.3hz", "light_loops"),
+    ),
+    "all_loads_and_60c": Trial(
+        text=f"{_LIGHT_SWEEP}, and {_LOOPS}: at the usual pressures, then {_LIGHT}, then there once more with the oil "
+        "at 60 °C",
+        parts=("light_sweep", "loops_0.3hz", "light_loops", "light_loops_60c"),
+    ),
+    "open_sweep": Trial(text=_OPEN_SWEEP, pressure=0.0),
+    "open_loops": Trial(text="", loops=True, frequency=0.3, pressure=0.0),
+    "open_clutch": Trial(text=f"{_OPEN_SWEEP}, and {_OPEN_LOOPS}", parts=("open_sweep", "open_loops")),
+    "open_clutch_and_light": Trial(
+        text=f"{_OPEN_SWEEP}, and {_OPEN_LOOPS}; then {_LIGHT_SWEEP}, and {_LOOPS}, {_LIGHT}",
+        parts=("open_sweep", "open_loops", "light_sweep", "light_loops"),
+    ),
+    "all_loads_and_open": Trial(
+        text=f"{_LIGHT_SWEEP}, and {_LOOPS}, at the usual pressures and then {_LIGHT}; then {_OPEN_SWEEP}, and "
+        f"{_OPEN_LOOPS}",
+        parts=("light_sweep", "loops_0.3hz", "light_loops", "open_sweep", "open_loops"),
+    ),
+    "sweep_60c": Trial(text="stationary test with the oil at 60 °C", temperature=333.15),
+    "sweeps_60c": Trial(text="stationary test with the oil at 60 °C, three times", temperature=333.15, times=3),
+    "sweep_100c": Trial(text="stationary test with the oil at 100 °C", temperature=373.15),
+    "falling_speeds": Trial(
+        text="stationary test with the speeds falling instead of rising, three times", falling=True, times=3
+    ),
+    "light_sweep": Trial(text=_LIGHT_SWEEP, pressure=0.25),
+    "light_sweeps": Trial(text=f"{_LIGHT_SWEEP}, five times", pressure=0.25, times=5),
+    "repeats": Trial(text="the stationary test again at once, five times", times=5),
+    "more_states": Trial(text="three more states of use, at the usual distance, with a stationary test each", later=3),
+    "rests": Trial(
+        text="three more states of use, at the usual distance, with a stationary test each; the clutch rests for two days "
+        "before the first and the third of these tests, not before the second",
+        later=3,
+        rest=48 * _HOUR,
+    ),
+    "half_energy": Trial(
+        text="two more states of use with engagements of half the usual energy, with a stationary test each",
+        later=2,
+        energy=0.5,
+    ),
+    "twice_energy": Trial(
+        text="two more states of use with engagements of twice the usual energy, with a stationary test each",
+        later=2,
+        energy=2.0,
+    ),
+}
+
+
+def runs_of(key: str) -> float:
+    """How much work a trial is, in runs: pressures that were not tried before are as much as two more (none at all is not),
+    another oil temperature (hours of settling, and all changes that oil changes) as ten, a state of use as three,
+    unusual engagements as four, a pause as one."""
+    trial = TRIALS[key]
+    if trial.parts:
+        return sum(runs_of(part) for part in trial.parts)
+    made = 3.0 * trial.later if trial.later else float(trial.times)
+    made += 2.0 * (trial.pressure not in {0.0, 1.0}) + 4.0 * (trial.energy != 1.0) + 1.0 * (trial.rest > 0)
+    return made + 10.0 * (trial.temperature is not None)
+
+
+def with_trial(campaign: Campaign, key: str) -> Campaign | None:
+    """The campaign with the trial's runs added at its end (torques 0), the first of those that are alike; None where the
+    campaign has no pattern for it."""
+    trial = TRIALS[key]
+    pattern = _usual([(run, run.plateaus) for run in campaign.stationary], trial)
+    if trial.parts:
+        whole: Campaign | None = campaign
+        for part in trial.parts:
+            whole = None if whole is None else with_trial(whole, part)
+        return whole
+    states = np.unique([*(run.cycles for run in campaign.stationary), *(run.cycles for run in campaign.dynamic)])
+    if states.size == 0 or (trial.later and states.size < 2):
+        return None
+    last = float(states[-1])
+    if trial.loops:
+        swung = _usual([(run, run.record) for run in campaign.dynamic], trial)
+        return None if swung is None else replace(campaign, dynamic=(*campaign.dynamic, _loops(swung, trial, last)))
+    if pattern is None:
+        return None
+    step = _distance(states) if trial.later else 0.0
+    ahead = [last + step * (k + 1) for k in range(trial.later)] or [last]
+    rested = [trial.rest * float(k % 2 == 0) for k in range(len(ahead))]
+    tests = tuple(
+        _sweep(pattern, trial, cycles, k, sum(rested[: k + 1]))  # in the order in which they are made
+        for k, cycles in enumerate(ahead)
+    )
+    added = replace(campaign, stationary=(*campaign.stationary, *tests))
+    if trial.later:
+        added = replace(added, duty=(*campaign.duty, *_duty(campaign, trial, ahead, step)))
+    rests = tuple(
+        MaintenanceEvent(
+            run_id=f"trial-rest-{k}",
+            cycles=test.cycles,
+            event=EventKind.REST,
+            moment=None if test.moment is None else test.moment - rested[k],
+        )
+        for k, test in enumerate(tests)
+        if rested[k]
+    )
+    return replace(added, maintenance=(*campaign.maintenance, *rests))
+
+
+def _usual(runs: Sequence[tuple[Run, Plateaus | Record]], trial: Trial) -> Run | None:
+    """The last run under the usual pressures, not one of those that a trial at light pressures or none has added; none where
+    the trial's share of its lowest pressure would leave the clutch open."""
+    highest = max((float(table.pressure.max()) for _, table in runs), default=0.0)
+    usual = [each for each in runs if max(USUAL * highest, UNLOADED) <= float(each[1].pressure.max())]
+    if not usual:
+        return None
+    run, table = usual[-1]
+    lowest = trial.pressure * float(table.pressure[table.pressure >= UNLOADED].min())
+    return run if trial.pressure == 0.0 or lowest >= UNLOADED else None
+
+
+def _distance(states: FloatArray) -> float:
+    """The usual distance [cycles] of two states [s >= 2] late in life."""
+    return float(np.median(np.diff(states[max(0, min(states.size // 2, states.size - 2)) :])))
+
+
+def _sweep(pattern: StationaryRun, trial: Trial, cycles: float, number: int, rested: float) -> StationaryRun:
+    """The trial's test of that number, after so many seconds of pauses."""
+    table = pattern.plateaus
+    levels = pressure_levels(table.pressure)
+    rows = np.arange(table.torque.size)
+    if trial.falling:
+        rows = np.lexsort((-table.speed, levels))
+    if trial.pressure == 0.0:
+        closed = np.unique(levels[levels >= UNLOADED])
+        rows = np.tile(rows[levels == closed[closed.size // 2]], PASSES)
+    oil = table.oil_temperature
+    if trial.temperature is not None:
+        oil = np.full(rows.size, trial.temperature)
+    taken = PLATEAU_DURATION * rows.size * (number + 1) + rested
+    moment = None if pattern.moment is None else pattern.moment + taken
+    return StationaryRun(
+        run_id=f"trial-{number}",
+        cycles=cycles,
+        plateaus=Plateaus(
+            pressure=trial.pressure * table.pressure[rows],
+            speed=table.speed[rows],
+            torque=np.zeros(rows.size),
+            oil_temperature=oil if oil is None or trial.temperature is not None else oil[rows],
+        ),
+        moment=moment,
+    )
+
+
+def _loops(pattern: DynamicRun, trial: Trial, cycles: float) -> DynamicRun:
+    """The pressures of a dynamic test, or a share of them, at another frequency."""
+    record = pattern.record
+    levels = np.unique(pressure_levels(record.pressure[:: max(1, record.pressure.size // 5000)]))
+    levels = levels[levels >= UNLOADED]
+    if trial.pressure != 1.0:
+        levels = trial.pressure * float(levels[0]) * np.array(LIGHT if trial.pressure > 0.0 else LIGHT[:1])
+    count = _SAMPLES * _PERIODS + 1
+    step = 1.0 / (trial.frequency * _SAMPLES)
+    phase = 2 * np.pi * np.arange(count) / _SAMPLES
+    speed = np.tile(SWING * (1 - np.cos(phase)), levels.size)
+    pressure = np.repeat(levels, count)
+    temperature = None
+    if record.oil_temperature is not None:
+        usual = float(np.median(record.oil_temperature))
+        temperature = np.full(speed.size, usual if trial.temperature is None else trial.temperature)
+    time = np.arange(speed.size, dtype=np.float64) * step
+    torque = speed * 1e-3  # a record must swing to be cut into loops
+    return DynamicRun(
+        run_id="trial-loops",
+        cycles=cycles,
+        record=Record(time=time, pressure=pressure, speed=speed, torque=torque, oil_temperature=temperature),
+    )
+
+
+def _duty(campaign: Campaign, trial: Trial, ahead: list[float], step: float) -> list[DutyRun]:
+    known = [run.energy for run in campaign.duty if run.energy is not None]
+    usual = float(np.median(known)) if known else None
+    return [
+        DutyRun(
+            run_id=f"trial-duty-{k}",
+            cycles=cycles,
+            engagements=step,
+            energy=None if usual is None else usual * trial.energy,
+        )
+        for k, cycles in enumerate(ahead)
+    ]

@@ -1,0 +1,91 @@
+"""Where a model misses: whitened residuals over speed and pressure and over cycles, and loops beside what models say."""
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.design.design import Design
+from models.diagnosis.design.points import IntArray
+from models.diagnosis.noise.covariance import Noise
+from models.diagnosis.pooled_fit.gauss_newton import Fit
+from models.diagnosis.report.report import LoopTrace, Maps
+
+#: Speeds are gathered into at most this many bins, states into as many.
+MOST_BINS = 24
+#: Loops shown: so many states by so many pressures, spread evenly.
+SHOWN = 3
+
+
+def residual_maps(design: Design, noise: Noise, baseline: Fit, extended: Fit | None) -> Maps | None:
+    """Means of residual over noise on plateaus (on loops where there are no plateaus) of the closed clutch; None without."""
+    rows = np.flatnonzero(design.closed & (design.rows.steady | (design.plateaus == 0)))
+    if rows.size == 0:
+        return None
+    speed = design.rows.velocity[rows] / design.facts.geometry.mean_radius
+    levels, of_level = np.unique(design.level[rows], return_inverse=True)
+    speeds, of_speed = _binned(speed)
+    cycles, of_cycles = _binned(design.rows.cycles[rows])
+    after = baseline if extended is None else extended
+    white = [each.residual[rows] / noise.deviation[rows] for each in (baseline, after)]
+    by_speed = [_means(each, of_level, of_speed, (levels.size, speeds.size)) for each in white]
+    by_cycles = [_means(each, of_cycles, of_level, (cycles.size, levels.size)) for each in white]
+    return Maps(
+        pressure=levels,
+        speed=speeds,
+        cycles=cycles,
+        speed_pressure_before=by_speed[0],
+        speed_pressure_after=by_speed[1],
+        pressure_cycles_before=by_cycles[0],
+        pressure_cycles_after=by_cycles[1],
+    )
+
+
+def _binned(values: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Middles of the bins [b], and each value's bin [n]: distinct values where they are few."""
+    distinct, index = np.unique(values, return_inverse=True)
+    if distinct.size <= MOST_BINS:
+        return distinct, np.asarray(index, dtype=np.intp)
+    edges = np.linspace(distinct[0], distinct[-1], MOST_BINS + 1)
+    bins = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, MOST_BINS - 1)
+    return 0.5 * (edges[1:] + edges[:-1]), np.asarray(bins, dtype=np.intp)
+
+
+def _means(values: FloatArray, row: IntArray, column: IntArray, shape: tuple[int, int]) -> FloatArray:
+    """[shape]: the mean of values [n] by row and column, NaN where there is none."""
+    cell = row * shape[1] + column
+    count = np.bincount(cell, minlength=shape[0] * shape[1])
+    total = np.bincount(cell, weights=values, minlength=shape[0] * shape[1])
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(shape)
+
+
+def loop_traces(design: Design, baseline: Fit, extended: Fit | None) -> tuple[LoopTrace, ...]:
+    """A few loops, fresh to worn and low to high pressure: a period's bins, as measured and as both models have it."""
+    number = design.rows.loop
+    loops = np.unique(number[design.plateaus :][design.closed[design.plateaus :]])
+    if loops.size == 0:
+        return ()
+    first = np.array([np.flatnonzero(number == loop)[0] for loop in loops])
+    states, levels = design.rows.cycles[first], design.level[first]
+    chosen = [
+        loop
+        for loop, state, level in zip(loops, states, levels, strict=True)
+        if state in _spread(np.unique(states)) and level in _spread(np.unique(levels))
+    ]
+    after = baseline if extended is None else extended
+    return tuple(_trace(design, baseline, after, np.flatnonzero(number == loop)) for loop in chosen)
+
+
+def _spread(values: FloatArray) -> FloatArray:
+    return np.asarray(values[np.unique(np.linspace(0, values.size - 1, SHOWN).round().astype(int))])
+
+
+def _trace(design: Design, baseline: Fit, extended: Fit, rows: IntArray) -> LoopTrace:
+    at = int(rows[0])
+    return LoopTrace(
+        pressure=float(design.level[at]),
+        cycles=float(design.rows.cycles[at]),
+        frequency=float(design.rows.angular_frequency[at]) / (2 * np.pi),
+        speed=design.rows.velocity[rows] / design.facts.geometry.mean_radius,
+        measured=design.torque[rows],
+        baseline=baseline.torque[rows],
+        extended=extended.torque[rows],
+    )

@@ -1,0 +1,158 @@
+"""What an identified Stribeck curve is worth: noise, covariance and the parameters that the data do not tell.
+
+The covariance is the linearised one, σ² (JᵀJ)^-1 in (M_s, M_s M̄_c e_max, C_v, log V_S), carried to the four parameters
+by the delta method. J holds all four columns also where a parameter sits at its bound, so an interval there has an
+honest width.
+
+- σ² is the residual variance with n - (free parameters) degrees of freedom, and the covariance is widened by the square
+  of Student's over the normal 95 % quantile, so that estimate ± 1.645 standard errors holds the truth 90 % of the time.
+  With that factor the linearised covariance holds what it says (tests/statistical measures it): no correction for the
+  curvature in V_S is needed while V_S is determined.
+- How the noise depends on the torque is not known: sensors have noise in proportion to torque and noise that is constant.
+  Its variance is taken as half of each, (1 + S²/mean S²)/2, in the middle of the covariance ("sandwich"). That holds
+  90 ± 2 % for noise of either kind; (JᵀJ)^-1 alone held 87.5 % for M_s under noise in proportion.
+- Where the deviation of the points is given it is the noise, unless the weighted residuals exceed the 99 % point of χ²:
+  then the residuals rule, as above.
+- Without any degree of freedom, and without given deviations, noise of 5 % of the torque is assumed.
+- A weak prior keeps it finite: each term of the torque may be three times the torque, log V_S may stray by 5. What the
+  data do not say (rank deficiency, one speed) gets that variance.
+- Where the profile over V_S leaves values a factor e away as likely (90 %), V_S is not determined, and the covariance
+  is widened along the profile's direction up to them.
+
+All quantities are in the scaled units of `models.friction.variable_projection.Problem`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri, stdtrit
+
+from models.arrays import FloatArray
+from models.friction.variable_projection import Problem, Profile, jacobian
+
+#: Noise where nothing tells it, and the least that is believed, as shares of the root mean square torque.
+ASSUMED_NOISE, LEAST_NOISE = 0.05, 1e-6
+#: Prior deviations: of each term in root mean square torques, and of log V_S.
+PRIOR_TERM, PRIOR_LOG_VELOCITY = 3.0, 5.0
+#: A parameter with a standard error above this share of its scale is undetermined.
+UNDETERMINED_SHARE = 0.5
+#: V_S is undetermined where values this far from the optimum in log V_S are as likely as the 90 % interval allows.
+STRAY = 1.0
+#: The normal quantile of a two-sided 90 % interval.
+Z90 = 1.6448536269514722
+#: An eigenvalue of JᵀJ below this share of the largest is rounding.
+_ROUNDING = 1e-14
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Noise:
+    """sd [P] of a point of weight 1, widening [P]: Student's over the normal quantile, inflated [P], assumed [P].
+
+    shaped [P]: part of the noise goes with the torque, nobody having said how it is distributed over the points.
+    """
+
+    sd: FloatArray
+    widening: FloatArray
+    inflated: NDArray[np.bool_]
+    assumed: NDArray[np.bool_]
+    shaped: NDArray[np.bool_]
+
+
+def estimate_noise(residual: FloatArray, freedom: FloatArray, known: FloatArray, level: FloatArray) -> Noise:
+    """The noise of P curves from the weighted sum of squares [P], degrees of freedom [P] and known deviation [P].
+
+    `known` is NaN where it is not given; `level` [P] is the root mean square torque.
+    """
+    given, estimable = np.isfinite(known), freedom >= 1
+    spare = np.maximum(freedom, 1.0)
+    known = np.where(given, known, 1.0)
+    inflated = given & estimable & (residual / known**2 > chdtri(spare, 0.01))
+    estimated = (estimable & ~given) | inflated
+    sd = np.where(estimated, np.sqrt(residual / spare), np.where(given, known, ASSUMED_NOISE * level))
+    return Noise(
+        sd=np.maximum(sd, LEAST_NOISE * level),
+        widening=np.where(estimated, stdtrit(spare, 0.95) / Z90, 1.0),
+        inflated=inflated,
+        assumed=~estimated & ~given,
+        shaped=estimated & ~given,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Uncertainty:
+    """covariance [P, 4, 4] of (M_s, M̄_c, V_S, C_v), all but M̄_c scaled; undetermined [P, 4]."""
+
+    covariance: FloatArray
+    undetermined: NDArray[np.bool_]
+
+
+def uncertainty(problem: Problem, optimum: Profile, scan: Profile, noise: Noise, level: FloatArray) -> Uncertainty:
+    """Covariance of the optimum [P, 1] with a > 0, and which parameters the data do not tell."""
+    columns = jacobian(problem, optimum)
+    points = (problem.weight**2).sum(axis=1)
+    size = np.sqrt((columns**2).sum(axis=1) / points[:, None])
+    prior = PRIOR_TERM * level[:, None] / np.where(size > 0, size, 1.0)
+    prior[:, 3] = PRIOR_LOG_VELOCITY
+    inner = _linearised(
+        columns * prior[:, None, :], _shape(problem, columns, optimum, noise), noise.sd * noise.widening
+    )
+    inner *= prior[:, :, None] * prior[:, None, :]
+    stray = _stray(optimum, scan, noise)
+    variance = inner[:, 3, 3]
+    missing = np.where(stray > STRAY, np.maximum((stray / Z90) ** 2 - variance, 0.0), 0.0)
+    direction = inner[:, :, 3] / variance[:, None]
+    inner += missing[:, None, None] * direction[:, :, None] * direction[:, None, :]
+    transform = _transform(problem, optimum)
+    covariance = transform @ inner @ transform.swapaxes(1, 2)
+    covariance = (covariance + covariance.swapaxes(1, 2)) / 2
+    deviation = np.sqrt(np.maximum(np.einsum("pii->pi", covariance), 0.0))
+    ratio = transform[:, 1, 1] * optimum.coefficients[:, 0, 1]
+    viscous = np.sqrt((problem.viscous**2).sum(axis=1) / points)
+    scale = np.stack([level, np.maximum(ratio, 1.0), transform[:, 2, 3], level / np.maximum(viscous, 1e-100)], axis=1)
+    undetermined = deviation > UNDETERMINED_SHARE * scale
+    undetermined[:, 2] |= stray > STRAY
+    return Uncertainty(covariance=covariance, undetermined=undetermined)
+
+
+def _shape(problem: Problem, columns: FloatArray, optimum: Profile, noise: Noise) -> FloatArray:
+    """Variance of each point [P, n] over the mean variance: (1 + S²/mean S²)/2, or 1 where the deviations are given."""
+    fitted = (columns[:, :, :3] @ optimum.coefficients[:, 0, :, None])[..., 0]
+    square, points = fitted**2, (problem.weight**2).sum(axis=1, keepdims=True)
+    mean = square.sum(axis=1, keepdims=True) / points
+    shape = 0.5 + 0.5 * np.divide(square, mean, out=np.ones_like(square), where=mean > 0)
+    return np.where(noise.shaped[:, None], shape, 1.0)
+
+
+def _linearised(columns: FloatArray, shape: FloatArray, sd: FloatArray) -> FloatArray:
+    """M (CᵀDC/σ² + 1) M, M = (CᵀC/σ² + 1)^-1, for columns C [P, n, 4] and D = diag(shape [P, n]): [P, 4, 4].
+
+    The inverse goes by eigenvalues, those that are rounding taken as zero.
+    """
+    columns = columns / sd[:, None, None]
+    across = columns.swapaxes(1, 2)
+    values, vectors = np.linalg.eigh(across @ columns)
+    values = np.where(values > _ROUNDING * values[:, -1:], values, 0.0)
+    inverse = (vectors / (values + 1)[:, None, :]) @ vectors.swapaxes(1, 2)
+    middle = across @ (shape[..., None] * columns) + np.eye(4)
+    return np.asarray(inverse @ middle @ inverse)
+
+
+def _stray(optimum: Profile, scan: Profile, noise: Noise) -> FloatArray:
+    """How far [P] from the optimum, in log V_S, the profile still lies within the 90 % likelihood interval."""
+    limit = optimum.residual + (Z90 * noise.widening * noise.sd)[:, None] ** 2
+    distance = np.abs(scan.log_velocity - optimum.log_velocity)
+    return np.asarray(np.where(scan.residual <= limit, distance, 0.0).max(axis=1))
+
+
+def _transform(problem: Problem, optimum: Profile) -> FloatArray:
+    """∂(M_s, M̄_c, V_S, C_v)/∂(a, b e_max, c, log V_S) [P, 4, 4]."""
+    a, b = optimum.coefficients[:, 0, :2].T
+    v_s = np.exp(optimum.log_velocity[:, 0])
+    peak = v_s * problem.fastest
+    per_a = np.exp(peak) / a
+    transform = np.zeros((len(a), 4, 4))
+    transform[:, 0, 0] = transform[:, 3, 2] = 1.0
+    transform[:, 1, 0], transform[:, 1, 1], transform[:, 1, 3] = -b * per_a / a, per_a, b * per_a * peak
+    transform[:, 2, 3] = v_s
+    return transform

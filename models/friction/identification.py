@@ -1,0 +1,271 @@
+"""Identification of the four Stribeck parameters of every pressure of a stationary test, eq. 4-5, with uncertainty.
+
+The estimate is the global optimum of eq. 4 (see `friction.variable_projection`), weighted by 1/torque_sd where that is
+given.
+
+How uncertain it is, and how that was decided, stands in `friction.fit_uncertainty`: the covariance is always finite, and
+estimate ± 1.645 standard errors holds the truth in 90 % of tests for every parameter that is not called undetermined.
+
+Where the optimum has M_s = 0 with M_s M̄_c finite (a torque that only rises), M_s is put at a millionth of the torque,
+so that M̄_c exists and the curve is right to a millionth; M̄_c is then called undetermined. Where V_S does not matter to
+the fit it is the one in the middle of the speeds, and a single speed is answered with a constant torque.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from models.friction.fit_uncertainty import ASSUMED_NOISE, Noise, Uncertainty, estimate_noise, uncertainty
+from models.friction.stribeck import GAMMA, PARAMETER_NAMES, STANDSTILL, StribeckParameters, gradient, torque
+from models.friction.variable_projection import Problem, Profile, make_problem, minimise
+from models.records.runs import Curve
+
+#: A fit with an error of eq. 5 below this is acceptable [%].
+ACCEPTABLE_MSE = 5.0
+#: M_s is not taken below this share of the torque: M̄_c = b/M_s must exist where the optimum has M_s = 0.
+LEAST_STATIC = 1e-6
+#: Points that are fitted at once, which bounds the memory of a scan.
+BATCH = 20_000
+#: Torques or speeds beyond any sense can overflow a variance: it is cut here.
+_LARGEST = 1e300
+
+
+class FitStatus(StrEnum):
+    """DETERMINED; AT_BOUND: a parameter is zero; UNDETERMINED: the data do not tell some parameters."""
+
+    DETERMINED = "determined"
+    AT_BOUND = "at_bound"
+    UNDETERMINED = "undetermined"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StribeckFit:
+    """The identified curve of one pressure [Pa].
+
+    covariance [4, 4] in the order of PARAMETER_NAMES, finite always; noise [Nm]: the deviation of a point; mse_percent:
+    eq. 5, unweighted, on torque folded to v >= 0, None where that does not vary; rmse [Nm]; acceptable: mse_percent
+    < 5; undetermined: names of parameters.
+    """
+
+    pressure: float
+    parameters: StribeckParameters
+    covariance: FloatArray
+    status: FitStatus
+    undetermined: tuple[str, ...]
+    noise: float
+    mse_percent: float | None
+    rmse: float
+    acceptable: bool
+    points: int
+    message: str
+
+    @property
+    def standard_errors(self) -> FloatArray:
+        """[4] in the order of PARAMETER_NAMES; estimate ± 1.645 of it holds the truth in 90 % of tests."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Folded:
+    """A curve folded to v >= 0 and scaled: speed [n] and torque [n] in 0..1 and -1..1 of their scales, weight [n]."""
+
+    curve: Curve
+    speed: FloatArray
+    torque: FloatArray
+    weight: FloatArray
+    speed_scale: float
+    torque_scale: float
+    distinct: int  # speeds that differ by more than a millionth of the highest
+    known_noise: float | None  # the deviation of a point of weight 1, in torque_scale
+
+
+def fit_curves(curves: Sequence[Curve]) -> tuple[StribeckFit, ...]:
+    """Eq. 4-5 for every curve: the global optimum with all four parameters >= 0, its covariance and what it is worth.
+
+    Velocity [n] m/s of either sign (the model is odd: folded by the sign bit), torque [n] Nm, n >= 1.
+    Raises ValueError where a curve is empty, has unequal lengths, a value that is not finite, or torque_sd <= 0;
+    numerically hard input is answered with a status.
+    """
+    folded = [_fold(curve) for curve in curves]
+    fits: list[StribeckFit] = []
+    start = 0
+    while start < len(folded):
+        stop, longest = start, 0
+        while stop < len(folded):
+            longest = max(longest, folded[stop].speed.size)
+            if stop > start and longest * (stop - start + 1) > BATCH:
+                break
+            stop += 1
+        fits.extend(_fit_batch(folded[start:stop]))
+        start = stop
+    return tuple(fits)
+
+
+def mean_torque(fit: StribeckFit, velocities: FloatArray) -> tuple[float, float]:
+    """Mean of the fitted curve over velocities [m] m/s, and its standard deviation by the delta method [Nm]."""
+    mean, deviation = mean_torques([fit], velocities)[0].tolist()
+    return mean, deviation
+
+
+def mean_torques(fits: Sequence[StribeckFit], velocities: FloatArray) -> FloatArray:
+    """`mean_torque` of several fits at once, [n, 2]."""
+    stacked = np.stack([fit.parameters.as_array() for fit in fits], axis=1)[:, :, None]
+    parameters = StribeckParameters.from_array(stacked)
+    direction = gradient(velocities, parameters).mean(axis=1)
+    variance = np.einsum("ni,nij,nj->n", direction, np.stack([fit.covariance for fit in fits]), direction)
+    return np.stack([torque(velocities, parameters).mean(axis=1), np.sqrt(np.maximum(variance, 0.0))], axis=1)
+
+
+def _fold(curve: Curve) -> _Folded:
+    velocity, measured, sd = curve.velocity, curve.torque, curve.torque_sd
+    if measured.ndim != 1 or measured.size == 0:
+        raise ValueError(f"torque must be a column with at least one row, got shape {measured.shape}")
+    for name, column in (("velocity", velocity), ("torque", measured), ("torque_sd", sd)):
+        if column is None:
+            continue
+        if column.shape != measured.shape:
+            raise ValueError(f"{name} must have the shape of torque {measured.shape}, got {column.shape}")
+        bad = ~np.isfinite(column) if name != "torque_sd" else ~(np.isfinite(column) & (column > 0))
+        if bad.any():
+            row = int(bad.argmax())
+            rule = "finite" if name != "torque_sd" else "finite and positive"
+            raise ValueError(f"{name}[{row}] must be {rule}, got {column[row]}")
+    speed_scale = float(np.abs(velocity).max())
+    speed_scale = speed_scale if speed_scale > STANDSTILL else 1.0
+    torque_scale = max(float(np.abs(measured).max()), 1e-100)
+    speed = np.where(np.abs(velocity) > STANDSTILL, np.abs(velocity) / speed_scale, 0.0)
+    ordered = np.sort(speed)
+    return _Folded(
+        curve=curve,
+        speed=speed,
+        torque=np.copysign(1.0, velocity) * (measured / torque_scale),
+        weight=np.ones_like(measured) if sd is None else sd.min() / sd,
+        speed_scale=speed_scale,
+        torque_scale=torque_scale,
+        distinct=1 + int(np.count_nonzero(ordered[1:] - ordered[:-1] > 1e-6)),
+        known_noise=None if sd is None else float(sd.min()) / torque_scale,
+    )
+
+
+def _fit_batch(folded: Sequence[_Folded]) -> list[StribeckFit]:
+    shape = (len(folded), max(one.speed.size for one in folded))
+    speed, measured, weight = np.ones(shape), np.zeros(shape), np.zeros(shape)
+    for row, one in enumerate(folded):
+        n = one.speed.size
+        speed[row, :n], measured[row, :n], weight[row, :n] = one.speed, one.torque, one.weight
+    problem = make_problem(speed, measured, weight)
+    optimum, scan = minimise(problem)
+    level = np.sqrt((problem.torque**2).sum(axis=1) / (weight**2).sum(axis=1))
+    level = np.maximum(level, 1e-9)
+    distinct = np.array([one.distinct for one in folded])
+    optimum, bound = _at_bound(_constant(problem, optimum, distinct == 1), level)
+    noise = estimate_noise(
+        optimum.residual[:, 0],
+        np.array([one.speed.size for one in folded]) - np.minimum(distinct, 4 - bound.sum(axis=1)),
+        np.array([np.nan if one.known_noise is None else one.known_noise for one in folded]),
+        level,
+    )
+    told = uncertainty(problem, optimum, scan, noise, level)
+    return [_describe(one, row, optimum, bound, noise, told) for row, one in enumerate(folded)]
+
+
+def _constant(problem: Problem, optimum: Profile, single: NDArray[np.bool_]) -> Profile:
+    """At a single speed four parameters fit a mean: M_s is that mean, M̄_c = 1, V_S that speed, C_v = 0."""
+    if not single.any():
+        return optimum
+    mean = (problem.torque * problem.weight).sum(axis=1) / (problem.weight**2).sum(axis=1)
+    mean = np.maximum(mean, 0.0)
+    share = np.exp(-problem.fastest)
+    miss = ((problem.torque - mean[:, None] * problem.weight) ** 2).sum(axis=1)
+    flat = np.stack([mean, mean * share, np.zeros_like(mean)], axis=1)[:, None]
+    return replace(
+        optimum,
+        log_velocity=np.where(single[:, None], 0.0, optimum.log_velocity),
+        coefficients=np.where(single[:, None, None], flat, optimum.coefficients),
+        residual=np.where(single[:, None], miss[:, None], optimum.residual),
+    )
+
+
+def _at_bound(optimum: Profile, level: FloatArray) -> tuple[Profile, NDArray[np.bool_]]:
+    """The optimum with M_s lifted off zero, and which of M_s, M̄_c, C_v are zero [P, 3]."""
+    coefficients = optimum.coefficients[:, 0]
+    least = LEAST_STATIC * level
+    bound = coefficients <= np.stack([least, 0 * least, 0 * least], axis=1)
+    lifted = np.hstack([np.maximum(coefficients[:, :1], least[:, None]), coefficients[:, 1:]])
+    return replace(optimum, coefficients=lifted[:, None]), bound
+
+
+def _describe(
+    one: _Folded, row: int, optimum: Profile, bound: NDArray[np.bool_], noise: Noise, told: Uncertainty
+) -> StribeckFit:
+    a, b, c = optimum.coefficients[row, 0].tolist()
+    v_s = math.exp(optimum.log_velocity[row, 0])
+    fastest = 1.0 if one.speed.any() else 0.0
+    scale = np.array([one.torque_scale, 1.0, one.speed_scale, one.torque_scale / one.speed_scale**GAMMA])
+    values = np.array([a, b * math.exp(v_s * fastest) / a, v_s, c]) * scale
+    parameters = StribeckParameters.from_array(np.minimum(values, _LARGEST))
+    with np.errstate(over="ignore"):
+        covariance = np.clip(told.covariance[row] * (scale[:, None] * scale), -_LARGEST, _LARGEST)
+    miss = one.torque - np.abs(torque(one.curve.velocity, parameters)) / one.torque_scale
+    mean_square = float((miss**2).mean())
+    variance = float(one.torque.var())
+    varies = variance > (1e-9 * float(np.abs(one.torque).max())) ** 2
+    mse = 100 * mean_square / variance if varies else None
+    undetermined = _undetermined(one, told.undetermined[row])
+    at_zero = tuple(PARAMETER_NAMES[i] for i, zero in zip((0, 1, 3), bound[row], strict=True) if zero)
+    sd_share = 1.0 if one.known_noise is None else math.sqrt(float((one.weight**-2.0).mean()))
+    return StribeckFit(
+        pressure=one.curve.pressure,
+        parameters=parameters,
+        covariance=covariance,
+        status=_status(undetermined, at_zero),
+        undetermined=undetermined,
+        noise=float(noise.sd[row]) * sd_share * one.torque_scale,
+        mse_percent=mse,
+        rmse=math.sqrt(mean_square) * one.torque_scale,
+        acceptable=mse is not None and mse < ACCEPTABLE_MSE,
+        points=one.speed.size,
+        message=_message(one, undetermined, at_zero, noise, row),
+    )
+
+
+def _undetermined(one: _Folded, too_wide: NDArray[np.bool_]) -> tuple[str, ...]:
+    """Names by the width of their uncertainty; with fewer than four speeds all, but M_s where it is seen at rest."""
+    few = one.distinct < len(PARAMETER_NAMES)
+    seen_at_rest = bool((one.speed == 0).any())
+    return tuple(
+        name
+        for name, wide in zip(PARAMETER_NAMES, too_wide, strict=True)
+        if wide or (few and not (name == "static_torque" and seen_at_rest))
+    )
+
+
+def _status(undetermined: tuple[str, ...], at_zero: tuple[str, ...]) -> FitStatus:
+    if undetermined:
+        return FitStatus.UNDETERMINED
+    return FitStatus.AT_BOUND if at_zero else FitStatus.DETERMINED
+
+
+def _message(one: _Folded, undetermined: tuple[str, ...], at_zero: tuple[str, ...], noise: Noise, row: int) -> str:
+    """A sentence or two for a person."""
+    parts = []
+    if undetermined and one.distinct < len(PARAMETER_NAMES):
+        parts.append(
+            f"{one.distinct} distinct speeds cannot tell four parameters apart: {', '.join(undetermined)} undetermined."
+        )
+    elif undetermined:
+        parts.append(f"The measured speeds and torques do not determine {', '.join(undetermined)}.")
+    if at_zero:
+        parts.append(f"The best fit has {', '.join(at_zero)} at zero.")
+    if not parts:
+        parts.append("All four parameters are determined.")
+    if noise.inflated[row]:
+        parts.append("The residuals exceed the given torque_sd, and uncertainties follow the residuals.")
+    if noise.assumed[row]:
+        parts.append(f"Too few points to estimate noise: {ASSUMED_NOISE:.0%} of the torque is assumed.")
+    return " ".join(parts)

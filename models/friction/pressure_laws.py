@@ -1,0 +1,119 @@
+"""How the Stribeck parameters depend on pressure (fig. 9): three grow linearly, the Coulomb ratio falls to an asymptote.
+
+    M_s, V_S, C_v = α + β p          M̄_c = c_∞ + a e^{-p/p_0},   a, c_∞ >= 0,  p_0 > 0
+
+Weighted least squares through the parameters of one test's pressures, each with the variance of its fit. Given p_0 the
+falling law is linear in a and c_∞, so a search over p_0 alone finds the optimum.
+
+Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, fig. 9 and section 3.1.2, which names the shapes and not
+the formula of the falling one.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar, nnls
+
+from models.arrays import FloatArray
+from models.friction.identification import StribeckFit
+from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
+
+#: A law is fitted through at least this many pressures.
+FEWEST_PRESSURES = 3
+#: The decay p_0 is looked for between these multiples of the pressures' range.
+_DECAYS = np.geomspace(0.05, 20.0, 41)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinearLaw:
+    """α + β p: `intercept` in the parameter's unit, `slope` in that unit per Pa."""
+
+    intercept: float
+    slope: float
+
+    def __call__(self, pressure: FloatArray) -> FloatArray:
+        """At pressure [...] Pa."""
+        return self.intercept + self.slope * pressure
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AsymptoticLaw:
+    """c_∞ + a e^{-p/p_0}: `asymptote` and `excess` in the parameter's unit, `decay` p_0 in Pa."""
+
+    asymptote: float
+    excess: float
+    decay: float
+
+    def __call__(self, pressure: FloatArray) -> FloatArray:
+        """At pressure [...] Pa."""
+        return self.asymptote + self.excess * np.exp(-pressure / self.decay)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressureLaws:
+    """The four laws of one stationary test."""
+
+    static_torque: LinearLaw
+    coulomb_ratio: AsymptoticLaw
+    stribeck_velocity: LinearLaw
+    viscous_coefficient: LinearLaw
+
+    def parameters(self, pressure: FloatArray) -> StribeckParameters:
+        """The Stribeck parameters at pressure [...] Pa, each at least 0."""
+        at = [np.maximum(getattr(self, name)(pressure), 0.0) for name in PARAMETER_NAMES]
+        return StribeckParameters(**dict(zip(PARAMETER_NAMES, at, strict=True)))
+
+
+def fit_pressure_laws(fits: Sequence[StribeckFit]) -> PressureLaws | None:
+    """The laws over the fits of one test, or None where a parameter is determined at fewer than three pressures."""
+    told = [_determined(fits, index) for index in range(len(PARAMETER_NAMES))]
+    if any(np.unique(pressure).size < FEWEST_PRESSURES for pressure, _, _ in told):
+        return None
+    return PressureLaws(
+        static_torque=fit_linear(*told[0]),
+        coulomb_ratio=fit_asymptotic(*told[1]),
+        stribeck_velocity=fit_linear(*told[2]),
+        viscous_coefficient=fit_linear(*told[3]),
+    )
+
+
+def fit_linear(pressure: FloatArray, value: FloatArray, deviation: FloatArray) -> LinearLaw:
+    """Weighted least squares line through value [n] at pressure [n] Pa, deviation [n] > 0, two pressures or more."""
+    scale = float(pressure.max())
+    columns = np.stack([np.ones_like(pressure), pressure / scale], axis=1) / deviation[:, None]
+    intercept, slope = np.linalg.lstsq(columns, value / deviation, rcond=None)[0].tolist()
+    return LinearLaw(intercept=intercept, slope=slope / scale)
+
+
+def fit_asymptotic(pressure: FloatArray, value: FloatArray, deviation: FloatArray) -> AsymptoticLaw:
+    """Weighted least squares in (c_∞, a) >= 0 and p_0, for value [n] at pressure [n] Pa, deviation [n] > 0.
+
+    p_0 is scanned from 0.05 to 20 times the pressures' range, then refined between the best one's neighbours.
+    """
+    least = float(pressure.min())
+    span = max(float(np.ptp(pressure)), 1e-6 * least)
+
+    def solve(log_decay: float) -> tuple[FloatArray, float]:
+        falling = np.exp((least - pressure) / (span * np.exp(log_decay)))
+        found, norm = nnls(np.stack([np.ones_like(pressure), falling], axis=1) / deviation[:, None], value / deviation)
+        return np.asarray(found), float(norm)
+
+    logs = np.log(_DECAYS)
+    best = int(np.argmin([solve(float(log))[1] for log in logs]))
+    around = (float(logs[max(best - 1, 0)]), float(logs[min(best + 1, logs.size - 1)]))
+    refined = minimize_scalar(lambda log: solve(log)[1], bounds=around, method="bounded", options={"xatol": 1e-6})
+    log_decay = float(refined.x) if refined.fun <= solve(float(logs[best]))[1] else float(logs[best])
+    (asymptote, at_least), _ = solve(log_decay)
+    decay = span * float(np.exp(log_decay))
+    return AsymptoticLaw(asymptote=float(asymptote), excess=float(at_least * np.exp(least / decay)), decay=decay)
+
+
+def _determined(fits: Sequence[StribeckFit], index: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Pressure [n] Pa, value [n] and deviation [n] of a parameter where its fit determines it."""
+    usable = [fit for fit in fits if PARAMETER_NAMES[index] not in fit.undetermined]
+    value = np.array([fit.parameters.as_array()[index] for fit in usable])
+    deviation = np.array([fit.standard_errors[index] for fit in usable])
+    # the fits of noiseless data must not weigh without bound, nor divide by zero
+    least = max(1e-6 * float(np.abs(value).max(initial=0.0)), 1e-100)
+    return np.array([fit.pressure for fit in usable]), value, np.maximum(deviation, least)

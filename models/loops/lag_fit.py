@@ -1,0 +1,258 @@
+"""How far friction lags, fitted to whole periods of a dynamic record given the stationary curve S.
+
+One number u is sought, 1/C [s/Nm] of the attractor law or τ_1 [s] of the squeezed film: the torque is nearly linear
+in it, so its likelihood is nearly normal, which that of C itself is not. With a gain, a zero and single-valued shapes
+beside it (`models.loops.lag_problem`), none of which has a loop area, u is judged by how the torque differs between
+accelerating and decelerating. u maximises the likelihood (the others are profiled out); its deviation comes from the
+curvature there, with the noise taken from the residual and raised where that is not white: what no u explains makes u
+less certain.
+
+The curve's own error is part of it: the lag is S S' v̇/C, so that C is off by 9 to 18 % with M̄_c 2 % off, by up to 3 %
+with V_S 5 % off, by up to 5 % with C_v 5 % off. u's gradient by the four parameters, each from one Gauss-Newton step at a
+curve moved by a little, carries their covariance (delta method). To first order u is a measured loop over S S' v̇², noisy
+both: its interval is Fieller's, |û - u| <= 1.645 √(n² + u² r²) with n the noise's deviation and r the curve's share, which
+is open at the top where the curve's slope might be none.
+
+By scaling, a torque g S is followed at C when S is followed at C/g: the attractor told is g/u.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.friction.stribeck import StribeckParameters, torque
+from models.loops.lag import attractor_torque, squeeze_film_torque
+from models.loops.lag_problem import LagProblem, lag_problem
+from models.records.periods import Cycle
+
+#: Two-sided 90 %.
+NINETY = 1.6448536269514722
+#: A lag is against the law where it is this many deviations below none.
+AGAINST = 3.0
+_GRID = 1000  # steps of a period
+_RUN_IN = 5.0  # s before the periodic state, half a period at least and 12 at most
+#: A parameter is moved by this share of its deviation.
+_MOVED = 0.01
+
+
+class LagStatus(StrEnum):
+    """DETERMINED; UNRESOLVED: no lag that noise would not make; AGAINST: torque lags the other way than the law can."""
+
+    DETERMINED = "determined"
+    UNRESOLVED = "unresolved"
+    AGAINST = "against_the_law"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StationaryCurve:
+    """The curve that torque lags behind, and its covariance [4, 4] as `StribeckFit` has it; none where it is exact."""
+
+    parameters: StribeckParameters
+    covariance: FloatArray = field(default_factory=lambda: np.zeros((4, 4)))
+
+    def __post_init__(self) -> None:
+        if self.covariance.shape != (4, 4) or not np.isfinite(self.covariance).all():
+            raise ValueError(f"covariance must be 4 x 4 and finite, got shape {self.covariance.shape}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Law:
+    """A law of lag: `lags` [k] are the u that are scanned, ascending; `respond` gives torque [k, n] at time, velocity.
+
+    `scaled`: the lag of a torque g S is u/g.
+    """
+
+    name: str
+    lags: FloatArray
+    scaled: bool
+    respond: Callable[[FloatArray, FloatArray, StribeckParameters, FloatArray], FloatArray]
+
+
+ATTRACTOR = Law(
+    name="attractor",
+    lags=np.geomspace(2e-5, 0.2, 15),
+    scaled=True,
+    respond=lambda time, velocity, curve, lag: attractor_torque(time, velocity, curve, 1 / lag),
+)
+SQUEEZE_FILM = Law(
+    name="squeeze film",
+    lags=np.geomspace(2e-4, 3.0, 15),
+    scaled=False,
+    respond=lambda time, velocity, curve, lag: squeeze_film_torque(time, velocity, curve, lag),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LagFit:
+    """u of one law: lag > 0 or None, its deviation, the 90 % interval (its ends may be <= 0 or infinite), the gain, `noise`
+    [Nm] the residual's deviation, log_likelihood up to a constant that laws on one record share."""
+
+    lag: float | None
+    lag_sd: float
+    interval: tuple[float, float]
+    gain: float
+    noise: float
+    log_likelihood: float
+    status: LagStatus
+
+
+def fit_lag(law: Law, cycle: Cycle, phase: FloatArray, measured: FloatArray, curve: StationaryCurve) -> LagFit:
+    """Fit `law` to torque [n] Nm at phase [n] rad of a cycle of *sliding velocity* in m/s, v >= 0 but for noise.
+
+    Raises ValueError where fewer than 20 samples slide.
+    """
+    posed = _posed(law, cycle, phase, measured, curve.parameters)
+    scanned = posed.course.at(law.lags, posed.problem.phase)
+    misses = [posed.problem.miss(row) for row in scanned]
+    best = int(np.argmin(misses))
+    none, first = posed.near_none(scanned[0])
+    if first < -AGAINST * none or (best == 0 and first <= NINETY * none):
+        slant = _by_curve(lambda moved: _posed(law, cycle, phase, measured, moved).near_none()[1], curve)
+        found = _Estimate(first, none, slant)
+        status = LagStatus.AGAINST if first < -AGAINST * found.sd else LagStatus.UNRESOLVED
+        return _told(posed.problem, torque(posed.problem.speed, curve.parameters), None, found, status)
+    lag = _refine(posed.problem, posed.course, law.lags, misses, best)
+    middle, change = posed.about(lag)
+    sd, gain = posed.problem.deviation(middle, change, lag, cycle, law.scaled)
+    share = 1 / gain if law.scaled else 1.0
+    slant = _by_curve(lambda moved: _posed(law, cycle, phase, measured, moved).stepped(lag), curve)
+    found = _Estimate(lag * share, sd * share, slant)
+    status = LagStatus.DETERMINED if found.lag > NINETY * found.sd else LagStatus.UNRESOLVED
+    return _told(posed.problem, middle, found.lag if status is LagStatus.DETERMINED else None, found, status)
+
+
+@dataclass(frozen=True, slots=True)
+class _Estimate:
+    """u, its deviation by the record's noise, and by the curve's error."""
+
+    lag: float
+    noise: float
+    slant: float
+
+    @property
+    def sd(self) -> float:
+        return math.hypot(self.noise, self.slant)
+
+    def interval(self) -> tuple[float, float]:
+        """Fieller's, 90 %; an end that is not bounded is infinite."""
+        spare = 1 - (NINETY * self.slant / self.lag) ** 2 if self.lag else 1.0
+        clear = self.lag**2 - (NINETY * self.noise) ** 2
+        if spare > 0:
+            half = math.sqrt(max(self.lag**2 - spare * clear, 0.0))
+            return (self.lag - half) / spare, (self.lag + half) / spare
+        if clear <= 0:
+            return -math.inf, math.inf
+        # one end: the root of the quadratic that lies on the estimate's side
+        end = clear / (abs(self.lag) + math.sqrt(self.lag**2 - spare * clear))
+        return (end, math.inf) if self.lag > 0 else (-math.inf, -end)
+
+
+def _by_curve(estimate: Callable[[StribeckParameters], float], curve: StationaryCurve) -> float:
+    """The deviation of an estimate that the curve's covariance makes, by forward differences: bounds at 0 do not matter."""
+    deviation = np.sqrt(np.maximum(np.diag(curve.covariance), 0.0))
+    if not deviation.any():
+        return 0.0
+    values = curve.parameters.as_array()
+    here = estimate(curve.parameters)
+    gradient = np.zeros(values.size)
+    for k in np.flatnonzero(deviation):
+        moved = values.copy()
+        moved[k] += _MOVED * deviation[k]
+        gradient[k] = (estimate(StribeckParameters.from_array(moved)) - here) / (moved[k] - values[k])
+    variance = float(gradient @ curve.covariance @ gradient)
+    return math.sqrt(max(variance, 0.0)) if math.isfinite(variance) else math.inf
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Posed:
+    """A law and a curve put to a record."""
+
+    law: Law
+    problem: LagProblem
+    course: "_Course"
+
+    def about(self, lag: float) -> tuple[FloatArray, FloatArray]:
+        """The torque [n] Nm at a lag, and how it changes with it."""
+        step = 1e-3 * lag
+        low, middle, high = self.course.at(np.array([lag - step, lag, lag + step]), self.problem.phase)
+        return middle, (high - low) / (2 * step)
+
+    def stepped(self, lag: float) -> float:
+        """The lag one Gauss-Newton step on, over its gain where the law is scaled."""
+        after, gain = self.problem.step(*self.about(lag), lag)
+        return after / gain if self.law.scaled else after
+
+    def near_none(self, little: FloatArray | None = None) -> tuple[float, float]:
+        """Deviation and estimate of the lag, linearised about none; `little` [n] Nm is the torque at the least lag."""
+        least = self.law.lags[:1]
+        row = self.course.at(least, self.problem.phase)[0] if little is None else little
+        return self.problem.linear(self.course.still(self.problem.speed), row, float(least[0]))
+
+
+def _posed(law: Law, cycle: Cycle, phase: FloatArray, measured: FloatArray, curve: StribeckParameters) -> _Posed:
+    return _Posed(law=law, problem=lag_problem(cycle, phase, measured, curve), course=_Course(law, cycle, curve))
+
+
+def _told(problem: LagProblem, course: FloatArray, lag: float | None, found: _Estimate, status: LagStatus) -> LagFit:
+    left = problem.without(course)
+    gain = problem.gain(left)
+    miss = float(np.square(problem.left - gain * left).sum())
+    size = problem.measured.size
+    return LagFit(
+        lag=lag,
+        lag_sd=found.sd,
+        interval=found.interval(),
+        gain=gain,
+        noise=math.sqrt(miss / max(size - problem.absorbed.shape[1] - 2, 1)),
+        log_likelihood=-0.5 * size * math.log(max(miss, 1e-300) / size),
+        status=status,
+    )
+
+
+class _Course:
+    """A law's torque in its periodic state, over a grid of phases."""
+
+    def __init__(self, law: Law, cycle: Cycle, curve: StribeckParameters) -> None:
+        self._law, self._curve = law, curve
+        self._start = round(_GRID * min(max(0.5, _RUN_IN * cycle.frequency), 12.0))
+        self._grid = 2 * math.pi * np.arange(-self._start, _GRID + 1) / _GRID
+        self._time = self._grid / (2 * math.pi * cycle.frequency)
+        self._velocity = np.maximum(cycle.value(self._grid), 0.0)
+
+    def still(self, speed: FloatArray) -> FloatArray:
+        """Torque [n] Nm without any lag at speed [n] m/s."""
+        return torque(speed, self._curve)
+
+    def at(self, lags: FloatArray, phase: FloatArray) -> FloatArray:
+        """[k, n] Nm for lags [k] at phase [n]."""
+        courses = self._law.respond(self._time, self._velocity, self._curve, lags[:, np.newaxis])[:, self._start :]
+        position = np.mod(phase, 2 * math.pi) * (_GRID / (2 * math.pi))
+        cell = np.minimum(position.astype(np.int64), _GRID - 1)
+        part = position - cell
+        return np.asarray(courses[:, cell] * (1 - part) + courses[:, cell + 1] * part, dtype=np.float64)
+
+
+def _refine(problem: LagProblem, course: _Course, lags: FloatArray, misses: list[float], best: int) -> float:
+    """The minimum about the best of the scan, in log u: three finer scans, each a ninth of the last, and a parabola."""
+    low = math.log(lags[max(best - 1, 0)])
+    high = math.log(lags[min(best + 1, lags.size - 1)])
+    found = math.log(lags[best])
+    least = misses[best]
+    for _ in range(3):
+        points = np.linspace(low, high, 9)
+        values = np.array([problem.miss(row) for row in course.at(np.exp(points), problem.phase)])
+        i = int(np.argmin(values))
+        if values[i] <= least:
+            found, least = float(points[i]), float(values[i])
+        width = (high - low) / 8
+        if 0 < i < 8:
+            left, here, right = values[i - 1 : i + 2]
+            bend = left - 2 * here + right
+            if bend > 0:
+                found = float(points[i] + 0.5 * width * (left - right) / bend)
+        low, high = found - width, found + width
+    return math.exp(found)

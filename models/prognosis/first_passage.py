@@ -1,0 +1,170 @@
+"""Remaining useful life: when a quantity first passes the threshold, with the uncertainty of everything that decides it.
+
+The criterion is ξ(ζ) <= fraction · ξ0, with ξ0 the value at ζ = 0. Each draw of the coefficients has its own ξ0,
+hence its own threshold. Eq. 6 alone passes it in closed form, and saturates: a draw whose ξ0 + Δ stays above its
+threshold never gets there. With a discrepancy beside eq. 6, or a known further course of the quantity, the first
+passage is found along the draw's path. How probable it is to get there, is an answer; a quantile that lies beyond the
+horizon is None, never an infinity.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TypeAlias
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.degradation import general_order
+from models.tracking.posterior import Posterior
+
+QUANTILES = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95)
+#: Cycles beyond which an end of life is not told from never.
+HORIZON = 1_000_000.0
+#: Places at which a path is looked at: evenly over what was measured, and then in equal ratios up to the horizon.
+BEHIND, AHEAD = 40, 240
+
+#: A known course of the quantity over ζ [k] that is no part of eq. 6, in the quantity's unit [k].
+Offset: TypeAlias = Callable[[FloatArray], FloatArray]
+
+
+class PassageStatus(StrEnum):
+    """Whether the threshold is ahead, more likely than not behind, or may never be reached within the horizon."""
+
+    PREDICTED = "predicted"
+    REACHED = "reached"
+    MAY_NEVER_REACH = "may_never_reach"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FirstPassage:
+    """End of life [cycles since new] and remaining life [cycles from `as_of`] by quantile, None beyond the horizon.
+
+    `probability_of_reaching` is that of reaching the threshold within the horizon. `initial` is the mean of the value
+    at ζ = 0, `threshold` fraction · initial, `current` the mean and deviation of the value at `as_of`.
+    """
+
+    as_of: float
+    end_of_life: dict[float, float | None]
+    remaining: dict[float, float | None]
+    probability_of_reaching: float
+    status: PassageStatus
+    initial: float
+    threshold: float
+    current: tuple[float, float]
+
+
+def first_passage(
+    posterior: Posterior,
+    *,
+    fraction: float,
+    as_of: float,
+    horizon: float = HORIZON,
+    quantiles: Sequence[float] = QUANTILES,
+    offset: Offset | None = None,
+) -> FirstPassage:
+    """The end of life of a weighted sample of coefficients; 0 < fraction < 1, as_of >= 0 and horizon > 0 in cycles.
+
+    With an `offset` the criterion is ξ(ζ) + offset(ζ) <= fraction · (ξ0 + offset(0)). A horizon before `as_of` is taken
+    to be `as_of`. Raises ValueError where an argument is out of its range.
+    """
+    if not 0.0 < fraction < 1.0:
+        raise ValueError(f"fraction must lie between 0 and 1, got {fraction}")
+    if not (np.isfinite(as_of) and as_of >= 0.0):
+        raise ValueError(f"as_of must be finite and not negative, got {as_of}")
+    if not (np.isfinite(horizon) and horizon > 0.0):
+        raise ValueError(f"horizon must be finite and positive, got {horizon}")
+    horizon = max(horizon, as_of)
+    passages = ends_of_life(posterior, fraction, offset=offset, horizon=horizon)
+    found = weighted_quantiles(np.minimum(passages, 10.0 * horizon), posterior.weight, quantiles)
+    end = {q: float(x) if x <= horizon else None for q, x in zip(quantiles, found, strict=True)}
+    fresh, now = (paths(posterior, np.array([zeta]), offset)[0] for zeta in (0.0, as_of))
+    initial = float(posterior.weight @ fresh)
+    return FirstPassage(
+        as_of=as_of,
+        end_of_life=end,
+        remaining={q: None if x is None else max(0.0, x - as_of) for q, x in end.items()},
+        probability_of_reaching=_probability(passages <= horizon, posterior.weight),
+        status=_status(end, _probability(passages <= as_of, posterior.weight)),
+        initial=initial,
+        threshold=fraction * initial,
+        current=posterior.moments(now),
+    )
+
+
+def ends_of_life(
+    posterior: Posterior, fraction: float, *, offset: Offset | None = None, horizon: float = HORIZON
+) -> FloatArray:
+    """The ζ [n] at which each draw first has ξ(ζ) <= fraction · ξ0; inf where it never has.
+
+    Of a draw that has a discrepancy, or with an offset, only what happens up to the horizon is known.
+    """
+    threshold = fraction * posterior.initial
+    crossing = general_order.first_passage(threshold, posterior.degradation)
+    found = np.where(posterior.initial <= threshold, 0.0, crossing)
+    beside = posterior.discrepancy
+    if offset is None and beside is None:
+        return found
+    walked = np.ones(found.size, dtype=bool) if offset is not None or beside is None else beside.present
+    index = np.flatnonzero(walked)
+    if index.size:
+        some = posterior.taken(index, posterior.weight[index])
+        found[index] = _along_paths(some, fraction, offset, horizon)
+    return found
+
+
+def paths(posterior: Posterior, progress: FloatArray, offset: Offset | None = None) -> FloatArray:
+    """ξ(ζ) + offset(ζ) at progress [k] of every draw; [k, n]."""
+    values = posterior.values(progress)
+    return values if offset is None else np.asarray(values + offset(progress)[:, None])
+
+
+def bands(
+    posterior: Posterior, progress: FloatArray, quantiles: Sequence[float] = (0.05, 0.5, 0.95)
+) -> tuple[FloatArray, FloatArray]:
+    """The mean of ξ at progress [k], and its quantiles [k, q]: what a plot of the course shows."""
+    values = posterior.values(progress)
+    return values @ posterior.weight, np.array([weighted_quantiles(row, posterior.weight, quantiles) for row in values])
+
+
+def _along_paths(posterior: Posterior, fraction: float, offset: Offset | None, horizon: float) -> FloatArray:
+    """First passages [n], linear between places; a step of the level or of the offset is a crossing where it is."""
+    beside = posterior.discrepancy
+    known = 1.0 if beside is None else beside.span
+    places = np.unique(
+        np.concatenate(
+            [
+                np.linspace(0.0, min(known, horizon), BEHIND),
+                np.geomspace(min(known, horizon), horizon, AHEAD),
+                np.zeros(0) if beside is None else beside.at[beside.at <= horizon],
+            ]
+        )
+    )
+    values = paths(posterior, places, offset)
+    over = values - fraction * values[0]
+    below = over <= 0.0
+    first = below.argmax(axis=0)
+    draws = np.arange(first.size)
+    before = np.maximum(first - 1, 0)
+    high, low = over[before, draws], over[first, draws]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(first > 0, high / (high - low), 0.0)
+    crossed = places[before] + share * (places[first] - places[before])
+    return np.where(below.any(axis=0), crossed, np.inf)
+
+
+def weighted_quantiles(sample: FloatArray, weight: FloatArray, quantiles: Sequence[float]) -> FloatArray:
+    """Quantiles of a finite sample [n] with weights [n] >= 0, linear between the middles of the draws' shares."""
+    order = np.argsort(sample, kind="stable")
+    share = weight[order] / weight.sum()
+    return np.asarray(np.interp(quantiles, np.cumsum(share) - 0.5 * share, sample[order]))
+
+
+def _probability(event: np.ndarray[tuple[int, ...], np.dtype[np.bool_]], weight: FloatArray) -> float:
+    return float(min(1.0, weight[event].sum() / weight.sum()))
+
+
+def _status(end_of_life: dict[float, float | None], passed: float) -> PassageStatus:
+    if passed >= 0.5:
+        return PassageStatus.REACHED
+    return PassageStatus.MAY_NEVER_REACH if None in end_of_life.values() else PassageStatus.PREDICTED

@@ -1,0 +1,260 @@
+"""What a fleet of earlier lives says of the next one: the population of eq. 6's coefficients, learned by empirical Bayes.
+
+Each clutch of a fleet has x = (Δ/ξ0, log φ, log ε, log s/ξ0), drawn from a normal population N(μ, Σ). None of them is
+known exactly, so each clutch gives a weighted sample of its posterior under the weak prior, and an
+expectation-maximisation goes to and fro between the clutches' moments given the population (the samples, weighted by
+population over weak prior) and the population given those moments. The hyperprior, normal-inverse-Wishart, stands for
+clutches that differ by 0.15 in Δ/ξ0 and about half in φ, ε and s: it decides where the fleet is small, and is soon
+forgotten. What is foretold of the next clutch is then Student's t.
+
+A clutch may be of another kind than its fleet. The prior is therefore a mixture, `share` of the learned population and the
+rest weak, and the clutch's own measurements decide between them. A filter runs under the weak prior and under the normal
+nearest to the population; the two samples are put together with the weights that make them one sample of the posterior
+under the mixture. Only the ratio of the two evidences is needed for that, and the samples tell it themselves (Bennett).
+
+Sources: B. P. Carlin, T. A. Louis, Bayesian Methods for Data Analysis (2008) ch. 5, for empirical Bayes; C. H. Bennett,
+J. Comput. Phys. 22 (1976) 245-268, and M. R. Shirts, J. D. Chodera, J. Chem. Phys. 129 (2008) 124105, for the weights.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.special import gammaln, log_expit, logsumexp
+
+from models.arrays import FloatArray
+from models.tracking.discrepancy import Discrepancy
+from models.tracking.filters.grid import Grid
+from models.tracking.filters.lattice import REACH
+from models.tracking.measurement import Measurement
+from models.tracking.posterior import Posterior
+from models.tracking.prior import Prior, weak
+
+#: A clutch with fewer tests than this says too little to teach anything.
+FEWEST_TESTS = 6
+#: The hyperprior: the deviations of x among clutches of one kind, how many clutches that is worth, and how many the centre
+#: of the weak prior is worth as the population's mean.
+HYPER_SD = np.array([0.15, 0.6, 0.4, 0.5])
+HYPER_CLUTCHES, HYPER_CENTRE = 6.0, 0.03
+#: A fleet of n has the share TRUST n/(n + DOUBT) of the mixture: most of it stays weak, for the evidence soon speaks for a
+#: fleet that is right, and slowly against one that is wrong.
+TRUST, DOUBT = 0.25, 3.0
+#: A filter runs under a normal that is wider than the population by this factor: a clutch at the edge of its fleet must not
+#: lie at the edge of what the filter looks at, REACH deviations to either side. Beyond, it has no draws: log of nothing.
+WIDER, NEVER = 1.5, -700.0
+_DRAWS, _ROUNDS = 2000, 40
+_GRID = Grid()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FleetPrior:
+    """The population that `clutches` clutches taught: Student's t of x [4], `mean` [4], `scale` [4, 4] and `freedom` > 2.
+
+    x is (Δ/ξ0, log φ, log ε, log s/ξ0), φ in cycles.
+    """
+
+    clutches: int
+    mean: FloatArray
+    scale: FloatArray
+    freedom: float
+
+    @property
+    def share(self) -> float:
+        """The learned population's share of the mixture with the weak prior."""
+        return TRUST * self.clutches / (self.clutches + DOUBT)
+
+    def in_unit(self, cycles: float) -> "FleetPrior":
+        """The same population with φ counted in units of so many cycles."""
+        return replace(self, mean=self.mean - np.array([0.0, math.log(cycles), 0.0, 0.0]))
+
+    def prior_for(self, first: Measurement) -> Prior:
+        """The normal nearest to the population, WIDER than it, for a filter of a series that begins with `first`."""
+        believed = weak(first, falling=True)
+        size = believed.size
+        deviation = (WIDER * np.sqrt(np.diag(self.scale) * self.freedom / (self.freedom - 2.0))).tolist()
+        mean = self.mean.tolist()
+        return replace(
+            believed,
+            change_mean=mean[0] * size,
+            change_sd=deviation[0] * size,
+            log_scale_mean=mean[1],
+            log_scale_sd=deviation[1],
+            log_exponent_mean=mean[2],
+            log_exponent_sd=deviation[2],
+            log_scatter_mean=mean[3] + math.log(size),
+            log_scatter_sd=deviation[3],
+        )
+
+    def log_density(self, x: FloatArray) -> FloatArray:
+        """Log density of the population at x [n, 4]; [n]."""
+        root = np.linalg.cholesky(self.scale)
+        off = np.linalg.solve(root, (x - self.mean).T)
+        d, f = x.shape[1], self.freedom
+        constant = gammaln(0.5 * (f + d)) - gammaln(0.5 * f) - 0.5 * d * math.log(f * math.pi)
+        distance = np.square(off).sum(axis=0)
+        return np.asarray(constant - np.log(np.diag(root)).sum() - 0.5 * (f + d) * np.log1p(distance / f))
+
+    def together(self, under_weak: Posterior, under_fleet: Posterior, first: Measurement) -> Posterior:
+        """Samples of the posterior under `weak` and under `prior_for`, as one of the posterior under the mixture."""
+        drawn = pooled(under_weak, under_fleet)
+        ours, theirs = weak(first, falling=True), self.prior_for(first)
+        log_weak = _log_prior(drawn, ours)
+        lean = np.where(_within(drawn, theirs), _log_prior(drawn, theirs) - log_weak, NEVER)
+        split = under_weak.weight.size
+        ratio = _log_evidence_ratio(lean[:split], under_weak.weight, lean[split:], under_fleet.weight)
+        learned = self.log_density(_coordinates(drawn)) - np.log(np.abs(drawn.initial)) - log_weak
+        mixture = np.logaddexp(math.log1p(-self.share), math.log(self.share) + learned)
+        with np.errstate(divide="ignore"):
+            log_weight = np.log(drawn.weight) + mixture - np.logaddexp(0.0, lean - ratio)
+        return replace(drawn, weight=np.exp(log_weight - logsumexp(log_weight)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON can carry it."""
+        return {
+            "clutches": self.clutches,
+            "mean": self.mean.tolist(),
+            "scale": self.scale.tolist(),
+            "freedom": self.freedom,
+        }
+
+    @classmethod
+    def from_dict(cls, stored: Mapping[str, Any]) -> "FleetPrior":
+        """The inverse of `to_dict`, exactly."""
+        return cls(
+            clutches=stored["clutches"],
+            mean=np.array(stored["mean"], dtype=np.float64),
+            scale=np.array(stored["scale"], dtype=np.float64),
+            freedom=stored["freedom"],
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Taught:
+    """What one clutch says of x: a sample [n, 4] of its posterior, with the weak prior divided out of the weights."""
+
+    x: FloatArray
+    log_weight: FloatArray
+
+
+def taught(history: Sequence[Measurement], seed: int = 0) -> Taught:
+    """What a clutch's measurements of mean COF say of x. Raises ValueError where there are fewer than FEWEST_TESTS."""
+    if len(history) < FEWEST_TESTS:
+        raise ValueError(f"a clutch needs {FEWEST_TESTS} tests to teach a fleet's prior, got {len(history)}")
+    prior = weak(history[0], falling=True)
+    drawn = _GRID.posterior(_GRID.from_history(prior, history), _DRAWS, np.random.default_rng(seed))
+    sound = drawn.initial > 0.0
+    with np.errstate(divide="ignore"):
+        log_weight = np.log(drawn.weight) - np.log(np.abs(drawn.initial)) - _log_prior(drawn, prior)
+    return Taught(x=_coordinates(drawn)[sound], log_weight=log_weight[sound])
+
+
+def learn(histories: Sequence[Sequence[Measurement]]) -> FleetPrior:
+    """The population behind clutches of one kind, each by its measurements of mean COF in order.
+
+    Those with fewer than FEWEST_TESTS measurements are left out. Raises ValueError where none is left.
+    """
+    return population([taught(history) for history in histories if len(history) >= FEWEST_TESTS])
+
+
+def population(fleet: Sequence[Taught]) -> FleetPrior:
+    """The population behind what clutches have taught. Raises ValueError where there are none."""
+    if not fleet:
+        raise ValueError(f"a fleet needs a clutch with {FEWEST_TESTS} tests or more")
+    centre = weak(Measurement(progress=0.0, value=1.0, variance=0.0), falling=True)
+    believed = np.array([centre.change_mean, centre.log_scale_mean, centre.log_exponent_mean, centre.log_scatter_mean])
+    found = FleetPrior(
+        clutches=len(fleet),
+        mean=believed,
+        scale=np.diag([centre.change_sd, centre.log_scale_sd, centre.log_exponent_sd, centre.log_scatter_sd]) ** 2,
+        freedom=HYPER_CLUTCHES,
+    )
+    for _ in range(_ROUNDS):
+        found = _learnt(found, fleet, believed)
+    return found
+
+
+def pooled(first: Posterior, second: Posterior) -> Posterior:
+    """The draws of both, each with half of the weight; discrepancies must be of the same history."""
+    joined = {field.name: _joined(getattr(first, field.name), getattr(second, field.name)) for field in fields(first)}
+    return replace(first, **joined | {"weight": 0.5 * joined["weight"]})
+
+
+def _joined(first: Any, second: Any) -> Any:
+    """Columns one after the other, of discrepancies those that have a row a draw; what they share stays."""
+    if isinstance(first, Discrepancy):
+        names = ("size", "curvature", "height")
+        rows = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in names}
+        return Discrepancy(span=first.span, at=first.at, **rows)
+    return None if first is None else np.concatenate([first, second])
+
+
+def _learnt(population: FleetPrior, fleet: Sequence[Taught], believed: FloatArray) -> FleetPrior:
+    """One round: the clutches' moments given the population, then the population given their moments."""
+    n, d = len(fleet), believed.size
+    means, spread = np.zeros((n, d)), np.zeros((d, d))
+    for index, clutch in enumerate(fleet):
+        log_weight = clutch.log_weight + population.log_density(clutch.x)
+        weight = np.exp(log_weight - logsumexp(log_weight))
+        means[index] = weight @ clutch.x
+        off = clutch.x - means[index]
+        spread += (weight * off.T) @ off
+    middle = means.mean(axis=0)
+    centre = HYPER_CENTRE + n
+    off, pull = means - middle, middle - believed
+    scatter = np.diag(HYPER_SD**2) * (HYPER_CLUTCHES - d + 1.0) + spread + off.T @ off
+    scatter += HYPER_CENTRE * n / centre * np.outer(pull, pull)
+    freedom = HYPER_CLUTCHES + n - d + 1.0
+    return FleetPrior(
+        clutches=n,
+        mean=(HYPER_CENTRE * believed + n * middle) / centre,
+        scale=scatter * (centre + 1.0) / (centre * freedom),
+        freedom=freedom,
+    )
+
+
+def _coordinates(drawn: Posterior) -> FloatArray:
+    """x [n, 4] of a sample."""
+    size = np.abs(drawn.initial)
+    return np.stack(
+        [drawn.change / drawn.initial, np.log(drawn.scale), np.log(drawn.exponent), np.log(drawn.scatter / size)],
+        axis=1,
+    )
+
+
+def _log_prior(drawn: Posterior, prior: Prior) -> FloatArray:
+    """Log density of (Δ, log φ, log ε, log s) [n] under a prior; ξ0 has the same under all."""
+    spread = math.log(prior.change_sd * prior.log_scale_sd * prior.log_exponent_sd * prior.log_scatter_sd)
+    off = (drawn.change - prior.change_mean) / prior.change_sd
+    rest = prior.log_density(np.log(drawn.scale), np.log(drawn.exponent), np.log(drawn.scatter))
+    return np.asarray(rest - 0.5 * off**2 - spread - 2.0 * math.log(2.0 * math.pi))
+
+
+def _within(drawn: Posterior, prior: Prior) -> NDArray[np.bool_]:
+    """Which draws a grid under a prior can have [n]."""
+    off = [
+        (np.log(drawn.scale) - prior.log_scale_mean) / prior.log_scale_sd,
+        (np.log(drawn.exponent) - prior.log_exponent_mean) / prior.log_exponent_sd,
+        (np.log(drawn.scatter) - prior.log_scatter_mean) / prior.log_scatter_sd,
+    ]
+    return np.asarray((np.abs(off) <= REACH).all(axis=0))
+
+
+def _log_evidence_ratio(
+    lean_first: FloatArray, weight_first: FloatArray, lean_second: FloatArray, weight_second: FloatArray
+) -> float:
+    """log(Z2/Z1) of two posteriors with the same likelihood, from samples of both.
+
+    `lean` is log(prior 2/prior 1) at the draws. Bennett: E1[σ(lean - c)] = E2[σ(c - lean)] at c = log(Z2/Z1).
+    """
+    both = np.concatenate([lean_first, lean_second])
+    low, high = float(both.min()) - 1.0, float(both.max()) + 1.0
+
+    def excess(c: float) -> float:
+        one = logsumexp(log_expit(lean_first - c), b=weight_first)
+        return float(one - logsumexp(log_expit(c - lean_second), b=weight_second))
+
+    return float(brentq(excess, low, high, xtol=1e-6))

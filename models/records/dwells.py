@@ -1,0 +1,274 @@
+"""The dwells of a stationary test, found in its speed and pressure without knowing its protocol.
+
+The record is averaged over blocks of some 10 ms. A block is steady where the means of 0.2 s after it and of 0.2 s before
+it agree within six deviations of their difference, in speed and in pressure; runs of steady blocks are dwells, widened
+again up to where speed or pressure leaves the level. Where the clutch is open throughout, pressure is its sensor's noise:
+the dwells are those of speed.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from models.records.cleaning import Cleaning, Note, Sampled
+from models.records.runs import UNLOADED
+
+#: A block [s].
+BLOCK = 0.01
+#: The windows before and after that are compared [s], at least this many blocks.
+WINDOW, FEWEST_BLOCKS = 0.2, 4
+#: Deviations that make a step of a difference of windows; those that make a block leave its level.
+STEP, LEAVE = 6.0, 5.0
+#: Changes smaller than the first share of the highest speed or pressure are never steps, larger than the second always.
+RESOLUTION, PLAIN = 5e-4, 0.02
+#: No lining is loaded below this share of the highest pressure, and nothing slides below this share of the highest speed.
+NO_PRESSURE, STANDSTILL = 0.02, 1e-3
+#: A dwell ends at a gap in the record longer than this [s] and than so many blocks.
+GAP, GAP_BLOCKS = 0.25, 6
+#: Speed or pressure that changes by more than this share over a dwell is a slow ramp.
+RAMP = 0.01
+#: Pieces of a dwell whose means are compared for that.
+PIECES = 6
+#: Blocks below which a dwell is not worth a mean.
+SHORTEST = 8
+
+#: A crest is shorter than this share of the dwell that follows, and off its level by this share of the step to it at most;
+#: so many may follow each other.
+CREST, OVERSHOOT, CRESTS = 0.25, 0.3, 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Blocks:
+    """Means over `size` samples each: time [m] s, pressure, speed, torque, oil_temperature; scatter [m] Nm², the
+    variance of torque within a block; gap [m]: samples are missing for long before or in this block.
+    """
+
+    size: int
+    duration: float
+    time: FloatArray
+    pressure: FloatArray
+    speed: FloatArray
+    torque: FloatArray
+    scatter: FloatArray
+    oil_temperature: FloatArray | None
+    gap: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Dwell:
+    """Blocks start:stop lie on one level."""
+
+    start: int
+    stop: int
+
+
+def average(record: Sampled, cleaning: Cleaning) -> Blocks:
+    """Means over blocks of some 10 ms of what is kept of a record; a remainder at its end is left out."""
+    period = cleaning.period
+    size = max(1, round(BLOCK / period))
+    time = cleaning.of(record.time)
+    count = time.size // size
+    share = np.full(size, 1.0 / size)
+
+    def blocks_of(channel: FloatArray) -> FloatArray:
+        return cleaning.of(channel)[: count * size].reshape(count, size)
+
+    def mean(channel: FloatArray) -> FloatArray:
+        return np.asarray(blocks_of(channel) @ share, dtype=np.float64)
+
+    def scatter(channel: FloatArray) -> FloatArray:
+        off = blocks_of(channel) - mean(channel)[:, np.newaxis]
+        return np.asarray(np.einsum("ij,ij->i", off, off) / size, dtype=np.float64)
+
+    late = np.flatnonzero(np.diff(time) > max(GAP, GAP_BLOCKS * size * period)) + 1
+    gap: NDArray[np.bool_] = np.zeros(count, dtype=np.bool_)
+    gap[np.minimum(late // size, count - 1)] = True
+    oil = record.oil_temperature
+    return Blocks(
+        size=size,
+        duration=size * period,
+        time=np.asarray(time[: count * size].reshape(count, size) @ share, dtype=np.float64),
+        pressure=mean(record.pressure),
+        speed=mean(record.speed),
+        torque=mean(record.torque),
+        scatter=scatter(record.torque),
+        oil_temperature=None if oil is None else mean(oil),
+        gap=gap,
+    )
+
+
+def find_dwells(blocks: Blocks) -> tuple[list[Dwell], list[Note]]:
+    """The dwells in motion, and under pressure where there is any, in the order of time, and notes on those left out."""
+    if blocks.time.size < SHORTEST:
+        return [], []
+    window = max(FEWEST_BLOCKS, round(WINDOW / blocks.duration))
+    pressure, speed = _Channel(blocks.pressure, window), _Channel(blocks.speed, window)
+    idle = _highest(blocks.pressure, window) < UNLOADED
+    channels, least = ((speed,), -math.inf) if idle else ((pressure, speed), NO_PRESSURE * pressure.highest)
+    active = (np.abs(blocks.pressure) > least) & (np.abs(blocks.speed) > STANDSTILL * speed.highest)
+    steady = ~blocks.gap
+    for channel in channels:
+        channel.judge(active)
+        steady &= channel.steady
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], steady, [False]]).astype(np.int8)))
+    cores = [(int(a), int(b)) for a, b in edges.reshape(-1, 2) if b - a >= 2]
+    cores = _merged(cores, blocks, channels)
+    return _sorted_out(_widened(cores, blocks, channels), blocks, channels, least)
+
+
+def _highest(pressure: FloatArray, window: int) -> float:
+    """What means [Pa] over a window of blocks hardly ever reach: a gauge's noise and its negative offset are no pressure."""
+    size = min(window, pressure.size)
+    total = np.concatenate([[0.0], np.cumsum(pressure)])
+    return float(np.quantile((total[size:] - total[:-size]) / size, 0.995))
+
+
+class _Channel:
+    """Speed or pressure [m], and where it is steady."""
+
+    def __init__(self, values: FloatArray, window: int) -> None:
+        self.values = values
+        self.highest = float(np.quantile(np.abs(values), 0.995))
+        self.steady: NDArray[np.bool_] = np.ones(values.size, dtype=np.bool_)
+        self.threshold = RESOLUTION * self.highest
+        self.window = window
+        self._levels: dict[tuple[int, int], tuple[float, float]] = {}
+
+    def judge(self, active: NDArray[np.bool_]) -> None:
+        """Steady where the windows after and before agree; the ends of the record are as what lies next to them."""
+        size = self.values.size
+        window = min(self.window, size // 2)
+        total = np.concatenate([[0.0], np.cumsum(self.values - self.values.mean())])
+        apart = np.abs(total[2 * window :] - 2 * total[window : size - window + 1] + total[: size - 2 * window + 1])
+        apart = (apart / window)[np.clip(np.arange(size) - window, 0, size - 2 * window)]
+        # A quarter of a normal variable's absolute values lies below 0.3186 deviations: ramps do not reach that far down.
+        deviation = float(np.quantile(apart[active] if active.any() else apart, 0.25)) / 0.3186
+        self.threshold = max(self.threshold, min(STEP * deviation, PLAIN * self.highest))
+        self.steady = apart <= self.threshold
+
+    def level(self, core: tuple[int, int]) -> tuple[float, float]:
+        """The level of a core and how far a block may lie off it, once it has been judged what is steady."""
+        if core not in self._levels:
+            part = self.values[slice(*core)]
+            self._levels[core] = float(np.median(part)), max(LEAVE * float(part.std()), self.threshold)
+        return self._levels[core]
+
+
+def _merged(cores: list[tuple[int, int]], blocks: Blocks, channels: tuple[_Channel, ...]) -> list[tuple[int, int]]:
+    """Neighbours on the same level, with nothing that leaves it between them, are one."""
+    merged: list[tuple[int, int]] = []
+    for core in cores:
+        if merged and not blocks.gap[merged[-1][1] : core[0]].any():
+            last = merged[-1]
+            same = True
+            for channel in channels:
+                (one, wide), (other, narrow) = channel.level(last), channel.level(core)
+                between = np.abs(channel.values[last[1] : core[0]] - 0.5 * (one + other))
+                same &= abs(one - other) <= channel.threshold
+                same &= bool((between <= max(wide, narrow) + 0.5 * abs(one - other)).all())
+            if same:
+                merged[-1] = (last[0], core[1])
+                continue
+        merged.append(core)
+    return merged
+
+
+def _widened(cores: list[tuple[int, int]], blocks: Blocks, channels: tuple[_Channel, ...]) -> list[Dwell]:
+    """Up to where a channel begins to leave the level, or samples are missing."""
+    dwells = []
+    for row, (start, stop) in enumerate(cores):
+        first = cores[row - 1][1] if row else 0
+        last = cores[row + 1][0] if row + 1 < len(cores) else blocks.time.size
+        back, on = start - first, last - stop
+        for channel in channels:
+            level, tolerance = channel.level((start, stop))
+            off = np.where(blocks.gap[first:last], np.inf, np.abs(channel.values[first:last] - level))
+            back = min(back, _reach(off[: start - first][::-1], tolerance))
+            on = min(on, _reach(off[stop - first :], tolerance))
+        dwells.append(Dwell(start=start - back, stop=stop + on))
+    return dwells
+
+
+def _reach(off: FloatArray, tolerance: float) -> int:
+    """How many blocks lie on the level: a ramp takes as long to the tolerance as from there to twice that."""
+    out = np.flatnonzero(off > tolerance)
+    if out.size == 0:
+        return off.size
+    far = np.flatnonzero(off[out[0] :] > 2 * tolerance)
+    return max(int(out[0]) - 1 - (int(far[0]) if far.size else 0), 0)
+
+
+def _sorted_out(
+    found: list[Dwell], blocks: Blocks, channels: tuple[_Channel, ...], least: float
+) -> tuple[list[Dwell], list[Note]]:
+    """Those worth a mean; the last of `channels` is speed, `least` a pressure [Pa] below which there is none."""
+    kept: list[Dwell] = []
+    speed = channels[-1]
+    left: dict[str, list[float]] = {code: [] for code in _SENTENCES}
+    settled: Dwell | None = None
+    for row, dwell in enumerate(found):
+        where = slice(dwell.start, dwell.stop)
+        following = [
+            each for each in found[row + 1 : row + 1 + CRESTS] if not blocks.gap[dwell.stop : each.start].any()
+        ]
+        if settled is not None and _crest(channels, settled, dwell, following):
+            left["overshoot"].append(float(blocks.time[dwell.start]))
+            continue
+        settled = dwell
+        if float(blocks.pressure[where].mean()) <= least:
+            reason = "no_pressure"
+        elif abs(float(blocks.speed[where].mean())) <= STANDSTILL * speed.highest:
+            reason = "standstill"
+        elif dwell.stop - dwell.start < SHORTEST:
+            reason = "dwell_too_short"
+        elif any(_ramps(channel, where) for channel in channels):
+            reason = "not_steady"
+        else:
+            kept.append(dwell)
+            continue
+        left[reason].append(float(blocks.time[dwell.start]))
+    return kept, [
+        (code, _SENTENCES[code].format(n=len(at), at=listed(np.array(at)))) for code, at in left.items() if at
+    ]
+
+
+def _crest(channels: tuple[_Channel, ...], before: Dwell, dwell: Dwell, following: list[Dwell]) -> bool:
+    """Whether a dwell is no more than a crest of an overshoot, or the trough after it, on the way from the one before to the
+    first long one of those that follow: the way led beyond that one's level."""
+    long = (each for each in following if dwell.stop - dwell.start < CREST * (each.stop - each.start))
+    after = next(long, None)
+    if after is None:
+        return False
+    beyond = False
+    for channel in channels:
+        first, here, last = (float(channel.values[each.start : each.stop].mean()) for each in (before, dwell, after))
+        if abs(here - last) > OVERSHOOT * abs(last - first) + channel.threshold:
+            return False
+        on_the_way = np.copysign(1.0, last - first) * (channel.values[before.stop : dwell.stop] - last)
+        beyond |= abs(last - first) > 2 * channel.threshold and bool(on_the_way.max() > channel.threshold)
+    return beyond
+
+
+_SENTENCES = {
+    "overshoot": "{n} crests of overshoots left out, from {at} s.",
+    "no_pressure": "{n} stretches without pressure left out, from {at} s.",
+    "standstill": "{n} stretches at standstill left out, from {at} s.",
+    "dwell_too_short": "{n} dwells of fewer than 8 averages left out, from {at} s.",
+    "not_steady": "{n} stretches left out whose speed or pressure changes slowly throughout, from {at} s.",
+}
+
+
+def _ramps(channel: _Channel, where: slice) -> bool:
+    part = channel.values[where]
+    pieces = min(PIECES, part.size // 2)
+    means = part[: part.size // pieces * pieces].reshape(pieces, -1).mean(axis=1)
+    noise = LEAVE * float(np.diff(part).std()) * np.sqrt(pieces / part.size)
+    return bool(np.ptp(means) > max(2 * channel.threshold, noise, RAMP * abs(float(part.mean()))))
+
+
+def listed(times: FloatArray) -> str:
+    """The first five of some times [s], for a note."""
+    return ", ".join(f"{one:.2f}" for one in times[:5]) + (", ..." if len(times) > 5 else "")

@@ -1,0 +1,148 @@
+"""The deviation of a mean over noise that remembers: Var(mean) = s²/n [1 + 2 Σ (1 - k/n) ρ(k)].
+
+The correlation ρ is estimated over all dwells of a record together, where it is known well, up to 2.5 times its own
+integrated time (Sokal's window) and free of the bias that removing a mean and a trend from each dwell has. A dwell may
+have another one: its batch means say so, and are followed as far as dwells differ by more than batch means scatter
+(Smyth's moderation of variances). Where ρ has not faded within the dwells its tail is that of `models.records.slow_noise`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import digamma, polygamma
+
+from models.arrays import FloatArray
+from models.records.slow_noise import slow_correlation
+
+#: The window of the sum, in integrated correlation times 1 + 2 Σ ρ.
+SOKAL = 2.5
+#: The longest lag: the share of the sum that removing a mean and a trend may take off, and in averages.
+LOST_SHARE, LONGEST = 0.6, 400
+#: A correlation below this at the longest lag has faded.
+FADED = 0.1
+#: Batches of a dwell, each at least this many correlation times long.
+BATCHES, BATCH_TIMES = 16, 3.0
+#: Dwells that it takes to tell how much they differ.
+FEWEST_DWELLS = 8
+#: Anticorrelated noise averages out faster, but no more is believed than this.
+LEAST_FACTOR = 0.2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stretch:
+    """A stretch of a record: time [m] s from its start, torque [m] Nm, averages that follow one another."""
+
+    time: FloatArray
+    torque: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Correlation:
+    """ρ at lags 1, 2, ... [m]; resolved is false where it had not faded at the longest lag that dwells can show: then it is
+    that of `models.records.slow_noise`."""
+
+    lags: FloatArray
+    resolved: bool = True
+
+    def factor(self, count: int) -> float:
+        """By what the variance of a mean over `count` exceeds that over as many independent values."""
+        lag = np.arange(1, self.lags.size + 1)
+        return max(float(1 + 2 * (np.maximum(1 - lag / count, 0.0) * self.lags).sum()), LEAST_FACTOR)
+
+
+def pooled_correlation(residuals: Sequence[FloatArray], removed: int) -> Correlation:
+    """ρ of all residuals together, each of which `removed` coefficients of low frequency were fitted to."""
+    length = float(np.median([one.size for one in residuals]))
+    longest = max(1, min(LONGEST, int(LOST_SHARE * length / (2 * removed))))
+    total, count = np.zeros(longest + 1), np.zeros(longest + 1)
+    for one in residuals:
+        power = float(one @ one)
+        if one.size <= longest or power == 0.0:
+            continue
+        padded = np.fft.rfft(one, 1 << int(one.size + longest).bit_length())
+        products = np.fft.irfft(padded.real**2 + padded.imag**2)[: longest + 1]
+        total += products * (one.size / power)
+        count += one.size - np.arange(longest + 1)
+    if count[0] == 0.0:
+        return Correlation(lags=np.zeros(0))
+    covariance = total / count
+    # What was removed takes `removed` Λ/n off every lag, Λ = γ_0 + 2 Σ γ_k being what is looked for: solved for each window.
+    lag = np.arange(longest + 1)
+    raw = covariance[0] + 2 * np.cumsum(np.where(lag > 0, covariance, 0.0))
+    long_run = raw / np.maximum(1 - (1 + 2 * lag) * removed / length, 0.5 * (1 - LOST_SHARE))
+    lost = removed * long_run / length
+    times = np.maximum(long_run / (covariance[0] + lost), 1.0)
+    enough = lag >= SOKAL * times
+    window = int(enough.argmax()) if enough.any() else longest
+    lags = (covariance[1 : window + 1] + lost[window]) / (covariance[0] + lost[window])
+    if enough.any() or abs(float(lags[-1])) < FADED:
+        return Correlation(lags=lags)
+    return Correlation(lags=slow_correlation(residuals), resolved=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeanDeviations:
+    """One row a dwell: of its mean [n] Nm, its drift [n] Nm/s, the drift's deviation [n] Nm/s, of an average [n] Nm.
+
+    resolved is false where noise remembers for longer than a dwell can show: its memory is then a model's.
+    """
+
+    mean: FloatArray
+    drift: FloatArray
+    drift_sd: FloatArray
+    average: FloatArray
+    resolved: bool
+
+
+def deviations(stretches: Sequence[Stretch]) -> MeanDeviations:
+    """The deviation of the mean of every stretch."""
+    slopes, squares, residuals = [], [], []
+    for one in stretches:
+        centred = one.time - one.time.mean()
+        square = max(float(centred @ centred), 1e-12)
+        slope = float(centred @ one.torque) / square
+        residuals.append(one.torque - one.torque.mean() - slope * centred)
+        slopes.append(slope)
+        squares.append(square)
+    correlation = pooled_correlation(residuals, removed=2)
+    rows = [_moments(one, correlation) for one in residuals]
+    variance, factor, ratio, freedom = np.array(rows).T
+    if not correlation.resolved and variance.any():  # a dwell of few independent values hardly tells its own variance
+        independent = np.maximum(np.array([one.size for one in residuals]) / factor - 2, 1.0)
+        variance = variance.mean() * _moderated(variance / variance.mean(), independent)
+    long_run = variance * factor * _moderated(ratio, freedom)
+    count = np.array([one.size for one in residuals])
+    return MeanDeviations(
+        mean=np.sqrt(long_run / count),
+        drift=np.array(slopes),
+        drift_sd=np.sqrt(long_run / np.array(squares)),
+        average=np.sqrt(variance),
+        resolved=correlation.resolved,
+    )
+
+
+def _moments(residual: FloatArray, correlation: Correlation) -> tuple[float, float, float, float]:
+    """Variance of an average, the factor of its mean, batch means over what the factor says, their degrees of freedom."""
+    size = residual.size
+    factor = correlation.factor(size)
+    variance = float(residual @ residual) / max(size - 2 * factor, 0.5 * size)
+    length = max(1, size // BATCHES, int(np.ceil(BATCH_TIMES * factor)))
+    batches = size // length
+    if batches < 4 or variance == 0.0:
+        return variance, factor, 1.0, 1.0
+    means = residual[: batches * length].reshape(batches, length).mean(axis=1)
+    expected = (batches - 2) * variance * correlation.factor(length) / length
+    return variance, factor, float(means @ means) / expected, float(batches - 2)
+
+
+def _moderated(ratio: FloatArray, freedom: FloatArray) -> FloatArray:
+    """Each dwell's own ratio [n], drawn towards 1 by as much as ratios scatter by chance (G. Smyth 2004)."""
+    if ratio.size < FEWEST_DWELLS:
+        return np.ones_like(ratio)
+    log_ratio = np.log(np.maximum(ratio, 1e-6)) - digamma(freedom / 2) + np.log(freedom / 2)
+    excess = float(log_ratio.var(ddof=1) - polygamma(1, freedom / 2).mean())
+    if excess <= 0:
+        return np.ones_like(ratio)
+    prior = (1 + np.sqrt(1 + 2 * excess)) / excess  # degrees of freedom: trigamma(prior / 2) = excess
+    return np.asarray((prior + freedom * ratio) / (prior + freedom))

@@ -1,0 +1,300 @@
+"""Whole periods of a record whose speed swings periodically.
+
+A dynamic Stribeck test holds the pressure and swings the speed, 15 s at 0.1 Hz a pressure: one and a half periods. A
+loop closes after whole periods only, so half a period must be left out; the *last* whole periods are kept, for the
+first half holds the start. The swing is fitted by
+
+    v(t) = v_0 + Σ_h a_h cos hθ + b_h sin hθ,    θ = 2π f (t - t_0),    h = 1 ... 4, or up to 32 where ramps have corners
+
+with f free (Gauss-Newton on all of the level's samples, outliers left out), so that nothing is asked of the clock's
+evenness, of the rate, or of a period being a whole number of samples.
+
+Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3.4.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from models.arrays import FloatArray
+from models.records.outliers import NEIGHBOURS, OUTLIER, beside, near
+
+#: Harmonics of the speed.
+SPEED_HARMONICS = 4
+#: A period counts as whole where this share of it was sampled: a fit of harmonics bridges the rest.
+WHOLE = 0.99
+#: A speed that misses its fit by more than this share of its swing (rms) does not swing periodically.
+PERIODIC = 0.15
+#: Standing still for longer than this share of a period, or so many times as long as a sine lingers (standing is within so
+#: much of the swing), before or after, is no part of the swing; away from its ends the lower share of the record holds.
+_REST_SHARE, _REST_INSIDE, _INSIDE = 0.1, 0.02, (0.1, 0.9)
+_LINGERS, _STILL = 1.6, 1e-3
+_SWING_SHARE, _MOST_SHARE = 0.02, 0.05
+#: Where speed at a record's ends is further off the swing than OUTLIER deviations and this share of its amplitude, it does
+#: not swing yet, or no more; ends are cut so many times at most.
+_OFF_SWING, _CUTS = 0.02, 6
+#: A frequency is known to so much of 1/duration where the first harmonic alone looks for it, and at last.
+_NEAR, _EXACT = 1e-3, 1e-10
+#: Harmonics of motions with corners, tried one after the other while what is missed (rms) is more than such a share of the
+#: swing and falls to this share.
+CORNERS = (8, 16, 32)
+_FOLLOWED, _TAKEN = 0.002, 0.7
+#: They are fitted to so many samples at most, evenly taken.
+_MOST_WITH_CORNERS = 8000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cycle:
+    """A fitted swing: frequency [Hz], origin t_0 [s], mean v_0, cosine and sine [h], in the unit of what was fitted.
+
+    `covariance` [2h, 2h] is that of (cosine, sine) with f free; `noise` the deviation of a sample; the swing begins at
+    `begin` [s], its last whole periods are those of start <= t < stop [s]; `outliers` samples were left out.
+    """
+
+    frequency: float
+    origin: float
+    mean: float
+    cosine: FloatArray
+    sine: FloatArray
+    covariance: FloatArray
+    noise: float
+    periods: int
+    begin: float
+    start: float
+    stop: float
+    outliers: int
+
+    @property
+    def amplitude(self) -> float:
+        """Of the first harmonic."""
+        return math.hypot(float(self.cosine[0]), float(self.sine[0]))
+
+    def phase(self, time: FloatArray) -> FloatArray:
+        """θ [n] rad at time [n] s."""
+        return 2 * math.pi * self.frequency * (time - self.origin)
+
+    def value(self, phase: FloatArray) -> FloatArray:
+        """v [n] at phase [n] rad."""
+        basis = harmonics(phase, self.cosine.size)
+        return np.asarray(self.mean + basis @ np.concatenate([self.cosine, self.sine]), dtype=np.float64)
+
+    def gradient(self, phase: FloatArray) -> FloatArray:
+        """dv/dθ [n] at phase [n] rad; dv/dt is 2πf times that."""
+        order = np.arange(1, self.cosine.size + 1)
+        basis = harmonics(phase, self.cosine.size)
+        return np.asarray(basis @ np.concatenate([order * self.sine, -order * self.cosine]), dtype=np.float64)
+
+
+def harmonics(phase: FloatArray, count: int) -> FloatArray:
+    """cos hθ and sin hθ for h = 1 ... count: [n, 2 count], cosines first."""
+    turn = np.exp(1j * phase)
+    powers = np.empty((phase.size, count), dtype=np.complex128)
+    power = np.ones_like(turn)
+    for h in range(count):
+        power = power * turn
+        powers[:, h] = power
+    return np.concatenate([powers.real, powers.imag], axis=1)
+
+
+def sample_interval(time: FloatArray) -> float:
+    """The usual distance of two samples [s], 0 for a single one."""
+    return float(np.median(np.diff(time))) if time.size > 1 else 0.0
+
+
+def fit_cycle(time: FloatArray, value: FloatArray) -> Cycle | str:
+    """The swing of value [n] over time [n] s (ascending), and its last whole periods; a sentence where there is none.
+
+    SPEED_HARMONICS for a motor told to follow a sine, more for motions with corners.
+    """
+    moving = _without_rest(time, value, float(time[-1] - time[0])) if time.size else slice(0)
+    t, y = time[moving], value[moving]
+    if t.size < 4 * (2 * SPEED_HARMONICS + 2) or t[-1] <= t[0]:
+        return f"The speed moves for {t.size} samples only: too few for a period."
+    if not (np.ptp(y) > 0 and np.isfinite(np.ptp(y))):
+        return "The speed does not move."
+    fitted = _refine(t, y, _coarse_frequency(t, y), 1, _NEAR)
+    if not isinstance(fitted, str):
+        moving = _without_rest(t, y, min(1 / fitted.frequency, float(t[-1] - t[0])))
+        t, y = t[moving], y[moving]
+        fitted = _without_ends(t, y, fitted.frequency, SPEED_HARMONICS)
+    if isinstance(fitted, str):
+        return fitted
+    if not (fitted.noise < PERIODIC * fitted.amplitude and fitted.outliers <= 0.2 * t.size):
+        miss = fitted.noise / max(fitted.amplitude, 1e-3 * fitted.noise, 1e-300)
+        return f"The speed does not swing periodically: it misses its best fit by {miss:.0%} of its swing."
+    return _with_corners(t, y, fitted)
+
+
+def _without_ends(time: FloatArray, value: FloatArray, frequency: float, count: int) -> Cycle | str:
+    """A fit of `count` harmonics to what follows the swing."""
+    fitted: Cycle | str = ""
+    for _ in range(_CUTS):
+        fitted = _refine(time, value, frequency, count, _EXACT)
+        if isinstance(fitted, str):
+            return fitted
+        following = _following(time, value, fitted)
+        if following == slice(0, time.size):
+            break
+        frequency, time, value = fitted.frequency, time[following], value[following]
+    return fitted
+
+
+def _with_corners(time: FloatArray, value: FloatArray, cycle: Cycle) -> Cycle:
+    """With more harmonics while they take away much of what is missed: ramps have corners, a sine has none."""
+    step = max(1, time.size // _MOST_WITH_CORNERS)
+    time, value = time[::step], value[::step]
+    inside = (time >= cycle.begin) & (time < cycle.stop)
+    t, y = time[inside], value[inside]
+    most = t.size / (3 * max((t[-1] - t[0]) * cycle.frequency, 1.0))
+    richer = cycle
+    for count in CORNERS:
+        if richer.noise < _FOLLOWED * cycle.amplitude or count > most or t.size < 4 * (2 * count + 2):
+            break
+        again = _refine(t, y, richer.frequency, count, _EXACT)
+        if isinstance(again, str) or again.noise > _TAKEN * richer.noise:
+            break
+        richer = again
+    if richer is cycle:
+        return cycle
+    # a corner at an end may have been taken for no part of the swing
+    whole = _without_ends(time, value, richer.frequency, richer.cosine.size)
+    return richer if isinstance(whole, str) or whole.noise > richer.noise / _TAKEN else whole
+
+
+def _following(time: FloatArray, value: FloatArray, cycle: Cycle) -> slice:
+    """Without the ends that do not follow the swing: holds between two pressures, the way back to where the next begins."""
+    residual = value - cycle.value(cycle.phase(time))
+    usual = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
+    smooth = median_filter(residual, size=min(NEIGHBOURS, residual.size), mode="nearest")
+    off = np.abs(smooth) > max(OUTLIER * usual, _OFF_SWING * cycle.amplitude)
+    before, after = leading(off), leading(off[::-1])
+    return slice(before, off.size - after) if before + after < off.size else slice(0, off.size)
+
+
+def leading(off: NDArray[np.bool_]) -> int:
+    """How many of `off` [n] at the beginning are, up to the last before most that follow are not."""
+    share = np.cumsum(off) / np.arange(1, off.size + 1)
+    rows = np.flatnonzero(off & (share > 0.5))
+    return int(rows[-1]) + 1 if rows.size else 0
+
+
+def _without_rest(time: FloatArray, value: FloatArray, period: float) -> slice:
+    """Without standing still before and after, where that lasts for a swing of this period [s] at most."""
+    smooth = median_filter(value, size=min(3, value.size), mode="nearest")
+    swing, noise = float(np.ptp(smooth)), float(np.median(np.abs(value - smooth)))
+    least = min(_SWING_SHARE * swing + 4 * noise, _MOST_SHARE * swing)
+    # so long does a sine stay so near an end of its swing, where the record begins or stops there
+    lingers = _LINGERS * math.acos(1 - 2 * least / swing) / (2 * math.pi) if swing > 0 else _REST_SHARE
+    lowest, still = float(smooth.min()), max(4 * noise, _STILL * swing)
+
+    def rest(course: FloatArray, passed: FloatArray) -> int:
+        """Samples of the course that stand still at its beginning, `passed` [n] s being its clock."""
+        off = np.abs(course - course[0])
+        inside = _INSIDE[0] * swing < course[0] - lowest < _INSIDE[1] * swing
+        moved = np.flatnonzero(off > least)
+        longest = _REST_INSIDE * (time[-1] - time[0]) if inside else min(_REST_SHARE, lingers) * period
+        if not moved.size or passed[moved[0]] <= longest:
+            return 0
+        return int(moved[0]) if inside else int(np.flatnonzero(off[: moved[0]] <= still)[-1]) + 1
+
+    start, after = rest(smooth, time - time[0]), rest(smooth[::-1], (time[-1] - time)[::-1])
+    return slice(start, time.size - after) if start + after < time.size else slice(0, time.size)
+
+
+def _coarse_frequency(time: FloatArray, value: FloatArray) -> float:
+    """The periodogram's highest frequency, then the best sine about it: within a twentieth of 1/duration."""
+    duration = float(time[-1] - time[0])
+    points = int(min(4096, max(64, time.size)))
+    grid = np.linspace(0.0, duration, points)
+    y = np.interp(grid, time - time[0], median_filter(value, size=5, mode="nearest"))
+    power = np.abs(np.fft.rfft(y - y.mean(), 4 * points)) ** 2
+    frequencies = np.fft.rfftfreq(4 * points, grid[1])
+    peak = float(frequencies[np.argmax(np.where(frequencies >= 0.5 / duration, power, 0.0))])
+    step = max(1, points // 1024) if peak * duration < 100 else 1
+    candidates = np.linspace(peak - 0.8 / duration, peak + 0.8 / duration, 65)
+    candidates = candidates[candidates > 0.4 / duration]
+    return float(candidates[int(np.argmax(_explained(grid[::step], y[::step], candidates)))])
+
+
+def _explained(time: FloatArray, value: FloatArray, frequencies: FloatArray) -> FloatArray:
+    """How much of the squares of value [n] a mean and a sine of each frequency [m] Hz explain: [m]."""
+    turn = np.exp(2j * math.pi * frequencies[:, np.newaxis] * time)
+    once, twice, along = turn.sum(axis=1), (turn**2).sum(axis=1), turn @ value
+    gram = np.empty((frequencies.size, 3, 3))
+    gram[:, 0, 0] = time.size
+    gram[:, 0, 1] = gram[:, 1, 0] = once.real
+    gram[:, 0, 2] = gram[:, 2, 0] = once.imag
+    gram[:, 1, 1], gram[:, 2, 2] = 0.5 * (time.size + twice.real), 0.5 * (time.size - twice.real)
+    gram[:, 1, 2] = gram[:, 2, 1] = 0.5 * twice.imag
+    projected = np.stack([np.full(frequencies.size, value.sum()), along.real, along.imag], axis=1)
+    solved = np.linalg.solve(gram + 1e-12 * time.size * np.eye(3), projected[..., np.newaxis])[..., 0]
+    return np.asarray((projected * solved).sum(axis=1), dtype=np.float64)
+
+
+def _refine(time: FloatArray, value: FloatArray, frequency: float, count: int, tolerance: float) -> Cycle | str:
+    """Gauss-Newton on frequency, mean and `count` harmonics until the frequency moves by less than `tolerance`/duration;
+    outliers judged anew in the first steps."""
+    origin, duration = 0.5 * float(time[0] + time[-1]), float(time[-1] - time[0])
+    order, highest = np.arange(1, count + 1), 0.5 / max(sample_interval(time), 1e-12)
+    keep, steady = np.ones(time.size, dtype=np.bool_), beside(value)
+    coefficients: FloatArray = np.zeros(2 * count + 1)
+    gram: FloatArray = np.zeros((0, 0))
+    residual: FloatArray = value
+    for step in range(25):
+        basis = harmonics(2 * math.pi * frequency * (time - origin), count)
+        design = np.column_stack([np.ones_like(time), basis])
+        kept = design[keep]
+        coefficients = np.asarray(np.linalg.lstsq(kept.T @ kept, kept.T @ value[keep], rcond=None)[0], dtype=np.float64)
+        cosine, sine = coefficients[1 : count + 1], coefficients[count + 1 :]
+        slope = basis @ np.concatenate([order * sine, -order * cosine])
+        by_frequency = 2 * math.pi * (time - origin) / duration * slope  # per cycle over the record
+        residual = np.asarray(value - design @ coefficients, dtype=np.float64)
+        full = np.column_stack([design, by_frequency])[keep]
+        gram = full.T @ full
+        move = float(np.linalg.lstsq(gram, full.T @ residual[keep], rcond=None)[0][-1])
+        frequency += float(np.clip(move, -0.2, 0.2)) / duration
+        if not 0.2 / duration < frequency < highest:
+            return "The speed does not swing periodically."
+        if step < 4:
+            keep = near(residual, value) | steady
+        elif abs(move) < tolerance:
+            break
+    noise = math.sqrt(float((residual[keep] ** 2).sum()) / max(int(keep.sum()) - 2 * count - 2, 1))
+    inverse = np.asarray(np.linalg.pinv(gram, hermitian=True), dtype=np.float64)
+    return _cycle(time, frequency, origin, coefficients, inverse[1:-1, 1:-1] * noise**2, noise, int((~keep).sum()))
+
+
+def _cycle(
+    time: FloatArray,
+    frequency: float,
+    origin: float,
+    coefficients: FloatArray,
+    covariance: FloatArray,
+    noise: float,
+    outliers: int,
+) -> Cycle | str:
+    """Count the whole periods."""
+    interval = sample_interval(time)
+    sampled = (float(time[-1] - time[0]) + interval) * frequency
+    periods = math.floor(sampled + 1 - WHOLE)
+    if periods < 1:
+        return f"No whole period: {sampled:.2f} periods of {1 / frequency:.4g} s were recorded."
+    count = coefficients.size // 2
+    stop = float(time[-1]) + 0.5 * interval
+    return Cycle(
+        frequency=frequency,
+        origin=origin,
+        mean=float(coefficients[0]),
+        cosine=coefficients[1 : count + 1],
+        sine=coefficients[count + 1 :],
+        covariance=covariance,
+        noise=noise,
+        periods=periods,
+        begin=float(time[0]),
+        start=stop - periods / frequency,
+        stop=stop,
+        outliers=outliers,
+    )

@@ -1,0 +1,174 @@
+"""A raw stationary record (section 2.3.3 of the reference) cut into steady plateaus.
+
+Clean the record (`records.cleaning`), find the dwells in its speed and pressure (`records.dwells`), drop the transient of
+torque at the start of each (`records.settling`), and take the mean of the rest with its deviation under noise that
+remembers (`records.mean_deviation`). What is dropped, and why, is said in notes.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from models.records.cleaning import SCALE_SAMPLES, Note, Sampled, cleaning
+from models.records.dwells import Blocks, Dwell, average, find_dwells, listed
+from models.records.mean_deviation import Stretch, deviations
+from models.records.runs import Plateaus
+from models.records.settling import SETTLING, Transients, dropped, fit_transients, mean_decay
+
+#: A drift of more deviations than this is worth a note.
+DRIFTING = 4.0
+#: What is dropped had made the means look less sure than they are, so that more may have to be: so often at most.
+ROUNDS = 4
+#: No mean is known better than to this share of itself.
+LEAST_SHARE = 1e-9
+SLOW_NOISE = (
+    "slow_noise",
+    "The noise of torque remembers for longer than a dwell can show: deviations of means rest on a white and a slow part "
+    "of it, estimated from all dwells together.",
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlateauCut:
+    """Plateaus in the order measured, one row [n] each, and how they were come by.
+
+    `plateaus.torque_sd` [n] Nm is the deviation of the mean torque. `count` [n] samples were used; `noise` [n] Nm is the
+    deviation of a sample about its dwell; `drift` [n] Nm/s the slope of torque over the samples used, with its deviation
+    `drift_sd`; `time_constant` [n] s that of torque's exponential approach and `settling_time` [n] s four times that,
+    both nan where no transient stands out of the noise. `settled` [n] is false where more of the transient than the
+    mean's deviation was left at the end of the dwell: that mean is taken over the last quarter, is not extrapolated, and
+    what its transient is estimated to shift it by is part of its torque_sd. `start` and `stop` [n] s bound the samples
+    used. `notes` are pairs of a code and a sentence.
+    """
+
+    plateaus: Plateaus
+    count: NDArray[np.int64]
+    drift: FloatArray
+    drift_sd: FloatArray
+    settling_time: FloatArray
+    time_constant: FloatArray
+    settled: NDArray[np.bool_]
+    noise: FloatArray
+    start: FloatArray
+    stop: FloatArray
+    notes: tuple[Note, ...]
+
+
+def cut_plateaus(record: Sampled) -> PlateauCut:
+    """The steady plateaus of a record of 10 to 2,000 Hz.
+
+    Steps of speed and pressure may come in any order and direction; samples may be missing, their times jitter, single
+    samples spike, signals be quantised. Raises ValueError on fewer than 16 samples, a clock that does not advance or
+    falls back, and a record without any steady dwell in motion, and under pressure where there is any.
+    """
+    kept = cleaning(record)
+    blocks = average(record, kept)
+    dwells, left_out = find_dwells(blocks)
+    if not dwells:
+        reasons = " ".join(sentence for _, sentence in left_out)
+        raise ValueError(
+            f"the record has no steady dwell in motion and, where it has any, under pressure. {reasons}".rstrip()
+        )
+    duration = np.array([blocks.time[one.stop - 1] - blocks.time[one.start] + blocks.duration for one in dwells])
+    transients = fit_transients(_stretches(blocks, dwells), blocks.duration)
+    used, drop, told = dwells, np.zeros(duration.size), deviations(_stretches(blocks, dwells))
+    for _ in range(ROUNDS):
+        further = np.maximum(drop, dropped(transients, duration, told.mean * np.sqrt(1 - drop / duration)))
+        if (further == drop).all():
+            break
+        drop = further
+        used = [_used(blocks, one, float(drop[row])) for row, one in enumerate(dwells)]
+        told = deviations(_stretches(blocks, used))
+    settled = ~(
+        np.hypot(transients.amplitude, transients.amplitude_sd) * np.exp(-duration / transients.time_constant)
+        > told.mean
+    )
+    noise = np.sqrt(_mean(blocks.scatter, used) + told.average**2)
+    shift = np.nan_to_num(_shift(transients, drop, duration))
+    half = 0.5 * (blocks.duration - kept.period)
+    cut = PlateauCut(
+        plateaus=_plateaus(
+            blocks, used, np.sqrt(told.mean**2 + _rounding(kept.of(record.torque), noise) ** 2 + shift**2)
+        ),
+        count=np.array([(one.stop - one.start) * blocks.size for one in used]),
+        drift=told.drift,
+        drift_sd=told.drift_sd,
+        settling_time=SETTLING * transients.time_constant,
+        time_constant=transients.time_constant,
+        settled=settled,
+        noise=noise,
+        start=np.array([blocks.time[one.start] for one in used]) - half,
+        stop=np.array([blocks.time[one.stop - 1] for one in used]) + half,
+        notes=(*kept.notes, *left_out),
+    )
+    slow = () if told.resolved else (SLOW_NOISE,)
+    return replace(cut, notes=(*cut.notes, *_notes(cut, drop), *slow))
+
+
+def _stretches(blocks: Blocks, dwells: list[Dwell]) -> list[Stretch]:
+    stretches = []
+    for one in dwells:
+        time = blocks.time[one.start : one.stop]
+        stretches.append(Stretch(time=time - time[0], torque=blocks.torque[one.start : one.stop]))
+    return stretches
+
+
+def _shift(transients: Transients, drop: FloatArray, duration: FloatArray) -> FloatArray:
+    """What the transient is thought to shift the mean by [n] Nm; nan where no transient is seen."""
+    amplitude = np.hypot(transients.amplitude, transients.amplitude_sd)
+    return np.asarray(amplitude * mean_decay(transients.time_constant, drop, duration))
+
+
+def _plateaus(blocks: Blocks, used: list[Dwell], torque_sd: FloatArray) -> Plateaus:
+    torque = _mean(blocks.torque, used)
+    return Plateaus(
+        pressure=_mean(blocks.pressure, used),
+        speed=_mean(blocks.speed, used),
+        torque=torque,
+        torque_sd=np.maximum(torque_sd, LEAST_SHARE * np.maximum(np.abs(torque), 1e-9)),
+        oil_temperature=None if blocks.oil_temperature is None else _mean(blocks.oil_temperature, used),
+    )
+
+
+def _notes(cut: PlateauCut, drop: FloatArray) -> list[Note]:
+    notes = [
+        (
+            "transient_discarded",
+            f"The first {drop.min():.2f} to {drop.max():.2f} s of {drop.size} dwells, {drop.sum():.1f} s in all, are "
+            "left out of their means: torque was settling.",
+        )
+    ]
+    for code, rows, sentence in (
+        ("unsettled", ~cut.settled, "{n} of {all} dwells ended before their torque had settled, from {at} s."),
+        (
+            "drifting",
+            cut.settled & (np.abs(cut.drift) > DRIFTING * cut.drift_sd),
+            "Torque drifts on {n} of {all} settled dwells, from {at} s.",
+        ),
+    ):
+        if rows.any():
+            told = sentence.format(n=np.count_nonzero(rows), all=rows.size, at=listed(cut.start[rows]))
+            notes.append((code, told))
+    return notes
+
+
+def _used(blocks: Blocks, dwell: Dwell, drop: float) -> Dwell:
+    first = int(np.searchsorted(blocks.time[dwell.start : dwell.stop], blocks.time[dwell.start] + drop))
+    return Dwell(start=min(dwell.start + first, dwell.stop - 3), stop=dwell.stop)
+
+
+def _mean(channel: FloatArray, dwells: list[Dwell]) -> FloatArray:
+    return np.array([channel[one.start : one.stop].mean() for one in dwells])
+
+
+def _rounding(torque: FloatArray, noise: FloatArray) -> float:
+    """What rounding to counts of q leaves in a mean [Nm]: q/√12 exp(-2π² σ²/q²), σ the noise [n] Nm before rounding."""
+    levels = np.unique(torque[:: max(1, torque.size // SCALE_SAMPLES)])
+    if levels.size < 2:
+        return 0.0
+    count = float(np.diff(levels).min())
+    before = max(float((noise**2).mean()) / count**2 - 1 / 12, 0.0)  # over many levels, rounding adds q²/12 on average
+    return count / math.sqrt(12.0) * math.exp(-2 * math.pi**2 * min(before, 30.0))

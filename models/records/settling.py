@@ -1,0 +1,201 @@
+"""How torque approaches its steady value on a dwell, and from when on a mean may be taken.
+
+After a step the torque approaches like M(t) = M_inf + A exp(-t/τ): the attractor law dM/dt = C (1 - M/S) at constant S is
+this with τ = S/C. M_inf, A and a drift beside fast transients are linear given τ, which is scanned; every dwell has its
+own τ, held near the one that explains all dwells of the record together, because most steps of a test are too small to
+tell τ alone.
+
+The settling time is 4 τ: what is left of the transient then is 1.8 %.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from models.records.mean_deviation import Stretch, pooled_correlation
+
+#: Time constants that make a settling time.
+SETTLING = 4.0
+#: Time constants tried: so many, from one block to this many of the longest dwell, no longer than this [s].
+SCANNED, LONGEST_SHARE, LONGEST = 40, 2.0, 6.0
+#: Beside a transient faster than this share of its dwell, torque may drift; a slower one cannot be told from a drift.
+DRIFT_SHARE = 1 / 6
+#: How far (in its logarithm, one deviation) a dwell's time constant lies from the record's at most and at least, and how
+#: many dwells it takes to tell.
+SPREAD, LEAST_SPREAD, FEWEST_DWELLS = 0.5, 0.1, 8
+#: Deviations by which all dwells together must gain from a transient, and squared deviations by which a single one must.
+POOLED_GAIN, OWN_GAIN = 5.0, 25.0
+#: No dwell counts for more than this among all, in squared deviations.
+GAIN_CAP = 1e3
+#: What a discarded transient may leave in the mean, in deviations of the mean; least and most of a dwell that is dropped.
+LEFT, LEAST_DROPPED, MOST_DROPPED = 0.1, 0.05, 0.75
+#: So many sets of times are remembered.
+KNOWN_TIMES = 4
+#: Deviations of amplitude and of the time constant that are reckoned with.
+LATE = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Transients:
+    """One row a dwell: time_constant [n] s (nan where no transient is seen), slowest [n] s, a time constant that it hardly
+    exceeds, amplitude [n] Nm at the dwell's start, amplitude_sd [n] Nm.
+    """
+
+    time_constant: FloatArray
+    slowest: FloatArray
+    amplitude: FloatArray
+    amplitude_sd: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Scan:
+    gain: FloatArray  # [J] what A takes off the sum of squares
+    total: FloatArray  # [J] what A and the drift, where there is one, take off it
+    residual: FloatArray  # [m] at the best
+    variance: float
+
+
+def fit_transients(stretches: Sequence[Stretch], shortest: float) -> Transients:
+    """The exponential approach of every dwell. `shortest` [s] is a block."""
+    longest = max(float(one.time[-1]) for one in stretches)
+    taus = np.geomspace(shortest, max(min(LONGEST_SHARE * longest, LONGEST), 4 * shortest), SCANNED)
+    basis = _Bases(taus)
+    scans = [_scan(one, basis.of(one.time)) for one in stretches]
+    correlation = pooled_correlation([scan.residual for scan in scans], removed=3)
+    long_run = np.array([[scan.variance * correlation.factor(scan.residual.size)] for scan in scans])
+    gain = np.stack([scan.gain for scan in scans]) / long_run
+    drifts = taus < DRIFT_SHARE * np.array([[one.time[-1]] for one in stretches])
+    worth = np.stack([scan.total for scan in scans]) / long_run - drifts  # a drift is worth 1 by chance
+    place = np.log(taus)
+    common = _common(worth, gain, place)
+    rows = [_fit(one, place, worth[i], gain[i], float(long_run[i, 0]), common) for i, one in enumerate(stretches)]
+    tau, slowest, amplitude, deviation = np.array(rows).T
+    return Transients(time_constant=tau, slowest=slowest, amplitude=amplitude, amplitude_sd=deviation)
+
+
+def _decays(time: FloatArray, taus: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """exp(-t/τ) [J, m] free of its mean and, where τ < a sixth of the dwell, of its trend; the unit trend [m]."""
+    decay = np.exp(-time / taus[:, np.newaxis])
+    decay -= decay.mean(axis=1, keepdims=True)
+    trend = time - time.mean()
+    trend /= max(float(np.sqrt(trend @ trend)), 1e-300)
+    drifts = taus < DRIFT_SHARE * time[-1]
+    decay -= np.where(drifts, decay @ trend, 0.0)[:, np.newaxis] * trend
+    return decay, trend
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Basis:
+    decay: FloatArray  # [J, m] as `_decays` has it
+    trend: FloatArray  # [m]
+    square: FloatArray  # [J] of the decays
+    drifts: NDArray[np.bool_]  # [J] whether torque may drift beside a transient so fast
+
+
+class _Bases:
+    """The transients tried over the times of a dwell: one clock gives most dwells the same times, to the microsecond."""
+
+    def __init__(self, taus: FloatArray) -> None:
+        self._taus = taus
+        self._known: dict[bytes, _Basis] = {}
+
+    def of(self, time: FloatArray) -> _Basis:
+        key = np.round(time, 6).tobytes()
+        if key not in self._known:
+            decay, trend = _decays(time, self._taus)
+            square = np.maximum(np.einsum("jk,jk->j", decay, decay), 1e-12)
+            if len(self._known) == KNOWN_TIMES:
+                self._known.clear()
+            drifts = self._taus < DRIFT_SHARE * time[-1]
+            self._known[key] = _Basis(decay=decay, trend=trend, square=square, drifts=drifts)
+        return self._known[key]
+
+
+def _scan(stretch: Stretch, basis: _Basis) -> _Scan:
+    off = stretch.torque - stretch.torque.mean()
+    along = basis.decay @ off
+    gain = along**2 / basis.square
+    drift = np.where(basis.drifts, float(basis.trend @ off), 0.0)
+    total = gain + drift**2
+    best = int(total.argmax())
+    residual = off - along[best] / basis.square[best] * basis.decay[best] - drift[best] * basis.trend
+    floor = (1e-9 * max(float(np.abs(stretch.torque).max()), 1e-9)) ** 2
+    variance = max(float(residual @ residual) / max(residual.size - 3, 1), floor)
+    return _Scan(gain=gain, total=total, residual=residual, variance=variance)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Common:
+    """log τ of all dwells together, and how far that of one of them lies from it (one deviation)."""
+
+    place: float
+    spread: float
+
+
+def _common(worth: FloatArray, gain: FloatArray, place: FloatArray) -> _Common | None:
+    """What explains all dwells [n, J] best, if a transient explains them at all."""
+    share = np.minimum(GAIN_CAP / np.maximum(worth.max(axis=1), GAIN_CAP), 1.0)
+    together = share @ worth
+    dwells = worth.shape[0]
+    if share @ gain[:, together.argmax()] - dwells <= POOLED_GAIN * np.sqrt(2.0 * dwells):
+        return None
+    own = np.array([_peak(one, place) for one in worth])
+    seen = gain[np.arange(dwells), worth.argmax(axis=1)] > OWN_GAIN
+    known = own[seen & (own[:, 1] < SPREAD)]
+    centre = _peak(together, place)[0]
+    if known.shape[0] < FEWEST_DWELLS:
+        return _Common(place=centre, spread=SPREAD)
+    # The median of a squared normal variable is 0.455 of its variance.
+    beyond = float(np.median((known[:, 0] - centre) ** 2)) / 0.455 - float(np.median(known[:, 1] ** 2))
+    return _Common(place=centre, spread=min(max(float(np.sqrt(max(beyond, 0.0))), LEAST_SPREAD), SPREAD))
+
+
+def _peak(worth: FloatArray, place: FloatArray) -> tuple[float, float]:
+    """Where worth [J], in squared deviations, is highest over place [J], by a parabola; and the deviation of that."""
+    best, step = int(worth.argmax()), float(place[1] - place[0])
+    if not 0 < best < worth.size - 1:
+        return float(place[best]), 1.0
+    left, middle, right = (float(one) for one in worth[best - 1 : best + 2])
+    bend = left - 2 * middle + right
+    if bend >= 0:
+        return float(place[best]), 1.0
+    return float(place[best]) + 0.5 * (left - right) / bend * step, min(step * float(np.sqrt(-2 / bend)), 1.0)
+
+
+def _fit(
+    stretch: Stretch, place: FloatArray, worth: FloatArray, gain: FloatArray, long_run: float, common: _Common | None
+) -> tuple[float, float, float, float]:
+    """τ, the slowest τ to reckon with, A and its deviation."""
+    if common is None and gain[worth.argmax()] < OWN_GAIN:
+        return np.nan, np.nan, 0.0, 0.0
+    held = 0.0 if common is None else ((place - common.place) / common.spread) ** 2
+    at, deviation = _peak(worth - held, place)
+    tau = float(np.exp(at))
+    decay = _decays(stretch.time, np.array([tau]))[0][0]
+    square = max(float(decay @ decay), 1e-12)
+    slowest = tau * float(np.exp(LATE * deviation))
+    return tau, slowest, float(decay @ stretch.torque) / square, float(np.sqrt(long_run / square))
+
+
+def dropped(transients: Transients, duration: FloatArray, deviation: FloatArray) -> FloatArray:
+    """How much of each dwell to drop [n] s: from then on, the transient shifts the mean by < 0.1 of its deviation.
+
+    duration [n] s of the dwells, deviation [n] Nm of a mean over the whole of each. At most three quarters are dropped.
+    """
+    share = np.linspace(LEAST_DROPPED, MOST_DROPPED, 71)
+    size, wide = np.abs(transients.amplitude), LATE * transients.amplitude_sd
+    shift = np.zeros((duration.size, share.size))
+    for amplitude, tau in ((size + wide, transients.time_constant), (size, transients.slowest)):
+        left = mean_decay(tau[:, np.newaxis], share * duration[:, np.newaxis], duration[:, np.newaxis])
+        shift = np.maximum(shift, amplitude[:, np.newaxis] * left)
+    small = shift <= LEFT * deviation[:, np.newaxis] / np.sqrt(1 - share)
+    small[np.isnan(transients.time_constant)] = True
+    return np.asarray(np.where(small.any(axis=1), share[small.argmax(axis=1)], MOST_DROPPED) * duration)
+
+
+def mean_decay(tau: FloatArray, start: FloatArray, stop: FloatArray) -> FloatArray:
+    """The mean of exp(-t/τ) over start..stop."""
+    return np.asarray(tau * (np.exp(-start / tau) - np.exp(-stop / tau)) / (stop - start))

@@ -1,0 +1,121 @@
+"""A cloud of particles, the target that they stand for, and the bridge from one history's posterior to the next one's."""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from models.tracking.data import History
+from models.tracking.discrepancy import SIZES, log_size_weight
+from models.tracking.linear_model import Points, basis, evidence, log_spoiled, pointwise, turned_last
+from models.tracking.prior import Prior
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cloud:
+    """n particles: points [n, 3] of (log φ, log ε, log s), size [n] an index into SIZES, spoiled [n, t] (0, 1),
+    log_weight [n] and log_target [n] (log prior plus evidence)."""
+
+    points: FloatArray
+    size: FloatArray
+    spoiled: FloatArray
+    log_weight: FloatArray
+    log_target: FloatArray
+
+    def taken(self, index: NDArray[np.intp]) -> "Cloud":
+        """The particles at `index`, with equal weights."""
+        cloud = Cloud(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
+        return replace(cloud, log_weight=np.zeros(index.size))
+
+    def placed(self) -> Points:
+        """The particles as points of the closed form."""
+        return Points(
+            log_scale=self.points[:, 0],
+            log_exponent=self.points[:, 1],
+            log_scatter=self.points[:, 2],
+            size=SIZES[self.size.astype(np.intp)],
+            spoiled=self.spoiled.T,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Bridge:
+    """From the posterior of one history to that of the next, which has one measurement more."""
+
+    prior: Prior
+    before: History
+    after: History
+
+    def entered(self, cloud: Cloud, rng: np.random.Generator) -> tuple[Cloud, FloatArray, FloatArray]:
+        """The particles with a belief about the new run, drawn from its posterior given the rest of each; and their log
+        targets before (with the prior of that belief) and after."""
+        count = cloud.size.size
+        as_sound = replace(cloud, spoiled=np.column_stack([cloud.spoiled, np.zeros(count)]))
+        as_spoiled = replace(cloud, spoiled=np.column_stack([cloud.spoiled, np.ones(count)]))
+        table = table_of(self.after, cloud)
+        sound, spoiled = self._either_way(as_sound, as_spoiled, table)
+        total = np.logaddexp(sound, spoiled)
+        turned = np.log(rng.random(total.size)) < spoiled - total
+        entered = merged(as_sound, as_spoiled, turned)
+        after = np.where(turned, spoiled, sound)
+        before = cloud.log_target + _log_prior_of_last(self.prior, entered)
+        return replace(entered, log_weight=cloud.log_weight + total - cloud.log_target), before, after
+
+    def _either_way(self, as_sound: Cloud, as_spoiled: Cloud, table: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The log targets with the new run sound and spoiled; where there are no further terms, by its share of the sums
+        alone."""
+        points = as_sound.placed()
+        sums, terms = pointwise(self.after, self.prior, points, table)
+        sound = evidence(sums, self.prior) + _log_prior(self.prior, as_sound)
+        spoiled, plain = np.empty(sound.size), np.setdiff1d(np.arange(sound.size), terms.where)
+        spoiled[plain] = evidence(turned_last(self.after, self.prior, points, sums, table[-1], plain), self.prior)
+        spoiled[plain] += _log_prior(self.prior, as_spoiled)[plain]
+        if terms.where.size:
+            some = as_spoiled.taken(terms.where)
+            spoiled[terms.where] = log_target_of(self.after, self.prior, some, table[:, terms.where])
+        return sound, spoiled
+
+    def log_before(self, cloud: Cloud, table: FloatArray) -> FloatArray:
+        """The target before the new run, with the prior of what is believed of it; `table` is that of the runs after."""
+        without = replace(cloud, spoiled=cloud.spoiled[:, :-1])
+        return log_target_of(self.before, self.prior, without, table[:-1]) + _log_prior_of_last(self.prior, cloud)
+
+
+def _log_prior_of_last(prior: Prior, cloud: Cloud) -> FloatArray:
+    return log_spoiled(prior, cloud.spoiled[:, -1:].T)
+
+
+def table_of(history: History, cloud: Cloud) -> FloatArray:
+    """b of every run and particle, [t, n]."""
+    return basis(history.progress[:, None], cloud.points[:, 0], cloud.points[:, 1])
+
+
+def log_target_of(history: History, prior: Prior, cloud: Cloud, table: FloatArray) -> FloatArray:
+    """Log posterior density of every particle, up to a constant."""
+    return evidence(pointwise(history, prior, cloud.placed(), table)[0], prior) + _log_prior(prior, cloud)
+
+
+def _log_prior(prior: Prior, cloud: Cloud) -> FloatArray:
+    flat = prior.log_density(*cloud.points.T) + log_size_weight(prior)[cloud.size.astype(np.intp)]
+    return np.asarray(flat + log_spoiled(prior, cloud.spoiled.T))
+
+
+def merged(old: Cloud, new: Cloud, accepted: NDArray[np.bool_]) -> Cloud:
+    """The new particles where they were accepted, the old ones elsewhere."""
+    columns = {}
+    for field in fields(Cloud):
+        kept, offered = getattr(old, field.name), getattr(new, field.name)
+        columns[field.name] = np.where(accepted if kept.ndim == 1 else accepted[:, None], offered, kept)
+    return Cloud(**columns)
+
+
+def weights(log_weight: FloatArray) -> FloatArray:
+    """Weights [n] that sum to one."""
+    weight = np.exp(log_weight - log_weight.max())
+    return np.asarray(weight / weight.sum())
+
+
+def effective(log_weight: FloatArray) -> float:
+    """Effective number of particles, (Σw)²/Σw²."""
+    return float(1.0 / np.square(weights(log_weight)).sum())

@@ -1,0 +1,174 @@
+"""The exact posterior of eq. 6 on a grid: the witness of the other filters, and quick enough to be one itself.
+
+ξ0, Δ, the discrepancy and the steps are integrated out in closed form at every node (`tracking.linear_model`), for all
+scatter levels at once by matrix products; the grid lies where the mass is (`tracking.filters.lattice`). The integrand is
+smooth and vanishes at the edges (or the prior ends there, at four deviations), where equidistant nodes converge
+geometrically. Draws are spread evenly within their cells and weighted by the exact density, so that quantiles do not
+show the grid.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from models.arrays import FloatArray
+from models.tracking.data import History
+from models.tracking.discrepancy import PAST, drawn
+from models.tracking.filters import lattice
+from models.tracking.filters.lattice import Frame, Kinds
+from models.tracking.filters.outlying_refinement import completed
+from models.tracking.linear_model import Points, conditional, drawn_terms, evidence, pointwise
+from models.tracking.measurement import Measurement
+from models.tracking.posterior import Posterior
+from models.tracking.prior import Prior
+from models.tracking.sampling import correlated_pair, spread_points, systematic, thinned
+
+#: A row cannot resolve a ridge whose width depends on a scatter still unknown; draws are cheap then, and made up to
+#: this many times over and thinned, while there are fewer than MANY measurements.
+OVERSAMPLING, MANY = 4, 12
+#: The share of a cell's mass that counts for its neighbour along an axis when cells are drawn.
+BLEND = 0.15
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GridState:
+    """Everything measured: the posterior is laid anew over the whole history, so nothing else is carried on."""
+
+    prior: Prior
+    history: History
+
+    def to_arrays(self) -> dict[str, FloatArray]:
+        """The state as named arrays; `from_arrays` gives it back exactly."""
+        return {"prior": self.prior.to_array()} | self.history.to_arrays()
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, FloatArray]) -> "GridState":
+        """The inverse of `to_arrays`."""
+        return cls(prior=Prior.from_array(arrays["prior"]), history=History.from_arrays(arrays))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Laid:
+    """The kinds of history that count, the grid's frame, and the posterior's mass [kinds, levels, rows, nodes] on it,
+    summing to one."""
+
+    kinds: Kinds
+    frame: Frame
+    mass: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Grid:
+    """The filter: `nodes` of log τ on each of `rows` of log ε, at `levels` of log s; each at least 2.
+
+    A measurement is noted, no more: the discrepancy is told in shares of what has been measured so far, so that with
+    every test all sums over the history are others. The grid is laid once, when its draws are asked for.
+    """
+
+    nodes: int = 21
+    rows: int = 21
+    levels: int = 11
+
+    @property
+    def name(self) -> str:
+        """`grid`."""
+        return "grid"
+
+    def start(self, prior: Prior) -> GridState:
+        """Nothing measured."""
+        return self.from_history(prior, ())
+
+    def update(self, state: GridState, measurement: Measurement, rng: np.random.Generator | None = None) -> GridState:  # noqa: ARG002
+        """One more measurement; exact, so chance is not used."""
+        return GridState(prior=state.prior, history=state.history.append(measurement, state.prior))
+
+    @staticmethod
+    def from_history(prior: Prior, measurements: Sequence[Measurement]) -> GridState:
+        """All measurements at once: the same as `update` with one after another, bit for bit."""
+        return GridState(prior=prior, history=History.of(measurements, prior))
+
+    def laid(self, state: GridState) -> Laid:
+        """The posterior of everything measured."""
+        prior, history = state.prior, state.history
+        kinds, frame = completed(prior, history, *lattice.closed_in(prior, history))
+        frame = frame.resized(self.rows, self.levels)
+        table = lattice.tabled(frame, self.nodes, history.progress)
+        density = lattice.log_density(prior, history, kinds, frame, table)
+        mass = np.exp(density - density.max()) * frame.cells(self.nodes)[:, None, :, None]
+        return Laid(kinds=kinds, frame=frame, mass=mass / mass.sum())
+
+    def posterior(self, state: GridState, size: int, rng: np.random.Generator) -> Posterior:
+        """`size` draws: systematic over the cells, evenly spread within them, weighted by the exact density."""
+        prior, history, laid = state.prior, state.history, self.laid(state)
+        offset = rng.random(7)
+        count = size * min(max(MANY // max(history.progress.size, 1), 1), OVERSAMPLING)
+        uniform = spread_points(count, offset[:5])
+        chance = _blended(laid.mass)
+        cell = np.unravel_index(systematic(chance.ravel(), count, float(offset[5])), chance.shape)
+        points, volume = _placed(laid, cell, uniform[:, :3])
+        sums, terms = pointwise(history, prior, points)
+        density = evidence(sums, prior) + prior.log_density(points.log_scale, points.log_exponent, points.log_scatter)
+        density += laid.kinds.log_weight[cell[0]]
+        weight = np.exp(density - density.max()) * volume / chance[cell]
+        given = conditional(sums, prior)
+        pair = correlated_pair(ndtri(uniform[:, 3:]), given.initial_variance, given.change_variance, given.covariance)
+        initial, change = given.initial + pair[:, 0], given.change + pair[:, 1]
+        normals = rng.standard_normal((count, PAST + history.steps.size))
+        further = drawn_terms(terms, initial - prior.initial_mean, change, normals)
+        found = Posterior(
+            weight=weight / weight.sum(),
+            initial=initial,
+            change=change,
+            scale=np.exp(points.log_scale),
+            exponent=np.exp(points.log_exponent),
+            scatter=np.exp(points.log_scatter),
+            discrepancy=drawn(history, prior, points.size, further, rng),
+        )
+        return found if count == size else thinned(found, size, float(offset[6]))
+
+
+def _blended(mass: FloatArray) -> FloatArray:
+    """How often to draw from each cell: its mass blended with its neighbours', [kinds, levels, rows, nodes].
+
+    A ridge narrower than a cell may run past the nodes of a row; such a cell has too little mass for what it holds, and
+    one draw out of it would outweigh hundreds of others.
+    """
+    blended = mass
+    for axis in (1, 2, 3):
+        along = np.moveaxis(blended, axis, -1)
+        sides = np.zeros_like(along)
+        sides[..., 1:] += along[..., :-1]
+        sides[..., :-1] += along[..., 1:]
+        blended = np.moveaxis((1.0 - 2.0 * BLEND) * along + BLEND * sides, -1, axis)
+    return np.ascontiguousarray(blended)
+
+
+def _placed(laid: Laid, cell: tuple[NDArray[np.intp], ...], uniform: FloatArray) -> tuple[Points, FloatArray]:
+    """Points placed within their cells by uniform numbers [n, 3], and the volume that each stands for [n]."""
+    frame, (kind, level, row, node) = laid.frame, cell
+    log_scatter = _within(frame.log_scatter, kind, level, uniform[:, 0])
+    log_exponent = _within(frame.log_exponent, kind, row, uniform[:, 1])
+    lower, upper = np.empty(kind.size), np.empty(kind.size)
+    for each in range(frame.lower.shape[0]):
+        here = kind == each
+        lower[here] = np.interp(log_exponent[here], frame.log_exponent[each], frame.lower[each])
+        upper[here] = np.interp(log_exponent[here], frame.log_exponent[each], frame.upper[each])
+    nodes = laid.mass.shape[3]
+    steps = np.ptp(frame.log_exponent, axis=1) * np.ptp(frame.log_scatter, axis=1)
+    log_rate = lower + (upper - lower) * (node + uniform[:, 2] - 0.5) / (nodes - 1)
+    points = Points(
+        log_scale=log_rate + log_exponent,
+        log_exponent=log_exponent,
+        log_scatter=log_scatter,
+        size=laid.kinds.size[kind],
+        spoiled=laid.kinds.spoiled[kind].T,
+    )
+    return points, (upper - lower) * steps[kind]
+
+
+def _within(axis: FloatArray, kind: NDArray[np.intp], index: NDArray[np.intp], place: FloatArray) -> FloatArray:
+    """A place in [0, 1) within the cell around each node of an equidistant axis [k, nodes]."""
+    return np.asarray(axis[kind, index] + (place - 0.5) * (axis[kind, 1] - axis[kind, 0]))

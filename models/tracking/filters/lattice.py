@@ -1,0 +1,282 @@
+"""Where the grid lies, and how it closes in on the posterior's mass.
+
+The axes are log τ = log φ - log ε, log ε and log s. The data speak of the initial rate Δ/τ long before they tell φ
+from ε, so along these axes the ridge of the posterior is nearly straight; the prior stays independent in log φ and
+log ε. There is one such lattice for each kind of history: a size q of the discrepancy and a set of spoiled runs.
+
+Each row of a lattice (one ε) spans its own interval of log τ, so that the lattice follows the ridge where it bends. As
+the posterior shrinks a hundredfold over a life the lattice closes in on it: a coarse one over the prior's range finds
+where the mass is, the next is laid there, until nothing shrinks any more. A coarse row could step over a narrow peak,
+so every measurement is blurred on it by about what the model changes from node to node.
+"""
+
+from dataclasses import dataclass, fields, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from models.tracking.data import History
+from models.tracking.discrepancy import SIZES, log_size_weight
+from models.tracking.linear_model import basis, evidence, log_spoiled, tabulated
+from models.tracking.outlying_runs import NODES, TEMPER, Nodes, Search
+from models.tracking.prior import Prior
+
+#: The prior's range in deviations to either side.
+REACH = 4.0
+#: A node belongs to the mass where its log density is less than this below the highest: 4.2 deviations of a normal. A
+#: kind is dropped where its log mass is by so much below that of the best: on the first coarse lattice, which is
+#: blurred, and once the lattice has closed in.
+DEPTH, NEGLIGIBLE, SLIGHT = 9.0, 10.0, 6.0
+#: Blur of a coarse grid for each e-fold of τ between nodes, as a share of the observed change. A node off by half a
+#: step changes b by 0.18 at most, and most of that goes into ξ0 and Δ.
+BLUR = 0.03
+#: Nodes along log τ (the first time, and then), log ε and log s while closing in; how often; what shrinking is worth
+#: it.
+FIRST, COARSE = 65, (11, 8, 7)
+CLOSINGS = 8
+WORTHWHILE = 0.7
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kinds:
+    """k kinds of history: the discrepancy's q [k], which runs are spoiled [k, t] (0, 1), log prior probability [k]."""
+
+    size: FloatArray
+    spoiled: FloatArray
+    log_weight: FloatArray
+
+    @classmethod
+    def of(cls, prior: Prior, spoiled: FloatArray) -> "Kinds":
+        """Every size with each of the sets [c, t]."""
+        weight = log_size_weight(prior)
+        known = np.flatnonzero(np.isfinite(weight))
+        sets = np.repeat(spoiled, known.size, axis=0)
+        sizes = np.tile(SIZES[known], spoiled.shape[0])
+        return cls(
+            size=sizes,
+            spoiled=sets,
+            log_weight=np.tile(weight[known], spoiled.shape[0]) + log_spoiled(prior, sets.T),
+        )
+
+    def taken(self, index: NDArray[np.intp]) -> "Kinds":
+        """The kinds at `index`."""
+        return Kinds(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Frame:
+    """Where a lattice lies, for each kind: rows of log ε [k, r] and levels of log s [k, l], equidistant, and each row's
+    interval of log τ, [k, r]."""
+
+    log_exponent: FloatArray
+    log_scatter: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+
+    def resized(self, rows: int, levels: int) -> "Frame":
+        """The same regions with other numbers of rows and levels; intervals are interpolated between rows."""
+        log_exponent = _spaced(self.log_exponent[:, 0], self.log_exponent[:, -1], rows)
+        return Frame(
+            log_exponent=log_exponent,
+            log_scatter=_spaced(self.log_scatter[:, 0], self.log_scatter[:, -1], levels),
+            lower=self.at(log_exponent, self.lower),
+            upper=self.at(log_exponent, self.upper),
+        )
+
+    def at(self, log_exponent: FloatArray, edge: FloatArray) -> FloatArray:
+        """An edge [k, r] of the rows' intervals at other rows [k, n], linear between rows."""
+        return np.stack([np.interp(*each) for each in zip(log_exponent, self.log_exponent, edge, strict=True)])
+
+    def log_rate(self, nodes: int) -> FloatArray:
+        """Nodes of log τ, [k, rows, nodes]."""
+        return _spaced(self.lower, self.upper, nodes)
+
+    def cells(self, nodes: int) -> FloatArray:
+        """The volume of a cell, [k, rows]."""
+        steps = np.ptp(self.log_exponent, axis=1) * np.ptp(self.log_scatter, axis=1)
+        return np.asarray((self.upper - self.lower) * steps[:, None] / (nodes - 1))
+
+    def taken(self, index: NDArray[np.intp]) -> "Frame":
+        """The lattices of the kinds at `index`."""
+        return Frame(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
+
+
+def whole(prior: Prior) -> Frame:
+    """The prior's own range, for a single kind."""
+    _, rows, levels = COARSE
+    log_exponent = prior.log_exponent_mean + np.linspace(-REACH, REACH, rows) * prior.log_exponent_sd
+    low = prior.log_scale_mean - REACH * prior.log_scale_sd
+    high = prior.log_scale_mean + REACH * prior.log_scale_sd
+    log_scatter = prior.log_scatter_mean + np.linspace(-REACH, REACH, levels) * prior.log_scatter_sd
+    return Frame(
+        log_exponent=log_exponent[None],
+        log_scatter=log_scatter[None],
+        lower=(low - log_exponent)[None],
+        upper=(high - log_exponent)[None],
+    )
+
+
+def tabled(frame: Frame, nodes: int, progress: FloatArray) -> FloatArray:
+    """b at progress [t] on the cells of all rows, [k, t, rows · nodes]."""
+    log_exponent = frame.log_exponent[:, None, :, None]
+    table = basis(progress[:, None, None], frame.log_rate(nodes)[:, None] + log_exponent, log_exponent)
+    return table.reshape(log_exponent.shape[0], progress.size, log_exponent.shape[2] * nodes)
+
+
+def log_density(
+    prior: Prior, history: History, kinds: Kinds, frame: Frame, table: FloatArray, blur: FloatArray | float = 0.0
+) -> FloatArray:
+    """Log posterior density up to a constant, [k, levels, rows, nodes]; a frame and table of one kind serve all."""
+    count, rows = kinds.size.size, frame.log_exponent.shape[1]
+    levels = np.broadcast_to(frame.log_scatter, (count, frame.log_scatter.shape[1]))
+    sums = tabulated(history, prior, table, levels, kinds.size, kinds.spoiled.T, blur)
+    log_exponent = frame.log_exponent[:, None, :, None]
+    log_scale = frame.log_rate(table.shape[-1] // rows)[:, None] + log_exponent
+    flat = prior.log_density(log_scale, log_exponent, frame.log_scatter[:, :, None, None])
+    found = evidence(sums, prior).reshape(count, levels.shape[1], rows, -1)
+    return np.asarray(found + flat + kinds.log_weight[:, None, None, None])
+
+
+def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame]:
+    """The kinds and regions that hold the posterior's mass, by coarse lattices laid over what the last one left."""
+    first = whole(prior)
+    if history.value.size == 0:
+        kinds = Kinds.of(prior, np.zeros((1, 0)))
+        return kinds, first.taken(np.zeros(kinds.size.size, dtype=np.intp))
+    nodes, rows, levels = COARSE
+    share = BLUR * float(np.ptp(history.value))
+    table = tabled(first, FIRST, history.progress)[0]
+    blur = share * float((first.upper - first.lower).max()) / (FIRST - 1)
+    kinds, density = _first(prior, history, first, table, blur)
+    frame = shrunk(first.taken(np.zeros(kinds.size.size, dtype=np.intp)), density)
+    kinds, frame = _weighty(kinds, frame.resized(rows, levels), log_masses(density, first.cells(FIRST)), NEGLIGIBLE)
+    shares, left = np.full(kinds.size.size, share), np.ones(kinds.size.size, dtype=bool)
+    log_mass = np.zeros(kinds.size.size)
+    for _ in range(CLOSINGS):
+        now = np.flatnonzero(left)
+        if now.size == 0:
+            break
+        wide = frame.taken(now)
+        widest = (wide.upper - wide.lower).max(axis=1)
+        blurs = shares[now] * widest / (nodes - 1)
+        density = log_density(prior, history, kinds.taken(now), wide, tabled(wide, nodes, history.progress), blurs)
+        closer = shrunk(wide, density)
+        log_mass[now] = log_masses(density, wide.cells(nodes))
+        settled = _shrinkage(wide, closer) > WORTHWHILE
+        left[now] = ~(settled & (blurs < 0.5 * np.exp(closer.log_scatter.mean(axis=1))))
+        shares[now] *= np.where(settled, 0.3, 1.0)
+        for field in fields(Frame):
+            getattr(frame, field.name)[now] = getattr(closer, field.name)
+    return _weighty(kinds, frame, np.where(left, log_mass.max(), log_mass), SLIGHT)
+
+
+def _first(prior: Prior, history: History, frame: Frame, table: FloatArray, blur: float) -> tuple[Kinds, FloatArray]:
+    """The kinds, once it is known which runs may be spoiled, and their density on the first coarse lattice."""
+    search, found = Search.begun(prior, history), {}
+
+    def looked_at(spoiled: FloatArray) -> FloatArray:
+        if spoiled.tobytes() not in found:
+            kinds = Kinds.of(prior, spoiled[None])
+            found[spoiled.tobytes()] = log_density(prior, history, kinds, frame, table, blur)
+        return found[spoiled.tobytes()]
+
+    while (spoiled := search.next()) is not None:
+        plain = looked_at(spoiled) - log_spoiled(prior, spoiled) + np.log(frame.cells(FIRST))[:, None, :, None]
+        total = float(plain.max() + np.log(np.exp(plain - plain.max()).sum()))
+        search.learn(spoiled, total, *_chosen(prior, frame, table, plain - total, blur))
+    sets = search.kept()
+    return Kinds.of(prior, sets), np.concatenate([looked_at(each) for each in sets])
+
+
+def _chosen(prior: Prior, frame: Frame, table: FloatArray, log_mass: FloatArray, blur: float) -> tuple[Nodes, Nodes]:
+    """NODES nodes of each level of s, drawn evenly by a power of their mass so that what a spoiled run hides is among
+    them; and the best one of each level."""
+    _, levels, rows, nodes = log_mass.shape
+    by_level = np.moveaxis(log_mass, 1, 0).reshape(levels, -1)
+    chance = np.exp(TEMPER * (by_level - by_level.max(axis=1, keepdims=True)))
+    edges = np.cumsum(chance, axis=1)
+    places = (np.arange(NODES) + 0.5) / NODES
+    drawn = np.stack([np.searchsorted(each, places * each[-1]) for each in edges])
+    log_share = np.log(NODES * np.take_along_axis(chance, drawn, axis=1) / edges[:, -1:])
+    best = by_level.argmax(axis=1)[:, None]
+
+    def at(found: NDArray[np.intp], log_share: FloatArray | float) -> Nodes:
+        level = np.repeat(np.arange(levels), found.shape[1])
+        kind, cell = np.divmod(found.ravel(), rows * nodes)
+        return Nodes(
+            b=table[:, cell].T,
+            noise=np.exp(2.0 * frame.log_scatter[0, level]) + blur**2,
+            size=SIZES[np.isfinite(log_size_weight(prior))][kind],
+            log_weight=(np.take_along_axis(by_level, found, axis=1) - log_share).ravel(),
+        )
+
+    return at(drawn, log_share), at(best, 0.0)
+
+
+def log_masses(density: FloatArray, cells: FloatArray) -> FloatArray:
+    """The logarithm of the mass of each kind [k] on cells of volume [k, rows] or [1, rows]."""
+    top = density.max(axis=(1, 2, 3))
+    off = np.exp(density - top[:, None, None, None]).sum(axis=(1, 3))
+    return np.asarray(top + np.log((off * cells).sum(axis=1)))
+
+
+Part = TypeVar("Part", Kinds, Frame)
+
+
+def joined(first: Part, second: Part) -> Part:
+    """The kinds of both, or their lattices, one after the other."""
+    columns = {
+        each.name: np.concatenate([getattr(one, each.name) for one in (first, second)]) for each in fields(first)
+    }
+    return replace(first, **columns)
+
+
+def _weighty(kinds: Kinds, frame: Frame, log_mass: FloatArray, depth: float) -> tuple[Kinds, Frame]:
+    """The kinds whose log mass [k] is not more than `depth` below the largest."""
+    kept = np.flatnonzero(log_mass > log_mass.max() - depth)
+    return kinds.taken(kept), frame.taken(kept)
+
+
+def shrunk(frame: Frame, density: FloatArray) -> Frame:
+    """The rows, levels and intervals that hold mass, with a node to spare on either side; as many as before."""
+    nodes = density.shape[3]
+    by_row = density.max(axis=1)
+    held = by_row > by_row.max(axis=2, keepdims=True) - DEPTH
+    first = np.maximum(held.argmax(axis=2) - 1, 0)
+    last = np.minimum(nodes - held[..., ::-1].argmax(axis=2), nodes - 1)
+    step = (frame.upper - frame.lower) / (nodes - 1)
+    lower, upper = frame.lower + first * step, frame.lower + last * step
+    row_low, row_high = _held(by_row.max(axis=2))
+    level_low, level_high = _held(density.max(axis=(2, 3)))
+    kind = np.arange(density.shape[0])
+    rows, levels = frame.log_exponent, frame.log_scatter
+    within = Frame(log_exponent=rows, log_scatter=levels, lower=lower, upper=upper)
+    log_exponent = _spaced(rows[kind, row_low], rows[kind, row_high], rows.shape[1])
+    return Frame(
+        log_exponent=log_exponent,
+        log_scatter=_spaced(levels[kind, level_low], levels[kind, level_high], levels.shape[1]),
+        lower=within.at(log_exponent, within.lower),
+        upper=within.at(log_exponent, within.upper),
+    )
+
+
+def _held(density: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The first and last index along the last axis that hold mass, with one to spare."""
+    held = density > density.max(axis=1, keepdims=True) - DEPTH
+    last = density.shape[1] - 1
+    return np.maximum(held.argmax(axis=1) - 1, 0), np.minimum(last - held[:, ::-1].argmax(axis=1) + 1, last)
+
+
+def _shrinkage(wide: Frame, closer: Frame) -> FloatArray:
+    """The share of the widest interval, of the rows or of the levels that is left, whichever is smallest; [k]."""
+    interval = (closer.upper - closer.lower).max(axis=1) / (wide.upper - wide.lower).max(axis=1)
+    rows = np.ptp(closer.log_exponent, axis=1) / np.ptp(wide.log_exponent, axis=1)
+    levels = np.ptp(closer.log_scatter, axis=1) / np.ptp(wide.log_scatter, axis=1)
+    return np.asarray(np.minimum(interval, np.minimum(rows, levels)))
+
+
+def _spaced(low: FloatArray, high: FloatArray, count: int) -> FloatArray:
+    """`count` numbers from low to high [...], equidistant along a new last axis."""
+    return np.asarray(low[..., None] + (high - low)[..., None] * (np.arange(count) / (count - 1)))

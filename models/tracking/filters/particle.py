@@ -1,0 +1,203 @@
+"""A particle filter for eq. 6 that marginalises what is linear and keeps its particles apart.
+
+Particles carry (log φ, log ε, log s), the size q of the discrepancy and, of every run, whether it was spoiled; given
+these, all else is linear and integrated out in closed form (Rao-Blackwell). The coefficients do not move, so
+resampling alone would soon leave copies of one particle. After it every particle takes Metropolis-Hastings steps that
+leave the exact marginal posterior over the whole history as it is (iterated batch importance sampling), until nine in
+ten have moved.
+
+A measurement that would starve the cloud at once is let in by degrees: the cloud passes through targets that lie
+between the old posterior and the new one, their logarithms mixed (1 - β) : β, with resampling and moves in between.
+The last target is the posterior itself, so nothing is approximated.
+
+Sources: N. Chopin, "A sequential particle filter method for static models", Biometrika 89 (2002) 539-552; P. Del Moral,
+A. Doucet, A. Jasra, "Sequential Monte Carlo samplers", J. R. Statist. Soc. B 68 (2006) 411-436.
+"""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from scipy.special import ndtri
+
+from models.arrays import FloatArray
+from models.tracking.data import History
+from models.tracking.discrepancy import PAST, SIZES, drawn, log_size_weight
+from models.tracking.filters.cloud import Bridge, Cloud, effective, log_target_of, merged, table_of, weights
+from models.tracking.linear_model import conditional, drawn_terms, pointwise
+from models.tracking.measurement import Measurement
+from models.tracking.posterior import Posterior
+from models.tracking.prior import Prior
+from models.tracking.sampling import correlated_pair, spread_normals, spread_points, systematic
+
+#: Resample below this share of effective particles; let no single step bring them below the second share.
+HEALTHY, STARVED = 0.5, 0.25
+#: Steps of a move: at most so many, until this share of particles has moved since resampling.
+MOVES, MOVED = 8, 0.9
+#: Where a smaller share of steps than the first is accepted, the next are shorter by the second.
+TIMID, SHORTER = 0.2, 0.5
+#: In a step, how often another size is tried, and how often another belief about one run.
+RESIZED, TURNED = 0.25, 0.1
+#: Degrees by which a measurement may be let in, and halvings in the search for each.
+DEGREES, HALVINGS = 30, 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParticleState:
+    """Everything measured and the particles that stand for it."""
+
+    prior: Prior
+    history: History
+    cloud: Cloud
+
+    def to_arrays(self) -> dict[str, FloatArray]:
+        """The state as named arrays; `from_arrays` gives it back exactly."""
+        cloud = {field.name: getattr(self.cloud, field.name) for field in fields(self.cloud)}
+        return {"prior": self.prior.to_array()} | self.history.to_arrays() | cloud
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, FloatArray]) -> "ParticleState":
+        """The inverse of `to_arrays`."""
+        return cls(
+            prior=Prior.from_array(arrays["prior"]),
+            history=History.from_arrays(arrays),
+            cloud=Cloud(**{field.name: arrays[field.name] for field in fields(Cloud)}),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Particle:
+    """The filter. `moves` = 0 leaves a plain resampling filter, which starves: it is there to be compared with."""
+
+    particles: int = 2_000
+    moves: int = MOVES
+
+    @property
+    def name(self) -> str:
+        """`particle`."""
+        return "particle"
+
+    def start(self, prior: Prior) -> ParticleState:
+        """Particles spread evenly over the prior, the same every time."""
+        centre = np.array([prior.log_scale_mean, prior.log_exponent_mean, prior.log_scatter_mean])
+        spread = np.array([prior.log_scale_sd, prior.log_exponent_sd, prior.log_scatter_sd])
+        even = spread_points(self.particles, np.full(4, 0.5))
+        sizes = np.searchsorted(np.cumsum(np.exp(log_size_weight(prior)))[:-1], even[:, 3], side="right")
+        cloud = Cloud(
+            points=centre + spread * ndtri(even[:, :3]),
+            size=sizes.astype(np.float64),
+            spoiled=np.zeros((self.particles, 0)),
+            log_weight=np.zeros(self.particles),
+            log_target=np.zeros(self.particles),
+        )
+        nothing = History.of((), prior)
+        target = log_target_of(nothing, prior, cloud, table_of(nothing, cloud))
+        return ParticleState(prior=prior, history=nothing, cloud=replace(cloud, log_target=target))
+
+    def update(self, state: ParticleState, measurement: Measurement, rng: np.random.Generator) -> ParticleState:
+        """The posterior with one more measurement."""
+        bridge = Bridge(state.prior, state.history, state.history.append(measurement, state.prior))
+        cloud, before, after = bridge.entered(state.cloud, rng)
+        held, degree = 1.0, 0.0
+        for attempt in range(DEGREES):
+            gap = after - before
+            start = cloud.log_weight - held * gap
+            degree = 1.0 if attempt == DEGREES - 1 else _next_degree(start, gap, degree)
+            log_weight = start + degree * gap
+            cloud = replace(cloud, log_weight=log_weight - log_weight.max())
+            if degree < 1.0 or effective(cloud.log_weight) < HEALTHY * self.particles:
+                cloud, before, after = self._renewed(bridge, cloud, before, after, degree, rng)
+            if degree == 1.0:
+                break
+            held = degree
+        return ParticleState(prior=state.prior, history=bridge.after, cloud=replace(cloud, log_target=after))
+
+    def _renewed(
+        self,
+        bridge: Bridge,
+        cloud: Cloud,
+        before: FloatArray,
+        after: FloatArray,
+        degree: float,
+        rng: np.random.Generator,
+    ) -> tuple[Cloud, FloatArray, FloatArray]:
+        """Resampled, and moved by steps of a random walk shaped like the cloud; with both targets of each particle."""
+        weight = weights(cloud.log_weight)
+        off = cloud.points - weight @ cloud.points
+        shape = _root((weight * off.T) @ off)
+        index = systematic(weight, weight.size, float(rng.random()))
+        cloud, before, after = cloud.taken(index), before[index], after[index]
+        moved, reach = np.zeros(weight.size, dtype=bool), 1.0
+        for _ in range(self.moves):
+            proposed = _proposed(cloud, reach * shape, rng)
+            table = table_of(bridge.after, proposed)
+            offered_after = log_target_of(bridge.after, bridge.prior, proposed, table)
+            offered_before = before if degree == 1.0 else bridge.log_before(proposed, table)
+            gain = degree * (offered_after - after)
+            if degree < 1.0:
+                gain += (1.0 - degree) * (offered_before - before)
+            accepted = np.log(rng.random(weight.size)) < gain
+            cloud = merged(cloud, proposed, accepted)
+            after = np.where(accepted, offered_after, after)
+            before = np.where(accepted, offered_before, before)
+            moved |= accepted
+            reach *= SHORTER if accepted.mean() < TIMID else 1.0
+            if moved.mean() >= MOVED:
+                break
+        return cloud, before, after
+
+    def posterior(self, state: ParticleState, size: int, rng: np.random.Generator) -> Posterior:
+        """`size` draws of equal weight: systematic over the particles, with evenly spread draws of (ξ0, Δ)."""
+        cloud, offset = state.cloud, rng.random(3)
+        index = systematic(weights(cloud.log_weight), size, float(offset[2]))
+        points = cloud.taken(index).placed()
+        sums, terms = pointwise(state.history, state.prior, points)
+        given = conditional(sums, state.prior)
+        pair = correlated_pair(
+            spread_normals(size, offset[:2]), given.initial_variance, given.change_variance, given.covariance
+        )
+        initial, change = given.initial + pair[:, 0], given.change + pair[:, 1]
+        normals = rng.standard_normal((size, PAST + state.history.steps.size))
+        further = drawn_terms(terms, initial - state.prior.initial_mean, change, normals)
+        return Posterior(
+            weight=np.full(size, 1.0 / size),
+            initial=initial,
+            change=change,
+            scale=np.exp(points.log_scale),
+            exponent=np.exp(points.log_exponent),
+            scatter=np.exp(points.log_scatter),
+            discrepancy=drawn(state.history, state.prior, points.size, further, rng),
+        )
+
+
+def _proposed(cloud: Cloud, shape: FloatArray, rng: np.random.Generator) -> Cloud:
+    """A step of every particle, as likely as the step back: in its points always, in its size and its beliefs at
+    times."""
+    count, runs = cloud.spoiled.shape
+    stride = rng.uniform(0.2, 1.6, size=(count, 1))
+    points = cloud.points + stride * rng.standard_normal(cloud.points.shape) @ shape.T
+    step = np.where(rng.random(count) < RESIZED, rng.choice([-1.0, 1.0], size=count), 0.0)
+    size = cloud.size + step
+    spoiled = cloud.spoiled.copy()
+    turned = np.flatnonzero(rng.random(count) < TURNED)
+    run = rng.integers(runs, size=turned.size)
+    spoiled[turned, run] = 1.0 - spoiled[turned, run]
+    inside = (size >= 0) & (size < SIZES.size)
+    return replace(cloud, points=points, size=np.where(inside, size, cloud.size), spoiled=spoiled)
+
+
+def _next_degree(start: FloatArray, gap: FloatArray, degree: float) -> float:
+    """The largest β, 1 if possible, at which weights start + β · gap do not starve the cloud."""
+    enough = STARVED * start.size
+    if effective(start + gap) >= enough:
+        return 1.0
+    low, high = degree, 1.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if effective(start + middle * gap) >= enough else (low, middle)
+    return low if low > degree else degree + (1.0 - degree) * 2.0**-HALVINGS
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """A square root of a covariance [3, 3] that may be singular."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 1e-12)))

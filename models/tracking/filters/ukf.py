@@ -1,0 +1,222 @@
+"""Unscented Kalman filters for eq. 6, filterpy's, one for each size q of the discrepancy, weighed by their innovations.
+
+The state is (ξ0, ξ at a reference progress, log τ, log ε, δ, T δ', step): in logarithms φ = τε and ε cannot leave their
+domain, and with ξ at the reference in place of Δ the ridge of the posterior is nearly straight. All are in deviations
+from the prior mean, in units of the prior's deviations, so that the numbers are near 1 whatever the quantity's unit.
+The law does not move between runs; δ is an integrated random walk, and an event lets the level step.
+
+The prior is far too wide for sigma points: φ spans decades within them, and a filter started there does not recover.
+So the first measurements are taken together, and the normals that have the means and covariances of their exact
+posterior, one for each size, are where the filters start. They start so again when the innovations say that they are
+lost, when progress has doubled (the law bends, and the reference moves along), or when a run comes out of order.
+
+A run may be spoiled: each update is that of a sound run and of a spoiled one, mixed by how probable either is. The
+scatter between runs is learnt from the innovations: of an innovation with y²/S = κ, the share g = s²/S is scatter, and
+E[e²] = s² (1 + g (κ - 1)) is averaged into s² with the weight of one observation (the step of an
+expectation-maximisation). A normal on a bent ridge is still a rough picture: the other filters are the reference.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.degradation.general_order import progress_fraction
+from models.tracking.data import History
+from models.tracking.discrepancy import PAST, SIZES, at_end, drawn
+from models.tracking.filters.grid import Grid, GridState
+from models.tracking.filters.sigma_points import DIMENSION, DOMAIN, Normal, Way, definite, scaled, stepped, unscaled
+from models.tracking.measurement import Measurement
+from models.tracking.posterior import Posterior
+from models.tracking.prior import Prior
+from models.tracking.sampling import spread_normals, systematic
+
+#: The running mean of squared innovations forgets at this rate, and above the second number the filter is lost.
+FORGET, LOST = 0.3, 4.0
+#: The filters start anew when progress has grown by this factor.
+GROWN = 2.0
+#: The grid that starts the filter, the draws from it whose moments are taken, and the share of them below which a size
+#: is left out.
+STARTER, DRAWS, FEW = Grid(nodes=13, rows=13, levels=7), 1_000, 0.01
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UkfState:
+    """One filter for each of k sizes q: size [k], log_weight [k], mean [k, 7], covariance [k, 7, 7] in units of the
+    prior, and scatter [k, 2]: its variance in the quantity's unit squared and how many observations it is worth.
+
+    `history` is everything measured, `reference` the progress at which the filters started, `surprise` the running mean
+    of squared innovations.
+    """
+
+    prior: Prior
+    history: History
+    reference: float
+    surprise: float
+    size: FloatArray
+    log_weight: FloatArray
+    mean: FloatArray
+    covariance: FloatArray
+    scatter: FloatArray
+
+    def normal(self, kind: int) -> Normal:
+        """One of the filters."""
+        return Normal(
+            size=float(self.size[kind]),
+            mean=self.mean[kind],
+            covariance=self.covariance[kind],
+            scatter=self.scatter[kind],
+        )
+
+    def to_arrays(self) -> dict[str, FloatArray]:
+        """The state as named arrays; `from_arrays` gives it back exactly."""
+        named = {name: getattr(self, name) for name in ("size", "log_weight", "mean", "covariance", "scatter")}
+        lone = {"prior": self.prior.to_array(), "place": np.array([self.reference, self.surprise])}
+        return self.history.to_arrays() | lone | named
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, FloatArray]) -> "UkfState":
+        """The inverse of `to_arrays`."""
+        reference, surprise = arrays["place"].tolist()
+        return cls(
+            prior=Prior.from_array(arrays["prior"]),
+            history=History.from_arrays(arrays),
+            reference=reference,
+            surprise=surprise,
+            **{name: arrays[name] for name in ("size", "log_weight", "mean", "covariance", "scatter")},
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ukf:
+    """The filter, started from the first `together` measurements; nothing in its updates is left to chance."""
+
+    together: int = 8
+
+    @property
+    def name(self) -> str:
+        """`ukf`."""
+        return "ukf"
+
+    def start(self, prior: Prior) -> UkfState:
+        """The prior itself, as far as normals can say it."""
+        return _started(prior, History.of((), prior))
+
+    def update(self, state: UkfState, measurement: Measurement, rng: np.random.Generator | None = None) -> UkfState:  # noqa: ARG002
+        """The state after one more measurement: predict, update, symmetrise, keep to the domain; or start anew."""
+        before, prior = state.history, state.prior
+        history = before.append(measurement, prior)
+        backwards = measurement.progress < before.span or measurement.epoch < before.epoch.max(initial=0.0)
+        if history.value.size <= self.together or backwards or measurement.progress > GROWN * state.reference:
+            return _started(prior, history)
+        way = Way(
+            reference=state.reference,
+            before=before.span,
+            after=history.span,
+            events=history.steps.size - before.steps.size,
+            progress=measurement.progress,
+            value=measurement.value,
+            variance=float(history.variance[-1]),
+        )
+        parts = [stepped(prior, state.normal(kind), way) for kind in range(state.size.size)]
+        log_weight = state.log_weight + np.array([part.log_likelihood for part in parts])
+        weight = _weights(log_weight)
+        surprise = float(weight @ [part.surprise for part in parts])
+        surprise = (1.0 - FORGET) * state.surprise + FORGET * surprise
+        if surprise > LOST:
+            return _started(prior, history)
+        return replace(
+            state,
+            history=history,
+            surprise=surprise,
+            log_weight=log_weight - log_weight.max(),
+            mean=np.stack([part.mean for part in parts]),
+            covariance=np.stack([part.covariance for part in parts]),
+            scatter=np.stack([part.scatter for part in parts]),
+        )
+
+    def posterior(self, state: UkfState, size: int, rng: np.random.Generator) -> Posterior:
+        """`size` evenly spread draws of equal weight from the normals; the scatter is a point estimate of each."""
+        prior, history = state.prior, state.history
+        kind = systematic(_weights(state.log_weight), size, float(rng.random()))
+        normals = spread_normals(size, rng.random(5))
+        normals = np.column_stack([normals, rng.standard_normal((size, DIMENSION - 5))])
+        root = np.linalg.cholesky(state.covariance)
+        point = state.mean[kind] + np.einsum("nij,nj->ni", root[kind], normals)
+        initial, at_reference, log_scale, log_exponent, *beside = unscaled(prior, point).T
+        scale, exponent = np.exp(log_scale), np.exp(log_exponent)
+        change = (at_reference - initial) / progress_fraction(state.reference, scale, exponent)
+        ends = np.stack([beside[0], beside[1] * history.span / state.reference])
+        sizes = state.size[kind]
+        course = np.where(sizes[:, None] > 0.0, (np.linalg.pinv(at_end()) @ ends).T, 0.0)
+        heights = np.zeros((size, history.steps.size))
+        heights[:, -1:] = beside[2][:, None]
+        return Posterior(
+            weight=np.full(size, 1.0 / size),
+            initial=initial,
+            change=change,
+            scale=scale,
+            exponent=exponent,
+            scatter=np.sqrt(state.scatter[kind, 0]),
+            discrepancy=drawn(history, prior, sizes, np.concatenate([course, heights], axis=1), rng),
+        )
+
+
+def _started(prior: Prior, history: History) -> UkfState:
+    """The normals with the moments of the exact posterior, by size, from evenly spread draws."""
+    draws = STARTER.posterior(GridState(prior=prior, history=history), DRAWS, np.random.default_rng(0))
+    reference = history.span
+    size, course, step = _beside(draws)
+    points = scaled(
+        prior,
+        np.column_stack(
+            [
+                draws.initial,
+                draws.initial + draws.change * progress_fraction(reference, draws.scale, draws.exponent),
+                np.log(draws.scale),
+                np.log(draws.exponent),
+                course,
+                step,
+            ]
+        ),
+    )
+    kinds = np.abs(size[:, None] - SIZES).argmin(axis=1)
+    shares = np.bincount(kinds, weights=draws.weight, minlength=SIZES.size)
+    kept = np.flatnonzero((shares > FEW) & (np.bincount(kinds, minlength=SIZES.size) > 3 * DIMENSION))
+    moments = [_moments(points[kinds == kind], draws.weight[kinds == kind]) for kind in kept]
+    log_scatter = np.log(draws.scatter)
+    variance = [math.exp(2.0 * np.average(log_scatter[kinds == k], weights=draws.weight[kinds == k])) for k in kept]
+    worth = max(1.0, 0.5 / prior.log_scatter_sd**2) + history.value.size
+    return UkfState(
+        prior=prior,
+        history=history,
+        reference=reference,
+        surprise=1.0,
+        size=SIZES[kept],
+        log_weight=np.log(shares[kept] / shares[kept].max()),
+        mean=np.stack([mean for mean, _ in moments]),
+        covariance=np.stack([covariance for _, covariance in moments]),
+        scatter=np.array([(each, worth) for each in variance]),
+    )
+
+
+def _beside(draws: Posterior) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Of every draw q [n], (δ, T δ') at the end of what was measured [n, 2], and by how much the level has stepped."""
+    beside = draws.discrepancy
+    if beside is None:
+        none = np.zeros(draws.weight.size)
+        return none, np.zeros((none.size, 2)), none
+    return beside.size, beside.curvature[:, :PAST] @ at_end().T, beside.height.sum(axis=1)
+
+
+def _moments(points: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
+    share = weight / weight.sum()
+    mean = share @ points
+    off = points - mean
+    return np.clip(mean, -DOMAIN, DOMAIN), definite((share * off.T) @ off)
+
+
+def _weights(log_weight: FloatArray) -> FloatArray:
+    weight = np.exp(log_weight - log_weight.max())
+    return np.asarray(weight / weight.sum())

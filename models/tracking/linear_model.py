@@ -1,0 +1,287 @@
+"""The closed form that the filters share: all is linear once φ, ε, the scatter s and the size q are given.
+
+With y_t = ξ0 + Δ b_t + Σ_k w_k Z_tk + e_t, b_t = 1 - (1 + ζ_t/φ)^-ε and e_t ~ N(0, d_t), d_t = v_t + s², normal priors
+on ξ0, Δ and w (the discrepancy and the steps, `models.tracking.discrepancy`) lead to a normal posterior and to the
+probability of the data with all of them integrated out. For a spoiled run d_t has a further W². A few weighted sums
+over the measurements are all that is needed, with weights r_t = 1/d_t and y_t taken from the prior mean of ξ0. The
+further terms go first: with M = I + σZᵀRZσ = LLᵀ and N = L⁻¹ σZᵀR (1, y, b), each sum loses the product of its columns
+of N.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from models.tracking.data import History
+from models.tracking.discrepancy import column_sds, columns
+from models.tracking.prior import Prior
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sums:
+    """Weighted sums over the measurements: Σr, Σrb, Σrb², Σry, Σrby, Σry², and Σ log r - log|M|; shapes broadcast."""
+
+    r: FloatArray
+    rb: FloatArray
+    rbb: FloatArray
+    ry: FloatArray
+    rby: FloatArray
+    ryy: FloatArray
+    log_r: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Conditional:
+    """The normal posterior of (ξ0, Δ) given φ, ε, s and q: means, variances and covariance, equal shapes."""
+
+    initial: FloatArray
+    change: FloatArray
+    initial_variance: FloatArray
+    change_variance: FloatArray
+    covariance: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Points:
+    """Where the closed form is taken: log φ, log ε, log s and q, each [n], and which runs are spoiled [t, n] (0, 1)."""
+
+    log_scale: FloatArray
+    log_exponent: FloatArray
+    log_scatter: FloatArray
+    size: FloatArray
+    spoiled: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Terms:
+    """What is left of the further terms of the points `where` [j]: their prior deviations σ [j, p], L [j, p, p] and N
+    [j, p, 3] of the columns (1, y, b)."""
+
+    where: NDArray[np.intp]
+    sd: FloatArray
+    root: FloatArray
+    cross: FloatArray
+
+
+def evidence(sums: Sums, prior: Prior) -> FloatArray:
+    """Log probability of the data given φ, ε, s and q, with ξ0, Δ and the further terms integrated out.
+
+    -½ [Σ log(2π/r) + log|M| + log|A| + log(σ0² σΔ²) + Σ r z² - cᵀ A⁻¹ c], where z = y - E[ξ0] - E[Δ] b, c = (Σrz, Σrbz)
+    and A is the posterior precision. By elimination, so that the nearly singular A of a curve that has saturated keeps
+    its digits.
+    """
+    a00, _, c0, pivot, d1 = _eliminate(sums, prior)
+    mean = prior.change_mean
+    misfit = sums.ryy - 2.0 * mean * sums.rby + mean**2 * sums.rbb
+    quadratic = c0**2 / a00 + d1**2 / pivot
+    spread = math.log(prior.initial_sd) + math.log(prior.change_sd)
+    return np.asarray(0.5 * (sums.log_r - np.log(a00 * pivot) - misfit + quadratic) - spread)
+
+
+def conditional(sums: Sums, prior: Prior) -> Conditional:
+    """The posterior of (ξ0, Δ) given φ, ε, s and q."""
+    a00, a01, c0, pivot, d1 = _eliminate(sums, prior)
+    change_variance = 1.0 / pivot
+    slope = a01 / a00
+    shift = d1 * change_variance
+    return Conditional(
+        initial=prior.initial_mean + c0 / a00 - slope * shift,
+        change=prior.change_mean + shift,
+        initial_variance=1.0 / a00 + slope**2 * change_variance,
+        change_variance=change_variance,
+        covariance=-slope * change_variance,
+    )
+
+
+def _eliminate(sums: Sums, prior: Prior) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    a00 = sums.r + prior.initial_sd**-2
+    c0 = sums.ry - prior.change_mean * sums.rb
+    c1 = sums.rby - prior.change_mean * sums.rbb
+    slope = sums.rb / a00
+    floor = prior.change_sd**-2
+    pivot = floor + np.maximum(sums.rbb - sums.rb * slope, 0.0)
+    return a00, sums.rb, c0, pivot, c1 - slope * c0
+
+
+def basis(progress: FloatArray, log_scale: FloatArray, log_exponent: FloatArray) -> FloatArray:
+    """b = 1 - (1 + ζ/φ)^-ε, in the shape of ζ/φ, to which ε is broadcast: `degradation.progress_fraction`, three times as
+    quick.
+
+    Accurate to 2e-16 absolute, not relative: here b only ever stands beside measurement noise.
+    """
+    found = np.asarray(progress * np.exp(-log_scale))
+    found += 1.0
+    np.log(found, out=found)
+    found *= -np.exp(log_exponent)
+    np.exp(found, out=found)
+    return np.asarray(np.subtract(1.0, found, out=found))
+
+
+def log_spoiled(prior: Prior, spoiled: FloatArray) -> FloatArray:
+    """Log prior probability of which runs are spoiled, along the first axis of [t, ...]."""
+    count = spoiled.sum(axis=0)
+    if prior.spoiled_share == 0.0:
+        return np.where(count > 0, -np.inf, 0.0)
+    sound = spoiled.shape[0] - count
+    return np.asarray(count * math.log(prior.spoiled_share) + sound * math.log1p(-prior.spoiled_share))
+
+
+def pointwise(history: History, prior: Prior, points: Points, table: FloatArray | None = None) -> tuple[Sums, Terms]:
+    """The sums at n points, each [n], and what is left of the further terms; `table` may hold their b [t, n]."""
+    b = basis(history.progress[:, None], points.log_scale, points.log_exponent) if table is None else table
+    d = np.multiply(points.spoiled, (prior.spoiled_size * prior.size) ** 2, out=np.empty(b.shape))
+    d += history.variance[:, None]
+    d += np.exp(2.0 * points.log_scatter)
+    log_r = -_log_product(d) - b.shape[0] * math.log(2.0 * math.pi)
+    r = np.divide(1.0, d, out=d)
+    y = history.value - prior.initial_mean
+    rb = r * b
+    sums = Sums(
+        r=r.sum(axis=0),
+        rb=rb.sum(axis=0),
+        rbb=np.einsum("tn,tn->n", rb, b),
+        ry=y @ r,
+        rby=y @ rb,
+        ryy=y**2 @ r,
+        log_r=log_r,
+    )
+    z = columns(history)
+    sd = column_sds(prior, points.size, history.steps.size)
+    where = np.flatnonzero(sd.any(axis=1))
+    if where.size == 0:
+        return sums, Terms(where=where, sd=sd[:0], root=np.zeros((0, 0, 0)), cross=np.zeros((0, 0, 3)))
+    r, rb, sd = r[:, where].T, rb[:, where].T, sd[where]
+    squares = (z[:, :, None] * z[:, None, :]).reshape(y.size, z.shape[1] ** 2)
+    gram = (r @ squares).reshape(where.size, sd.shape[1], sd.shape[1])
+    cross = np.stack([r @ z, (r * y) @ z, rb @ z], axis=2)
+    terms = _reduced(gram, cross, sd, where)
+    return _without(sums, terms), terms
+
+
+def turned_last(
+    history: History, prior: Prior, points: Points, sums: Sums, last: FloatArray, plain: NDArray[np.intp]
+) -> Sums:
+    """The sums at the points `plain` where the last run, whose b is `last` [n], is taken to be spoiled and was not before.
+
+    For points without further terms alone: one run's share of each sum is exchanged.
+    """
+    d = history.variance[-1] + np.exp(2.0 * points.log_scatter[plain])
+    spoiled = d + (prior.spoiled_size * prior.size) ** 2
+    change, b = 1.0 / spoiled - 1.0 / d, last[plain]
+    y = float(history.value[-1]) - prior.initial_mean
+    return Sums(
+        r=sums.r[plain] + change,
+        rb=sums.rb[plain] + change * b,
+        rbb=sums.rbb[plain] + change * b**2,
+        ry=sums.ry[plain] + change * y,
+        rby=sums.rby[plain] + change * y * b,
+        ryy=sums.ryy[plain] + change * y**2,
+        log_r=sums.log_r[plain] + np.log(d / spoiled),
+    )
+
+
+def _log_product(d: FloatArray) -> FloatArray:
+    """The logarithm of the product along the first axis of [t, ...], eight factors at a time: these neither overflow nor
+    vanish where each lies within 1e±38."""
+    blocks = [np.log(np.multiply.reduce(d[start : start + 8], axis=0)) for start in range(0, d.shape[0], 8)]
+    return np.asarray(np.sum(blocks, axis=0)) if blocks else np.zeros(d.shape[1:])
+
+
+def tabulated(
+    history: History,
+    prior: Prior,
+    table: FloatArray,
+    log_scatter: FloatArray,
+    size: FloatArray,
+    spoiled: FloatArray,
+    blur: FloatArray | float = 0.0,
+) -> Sums:
+    """The sums of k kinds by scatter levels by cells, by matrix products; [k, l, g], those without b [k, l, 1].
+
+    `table` holds b, [t, g] or [k, t, g]; a kind has its own levels log_scatter [k, l], size q [k] and spoiled runs
+    [t, k]. `blur` is a further deviation of every measurement, one or [k].
+    """
+    further = (prior.spoiled_size * prior.size) ** 2
+    fixed = history.variance + further * spoiled.T + (np.zeros(size.size) + blur)[:, None] ** 2
+    r = 1.0 / (fixed[:, None, :] + np.exp(2.0 * log_scatter)[:, :, None])
+    y = history.value - prior.initial_mean
+    rb, rby = np.split(np.concatenate([r, r * y], axis=1) @ table, 2, axis=1)
+    sums = Sums(
+        r=r.sum(axis=2)[:, :, None],
+        rb=rb,
+        rbb=r @ np.square(table),
+        ry=(r @ y)[:, :, None],
+        rby=rby,
+        ryy=(r @ y**2)[:, :, None],
+        log_r=(np.log(r).sum(axis=2) - y.size * math.log(2.0 * math.pi))[:, :, None],
+    )
+    z = columns(history)
+    sd = column_sds(prior, size, history.steps.size)
+    where = np.flatnonzero(sd.any(axis=1))
+    if where.size == 0:
+        return sums
+    sd = sd[where, None, :]
+    weighted = (r[where, :, None, :] * z.T) * sd[..., None]
+    root = np.linalg.cholesky(np.eye(z.shape[1]) + (weighted @ z) * sd[:, :, None, :])
+    left = np.linalg.inv(root) @ weighted
+    n_1, n_y = left.sum(axis=3), left @ y
+    flat = left.reshape(where.size, n_y.shape[1] * n_y.shape[2], y.size)
+    n_b = (flat @ (table if table.ndim == 2 else table[where])).reshape(*n_y.shape, -1)
+    lost = {
+        "r": np.square(n_1).sum(axis=2)[:, :, None],
+        "rb": (n_1[:, :, None, :] @ n_b)[:, :, 0],
+        "rbb": np.einsum("klpg,klpg->klg", n_b, n_b),
+        "ry": (n_1 * n_y).sum(axis=2)[:, :, None],
+        "rby": (n_y[:, :, None, :] @ n_b)[:, :, 0],
+        "ryy": np.square(n_y).sum(axis=2)[:, :, None],
+        "log_r": 2.0 * np.log(np.diagonal(root, axis1=2, axis2=3)).sum(axis=2)[:, :, None],
+    }
+    return _less(sums, lost, where)
+
+
+def drawn_terms(terms: Terms, off_initial: FloatArray, change: FloatArray, normals: FloatArray) -> FloatArray:
+    """Draws of the further terms given ξ0 (less its prior mean) and Δ, each [n], from normals [n, p]; [n, p].
+
+    w = σ L⁻ᵀ (N_y - ξ0 N_1 - Δ N_b + z); zero where there are none.
+    """
+    found = np.zeros_like(normals)
+    if terms.where.size:
+        at = terms.where
+        n = terms.cross
+        right = n[:, :, 1] - off_initial[at, None] * n[:, :, 0] - change[at, None] * n[:, :, 2] + normals[at]
+        found[at] = terms.sd * np.linalg.solve(np.swapaxes(terms.root, 1, 2), right[:, :, None])[:, :, 0]
+    return found
+
+
+def _reduced(gram: FloatArray, cross: FloatArray, sd: FloatArray, where: NDArray[np.intp]) -> Terms:
+    root = np.asarray(
+        np.linalg.cholesky(np.eye(sd.shape[1]) + gram * sd[:, :, None] * sd[:, None, :]), dtype=np.float64
+    )
+    left = np.asarray(np.linalg.solve(root, cross * sd[:, :, None]), dtype=np.float64)
+    return Terms(where=where, sd=sd, root=root, cross=left)
+
+
+def _without(sums: Sums, terms: Terms) -> Sums:
+    n_1, n_y, n_b = np.moveaxis(terms.cross, 2, 0)
+    lost = {
+        "r": np.square(n_1).sum(axis=1),
+        "rb": (n_1 * n_b).sum(axis=1),
+        "rbb": np.square(n_b).sum(axis=1),
+        "ry": (n_1 * n_y).sum(axis=1),
+        "rby": (n_y * n_b).sum(axis=1),
+        "ryy": np.square(n_y).sum(axis=1),
+        "log_r": 2.0 * np.log(np.diagonal(terms.root, axis1=1, axis2=2)).sum(axis=1),
+    }
+    return _less(sums, lost, terms.where)
+
+
+def _less(sums: Sums, lost: dict[str, FloatArray], where: NDArray[np.intp]) -> Sums:
+    found = {}
+    for name, loss in lost.items():
+        column = getattr(sums, name)
+        column[where] -= loss
+        found[name] = column
+    return Sums(**found)

@@ -1,0 +1,191 @@
+"""`clutchlife demo`: a simulated life, posted run by run to a service of its own, with the prognosis as it sharpens."""
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import webbrowser
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from service.cli.diagnose import ask
+from service.cli.diagnosis_view import shown
+from service.cli.options import Seed, fail, out
+from service.cli.sending.client import Service, ServiceAwayError, connect
+
+_PORT = 8000
+_START_SECONDS = 60.0
+HIDDEN_EFFECT = "oil_temperature"
+HIDDEN = "the oil's temperature, whose viscosity acts as another speed would"
+_HEADER = f"{'cycles':>7} {'mean COF':>16} {'of new':>7} {'remaining':>10} {'90 % interval':>17} {'truth':>7}"
+
+
+def demo(
+    seed: Seed = 1,
+    exit_at_end: Annotated[bool, typer.Option("--exit", help="End instead of leaving the service open")] = False,
+    browser: Annotated[
+        bool, typer.Option(help="Open the dashboard in a browser at the end, where there is one")
+    ] = True,
+) -> None:
+    """Simulate a clutch's life, send it to a service run by run, and watch its remaining life being foretold."""
+    with tempfile.TemporaryDirectory(prefix="clutchlife-demo-") as folder, _service(Path(folder)) as (url, process):
+        out.print(f"Clutchlife at {url}, its database in {folder}", markup=False, soft_wrap=True)
+        with connect(url) as http:
+            cycles = _life(Service(http=http), seed)
+            if exit_at_end:
+                return
+            _loops(Service(http=http), seed, cycles)
+        page = f"{url}/clutches/sim-{seed}"
+        with suppress(KeyboardInterrupt):
+            out.print(
+                f"\nThe dashboard stays open at {page} until Ctrl-C; all clutches: {url}", markup=False, soft_wrap=True
+            )
+            if browser and sys.stdout.isatty() and "CI" not in os.environ:
+                webbrowser.open(page)
+            process.wait()
+        out.print("closing")
+
+
+def _life(service: Service, seed: int) -> float:
+    """Post the life and have it diagnosed; the duty cycles at its end."""
+    from models.rig import campaign  # what only this command needs is loaded by it alone
+    from service.cli.demo import life
+    from service.run_files import simulated
+
+    clutch_id, truth = f"sim-{seed}", campaign.simulated_clutch(seed)
+    end = truth.end_of_life()
+    service.post("/v1/clutches", json.dumps(simulated.simulated_clutch_body(clutch_id)).encode())
+    out.print(f"\nA simulated clutch, {clutch_id}: 7 pressures x 40 speeds a test, 1 % noise.")
+    out.print(f"Hidden in its torque: {HIDDEN}, which the service is not told of.", markup=False)
+    out.print("Duty cycles that remain until its mean COF has halved:\n")
+    out.print(_HEADER, style="bold")
+    inside: list[bool] = []
+    with _progress() as progress:
+        task = progress.add_task("run-in", total=end)
+        for run in life.runs(seed):
+            progress.update(task, description=f"{run.kind.value.replace('_', ' ')}, {run.cycles} cycles")
+            body = json.dumps(simulated.simulated_body(run)).encode()
+            service.post(f"/v1/clutches/{clutch_id}/runs", body)
+            progress.update(task, completed=run.cycles)
+            if run.plateaus is not None:
+                said = service.get(f"/v1/clutches/{clutch_id}/remaining-useful-life")
+                progress.console.print(_row(said, end), markup=False)
+                inside += _inside(said, end)
+    truth_said = "it never halves" if end is None else f"it halved at {end:.0f} cycles"
+    out.print(
+        f"The truth: {truth_said}.\nIt lay inside the 90 % interval {sum(inside)} times out of {len(inside)}.\n"
+        "'-' means that too few tests are known yet, or that it may never come."
+    )
+    _diagnosed(service, clutch_id, end)
+    return run.cycles
+
+
+def _loops(service: Service, seed: int, last: float) -> None:
+    """Dynamic tests at some states of the same life, for the dashboard: they come late, as a rig's own archive would."""
+    from service.cli.demo import life
+    from service.run_files import simulated
+
+    out.print("\nDynamic tests of the same life follow, for the friction loops on the dashboard.")
+    for run in life.loops(seed, last):
+        service.post(f"/v1/clutches/sim-{seed}/runs", json.dumps(simulated.simulated_body(run)).encode())
+
+
+def _diagnosed(service: Service, clutch_id: str, end: float | None) -> None:
+    """The diagnosis of the life that was posted, and what it would have changed halfway."""
+    out.print("\nWhat does the simulation get wrong?\n", style="bold")
+    halfway = {} if end is None else {"at_cycles": round(end / 2)}
+    before = service.get(f"/v1/clutches/{clutch_id}/remaining-useful-life", **halfway)
+    with _progress() as progress:
+        progress.add_task("diagnosing", total=None)
+        report = ask(service, clutch_id, adopt=True)
+    if report["status"] != "finished":
+        fail(f"the diagnosis failed: {report['problem']}")
+    for part in shown(report):
+        out.print(part)
+    after = service.get(f"/v1/clutches/{clutch_id}/remaining-useful-life", **halfway)
+    found = HIDDEN_EFFECT in report["causes"]
+    out.print(f"\nHidden was {HIDDEN_EFFECT}: {'found' if found else 'not named'}.", style="bold", markup=False)
+    if end is not None:
+        out.print(f"Halfway, under either model:\n{'':8} {_HEADER}")
+        for name, said in (("before", before), ("after", after)):
+            out.print(f"{name:8} {_row(said, end)}", markup=False)
+
+
+def _row(said: dict[str, Any], end: float | None) -> str:
+    current, remaining = said["current"], said["remaining_cycles"]
+    cof = f"{current['mean_cof']:.4f} ± {current['mean_cof_sd']:.4f}"
+    interval = f"{_count(remaining['0.05'])} … {_count(remaining['0.95'])}"
+    left = "-" if end is None else f"{max(0.0, end - said['as_of_cycles']):.0f}"
+    share = f"{100 * current['fraction_of_initial']:.1f} %"
+    if said["status"] == "reached":
+        interval = "reached"
+    return f"{said['as_of_cycles']:>7} {cof:>16} {share:>7} {_count(remaining['0.5']):>10} {interval:>17} {left:>7}"
+
+
+def _inside(said: dict[str, Any], end: float | None) -> list[bool]:
+    """Whether the truth lay inside the interval, where one was given and the end of life was ahead."""
+    low, high = (said["end_of_life_cycles"][quantile] for quantile in ("0.05", "0.95"))
+    if low is None or end is None or said["as_of_cycles"] > end:
+        return []
+    return [low <= end and (high is None or end <= high)]
+
+
+def _count(cycles: float | None) -> str:
+    return "-" if cycles is None else f"{cycles:.0f}"
+
+
+def _progress() -> Progress:
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    return Progress(*columns, console=out, transient=True)
+
+
+@contextmanager
+def _service(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """A service in a process of its own, with a database of its own; stopped at the end."""
+    port, log = _free_port(), folder / "service.log"
+    command = [sys.executable, "-m", "service.cli.main", "serve", "--port", str(port), "--log-level", "warning"]
+    with log.open("wb") as file:
+        process = subprocess.Popen(  # noqa: S603  (our own command)
+            [*command, "--database", f"sqlite:///{folder / 'clutchlife.db'}"], stdout=file, stderr=file
+        )
+    url = f"http://127.0.0.1:{port}"
+    try:
+        with connect(url, timeout=5.0) as http:
+            _await_ready(Service(http=http, patience=0.0), process, log)
+        yield url, process
+    finally:
+        process.terminate()
+        process.wait(timeout=20)
+
+
+def _await_ready(service: Service, process: subprocess.Popen[bytes], log: Path) -> None:
+    deadline = time.monotonic() + _START_SECONDS
+    while time.monotonic() < deadline:
+        if process.poll() is not None:
+            fail(f"the service ended with {process.returncode}:\n{log.read_text(encoding='utf-8')}")
+        try:
+            service.get("/readyz")
+        except ServiceAwayError:
+            time.sleep(0.1)
+        else:
+            return
+    fail(f"the service was not ready after {_START_SECONDS:.0f} s:\n{log.read_text(encoding='utf-8')}")
+
+
+def _free_port() -> int:
+    """The usual port where it is free, else any."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", _PORT))
+        except OSError:
+            probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])

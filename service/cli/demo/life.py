@@ -1,0 +1,69 @@
+"""The life that `clutchlife demo` simulates: the rig's campaign, with an effect in its torque that its sensors do not name.
+
+Dynamic tests are made at few states and pressures, at a quarter of the usual rate, with the plateaus' noise of 1 %: the
+friction loops are seen over the life, and the demo stays short, for to tell the lag of a loop takes the service longest.
+Friction lags speed as the service's own model has it, so that one effect alone is hidden.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from models.records.runs import Record
+from models.rig import campaign
+from models.rig.hysteresis import FrictionLag
+from models.rig.oil_warmth import warmed
+from models.rig.recorder import Recorder
+from models.rig.sampled import DynamicTest, sampled_test
+from models.rig.simulated_runs import RunKind, SimulatedRun
+from models.rig.stationary import Sensor
+
+#: The demo ends a little after the end of life.
+_STOP = 0.49
+#: Duty cycles at which a dynamic test is made, pressures [Pa] at which it is recorded, what it is, the lag of its torque.
+_LOOPS_AT = (0, 3000, 11_000)
+_RECORDED, _NEAR = (4.0e5, 5.5e5, 7.0e5), 0.03e5
+_TEST = DynamicTest(rate=25.0, recorder=Recorder(torque_noise=0.25, memory=0.02))
+_LAG = FrictionLag(film_time=0.0, attractor=150.0)
+#: The stream of the dynamic tests' noise.
+_STREAM = 0xD7
+
+
+def runs(seed: int) -> Iterator[SimulatedRun]:
+    """All runs but the dynamic tests, in rig order; torque as the oil's temperature makes it.
+
+    Made as they are asked for. The same seed >= 0 gives the same bits. Raises ValueError on a negative seed.
+    """
+    truth = campaign.simulated_clutch(seed)
+    for run in campaign.simulate(seed, clutch=truth, stop_fraction=_STOP):
+        yield run if run.plateaus is None else replace(run, plateaus=warmed(run.plateaus, truth, run.wear))
+
+
+def loops(seed: int, last: float) -> Iterator[SimulatedRun]:
+    """The dynamic tests of that life up to `last` duty cycles; `runs` ages the clutch by cycles alone."""
+    truth = replace(campaign.simulated_clutch(seed), lag=_LAG)
+    for cycles in _LOOPS_AT:
+        if cycles > last:
+            return
+        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_STREAM, cycles)))
+        record = _recorded(sampled_test(truth, cycles, _TEST, rng, Sensor()))
+        yield SimulatedRun(
+            run_id=f"sim-{seed}-dynamic-{cycles:05d}",
+            kind=RunKind.DYNAMIC_STRIBECK,
+            cycles=cycles,
+            record=warmed(record, truth, cycles),
+            wear=cycles,
+        )
+
+
+def _recorded(record: Record) -> Record:
+    """What is left of a record where the recorder ran at some pressures only."""
+    kept = np.any([np.abs(record.pressure - level) < _NEAR for level in _RECORDED], axis=0)
+    return Record(
+        time=record.time[kept],
+        pressure=record.pressure[kept],
+        speed=record.speed[kept],
+        torque=record.torque[kept],
+        oil_temperature=None if record.oil_temperature is None else record.oil_temperature[kept],
+    )

@@ -1,0 +1,166 @@
+"""A run on its way in: what was sent, checked, with its channels bit for bit, and its step into the models' units."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.records.runs import UNLOADED, Plateaus, Record, pressure_levels
+from service.errors import FieldError, InvalidError
+from service.readers.units import CHANNELS
+from service.schemas.base import whole
+
+#: No mean torque is known better than to this share of the torque: a smaller deviation counts as this.
+SHARPEST = 1e-4
+#: More pressure levels than any protocol has: a continuous pressure is no stationary test.
+MOST_LEVELS = 100
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IncomingRun:
+    """One run as the rig sent it. `channels` are in the units of their names, `details` is what else was said."""
+
+    kind: str
+    cycles: float
+    run_id: str
+    content_sha256: str
+    started_at: str | None = None
+    origin: str = "measured"
+    channels: Mapping[str, FloatArray] = field(default_factory=dict)
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+
+def name_run(
+    *,
+    kind: str,
+    cycles: float,
+    run_id: str | None,
+    started_at: str | None,
+    origin: str,
+    channels: Mapping[str, FloatArray],
+    details: Mapping[str, Any],
+) -> IncomingRun:
+    """A run with its content's hash, and its name derived from that where none was given.
+
+    The hash covers everything but the name: kind, cycles, time, origin, details and every bit of every channel.
+    Raises InvalidError where a stationary test says nothing: no curve could be fitted to it, nor is it of an open clutch.
+    """
+    said = [kind, whole(cycles), started_at, origin, dict(details)]
+    digest = hashlib.sha256(json.dumps(said, sort_keys=True, allow_nan=False).encode())
+    for name in sorted(channels):
+        digest.update(f"\n{name}:{channels[name].size}\n".encode())
+        digest.update(np.ascontiguousarray(channels[name], dtype="<f8").data)
+    content = digest.hexdigest()
+    run = IncomingRun(
+        kind=kind,
+        cycles=cycles,
+        run_id=run_id or f"{kind}-{content[:16]}",
+        content_sha256=content,
+        started_at=started_at,
+        origin=origin,
+        channels=channels,
+        details=details,
+    )
+    if kind == "stationary_stribeck" and "time_s" not in channels:
+        _require_readings(channels)
+    return run
+
+
+def sampled_record(channels: Mapping[str, FloatArray]) -> Record:
+    """A sampled record in SI units."""
+    si = {name: CHANNELS[name].to_si(values) for name, values in channels.items()}
+    return Record(
+        time=si["time_s"],
+        pressure=si["pressure_bar"],
+        speed=si["speed_rpm"],
+        torque=si["torque_nm"],
+        oil_temperature=si.get("oil_temperature_c"),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class SampledChannels:
+    """A sampled record whose channels become SI units as they are asked for: all at once would be two thirds more memory."""
+
+    channels: Mapping[str, FloatArray]
+
+    def _si(self, name: str) -> FloatArray:
+        return CHANNELS[name].to_si(self.channels[name])
+
+    @property
+    def time(self) -> FloatArray:
+        """[n] s."""
+        return self._si("time_s")
+
+    @property
+    def pressure(self) -> FloatArray:
+        """[n] Pa."""
+        return self._si("pressure_bar")
+
+    @property
+    def speed(self) -> FloatArray:
+        """[n] rad/s."""
+        return self._si("speed_rpm")
+
+    @property
+    def torque(self) -> FloatArray:
+        """[n] Nm."""
+        return self._si("torque_nm")
+
+    @property
+    def oil_temperature(self) -> FloatArray | None:
+        """[n] K."""
+        return self._si("oil_temperature_c") if "oil_temperature_c" in self.channels else None
+
+
+def stationary_plateaus(channels: Mapping[str, FloatArray]) -> Plateaus:
+    """The plateaus of a stationary test in SI units, rows in the order they were sent."""
+    si = {name: CHANNELS[name].to_si(values) for name, values in channels.items()}
+    deviation = si.get("torque_sd_nm")
+    if deviation is not None:
+        under_load = si["pressure_bar"] >= UNLOADED
+        torque = si["torque_nm"][under_load] if under_load.any() else si["torque_nm"]
+        deviation = np.maximum(deviation, SHARPEST * float(np.sqrt(np.mean(torque**2))))
+    return Plateaus(
+        pressure=si["pressure_bar"],
+        speed=si["speed_rpm"],
+        torque=si["torque_nm"],
+        torque_sd=deviation if deviation is not None and bool((channels["torque_sd_nm"] > 0).all()) else None,
+        oil_temperature=si.get("oil_temperature_c"),
+    )
+
+
+def _require_readings(channels: Mapping[str, FloatArray]) -> None:
+    """Refuse what says nothing: no torque, an open clutch at rest, under pressure what no Stribeck curve passes through."""
+    torque, speed, pressure = channels["torque_nm"], channels["speed_rpm"], channels["pressure_bar"]
+    if (pressure * CHANNELS["pressure_bar"].factor >= UNLOADED).any():
+        _require_curve(torque, speed, pressure)
+    elif not speed.any():
+        _refuse("speed_rpm", speed, "open_at_rest", "at least one plateau must turn where none is loaded")
+    if not torque.any():
+        _refuse("torque_nm", torque, "torque_all_zero", "at least one torque must differ from zero")
+
+
+def _require_curve(torque: FloatArray, speed: FloatArray, pressure: FloatArray) -> None:
+    if torque.size == 1:
+        _refuse("torque_nm", torque, "too_few_points", "a Stribeck curve needs more than one point")
+    if np.unique(pressure_levels(pressure * CHANNELS["pressure_bar"].factor)).size > MOST_LEVELS:
+        _refuse("pressure_bar", pressure, "too_many_levels", f"a test may have at most {MOST_LEVELS} pressure levels")
+    if (speed == speed[0]).all():
+        _refuse("speed_rpm", speed, "speeds_all_equal", "a Stribeck curve needs more than one speed")
+
+
+def _refuse(name: str, column: FloatArray, code: str, rule: str) -> None:
+    value = float(column[0])
+    more = "" if column.size == 1 else f" in all {column.size} rows"
+    if more and not (column == value).all():
+        more = f" in row 1 of {column.size}"
+    message = f"{name}: {rule}, got {value:g}{more}"
+    raise InvalidError(
+        message,
+        errors=[FieldError(pointer=f"/channels/{name}/0", row=1, value=f"{value:g}", code=code, message=message)],
+    )

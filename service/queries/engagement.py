@@ -1,0 +1,118 @@
+"""The engagement that a tracked clutch would give at any state of its degradation."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from models.clutch import Geometry
+from models.engagements.simulation import Capacity, Drive, Engagement, PressureProfile, engage
+from models.friction.pressure_laws import PressureLaws, fit_asymptotic, fit_linear
+from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters, torque
+from models.prognosis.first_passage import weighted_quantiles
+from service.errors import NotFoundError
+from service.lives.assumptions import Basis
+from service.lives.history import Event, Life, Series, lives
+from service.lives.run_analysis import LevelFit
+from service.queries.trajectories import posterior_of
+from service.queries.views import parameter_series, tests_of
+from service.readers.units import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
+from service.schemas.base import whole
+
+#: Pressure laws need this many pressures; with fewer, torque goes with pressure from the nearest one.
+_FEWEST_FOR_LAWS = 3
+
+
+def engagement(
+    clutch_id: str,
+    events: Sequence[Event],
+    basis: Basis,
+    fits: Mapping[str, Sequence[LevelFit]],
+    geometry: Geometry,
+    *,
+    at_cycles: float | None,
+) -> dict[str, Any]:
+    """The trace in the public shape. Raises NotFoundError before the first stationary test that tells all parameters."""
+    happened = [event for event in events if at_cycles is None or event.cycles <= at_cycles]
+    found = lives(happened)
+    if not found:
+        raise NotFoundError("no stationary test is known by then: there is no clutch to engage")
+    life = found[-1]
+    cycles = happened[-1].cycles if at_cycles is None else at_cycles
+    parameters = _parameters(clutch_id, life, basis, tests_of(life, fits), cycles)
+    profile, drive = PressureProfile(), Drive()
+    trace = engage(_capacity(parameters), geometry.mean_radius, profile=profile, drive=drive)
+    return {
+        "at_cycles": whole(cycles),
+        "model": dict(basis.model),
+        "initial_speed_rpm": drive.speed / RADIANS_PER_SECOND_PER_RPM,
+        "maximum_pressure_bar": profile.maximum / PASCALS_PER_BAR,
+        "motor_torque_limit_nm": drive.limit,
+        "engaged": trace.duration is not None,
+        "duration_s": trace.duration,
+        "energy_kj": trace.energy / 1000,
+        "channels": _channels(trace),
+    }
+
+
+def _parameters(
+    clutch_id: str, life: Life, basis: Basis, tests: Sequence[Sequence[LevelFit]], cycles: float
+) -> dict[float, StribeckParameters]:
+    """The tracked Stribeck parameters by pressure [Pa], each the median of its own eq. 6 at `cycles` since new."""
+    at: dict[float, dict[str, float]] = {}
+    for name in PARAMETER_NAMES:
+        for series in parameter_series(life, basis, tests, name):
+            if series.measurements:
+                at.setdefault(series.pressure, {})[name] = _median(clutch_id, series, basis, cycles)
+    told = {level: values for level, values in at.items() if len(values) == len(PARAMETER_NAMES)}
+    if not told:
+        raise NotFoundError("no stationary test tells all four Stribeck parameters by then")
+    return {level: StribeckParameters(**{n: max(v, 0.0) for n, v in values.items()}) for level, values in told.items()}
+
+
+def _median(clutch_id: str, series: Series, basis: Basis, cycles: float) -> float:
+    posterior = posterior_of(clutch_id, series, basis)
+    values = posterior.values(np.array([float(series.scale.progress(cycles))]))[0]
+    return float(weighted_quantiles(values, posterior.weight, (0.5,))[0])
+
+
+def _capacity(parameters: Mapping[float, StribeckParameters]) -> Capacity:
+    """Torque over pressure and velocity: the pressure laws where there are enough pressures, never below the lowest one."""
+    levels = np.array(sorted(parameters))
+    columns = np.stack([parameters[level].as_array() for level in levels.tolist()])
+    laws = _laws(levels, columns) if levels.size >= _FEWEST_FOR_LAWS else None
+
+    def capacity(pressure: float, velocity: float) -> float:
+        known = max(pressure, float(levels[0]))
+        if laws is None:
+            known = float(levels[np.argmin(np.abs(levels - pressure))])
+            at = parameters[known]
+        else:
+            at = laws.parameters(np.array(known))
+        return float(torque(np.array(velocity), at)) * pressure / known
+
+    return capacity
+
+
+def _laws(
+    levels: np.ndarray[tuple[int], np.dtype[np.float64]], columns: np.ndarray[Any, np.dtype[np.float64]]
+) -> PressureLaws:
+    equal = np.ones_like(levels)
+    m_s, m_c, v_s, c_v = columns.T
+    return PressureLaws(
+        static_torque=fit_linear(levels, m_s, equal),
+        coulomb_ratio=fit_asymptotic(levels, m_c, equal),
+        stribeck_velocity=fit_linear(levels, v_s, equal),
+        viscous_coefficient=fit_linear(levels, c_v, equal),
+    )
+
+
+def _channels(trace: Engagement) -> dict[str, list[float]]:
+    columns = {
+        "time_s": trace.time,
+        "pressure_bar": trace.pressure,
+        "speed_rpm": trace.speed,
+        "torque_nm": trace.torque,
+    }
+    found = {name: (column / CHANNELS[name].factor).round(6).tolist() for name, column in columns.items()}
+    return found | {"motor_torque_nm": trace.motor_torque.round(6).tolist()}

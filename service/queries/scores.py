@@ -1,0 +1,192 @@
+"""How right the predictions were, once a clutch has reached its threshold: what would have been said at each of its tests.
+
+The end of life that came is where straight lines between the tests first pass the threshold; the threshold is the
+criterion's fraction of the initial mean COF, as the exact filter has it from all tests. Every test before it is a prediction
+made of the tests up to then. Shares are of the whole life, from its origin to its end.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from models.prognosis import scoring
+from models.prognosis.first_passage import HORIZON, QUANTILES
+from service import records
+from service.lives.assumptions import ALL_PRESSURES, Basis, basis_of
+from service.lives.history import Event, Life, lives
+from service.lives.prediction import INSUFFICIENT, named
+from service.lives.tracks import CARRIED
+from service.queries import views
+from service.queries.views import Remembered
+from service.schemas.base import whole
+from storage import clutches, predictions
+from storage.engine.database import Database
+
+#: α of the α-λ accuracy, of remaining life, and of the prognostic horizon, of the whole life.
+ALPHA_LAMBDA, ALPHA_HORIZON = 0.2, 0.1
+#: Stages of life, by their middles, and the half width of each.
+STAGES, HALF_STAGE = (0.2, 0.4, 0.6, 0.8), 0.1
+_LOW, _HIGH = "0.05", "0.95"
+
+
+def of_clutch(database: Database, remembered: Remembered, clutch_id: str, *, method: str) -> dict[str, Any]:
+    """The scores of a clutch's lives that came to their end; NotFoundError for an unknown clutch."""
+    with database.reading() as connection:
+        row = records.clutch(connection, clutch_id)
+        key = (clutch_id, row.revision, "scores", method)
+        items = remembered.find(key)
+        if items is None:
+            events, basis = records.events(connection, clutch_id), basis_of(connection, row)
+            said = {
+                each.cycles: each.payload for each in predictions.history(connection, clutch_id, method, ALL_PRESSURES)
+            }
+    if items is None:
+        fraction = records.record(row).end_of_life.cof_fraction
+        items = []
+        for life in lives(events):
+            end = end_of_life(clutch_id, life, basis, fraction)
+            if end is not None:
+                told = said if method in CARRIED else _told(clutch_id, life, basis, fraction, method)
+                items.append(_scored(life, basis, end, told))
+        remembered.keep(key, items)
+    return {"clutch_id": clutch_id, "method": method, "revision": row.revision, "items": items, "next": None}
+
+
+def of_fleet(database: Database, remembered: Remembered, *, method: str) -> dict[str, Any]:
+    """All lives that came to their end, together and by stage of life."""
+    with database.reading() as connection:
+        names = clutches.all_ids(connection)
+    found = [
+        item | {"clutch_id": clutch_id}
+        for clutch_id in names
+        for item in of_clutch(database, remembered, clutch_id, method=method)["items"]
+    ]
+    tests = [test for item in found for test in item["predictions"]]
+    stages = [
+        {"share_of_life": stage} | summary([test for test in tests if abs(test["share_of_life"] - stage) <= HALF_STAGE])
+        for stage in STAGES
+    ]
+    return {
+        "method": method,
+        "lives": [
+            {name: item[name] for name in ("clutch_id", "origin_cycles", "end_of_life_cycles")} for item in found
+        ],
+        "overall": summary(tests),
+        "stages": stages,
+        "pit_histogram": _histogram(tests),
+    }
+
+
+def end_of_life(clutch_id: str, life: Life, basis: Basis, fraction: float) -> float | None:
+    """The cycles since new at which the tests have passed the threshold; None where they have not."""
+    series = life.pooled(basis)
+    if not series.measurements:
+        return None
+    said = views.foretell(clutch_id, life.events, basis, fraction, method="grid", pressure_bar=None, at_cycles=None)
+    threshold = said["criterion"]["threshold_mean_cof"]
+    if said["status"] == INSUFFICIENT or threshold is None:
+        return None
+    cycles = np.array([life.events[index].cycles for index in series.events])
+    values = np.array([each.value for each in series.measurements])
+    values = values + basis.offset(series.quantity, series.pressure, cycles)
+    below = np.flatnonzero(values <= threshold)
+    if below.size == 0 or below[0] == 0:
+        return None
+    last, first = int(below[0]) - 1, int(below[0])
+    share = (values[last] - threshold) / (values[last] - values[first])
+    return float(cycles[last] + share * (cycles[first] - cycles[last]))
+
+
+def _told(clutch_id: str, life: Life, basis: Basis, fraction: float, method: str) -> dict[float, dict[str, Any]]:
+    """What a method that is not stored would have said at each test."""
+    found = {}
+    for index, event in enumerate(life.events):
+        if event.cofs:
+            happened: Sequence[Event] = life.events[: index + 1]
+            found[event.cycles] = views.foretell(
+                clutch_id, happened, basis, fraction, method=method, pressure_bar=None, at_cycles=None
+            )
+    return found
+
+
+def _scored(life: Life, basis: Basis, end: float, said: dict[float, dict[str, Any]]) -> dict[str, Any]:
+    """A life's scores, with every prediction of it."""
+    at = sorted({event.cycles for event in life.events if event.cofs and event.cycles < end})
+    tests = [_test(said[cycles], cycles, life.origin, end) for cycles in at if said[cycles]["status"] != INSUFFICIENT]
+    horizon = scoring.prognostic_horizon(
+        [test["cycles"] - life.origin for test in tests],
+        [test["remaining_cycles"]["0.5"] for test in tests],
+        end - life.origin,
+        ALPHA_HORIZON,
+    )
+    return {
+        "origin_cycles": whole(life.origin),
+        "end_of_life_cycles": end,
+        "prognostic_horizon_cycles": horizon,
+        "summary": summary(tests),
+        "pit_histogram": _histogram(tests),
+        "predictions": tests,
+    } | named(basis)
+
+
+def _test(said: dict[str, Any], cycles: float, origin: float, end: float) -> dict[str, Any]:
+    """One prediction and how right it was; a quantile beyond the horizon is scored as if it were there."""
+    remaining, length = said["remaining_cycles"], end - origin
+    ends = [origin + HORIZON if value is None else value for value in said["end_of_life_cycles"].values()]
+    crps = scoring.crps_of_quantiles(QUANTILES, ends, end)
+    low, high = (said["end_of_life_cycles"][quantile] for quantile in (_LOW, _HIGH))
+    return {
+        "cycles": whole(cycles),
+        "runs_used": said["runs_used"],
+        "share_of_life": (cycles - origin) / length,
+        "true_remaining_cycles": end - cycles,
+        "remaining_cycles": remaining,
+        "crps_cycles": crps,
+        "crps_share": crps / length,
+        "interval_share": (ends[-1] - ends[0]) / length,
+        "covered": scoring.covered(low, high, end),
+        "pit": scoring.pit_of_quantiles(QUANTILES, ends, end),
+        "alpha_lambda": scoring.alpha_lambda(remaining["0.5"], cycles, end, ALPHA_LAMBDA),
+    }
+
+
+def summary(tests: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Means over predictions; null where there are none."""
+
+    def mean(name: str) -> float | None:
+        return math.fsum(test[name] for test in tests) / len(tests) if tests else None
+
+    return {
+        "predictions": len(tests),
+        "crps_share": mean("crps_share"),
+        "interval_share": mean("interval_share"),
+        "coverage": mean("covered"),
+        "alpha_lambda": mean("alpha_lambda"),
+    }
+
+
+def _histogram(tests: Sequence[dict[str, Any]]) -> list[float]:
+    return scoring.pit_histogram([test["pit"] for test in tests]).tolist() if tests else []
+
+
+def flat(item: dict[str, Any]) -> list[dict[str, Any]]:
+    """A life's predictions as rows of a table."""
+    names = (
+        "cycles",
+        "runs_used",
+        "share_of_life",
+        "true_remaining_cycles",
+        "crps_cycles",
+        "crps_share",
+        "interval_share",
+    )
+    told = ("covered", "pit", "alpha_lambda")
+    return [
+        {"end_of_life_cycles": item["end_of_life_cycles"]}
+        | {name: test[name] for name in names}
+        | {f"remaining_cycles_{quantile}": value for quantile, value in test["remaining_cycles"].items()}
+        | {name: test[name] for name in told}
+        for test in item["predictions"]
+    ]

@@ -1,0 +1,137 @@
+"""Columns of numbers as they were sent -> checked 64-bit columns, or errors that name channel, row and value."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from models.arrays import FloatArray
+from service.errors import MOST_ERRORS, FieldError, InvalidError
+from service.readers.units import CHANNELS, SAMPLED_LEAST
+
+_SHOWN = 80
+
+
+#: Row of a column, from 0 -> line of the file that it stands on, from 1.
+LineOf = Callable[[int], int]
+
+
+class _Errors:
+    """Collects errors; keeps the first MOST_ERRORS and counts the rest. Rows of a file are named with their line."""
+
+    def __init__(self, line_of: LineOf | None = None) -> None:
+        self.kept: list[FieldError] = []
+        self.total = 0
+        self._line_of = line_of
+
+    def add(self, error: FieldError) -> None:
+        self.total += 1
+        if len(self.kept) < MOST_ERRORS:
+            self.kept.append(error)
+
+    def add_row(self, name: str, index: int, value: object, code: str, rule: str) -> None:
+        if len(self.kept) >= MOST_ERRORS:
+            self.total += 1
+            return
+        shown = repr(value)[:_SHOWN] if isinstance(value, str | list | dict) else str(value)[:_SHOWN]
+        place = f"{name}[{index}]" + (f" (line {self._line_of(index)})" if self._line_of else "")
+        self.add(
+            FieldError(
+                pointer=f"/channels/{name}/{index}",
+                row=index + 1,
+                value=shown,
+                code=code,
+                message=f"{place} {rule}, got {shown}",
+            )
+        )
+
+
+def check_columns(columns: Mapping[str, Sequence[Any]]) -> dict[str, FloatArray]:
+    """Columns by public channel name, as parsed -> the same as float64 [n], bit for bit.
+
+    Raises InvalidError where a column is empty, lengths differ, or a value is not a finite number within its channel's
+    range. The error lists at most 50 places and says how many there are in all.
+    """
+    errors = _Errors()
+    _check_lengths(columns, errors)
+    checked = {}
+    for name, values in columns.items():
+        column = _numbers(name, values, errors)
+        if column is not None:
+            _check_range(name, column, errors, sampled="time_s" in columns)
+            checked[name] = column
+    _raise_any(errors)
+    return checked
+
+
+def check_arrays(columns: Mapping[str, FloatArray], *, line_of: LineOf | None = None) -> None:
+    """Columns [n] by public channel name, in the channels' units, held to the rules of `check_columns`.
+
+    Raises InvalidError as that does; with `line_of` the messages name the line of the file too.
+    """
+    errors = _Errors(line_of)
+    _check_lengths(columns, errors)
+    for name, column in columns.items():
+        _check_range(name, column, errors, sampled="time_s" in columns)
+    _raise_any(errors)
+
+
+def _check_lengths(columns: Mapping[str, Sequence[Any] | FloatArray], errors: _Errors) -> None:
+    rows = max((len(values) for values in columns.values()), default=0)
+    for name, values in columns.items():
+        if len(values) == 0:
+            errors.add(FieldError(pointer=f"/channels/{name}", code="empty", message=f"{name} must not be empty"))
+        elif len(values) != rows:
+            rule = f"must be as long as the longest channel ({rows} rows), got {len(values)} rows"
+            errors.add(
+                FieldError(
+                    pointer=f"/channels/{name}",
+                    row=len(values) + 1,
+                    value=str(len(values)),
+                    code="ragged",
+                    message=f"{name} {rule}",
+                )
+            )
+
+
+def _raise_any(errors: _Errors) -> None:
+    if errors.total:
+        raise InvalidError(_summary(errors), errors=errors.kept, total=errors.total)
+
+
+def _summary(errors: _Errors) -> str:
+    first = errors.kept[0].message
+    return first if errors.total == 1 else f"{first}; {errors.total} errors in all"
+
+
+def _numbers(name: str, values: Sequence[Any], errors: _Errors) -> FloatArray | None:
+    if not set(map(type, values)) <= {int, float}:
+        for index, value in enumerate(values):
+            if type(value) not in (int, float):
+                errors.add_row(name, index, value, "not_a_number", "must be a number")
+        return None
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except OverflowError:
+        for index, value in enumerate(values):
+            if isinstance(value, int) and abs(value) > 1e300:
+                errors.add_row(name, index, value, "out_of_range", "must be a number that fits 64 bits")
+        return None
+
+
+def _check_range(name: str, column: FloatArray, errors: _Errors, *, sampled: bool) -> None:
+    channel = CHANNELS[name]
+    least = SAMPLED_LEAST.get(name, channel.least) if sampled else channel.least
+    good = (column >= least) & (column <= channel.most)
+    wrong = np.flatnonzero(~good)
+    errors.total += max(0, wrong.size - MOST_ERRORS)
+    for index in wrong[:MOST_ERRORS]:
+        value = float(column[index])
+        if not math.isfinite(value):
+            errors.add_row(name, int(index), value, "not_finite", "must be finite")
+        elif value < 0 <= least:
+            errors.add_row(name, int(index), value, "negative", "must not be negative")
+        else:
+            rule = f"must lie between {least:g} and {channel.most:g} {channel.unit}"
+            errors.add_row(name, int(index), value, "out_of_range", rule)

@@ -1,0 +1,254 @@
+"""Which of a file's columns is which channel: by public name, by synonym, or as an explicit map says; and its unit."""
+
+import re
+import unicodedata
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from service.errors import FieldError, InvalidError
+from service.readers.unit_table import Conversion, conversion, is_unit, spellings
+from service.readers.units import CHANNELS
+
+#: Single letters mean what they mean in mechanics: capitals count (M is a torque, n a speed, p a pressure, t a time).
+_LETTERS = {"M": "torque_nm", "n": "speed_rpm", "p": "pressure_bar", "t": "time_s"}
+
+_WORDS = {
+    "time_s": "time zeit timestamp zeitstempel elapsed_time elapsed messzeit time_stamp",
+    "pressure_bar": "pressure druck line_pressure leitungsdruck anpressdruck kolbendruck "
+    "clutch_pressure kupplungsdruck piston_pressure druck_ist pressure_actual p_ist p_line",
+    "speed_rpm": "speed drehzahl rotational_speed rotation_speed shaft_speed differential_speed slip_speed motor_speed "
+    "relative_speed drehgeschwindigkeit winkelgeschwindigkeit angular_velocity angular_speed differenzdrehzahl "
+    "schlupfdrehzahl motordrehzahl drehzahl_ist n_ist n_motor n_rel n_diff omega speed_actual rpm",
+    "torque_nm": "torque drehmoment moment friction_torque reibmoment clutch_torque kupplungsmoment "
+    "drehmoment_ist torque_actual m_ist m_d md m_r",
+    "torque_sd_nm": "torque_sd torque_std torque_deviation standard_deviation_of_torque "
+    "drehmoment_standardabweichung standardabweichung_drehmoment",
+    "oil_temperature_c": "oil_temperature oil_temp oiltemperature oiltemp öltemperatur öltemp t_oil t_öl toil töl "
+    "temperature_oil temperatur_öl theta_oil theta_öl sump_temperature sumpftemperatur oil_sump_temperature",
+}
+
+_SHOWN = 80
+_MOST_NAMED = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """One column of a file: its name without a unit, and the unit that the file states (None: it states none).
+
+    `group` is what tells equal names apart in files that have groups; `group/name` may be used in a map.
+    """
+
+    name: str
+    unit: str | None = None
+    group: str = ""
+
+    def shown(self) -> str:
+        """The name for a message."""
+        return f"{self.group}/{self.name}"[:_SHOWN] if self.group else self.name[:_SHOWN]
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """A column that is taken: the file's `index`-th as `channel`, with its way into the channel's unit."""
+
+    channel: str
+    index: int
+    conversion: Conversion
+
+
+def _key(name: str) -> str:
+    """Names that differ in case, blanks, dashes or in ö for oe are one name."""
+    plain = unicodedata.normalize("NFC", name).strip().casefold()
+    plain = plain.replace("oel", "öl").replace("ϑ", "theta").replace("ω", "omega")
+    return re.sub(r"[\s._\-]+", "_", plain).strip("_")
+
+
+_BY_KEY = {_key(word): channel for channel, words in _WORDS.items() for word in words.split()}
+_BY_KEY |= {name: name for name in CHANNELS}
+_BRACKETED = re.compile(r"(?P<name>[^\[\](){}<>]*)[\[({<](?P<unit>[^\[\](){}<>]*)[\])}>]\s*")
+_PER = re.compile(r"(?P<name>[^/]+)/\s*(?P<unit>.+)")
+_IN = re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>\S.*)")
+
+
+def known_channel(name: str) -> str | None:
+    """The public channel that a name stands for, or None."""
+    bare = name.strip()
+    return _LETTERS.get(bare) or (_BY_KEY.get(_key(bare)) if len(bare) > 1 else None)
+
+
+def header_of(text: str) -> Header:
+    """A column's title -> name and unit: `torque [Nm]`, `torque (Nm)`, `M / Nm`, `Druck in bar`, `speed_rad_s`."""
+    title = text.strip()
+    if known_channel(title):
+        return Header(title)
+    if found := _BRACKETED.fullmatch(title):
+        return Header(found["name"].strip(), bare_unit(found["unit"]))
+    for pattern in (_PER, _IN):
+        found = pattern.fullmatch(title)
+        if found and (known_channel(found["name"]) or is_unit(found["unit"])):
+            return Header(found["name"].strip(), bare_unit(found["unit"]))
+    for mark in re.finditer(r"[\s_]+", title):
+        name, unit = title[: mark.start()], title[mark.end() :]
+        if known_channel(name) and is_unit(unit):
+            return Header(name, unit)
+    return Header(title)
+
+
+def bare_unit(text: str) -> str | None:
+    """A unit without its brackets; None where nothing is stated."""
+    unit = text.strip().strip("[](){}<>").strip()
+    return None if unit in ("", "-", "--", "_", "?") else unit
+
+
+def with_unit(header: Header, unit: str | None) -> Header:
+    """A header with the unit that the file states beside the name; raises InvalidError where the name says another."""
+    stated = bare_unit(unit or "")
+    if stated and header.unit and stated != header.unit:
+        channel = known_channel(header.name)
+        if channel is None or conversion(channel, stated) != conversion(channel, header.unit):
+            both = f"{header.unit[:_SHOWN]!r} and {stated[:_SHOWN]!r}"
+            message = f"column {header.shown()!r} must be in one unit, got {both}"
+            raise InvalidError(
+                message, errors=[FieldError(pointer="", code="mixed_units", message=message, value=both)]
+            )
+    return Header(header.name, stated or header.unit, header.group)
+
+
+def parse_map(mapping: str | None) -> dict[str, str]:
+    """`torque_nm:Mz,pressure_bar:p1` -> {channel: column's name}. Names may hold commas and colons themselves.
+
+    Raises InvalidError where the text is no such list, a channel is not known or is named twice.
+    """
+    if mapping is None or not mapping.strip():
+        return {}
+    if len(mapping) > 4096:
+        raise _wrong_map(mapping, "must not be longer than 4096 characters")
+    asked: dict[str, str] = {}
+    for part in re.split(rf",(?=\s*(?:{'|'.join(CHANNELS)})\s*:)", mapping):
+        channel, colon, name = part.partition(":")
+        channel, name = channel.strip(), name.strip()
+        if not colon or not name:
+            raise _wrong_map(part, "must be a list such as torque_nm:Mz,pressure_bar:p1")
+        if channel not in CHANNELS:
+            raise _wrong_map(channel, f"must name channels out of {', '.join(CHANNELS)}")
+        if channel in asked:
+            raise _wrong_map(channel, "must name each channel once")
+        asked[channel] = name
+    return asked
+
+
+def _wrong_map(value: str, rule: str) -> InvalidError:
+    message = f"map {rule}, got {value[:_SHOWN]!r}"
+    return InvalidError(
+        message, errors=[FieldError(pointer="/map", code="invalid_map", message=message, value=value[:_SHOWN])]
+    )
+
+
+def choose(headers: Sequence[Header], mapping: str | None) -> list[Taken]:
+    """Which columns are taken, in the order of the file.
+
+    Without a map every column must be known; a map says what some are, and what is neither named in it nor known is left
+    out. Raises InvalidError where a column is unknown, two are the same channel, or a unit is unknown or not stated.
+    """
+    asked = parse_map(mapping)
+    by_map = {_find(headers, channel, name): channel for channel, name in asked.items()}
+    if len(by_map) < len(asked):
+        raise _wrong_map(str(mapping), "must not name one column for two channels")
+    names: dict[str, int] = {}
+    unknown = []
+    for index, header in enumerate(headers):
+        channel = by_map.get(index) or known_channel(header.name)
+        if channel is None:
+            unknown.append(header)
+        elif index in by_map or channel not in asked:
+            if channel in names:
+                raise _twice(channel, headers[names[channel]], header)
+            names[channel] = index
+    if unknown and not asked:
+        raise _unknown(headers, unknown)
+    if not names:
+        raise InvalidError(f"the file holds no channel that is known: it has {_list(headers)}")
+    taken = [
+        Taken(name, index, _conversion(name, headers[index], mapped=index in by_map)) for name, index in names.items()
+    ]
+    return sorted(taken, key=lambda each: each.index)
+
+
+def _find(headers: Sequence[Header], channel: str, name: str) -> int:
+    """The column that a map names: by its exact name, else by its name without regard to case, blanks and unit."""
+    wanted = header_of(name).name
+    exact = [index for index, header in enumerate(headers) if name in (header.name, f"{header.group}/{header.name}")]
+    alike = [index for index, header in enumerate(headers) if _key(wanted) == _key(header.name)]
+    for found in (exact, alike):
+        if len(found) == 1:
+            return found[0]
+        if found:
+            raise _twice(channel, *(headers[index] for index in found))
+    message = f"map says that {channel} is {name[:_SHOWN]!r}, which the file does not have: it has {_list(headers)}"
+    raise InvalidError(
+        message, errors=[FieldError(pointer="/map", code="no_such_column", message=message, value=name[:_SHOWN])]
+    )
+
+
+def _twice(channel: str, *headers: Header) -> InvalidError:
+    shown = " and ".join(header.shown() for header in headers[:_MOST_NAMED])
+    message = f"{channel} must be one column, got {shown}; map={channel}:NAME says which"
+    return InvalidError(
+        message, errors=[FieldError(pointer=f"/channels/{channel}", code="ambiguous", message=message, value=shown)]
+    )
+
+
+def _unknown(headers: Sequence[Header], unknown: Sequence[Header]) -> InvalidError:
+    """Every column that is not known, and equal names said first: they cannot be told apart by a map either."""
+    repeated = [name for name, times in Counter(header.shown() for header in headers).items() if times > 1]
+    more = f"; {', '.join(repeated[:_MOST_NAMED])} is there more than once" if repeated else ""
+    errors = [
+        FieldError(
+            pointer=f"/channels/{header.shown().replace('~', '~0').replace('/', '~1')}",
+            code="unknown_channel",
+            message=f"{header.shown()!r} is not a channel that is known",
+            value=header.shown(),
+        )
+        for header in unknown
+    ]
+    detail = (
+        f"{_list(unknown)}: not known as a channel; the channels are {', '.join(CHANNELS)}{more}; "
+        "map=CHANNEL:NAME,... says what is what, and leaves out what it does not name"
+    )
+    return InvalidError(detail, errors=errors)
+
+
+def _list(headers: Sequence[Header]) -> str:
+    shown = ", ".join(repr(header.shown()) for header in headers[:_MOST_NAMED])
+    return shown if len(headers) <= _MOST_NAMED else f"{shown} and {len(headers) - _MOST_NAMED} more"
+
+
+def _conversion(channel: str, header: Header, *, mapped: bool) -> Conversion:
+    """The way into the channel's unit. A public name states its unit itself: another one beside it is a contradiction.
+
+    A map states it too, for a column that has none of its own.
+    """
+    own, public = CHANNELS[channel].unit, _key(header.name) == channel
+    if header.unit is None:
+        if public or mapped:
+            return Conversion()
+        rule = (
+            f"must state its unit ({spellings(channel)}), in brackets or in a units row; or map={channel}:{header.name}"
+        )
+        raise _wrong_unit(channel, header, "missing_unit", rule, "none")
+    found = conversion(channel, header.unit)
+    if found is None:
+        rule = f"must be in a unit that is known ({spellings(channel)})"
+        raise _wrong_unit(channel, header, "unknown_unit", rule, repr(header.unit[:_SHOWN]))
+    if public and not mapped and not found.is_identity():
+        rule = f"is in {own} by its name"
+        raise _wrong_unit(channel, header, "mixed_units", rule, repr(header.unit[:_SHOWN]))
+    return found
+
+
+def _wrong_unit(channel: str, header: Header, code: str, rule: str, got: str) -> InvalidError:
+    said = channel if _key(header.name) == channel else f"{channel} (column {header.shown()!r})"
+    message = f"{said}: the unit {rule}, got {got}"
+    error = FieldError(pointer=f"/channels/{channel}", code=code, message=message, value=(header.unit or "")[:_SHOWN])
+    return InvalidError(message, errors=[error])

@@ -1,0 +1,29 @@
+"""A run's record as a file, of whatever format -> checked columns by public channel name."""
+
+from pathlib import Path
+
+from models.arrays import FloatArray
+from service.readers import sandbox
+from service.readers.checks import check_arrays
+from service.readers.csv.read import read_csv
+from service.readers.detect import Format, opened, sniff
+from service.readers.limits import LIMITS, Limits
+
+
+def read_file(
+    path: Path, *, filename: str, mapping: str | None = None, limits: Limits = LIMITS
+) -> dict[str, FloatArray]:
+    """The channels [n] of a CSV, TDMS, MDF4 or Parquet file by public name, in the channels' units.
+
+    `filename` is what the sender called it, `mapping` is `torque_nm:Mz,...`. Raises InvalidError and TooLargeError, and
+    nothing else, whatever the file holds.
+    """
+    kind = sniff(path, filename, limits)
+    if kind is not Format.CSV:
+        columns = sandbox.read_isolated(kind, path, mapping=mapping, limits=limits)
+        check_arrays(columns)
+        return columns
+    with opened(path, limits) as source:
+        columns, line_of = read_csv(source, mapping=mapping, limits=limits)
+    check_arrays(columns, line_of=line_of)
+    return columns

@@ -1,0 +1,104 @@
+"""A run's channels -> a record file: CSV, NI TDMS or ASAM MDF4, as `reading` takes them back bit for bit.
+
+Names and units are the public ones. TDMS and MDF4 need the extras' packages, which are loaded when they are used.
+"""
+
+import warnings
+from collections.abc import Mapping
+from enum import StrEnum
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.arrays import FloatArray
+from service.readers.detect import Format
+from service.readers.sandbox import READERS
+from service.readers.units import CHANNELS
+
+_ROWS = 50_000
+_GROUP = "rig"
+
+
+class RecordFormat(StrEnum):
+    """The formats that are written; the value is what the command line calls it, and JSON holds the whole run."""
+
+    JSON = "json"
+    CSV = "csv"
+    TDMS = "tdms"
+    MDF4 = "mdf4"
+
+    @property
+    def suffix(self) -> str:
+        """Of its files."""
+        return ".mf4" if self is RecordFormat.MDF4 else f".{self.value}"
+
+
+_NEEDING = {RecordFormat.TDMS: Format.TDMS, RecordFormat.MDF4: Format.MDF4}
+
+
+def require_writer(kind: RecordFormat) -> None:
+    """Raises ValueError where the package that writes a format is not installed; names the extra that has it."""
+    if kind not in _NEEDING:
+        return
+    _, package, extra = READERS[_NEEDING[kind]]
+    if find_spec(package) is None:
+        raise ValueError(f"{_NEEDING[kind]} is not written here: install clutchlife[{extra}]")
+
+
+def write_record(path: Path, kind: RecordFormat, channels: Mapping[str, FloatArray], head: Mapping[str, Any]) -> None:
+    """Channels [n] by public name into one file, whole or not at all; `head` goes in as comment or properties.
+
+    Raises ValueError where the format is none of records, or its package is not installed.
+    """
+    if kind is RecordFormat.JSON:
+        raise ValueError("a record file must be CSV, TDMS or MDF4, got JSON")
+    require_writer(kind)
+    partial = path.with_name(f".{path.stem}.part{path.suffix}")
+    _WRITERS[kind](partial, channels, head)
+    partial.replace(path)
+
+
+def _write_csv(path: Path, channels: Mapping[str, FloatArray], head: Mapping[str, Any]) -> None:
+    """The shortest decimals that are the same doubles, a comment line before the header."""
+    columns = list(channels.values())
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write("# " + ", ".join(f"{name} {value}" for name, value in head.items()) + "\n")
+        file.write(",".join(channels) + "\n")
+        for start in range(0, columns[0].size, _ROWS):
+            cells = [map(repr, column[start : start + _ROWS].tolist()) for column in columns]
+            file.writelines(",".join(row) + "\n" for row in zip(*cells, strict=True))
+
+
+def _write_tdms(path: Path, channels: Mapping[str, FloatArray], head: Mapping[str, Any]) -> None:
+    from nptdms import ChannelObject, RootObject, TdmsWriter  # type: ignore[import-untyped]
+
+    objects = [RootObject(properties=dict(head))]
+    for name, column in channels.items():
+        objects.append(ChannelObject(_GROUP, name, column, properties={"unit_string": CHANNELS[name].unit}))
+    with TdmsWriter(path) as writer:
+        writer.write_segment(objects)
+
+
+def _write_mdf4(path: Path, channels: Mapping[str, FloatArray], head: Mapping[str, Any]) -> None:
+    """With time as the master channel; plateaus, which have none, by their number."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the package warns of others as it is loaded
+        from asammdf import MDF, Signal
+        from asammdf.blocks import v4_constants as v4c
+
+        rows = next(iter(channels.values())).size
+        master = channels.get("time_s", np.arange(rows, dtype=np.float64))
+        said = ("time", v4c.SYNC_TYPE_TIME) if "time_s" in channels else ("number", v4c.SYNC_TYPE_INDEX)
+        signals = [
+            Signal(column, master, name=name, unit=CHANNELS[name].unit, master_metadata=said)
+            for name, column in channels.items()
+            if name != "time_s"
+        ]
+        with MDF(version="4.10") as file:
+            file.append(signals, comment=", ".join(f"{name} {value}" for name, value in head.items()))
+            file.save(path, overwrite=True)
+
+
+_WRITERS = {RecordFormat.CSV: _write_csv, RecordFormat.TDMS: _write_tdms, RecordFormat.MDF4: _write_mdf4}

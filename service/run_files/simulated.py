@@ -1,0 +1,74 @@
+"""Simulated runs as they are posted: in the channels' public units, and labelled as simulated."""
+
+from typing import Any
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.records.runs import Plateaus, Record
+from models.rig.simulated_runs import DutyBlock, SimulatedRun
+from service.readers.units import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
+
+#: A rig's files are no wider than so many digits.
+_DIGITS = 9
+_POWERS = np.array([float(f"1e{exponent}") for exponent in range(23)])
+
+
+def simulated_clutch_body(clutch_id: str) -> dict[str, Any]:
+    """The record of a simulated clutch: the reference's geometry and oil, and that it is simulated."""
+    return {"clutch_id": clutch_id, "origin": "simulated"}
+
+
+def simulated_head(run: SimulatedRun) -> dict[str, Any]:
+    """What is said of a simulated run beside its channels: its name, kind and cycles, and that it is simulated."""
+    return {"run_id": run.run_id, "kind": run.kind.value, "cycles": run.cycles, "origin": "simulated"}
+
+
+def simulated_channels(run: SimulatedRun) -> dict[str, FloatArray]:
+    """The channels [n] of a simulated run by public name, in their units, to nine digits; none where it has none."""
+    held = run.record if run.record is not None else run.plateaus
+    if held is None:
+        return {}
+    return {name: _from_si(name, column) for name, column in _columns(held).items() if column is not None}
+
+
+def simulated_body(run: SimulatedRun) -> dict[str, Any]:
+    """A simulated run as it is posted."""
+    body = simulated_head(run)
+    channels = simulated_channels(run)
+    if channels:
+        body["channels"] = {name: column.tolist() for name, column in channels.items()}
+    if run.duty is not None:
+        body["duty"] = _duty(run.duty)
+    return body
+
+
+def _columns(held: Plateaus | Record) -> dict[str, FloatArray | None]:
+    columns = {
+        "pressure_bar": held.pressure,
+        "speed_rpm": held.speed,
+        "torque_nm": held.torque,
+        "oil_temperature_c": held.oil_temperature,
+    }
+    if isinstance(held, Record):
+        return {"time_s": held.time} | columns
+    return columns | {"torque_sd_nm": held.torque_sd}
+
+
+def _from_si(name: str, column: FloatArray) -> FloatArray:
+    """In the channel's unit, to nine digits: each the double nearest to its decimal."""
+    channel = CHANNELS[name]
+    values = (column - channel.offset) / channel.factor
+    size = np.floor(np.log10(np.maximum(np.abs(values), 1e-9))).astype(np.int64)
+    scale = _POWERS[np.clip(_DIGITS - 1 - size, 0, _POWERS.size - 1)]
+    # exact powers of ten, and an integer over one is rounded once
+    return np.asarray(np.round(values * scale) / scale + 0.0, dtype=np.float64)
+
+
+def _duty(block: DutyBlock) -> dict[str, float]:
+    return {
+        "cycles": block.cycles,
+        "energy_per_cycle_kj": round(block.energy_per_cycle / 1000, 6),
+        "initial_speed_rpm": round(block.initial_speed / RADIANS_PER_SECOND_PER_RPM, 6),
+        "maximum_pressure_bar": block.maximum_pressure / PASCALS_PER_BAR,
+    }

@@ -1,0 +1,99 @@
+"""What stands before every address: a bound on the body, and headers that browsers heed."""
+
+from starlette.datastructures import MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from service.errors import TooLargeError
+from service.web.problems import problem
+
+
+class BodyLimit:
+    """Refuses a body over `most` bytes (a file over `most_file`) with 413, announced or grown so far."""
+
+    def __init__(self, app: ASGIApp, most: int, most_file: int) -> None:
+        self.app = app
+        self.most = most
+        self.most_file = most_file
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        most = self.most_file if scope["path"].endswith("/runs/file") else self.most
+        announced = dict(scope["headers"]).get(b"content-length", b"0")
+        if announced.isdigit() and int(announced) > most:
+            await self._refuse(most, scope, receive, send)
+            return
+        taken = 0
+
+        async def counted() -> Message:
+            nonlocal taken
+            message = await receive()
+            taken += len(message.get("body", b""))
+            if taken > most:
+                raise TooLargeError(_detail(most))
+            return message
+
+        await self.app(scope, counted, send)
+
+    async def _refuse(self, most: int, scope: Scope, receive: Receive, send: Send) -> None:
+        response = problem(TooLargeError.status, TooLargeError.slug, TooLargeError.title, _detail(most))
+        response.headers["Connection"] = "close"
+        await response(scope, receive, send)
+
+
+def _detail(most: int) -> str:
+    return f"a request may hold at most {most} bytes here"
+
+
+class Heads:
+    """HEAD is answered wherever GET is: the same status and headers, and no body (RFC 9110, section 9.3.2)."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http" or scope["method"] != "HEAD":
+            await self.app(scope, receive, send)
+            return
+
+        async def without_body(message: Message) -> None:
+            scope["method"] = "HEAD"  # the server must not wait for the body that the headers announce
+            if message["type"] == "http.response.body":
+                message = {**message, "body": b""}
+            await send(message)
+
+        scope["method"] = "GET"
+        await self.app(scope, receive, without_body)
+
+
+class SafeHeaders:
+    """Nothing is sniffed, framed or told to other hosts; pages may load from this host only.
+
+    No script runs that is not a file of this service; the API's description alone starts from an inline one. The
+    plotting library sets inline styles, saves a chart by way of `blob:` and draws icons from `data:`.
+    """
+
+    _base = (
+        "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; object-src 'none'; "
+        "frame-ancestors 'none'; base-uri 'none'; form-action 'none'; "
+    )
+    policy = _base + "script-src 'self'"
+    policy_of_description = _base + "script-src 'self' 'unsafe-inline'"
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        described = scope["type"] == "http" and scope["path"].startswith("/docs")
+        policy = self.policy_of_description if described else self.policy
+
+        async def with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                headers["X-Content-Type-Options"] = "nosniff"
+                headers["Referrer-Policy"] = "no-referrer"
+                headers["Content-Security-Policy"] = policy
+            await send(message)
+
+        await self.app(scope, receive, with_headers)

@@ -1,0 +1,132 @@
+"""Errors as `application/problem+json` (RFC 9457): the one place where what went wrong becomes HTTP."""
+
+import http
+import logging
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import Response
+from starlette.exceptions import HTTPException
+
+from service.errors import (
+    MOST_ERRORS,
+    ConflictError,
+    FieldError,
+    ForbiddenError,
+    InvalidError,
+    NotFoundError,
+    ServiceError,
+    TooLargeError,
+    UnauthorizedError,
+    UnsupportedMediaTypeError,
+)
+from service.schemas.problem import Problem
+from service.web.pages import encode
+from storage.engine.errors import DatabaseBusy, StorageError
+
+PROBLEM_TYPE = "application/problem+json"
+RETRY_AFTER_SECONDS = 1
+_log = logging.getLogger("clutchlife")
+
+
+def problem(
+    status: int, slug: str, title: str, detail: str, errors: tuple[FieldError, ...] = (), total: int = 0
+) -> Response:
+    """The answer for a problem."""
+    body: dict[str, Any] = {
+        "type": f"urn:clutchlife:problem:{slug}",
+        "title": title,
+        "status": status,
+        "detail": detail,
+        "errors": [_shown(each) for each in errors],
+        "total_errors": total,
+    }
+    headers = {"Cache-Control": "no-store"}
+    if status == http.HTTPStatus.SERVICE_UNAVAILABLE:
+        headers["Retry-After"] = str(RETRY_AFTER_SECONDS)
+    if status == http.HTTPStatus.UNAUTHORIZED:
+        headers["WWW-Authenticate"] = "Bearer"
+    return Response(content=encode(body), status_code=status, media_type=PROBLEM_TYPE, headers=headers)
+
+
+def _shown(error: FieldError) -> dict[str, Any]:
+    return {
+        "pointer": error.pointer,
+        "row": error.row,
+        "value": _printable(error.value),
+        "code": error.code,
+        "message": _printable(error.message),
+    }
+
+
+def _printable(text: str) -> str:
+    return text.encode("utf-8", "backslashreplace").decode()
+
+
+def install(app: FastAPI) -> None:
+    """Map every error of the service to its answer."""
+    app.add_exception_handler(ServiceError, _service_error)
+    app.add_exception_handler(StorageError, _storage_error)
+    app.add_exception_handler(RequestValidationError, _request_error)
+    app.add_exception_handler(HTTPException, _http_error)
+    app.add_exception_handler(Exception, _unexpected)
+
+
+def _service_error(_: Request, error: Exception) -> Response:
+    assert isinstance(error, ServiceError)  # noqa: S101  (registered for it)
+    return problem(error.status, error.slug, error.title, _printable(error.detail), error.errors, error.total)
+
+
+def _storage_error(_: Request, error: Exception) -> Response:
+    slug, title = ("busy", "Busy") if isinstance(error, DatabaseBusy) else ("storage", "The database cannot be used")
+    _log.error("storage: %s", error)
+    return problem(503, slug, title, "nothing was changed; try again, or see the service's log")
+
+
+def _request_error(_: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)  # noqa: S101  (registered for it)
+    found = [_argument_error(each) for each in error.errors()]
+    more = f"; {len(found)} errors in all" if len(found) > 1 else ""
+    detail = found[0].message + more
+    return problem(422, InvalidError.slug, InvalidError.title, detail, tuple(found[:MOST_ERRORS]), len(found))
+
+
+def _argument_error(found: dict[str, Any]) -> FieldError:
+    name = ".".join(str(part) for part in found["loc"][1:])
+    shown = repr(found.get("input"))[:80]
+    return FieldError(
+        pointer="/" + "/".join(str(part) for part in found["loc"]),
+        code=found["type"],
+        message=f"{name}: {found['msg']}, got {shown}",
+        value=shown,
+    )
+
+
+def _http_error(_: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)  # noqa: S101  (registered for it)
+    title = http.HTTPStatus(error.status_code).phrase
+    response = problem(error.status_code, title.lower().replace(" ", "-"), title, str(error.detail))
+    response.headers.update(error.headers or {})
+    return response
+
+
+def _unexpected(request: Request, error: Exception) -> Response:
+    _log.error("%s %s", request.method, request.url.path, exc_info=error)
+    return problem(500, ServiceError.slug, ServiceError.title, "the service's log says more")
+
+
+#: For the API's description: which problems an address may answer with.
+def described(*kinds: type[ServiceError]) -> dict[int | str, dict[str, Any]]:
+    """OpenAPI responses for these problems and for those that every address has."""
+    always: list[type[ServiceError]] = [UnauthorizedError, ForbiddenError, InvalidError]
+    found: dict[int | str, dict[str, Any]] = {kind.status: _described(kind.title) for kind in [*always, *kinds]}
+    return found | {503: _described("Busy, or the database cannot be used; try again after Retry-After")}
+
+
+def _described(title: str) -> dict[str, Any]:
+    return {"description": title, "content": {PROBLEM_TYPE: {"schema": Problem.model_json_schema()}}}
+
+
+READING = described(NotFoundError)
+SENDING = described(NotFoundError, ConflictError, TooLargeError, UnsupportedMediaTypeError)

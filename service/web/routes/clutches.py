@@ -1,0 +1,67 @@
+"""Clutches: register, list worst first, look up."""
+
+import pydantic
+from fastapi import APIRouter, Request
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import Response
+
+from service.run_files.json_run import invalid
+from service.schemas.clutch import ClutchIn, ClutchOut, ClutchPage
+from service.web.bodies import described_body, json_body
+from service.web.context import Context, Cursor, Ingester, Limit, Reader
+from service.web.pages import JSON_TYPE, answer, encode, from_cursor, page, tagged
+from service.web.problems import READING, SENDING
+from service.workflows import register_clutch as registration
+
+router = APIRouter(prefix="/v1/clutches", tags=["clutches"])
+
+EXAMPLE = {
+    "clutch_id": "bench3-017",
+    "geometry": {"inner_diameter_mm": 99, "outer_diameter_mm": 133, "friction_faces": 2},
+    "oil": {"kinematic_viscosity_40c_cst": 56, "kinematic_viscosity_100c_cst": 9.3},
+    "end_of_life": {"cof_fraction": 0.5},
+    "friction_material": "paper",
+    "reaction_plate": "steel",
+    "fluid": "ATF",
+}
+
+
+@router.post(
+    "",
+    status_code=201,
+    response_model=ClutchOut,
+    responses=SENDING | {200: {"model": ClutchOut, "description": "Known already, with the same content"}},
+    openapi_extra=described_body(ClutchIn, EXAMPLE),
+)
+async def register_clutch(request: Request, context: Ingester) -> Response:
+    """Register a clutch. Everything but `clutch_id` has a default: the reference's clutch."""
+    body = await json_body(request)
+    found, new = await run_in_threadpool(_register, context, body)
+    headers = {"Location": f"/v1/clutches/{found['clutch_id']}"}
+    return Response(content=encode(found), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
+
+
+def _register(context: Context, body: bytes) -> tuple[dict[str, object], bool]:
+    try:
+        clutch = ClutchIn.model_validate_json(body)
+    except pydantic.ValidationError as error:
+        raise invalid(error) from None
+    return registration.register(context.database, clutch, created_at=context.now())
+
+
+@router.get("", response_model=ClutchPage, responses=READING)
+def list_clutches(request: Request, context: Reader, limit: Limit = 100, cursor: Cursor = None) -> Response:
+    """All clutches with current health and remaining life, the fewest remaining cycles first."""
+    version = context.database.version()  # before the rows are read: what is committed meanwhile makes another
+    known = context.pages.find((limit, cursor))
+    if known is None or known[0] != version:
+        items, after = registration.page(context.database, limit=limit, after=from_cursor(cursor))
+        known = (version, encode(page(items, after)))
+        context.pages.keep((limit, cursor), known, len(known[1]))
+    return tagged(request, known[1], JSON_TYPE)
+
+
+@router.get("/{clutch_id}", response_model=ClutchOut, responses=READING)
+def read_clutch(request: Request, context: Reader, clutch_id: str) -> Response:
+    """One clutch."""
+    return answer(request, registration.look_up(context.database, clutch_id))

@@ -1,0 +1,90 @@
+"""Runs as files: the body itself, or a form with a `file` part; kept on disk while they are read, never in memory whole."""
+
+import tempfile
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Query, Request
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import Response
+from pydantic import AwareDatetime
+from starlette.datastructures import UploadFile
+
+from service.errors import InvalidError
+from service.run_files.upload import read_file_run
+from service.schemas.base import IDENTIFIER_PATTERN, Origin
+from service.schemas.run import Receipt
+from service.web.context import Context, Ingester
+from service.web.pages import JSON_TYPE, encode
+from service.web.problems import SENDING
+from service.workflows.ingest_run import ingest
+
+router = APIRouter(prefix="/v1/clutches/{clutch_id}/runs", tags=["runs"])
+
+_CHUNK = 1 << 20
+_BODY = {
+    "requestBody": {
+        "required": True,
+        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
+Kind = Literal["stationary_stribeck", "dynamic_stribeck"]
+
+
+@router.post(
+    "/file",
+    status_code=201,
+    response_model=Receipt,
+    responses=SENDING | {200: {"model": Receipt, "description": "The same run again: the same receipt"}},
+    openapi_extra=_BODY,
+)
+async def post_run_file(
+    request: Request,
+    context: Ingester,
+    clutch_id: str,
+    kind: Kind,
+    cycles: Annotated[float, Query(ge=0, le=1e12, allow_inf_nan=False)],
+    map: Annotated[str | None, Query(max_length=4000, description="Channels by name: torque_nm:Mz,speed_rpm:n")] = None,  # noqa: A002
+    filename: Annotated[str, Query(max_length=255)] = "upload",
+    run_id: Annotated[str | None, Query(pattern=IDENTIFIER_PATTERN)] = None,
+    started_at: AwareDatetime | None = None,
+    origin: Origin = "measured",
+) -> Response:
+    """Post a run as CSV, NI TDMS, ASAM MDF4 or Parquet, plain or gzipped."""
+    with tempfile.TemporaryDirectory(prefix="clutchlife-") as folder:
+        path = Path(folder) / "run"
+        filename = await _save(request, path, filename)
+        asked = {"kind": kind, "cycles": cycles, "mapping": map, "run_id": run_id, "origin": origin}
+        receipt, new = await run_in_threadpool(_ingest, context, clutch_id, path, filename, started_at, asked)
+    headers = {"Location": f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"}
+    return Response(content=encode(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
+
+
+async def _save(request: Request, path: Path, filename: str) -> str:
+    """Write the file to disk as it arrives; returns what its sender calls it."""
+    if not request.headers.get("content-type", "").startswith("multipart/form-data"):
+        with path.open("wb") as file:
+            async for chunk in request.stream():
+                file.write(chunk)
+        return filename
+    async with request.form(max_files=1, max_fields=8) as form:
+        sent = next((part for part in form.values() if isinstance(part, UploadFile)), None)
+        if sent is None:
+            raise InvalidError("the form must hold one file")
+        with path.open("wb") as file:
+            while chunk := await sent.read(_CHUNK):
+                file.write(chunk)
+        return sent.filename or filename
+
+
+def _ingest(
+    context: Context, clutch_id: str, path: Path, filename: str, started_at: datetime | None, asked: dict[str, Any]
+) -> tuple[dict[str, Any], bool]:
+    # The run is named by none here, so that its columns can go when they are encoded.
+    return ingest(
+        context.database,
+        clutch_id,
+        read_file_run(path, filename=filename, started_at=started_at, **asked),
+        received_at=context.now(),
+    )

@@ -1,0 +1,84 @@
+"""Runs: post, list, look up."""
+
+from typing import Any
+
+from fastapi import APIRouter, Request
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import Response
+
+from service.queries import answers
+from service.run_files.json_run import read_run
+from service.schemas.run import RUN_IN, Receipt, RunOut, RunPage
+from service.web.bodies import described_body, json_body
+from service.web.context import Context, Cursor, Ingester, Limit, Reader
+from service.web.lasting import lasting_answer
+from service.web.pages import JSON_TYPE, answer, encode, from_cursor, page, table
+from service.web.problems import READING, SENDING
+from service.workflows.ingest_run import ingest
+
+router = APIRouter(prefix="/v1/clutches/{clutch_id}/runs", tags=["runs"])
+
+EXAMPLE = {
+    "run_id": "2026-11-02-stationary-7000",
+    "kind": "stationary_stribeck",
+    "cycles": 7000,
+    "started_at": "2026-11-02T08:00:00+01:00",
+    "channels": {
+        "pressure_bar": [5, 5, 5, 5, 5],
+        "speed_rpm": [20, 120, 520, 1020, 1970],
+        "torque_nm": [21.9, 22.8, 22.4, 21.5, 20.8],
+        "oil_temperature_c": [84.1, 84.3, 84.9, 85.2, 85.6],
+    },
+}
+
+COLUMNS = ("run_id", "kind", "cycles", "started_at", "received_at", "origin", "content_sha256", "warnings", "fits")
+
+
+@router.post(
+    "",
+    status_code=201,
+    response_model=Receipt,
+    responses=SENDING | {200: {"model": Receipt, "description": "The same run again: the same receipt"}},
+    openapi_extra=described_body(RUN_IN.json_schema(), EXAMPLE),
+)
+async def post_run(request: Request, context: Ingester, clutch_id: str) -> Response:
+    """Post a run, in any order of cycles. The receipt says what was made of it; by then it is stored for good."""
+    body = await json_body(request)
+    receipt, new = await run_in_threadpool(_ingest, context, clutch_id, body)
+    headers = {"Location": f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"}
+    return Response(content=encode(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
+
+
+def _ingest(context: Context, clutch_id: str, body: bytes) -> tuple[dict[str, Any], bool]:
+    return ingest(context.database, clutch_id, read_run(body), received_at=context.now())
+
+
+@router.get("", response_model=RunPage, responses=READING)
+def list_runs(request: Request, context: Reader, clutch_id: str, limit: Limit = 100, cursor: Cursor = None) -> Response:
+    """Receipts by cycles."""
+    after = from_cursor(cursor)
+
+    def told() -> dict[str, Any]:
+        return page(*answers.run_page(context.database, clutch_id, limit=limit, after=after))
+
+    return lasting_answer(request, context, clutch_id, told)
+
+
+@router.get("/{run_id}", response_model=RunOut, responses=READING)
+def read_run_with_channels(request: Request, context: Reader, clutch_id: str, run_id: str) -> Response:
+    """One receipt with the run's channels as they were sent."""
+    return answer(request, answers.one_run(context.database, clutch_id, run_id))
+
+
+twins = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["spreadsheets"])
+
+
+@twins.get("/runs.csv", response_class=Response, responses=READING)
+def list_runs_csv(
+    request: Request, context: Reader, clutch_id: str, limit: Limit = 1000, cursor: Cursor = None
+) -> Response:
+    """Receipts by cycles as CSV; warnings and fits are counted."""
+    items, _ = answers.run_page(context.database, clutch_id, limit=limit, after=from_cursor(cursor))
+    kept = ({name: item[name] for name in COLUMNS} for item in items)
+    rows = (row | {"warnings": len(row["warnings"]), "fits": len(row["fits"])} for row in kept)
+    return table(request, COLUMNS, rows)

@@ -1,0 +1,133 @@
+"""Eq. 6 against its inverse, finite differences, its series and the kinetics it solves."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from models.degradation.general_order import (
+    Degradation,
+    first_passage,
+    kinetics,
+    progress_fraction,
+    reaches,
+    sensitivities,
+    value,
+)
+
+scales = st.floats(1.0, 1e6)
+exponents = st.floats(0.05, 20.0)
+changes = st.floats(-2.0, 2.0).filter(lambda change: abs(change) > 1e-3)
+
+
+def test_half_of_the_change_by_hand() -> None:
+    """(1 + 15000/5000)^-0.5 = 4^-0.5 = 1/2."""
+    d = Degradation(initial=0.13, change=-0.1, scale=5_000.0, exponent=0.5)
+    assert value(15_000.0, d) == pytest.approx(0.08, rel=1e-15)
+    assert first_passage(0.08, d) == pytest.approx(15_000.0, rel=1e-12)
+
+
+@given(st.floats(-5.0, 5.0), changes, scales, exponents)
+def test_at_zero_nothing_has_happened(initial: float, change: float, scale: float, exponent: float) -> None:
+    d = Degradation(initial=initial, change=change, scale=scale, exponent=exponent)
+    assert value(0.0, d) == initial
+    assert sensitivities(0.0, d).tolist() == [1.0, 0.0, 0.0, 0.0]
+    assert first_passage(initial, d) == 0.0
+
+
+@settings(max_examples=300)
+@given(changes, scales, exponents, st.floats(1e-6, 1.0 - 1e-6))
+def test_inverse_round_trip(change: float, scale: float, exponent: float, share: float) -> None:
+    """value(first_passage(level)) is the level again, wherever in eq. 6's range the level lies.
+
+    Rounding of level - ξ0 by 1e-16 |ξ0| bounds the error.
+    """
+    d = Degradation(initial=0.13, change=change, scale=scale, exponent=exponent)
+    level = 0.13 + share * change
+    zeta = first_passage(level, d)
+    assert reaches(level, d)
+    if np.isfinite(zeta):
+        assert value(zeta, d) == pytest.approx(level, abs=1e-13)
+
+
+@given(st.floats(1e-3, 1e5), changes, scales, st.floats(0.1, 5.0))
+def test_passage_of_a_value_is_its_progress(zeta: float, change: float, scale: float, exponent: float) -> None:
+    """Where the law has not saturated, so that the level still says where on the curve it lies."""
+    d = Degradation(initial=0.0, change=change, scale=scale, exponent=exponent)
+    if progress_fraction(zeta, scale, exponent) < 0.999:
+        assert first_passage(value(zeta, d), d) == pytest.approx(zeta, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("level", "change"), [(0.05, -0.06), (0.07, -0.06), (0.14, -0.06), (0.1, 0.06), (0.1, 0.0), (0.2, 0.06)]
+)
+def test_a_level_outside_the_range_is_never_passed(level: float, change: float) -> None:
+    d = Degradation(initial=0.13, change=change, scale=4_000.0, exponent=0.8)
+    assert not reaches(level, d)
+    assert first_passage(level, d) == math.inf
+
+
+def test_passages_broadcast_and_overflow_to_infinity_without_a_warning() -> None:
+    d = Degradation(initial=1.0, change=np.array([-0.4, -0.6, -0.5 - 1e-15]), scale=1e5, exponent=0.01)
+    assert first_passage(0.5, d).tolist()[0] == math.inf
+    assert np.isinf(first_passage(0.5, d)[2])
+
+
+@settings(max_examples=200)
+@given(st.floats(1.0, 1e5), changes, st.floats(10.0, 1e5), st.floats(0.1, 5.0))
+def test_sensitivities_against_central_differences(zeta: float, change: float, scale: float, exponent: float) -> None:
+    """A central difference of step h errs by h² f'''/6 plus 1e-16/h: under 1e-8 of the change at h = 1e-5."""
+    point = np.array([0.13, change, math.log(scale), math.log(exponent)])
+
+    def at(p: np.ndarray) -> float:
+        d = Degradation(initial=p[0], change=p[1], scale=math.exp(p[2]), exponent=math.exp(p[3]))
+        return float(value(zeta, d))
+
+    steps = 1e-5 * np.eye(4)
+    numeric = [(at(point + step) - at(point - step)) / 2e-5 for step in steps]
+    d = Degradation(initial=0.13, change=change, scale=scale, exponent=exponent)
+    np.testing.assert_allclose(sensitivities(zeta, d), numeric, atol=2e-8)
+
+
+def test_sensitivities_have_a_column_a_coefficient() -> None:
+    d = Degradation(initial=0.13, change=np.array([-0.1, -0.05, 0.02]), scale=4_000.0, exponent=0.8)
+    assert sensitivities(np.array([[0.0], [100.0]]), d).shape == (2, 3, 4)
+
+
+def test_small_progress_keeps_its_digits() -> None:
+    """At ζ/φ = 1e-12 the series ε x (1 - (1 + ε) x/2) is exact to rounding; 1 - (1 + x)^-ε keeps four digits."""
+    x, exponent = 1e-12, 0.7
+    series = exponent * x * (1 - (1 + exponent) * x / 2)
+    assert progress_fraction(x, 1.0, exponent) == pytest.approx(series, rel=1e-14)
+    assert abs((1.0 - (1.0 + x) ** -exponent) / series - 1.0) > 1e-6
+
+
+@pytest.mark.parametrize("exponent", [0.3, 0.8, 1.5, 4.0])
+def test_general_order_kinetics_integrate_to_eq_6(exponent: float) -> None:
+    """dD/dζ = -k Dⁿ with n = 1 + 1/ε and k = ε/φ; the integrator's tolerance is 1e-10."""
+    d = Degradation(initial=0.0, change=1.0, scale=5_000.0, exponent=exponent)
+    rate, order = kinetics(d)
+    zeta = np.linspace(0.0, 40_000.0, 9)
+    solved = solve_ivp(
+        lambda _, left: -rate * left**order, (0.0, 40_000.0), [1.0], "DOP853", zeta, rtol=1e-10, atol=1e-12
+    )
+    np.testing.assert_allclose(1.0 - solved.y[0], value(zeta, d), atol=1e-8)
+    wrong = solve_ivp(lambda _, left: -rate * left, (0.0, 40_000.0), [1.0], "DOP853", zeta, rtol=1e-10, atol=1e-12)
+    assert np.abs(1.0 - wrong.y[0] - value(zeta, d)).max() > 0.01
+
+
+@pytest.mark.parametrize(
+    ("name", "number", "message"),
+    [
+        ("scale", 0.0, "scale must be positive"),
+        ("exponent", -1.0, "exponent must be"),
+        ("change", math.nan, "change must"),
+    ],
+)
+def test_coefficients_check_themselves(name: str, number: float, message: str) -> None:
+    coefficients = {"initial": 1.0, "change": -0.5, "scale": 10.0, "exponent": 1.0} | {name: number}
+    with pytest.raises(ValueError, match=message):
+        Degradation(**coefficients)

@@ -1,0 +1,150 @@
+"""Every effect of the catalogue: what its change looks like, its units and its limits."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.diagnosis.baseline.laws import Scene
+from models.diagnosis.baseline.prediction import frame_of, predict
+from models.diagnosis.campaign import Oil
+from models.diagnosis.design.design import build_design
+from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
+from models.diagnosis.effects.catalogued.oil_temperature import HERSEY
+from models.diagnosis.effects.catalogued.torque_zero_shift import DAYS, STRAIGHT
+from models.diagnosis.effects.effect import Effect, Kind, unit_changes
+from models.diagnosis.effects.viscosity import log_viscosity_ratio, viscosity
+from models.diagnosis.pooled_fit.starts import starting_laws
+from models.friction.stribeck import GAMMA
+from tests.models.diagnosis.campaigns import campaign
+
+SLUGS = [
+    "oil_temperature",
+    "interface_heating",
+    "viscous_exponent",
+    "hydrodynamic_drag",
+    "torque_zero_shift",
+    "pressure_offset",
+    "unsettled_dwell",
+    "channel_delay",
+    "inertia_torque",
+    "squeeze_film",
+    "shaft_ripple",
+    "stick_slip",
+    "running_in",
+    "oil_change",
+    "accelerated_wear",
+    "load_severity",
+    "rest_recovery",
+]
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    design = build_design(campaign(1))
+    return predict(design, starting_laws(design, frame_of(design))).scene
+
+
+def test_the_catalogue_is_the_contracts() -> None:
+    assert [effect.slug for effect in CATALOGUE] == SLUGS
+
+
+@pytest.mark.parametrize("effect", CATALOGUE, ids=SLUGS)
+def test_no_amplitude_no_change_and_all_changes_are_finite(effect: Effect, scene: Scene) -> None:
+    grid = effect.grid(scene.facts)
+    columns = unit_changes(effect, scene, [tried.shape for tried in grid]).T if grid else np.zeros((0, 0))
+    for tried, column in zip(grid, columns, strict=True):
+        assert np.abs(effect.change(scene, 0.0, tried.shape)).max() < 1e-9
+        assert column.shape == scene.curve.shape
+        assert np.isfinite(column).all()
+        one = effect.change(scene, 1e-3 * effect.prior_sd, tried.shape) / (1e-3 * effect.prior_sd)
+        np.testing.assert_allclose(column, one, rtol=1e-9, atol=1e-9 * np.abs(one).max())  # many at once, or each alone
+        assert np.abs(column).max() > 0
+        doubled = effect.change(scene, 2e-3 * effect.prior_sd, tried.shape) / (2e-3 * effect.prior_sd)
+        moving = (
+            scene.points.velocity > 0.01 * scene.points.velocity.max()
+        )  # a film that stands is slow whatever its time
+        # small amplitudes act in proportion
+        assert np.abs(doubled - column)[moving].max() < 0.05 * np.abs(column[moving]).max()
+
+
+def test_effects_of_loops_leave_plateaus_alone(scene: Scene) -> None:
+    for effect in CATALOGUE:
+        if effect.kind is Kind.LAG:
+            for tried in effect.grid(scene.facts):
+                assert np.abs(effect.change(scene, effect.prior_sd, tried.shape)[scene.points.steady]).max() == 0
+
+
+def test_units_of_a_few(scene: Scene) -> None:
+    steady = scene.points.steady
+    inertia = BY_SLUG["inertia_torque"].change(scene, 1.0, ())
+    np.testing.assert_allclose(inertia, scene.points.acceleration / 0.058)  # 1 kg m² feels dω/dt
+    drag = BY_SLUG["hydrodynamic_drag"].change(scene, 1.0, (1.0, 0.0, 0.0, 0.0))
+    assert np.ptp(drag[steady] / scene.points.velocity[steady]) < 1e-12  # pressure is not in it
+    offset = BY_SLUG["pressure_offset"].change(scene, 1000.0, (0.0, 0.0))
+    higher = scene.curve_at(pressure=scene.points.pressure + 1000.0) - scene.curve
+    np.testing.assert_allclose(offset, higher, rtol=0.02, atol=1e-4)
+    zero = BY_SLUG["torque_zero_shift"].change(scene, 0.5, (0.0, 2000.0, *STRAIGHT))
+    assert set(np.unique(zero)) == {0.0, 0.5}
+    assert (zero[scene.points.cycles > 2000.0] == 0.5).all()
+
+
+def test_a_zero_creeps_by_days_where_tests_are_timed(scene: Scene) -> None:
+    """Not by cycles: half of the days may have gone at a tenth of them; without moments it is by cycles."""
+    points, facts = scene.points, scene.facts
+    days = np.where(points.cycles > facts.states[0], 0.5, 0.0) + np.where(points.cycles == facts.states[-1], 0.5, 0.0)
+    timed = replace(
+        scene, facts=replace(facts, first_moment=1e9, last_moment=2e9), points=replace(points, moment=1e9 * (1 + days))
+    )
+    zero = BY_SLUG["torque_zero_shift"]
+    np.testing.assert_allclose(zero.change(timed, 0.4, (DAYS, 1.0, *STRAIGHT)), 0.4 * days, atol=1e-12)
+    untimed = replace(scene, facts=replace(facts, first_moment=None, last_moment=None))
+    by_cycles = 0.4 * (points.cycles - facts.states[0]) / facts.life
+    np.testing.assert_allclose(zero.change(untimed, 0.4, (DAYS, 1.0, *STRAIGHT)), by_cycles, atol=1e-12)
+    courses = [{tried.shape[0] for tried in zero.grid(each.facts)} for each in (timed, untimed)]
+    assert (DAYS in courses[0], DAYS in courses[1]) == (True, False)
+
+
+def test_friction_that_hangs_on_speed_times_viscosity_is_within_reach(scene: Scene) -> None:
+    """Hersey's similarity, exactly: oil of ν for ν_ref is a speed of v ν/ν_ref, whatever the pressure and the state."""
+    points = scene.points
+    steady = points.steady
+    thinner = np.exp(log_viscosity_ratio(points.temperature, scene.facts.reference_temperature, scene.facts.oil))
+    expected = scene.curve_at(velocity=points.velocity * thinner) - scene.curve
+    change = BY_SLUG["oil_temperature"].change(scene, GAMMA, (HERSEY,))
+    assert np.abs(expected[steady]).max() > 0.01
+    np.testing.assert_allclose(change[steady], expected[steady], atol=1e-9)
+
+
+def test_a_delay_is_the_torque_of_a_moment_before(scene: Scene) -> None:
+    delayed = scene.curve + BY_SLUG["channel_delay"].change(scene, 0.05, ())
+    loop = np.flatnonzero(scene.points.loop == 0)
+    phase, late = scene.points.phase[loop], 0.05 * scene.points.angular_frequency[loop]
+    expected = np.interp(phase - late, phase, scene.curve[loop], period=2 * np.pi)
+    away = scene.points.velocity[loop] > 1.0  # the cusp at rest is no parabola
+    np.testing.assert_allclose(delayed[loop][away], expected[away], rtol=2e-4)
+
+
+def test_viscosity_meets_its_two_points_and_one_of_the_reference() -> None:
+    oil = Oil(viscosity_40=56e-6, viscosity_100=9.3e-6)
+    found = viscosity(np.array([313.15, 373.15, 353.15, 363.15]), oil)
+    np.testing.assert_allclose(found[:2], [56e-6, 9.3e-6], rtol=1e-9)
+    # log10 log10(ν + 0.7) = 8.2404 - 3.2040 log10 T, rounded coefficients: 1 % of ν
+    expected = 10**10 ** (8.2404 - 3.2040 * np.log10([353.15, 363.15])) - 0.7
+    np.testing.assert_allclose(found[2:] * 1e6, expected, rtol=0.01)
+    assert 0.2 < 1 - found[3] / found[2] < 0.24  # 22 % over the reference's 80 to 90 °C
+
+
+def test_a_dwell_that_is_far_too_short_is_remembered_for_several(scene: Scene) -> None:
+    """x_i = S_i + k a (x_{i-1} - S_i) plateau by plateau, against what the effect says of all at once."""
+    effect, points = BY_SLUG["unsettled_dwell"], scene.points
+    for share, carried in ((0.3, 1.0), (0.4, 0.5)):
+        told = effect.change(scene, share, (0.0, carried))
+        ends = scene.curve.copy()
+        expected = np.zeros_like(ends)
+        for i in np.flatnonzero(points.previous >= 0):
+            before = ends[points.previous[i]]
+            expected[i] = share * (before - scene.curve[i])
+            ends[i] += carried * expected[i]
+        np.testing.assert_allclose(told, expected, atol=1e-9)
+    assert np.abs(effect.change(scene, 0.3, (0.0, 1.0)) - effect.change(scene, 0.3, (0.0, 0.0))).max() > 0.1

@@ -1,0 +1,298 @@
+"""The paragraph: every verdict has one, in words and units, and none says nan."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
+from models.diagnosis.report.report import Advice, Candidate, Estimate, Gain, Misfit, Verdict, Visible, Where
+from models.diagnosis.report.summary import Findings, summarise
+
+MISFIT = Misfit(
+    rmse=0.15234,
+    noise=0.1012,
+    unexplained_share=0.123,
+    where=(
+        Where(axis="oil_temperature_c", strength=31.0, p_value=1e-9),
+        Where(axis="cycles", strength=4.0, p_value=0.1),
+    ),
+)
+GAIN = Gain(
+    held_out_runs=("a",),
+    rmse_before=0.161,
+    rmse_after=0.149,
+    reduction_percent=7.45,
+    reduction_sd=0.9,
+    excess_before=0.08,
+    excess_after=0.01,
+    mse_percent_before=0.3,
+    mse_percent_after=0.2,
+    log_score_gain=40.0,
+    remaining=3.0,
+)
+
+
+def candidate(slug: str, probability: float, evidence: float = 30.0) -> Candidate:
+    effect = BY_SLUG[slug]
+    estimate = Estimate(name=effect.amplitude, value=0.3634, sd=0.0547, unit=effect.unit)
+    return Candidate(
+        effect=slug, title=effect.title, probability=probability, log_evidence_gain=evidence, estimate=estimate
+    )
+
+
+def visible(slug: str, sizes: float) -> Visible:
+    """An effect that so many of its usual sizes would have shown."""
+    effect = BY_SLUG[slug]
+    usual = effect.scale * effect.prior_sd
+    return Visible(effect=slug, amplitude=sizes * usual, least=sizes * usual / 2, usual=usual, unit=effect.unit)
+
+
+def findings(verdict: Verdict, *causes: str) -> Findings:
+    advice = Advice(
+        key="repeat", test="stationary test with the oil at 60 °C", effect="oil_change", other="running_in", nats=1234.5
+    )
+    return Findings(
+        verdict=verdict,
+        causes=causes,
+        candidates=tuple(candidate(slug, 0.9 / len(causes)) for slug in causes),
+        baseline=MISFIT,
+        extended=MISFIT,
+        gain=GAIN,
+        advice=(advice,),
+        visible=tuple(visible(each.slug, 0.2) for each in CATALOGUE),
+        notes=(),
+        tests=12,
+        states=6,
+    )
+
+
+ALL = [
+    findings(Verdict.MODEL_ADEQUATE),
+    *(findings(Verdict.CAUSE_NAMED, each.slug) for each in CATALOGUE),
+    findings(Verdict.CAUSE_NAMED, "oil_temperature", "oil_change"),
+    findings(Verdict.CAUSE_AMBIGUOUS, "oil_change", "running_in", "load_severity"),
+    findings(Verdict.UNEXPLAINED_STRUCTURE),
+    findings(Verdict.INSUFFICIENT_DATA),
+]
+
+
+@pytest.mark.parametrize("found", ALL, ids=lambda found: "-".join((found.verdict.value, *found.causes)))
+def test_every_verdict_has_a_paragraph(found):
+    said = summarise(found)
+    assert said.startswith("12 tests at 6 states of use")
+    assert said.endswith(".")
+    told = said.replace("M_s", "M").replace("C_v", "C").replace("V_S", "V")
+    assert not re.search(r"\bnan\b|\binf\b|None|_|  |\.\.|\( ", told)
+    # a number that has a unit is followed by it
+    for each in found.candidates:
+        if each.estimate.unit not in {"-", ""}:
+            assert f"± 0.055 {each.estimate.unit}" in said
+        assert each.effect.replace("_", " ") in said
+
+
+def test_what_is_named_is_explained_and_what_it_beat_is_said():
+    found = findings(Verdict.CAUSE_NAMED, "oil_temperature")
+    rival = candidate("torque_zero_shift", 0.01, evidence=12.3)
+    helper = replace(candidate("viscous_exponent", 0.02, evidence=14.0), beside=("oil_temperature",))
+    said = summarise(replace(found, candidates=(*found.candidates, rival, helper)))
+    assert BY_SLUG["oil_temperature"].physics in said
+    assert "better than torque zero shift by 17.7 nats" in said
+    assert "viscous exponent" not in said  # it was fitted with the cause, not against it
+    assert (
+        "0.149 Nm against 0.161 Nm (7.5 ± 0.9 % less)" in said or "0.149 Nm against 0.161 Nm (7.4 ± 0.9 % less)" in said
+    )
+    assert "foretells the last states better" in said
+    assert "by more than 100 nats" in said  # some 1,234
+
+
+def test_a_cause_without_a_rival_of_the_catalogue_may_be_none_of_it():
+    said = ambiguous(candidate("squeeze_film", 0.7))
+    assert "The cause may be squeeze film (probability" in said
+    assert "or something that the catalogue does not hold." in said
+
+
+def test_no_gain_is_said_as_none():
+    worse = replace(GAIN, reduction_percent=-2.0, remaining=-1.0)
+    said = summarise(replace(findings(Verdict.CAUSE_NAMED, "oil_change"), gain=worse))
+    assert "(2.0 ± 0.9 % more)" in said
+    assert "for remaining life it is no gain" in said
+
+
+def test_a_test_that_decides_little_is_not_oversold():
+    found = findings(Verdict.CAUSE_AMBIGUOUS, "oil_change", "running_in")
+    assert "What would decide: " in summarise(found)
+    weak = replace(found.advice[0], nats=1.6)
+    assert "No single test would decide" in summarise(replace(found, advice=(weak,)))
+    alone = replace(found.advice[0], other="baseline")
+    assert "To confirm it: " in summarise(replace(found, advice=(alone,)))
+    assert "decide" not in summarise(replace(found, advice=()))
+
+
+def test_a_test_of_a_nat_confirms_nothing_and_hardly_any_structure_is_no_percentage():
+    found = findings(Verdict.CAUSE_NAMED, "oil_temperature")
+    weak = replace(found.advice[0], other="baseline", nats=0.8)
+    said = summarise(replace(found, advice=(weak,), baseline=replace(MISFIT, unexplained_share=1e-5)))
+    assert "To confirm it" not in said
+    assert "No test that was considered would tell more." in said
+    assert "less than 0.1 % of the squared residual" in said
+    assert "To confirm it" in summarise(replace(found, advice=(replace(weak, nats=50.0),)))
+
+
+def test_what_was_not_measured_cannot_be_excluded():
+    found = findings(Verdict.CAUSE_AMBIGUOUS, "torque_zero_shift")
+    said = summarise(replace(found, causes=("torque_zero_shift", "oil_temperature")))
+    assert "oil temperature (not measured, so it cannot be excluded)" in said
+
+
+def test_effects_out_of_reach_are_said_to_be():
+    found = findings(Verdict.MODEL_ADEQUATE)
+    weak = visible("pressure_offset", 10.0)
+    said = summarise(replace(found, visible=(weak,)))
+    assert "hidden behind the baseline for: pressure offset" in said
+    assert "hidden" not in summarise(found)
+
+
+def test_of_a_course_over_life_two_states_say_little():
+    found = findings(Verdict.MODEL_ADEQUATE)
+    assert "Of a course over life 2 states of use can say little" in summarise(replace(found, states=2))
+    assert "1 test at 1 state of use was fitted. " in summarise(replace(found, tests=1, states=1))
+    assert "Of a course" not in summarise(found)
+    some = replace(visible("pressure_offset", 3.0), least=0.1)  # seen in one of its shapes, in most not
+    said = summarise(replace(found, visible=(some,)))
+    assert not any(told in said for told in ("would have shown", "hidden"))
+
+
+def test_notes_on_single_runs_are_counted():
+    notes = ("sweep-003: 1 plateaus at rest left out.", "sweep-004: the same", "Nothing was known of the oil")
+    said = summarise(replace(findings(Verdict.UNEXPLAINED_STRUCTURE), notes=notes))
+    assert said.endswith("Nothing was known of the oil. 2 notes on single runs stand in the report.")
+    assert "sweep" not in said
+
+
+def test_any_amplitude_can_be_told():
+    rng = np.random.default_rng(7)
+    found = findings(Verdict.CAUSE_NAMED, "oil_change")
+    for _ in range(300):
+        value, sd = rng.choice([-1, 1]) * 10 ** rng.uniform(-12, 12), 10 ** rng.uniform(-12, 12)
+        estimate = Estimate(name="step of C_v", value=value, sd=float(rng.choice([0.0, sd])), unit="%")
+        said = summarise(replace(found, candidates=(replace(found.candidates[0], estimate=estimate),)))
+        told = re.search(r"step of C_v (-?[\d.,e+-]+)", said.replace("−", "-"))
+        assert told is not None
+        number = float(told.group(1).replace(",", "").rstrip("."))
+        assert abs(number - value) <= max(0.006 * abs(value), 0.06 * estimate.sd)
+
+
+def test_a_torque_that_is_ahead_is_not_told_as_delayed():
+    found = findings(Verdict.CAUSE_NAMED, "channel_delay")
+    ahead = replace(found.candidates[0], estimate=replace(found.candidates[0].estimate, value=-0.012, sd=0.002))
+    said = summarise(replace(found, candidates=(ahead,)))
+    assert "Torque is ahead of the speed" in said
+    assert "−0.0120 ± 0.0020" in said
+    assert BY_SLUG["channel_delay"].physics not in said
+    late = summarise(found)
+    assert BY_SLUG["channel_delay"].physics in late
+    assert "ahead" not in late
+    other = findings(Verdict.CAUSE_NAMED, "torque_zero_shift")
+    below = replace(other.candidates[0], estimate=replace(other.candidates[0].estimate, value=-0.4))
+    assert BY_SLUG["torque_zero_shift"].physics in summarise(replace(other, candidates=(below,)))
+
+
+@pytest.mark.parametrize(
+    ("strengths", "told"),
+    [((31.0, 4.0), ", which lives on oil temperature and cycles."), ((31.0, 0.0), ", which lives on oil temperature.")],
+)
+def test_axes_that_show_nothing_are_not_spoken_of(strengths, told):
+    where = tuple(replace(each, strength=nats) for each, nats in zip(MISFIT.where, strengths, strict=True))
+    found = findings(Verdict.UNEXPLAINED_STRUCTURE)
+    assert f"is structure{told}" in summarise(replace(found, baseline=replace(MISFIT, where=where)))
+    silent = tuple(replace(each, strength=0.0) for each in where)
+    assert "is structure. " in summarise(replace(found, baseline=replace(MISFIT, where=silent)))
+
+
+@pytest.mark.parametrize(("nats", "told"), [(99.0, "about 99 nats"), (101.0, "more than 100 nats")])
+@pytest.mark.parametrize("other", ["running_in", "baseline"])
+def test_evidence_beyond_doubt_is_not_counted(nats, told, other):
+    found = findings(Verdict.CAUSE_AMBIGUOUS, "oil_change", "running_in")
+    said = summarise(replace(found, advice=(replace(found.advice[0], nats=nats, other=other),)))
+    assert told in said
+    assert said.count(" nats") == 1
+
+
+def test_a_baseline_that_misses_no_more_than_noise_is_not_said_to():
+    found = findings(Verdict.CAUSE_AMBIGUOUS, "squeeze_film")
+    said = summarise(replace(found, baseline=replace(MISFIT, rmse=0.0987)))
+    assert "misses the data by 0.0987 Nm, no more than noise alone would" in said
+    assert "not by chance: what it misses goes together, which lives on oil temperature" in said
+    assert "is structure" not in said
+    assert "no more than noise" not in summarise(found)
+
+
+def test_the_last_states_are_foretold_also_better_only_where_something_else_is():
+    found = findings(Verdict.CAUSE_NAMED, "oil_change")
+    assert "It also foretells the last states better" in summarise(found)
+    worse = summarise(replace(found, gain=replace(GAIN, reduction_percent=-2.0)))
+    assert "It foretells the last states better" in worse
+    assert "noise and gains that scatter included" in worse
+
+
+def ambiguous(*told: Candidate, looks: str = "") -> str:
+    causes = tuple(each.effect for each in told)
+    return summarise(replace(findings(Verdict.CAUSE_AMBIGUOUS, *causes), candidates=told, looks=looks))
+
+
+def test_a_sure_cause_that_is_not_named_says_what_keeps_it_from_being() -> None:
+    assert "It looks like rest recovery" in ambiguous(candidate("rest_recovery", 0.99))
+    said = ambiguous(candidate("rest_recovery", 0.6))
+    assert "The cause may be rest recovery" in said
+    assert "or something that the catalogue does not hold." in said
+
+
+def test_what_the_catalogue_does_not_hold_is_told_by_its_looks() -> None:
+    looks = "a gain that steps"
+    assert "does not hold, such as a gain that steps." in ambiguous(candidate("oil_change", 0.6), looks=looks)
+    both = candidate("oil_change", 0.4), candidate("running_in", 0.3)
+    assert "It may be none of them: a gain that steps would do as well." in ambiguous(*both, looks=looks)
+    assert "none of them" not in ambiguous(*both)
+    said = summarise(replace(findings(Verdict.UNEXPLAINED_STRUCTURE), looks=looks))
+    assert "It looks most like a gain that steps." in said
+
+
+def test_an_oil_temperature_that_nobody_measured_has_no_size() -> None:
+    nobody = replace(candidate("oil_temperature", 0.995), estimate=Estimate(name="β", value=0.0, sd=0.7, unit="-"))
+    said = ambiguous(nobody, candidate("oil_change", 0.1))
+    assert "oil temperature (not measured, so it cannot be excluded)" in said
+    assert "0.7" not in said
+
+
+def test_what_was_fitted_beside_a_named_cause_is_told() -> None:
+    found = findings(Verdict.CAUSE_NAMED, "oil_change")
+    film = replace(candidate("squeeze_film", 0.6), beside=("oil_change",))
+    told = "Something else may be at work beside it, which these data do not tell: squeeze film (probability 0.60)."
+    assert told in summarise(replace(found, candidates=(*found.candidates, film)))
+    assert told not in summarise(replace(found, candidates=(*found.candidates, replace(film, beside=()))))
+    faint = replace(film, probability=0.1)
+    assert "beside it" not in summarise(replace(found, candidates=(*found.candidates, faint)))
+
+
+def test_two_sure_causes_that_do_not_close_are_no_choice() -> None:
+    said = ambiguous(candidate("unsettled_dwell", 0.99), candidate("hydrodynamic_drag", 0.98))
+    assert "It looks like unsettled dwell" in said
+    assert "together with hydrodynamic drag" in said
+    assert "cannot tell which" not in said
+
+
+def test_the_likeliest_comes_first_and_a_correction_of_no_use_is_told_so() -> None:
+    said = ambiguous(candidate("oil_change", 0.03), candidate("inertia_torque", 0.8))
+    assert said.index("inertia torque (") < said.index("oil change (")
+    assert "So it is of no use there." not in said
+    found = findings(Verdict.UNEXPLAINED_STRUCTURE)
+    worse = replace(GAIN, rmse_after=2 * GAIN.rmse_before, reduction_percent=-100.0, log_score_gain=-9.0)
+    assert "So it is of no use there." in summarise(replace(found, gain=worse))
+
+
+def test_how_much_runs_scatter_is_told_where_the_model_is_adequate() -> None:
+    found = findings(Verdict.MODEL_ADEQUATE)
+    assert "from run to run (2.1 % of the torque)" in summarise(replace(found, scatter=0.021))
+    assert "from run to run: the model" in summarise(found)

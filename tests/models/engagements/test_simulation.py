@@ -1,0 +1,60 @@
+"""Engagements: energy balance, the stall of the motor, and the reference's finding that they grow longer with wear."""
+
+import numpy as np
+import pytest
+
+from models.engagements.simulation import Drive, PressureProfile, engage
+from models.rig.campaign import simulated_clutch
+
+RADIUS = 0.058
+
+
+def test_a_constant_torque_stops_the_shaft_as_in_the_textbook() -> None:
+    """With T = μ p and no motor limit left over the shaft decelerates at (T - T_max)/J: closed form against integration."""
+    profile = PressureProfile(contact=0.4, full=0.4 + 1e-6)
+    drive = Drive(drag=0.0)
+    found = engage(lambda pressure, _v: 45.0 * pressure / 8e5, RADIUS, profile=profile, drive=drive)
+    assert found.duration == pytest.approx(drive.speed * drive.inertia / (45.0 - drive.limit), rel=0.01)
+    # the clutch turns into heat what the shaft held and what the motor gave meanwhile
+    given = drive.limit * drive.speed * found.duration / 2
+    assert found.energy == pytest.approx(0.5 * drive.inertia * drive.speed**2 + given, rel=0.01)
+
+
+def test_nothing_is_transferred_before_the_discs_touch() -> None:
+    found = engage(simulated_clutch(1).capacity(0.0), RADIUS)
+    filling = found.time < PressureProfile().contact
+    assert found.torque[filling].max() < 1.0
+    assert found.speed[filling].min() > 0.99 * Drive().speed
+
+
+def test_the_motor_gives_no_more_than_its_limit_and_a_standing_clutch_carries_what_it_gives() -> None:
+    found = engage(simulated_clutch(1).capacity(0.0), RADIUS)
+    assert found.motor_torque.max() <= 20.0
+    assert found.speed[-1] == 0.0
+    assert found.torque[-1] == found.motor_torque[-1] == 20.0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_engagements_grow_longer_as_friction_falls(seed: int) -> None:
+    clutch = simulated_clutch(seed)
+    durations = [engage(clutch.capacity(cycles), RADIUS).duration for cycles in (0.0, 1000.0, 3000.0)]
+    told = [duration for duration in durations if duration is not None]
+    assert len(told) >= 2
+    assert told == sorted(told)
+    assert durations[: len(told)] == told  # once it slips on, it goes on slipping
+
+
+def test_a_clutch_that_is_too_weak_slips_on() -> None:
+    found = engage(lambda pressure, _v: 15.0 * pressure / 8e5, RADIUS)
+    assert found.duration is None
+    assert found.speed[-1] > 0
+
+
+def test_the_profile_is_that_of_fig_3() -> None:
+    profile = PressureProfile()
+    at = profile(np.array([0.05, 0.2, 0.3, 0.9, 2.0]))
+    assert at == pytest.approx([0.0, 2.5e5, 1.0e5, 4.5e5, 8.0e5])
+    with pytest.raises(ValueError, match="times must increase"):
+        PressureProfile(fill=0.5)
+    with pytest.raises(ValueError, match="plateau < pulse"):
+        PressureProfile(plateau=3e5)

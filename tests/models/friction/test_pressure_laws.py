@@ -1,0 +1,87 @@
+"""The pressure laws of fig. 9 against closed forms and against a general optimiser."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from models.arrays import FloatArray
+from models.friction.identification import StribeckFit, fit_curves
+from models.friction.pressure_laws import fit_asymptotic, fit_linear, fit_pressure_laws
+from models.records.runs import curves_by_pressure
+from models.rig.campaign import simulated_clutch
+from models.rig.stationary import NOISELESS, stationary_test
+from models.rig.truth import PROTOCOL_PRESSURES
+
+
+def fits_of_fresh_clutch() -> tuple[StribeckFit, ...]:
+    """Noise-free fits of a simulated clutch whose parameters follow the laws exactly."""
+    clutch = simulated_clutch(3)
+    plateaus = stationary_test(clutch, 0, np.random.default_rng(0), NOISELESS)
+    return fit_curves(curves_by_pressure(plateaus, clutch.geometry))
+
+
+def test_a_straight_line_is_found_exactly() -> None:
+    pressure = PROTOCOL_PRESSURES
+    law = fit_linear(pressure, 2.0 + 3e-6 * pressure, np.ones(7))
+    assert law.intercept == pytest.approx(2.0, abs=1e-12)
+    assert law.slope == pytest.approx(3e-6, rel=1e-12)
+
+
+def test_weights_count() -> None:
+    value = np.array([1.0, 2.0, 3.0, 40.0])
+    law = fit_linear(np.array([1.0, 2.0, 3.0, 4.0]), value, np.array([1e-3, 1e-3, 1e-3, 1e3]))
+    assert law.slope == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("decay", [0.5e5, 1.6e5, 4e5])
+def test_a_falling_exponential_is_found(decay: float) -> None:
+    value = 0.6 + 4.0 * np.exp(-PROTOCOL_PRESSURES / decay)
+    law = fit_asymptotic(PROTOCOL_PRESSURES, value, np.ones(7))
+    # where the decay is short the excess extrapolates to p = 0, so the law is compared where it was measured
+    assert law(PROTOCOL_PRESSURES) == pytest.approx(value, rel=1e-5)
+    assert law.asymptote == pytest.approx(0.6, rel=1e-3)
+
+
+def test_no_general_optimiser_does_better() -> None:
+    rng = np.random.default_rng(11)
+    for _ in range(20):
+        value = 0.6 + 4.2 * np.exp(-PROTOCOL_PRESSURES / 1.6e5) + 0.03 * rng.standard_normal(7)
+        deviation = rng.uniform(0.02, 0.05, 7)
+        law = fit_asymptotic(PROTOCOL_PRESSURES, value, deviation)
+
+        def misfit(x: FloatArray, value: FloatArray = value, deviation: FloatArray = deviation) -> FloatArray:
+            return np.asarray((x[0] + x[1] * np.exp(-(PROTOCOL_PRESSURES - 4e5) / x[2]) - value) / deviation)
+
+        span = 3e5
+        rivals = [
+            least_squares(
+                misfit, [0.5, 0.3, start * span], bounds=([0, 0, 0.05 * span], [9, 99, 20 * span]), x_scale=[1, 1, span]
+            )
+            for start in (0.1, 0.5, 2.0)
+        ]
+        ours = float(np.sum(((law(PROTOCOL_PRESSURES) - value) / deviation) ** 2))
+        assert ours <= min(2 * rival.cost for rival in rivals) * (
+            1 + 1e-5
+        )  # the search over p_0 stops at 1e-5 of its log
+
+
+def test_the_laws_of_a_simulated_clutch() -> None:
+    clutch = simulated_clutch(3)
+    laws = fit_pressure_laws(fits_of_fresh_clutch())
+    assert laws is not None
+    assert laws.static_torque.slope > 0
+    assert laws.stribeck_velocity.slope > 0
+    assert laws.viscous_coefficient.slope > 0
+    assert laws.coulomb_ratio.excess > 0
+    found = laws.parameters(PROTOCOL_PRESSURES).as_array()
+    assert found == pytest.approx(clutch.parameters(PROTOCOL_PRESSURES, 0.0).as_array(), rel=1e-3)
+
+
+def test_too_few_pressures_have_no_law() -> None:
+    fits = fits_of_fresh_clutch()
+    assert fit_pressure_laws(fits[:2]) is None
+    untold = [replace(fit, undetermined=("stribeck_velocity",)) for fit in fits[:5]]
+    assert fit_pressure_laws([*untold, *fits[5:]]) is None
+    assert fit_pressure_laws([*untold[:4], *fits[4:]]) is not None

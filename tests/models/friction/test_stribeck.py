@@ -1,0 +1,97 @@
+"""Eq. 3 and its derivatives against the formula as printed, finite differences and a complex step."""
+
+import numpy as np
+import pytest
+
+from models.friction.stribeck import GAMMA, PARAMETER_NAMES, StribeckParameters, gradient, slope, torque
+from tests.models.friction.stribeck_curves import VELOCITY, eq3, parameters
+
+FRESH = np.array([25.0, 0.57, 4.5, 2.5])
+CASES = [FRESH, np.array([12.0, 0.4, 2.7, 3.2]), np.array([3.0, 4.0, 0.3, 0.0]), np.array([0.0, 1.0, 1.0, 2.0])]
+
+
+@pytest.mark.parametrize("values", CASES)
+def test_torque_is_eq_3_as_printed(values):
+    np.testing.assert_allclose(torque(VELOCITY, parameters(values)), eq3(values, VELOCITY), rtol=1e-14)
+
+
+@pytest.mark.parametrize("values", CASES)
+def test_gradient_by_complex_step(values):
+    """A complex step has no cancellation: equal to rounding."""
+    steps = np.eye(4) * 1e-30j
+    witness = np.stack([_complex_eq3(values + step).imag / 1e-30 for step in steps], axis=1)
+    np.testing.assert_allclose(gradient(VELOCITY, parameters(values)), witness, rtol=1e-12, atol=1e-14)
+
+
+def _complex_eq3(x):
+    return x[0] * (1 + (x[1] - 1) * np.exp(-x[2] / VELOCITY)) + x[3] * VELOCITY**GAMMA
+
+
+@pytest.mark.parametrize("values", CASES)
+def test_slope_by_central_differences(values):
+    """Differences over 1e-5 of v: truncation 1e-10 and rounding 1e-11 of the torque over the step."""
+    h = 1e-5 * VELOCITY
+    p = parameters(values)
+    witness = (torque(VELOCITY + h, p) - torque(VELOCITY - h, p)) / (2 * h)
+    np.testing.assert_allclose(slope(VELOCITY, p), witness, rtol=1e-6, atol=1e-6)
+    np.testing.assert_array_equal(slope(-VELOCITY, p), slope(VELOCITY, p))
+
+
+def test_a_gradient_with_the_columns_swapped_would_be_caught():
+    """Negative control of the complex step: another order of the parameters is far from the witness."""
+    witness = np.stack([_complex_eq3(FRESH + step).imag / 1e-30 for step in np.eye(4) * 1e-30j], axis=1)
+    wrong = gradient(VELOCITY, parameters(FRESH))[:, [0, 2, 1, 3]]
+    assert np.abs(wrong - witness).max() > 1.0
+
+
+@pytest.mark.parametrize("values", CASES)
+def test_both_directions_are_odd(values):
+    p = parameters(values)
+    np.testing.assert_array_equal(torque(-VELOCITY, p), -torque(VELOCITY, p))
+    np.testing.assert_array_equal(gradient(-VELOCITY, p), -gradient(VELOCITY, p))
+
+
+def test_at_rest_the_sign_bit_names_the_limit():
+    p = parameters(FRESH)
+    assert torque(np.array([0.0, -0.0]), p).tolist() == [25.0, -25.0]
+    assert gradient(np.array([0.0, -0.0]), p).tolist() == [[1, 0, 0, 0], [-1, 0, 0, 0]]
+    tiny = np.array([1e-30, -1e-30])  # |v|^0.3 = 1e-9 is what is left of the viscous term
+    np.testing.assert_allclose(torque(tiny, p), [25.0, -25.0], atol=1e-8)
+    assert slope(np.array([0.0]), p).tolist() == [np.inf]
+    assert slope(np.array([0.0]), parameters([25.0, 0.5, 4.5, 0.0])).tolist() == [0.0]
+
+
+def test_at_rest_without_a_stribeck_velocity():
+    """V_S = 0 means e = 1 wherever it moves; at rest e is 0 by its limit, for every V_S."""
+    p = parameters([20.0, 0.5, 0.0, 0.0])
+    assert torque(np.array([0.0, 1e-9, 5.0]), p).tolist() == [20.0, 10.0, 10.0]
+
+
+def test_high_and_low_speed_limits():
+    p = parameters([20.0, 0.5, 3.0, 0.0])
+    np.testing.assert_allclose(torque(np.array([1e-3, 1e9]), p), [20.0, 10.0], rtol=1e-8)
+
+
+def test_parameters_round_trip_and_broadcast():
+    p = parameters(FRESH)
+    np.testing.assert_array_equal(p.as_array(), FRESH)
+    assert isinstance(p.static_torque, float)
+    many = StribeckParameters.from_array(np.stack([FRESH, 2 * FRESH], axis=1)[..., None])
+    assert torque(VELOCITY, many).shape == (2, VELOCITY.size)
+    assert gradient(VELOCITY, many).shape == (2, VELOCITY.size, 4)
+    np.testing.assert_array_equal(torque(VELOCITY, many)[0], torque(VELOCITY, p))
+    assert many.as_array().shape == (4, 2, 1)
+
+
+@pytest.mark.parametrize("bad", [-1.0, np.nan, np.inf])
+@pytest.mark.parametrize("index", range(4))
+def test_a_parameter_that_is_not_finite_and_positive_is_refused(bad, index):
+    values = FRESH.copy()
+    values[index] = bad
+    with pytest.raises(ValueError, match=f"{PARAMETER_NAMES[index]} must be finite and not negative"):
+        parameters(values)
+
+
+def test_an_array_of_another_length_is_refused():
+    with pytest.raises(ValueError, match="values must have 4 rows"):
+        StribeckParameters.from_array(np.ones(3))

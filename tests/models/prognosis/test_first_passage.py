@@ -1,0 +1,215 @@
+"""First passage of a weighted sample, against cases that can be worked out by hand."""
+
+import math
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from models.prognosis.first_passage import (
+    QUANTILES,
+    FirstPassage,
+    PassageStatus,
+    bands,
+    ends_of_life,
+    first_passage,
+    weighted_quantiles,
+)
+from models.tracking.discrepancy import FUTURE, PAST, Discrepancy
+from models.tracking.posterior import Posterior
+
+
+def sample(change: list[float], weight: list[float] | None = None, scale: float = 1_000.0) -> Posterior:
+    """Draws with ξ0 = 1 and ε = 1: the end of life at half is φ (1/(1 - 0.5/-Δ) - 1)."""
+    n = len(change)
+    return Posterior(
+        weight=np.full(n, 1.0 / n) if weight is None else np.array(weight),
+        initial=np.ones(n),
+        change=np.array(change),
+        scale=np.full(n, scale),
+        exponent=np.ones(n),
+        scatter=np.full(n, 0.003),
+    )
+
+
+def numbers(passage: FirstPassage) -> list[float]:
+    found: list[float] = []
+    for entry in asdict(passage).values():
+        entries = entry.values() if isinstance(entry, dict) else entry if isinstance(entry, tuple) else [entry]
+        found += [x for x in entries if isinstance(x, float)]
+    return found
+
+
+def test_a_certain_life_by_hand() -> None:
+    """Δ = -1, ε = 1: 1/(1 + ζ/φ) = 1/2 at ζ = φ."""
+    passage = first_passage(sample([-1.0]), fraction=0.5, as_of=250.0)
+    assert list(passage.end_of_life) == list(QUANTILES)
+    assert all(x == pytest.approx(1_000.0) for x in passage.end_of_life.values())
+    assert all(x == pytest.approx(750.0) for x in passage.remaining.values())
+    assert passage.status == "predicted"
+    assert passage.probability_of_reaching == 1.0
+    assert (passage.initial, passage.threshold) == (1.0, 0.5)
+    assert passage.current == (pytest.approx(0.8), 0.0)
+
+
+def test_remaining_life_is_never_negative() -> None:
+    passage = first_passage(sample([-1.0]), fraction=0.5, as_of=2_000.0)
+    assert set(passage.remaining.values()) == {0.0}
+    assert passage.status is PassageStatus.REACHED
+
+
+def test_half_of_the_probability_decides_what_is_reached() -> None:
+    """Ends of life 1,000 (Δ = -1) and never (Δ = -0.4)."""
+    for weight, status in ((0.5, "reached"), (0.49, "may_never_reach")):
+        passage = first_passage(sample([-1.0, -0.4], [weight, 1.0 - weight]), fraction=0.5, as_of=1_001.0)
+        assert passage.status == status
+        assert passage.probability_of_reaching == pytest.approx(weight)
+
+
+def test_a_quantile_beyond_the_horizon_is_none() -> None:
+    passage = first_passage(sample([-1.0] * 60 + [-0.4] * 40), fraction=0.5, as_of=0.0)
+    assert passage.status == "may_never_reach"
+    assert passage.probability_of_reaching == pytest.approx(0.6)
+    assert passage.end_of_life[0.5] == pytest.approx(1_000.0)
+    assert passage.end_of_life[0.75] is None
+    assert passage.remaining[0.95] is None
+
+
+def test_beyond_the_horizon_counts_as_not_reached() -> None:
+    passage = first_passage(sample([-1.0], scale=2e6), fraction=0.5, as_of=0.0)
+    assert set(passage.end_of_life.values()) == {None}
+    assert passage.probability_of_reaching == 0.0
+    assert first_passage(sample([-1.0], scale=2e6), fraction=0.5, as_of=0.0, horizon=3e6).status == "predicted"
+
+
+def test_the_threshold_is_each_draws_own() -> None:
+    """Two clutches alike but for the level of ξ0: a ratio is indifferent to it."""
+    draws = sample([-1.0, -1.0])
+    scaled = Posterior(
+        weight=draws.weight,
+        initial=np.array([1.0, 2.0]),
+        change=np.array([-1.0, -2.0]),
+        scale=draws.scale,
+        exponent=draws.exponent,
+        scatter=draws.scatter,
+    )
+    np.testing.assert_allclose(ends_of_life(scaled, 0.5), 1_000.0)
+
+
+@given(
+    st.lists(st.floats(-3.0, 3.0), min_size=1, max_size=30),
+    st.floats(0.05, 0.95),
+    st.floats(0.0, 1e7),
+    st.floats(1e-3, 1e9),
+)
+def test_nothing_that_json_cannot_carry(change: list[float], fraction: float, as_of: float, scale: float) -> None:
+    passage = first_passage(sample(change, scale=scale), fraction=fraction, as_of=as_of)
+    assert all(math.isfinite(x) for x in numbers(passage))
+    ends = [math.inf if x is None else x for x in passage.end_of_life.values()]
+    assert ends == sorted(ends)
+    assert 0.0 <= passage.probability_of_reaching <= 1.0
+
+
+def test_weighted_quantiles_of_a_normal() -> None:
+    """10,000 evenly spread draws of a uniform, weighted into a normal: the discreteness leaves 1e-3."""
+    x = np.linspace(-6.0, 6.0, 10_001)
+    weight = np.exp(-0.5 * x**2)
+    np.testing.assert_allclose(
+        weighted_quantiles(x, weight, (0.05, 0.5, 0.975)), [-1.6448536, 0.0, 1.9599640], atol=1e-3
+    )
+
+
+def test_weights_matter_and_order_does_not() -> None:
+    sample_, weight = np.array([3.0, 1.0, 2.0]), np.array([0.1, 0.8, 0.1])
+    shuffled = weighted_quantiles(sample_[::-1], weight[::-1], (0.4, 0.9))
+    np.testing.assert_array_equal(weighted_quantiles(sample_, weight, (0.4, 0.9)), shuffled)
+    assert weighted_quantiles(sample_, weight, (0.4,))[0] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"fraction": 1.0, "as_of": 0.0}, "fraction must lie between"),
+        ({"fraction": 0.5, "as_of": -1.0}, "as_of must be"),
+        ({"fraction": 0.5, "as_of": 0.0, "horizon": math.inf}, "horizon must be"),
+    ],
+)
+def test_arguments_out_of_range(arguments: dict[str, float], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        first_passage(sample([-1.0]), **arguments)
+
+
+def beside(draws: Posterior, size: float, curvature: list[float], step: float = 0.0, at: float = 0.0) -> Posterior:
+    """The same draws with a discrepancy whose curvature on the first stretches is as given; span 1,000."""
+    n = draws.weight.size
+    bends = np.zeros((n, PAST + FUTURE))
+    bends[:, : len(curvature)] = curvature
+    course = Discrepancy(
+        span=1_000.0, size=np.full(n, size), curvature=bends, at=np.array([at]), height=np.full((n, 1), step)
+    )
+    return replace(draws, discrepancy=course)
+
+
+def test_a_discrepancy_that_is_nothing_changes_nothing_but_the_way_it_is_found() -> None:
+    """Along the path, linear between places 6 % apart, the closed form's end is found to 0.1 %."""
+    draws = sample([-1.0, -0.7, -0.4])
+    found = ends_of_life(beside(draws, 0.03, [0.0]), 0.5)
+    np.testing.assert_allclose(found, ends_of_life(draws, 0.5), rtol=1e-3)
+    assert math.isinf(found[2])
+
+
+def test_a_step_of_the_level_is_a_crossing_where_it_is() -> None:
+    """1/(1 + ζ/φ) is 0.55 at ζ = 818: a step of -0.1 at 500, where it is 0.667, brings the end to 1/0.6 - 1."""
+    draws = sample([-1.0])
+    assert ends_of_life(beside(draws, 0.0, [0.0], step=-0.1, at=500.0), 0.5) == pytest.approx(666.7, rel=2e-3)
+    assert ends_of_life(beside(draws, 0.0, [0.0], step=-0.2, at=500.0), 0.5) == pytest.approx(500.0, rel=0.02)
+    assert ends_of_life(beside(draws, 0.0, [0.0], step=0.1, at=500.0), 0.5) == pytest.approx(1_500.0, rel=2e-3)
+
+
+def test_a_bend_by_hand() -> None:
+    """Constant but for δ: curvature w on the first sixth of T = 1,000 alone gives δ = w √18 (u - 1/12)/6 from there on."""
+    draws = replace(sample([-1.0]), change=np.zeros(1))
+    w = -0.5
+    slope = w * math.sqrt(18.0) / 6.0
+    found = ends_of_life(beside(draws, 0.1, [w]), 0.5)[0]
+    assert found == pytest.approx(1_000.0 * (-0.5 / slope + 1.0 / 12.0), rel=1e-3)
+
+
+def test_an_offset_is_part_of_the_criterion() -> None:
+    """ξ + offset <= half of (ξ0 + offset(0)): 1/(1 + u) + 0.2 = 0.6 at u = 1.5; a step from 0 to 0.2 at 100: 7/3."""
+    draws = sample([-1.0])
+    always = first_passage(draws, fraction=0.5, as_of=0.0, offset=lambda z: np.full(z.size, 0.2))
+    assert always.end_of_life[0.5] == pytest.approx(1_500.0, rel=1e-3)
+    assert (always.initial, always.current[0]) == (pytest.approx(1.2), pytest.approx(1.2))
+    later = first_passage(draws, fraction=0.5, as_of=250.0, offset=lambda z: 0.2 * (z > 100.0))
+    assert later.end_of_life[0.5] == pytest.approx(1_000.0 * (1.0 / 0.3 - 1.0), rel=1e-3)
+    assert later.current[0] == pytest.approx(1.0)
+
+
+def test_bands_are_those_of_the_paths() -> None:
+    draws = sample([-1.0, -0.5, -0.8], [0.25, 0.5, 0.25])
+    zeta = np.array([0.0, 1_000.0])
+    mean, quantiles = bands(draws, zeta)
+    np.testing.assert_allclose(mean, [1.0, 0.25 * 0.5 + 0.5 * 0.75 + 0.25 * 0.6])
+    assert quantiles.shape == (2, 3)
+    assert quantiles[1].tolist() == sorted(quantiles[1].tolist())
+    assert 0.5 <= quantiles[1, 0] < quantiles[1, 2] <= 0.75
+
+
+def test_a_value_that_is_not_positive_at_first_is_at_its_threshold_from_the_start() -> None:
+    """ξ0 = -1 lies below -0.5 at once, though eq. 6 then rises through it."""
+    draws = replace(sample([2.0]), initial=np.array([-1.0]))
+    assert ends_of_life(draws, 0.5)[0] == 0.0
+
+
+def test_the_median_of_two_equal_draws_lies_between_them() -> None:
+    assert weighted_quantiles(np.array([1.0, 3.0]), np.ones(2), (0.5,))[0] == 2.0
+
+
+def test_a_horizon_before_now_is_now() -> None:
+    """Reached at 1,000, asked at 2,000 with a horizon of 500: it has been reached, for sure."""
+    passage = first_passage(sample([-1.0]), fraction=0.5, as_of=2_000.0, horizon=500.0)
+    assert passage.probability_of_reaching == 1.0
+    assert passage.end_of_life[0.5] == pytest.approx(1_000.0)

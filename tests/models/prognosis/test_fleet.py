@@ -1,0 +1,188 @@
+"""A population of lives learned from others, and the mixture with the weak prior that it is used in."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.degradation.general_order import Degradation, value
+from models.prognosis.first_passage import ends_of_life
+from models.prognosis.fleet import FEWEST_TESTS, FleetPrior, learn, pooled
+from models.prognosis.scoring import crps_of_sample
+from models.tracking import linear_model
+from models.tracking.filters.grid import Grid
+from models.tracking.measurement import Measurement
+from models.tracking.posterior import Posterior
+from models.tracking.prior import weak
+
+GRID = Grid()
+
+
+def life(rng: np.random.Generator, scale: float) -> Degradation:
+    """A clutch of a population that is no normal one: uniform in Δ/ξ0 and in log φ, log ε."""
+    initial = 0.13 * math.exp(rng.uniform(-0.1, 0.1))
+    return Degradation(
+        initial=initial,
+        change=-initial * rng.uniform(0.65, 0.85),
+        scale=scale * math.exp(rng.uniform(-0.6, 0.6)),
+        exponent=0.8 * math.exp(rng.uniform(-0.5, 0.5)),
+    )
+
+
+def measured(truth: Degradation, last: float, tests: int, rng: np.random.Generator) -> list[Measurement]:
+    zeta = np.linspace(0.0, last, tests)
+    y = value(zeta, truth) + 0.003 * float(truth.initial) * rng.standard_normal(tests)
+    return [Measurement(progress=float(z), value=float(v), variance=0.0) for z, v in zip(zeta, y, strict=True)]
+
+
+def fleet(count: int, seed: int, scale: float = 5000.0) -> FleetPrior:
+    rng = np.random.default_rng(seed)
+    return learn([measured(life(rng, scale), 3.0 * scale, 14, rng) for _ in range(count)])
+
+
+def test_the_population_is_found() -> None:
+    found = fleet(12, 1)
+    assert found.clutches == 12
+    assert found.mean[0] == pytest.approx(-0.75, abs=0.06)
+    assert found.mean[1] == pytest.approx(math.log(5000.0), abs=0.35)
+    assert found.mean[2] == pytest.approx(math.log(0.8), abs=0.35)
+    assert found.mean[3] == pytest.approx(math.log(0.003), abs=0.3)
+    assert (np.sqrt(np.diag(found.scale)) < [0.16, 0.75, 0.6, 0.5]).all()
+
+
+def test_a_small_fleet_stays_vague_and_has_little_say() -> None:
+    small, large = fleet(3, 2), fleet(12, 2)
+    assert small.share < large.share < 0.5
+    deviations = [np.sqrt(np.diag(each.scale) * each.freedom / (each.freedom - 2)) for each in (small, large)]
+    assert (deviations[0] > deviations[1]).all()
+
+
+def test_it_survives_json_and_counts_in_other_units() -> None:
+    found = fleet(3, 3)
+    again = FleetPrior.from_dict(json.loads(json.dumps(found.to_dict())))
+    assert again.to_dict() == found.to_dict()
+    first = Measurement(progress=0.0, value=0.13, variance=0.0)
+    shifted = found.in_unit(2.0).prior_for(first)
+    assert math.exp(shifted.log_scale_mean) == pytest.approx(0.5 * math.exp(found.prior_for(first).log_scale_mean))
+
+
+def test_too_few_tests_teach_nothing() -> None:
+    rng = np.random.default_rng(4)
+    with pytest.raises(ValueError, match=f"{FEWEST_TESTS} tests or more"):
+        learn([measured(life(rng, 5000.0), 9000.0, FEWEST_TESTS - 1, rng)])
+
+
+def crps(posterior: Posterior, truth: float) -> float:
+    return crps_of_sample(np.minimum(ends_of_life(posterior, 0.5), 1e6), posterior.weight, truth)
+
+
+def foretold(prior: FleetPrior, seen: list[Measurement], rng: np.random.Generator) -> tuple[Posterior, Posterior]:
+    """Under the weak prior alone, and under the mixture."""
+    beliefs = weak(seen[0], falling=True), prior.prior_for(seen[0])
+    under = [GRID.posterior(GRID.from_history(each, seen), 1000, rng) for each in beliefs]
+    return under[0], prior.together(under[0], under[1], seen[0])
+
+
+def scored(prior: FleetPrior, seed: int, count: int) -> float:
+    """The mixture's CRPS over the weak prior's, at a third of the lives of `scale` 5,000."""
+    rng = np.random.default_rng(seed)
+    scores = []
+    for _ in range(count):
+        truth = life(rng, 5000.0)
+        end = float(ends_of_life(_certain(truth), 0.5)[0])
+        if end < 1e6:
+            by_weak, by_both = foretold(prior, measured(truth, 0.3 * end, 8, rng), rng)
+            scores.append((crps(by_weak, end) / end, crps(by_both, end) / end))
+    both = np.array(scores).sum(axis=0)
+    return float(both[1] / both[0])
+
+
+def _certain(truth: Degradation) -> Posterior:
+    initial, change, scale, exponent = (
+        np.array([float(each)]) for each in (truth.initial, truth.change, truth.scale, truth.exponent)
+    )
+    return Posterior(
+        weight=np.ones(1), initial=initial, change=change, scale=scale, exponent=exponent, scatter=np.full(1, 1e-4)
+    )
+
+
+def test_a_fleet_of_the_same_kind_helps_and_another_kind_does_little_harm() -> None:
+    ratio = {scale: scored(fleet(8, 5, scale), 6, 12) for scale in (5000.0, 40_000.0)}
+    print(ratio)
+    assert ratio[5000.0] < 0.75
+    assert ratio[40_000.0] < 1.25
+
+
+def test_the_mixture_is_that_of_importance_sampling() -> None:
+    """The witness: 400,000 draws of the mixture itself, weighted by the closed form's evidence, after three tests."""
+    rng = np.random.default_rng(7)
+    prior = fleet(6, 8)
+    truth = life(rng, 5000.0)
+    seen = [replace(m, variance=(0.003 * m.value) ** 2) for m in measured(truth, 3000.0, 3, rng)]
+    believed = replace(weak(seen[0], falling=True), spoiled_share=0.0, law_share=1.0)
+    learned = replace(prior.prior_for(seen[0]), spoiled_share=0.0, law_share=1.0)
+    under = [GRID.posterior(GRID.from_history(each, seen), 4000, rng) for each in (believed, learned)]
+    mixed = prior.together(under[0], under[1], seen[0])
+    reference = _brute(prior, seen, rng)
+    misfits = [_misfit(each, reference) for each in (mixed, *under)]
+    print("misfit of the mixture, the weak and the fleet's sample", misfits)
+    assert misfits[0] < 0.1
+    # the negative control: neither sample alone is that distribution
+    assert min(misfits[1:]) > 0.15
+
+
+def _misfit(found: Posterior, reference: Posterior) -> float:
+    """The largest difference of means, in deviations, or of logarithms of deviations, over the coefficients."""
+    worst = 0.0
+    for name in ("scale", "exponent", "change"):
+        (mean, sd), (other, spread) = (each.moments(np.log(np.abs(getattr(each, name)))) for each in (found, reference))
+        worst = max(worst, abs(mean - other) / spread, abs(math.log(sd / spread)))
+    return worst
+
+
+def _brute(prior: FleetPrior, seen: list[Measurement], rng: np.random.Generator) -> Posterior:
+    """Draws of the mixture prior, with the likelihood as weights; all five coefficients are drawn."""
+    count = 400_000
+    first = weak(seen[0], falling=True)
+    initial = rng.normal(first.initial_mean, 0.02 * first.initial_mean, count)
+    root = np.linalg.cholesky(prior.scale)
+    tail = np.sqrt(prior.freedom / rng.chisquare(prior.freedom, count))
+    x = prior.mean + (rng.standard_normal((count, 4)) @ root.T) * tail[:, None]
+    learned = rng.random(count) < prior.share
+    change = np.where(learned, x[:, 0] * initial, rng.normal(first.change_mean, first.change_sd, count))
+    scale = np.where(learned, x[:, 1], rng.normal(first.log_scale_mean, first.log_scale_sd, count))
+    exponent = np.where(learned, x[:, 2], rng.normal(first.log_exponent_mean, first.log_exponent_sd, count))
+    scatter = np.where(
+        learned, x[:, 3] + np.log(initial), rng.normal(first.log_scatter_mean, first.log_scatter_sd, count)
+    )
+    log_weight = 0.5 * ((initial - first.initial_mean) / (0.02 * first.initial_mean)) ** 2
+    log_weight -= 0.5 * ((initial - first.initial_mean) / first.initial_sd) ** 2
+    for each in seen:
+        b = linear_model.basis(np.full(count, each.progress), scale, exponent)
+        variance = each.variance + np.exp(2.0 * scatter)
+        log_weight += -0.5 * (np.log(variance) + (each.value - initial - change * b) ** 2 / variance)
+    weight = np.exp(log_weight - log_weight.max())
+    assert weight.sum() ** 2 / np.square(weight).sum() > 500
+    return Posterior(
+        weight=weight / weight.sum(),
+        initial=initial,
+        change=change,
+        scale=np.exp(scale),
+        exponent=np.exp(exponent),
+        scatter=np.exp(scatter),
+    )
+
+
+def test_pooled_draws_have_half_of_the_weight_each() -> None:
+    rng = np.random.default_rng(9)
+    seen = measured(life(rng, 5000.0), 9000.0, 8, rng)
+    one, other = (
+        GRID.posterior(GRID.from_history(weak(seen[0], falling=True), seen), size, rng) for size in (300, 500)
+    )
+    both = pooled(one, other)
+    assert both.weight[:300].sum() == pytest.approx(0.5)
+    at = np.array([0.0, 5000.0, 20_000.0])
+    assert both.values(at)[:, :300] == pytest.approx(one.values(at))
+    assert both.values(at)[:, 300:] == pytest.approx(other.values(at))

@@ -1,0 +1,115 @@
+"""Scores against closed forms and hand-worked cases."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import norm
+
+from models.prognosis.scoring import (
+    alpha_lambda,
+    coverage,
+    covered,
+    crps_of_quantiles,
+    crps_of_sample,
+    pit_histogram,
+    pit_of_quantiles,
+    pit_of_sample,
+    prognostic_horizon,
+)
+
+LEVELS = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95)
+
+
+@pytest.mark.parametrize("truth", [-2.0, 0.0, 0.7, 3.0])
+def test_crps_of_a_normal(truth: float) -> None:
+    """The closed form of Gneiting and Raftery, and the definition ∫ (F(x) - 1{x >= truth})² dx, by an even sample: the
+    discreteness of 20,000 points leaves 1e-4."""
+    closed = truth * (2 * norm.cdf(truth) - 1) + 2 * norm.pdf(truth) - 1 / math.sqrt(math.pi)
+    defined = quad(lambda x: norm.cdf(x) ** 2, -12, truth)[0] + quad(lambda x: norm.sf(x) ** 2, truth, 12)[0]
+    sample = norm.ppf((np.arange(20_000) + 0.5) / 20_000)
+    assert crps_of_sample(sample, np.ones(20_000), truth) == pytest.approx(closed, abs=2e-4)
+    assert defined == pytest.approx(closed, abs=1e-6)
+
+
+def test_crps_takes_weights_as_repeated_draws() -> None:
+    repeated = np.array([1.0, 1.0, 1.0, 4.0, 6.0, 6.0])
+    weighted, weight = np.array([6.0, 1.0, 4.0]), np.array([2.0, 3.0, 1.0])
+    expected = np.abs(repeated - 3.0).mean() - 0.5 * np.abs(repeated[:, None] - repeated).mean()
+    assert crps_of_sample(weighted, weight, 3.0) == pytest.approx(expected)
+    assert crps_of_sample(weighted, 10.0 * weight, 3.0) == pytest.approx(expected)
+
+
+def test_crps_of_quantiles_is_the_absolute_error_of_a_certain_prediction() -> None:
+    for truth in (2.0, 5.0, 9.0):
+        assert crps_of_quantiles(LEVELS, [5.0] * 7, truth) == pytest.approx(abs(truth - 5.0))
+
+
+def test_crps_of_quantiles_nears_that_of_the_distribution() -> None:
+    """199 levels of a normal: the integral over the levels by the nearest one is right to 1 %; seven to 15 %."""
+    levels = np.arange(1, 200) / 200
+    for truth in (-1.0, 0.2, 2.0):
+        exact = truth * (2 * norm.cdf(truth) - 1) + 2 * norm.pdf(truth) - 1 / math.sqrt(math.pi)
+        assert crps_of_quantiles(levels, norm.ppf(levels), truth) == pytest.approx(exact, rel=0.01)
+        assert crps_of_quantiles(LEVELS, norm.ppf(LEVELS), truth) == pytest.approx(exact, rel=0.15)
+
+
+def test_levels_must_ascend_within_the_unit_interval() -> None:
+    for levels, quantiles in (((0.5, 0.4), (1.0, 2.0)), ((0.0, 0.5), (1.0, 2.0)), ((0.5,), (1.0, 2.0)), ((), ())):
+        with pytest.raises(ValueError, match="levels must ascend"):
+            crps_of_quantiles(levels, quantiles, 1.0)
+
+
+def test_a_bound_beyond_the_horizon_holds_what_never_came() -> None:
+    assert covered(5.0, None, None)
+    assert covered(5.0, None, 9.0)
+    assert not covered(5.0, None, 4.0)
+    assert not covered(5.0, 8.0, None)
+    assert covered(None, None, None)
+    assert not covered(None, None, 9.0)
+
+
+def test_coverage_and_its_error() -> None:
+    share, error = coverage([True] * 90 + [False] * 10)
+    assert (share, error) == (pytest.approx(0.9), pytest.approx(0.03))
+    with pytest.raises(ValueError, match="at least one"):
+        coverage([])
+
+
+def test_the_pit_of_calibrated_predictions_is_uniform_and_of_sure_ones_is_not() -> None:
+    """1,000 truths from N(0, 1): ten bins of 10 % ± 1 %; predictions half as wide fill the outer bins."""
+    truths = np.random.default_rng(3).standard_normal(1_000)
+    even = norm.ppf((np.arange(500) + 0.5) / 500)
+    right = pit_histogram([pit_of_sample(even, np.ones(500), t) for t in truths])
+    sure = pit_histogram([pit_of_sample(0.5 * even, np.ones(500), t) for t in truths])
+    assert right.sum() == pytest.approx(1.0)
+    assert np.abs(right - 0.1).max() < 0.04
+    assert min(sure[0], sure[-1]) > 0.2
+
+
+def test_the_pit_by_quantiles() -> None:
+    assert pit_of_quantiles((0.1, 0.5, 0.9), (1.0, 2.0, 4.0), 3.0) == pytest.approx(0.7)
+    assert pit_of_quantiles((0.1, 0.5, 0.9), (1.0, 2.0, 4.0), 0.5) == pytest.approx(0.05)
+    assert pit_of_quantiles((0.1, 0.5, 0.9), (1.0, 2.0, 4.0), 9.0) == pytest.approx(0.95)
+    assert pit_of_sample(np.array([1.0, 2.0, 3.0, 4.0]), np.ones(4), 2.0) == pytest.approx(0.375)
+
+
+def test_alpha_lambda_accuracy() -> None:
+    """At 600 of 1,000 cycles 400 remain: ±20 % is 320 to 480."""
+    assert [alpha_lambda(p, 600.0, 1_000.0) for p in (319.0, 321.0, 479.0, 481.0, None)] == [
+        False,
+        True,
+        True,
+        False,
+        False,
+    ]
+    with pytest.raises(ValueError, match="no life left"):
+        alpha_lambda(1.0, 1_000.0, 1_000.0)
+
+
+def test_the_prognostic_horizon_counts_from_where_all_that_follow_are_right() -> None:
+    at = [0.0, 250.0, 500.0, 750.0]
+    assert prognostic_horizon(at, [1_050.0, 900.0, 480.0, 260.0], 1_000.0) == 500.0
+    assert prognostic_horizon(at, [1_050.0, 800.0, 480.0, 260.0], 1_000.0) == 1_000.0
+    assert prognostic_horizon(at, [1_050.0, 800.0, 480.0, None], 1_000.0) is None

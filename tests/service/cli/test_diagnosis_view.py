@@ -1,0 +1,64 @@
+"""What a terminal shows of a diagnosis, with and without colours, of full reports and of empty ones."""
+
+import io
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from service.cli.diagnosis_view import shown
+from service.lives.diagnosis_report import empty, public
+from tests.service.lives.test_campaign import EMPTY
+from tests.service.workflows.stand_in_engine import diagnose
+
+LIFE = {"status": "predicted", "remaining_cycles": {"0.05": 4000.0, "0.5": 12345.6, "0.95": None}}
+STATE = {"adoptable": True, "adopted": True}
+
+
+def printed(report: dict[str, Any], *, colours: bool = False) -> str:
+    text = io.StringIO()
+    console = Console(file=text, width=100, force_terminal=colours, color_system="256" if colours else None)
+    for part in shown(report):
+        console.print(part)
+    return text.getvalue()
+
+
+@pytest.fixture
+def report() -> dict[str, Any]:
+    found = diagnose(EMPTY, rng=None)  # type: ignore[arg-type]  # none is drawn without tests
+    said = public(found, origin=500.0, before=LIFE, after=LIFE | {"status": "reached"}, notes=("left out",))
+    return said | STATE
+
+
+def test_all_that_matters_is_there(report: dict[str, Any]) -> None:
+    said = printed(report)
+    for words in (
+        "The model is adequate",
+        "A stand-in looked at 0 tests.",
+        "torque_zero_shift",
+        "1.5 ± - Nm zero shift",
+        "0.3 Nm before, 0.25 Nm after, 16.7 ± 2 % less",
+        "Remaining life, baseline: 12,346 cycles (90 %: 4,000 to beyond the horizon)",
+        "Remaining life, extended: its end is reached",
+        "The extended model is adopted",
+        "read the unloaded zero",
+        "Note: left out",
+        "oil_temperature_c",
+    ):
+        assert words in said, words
+    assert report["maps"]["axes"]["cycles"] == [500.0, 1500.0, 2500.0]
+
+
+def test_the_maps_can_be_read_without_colours(report: dict[str, Any]) -> None:
+    lines = [line for line in printed(report).splitlines() if line.startswith("    5 ")]
+    # residuals 3, 4, 5 of at most 5 before, a tenth of it after
+    assert lines[0].split() == ["5", "++####", "5", "·", "·", "·"]
+    assert "\x1b[" not in printed(report)
+    assert "\x1b[30;48;5;160m##" in printed(report, colours=True)
+
+
+def test_a_report_that_says_little_is_shown(report: dict[str, Any]) -> None:
+    little = empty() | {"verdict": "insufficient_data", "summary": "Two tests."} | STATE | {"adopted": False}
+    assert "Too little data" in printed(little)
+    report["maps"]["before"] = {"speed_pressure": [[None] * 3] * 2, "pressure_cycles": [[0.0] * 2] * 3}
+    assert "·" in printed(report)

@@ -1,0 +1,209 @@
+"""Tests with the clutch open: taken in, said to be such, evidence for the diagnosis and nothing for any track."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from service.lives.model_correction import corrected
+from service.workflows.replay import replay_clutch
+from storage.engine.database import open_database
+from tests.service.lives.test_campaign import campaign, post
+from tests.service.run_files.test_files_and_records import dynamic_record
+from tests.support import stationary
+
+CLUTCH = "/v1/clutches/c1"
+RUNS = f"{CLUTCH}/runs"
+SPEEDS = [20.0, 520.0, 1020.0, 1520.0, 1970.0]
+#: What is said of a clutch, and what of it has a CSV twin; questions to which no open test changes an answer.
+TOLD = (
+    "remaining-useful-life",
+    "degradation",
+    "stribeck",
+    "loops",
+    "runs",
+    "series",
+    "surfaces",
+    "scores",
+    "engagement",
+)
+TWINS = ("degradation", "stribeck", "loops", "runs", "series", "surfaces", "scores")
+QUESTIONS = (
+    *(name for name in TOLD if name != "runs"),
+    *(f"{name}.csv" for name in TWINS if name != "runs"),
+    "engagement?at_cycles=1000",
+    *(f"remaining-useful-life?{each}" for each in ("method=ukf", "method=grid", "pressure_bar=5", "at_cycles=2500")),
+)
+
+
+def sweep(cycles: float, run_id: str, **changed: Any) -> dict[str, Any]:
+    """The advised stationary test: no pressure, the speeds five times over."""
+    speed = SPEEDS * 5
+    torque = [0.1 + 4e-4 * n + 0.01 * (i % 3) for i, n in enumerate(speed)]
+    channels = {"pressure_bar": [0.0, 0.02, 0.0, 0.01, 0.0] * 5, "speed_rpm": speed, "torque_nm": torque}
+    return {"kind": "stationary_stribeck", "cycles": cycles, "run_id": run_id, "channels": channels | changed}
+
+
+def raw_sweep(noise: float) -> dict[str, list[float]]:
+    """The same as its recorder saw it, 50 samples a second, a plateau 4 s."""
+    rng, per = np.random.default_rng(5), 200
+    speed = np.repeat(SPEEDS, per)
+    return {
+        "time_s": (np.arange(speed.size) / 50).tolist(),
+        "pressure_bar": (noise * rng.standard_normal(speed.size)).tolist(),
+        "speed_rpm": (speed + rng.standard_normal(speed.size)).tolist(),
+        "torque_nm": (0.1 + 4e-4 * speed + 0.02 * rng.standard_normal(speed.size)).tolist(),
+    }
+
+
+def idle_loops(cycles: float) -> dict[str, Any]:
+    """The advised dynamic test."""
+    record = dynamic_record()
+    nothing = {"pressure_bar": [0.0] * len(record["time_s"]), "torque_nm": [0.1 * t for t in record["torque_nm"]]}
+    return {"kind": "dynamic_stribeck", "cycles": cycles, "run_id": f"idle-{cycles:g}", "channels": record | nothing}
+
+
+def told(client: TestClient) -> dict[str, Any]:
+    """All that is said of a clutch beside the list of its runs."""
+    found = {question: client.get(f"{CLUTCH}/{question}") for question in QUESTIONS}
+    assert {answer.status_code for answer in found.values()} == {200}
+    summary = client.get("/v1/clutches").json()["items"][0]
+    line = summary["recent"]["mean_cof"]
+    said = {name: _plain(each) for name, each in found.items()}
+    return said | {
+        "line": line,
+        "summary": {n: v for n, v in summary.items() if n not in ("runs", "recent", "revision")},
+    }
+
+
+def _plain(answer: Any) -> Any:
+    """Without the revision, which every run moves on."""
+    said = answer.json() if answer.headers["content-type"] == "application/json" else answer.text
+    return {name: each for name, each in said.items() if name != "revision"} if isinstance(said, dict) else said
+
+
+def life() -> list[dict[str, Any]]:
+    return [stationary(at, run_id=f"s{at}") for at in (0, 1000, 2000, 3000)]
+
+
+def test_an_open_sweep_is_taken_in_and_said_to_be_one(client: TestClient, database_url: str) -> None:
+    answer = client.post(RUNS, json=sweep(0, "open"))
+    assert answer.status_code == 201, answer.text
+    receipt = answer.json()
+    assert (receipt["fits"], receipt["loops"]) == ([], [])
+    assert [each["code"] for each in receipt["warnings"]] == ["open_clutch"]
+    assert "all pressures lie below 0.05 bar: no curve is fitted" in receipt["warnings"][0]["message"]
+    assert client.post(RUNS, json=sweep(0, "open")).json() == receipt | {"duplicate": True}
+    assert client.get(f"{RUNS}/open").json()["channels"] == sweep(0, "open")["channels"]
+    (run,) = campaign(database_url).campaign.stationary
+    assert run.plateaus.torque.size == 25
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01], ids=["exact", "noisy"])
+def test_so_is_its_raw_record(client: TestClient, database_url: str, noise: float) -> None:
+    post(client, {"kind": "stationary_stribeck", "cycles": 0, "run_id": "raw", "channels": raw_sweep(noise)})
+    receipt = client.get(f"{RUNS}/raw").json()
+    assert receipt["fits"] == []
+    assert "open_clutch" in [each["code"] for each in receipt["warnings"]]
+    (run,) = campaign(database_url).campaign.stationary
+    assert run.plateaus.speed * 30 / np.pi == pytest.approx(SPEEDS, abs=1)
+    assert run.plateaus.torque == pytest.approx(0.1 + 4e-4 * np.array(SPEEDS), abs=0.01)
+    assert run.record is not None
+
+
+def test_a_single_plateau_and_a_deviation_do(client: TestClient) -> None:
+    one = {"pressure_bar": [0.0], "speed_rpm": [500.0], "torque_nm": [-0.1], "torque_sd_nm": [0.01]}
+    assert client.post(RUNS, json=sweep(0, "one", **one)).status_code == 201
+
+
+def test_while_there_is_nothing_else_all_is_answered_as_without_tests(client: TestClient) -> None:
+    bare = {name: client.get(f"{CLUTCH}/{name}").status_code for name in TOLD}
+    csv = {name: client.get(f"{CLUTCH}/{name}.csv").status_code for name in TWINS}
+    post(client, sweep(500, "open"), idle_loops(500))
+    assert {name: client.get(f"{CLUTCH}/{name}").status_code for name in TOLD} == bare
+    assert {name: client.get(f"{CLUTCH}/{name}.csv").status_code for name in TWINS} == csv
+    said = client.get(f"{CLUTCH}/remaining-useful-life").json()
+    assert (said["status"], said["runs_used"], said["as_of_cycles"]) == ("insufficient_data", 0, 500)
+    assert said["criterion"]["initial_mean_cof"] is None
+    for name in ("degradation", "stribeck"):
+        assert client.get(f"{CLUTCH}/{name}").json()["items"] == []
+    assert client.get(f"{RUNS}").json()["items"][1]["run_id"] == "open"
+    assert client.get("/v1/clutches").json()["items"][0]["summary"]["status"] == "insufficient_data"
+    # many plateaus whose pressures are a sensor's noise are no curve to the diagnosis either
+    more = [sweep(500, f"noise-{at}", pressure_bar=[0.001 * (at + i % 7) for i in range(25)]) for at in range(4)]
+    post(client, *more)
+    answer = client.post(f"{CLUTCH}/diagnoses", json={}, headers={"Prefer": "wait=120"}).json()
+    assert (answer["status"], answer["verdict"]) == ("finished", "insufficient_data")
+
+
+def test_no_track_sees_an_open_test_at_a_state(client: TestClient, database_url: str) -> None:
+    """Not to the last bit, whether it comes last or late, nor after all was made anew."""
+    post(client, *life())
+    before = told(client)
+    assert before["remaining-useful-life"]["status"] == "predicted"
+    post(client, sweep(3000, "last"), sweep(1000, "late"), sweep(0, "first") | {"started_at": "2020-01-01T00:00:00Z"})
+    assert told(client) == before
+    raw = {"kind": "stationary_stribeck", "cycles": 2000, "run_id": "raw", "channels": raw_sweep(0.01)}
+    post(client, raw)
+    assert told(client) == before
+    etag = client.get(CLUTCH).headers["etag"]
+    database = open_database(database_url)
+    try:
+        assert replay_clutch(database, "c1") == 8
+    finally:
+        database.close()
+    assert told(client) == before
+    assert client.get(CLUTCH).headers["etag"] == etag
+
+
+def test_an_open_test_that_came_first_leaves_the_reference_to_the_first_with_load(client: TestClient) -> None:
+    post(client, *life())
+    before = told(client)
+    assert client.post("/v1/clutches", json={"clutch_id": "c2"}).status_code == 201
+    for body in (sweep(0, "open") | {"started_at": "2020-01-01T00:00:00Z"}, *life()):
+        assert client.post("/v1/clutches/c2/runs", json=body).status_code == 201
+    for name in ("stribeck", "stribeck.csv"):
+        assert client.get(f"/v1/clutches/c2/{name}").text == client.get(f"{CLUTCH}/{name}").text
+    tracks, earlier = client.get("/v1/clutches/c2/degradation").json()["items"], before["degradation"]["items"]
+    assert [each["measured"] for each in tracks] == [each["measured"] for each in earlier]
+    assert client.get("/v1/clutches/c2/remaining-useful-life?pressure_bar=5").json()["runs_used"] == 4
+
+
+def test_curves_are_paged_past_open_tests(client: TestClient) -> None:
+    post(client, sweep(0, "a"), stationary(0, run_id="b"), sweep(0, "c"), sweep(500, "d"), stationary(1000, run_id="e"))
+    first = client.get(f"{CLUTCH}/stribeck?limit=1").json()
+    assert [each["run_id"] for each in first["items"]] == ["b"]
+    second = client.get(f"{CLUTCH}/stribeck?limit=1&cursor={first['next']}").json()
+    assert ([each["run_id"] for each in second["items"]], second["next"]) == (["e"], None)
+
+
+def test_loops_are_told_against_the_state_s_test_with_load(client: TestClient) -> None:
+    post(
+        client,
+        stationary(0, run_id="s0"),
+        {"kind": "dynamic_stribeck", "cycles": 500, "run_id": "d", "channels": dynamic_record()},
+    )
+    before = client.get(f"{CLUTCH}/loops").json()
+    post(client, sweep(400, "open"))
+    assert client.get(f"{CLUTCH}/loops").json() == before
+    assert before["items"][0]["attractor_nm_s"] is not None
+
+
+def test_a_file_of_one_is_taken_in(client: TestClient) -> None:
+    channels = sweep(0, "open")["channels"]
+    rows = zip(channels["pressure_bar"], channels["speed_rpm"], channels["torque_nm"], strict=True)
+    text = "pressure_bar,speed_rpm,torque_nm\n" + "".join(f"{p},{n},{t}\n" for p, n, t in rows)
+    answer = client.post(f"{RUNS}/file?kind=stationary_stribeck&cycles=0&filename=open.csv", content=text.encode())
+    assert answer.status_code == 201, answer.text
+    assert answer.json()["warnings"][0]["code"] == "open_clutch"
+
+
+def test_an_adopted_model_corrects_no_open_test(client: TestClient, database_url: str) -> None:
+    post(client, stationary(0, run_id="s0"), sweep(0, "open"))
+    known = campaign(database_url)
+    assert known.life is not None
+    shifted = SimpleNamespace(artefact=lambda run, _: np.ones_like(run.plateaus.torque))
+    found = corrected(shifted, known.record, known.life, known.taken, known.campaign.stationary)  # type: ignore[arg-type]
+    assert found.keys() == {"s0"}

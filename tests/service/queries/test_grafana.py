@@ -1,0 +1,113 @@
+"""What Grafana is provisioned with asks for what the service really says."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from tests.support import stationary
+
+FOLDER = Path(__file__).parents[3] / "docker" / "grafana"
+DASHBOARD: dict[str, Any] = json.loads((FOLDER / "dashboards" / "clutchlife.json").read_text(encoding="utf-8"))
+TARGETS = [target for panel in DASHBOARD["panels"] for target in panel["targets"]]
+
+
+@pytest.fixture
+def aged(client: TestClient) -> TestClient:
+    """A service that knows a clutch with three tests."""
+    client.post("/v1/clutches", json={"clutch_id": "bench"})
+    for cycles in (0, 1000, 2000):
+        assert client.post("/v1/clutches/bench/runs", json=stationary(cycles)).status_code == 201
+    return client
+
+
+def test_every_series_is_there_with_the_columns_that_are_read(aged: TestClient) -> None:
+    asked = [target for target in TARGETS if target["datasource"]["uid"] == "clutchlife"]
+    assert asked
+    for target in asked:
+        path = target["url"].removeprefix("http://clutchlife:8000").replace("${clutch}", "bench")
+        params = {each["key"]: each["value"] for each in target["url_options"]["params"]}
+        rows = aged.get(path, params=params).json()[target["root_selector"]]
+        assert rows, (path, params)
+        assert {each["selector"] for each in target["columns"]} <= rows[0].keys()
+
+
+def test_every_panel_finds_rows_among_them(aged: TestClient) -> None:
+    """What a panel filters for is there, and what it maps, sorts or renames is one of its columns."""
+    for panel in DASHBOARD["panels"]:
+        if panel["datasource"]["uid"] != "clutchlife":
+            continue
+        (target,) = panel["targets"]
+        params = {each["key"]: each["value"] for each in target["url_options"]["params"]}
+        rows = aged.get("/v1/clutches/bench/series", params=params).json()["items"]
+        columns = {each["text"] for each in target["columns"]}
+        for step in panel["transformations"]:
+            for each in step["options"].get("filters", []):
+                absent = each["config"]["id"] == "isNull"
+                assert each["config"]["id"] in ("isNull", "isNotNull")
+                rows = [row for row in rows if (row[each["fieldName"]] is None) == absent]
+            assert set(step["options"].get("fields", [])) <= columns, panel["title"]
+        assert len({row["cycles"] for row in rows}) == 3, panel["title"]
+        assert all(row["value"] is not None for row in rows[2:]), panel["title"]
+        for series in panel["options"]["series"]:
+            assert {series[axis]["matcher"]["options"] for axis in "xy"} <= columns, panel["title"]
+
+
+def test_every_expression_selects_by_labels_that_are_there(aged: TestClient) -> None:
+    said = [line for line in aged.get("/metrics").text.splitlines() if not line.startswith("#")]
+    known = {name: re.findall(r'(\w+)="([^"]*)"', line) for line in said for name in [line.partition("{")[0]]}
+    for target in TARGETS:
+        expression = target.get("expr", "").replace("$clutch", "bench")
+        for name, labels in re.findall(r"(clutchlife_\w+)(?:\{([^}]*)\})?", expression):
+            lines = [line for line in said if line.startswith(f"{name}{{")]
+            for label in labels.split(",") if labels else []:
+                lines = [line for line in lines if label in line]
+            assert lines, expression
+            grouped = re.search(r"by \(([^)]*)\)", expression)
+            names = set() if grouped is None else {each.strip() for each in grouped[1].split(",")}
+            assert names <= {label for label, _ in known[name]}, expression
+
+
+def test_every_metric_is_there(aged: TestClient) -> None:
+    said = aged.get("/metrics").text
+    asked = {name for target in TARGETS for name in re.findall(r"clutchlife_\w+", target.get("expr", ""))}
+    assert len(asked) >= 5
+    for name in asked:
+        assert re.search(rf"^{name}\{{", said, re.MULTILINE), name
+    assert not re.search(r"^clutchlife_nothing\{", said, re.MULTILINE)
+
+
+def test_every_source_is_provisioned() -> None:
+    said = (FOLDER / "provisioning" / "datasources" / "clutchlife.yaml").read_text(encoding="utf-8")
+    provisioned = set(re.findall(r"^\s+uid: (\S+)$", said, re.MULTILINE))
+    assert {target["datasource"]["uid"] for target in TARGETS} == provisioned
+    hosts = re.search(r'allowedHosts: \["([^"]+)"\]', said)
+    assert hosts is not None
+    assert all(target["url"].startswith(f"{hosts[1]}/") for target in TARGETS if "url" in target)
+
+
+def test_what_is_mounted_is_where_it_is_looked_for() -> None:
+    compose = (FOLDER.parent / "compose.yaml").read_text(encoding="utf-8")
+    mounts = dict(re.findall(r"- \./grafana/(\S+?):(/\S+?):ro", compose))
+    assert all((FOLDER / name).exists() for name in mounts)
+    provider = (FOLDER / "provisioning" / "dashboards" / "clutchlife.yaml").read_text(encoding="utf-8")
+    assert f"path: {mounts['dashboards']}\n" in provider
+    scraped = (FOLDER / "prometheus.yaml").read_text(encoding="utf-8")
+    host = re.search(r'targets: \["([^"]+)"\]', scraped)
+    assert host is not None
+    assert all(f"//{host[1]}/" in target["url"] for target in TARGETS if "url" in target)
+    assert re.search(r"credentials_file: (\S+)", scraped)[1] == "/run/secrets/clutchlife_key"  # type: ignore[index]
+
+
+def test_no_panel_lies_over_another() -> None:
+    taken: dict[tuple[int, int], str] = {}
+    for panel in DASHBOARD["panels"]:
+        at = panel["gridPos"]
+        assert at["x"] + at["w"] <= 24, panel["title"]
+        for x in range(at["x"], at["x"] + at["w"]):
+            for y in range(at["y"], at["y"] + at["h"]):
+                assert taken.setdefault((x, y), panel["title"]) == panel["title"]
+    assert len({panel["id"] for panel in DASHBOARD["panels"]}) == len(DASHBOARD["panels"])

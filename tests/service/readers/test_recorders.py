@@ -1,0 +1,217 @@
+"""TDMS, MDF4 and Parquet: the same columns as were written; wrong files end in errors, in a process of their own."""
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models.arrays import FloatArray
+from service.errors import InvalidError, ServiceError, TooLargeError
+from service.readers import sandbox
+from service.readers.detect import Format
+from service.readers.limits import LIMITS
+from service.readers.read_file import read_file
+from tests.service.readers.sample_files import UNITS, record, write_mdf, write_parquet, write_tdms
+
+Writer = Callable[..., Path]
+WRITERS = pytest.mark.parametrize(
+    ("write", "name"), [(write_tdms, "a.tdms"), (write_mdf, "a.mf4"), (write_parquet, "a.parquet")]
+)
+GERMAN = {"M": "kNm", "n": "rad/s", "p": "MPa", "Öltemperatur": "K"}
+
+
+def german(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    return {
+        "time_s": columns["time_s"],
+        "M": columns["torque_nm"] / 1e3,
+        "n": columns["speed_rpm"] * (2 * np.pi / 60),
+        "p": columns["pressure_bar"] / 10,
+        "Öltemperatur": columns["oil_temperature_c"] + 273.15,
+    }
+
+
+def read(path: Path, mapping: str | None = None) -> dict[str, FloatArray]:
+    return read_file(path, filename=path.name, mapping=mapping)
+
+
+@WRITERS
+def test_columns_come_back_bit_for_bit(tmp_path: Path, write: Writer, name: str) -> None:
+    columns = record()
+    got = read(write(tmp_path / name, columns, units=UNITS))
+    assert got.keys() == columns.keys()
+    for channel, column in columns.items():
+        assert got[channel].tobytes() == column.tobytes()
+
+
+@WRITERS
+def test_units_are_converted_and_names_understood(tmp_path: Path, write: Writer, name: str) -> None:
+    columns = record(200)
+    got = read(write(tmp_path / name, german(columns), units=GERMAN))
+    assert got.keys() == columns.keys()
+    for channel, column in columns.items():
+        np.testing.assert_allclose(got[channel], column, rtol=1e-13)
+
+
+@WRITERS
+def test_half_a_file_is_refused(tmp_path: Path, write: Writer, name: str) -> None:
+    whole = write(tmp_path / name, record(), units=UNITS).read_bytes()
+    for part in (0.05, 0.995):
+        cut = tmp_path / f"cut-{name}"
+        cut.write_bytes(whole[: int(part * len(whole))])
+        with pytest.raises(InvalidError):
+            read(cut)
+
+
+@WRITERS
+def test_damaged_files_raise_nothing_but_contract_errors(tmp_path: Path, write: Writer, name: str) -> None:
+    whole = write(tmp_path / name, record(50), units=UNITS).read_bytes()
+    rng = np.random.default_rng(11)
+    for _ in range(3 if write is write_mdf else 8):
+        damaged = bytearray(whole)
+        for place in rng.integers(8, min(len(whole), 4000), 12):
+            damaged[place] = rng.integers(256)
+        path = tmp_path / f"damaged-{name}"
+        path.write_bytes(damaged)
+        try:
+            read(path)
+        except ServiceError as error:
+            assert error.status in (413, 422)  # noqa: PT017
+
+
+@WRITERS
+def test_a_unit_that_is_not_known_is_refused(tmp_path: Path, write: Writer, name: str) -> None:
+    with pytest.raises(InvalidError, match=r"torque_nm .*'M'.*'furlong'"):
+        read(write(tmp_path / name, german(record(50)), units=GERMAN | {"M": "furlong"}))
+
+
+@WRITERS
+def test_channels_that_are_not_known_need_a_map(tmp_path: Path, write: Writer, name: str) -> None:
+    columns = record(50)
+    columns["Mz"] = columns.pop("torque_nm")
+    path = write(tmp_path / name, columns, units={})
+    with pytest.raises(InvalidError, match="'Mz': not known"):
+        read(path)
+    assert read(path, "torque_nm:Mz")["torque_nm"].tobytes() == columns["Mz"].tobytes()
+
+
+@WRITERS
+def test_not_finite_values_are_named(tmp_path: Path, write: Writer, name: str) -> None:
+    columns = record(50)
+    columns["torque_nm"][17] = np.nan
+    with pytest.raises(InvalidError, match=r"torque_nm\[17\] must be finite, got nan"):
+        read(write(tmp_path / name, columns, units=UNITS))
+
+
+@WRITERS
+def test_too_many_values_are_too_large(tmp_path: Path, write: Writer, name: str) -> None:
+    path = write(tmp_path / name, record(), units=UNITS)
+    with pytest.raises(TooLargeError, match="must not hold more than 100 values"):
+        read_file(path, filename=name, limits=replace(LIMITS, most_values=100))
+
+
+def test_a_waveform_has_its_time_from_its_clock(tmp_path: Path) -> None:
+    columns = {name: column for name, column in record(100).items() if name != "time_s"}
+    got = read(write_tdms(tmp_path / "a.tdms", columns, properties={"wf_increment": 1e-3, "wf_start_offset": 2.0}))
+    np.testing.assert_allclose(got["time_s"], 2 + np.arange(100) * 1e-3, rtol=1e-15)
+
+
+@pytest.mark.parametrize(("write", "name"), [(write_tdms, "a.tdms"), (write_mdf, "a.mf4")])
+def test_two_rates_are_refused_by_name(tmp_path: Path, write: Writer, name: str) -> None:
+    columns = record(100)
+    slow = {"oil_temperature_c": columns.pop("oil_temperature_c")[:10]}
+    with pytest.raises(
+        InvalidError, match=r"one number of rows, got: (?=.*torque_nm.* has 100)(?=.*oil_temperature_c.* has 10)"
+    ):
+        read(write(tmp_path / name, columns, units=UNITS, more=slow))
+
+
+@pytest.mark.parametrize(("write", "name"), [(write_tdms, "a.tdms"), (write_mdf, "a.mf4")])
+def test_two_channels_of_one_name_are_refused(tmp_path: Path, write: Writer, name: str) -> None:
+    columns = record(100)
+    path = write(tmp_path / name, columns, units=UNITS, more={"torque_nm": columns["torque_nm"]})
+    with pytest.raises(InvalidError, match="torque_nm must be one column"):
+        read(path)
+
+
+def test_mdf_3_is_refused_and_packed_mdf_4_is_read(tmp_path: Path) -> None:
+    columns = record()
+    packed = write_mdf(tmp_path / "b.mf4", columns, units=UNITS, compression=2)
+    assert read(packed)["torque_nm"].tobytes() == columns["torque_nm"].tobytes()
+    old = write_mdf(tmp_path / "a.mdf", columns, units=UNITS, version="3.30")
+    with pytest.raises(InvalidError, match=r"version 4, got '3\.30'"):
+        read(old)
+
+
+def test_a_time_stamp_is_seconds_since_the_first(tmp_path: Path) -> None:
+    stamps = [datetime(2026, 11, 2) + timedelta(milliseconds=100 * index) for index in range(5)]
+    columns = {"time": np.array(stamps, dtype="datetime64[us]"), "torque_nm": np.arange(5.0)}
+    for path in (write_tdms(tmp_path / "a.tdms", columns), write_parquet(tmp_path / "a.parquet", columns)):
+        np.testing.assert_allclose(read(path)["time_s"], 0.1 * np.arange(5), rtol=0, atol=1e-12)
+
+
+def test_words_in_parquet_are_refused(tmp_path: Path) -> None:
+    path = write_parquet(tmp_path / "a.parquet", {"time_s": [0.0, 1.0], "torque_nm": ["a", "b"]})
+    with pytest.raises(InvalidError, match="torque_nm must be numbers, got values of type string"):
+        read(path)
+
+
+def test_a_renamed_picture_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.tdms"
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(100))
+    with pytest.raises(InvalidError, match="PNG picture"):
+        read(path)
+    path.write_bytes(b"RIFF" + bytes(100))
+    with pytest.raises(InvalidError, match="named as TDMS but does not begin as one"):
+        read(path)
+
+
+def test_memory_is_limited(tmp_path: Path) -> None:
+    path = write_tdms(tmp_path / "a.tdms", record(2_000_000), units=UNITS)
+    with pytest.raises(TooLargeError, match="memory"):
+        read_file(path, filename="a.tdms", limits=replace(LIMITS, memory_bytes=130 << 20))
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ("import os; os.abort()", "SIGABRT"),
+        ("while True: pass", "longer than 1 s"),
+        ("import sys; sys.exit(3)", "status 3"),
+        ("raise RecursionError('deep')", "RecursionError: deep"),
+        ("import time; time.sleep(60)", "longer than 1 s"),
+        ("return {'secret': __import__('numpy').zeros(3)}", "gave no answer"),
+        ("return {'torque_nm': __import__('numpy').zeros(9000000)}", "OSError|SIGXFSZ"),
+    ],
+)
+def test_a_reader_that_misbehaves_ends_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str, message: str
+) -> None:
+    (tmp_path / "nptdms.py").write_text("class TdmsFile: pass\n", encoding="utf-8")
+    (tmp_path / "sitecustomize.py").write_text(
+        f"import sys, types\nfake = types.ModuleType('service.readers.tdms')\n"
+        f"def read(path, mapping, limits):\n    {body}\n"
+        "fake.read = read\nsys.modules['service.readers.tdms'] = fake\n",
+        encoding="utf-8",
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(sandbox, "_STARTING_SECONDS", 2)
+    path = tmp_path / "a.tdms"
+    path.write_bytes(b"TDSm")
+    with pytest.raises(InvalidError, match=message):
+        read_file(path, filename="a.tdms", limits=replace(LIMITS, seconds=1, most_values=1_000_000))
+
+
+def test_a_missing_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sandbox.READERS, Format.TDMS, ("service.readers.tdms", "no_such_package", "tdms"))
+    path = tmp_path / "a.tdms"
+    path.write_bytes(b"TDSm")
+    with pytest.raises(InvalidError, match=r"install clutchlife\[tdms\]"):
+        read(path)
+
+
+def test_reading_loads_no_foreign_package_here() -> None:
+    assert "asammdf" not in sys.modules

@@ -1,0 +1,248 @@
+"""Wrong files through the route, against a service in a process of its own: refused by the contract, and nothing else.
+
+After each of them the service answers, the clutch is as it was, and neither the service nor its readers have grown.
+"""
+
+import gzip
+import http.client
+import os
+import threading
+import time
+import zipfile
+from collections.abc import Callable, Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import numpy as np
+import pytest
+
+from tests.benchmarks.memory import added
+from tests.service.readers.sample_files import UNITS, csv_text, record, write_mdf, write_parquet, write_tdms
+from tests.support import Server, serving, stationary
+
+CLUTCH = "/v1/clutches/c1"
+#: A service at rest takes some 130 MB. What refusing a file may add, in it and in its readers together [bytes]: a reader
+#: of MDF4 alone takes 150 MB before it has read a byte.
+MOST_ADDED = 300 << 20
+#: No refusal may take longer [s]: the readers have 30 s, and none of these files needs a tenth of that.
+MOST_SECONDS = 20.0
+PNG = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + np.random.default_rng(1).bytes(5000)
+HEADER = "time_s,pressure_bar,speed_rpm,torque_nm\n"
+
+
+class Watched:
+    """A service that runs, with a clutch that has a run, and the memory that its processes take."""
+
+    def __init__(self, server: Server, client: httpx2.Client) -> None:
+        self.http = client
+        self._pid = server.pid
+        client.post("/v1/clutches", json={"clutch_id": "c1"})
+        client.post(f"{CLUTCH}/runs", json=stationary(0, run_id="known"))
+        self.before = self.state()
+
+    def state(self) -> list[Any]:
+        """All that is told of the clutch: revision and ETag among it."""
+        said = [self.http.get(f"{CLUTCH}{path}") for path in ("", "/runs", "/remaining-useful-life", "/loops")]
+        return [(answer.status_code, answer.headers["etag"], answer.json()) for answer in said]
+
+    def post(self, content: bytes, *, name: str = "run.csv", **query: str) -> tuple[httpx2.Response, int]:
+        """The answer, and by how much the memory of the service and its readers had grown at most meanwhile."""
+        asked = {"kind": "dynamic_stribeck", "cycles": "0", "filename": name} | query
+        answers: list[httpx2.Response] = []
+        grown = added(
+            self._pid,
+            lambda: answers.append(self.http.post(f"{CLUTCH}/runs/file", params=asked, content=content)),
+        )
+        return answers[0], grown
+
+    def refuse(self, content: bytes, *, name: str = "run.csv", status: int = 422, **query: str) -> dict[str, Any]:
+        """Post what must not be taken; the problem."""
+        begun = time.monotonic()
+        answer, grown = self.post(content, name=name, **query)
+        assert time.monotonic() - begun < MOST_SECONDS
+        assert (answer.status_code, answer.headers["content-type"]) == (status, "application/problem+json"), answer.text
+        problem: dict[str, Any] = answer.json()
+        assert problem["status"] == status
+        assert problem["detail"]
+        assert len(problem["errors"]) <= 50
+        assert grown < MOST_ADDED, f"{grown >> 20} MB"
+        assert self.state() == self.before
+        return problem
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Watched]:
+    folder = tmp_path_factory.mktemp("wrong")
+    with serving(folder / "a.db") as server, httpx2.Client(base_url=server.url, timeout=120) as client:
+        yield Watched(server, client)
+
+
+def codes(problem: dict[str, Any]) -> set[str]:
+    return {error["code"] for error in problem["errors"]}
+
+
+def text(columns: dict[str, Any], **how: str) -> bytes:
+    return csv_text(columns, **how).encode()
+
+
+@pytest.mark.parametrize(
+    ("write", "name", "cuts"),
+    [(write_tdms, "a.tdms", 24), (write_parquet, "a.parquet", 6), (write_mdf, "a.mf4", 5)],
+    ids=["TDMS", "Parquet", "MDF4"],
+)
+def test_a_file_cut_off_anywhere(
+    service: Watched, tmp_path: Path, write: Callable[..., Path], name: str, cuts: int
+) -> None:
+    """In its head, in its data, in its tail, and a byte before its end; and whole it is taken, as a control."""
+    whole = write(tmp_path / name, record(400), units=UNITS).read_bytes()
+    places = {1, 3, 9, len(whole) - 1, *np.geomspace(20, len(whole) - 2, cuts - 4).astype(int).tolist()}
+    for place in sorted(places):
+        service.refuse(whole[:place], name=name)
+    service.http.post("/v1/clutches", json={"clutch_id": "control"})
+    asked = {"kind": "dynamic_stribeck", "cycles": "0", "filename": name, "run_id": name}
+    assert service.http.post("/v1/clutches/control/runs/file", params=asked, content=whole).status_code == 201
+
+
+@pytest.mark.statistical
+@pytest.mark.parametrize(("write", "name"), [(write_tdms, "a.tdms"), (write_mdf, "a.mf4")], ids=["TDMS", "MDF4"])
+def test_a_file_cut_off_at_random_places(
+    service: Watched, tmp_path: Path, write: Callable[..., Path], name: str
+) -> None:
+    whole = write(tmp_path / name, record(400), units=UNITS).read_bytes()
+    for place in np.random.default_rng(20131113).integers(1, len(whole), 12).tolist():
+        service.refuse(whole[:place], name=name)
+
+
+@pytest.mark.parametrize("suffix", ["csv", "tdms", "mf4", "mdf", "parquet", "csv.gz", "exe", ""])
+def test_a_picture_by_any_name(service: Watched, suffix: str) -> None:
+    assert "PNG picture" in service.refuse(PNG, name=f"run.{suffix}")["detail"]
+    assert "PNG picture" in service.refuse(gzip.compress(PNG), name=f"run.{suffix}.gz")["detail"]
+
+
+def test_two_million_columns(service: Watched) -> None:
+    row = ",".join(["1"] * 2_000_000)
+    service.refuse((",".join(["torque_nm"] * 2_000_000) + "\n" + row + "\n").encode())
+    service.refuse((",".join(f"c{n}" for n in range(2_000_000)) + "\n" + row + "\n").encode())
+    service.refuse((HEADER + row + "\n").encode())
+    narrow = ",".join(f"c{n}" for n in range(2000)) + "\n"
+    assert codes(service.refuse(narrow.encode())) == {"too_wide"}
+
+
+@pytest.mark.parametrize("kind", ["CSV", "TDMS", "Parquet"])
+def test_a_gzip_bomb(service: Watched, kind: str, tmp_path: Path) -> None:
+    """Half a gigabyte out of half a megabyte."""
+    head = {
+        "CSV": HEADER.encode(),
+        "TDMS": write_tdms(tmp_path / "a.tdms", record(10), units=UNITS).read_bytes(),
+        "Parquet": b"PAR1",
+    }[kind]
+    packed = BytesIO()
+    with gzip.GzipFile(fileobj=packed, mode="wb", compresslevel=9) as bomb:
+        bomb.write(head)
+        for _ in range(512):
+            bomb.write((b"0,0,0,0\n" if kind == "CSV" else bytes(8)) * (1 << 17))
+    problem = service.refuse(packed.getvalue(), name=f"run.{kind.lower()}.gz", status=413)
+    assert "must not unpack to more than" in problem["detail"] or "must not have more than" in problem["detail"]
+
+
+def test_units_that_contradict_themselves(service: Watched) -> None:
+    columns = record(100)
+    rows = text(columns).partition(b"\n")[2]
+    names = ",".join(columns).encode()
+    assert codes(service.refuse(names + b"\ns,bar,rpm,kNm,K\n" + rows)) == {"mixed_units"}
+    both = b"t [s],p [bar],n [rpm],M [Nm],oil_temperature_c\ns,bar,rpm,kNm,C\n"
+    assert codes(service.refuse(both + rows)) == {"mixed_units"}
+
+
+@pytest.mark.parametrize("unit", ["furlong", "mPa", "Nm/s", "", "💥", "Nm" * 500])
+def test_units_that_are_not_known(service: Watched, unit: str) -> None:
+    columns = record(100)
+    rows = text(columns).partition(b"\n")[2]
+    head = f"t [s],p [bar],n [rpm],Drehmoment [{unit}],T_oil [°C]\n".encode()
+    assert codes(service.refuse(head + rows)) <= {"unknown_unit", "missing_unit"}
+
+
+@pytest.mark.parametrize(("write", "name"), [(write_tdms, "a.tdms"), (write_mdf, "a.mf4")], ids=["TDMS", "MDF4"])
+def test_wrong_units_and_names_in_a_recorder_s_file(
+    service: Watched, tmp_path: Path, write: Callable[..., Path], name: str
+) -> None:
+    columns = record(100)
+    wrong = write(tmp_path / f"1-{name}", columns, units=UNITS | {"torque_nm": "furlong"}).read_bytes()
+    assert codes(service.refuse(wrong, name=name)) == {"unknown_unit"}
+    twice = write(tmp_path / f"2-{name}", columns, units=UNITS, more={"torque_nm": columns["torque_nm"]}).read_bytes()
+    assert codes(service.refuse(twice, name=name)) == {"ambiguous"}
+
+
+def test_two_channels_of_one_name(service: Watched) -> None:
+    rows = b"0,5,100,20,20\n0.1,5,101,21,21\n"
+    assert codes(service.refuse(HEADER.strip().encode() + b",torque_nm\n" + rows)) == {"ambiguous"}
+    assert codes(service.refuse(HEADER.strip().encode() + b",M [Nm]\n" + rows)) == {"ambiguous"}
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.tdms", "run.mf4", "run.parquet"])
+def test_nothing_and_nuls(service: Watched, name: str) -> None:
+    assert "must not be empty" in service.refuse(b"", name=name)["detail"]
+    service.refuse(gzip.compress(b""), name=f"{name}.gz")
+    service.refuse(bytes(1 << 20), name=name)
+    service.refuse(gzip.compress(bytes(1 << 20)), name=f"{name}.gz")
+    service.refuse(b"\x1f\x8b", name=f"{name}.gz")
+
+
+def test_an_archive_and_a_table_of_words(service: Watched) -> None:
+    packed = BytesIO()
+    with zipfile.ZipFile(packed, "w") as archive:
+        archive.writestr("run.csv", csv_text(record(100)))
+    for name in ("run.zip", "run.csv", "run.xlsx"):
+        assert "ZIP archive" in service.refuse(packed.getvalue(), name=name)["detail"]
+    service.refuse((HEADER + "a,b,c,d\n" * 100_000).encode())
+    assert codes(service.refuse(b'{"kind": "stationary_stribeck"}', name="run.json")) <= {""}
+
+
+def test_the_wrong_suffix(service: Watched, tmp_path: Path) -> None:
+    """A table that is called a TDMS file is refused; a TDMS file that is called a table is what it begins as."""
+    assert "named as TDMS" in service.refuse(text(record(100)), name="run.tdms")["detail"]
+    assert "named as MDF4" in service.refuse(text(record(100)), name="run.mf4")["detail"]
+    service.http.post("/v1/clutches", json={"clutch_id": "control"})
+    whole = write_tdms(tmp_path / "a.tdms", record(400), units=UNITS).read_bytes()
+    asked = {"kind": "dynamic_stribeck", "cycles": "0", "filename": "run.csv", "run_id": "suffix"}
+    assert service.http.post("/v1/clutches/control/runs/file", params=asked, content=whole).status_code == 201
+
+
+def test_a_file_larger_than_is_taken(service: Watched) -> None:
+    """Refused by what it announces, before any of it is sent."""
+    asking = http.client.HTTPConnection(str(service.http.base_url.host), service.http.base_url.port, timeout=30)
+    asking.putrequest("POST", f"{CLUTCH}/runs/file?kind=dynamic_stribeck&cycles=0")
+    asking.putheader("Content-Length", str(1 << 40))
+    asking.endheaders()
+    answer = asking.getresponse()
+    assert (answer.status, answer.headers["content-type"]) == (413, "application/problem+json")
+    asking.close()
+    assert service.state() == service.before
+
+
+def test_many_at_once(service: Watched) -> None:
+    """Eight senders of cut-off files at a time: all are refused, and the service lives."""
+    answers: list[int] = []
+
+    def send() -> None:
+        with httpx2.Client(base_url=service.http.base_url, timeout=120) as client:
+            asked = {"kind": "dynamic_stribeck", "cycles": "0", "filename": "a.tdms"}
+            answers.append(client.post(f"{CLUTCH}/runs/file", params=asked, content=b"TDSm" + bytes(40)).status_code)
+
+    senders = [threading.Thread(target=send) for _ in range(8)]
+    for sender in senders:
+        sender.start()
+    for sender in senders:
+        sender.join()
+    assert answers == [422] * 8
+    assert service.state() == service.before
+
+
+def test_nothing_is_left_on_the_disk(service: Watched) -> None:
+    folder = Path(os.environ.get("TMPDIR", "/tmp"))  # noqa: S108
+    before = set(folder.glob("clutchlife-*"))
+    service.refuse(gzip.compress(b"TDSm" + bytes(100)), name="a.tdms.gz")
+    service.refuse(b"MDF     4.10" + bytes(100), name="a.mf4")
+    assert set(folder.glob("clutchlife-*")) <= before

@@ -1,0 +1,106 @@
+"""Answers that are remembered by the clutch's revision: made once, and never told when they no longer hold."""
+
+import pytest
+from fastapi.testclient import TestClient
+
+from service.app import create_app
+from service.queries import answers
+from service.queries.views import Remembered
+from service.settings import Settings
+from service.web.context import MOST_PAGES
+from service.workflows.replay import replay_clutch
+from storage.engine.database import open_database
+from tests.support import stationary
+
+BASE = "/v1/clutches/c1"
+ASKED = (
+    "series", "series.csv", "series?quantity=mean_cof", "series?limit=3", "degradation", "degradation?limit=2", "stribeck",
+    "stribeck?limit=1", "surfaces", "loops", "runs", "runs?limit=2",
+)  # fmt: skip
+
+
+def told(client: TestClient) -> dict[str, tuple[str, bytes]]:
+    """Entity tag and body of every remembered answer."""
+    found = {}
+    for name in ASKED:
+        answer = client.get(f"{BASE}/{name}")
+        assert answer.status_code == 200, answer.text
+        found[name] = answer.headers["ETag"], answer.content
+    return found
+
+
+def told_by_another(database_url: str) -> dict[str, tuple[str, bytes]]:
+    """The same by a service that remembers nothing yet, on the same database."""
+    other = create_app(Settings(database=database_url))
+    with TestClient(other, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
+        return told(client)
+
+
+def post(client: TestClient, cycles: float, **of_run: float) -> None:
+    body = stationary(cycles, run_id=f"r{cycles:g}", **of_run)  # type: ignore[arg-type]
+    assert client.post(f"{BASE}/runs", json=body).status_code == 201
+
+
+def test_what_is_remembered_is_what_would_be_told_anew(client: TestClient, database_url: str) -> None:
+    def rebuilt() -> None:
+        body = {"kind": "maintenance", "cycles": 2500, "event": "rebuild", "run_id": "new"}
+        assert client.post(f"{BASE}/runs", json=body).status_code == 201
+        post(client, 3000.0)
+
+    for cycles in (1000.0, 2000.0):
+        post(client, cycles)
+    before = told(client)
+    assert told(client) == before
+    # a test that comes late and becomes the reference, a rebuild and a test after it: each changes what is told
+    for change in (lambda: post(client, 0.0), rebuilt):
+        change()
+        after = told(client)
+        assert after == told_by_another(database_url)
+        assert after["series"] != before["series"]
+        assert after["degradation"][0] != before["degradation"][0]
+        before = after
+
+
+def test_a_replay_by_another_process_that_changes_nothing_keeps_the_tags(client: TestClient, database_url: str) -> None:
+    for cycles in (0.0, 1000.0, 2000.0):
+        post(client, cycles)
+    before = told(client)
+    with_others = open_database(database_url)
+    replay_clutch(with_others, "c1")
+    with_others.close()
+    assert told(client) == before == told_by_another(database_url)
+
+
+def test_nothing_is_made_twice_for_one_revision(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = []
+    ours = answers.series
+    monkeypatch.setattr(answers, "series", lambda *given: made.append(given) or ours(*given))
+    post(client, 0.0)
+    first = client.get(f"{BASE}/series")
+    again = client.get(f"{BASE}/series", headers={"If-None-Match": first.headers["ETag"]})
+    assert (again.status_code, again.content, len(made)) == (304, b"", 1)
+    assert client.get(f"{BASE}/series?quantity=health").content != first.content
+    assert len(made) == 2
+    post(client, 1000.0)
+    assert client.get(f"{BASE}/series", headers={"If-None-Match": first.headers["ETag"]}).status_code == 200
+    assert len(made) == 3
+
+
+def test_an_unknown_clutch_is_unknown_however_often_it_is_asked_for(client: TestClient) -> None:
+    for name in ASKED:
+        assert [client.get(f"/v1/clutches/nobody/{name}").status_code for _ in range(2)] == [404, 404]
+
+
+def test_answers_are_forgotten_by_their_size() -> None:
+    known = Remembered(most=10)
+    for name, size in (("a", 4), ("b", 4), ("c", 2)):
+        known.keep(name, name.upper(), size)
+    assert [known.find(name) for name in "bac"] == ["B", "A", "C"]
+    known.keep("d", "D", 3)  # the one not asked for longest goes, and no more than must
+    assert [known.find(name) for name in "abcd"] == ["A", None, "C", "D"]
+    known.keep("a", "AA", 1)  # in place of what was there: sizes are not counted twice
+    known.keep("e", "E", 4)
+    assert [known.find(name) for name in "acde"] == ["AA", "C", "D", "E"]
+    known.keep("f", "F", 11)  # would drive out everything, and not fit even so
+    assert [known.find(name) for name in "acdef"] == ["AA", "C", "D", "E", None]
+    assert MOST_PAGES < 2**27

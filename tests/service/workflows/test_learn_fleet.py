@@ -1,0 +1,116 @@
+"""A fleet's prior: learned from others only, named in every answer, refreshed by a command."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from service.app import create_app
+from service.settings import Settings
+from service.workflows import learn_fleet
+from storage.engine.database import open_database
+from tests.support import stationary
+
+LIFE = "/v1/clutches/{}/remaining-useful-life"
+SPEEDS = tuple(range(20, 1971, 150))
+
+
+def wear(cycles: float, scale: float) -> float:
+    return float(0.9 * (1 - (1 + cycles / scale) ** -0.9))
+
+
+def post(client: TestClient, name: str, scale: float, last: int = 9000, step: int = 1000, **record: str) -> None:
+    """A clutch with a test every `step` cycles."""
+    assert client.post("/v1/clutches", json={"clutch_id": name, **record}).status_code in (200, 201)
+    for cycles in range(0, last + 1, step):
+        noise = 0.002 * math.sin(37.0 * cycles + scale)
+        body = stationary(
+            cycles, wear=wear(cycles, scale) + noise, speeds=SPEEDS, pressures=(5.0,), run_id=f"{name}-{cycles}"
+        )
+        answer = client.post(f"/v1/clutches/{name}/runs", json=body)
+        assert answer.status_code == 201, answer.text
+
+
+@pytest.fixture
+def url(tmp_path: Path) -> str:
+    return f"sqlite:///{tmp_path / 'fleet.db'}"
+
+
+def client_of(url: str) -> TestClient:
+    return TestClient(create_app(Settings(database=url)), base_url="http://127.0.0.1", client=("127.0.0.1", 50000))
+
+
+def width(said: dict[str, dict[str, float | None]]) -> float:
+    low, high = (said["end_of_life_cycles"][q] for q in ("0.1", "0.9"))
+    return math.log((1e6 if high is None else high) / (1e6 if low is None else low))
+
+
+def refresh(url: str) -> learn_fleet.Refreshed:
+    database = open_database(url)
+    try:
+        return learn_fleet.refresh(database, now="2026-01-01T00:00:00+00:00")
+    finally:
+        database.close()
+
+
+def test_a_fleet_teaches_the_next_clutch_and_nobody_itself(url: str) -> None:
+    with client_of(url) as client:
+        for number, scale in enumerate((5000.0, 6000.0, 7000.0, 6500.0)):
+            post(client, f"old-{number}", scale)
+        post(client, "new", 6000.0, last=2000)
+        post(client, "other", 6000.0, last=2000, friction_material="sinter")
+        before = {name: client.get(LIFE.format(name)).json() for name in ("new", "other", "old-0")}
+        assert all(said["prior"] == {"name": "weak", "version": None, "clutches": 0} for said in before.values())
+        done = refresh(url)
+        assert [(item["version"], item["clutches"], item["new"]) for item in done.priors] == [(1, 4, True)]
+        assert set(done.changed) == {"old-0", "old-1", "old-2", "old-3", "new"}
+        after = {name: client.get(LIFE.format(name)).json() for name in before}
+        assert after["new"]["prior"] == {"name": "fleet", "version": 1, "clutches": 4}
+        assert after["old-0"]["prior"] == {"name": "fleet", "version": 1, "clutches": 3}
+        assert after["other"] == before["other"]
+        assert after["new"]["revision"] == before["new"]["revision"] + 1
+        assert width(after["new"]) < 0.9 * width(before["new"])
+        item = client.get("/v1/fleet/priors").json()["items"][0]
+        assert item["members"] == ["old-0", "old-1", "old-2", "old-3"]
+        assert -1.0 < item["population"]["change"]["median"] < -0.5
+        assert "scale_cycles_median" in client.get("/v1/fleet/priors.csv").text
+
+
+def test_a_refresh_that_learns_nothing_new_changes_nothing(url: str) -> None:
+    with client_of(url) as client:
+        for number, scale in enumerate((5000.0, 6000.0, 7000.0)):
+            post(client, f"old-{number}", scale, last=6000)
+        post(client, "new", 6000.0, last=2000)
+        refresh(url)
+        said = client.get(LIFE.format("new"))
+        assert said.json()["prior"]["clutches"] == 3
+        # with three in all, two are left for each of them: no fleet
+        assert client.get(LIFE.format("old-0")).json()["prior"]["name"] == "weak"
+        again = refresh(url)
+        assert again.changed == ()
+        assert not again.priors[0]["new"]
+        assert client.get(LIFE.format("new"), headers={"If-None-Match": said.headers["etag"]}).status_code == 304
+
+
+def test_posting_on_and_tracking_anew_agree_under_a_fleets_prior(url: str) -> None:
+    """One step on from stored states, and all of it anew (a test that comes late), give the same answer."""
+    with client_of(url) as client:
+        for number, scale in enumerate((5000.0, 6000.0, 7000.0)):
+            post(client, f"old-{number}", scale, last=6000)
+        refresh(url)
+        answers = []
+        for order in ((0, 1, 2, 3, 4), (0, 4, 2, 1, 3)):
+            name = f"new-{order[1]}"
+            client.post("/v1/clutches", json={"clutch_id": name})
+            for index in order:
+                body = stationary(
+                    1000 * index, wear=wear(1000 * index, 6000.0), speeds=SPEEDS, pressures=(5.0,), run_id=f"t{index}"
+                )
+                assert client.post(f"/v1/clutches/{name}/runs", json=body).status_code == 201
+            answers.append(client.get(LIFE.format(name), params={"method": "ukf"}).json())
+        assert answers[0]["prior"]["name"] == "fleet"
+        # the random numbers depend on the name: quantiles agree to what a thousand draws leave
+        ends = np.array([[said["end_of_life_cycles"][q] for q in ("0.25", "0.5")] for said in answers])
+        assert ends[0] == pytest.approx(ends[1], rel=0.1)
