@@ -1,27 +1,59 @@
 """The application: its parts put together, nothing made at import."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from typing import Any
 
 from fastapi import FastAPI
 from fastapi_offline import FastAPIOffline
 
 from service.dashboard import assets
 from service.dashboard import pages as dashboard
-from service.jobs.queue import Worker
-from service.queries.views import Remembered
+from service.jobs.queue import DiagnosisQueue
+from service.queries.cache import AnswerCache
 from service.settings import CODE_VERSION, Settings
 from service.web import problems
-from service.web.context import Context
-from service.web.headers import BodyLimit, Heads, SafeHeaders
-from service.web.metrics import Counting, Metrics
-from service.web.routes import clutches, diagnoses, files, fleet, health, life, runs
-from storage.engine.database import open_database
+from service.web.context import Context, now
+from service.web.limits import MOST_CACHED_BYTES
+from service.web.metrics import Metrics
+from service.web.middleware import BodyLimit, Counting, Heads, SafeHeaders
+from service.web.routes import clutches, diagnoses, exports, files, fleet, health, life, runs
+from service.workflows import adopt_model, run_diagnosis
+from storage.diagnoses import NewDiagnosis
+from storage.engine.database import Database, open_database
 
 _DESCRIPTION = """Condition monitoring and prognostics of wet friction clutches.
 
 Post the Stribeck tests of a rig; each is fitted, the clutch's degradation is tracked, and the duty cycles that remain until
-its mean coefficient of friction has halved are foretold with their uncertainty."""
+its mean coefficient of friction has halved are predicted with their uncertainty."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Diagnoses:
+    """What the queue asks of the workflows."""
+
+    database: Database
+
+    def fail_running(self, problem: str) -> None:
+        run_diagnosis.fail_running(self.database, problem, at=now())
+
+    def running(self, clutch_id: str) -> str | None:
+        return run_diagnosis.running(self.database, clutch_id)
+
+    def ask(self, clutch_id: str) -> NewDiagnosis:
+        return run_diagnosis.ask(self.database, clutch_id, created_at=now())
+
+    def finish(self, asked_for: NewDiagnosis, ended: Mapping[str, Any], *, adopt: bool) -> None:
+        adopted = (
+            adopt
+            and "report" in ended
+            and adopt_model.finish_and_adopt(
+                self.database, asked_for.clutch_id, asked_for.diagnosis_id, ended, life=asked_for.life, at=now()
+            )
+        )
+        if not adopted:
+            run_diagnosis.finish(self.database, asked_for.diagnosis_id, ended, at=now())
 
 
 def create_app(settings: Settings) -> FastAPI:
@@ -32,13 +64,14 @@ def create_app(settings: Settings) -> FastAPI:
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         database = open_database(settings.database)
-        worker = Worker(database, settings)
+        queue = DiagnosisQueue(f"sqlite:///{database.path.absolute()}", settings, _Diagnoses(database))
         try:
-            worker.start()
-            app.state.context = Context(database=database, remembered=Remembered(), metrics=metrics, worker=worker)
+            queue.start()
+            cache = AnswerCache(MOST_CACHED_BYTES)
+            app.state.context = Context(database=database, cache=cache, metrics=metrics, diagnoses=queue)
             yield
         finally:
-            worker.close()
+            queue.close()
             database.close()
 
     app = FastAPIOffline(
@@ -51,8 +84,8 @@ def create_app(settings: Settings) -> FastAPI:
     problems.install(app)
     for part in (health, clutches, files, runs, life, diagnoses, fleet):
         app.include_router(part.router)
-    for twin in (runs.twins, life.twins, fleet.twins):
-        app.include_router(twin)
+    for exported in (exports.router, exports.fleet_router):
+        app.include_router(exported)
     app.include_router(dashboard.router(assets.load()))
     app.add_middleware(Heads)
     app.add_middleware(BodyLimit, most=settings.most_body_bytes, most_file=settings.most_file_bytes)

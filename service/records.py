@@ -1,56 +1,60 @@
-"""Between stored rows and the values that the workflows think in."""
+"""Rows <-> values: a clutch's state loaded in one sweep, results stored in another.
+
+A workflow reads a `ClutchState`, computes outside any transaction, and stores with `unchanged` and `store`.
+"""
 
 from collections.abc import Mapping, Sequence
-from datetime import datetime
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from sqlalchemy import Connection
 
-from models.arrays import FloatArray
-from models.degradation.severity import Block
+from models.degradation.severity import Severity
+from models.diagnosis.extension import Extension
 from models.friction.identification import ACCEPTABLE_MSE, FitStatus, StribeckFit
-from models.friction.stribeck import StribeckParameters
+from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
+from models.prognosis.fleet import FleetPrior
+from models.tracking.filters.particle import ParticleState
+from models.tracking.filters.ukf import UkfState
 from service.errors import NotFoundError
-from service.lives.history import ByPressure, Event, order
+from service.lives.assumptions import ALL_PRESSURES, FLEET, LearnedPrior, kind_of, severity_under
+from service.lives.history import REBUILD, ByPressure, Event, duty_block, moment_of, order
 from service.lives.incoming_run import IncomingRun
+from service.lives.model_correction import RunReader
+from service.lives.recomputation import Adoption, ClutchState, Results, Tracking
 from service.lives.run_analysis import Analysis, LevelFit, Value
-from service.readers.units import RADIANS_PER_SECOND_PER_RPM
+from service.lives.tracks import CARRIED, States, Tracked
 from service.schemas.clutch import ClutchIn
 from service.settings import CODE_VERSION
-from storage import adopted_models, clutches, fits, runs
+from storage import adopted_models, channels, clutches, diagnoses, filter_states, fits, fleet_priors, predictions, runs
 from storage.clutches import ClutchRow
+from storage.engine.database import Database
+from storage.filter_states import FilterStateRow
 from storage.fits import FitRow
+from storage.predictions import PredictionRow
 from storage.runs import RunInOrder, RunRow
+
+_STATES: dict[str, type[ParticleState] | type[UkfState]] = {"particle": ParticleState, "ukf": UkfState}
+#: Columns of a stored fit that are a fit's own.
+_FIT_COLUMNS = ("pressure", "undetermined", "noise", "mse_percent", "rmse", "points", "message")
 
 
 def clutch(connection: Connection, clutch_id: str) -> ClutchRow:
     """The clutch, or NotFoundError."""
-    found = clutches.get(connection, clutch_id)
-    if found is None:
-        raise _unknown(clutch_id)
-    return found
-
-
-def revision(connection: Connection, clutch_id: str) -> int:
-    """The clutch's revision, which every change of its results moves on; or NotFoundError."""
-    found = clutches.revision(connection, clutch_id)
-    if found is None:
-        raise _unknown(clutch_id)
-    return found
-
-
-def _unknown(clutch_id: str) -> NotFoundError:
-    return NotFoundError(f"no clutch is known as {clutch_id!r}")
+    row = clutches.get(connection, clutch_id)
+    if row is None:
+        raise NotFoundError(f"no clutch is known as {clutch_id!r}")
+    return row
 
 
 def run(connection: Connection, clutch_id: str, run_id: str) -> RunRow:
     """The run of a known clutch, or NotFoundError."""
     clutch(connection, clutch_id)
-    found = runs.get(connection, clutch_id, run_id)
-    if found is None:
+    row = runs.get(connection, clutch_id, run_id)
+    if row is None:
         raise NotFoundError(f"clutch {clutch_id!r} has no run {run_id!r}")
-    return found
+    return row
 
 
 def record(row: ClutchRow) -> ClutchIn:
@@ -58,20 +62,101 @@ def record(row: ClutchRow) -> ClutchIn:
     return ClutchIn.model_validate(row.record)
 
 
-def details(incoming: IncomingRun, analysis: Analysis) -> dict[str, Any]:
-    """What is kept beside a run's channels: what was said of it, and its range of speeds [rad/s]."""
-    found = dict(incoming.details) | {"origin": incoming.origin}
-    return found | ({} if analysis.speed_range is None else {"speed_range": list(analysis.speed_range)})
+def state(connection: Connection, clutch_id: str, *, also: Extension | None = None) -> ClutchState:
+    """The clutch's state at its present revision. Raises NotFoundError.
+
+    `also`: an extension that may come into force; what fleets taught for its severity is loaded beside the others'.
+    """
+    row = clutch(connection, clutch_id)
+    own, adopted = record(row), adoption(connection, clutch_id)
+    extensions = [also, None if adopted is None else adopted.extension]
+    exponents = {None, *(extension.severity_exponent for extension in extensions if extension is not None)}
+    severities = {severity_under(own, exponent) for exponent in exponents}
+    return ClutchState(
+        record=own,
+        revision=row.revision,
+        events=events(connection, clutch_id),
+        adoption=adopted,
+        priors={severity: _learned_prior(connection, own, severity) for severity in severities},
+        filters=_filters(connection, clutch_id),
+    )
 
 
-def run_rows(connection: Connection, clutch_id: str) -> list[RunRow]:
-    """All runs of a clutch by cycles."""
-    return runs.page(connection, clutch_id)
+def adoption(connection: Connection, clutch_id: str) -> Adoption | None:
+    """What was adopted last, None under the baseline; whether it is in force the history tells."""
+    row = adopted_models.current(connection, clutch_id)
+    if row is None or row.diagnosis_id is None:
+        return None
+    diagnosed = diagnoses.get(connection, clutch_id, row.diagnosis_id)
+    if diagnosed is None or diagnosed.extension is None:
+        return None
+    return Adoption(
+        diagnosis_id=diagnosed.diagnosis_id,
+        life=diagnosed.life,
+        extension=Extension.from_dict(diagnosed.extension),
+    )
 
 
-def incoming(row: RunRow, columns: Mapping[str, FloatArray]) -> IncomingRun:
+def present_life(connection: Connection, clutch_id: str) -> str:
+    """The name of the present life: the run_id of the rebuild that began it, "" where there was none."""
+    rebuilds = order([_event(row, {}) for row in runs.rebuilds(connection, clutch_id)])
+    return rebuilds[-1].run_id if rebuilds else ""
+
+
+def events(connection: Connection, clutch_id: str) -> tuple[Event, ...]:
+    """All runs of a clutch as its history sees them, ordered; mean COF as the model in force corrects it."""
+    cofs = fits.cofs_of_clutch(connection, clutch_id) | adopted_models.corrected_cofs(connection, clutch_id)
+    return order([_event(row, cofs.get(row.run_key, {})) for row in runs.in_order(connection, clutch_id)])
+
+
+def baseline_cofs(connection: Connection, clutch_id: str) -> dict[str, ByPressure]:
+    """Mean COFs by run_id as the baseline has them."""
+    cofs = fits.cofs_of_clutch(connection, clutch_id)
+    return {row.run_id: cofs[row.run_key] for row in runs.in_order(connection, clutch_id) if row.run_key in cofs}
+
+
+def levels(connection: Connection, clutch_id: str) -> dict[str, list[LevelFit]]:
+    """All fits of a clutch by run_id."""
+    names = {row.run_key: row.run_id for row in runs.in_order(connection, clutch_id)}
+    of_runs = fits.of_clutch(connection, clutch_id)
+    return {names[run_key]: [_level_fit(row) for row in rows] for run_key, rows in of_runs.items()}
+
+
+def receipts(connection: Connection, clutch_id: str) -> dict[str, dict[str, Any]]:
+    """All receipts of a clutch by run_id."""
+    return {row.run_id: row.receipt for row in runs.page(connection, clutch_id)}
+
+
+def answers(connection: Connection, clutch_id: str) -> list[Any]:
+    """Receipts and predictions as they are stored of a clutch: whether they have changed decides on a new revision."""
+    tracks = [predictions.history(connection, clutch_id, method, ALL_PRESSURES) for method in CARRIED]
+    return [receipts(connection, clutch_id), tracks]
+
+
+def run_reader(database: Database, clutch_id: str) -> RunReader:
+    """The clutch's stored runs, each read in a transaction of its own when it is asked for: none stays open meanwhile."""
+
+    def described(run_id: str) -> IncomingRun:
+        with database.reading() as connection:
+            return incoming(run(connection, clutch_id, run_id), {})
+
+    def with_channels(run_id: str) -> IncomingRun:
+        with database.reading() as connection:
+            row = run(connection, clutch_id, run_id)
+            return incoming(row, channels.read(connection, row.run_key))
+
+    with database.reading() as connection:
+        sampled = channels.samples(connection, clutch_id)
+        names = {row.run_key: row.run_id for row in runs.in_order(connection, clutch_id)}
+    return RunReader(
+        read=with_channels,
+        describe=described,
+        sampled=frozenset(names[run_key] for run_key in sampled if run_key in names),
+    )
+
+
+def incoming(row: RunRow, columns: Mapping[str, NDArray[np.float64]]) -> IncomingRun:
     """A stored run as it came in."""
-    said: dict[str, Any] = {name: row.details[name] for name in ("duty", "event", "note") if name in row.details}
     return IncomingRun(
         kind=row.kind,
         cycles=row.cycles,
@@ -80,115 +165,150 @@ def incoming(row: RunRow, columns: Mapping[str, FloatArray]) -> IncomingRun:
         started_at=row.started_at,
         origin=row.details["origin"],
         channels=columns,
-        details=said,
+        details={name: row.details[name] for name in ("duty", "event", "note") if name in row.details},
     )
 
 
-def events(connection: Connection, clutch_id: str) -> list[Event]:
-    """All runs of a clutch as its history sees them, ordered; mean COF as the model in force corrects it."""
-    cofs = fits.cofs_of_clutch(connection, clutch_id) | adopted_models.corrected_cofs(connection, clutch_id)
-    return order([event(row, cofs.get(row.run_key, {})) for row in runs.in_order(connection, clutch_id)])
+def details(incoming_run: IncomingRun, analysis: Analysis) -> dict[str, Any]:
+    """What is kept beside a run's channels: what was sent with them, and its range of speeds [rad/s]."""
+    sent = dict(incoming_run.details) | {"origin": incoming_run.origin}
+    return sent | ({} if analysis.speed_range is None else {"speed_range": list(analysis.speed_range)})
 
 
-def levels(connection: Connection, clutch_id: str) -> dict[str, list[LevelFit]]:
-    """All fits of a clutch by run_id."""
-    names = {row.run_key: row.run_id for row in runs.in_order(connection, clutch_id)}
-    return {
-        names[key]: [level_fit(each) for each in found] for key, found in fits.of_clutch(connection, clutch_id).items()
-    }
+def unchanged(connection: Connection, clutch_id: str, revision: int) -> bool:
+    """Whether the clutch still is at the revision that results were computed from."""
+    return clutches.revision(connection, clutch_id) == revision
 
 
-def event(row: RunInOrder, cofs: ByPressure) -> Event:
-    """A stored run as the history sees it."""
+def store(connection: Connection, clutch_id: str, results: Results) -> None:
+    """Store results in place of those that were there. The revision is the workflow's to move on."""
+    if results.levels or results.receipts or results.corrected:
+        rows = {row.run_id: row.run_key for row in runs.in_order(connection, clutch_id)}
+        for run_id, own in results.levels.items():
+            fits.write(connection, rows[run_id], fit_rows(own, results.cofs.get(run_id, {})))
+        for run_id, receipt in results.receipts.items():
+            runs.set_receipt(connection, rows[run_id], receipt)
+    if results.corrected_anew:
+        adopted_models.clear_corrected(connection, clutch_id)
+    for run_id, cofs in results.corrected.items():
+        adopted_models.write_corrected(connection, rows[run_id], cofs)
+    if results.tracking is not None:
+        _store_tracking(connection, clutch_id, results.tracking)
+
+
+def _store_tracking(connection: Connection, clutch_id: str, tracking: Tracking) -> None:
+    if tracking.anew:
+        predictions.clear(connection, clutch_id)
+    rows = [
+        PredictionRow(
+            cycles=prediction.cycles,
+            method=prediction.method,
+            pressure=ALL_PRESSURES,
+            payload=prediction.payload,
+            code_version=CODE_VERSION,
+        )
+        for prediction in tracking.predictions
+    ]
+    predictions.put(connection, clutch_id, rows)
+    filter_states.clear(connection, clutch_id)
+    filter_states.put(connection, clutch_id, _filter_rows(tracking.filters))
+    clutches.set_summary(connection, clutch_id, tracking.rank, tracking.summary)
+
+
+def _filter_rows(filters: States) -> list[FilterStateRow]:
+    """The arrays of each state are named after the prior that it started from, as in `weak/mean`."""
+    return [
+        FilterStateRow(
+            method=method,
+            pressure=ALL_PRESSURES,
+            runs=tracked.runs,
+            arrays={
+                f"{prior}/{name}": array
+                for prior, filter_state in tracked.states.items()
+                for name, array in filter_state.to_arrays().items()
+            },
+            code_version=CODE_VERSION,
+        )
+        for method, tracked in filters.items()
+    ]
+
+
+def _filters(connection: Connection, clutch_id: str) -> States | None:
+    """The inverse of `_filter_rows`; None where another release stored them."""
+    rows = {method: row for (method, _), row in filter_states.get(connection, clutch_id).items()}
+    if any(row.code_version != CODE_VERSION for row in rows.values()):
+        return None
+    return {method: _tracked(method, row) for method, row in rows.items()}
+
+
+def _tracked(method: str, row: FilterStateRow) -> Tracked:
+    by_prior: dict[str, dict[str, NDArray[np.float64]]] = {}
+    for name, array in row.arrays.items():
+        prior, _, part = name.partition("/")
+        by_prior.setdefault(prior, {})[part] = array
+    return Tracked(
+        runs=row.runs, states={prior: _STATES[method].from_arrays(arrays) for prior, arrays in by_prior.items()}
+    )
+
+
+def _learned_prior(connection: Connection, own: ClutchIn, severity: Severity) -> LearnedPrior:
+    """The newest prior of the clutch's kind that was not learned from it, and its public name."""
+    row = fleet_priors.current(connection, kind_of(own, severity))
+    if row is not None and own.clutch_id in row.members:
+        row = fleet_priors.without(connection, row, own.clutch_id)
+    if row is None:
+        return LearnedPrior()
+    fleet = FleetPrior.from_dict(row.content)
+    return LearnedPrior(fleet=fleet, name={"name": FLEET, "version": row.version, "clutches": fleet.clutches})
+
+
+def _event(row: RunInOrder, cofs: ByPressure) -> Event:
     low, high = row.lowest_speed, row.highest_speed
     return Event(
         run_id=row.run_id,
         kind=row.kind,
         cycles=row.cycles,
-        moment=moment(row.started_at, row.received_at),
+        moment=moment_of(row.started_at, row.received_at),
         speed_range=None if low is None or high is None else (low, high),
         cofs=cofs,
-        rebuild=row.event == "rebuild",
-        shift=row.event not in (None, "rebuild"),
+        rebuild=row.event == REBUILD,
+        shift=row.event not in (None, REBUILD),
         duty=duty_block(row.cycles, row.duty_cycles, row.duty_energy_kj, row.duty_speed_rpm, row.duty_duration_s),
     )
 
 
-def duty_block(
-    end: float,
-    cycles: float | None,
-    energy_kj: float | None,
-    speed_rpm: float | None,
-    duration_s: float | None,
-) -> Block | None:
-    """A block of duty in SI units, None where a run is none."""
-    if cycles is None:
-        return None
-    return Block(
-        end=end,
-        cycles=cycles,
-        energy=None if energy_kj is None else 1000.0 * energy_kj,
-        speed=None if speed_rpm is None else speed_rpm * RADIANS_PER_SECOND_PER_RPM,
-        duration=duration_s,
-    )
-
-
-def moment(started_at: str | None, received_at: str) -> float:
-    """When a run was made [s since 1970]: when it was started, or received where the rig did not say."""
-    return datetime.fromisoformat(started_at or received_at).timestamp()
-
-
-def fit_rows(levels: Sequence[LevelFit], cofs: ByPressure) -> list[FitRow]:
-    """Fits as they are stored, with mean COF by pressure where a level can say it."""
-    return [_fit_row(level, cofs.get(level.fit.pressure)) for level in levels]
+def fit_rows(own: Sequence[LevelFit], cofs: ByPressure) -> list[FitRow]:
+    """Fits as they are stored, with mean COF by pressure where a level determines it."""
+    return [_fit_row(level, cofs.get(level.fit.pressure)) for level in own]
 
 
 def _fit_row(level: LevelFit, cof: Value | None) -> FitRow:
     fit = level.fit
-    m_s, m_c, v_s, c_v = map(float, fit.parameters.as_array())
+    mean_cof, mean_cof_sd = (None, None) if cof is None else cof
     return FitRow(
-        pressure=fit.pressure,
+        **{name: getattr(fit, name) for name in _FIT_COLUMNS},
+        **_parameters(fit.parameters),
         mean_pressure=level.mean_pressure,
-        static_torque=m_s,
-        coulomb_ratio=m_c,
-        stribeck_velocity=v_s,
-        viscous_coefficient=c_v,
         covariance=tuple(fit.covariance.ravel().tolist()),
         status=fit.status.value,
-        undetermined=fit.undetermined,
-        noise=fit.noise,
-        mse_percent=fit.mse_percent,
-        rmse=fit.rmse,
-        points=fit.points,
         speeds=level.speeds,
-        mean_cof=None if cof is None else cof[0],
-        mean_cof_sd=None if cof is None else cof[1],
-        message=fit.message,
+        mean_cof=mean_cof,
+        mean_cof_sd=mean_cof_sd,
         code_version=CODE_VERSION,
     )
 
 
-def level_fit(row: FitRow) -> LevelFit:
-    """The inverse of `fit_rows`, exactly."""
-    return LevelFit(
-        mean_pressure=row.mean_pressure,
-        speeds=row.speeds,
-        fit=StribeckFit(
-            pressure=row.pressure,
-            parameters=StribeckParameters(
-                static_torque=row.static_torque,
-                coulomb_ratio=row.coulomb_ratio,
-                stribeck_velocity=row.stribeck_velocity,
-                viscous_coefficient=row.viscous_coefficient,
-            ),
-            covariance=np.array(row.covariance, dtype=np.float64).reshape(4, 4),
-            status=FitStatus(row.status),
-            undetermined=row.undetermined,
-            noise=row.noise,
-            mse_percent=row.mse_percent,
-            rmse=row.rmse,
-            acceptable=row.mse_percent is not None and row.mse_percent < ACCEPTABLE_MSE,
-            points=row.points,
-            message=row.message,
-        ),
+def _parameters(parameters: StribeckParameters) -> dict[str, Any]:
+    return {name: float(getattr(parameters, name)) for name in PARAMETER_NAMES}
+
+
+def _level_fit(row: FitRow) -> LevelFit:
+    """The inverse of `_fit_row`, exactly."""
+    fit = StribeckFit(
+        **{name: getattr(row, name) for name in _FIT_COLUMNS},
+        parameters=StribeckParameters(**{name: getattr(row, name) for name in PARAMETER_NAMES}),
+        covariance=np.array(row.covariance, dtype=np.float64).reshape(4, 4),
+        status=FitStatus(row.status),
+        acceptable=row.mse_percent is not None and row.mse_percent < ACCEPTABLE_MSE,
     )
+    return LevelFit(mean_pressure=row.mean_pressure, speeds=row.speeds, fit=fit)

@@ -33,6 +33,7 @@ _set_summary = update(clutch).where(_of_wanted).values(rank=bindparam("new_rank"
 _bump = update(clutch).where(_of_wanted).values(revision=clutch.c.revision + 1)
 _revision = select(clutch.c.revision).where(_of_wanted)
 _ids = select(clutch.c.clutch_id).order_by(clutch.c.clutch_id)
+_revisions = select(clutch.c.clutch_id, clutch.c.revision).order_by(clutch.c.clutch_id)
 
 
 def insert(connection: Connection, row: ClutchRow) -> None:
@@ -89,6 +90,11 @@ def revision(connection: Connection, clutch_id: str) -> int | None:
 def all_ids(connection: Connection) -> list[str]:
     """The ids of all clutches, ascending."""
     return list(connection.execute(_ids).scalars())
+
+
+def revisions(connection: Connection) -> dict[str, int]:
+    """The revisions of all clutches by id, ascending."""
+    return {row.clutch_id: row.revision for row in connection.execute(_revisions)}
 
 
 def _row(found: Row[tuple[object, ...]]) -> ClutchRow:

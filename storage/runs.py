@@ -137,6 +137,12 @@ def set_results(connection: Connection, run_key: int, details: Json, receipt: Js
         raise LookupError(f"run {run_key} is not stored")
 
 
+def set_receipt(connection: Connection, run_key: int, receipt: Json) -> None:
+    """Replace a run's receipt alone. Raises LookupError on an unknown run."""
+    if connection.execute(_set_results, {"wanted": run_key, "receipt": to_text(receipt)}).rowcount != 1:
+        raise LookupError(f"run {run_key} is not stored")
+
+
 def _row(found: Row[tuple[object, ...]]) -> RunRow:
     values = found._asdict()
     values["details"] = to_object(values["details"])

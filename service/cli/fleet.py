@@ -15,13 +15,13 @@ def show(context: typer.Context, database: Database = DATABASE) -> None:
     """The newest version of every kind's prior."""
     if context.invoked_subcommand is not None:
         return
-    from service.workflows.learn_fleet import current  # loaded by the commands that need it
+    from service.queries.fleet_priors import newest  # loaded by the commands that need it
 
     with existing(database) as opened:
-        found = current(opened)
-    for item in found:
+        priors = newest(opened)
+    for item in priors:
         out.print(_line(item), markup=False, soft_wrap=True)
-    if not found:
+    if not priors:
         out.print("no fleet has taught a prior yet: run `clutchlife fleet refresh`", markup=False)
 
 
@@ -31,16 +31,19 @@ def refresh(
     quiet: Annotated[bool, typer.Option("--quiet", help="Say only what has changed")] = False,
 ) -> None:
     """Learn every kind's prior anew, and bring the predictions up to date with it."""
-    from service.workflows.learn_fleet import refresh as refreshed
+    from service.queries.fleet_priors import newest  # loaded by the commands that need it
+    from service.workflows.learn_fleet import refresh as refreshed  # as above
 
     with existing(database) as opened:
         done = refreshed(opened, now=datetime.now(UTC).isoformat(timespec="seconds"))
-    for item in done.priors:
-        if item["new"] or not quiet:
-            out.print(_line(item) + (" (new)" if item["new"] else ""), markup=False, soft_wrap=True)
+        priors = newest(opened)
+    for item in priors:
+        new = item["kind"] in done.kinds
+        if new or not quiet:
+            out.print(_line(item) + (" (new)" if new else ""), markup=False, soft_wrap=True)
     for clutch_id in done.changed:
         out.print(f"{clutch_id}: tracked anew", markup=False)
-    if not done.priors and not quiet:
+    if not priors and not quiet:
         out.print("no three clutches of a kind have six tests each: all priors stay weak", markup=False)
 
 

@@ -13,12 +13,13 @@ def score(
     """Back-cast every life that came to its end: what would have been said at each test, and how right it was."""
     from service.lives.tracks import METHODS
     from service.queries import scores  # loaded by the one command that needs it
-    from service.queries.views import Remembered
+    from service.queries.cache import AnswerCache
+    from service.web.limits import MOST_CACHED_BYTES
 
     if method not in METHODS:
         fail(f"method must be one of {', '.join(METHODS)}, got {method!r}", EX_USAGE)
     with existing(database) as opened:
-        said = scores.of_fleet(opened, Remembered(), method=method)
+        said = scores.of_fleet(opened, AnswerCache(MOST_CACHED_BYTES), method=method)
     for life in said["lives"]:
         out.print(f"{life['clutch_id']}: ended at {life['end_of_life_cycles']:.0f} cycles", markup=False)
     if not said["lives"]:

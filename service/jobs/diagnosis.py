@@ -1,53 +1,130 @@
-"""The process in which one diagnosis is made: it reads a clutch's runs, and says on standard output what was found."""
+"""The process in which one diagnosis is made: it reads a clutch's runs, and writes the report to standard output."""
 
 import importlib
 import json
 import os
+import resource
 import sys
 import threading
 import zlib
 from contextlib import closing
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from service.jobs.remaining import before_and_after
-from service.lives.campaign import read_campaign
+from models.diagnosis.campaign import StationaryRun
+from models.diagnosis.extension import Extension
+from service import records
+from service.lives.campaign import CampaignRun, DiagnosedLife, records_to_keep, run_of
 from service.lives.diagnosis_report import public
-from storage.engine.database import open_database
+from service.lives.history import STATIONARY, Life, lives_of
+from service.lives.model_correction import corrected_cofs
+from service.lives.tracks import predict_at
+from storage import channels, runs
+from storage.engine.database import Database, open_database
 
-#: How much this process yields to the one that answers.
+#: By how much this process yields to the one that answers [nice]. Chosen; no table.
 _NICE = 10
+_METHOD = "particle"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """What is to be diagnosed: a clutch's runs up to `last_run_key`, by `engine` (module:function), in so many bytes."""
+
+    database: str
+    clutch_id: str
+    last_run_key: int
+    engine: str
+    bytes: int
 
 
 def main() -> None:
     """Diagnose what the first argument names, JSON."""
-    asked = json.loads(sys.argv[1])
+    task = Task(**json.loads(sys.argv[1]))
     threading.Thread(target=_end_with_the_service, daemon=True).start()
     os.nice(_NICE)
-    _limit(asked["bytes"])
+    resource.setrlimit(resource.RLIMIT_AS, (task.bytes, task.bytes))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:
-        said = diagnosed(asked)
+        ended = diagnosed(task)
     except MemoryError:
-        said = {"problem": f"it needs more than {asked['bytes'] // 2**20} MB of memory"}
-    json.dump(said, sys.stdout, allow_nan=False)
+        ended = {"problem": f"it needs more than {task.bytes // 2**20} MB of memory"}
+    json.dump(ended, sys.stdout, allow_nan=False)
 
 
-def diagnosed(asked: dict[str, Any]) -> dict[str, Any]:
+def diagnosed(task: Task) -> dict[str, Any]:
     """The report in the public shape, and the extension. The same runs give the same."""
-    module, _, function = asked["engine"].partition(":")
+    module, _, function = task.engine.partition(":")
     diagnose = getattr(importlib.import_module(module), function)
-    clutch_id = asked["clutch_id"]
-    with closing(open_database(asked["database"])) as database:
-        known = read_campaign(database, clutch_id, last_run_key=asked["last_run_key"])
-        rng = np.random.default_rng([zlib.crc32(clutch_id.encode()), len(known.taken)])
-        report = diagnose(known.campaign, rng=rng)
-        before, after = before_and_after(database, clutch_id, known, report.extension)
-    origin = 0.0 if known.life is None else known.life.origin
+    with closing(open_database(task.database)) as database:
+        diagnosed_life = read_life(database, task.clutch_id, last_run_key=task.last_run_key)
+        rng = np.random.default_rng([zlib.crc32(task.clutch_id.encode()), len(diagnosed_life.runs)])
+        report = diagnose(diagnosed_life.campaign, rng=rng)
+        before, after = before_and_after(database, task.clutch_id, diagnosed_life, report.extension)
+    origin = 0.0 if diagnosed_life.life is None else diagnosed_life.life.origin
     return {
-        "report": public(report, origin=origin, before=before, after=after, notes=known.notes),
+        "report": public(report, origin=origin, before=before, after=after, notes=diagnosed_life.notes),
         "extension": None if report.extension is None else report.extension.to_dict(),
     }
+
+
+def read_life(database: Database, clutch_id: str, *, last_run_key: int) -> DiagnosedLife:
+    """The present life by the runs up to `last_run_key`. Raises NotFoundError.
+
+    Channels are read run by run: no transaction stays open for longer, for commits wait for it.
+    """
+    with database.reading() as connection:
+        record = records.record(records.clutch(connection, clutch_id))
+        rows = {row.run_id: row for row in runs.page(connection, clutch_id) if row.run_key <= last_run_key}
+        by_key = channels.samples(connection, clutch_id)
+        lives = lives_of([event for event in records.events(connection, clutch_id) if event.run_id in rows])
+    if not lives:
+        return DiagnosedLife(record=record)
+    life = lives[-1]
+    samples = {run_id: by_key[row.run_key] for run_id, row in rows.items() if row.run_key in by_key}
+    kept = records_to_keep([event.run_id for event in life.events], samples)
+    reader = records.run_reader(database, clutch_id)
+    campaign: list[CampaignRun] = []
+    notes = []
+    for event in life.events:
+        try:
+            run = run_of(reader.read(event.run_id), origin=life.origin, keep_record=event.run_id in kept)
+            campaign.append(run)
+        except ValueError as error:
+            notes.append(f"{event.run_id} is left out: {error}")
+    left_out = [event for event in life.events if event.kind == STATIONARY and event.run_id in samples.keys() - kept]
+    if left_out:
+        notes.append(
+            f"The raw records of {len(left_out)} stationary tests are left out for their size; their plateaus count."
+        )
+    return DiagnosedLife(record=record, life=life, runs=tuple(campaign), notes=tuple(notes))
+
+
+def before_and_after(
+    database: Database, clutch_id: str, diagnosed_life: DiagnosedLife, extension: Extension | None
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The particle filter's prediction of the life that was diagnosed, by both models; alike where there is no extension."""
+    if diagnosed_life.life is None:
+        return {}, {}
+    with database.reading() as connection:
+        state = records.state(connection, clutch_id, also=extension)
+        cofs = records.baseline_cofs(connection, clutch_id)
+    plain = diagnosed_life.life.with_cofs(cofs)
+    predicted = [plain]
+    if extension is not None:
+        runs_before = records.run_reader(database, clutch_id).campaign_runs(plain.events, origin=plain.origin)
+        tests = [run for run in diagnosed_life.runs if isinstance(run, StationaryRun)]
+        freed = corrected_cofs(extension, diagnosed_life.record, plain, runs_before, tests)
+        predicted.append(plain.with_cofs({event.run_id: freed.get(event.run_id, event.cofs) for event in plain.events}))
+
+    def prediction(life: Life, model: Extension | None) -> dict[str, Any]:
+        assumptions = state.assumptions_under(model, life)
+        return predict_at(clutch_id, life.events, assumptions, state.fraction, method=_METHOD)
+
+    before = prediction(predicted[0], None)
+    return before, before if extension is None else prediction(predicted[1], extension)
 
 
 def _end_with_the_service() -> None:
@@ -55,13 +132,6 @@ def _end_with_the_service() -> None:
     while os.read(0, 1):  # not by way of sys.stdin, whose lock would be in the way when this process ends
         pass
     os._exit(3)
-
-
-def _limit(most: int) -> None:
-    import resource
-
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 if __name__ == "__main__":

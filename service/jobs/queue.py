@@ -1,7 +1,7 @@
 """Diagnoses are made outside the process that answers: one at a time, each in a process of its own, in a bounded queue.
 
 A process that takes too long or too much memory ends, and its diagnosis is stored as failed; one that was running when
-the service itself ended is found at the next start.
+the service itself ended is found at the next start. What is asked and how an end is stored the queue is given (`Store`).
 """
 
 import json
@@ -12,24 +12,21 @@ import subprocess
 import sys
 import tempfile
 import threading
+from collections.abc import Mapping
 from concurrent.futures import Future
-from contextlib import suppress
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
-from typing import Any
+from typing import Any, Protocol
 
-from service.errors import BusyError, ConflictError
+from service.errors import BusyError
 from service.settings import Settings
-from service.workflows import run_diagnosis
-from service.workflows.adopt_model import adopt
-from storage import diagnoses
-from storage.engine.database import Database
+from storage.diagnoses import NewDiagnosis
 from storage.engine.errors import StorageError
 
 INTERRUPTED = "the service ended while the diagnosis ran: ask again"
+UNSTORED = "its report could not be stored: see the service's log"
 _TAIL = 2000
 #: One thread; and memory that arrays gave back is kept for the next ones: having it mapped anew each time takes as long as
-#: what is worked out in it.
+#: what is computed in it.
 _NUMERICS = {
     "OPENBLAS_NUM_THREADS": "1",
     "OMP_NUM_THREADS": "1",
@@ -39,13 +36,27 @@ _NUMERICS = {
 _log = logging.getLogger("clutchlife")
 
 
+class Store(Protocol):
+    """Where diagnoses are asked for and their ends stored."""
+
+    def fail_running(self, problem: str) -> None:
+        """Say of all diagnoses that an earlier service left running why they have no report."""
+
+    def running(self, clutch_id: str) -> str | None:
+        """The id of the diagnosis that is running of the very runs that are there now."""
+
+    def ask(self, clutch_id: str) -> NewDiagnosis:
+        """Store a diagnosis that is to be run. Raises NotFoundError."""
+
+    def finish(self, asked_for: NewDiagnosis, ended: Mapping[str, Any], *, adopt: bool) -> None:
+        """Store how one ended (`report` and `extension`, or `problem`), and adopt what it found where that was asked."""
+
+
 @dataclass(slots=True)
 class Job:
-    """A diagnosis that waits or runs; `done` is set once its end is stored. `adopt`: what it finds is to be adopted."""
+    """A diagnosis that waits or runs; `done` is set once its end is stored. `adopt`: its extension is to be adopted."""
 
-    clutch_id: str
-    diagnosis_id: str
-    last_run_key: int
+    diagnosis: NewDiagnosis
     adopt: bool
     done: "Future[None]" = field(default_factory=Future)
 
@@ -54,12 +65,13 @@ class FailedError(Exception):
     """The diagnosis has no report; the message says why to the one who asked."""
 
 
-class Worker:
+class DiagnosisQueue:
     """The queue and the thread that works on it. `start` before anything is asked, `close` at the end."""
 
-    def __init__(self, database: Database, settings: Settings) -> None:
-        self._database = database
+    def __init__(self, database_url: str, settings: Settings, store: Store) -> None:
+        self._database_url = database_url
         self._settings = settings
+        self._store = store
         self._jobs: dict[str, Job] = {}
         self._change = threading.Condition()
         self._closing = False
@@ -67,13 +79,12 @@ class Worker:
         self._thread = threading.Thread(target=self._work, name="diagnoses", daemon=True)
 
     def start(self) -> None:
-        """Say of diagnoses that an earlier service left running that they ended with it, and begin."""
-        with self._database.writing() as connection:
-            diagnoses.fail_all(connection, _now(), INTERRUPTED)
+        """Begin, once it is stored that what an earlier service left running ended with it."""
+        self._store.fail_running(INTERRUPTED)
         self._thread.start()
 
     def close(self) -> None:
-        """End what runs, say so where it is stored, and stop."""
+        """End what runs, store that it ended, and stop."""
         with self._change:
             self._closing = True
             if self._process is not None:
@@ -87,17 +98,14 @@ class Worker:
         Raises NotFoundError for an unknown clutch, BusyError where as many wait as may.
         """
         with self._change:
-            with self._database.reading() as connection:
-                known = self._jobs.get(run_diagnosis.running(connection, clutch_id) or "")
-            if known is not None:
-                known.adopt |= adopt
-                return known
+            waiting = self._jobs.get(self._store.running(clutch_id) or "")
+            if waiting is not None:
+                waiting.adopt |= adopt
+                return waiting
             if self._closing or len(self._jobs) >= self._settings.most_diagnoses:
                 raise BusyError(f"{len(self._jobs)} diagnoses wait already: ask again in a little while")
-            with self._database.writing() as connection:
-                row = run_diagnosis.ask(connection, clutch_id, created_at=_now())
-            job = Job(clutch_id, row.diagnosis_id, row.last_run_key, adopt)
-            self._jobs[job.diagnosis_id] = job
+            job = Job(self._store.ask(clutch_id), adopt)
+            self._jobs[job.diagnosis.diagnosis_id] = job
             self._change.notify_all()
             return job
 
@@ -109,50 +117,40 @@ class Worker:
                     return
                 job = next(iter(self._jobs.values()))
             try:
-                self._store(job, self._outcome(job))
+                ended = self._outcome(job)
+                self._store.finish(job.diagnosis, ended, adopt=job.adopt)
             except Exception:  # noqa: BLE001  (the next one is to be made all the same)
-                _log.exception("diagnosis %s of %s", job.diagnosis_id, job.clutch_id)
+                _log.exception("diagnosis %s of %s", job.diagnosis.diagnosis_id, job.diagnosis.clutch_id)
                 self._give_up(job)
             job.done.set_result(None)
 
     def _outcome(self, job: Job) -> dict[str, Any]:
-        """Run one; what its process says, or a problem. From its end on nobody can join it."""
+        """Run one; what its process wrote, or a problem. From its end on nobody can join it."""
         try:
             return self._run(job)
         except FailedError as error:
             return {"problem": str(error)}
         finally:
             with self._change:
-                del self._jobs[job.diagnosis_id]
-
-    def _store(self, job: Job, said: dict[str, Any]) -> None:
-        """Store how one ended and, in the same transaction, adopt what it found where that was asked."""
-        with self._database.writing() as connection:
-            if "problem" in said:
-                diagnoses.fail(connection, job.diagnosis_id, _now(), said["problem"])
-                return
-            diagnoses.finish(connection, job.diagnosis_id, _now(), said["report"], said["extension"])
-            if job.adopt:
-                with suppress(ConflictError):  # there is nothing to adopt, or a rebuild came meanwhile
-                    adopt(connection, job.clutch_id, job.diagnosis_id, adopted_at=_now())
+                del self._jobs[job.diagnosis.diagnosis_id]
 
     def _give_up(self, job: Job) -> None:
         """Its end could not be stored: say at least that it ended, or leave that to the next start."""
-        with suppress(StorageError), self._database.writing() as connection:
-            diagnoses.fail(
-                connection, job.diagnosis_id, _now(), "its report could not be stored: see the service's log"
-            )
+        try:
+            self._store.finish(job.diagnosis, {"problem": UNSTORED}, adopt=False)
+        except StorageError:
+            _log.exception("diagnosis %s stays running until the next start", job.diagnosis.diagnosis_id)
 
     def _run(self, job: Job) -> dict[str, Any]:
-        """What the process says. Raises FailedError."""
-        asked = {
-            "database": f"sqlite:///{self._database.path.absolute()}",
-            "clutch_id": job.clutch_id,
-            "last_run_key": job.last_run_key,
+        """What the process wrote. Raises FailedError."""
+        task = {
+            "database": self._database_url,
+            "clutch_id": job.diagnosis.clutch_id,
+            "last_run_key": job.diagnosis.last_run_key,
             "engine": self._settings.engine,
             "bytes": self._settings.diagnosis_bytes,
         }
-        command = [sys.executable, "-P", "-W", "ignore", "-m", "service.jobs.diagnosis", json.dumps(asked)]
+        command = [sys.executable, "-P", "-W", "ignore", "-m", "service.jobs.diagnosis", json.dumps(task)]
         with tempfile.TemporaryFile() as answer, tempfile.TemporaryFile() as errors:
             with self._change:
                 if self._closing:
@@ -168,13 +166,13 @@ class Worker:
             code = self._ended(self._process)
             if code != 0:
                 errors.seek(max(0, errors.seek(0, os.SEEK_END) - _TAIL))
-                _log.error("diagnosis %s: %s", job.diagnosis_id, errors.read().decode(errors="replace"))
+                _log.error("diagnosis %s: %s", job.diagnosis.diagnosis_id, errors.read().decode(errors="replace"))
                 raise FailedError(
                     INTERRUPTED if self._closing else f"its process ended with {_ending(code)}: see the log"
                 )
             answer.seek(0)
-            said: dict[str, Any] = json.load(answer)
-        return said
+            written: dict[str, Any] = json.load(answer)
+        return written
 
     def _ended(self, process: "subprocess.Popen[bytes]") -> int:
         """Wait for the process, at most as long as it may take; its exit code. Raises FailedError."""
@@ -196,7 +194,3 @@ def _ending(code: int) -> str:
         return signal.Signals(-code).name if code < 0 else f"status {code}"
     except ValueError:
         return f"signal {-code}"
-
-
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="milliseconds")

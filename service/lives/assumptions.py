@@ -1,14 +1,13 @@
-"""What a clutch's life is tracked under: what ζ counts, what is believed beforehand, and what an adopted model adds.
+"""What a clutch's life is tracked under: what ζ counts, the prior before the first test, and what an adopted model adds.
 
-Every prediction is made under a basis, and every answer names its model and its prior.
+Every prediction is made under assumptions, and every answer names its model, its prior and its severity.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
-from sqlalchemy import Connection
 
 from models.arrays import FloatArray
 from models.degradation.severity import IDENTITY, Block, Severity, SeverityBasis, SeverityMap, severity_map
@@ -16,18 +15,35 @@ from models.prognosis.fleet import FleetPrior
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior, weak
-from service.lives.adopted_model import BASELINE, Adopted, Course, adopted_of
 from service.schemas.clutch import ClutchIn
-from storage import fleet_priors
-from storage.clutches import ClutchRow
 
 MEAN_COF = "mean_cof"
-#: The mean over the reference pressures stands under this pressure.
+#: The mean over the reference pressures stands under this pressure [Pa].
 ALL_PRESSURES = 0.0
 
-#: What is believed of a series, by name: always the first, the second where there is a fleet.
+#: The priors of a series, by name: always the first, the second where a fleet has taught one.
 WEAK, FLEET = "weak", "fleet"
-WEAK_PRIOR: Mapping[str, Any] = {"name": WEAK, "version": None, "clutches": 0}
+BASELINE: Mapping[str, Any] = {"name": "baseline", "effects": []}
+
+#: Mean COF [m] that an adopted model's effects add at cycles since new [m], at a pressure [Pa] or ALL_PRESSURES.
+Course: TypeAlias = Callable[[FloatArray, float], FloatArray]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelInForce:
+    """The model as answers name it, its course (None: eq. 6 alone), and the exponent of an adopted load severity."""
+
+    name: Mapping[str, Any] = field(default_factory=lambda: BASELINE)
+    course: Course | None = None
+    severity_exponent: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LearnedPrior:
+    """The prior that a fleet has taught (None: the weak one alone), and its public name."""
+
+    fleet: FleetPrior | None = None
+    name: Mapping[str, Any] = field(default_factory=lambda: {"name": WEAK, "version": None, "clutches": 0})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,18 +63,15 @@ class Scale:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Basis:
-    """`severity` is what ζ counts; `fleet` None leaves the weak prior alone; `course` None is eq. 6 alone.
+class Assumptions:
+    """What ζ counts (`severity`), the fleet's prior beside the weak one, and the model in force.
 
-    `prior` and `model` are what answers name. The course is taken off measured mean COF before eq. 6 is tracked and put back
-    when the threshold is looked for.
+    The model's course is taken off measured mean COF before eq. 6 is tracked, and put back to look for the threshold.
     """
 
     severity: Severity = field(default_factory=Severity)
-    fleet: FleetPrior | None = None
-    prior: Mapping[str, Any] = field(default_factory=lambda: WEAK_PRIOR)
-    course: Course | None = None
-    model: Mapping[str, Any] = field(default_factory=lambda: BASELINE)
+    prior: LearnedPrior = field(default_factory=LearnedPrior)
+    model: ModelInForce = field(default_factory=ModelInForce)
 
     @property
     def counts_cycles(self) -> bool:
@@ -70,38 +83,37 @@ class Basis:
         since = [block.since(origin) for block in blocks if block.end > origin]
         return Scale(origin=origin, severity=severity_map(self.severity, since))
 
-    def beliefs(self, quantity: str, first: Measurement, scale: Scale) -> dict[str, Prior]:
-        """What is believed of a series before it is measured, by name; `first` gives its size."""
-        if self.fleet is None or quantity != MEAN_COF:
+    def priors(self, quantity: str, first: Measurement, scale: Scale) -> dict[str, Prior]:
+        """The priors of a series by name; its first measurement gives their size."""
+        fleet = self.prior.fleet
+        if fleet is None or quantity != MEAN_COF:
             return {WEAK: weak(first, falling=quantity == MEAN_COF)}
-        return {WEAK: weak(first, falling=True), FLEET: self.fleet.in_unit(scale.severity.unit).prior_for(first)}
+        return {WEAK: weak(first, falling=True), FLEET: fleet.in_unit(scale.severity.unit).prior_for(first)}
 
-    def together(self, found: Mapping[str, Posterior], first: Measurement, scale: Scale) -> Posterior:
-        """Samples under each of `beliefs` as one, put together as the measurements have it."""
-        if self.fleet is None or FLEET not in found:
-            return found[WEAK]
-        return self.fleet.in_unit(scale.severity.unit).together(found[WEAK], found[FLEET], first)
+    def pooled(self, posteriors: Mapping[str, Posterior], first: Measurement, scale: Scale) -> Posterior:
+        """The posteriors under each of `priors` as one, weighted by their evidence."""
+        fleet = self.prior.fleet
+        if fleet is None or FLEET not in posteriors:
+            return posteriors[WEAK]
+        return fleet.in_unit(scale.severity.unit).together(posteriors[WEAK], posteriors[FLEET], first)
 
     def offset(self, quantity: str, pressure: float, cycles: FloatArray) -> FloatArray:
-        """What the adopted model adds to a quantity at cycles since new [m]; [m]."""
-        if self.course is None or quantity != MEAN_COF:
+        """What the model in force adds to a quantity at cycles since new [m]; [m]."""
+        if self.model.course is None or quantity != MEAN_COF:
             return np.zeros(cycles.shape)
-        return self.course(cycles, pressure)
+        return self.model.course(cycles, pressure)
+
+    def named(self) -> dict[str, Any]:
+        """The model, the prior and the severity behind an answer, as it names them."""
+        severity = {"basis": self.severity.basis.value, "exponent": self.severity.exponent}
+        return {"model": dict(self.model.name), "prior": dict(self.prior.name), "severity": severity}
 
 
-def basis_of(connection: Connection, clutch: ClutchRow) -> Basis:
-    """The basis of a stored clutch under the model that is adopted for it."""
-    return basis_under(connection, clutch, adopted_of(connection, clutch.clutch_id))
-
-
-def basis_under(connection: Connection, clutch: ClutchRow, adopted: Adopted) -> Basis:
-    """The basis of a stored clutch under a model: severity by its record or the model, the fleet's prior, the course."""
-    record = ClutchIn.model_validate(clutch.record)
-    severity = record.severity.to_model()
-    if adopted.severity_exponent is not None:
-        severity = Severity(basis=SeverityBasis.DISSIPATED_ENERGY, exponent=adopted.severity_exponent)
-    fleet, prior = _fleet_of(connection, record, severity)
-    return Basis(severity=severity, fleet=fleet, prior=prior, course=adopted.course, model=adopted.model)
+def severity_under(record: ClutchIn, exponent: float | None) -> Severity:
+    """What ζ counts: by the clutch's record, or by the exponent of an adopted load severity."""
+    if exponent is None:
+        return record.severity.to_model()
+    return Severity(basis=SeverityBasis.DISSIPATED_ENERGY, exponent=exponent)
 
 
 def kind_of(record: ClutchIn, severity: Severity) -> dict[str, Any]:
@@ -113,16 +125,3 @@ def kind_of(record: ClutchIn, severity: Severity) -> dict[str, Any]:
         "origin": record.origin,
         "severity": {"basis": severity.basis.value, "exponent": severity.exponent},
     }
-
-
-def _fleet_of(
-    connection: Connection, record: ClutchIn, severity: Severity
-) -> tuple[FleetPrior | None, Mapping[str, Any]]:
-    """The newest prior of the clutch's kind that was not learned from it, and its public name."""
-    row = fleet_priors.current(connection, kind_of(record, severity))
-    if row is not None and record.clutch_id in row.members:
-        row = fleet_priors.without(connection, row, record.clutch_id)
-    if row is None:
-        return None, WEAK_PRIOR
-    fleet = FleetPrior.from_dict(row.content)
-    return fleet, {"name": FLEET, "version": row.version, "clutches": fleet.clutches}

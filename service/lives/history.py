@@ -8,7 +8,8 @@ after it is the new reference. Any other maintenance begins an epoch: it may hav
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from datetime import datetime
 
 import numpy as np
 
@@ -18,10 +19,15 @@ from models.degradation.severity import Block
 from models.friction.speed_protocol import protocol_speeds
 from models.records.runs import LEVEL_GAP, LEVEL_GAP_SHARE
 from models.tracking.measurement import Measurement
-from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Basis, Scale
+from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions, Scale
 from service.lives.run_analysis import Value
+from service.readers.units import RADIANS_PER_SECOND_PER_RPM
 
 ByPressure = Mapping[float, Value]
+
+#: Kinds of runs.
+STATIONARY, DYNAMIC, MAINTENANCE = "stationary_stribeck", "dynamic_stribeck", "maintenance"
+REBUILD = "rebuild"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,7 +35,7 @@ class Event:
     """A run as the history sees it.
 
     `moment` is when it was made [s]. A stationary test has the range of its speeds [rad/s], and mean COF with its
-    deviation by pressure [Pa] where its curves can say it; `duty` is the block that ends with the run, `shift` an event
+    deviation by pressure [Pa] where its curves determine it; `duty` is the block that ends with the run, `shift` an event
     that may have shifted the level.
     """
 
@@ -58,7 +64,7 @@ class Series:
     scale: Scale
 
     def until(self, event: int) -> int:
-        """How many measurements were there when `event` had happened."""
+        """How many measurements there were when `event` had happened."""
         return sum(1 for index in self.events if index <= event)
 
 
@@ -81,32 +87,39 @@ class Life:
 
     @property
     def reference(self) -> ByPressure:
-        """Mean COF by pressure of the first stationary test that says one."""
+        """Mean COF by pressure of the first stationary test that has one."""
         return next((event.cofs for event in self.events if event.cofs), {})
 
     def until(self, event: int) -> "Life":
         """The life as it was when `event` had happened."""
         return Life(origin=self.origin, events=self.events[: event + 1])
 
-    def scale(self, basis: Basis) -> Scale:
-        """ζ over cycles since new, by the duty of this life."""
-        return basis.scale(self.origin, [event.duty for event in self.events if event.duty is not None])
+    def with_cofs(self, cofs: Mapping[str, ByPressure]) -> "Life":
+        """The life by other mean COFs of its tests, by run_id; none for a test that is not among them."""
+        return replace(self, events=tuple(replace(event, cofs=cofs.get(event.run_id, {})) for event in self.events))
 
-    def pooled(self, basis: Basis) -> Series:
+    def scale(self, assumptions: Assumptions) -> Scale:
+        """ζ over cycles since new, by the duty of this life."""
+        return assumptions.scale(self.origin, [event.duty for event in self.events if event.duty is not None])
+
+    def pooled(self, assumptions: Assumptions) -> Series:
         """Mean COF over the pressures of the reference test."""
         reference = self.reference
-        return self.series(basis, MEAN_COF, ALL_PRESSURES, [_pooled(reference, event.cofs) for event in self.events])
+        pooled = [_pooled(reference, event.cofs) for event in self.events]
+        return self.series(assumptions, MEAN_COF, ALL_PRESSURES, pooled)
 
-    def at(self, basis: Basis, level: float) -> Series:
+    def at(self, assumptions: Assumptions, level: float) -> Series:
         """Mean COF at one pressure level of the reference test."""
-        return self.series(basis, MEAN_COF, level, [nearest(level, event.cofs) for event in self.events])
+        return self.series(assumptions, MEAN_COF, level, [nearest(level, event.cofs) for event in self.events])
 
-    def series(self, basis: Basis, quantity: str, pressure: float, values: Sequence[Value | None]) -> Series:
+    def series(
+        self, assumptions: Assumptions, quantity: str, pressure: float, values: Sequence[Value | None]
+    ) -> Series:
         """The series of a quantity from its value at every event, None where it has none."""
-        kept = [(index, value) for index, value in enumerate(values) if value is not None]
-        scale = self.scale(basis)
-        cycles = np.array([self.events[index].cycles for index, _ in kept])
-        course = basis.offset(quantity, pressure, cycles)
+        measured = [(index, value) for index, value in enumerate(values) if value is not None]
+        scale = self.scale(assumptions)
+        cycles = np.array([self.events[index].cycles for index, _ in measured])
+        course = assumptions.offset(quantity, pressure, cycles)
         epochs = list(itertools.accumulate(int(event.shift) for event in self.events))
         return Series(
             quantity=quantity,
@@ -114,24 +127,36 @@ class Life:
             measurements=tuple(
                 Measurement(progress=zeta, value=value - off, variance=sd**2, epoch=epochs[index])
                 for (index, (value, sd)), zeta, off in zip(
-                    kept, scale.progress(cycles).tolist(), course.tolist(), strict=True
+                    measured, scale.progress(cycles).tolist(), course.tolist(), strict=True
                 )
             ),
-            events=tuple(index for index, _ in kept),
+            events=tuple(index for index, _ in measured),
             scale=scale,
         )
 
 
-def order(events: Sequence[Event]) -> list[Event]:
+def order(events: Sequence[Event]) -> tuple[Event, ...]:
     """By cycles, at equal cycles by when they were made: whatever the order of arrival, the history is the same."""
-    return sorted(events, key=lambda event: (event.cycles, event.moment, event.run_id))
+    return tuple(sorted(events, key=lambda event: (event.cycles, event.moment, event.run_id)))
 
 
-def lives(events: Sequence[Event]) -> list[Life]:
+def lives_of(events: Sequence[Event]) -> list[Life]:
     """Cut an ordered history into lives at its rebuilds."""
     starts = [index for index, event in enumerate(events) if event.rebuild and index > 0]
     parts = [tuple(events[a:b]) for a, b in itertools.pairwise([0, *starts, len(events)]) if b > a]
     return [Life(origin=part[0].cycles if part[0].rebuild else 0.0, events=part) for part in parts]
+
+
+def life_with(events: Sequence[Event], event: Event) -> Life:
+    """The life of an ordered history to which one of its events belongs."""
+    return next(life for life in lives_of(events) if event in life.events)
+
+
+def stationary_test_of(events: Sequence[Event], event: Event) -> Event | None:
+    """The stationary test that shows the clutch's state at a dynamic test: the last one up to its cycles, else the next."""
+    tests = [test for test in life_with(events, event).events if test.speed_range is not None]
+    before = [test for test in tests if test.cycles <= event.cycles]
+    return before[-1] if before else (tests[0] if tests else None)
 
 
 def reference_velocities(speed_range: Value, geometry: Geometry) -> FloatArray:
@@ -145,6 +170,36 @@ def nearest(level: float, values: ByPressure) -> Value | None:
         return None
     near = min(values, key=lambda pressure: abs(pressure - level))
     return values[near] if abs(near - level) <= max(LEVEL_GAP, LEVEL_GAP_SHARE * level) else None
+
+
+def nearest_pressure(level: float, pressures: Sequence[float]) -> float | None:
+    """The pressure [Pa] that is the same level as `level`, if there is one."""
+    near = nearest(level, {pressure: (pressure, 0.0) for pressure in pressures})
+    return None if near is None else near[0]
+
+
+def duty_block(
+    end: float,
+    cycles: float | None,
+    energy_kj: float | None,
+    speed_rpm: float | None,
+    duration_s: float | None,
+) -> Block | None:
+    """A block of duty in SI units, None where a run is none."""
+    if cycles is None:
+        return None
+    return Block(
+        end=end,
+        cycles=cycles,
+        energy=None if energy_kj is None else 1000.0 * energy_kj,
+        speed=None if speed_rpm is None else speed_rpm * RADIANS_PER_SECOND_PER_RPM,
+        duration=duration_s,
+    )
+
+
+def moment_of(started_at: str | None, received_at: str) -> float:
+    """When a run was made [s since 1970]: when it was started, or received where the rig did not say."""
+    return datetime.fromisoformat(started_at or received_at).timestamp()
 
 
 def _pooled(reference: ByPressure, values: ByPressure) -> Value | None:

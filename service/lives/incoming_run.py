@@ -11,13 +11,9 @@ import numpy as np
 from models.arrays import FloatArray
 from models.records.runs import UNLOADED, Plateaus, Record, pressure_levels
 from service.errors import FieldError, InvalidError
+from service.lives.criteria import LEAST_TORQUE_SD, MOST_LEVELS
 from service.readers.units import CHANNELS
 from service.schemas.base import whole
-
-#: No mean torque is known better than to this share of the torque: a smaller deviation counts as this.
-SHARPEST = 1e-4
-#: More pressure levels than any protocol has: a continuous pressure is no stationary test.
-MOST_LEVELS = 100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,10 +43,10 @@ def name_run(
     """A run with its content's hash, and its name derived from that where none was given.
 
     The hash covers everything but the name: kind, cycles, time, origin, details and every bit of every channel.
-    Raises InvalidError where a stationary test says nothing: no curve could be fitted to it, nor is it of an open clutch.
+    Raises InvalidError where a stationary test holds neither a curve that could be fitted nor an open clutch.
     """
-    said = [kind, whole(cycles), started_at, origin, dict(details)]
-    digest = hashlib.sha256(json.dumps(said, sort_keys=True, allow_nan=False).encode())
+    head = [kind, whole(cycles), started_at, origin, dict(details)]
+    digest = hashlib.sha256(json.dumps(head, sort_keys=True, allow_nan=False).encode())
     for name in sorted(channels):
         digest.update(f"\n{name}:{channels[name].size}\n".encode())
         digest.update(np.ascontiguousarray(channels[name], dtype="<f8").data)
@@ -124,7 +120,7 @@ def stationary_plateaus(channels: Mapping[str, FloatArray]) -> Plateaus:
     if deviation is not None:
         under_load = si["pressure_bar"] >= UNLOADED
         torque = si["torque_nm"][under_load] if under_load.any() else si["torque_nm"]
-        deviation = np.maximum(deviation, SHARPEST * float(np.sqrt(np.mean(torque**2))))
+        deviation = np.maximum(deviation, LEAST_TORQUE_SD * float(np.sqrt(np.mean(torque**2))))
     return Plateaus(
         pressure=si["pressure_bar"],
         speed=si["speed_rpm"],
@@ -135,7 +131,7 @@ def stationary_plateaus(channels: Mapping[str, FloatArray]) -> Plateaus:
 
 
 def _require_readings(channels: Mapping[str, FloatArray]) -> None:
-    """Refuse what says nothing: no torque, an open clutch at rest, under pressure what no Stribeck curve passes through."""
+    """Refuse a test without information: no torque, an open clutch at rest, under pressure rows that make no curve."""
     torque, speed, pressure = channels["torque_nm"], channels["speed_rpm"], channels["pressure_bar"]
     if (pressure * CHANNELS["pressure_bar"].factor >= UNLOADED).any():
         _require_curve(torque, speed, pressure)

@@ -1,80 +1,95 @@
-"""Mean COF freed of the artefacts of an extended model: taken off the plateaus, curves fitted anew.
+"""What an adopted extension changes in tracking: mean COFs freed of artefacts, and the course of the effects of use.
 
-A test is corrected with what was known when it was made: the runs before it in the order of the history. So the same
-history gives the same corrections, in whatever order its runs arrived. Of a sampled record before it only the moment and
-one point stand in, for to cut all of them at every new run would cost more than the run.
+Artefacts are taken off the plateaus of a test and its curves fitted anew, with what was known when it was made: the runs
+before it in the order of the history. So the same history gives the same corrections, in whatever order its runs arrived.
+Of a sampled record before it only the moment and one point stand in, for to cut all of them at every new run would cost
+more than the run. The fits and receipts of the baseline stay as they are.
 """
 
 import logging
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
-from sqlalchemy import Connection
 
 from models.arrays import FloatArray
+from models.clutch import Geometry
 from models.diagnosis.campaign import Campaign, StationaryRun
 from models.diagnosis.extension import Extension
+from models.prognosis.first_passage import HORIZON
 from models.records.runs import loaded
-from service import records
-from service.lives.campaign import STATIONARY, Taken, campaign_of, run_of, without_record
-from service.lives.history import Life, reference_velocities
-from service.lives.run_analysis import Value, levels_of, mean_cofs
+from service.lives.assumptions import ALL_PRESSURES, Course, ModelInForce
+from service.lives.campaign import CampaignRun, campaign_of, run_of, without_record
+from service.lives.criteria import COURSE_PROBES
+from service.lives.history import STATIONARY, ByPressure, Event, Life, reference_velocities
+from service.lives.incoming_run import IncomingRun
+from service.lives.run_analysis import levels_of, mean_cofs
 from service.schemas.clutch import ClutchIn
-from storage import channels
 
 _log = logging.getLogger("clutchlife")
 
 
-def neighbours(connection: Connection, clutch_id: str, life: Life) -> list[Taken]:
-    """The stored runs of a life in order, sampled records left out."""
-    rows = {row.run_id: row for row in records.run_rows(connection, clutch_id)}
-    samples = channels.samples(connection, clutch_id)
-    return [
-        without_record(rows[event.run_id], life.origin)
-        if rows[event.run_id].run_key in samples
-        else run_of(rows[event.run_id], channels.read(connection, rows[event.run_id].run_key), origin=life.origin)
-        for event in life.events
-    ]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunReader:
+    """A clutch's runs as they were sent, read when they are asked for.
+
+    `read(run_id)` gives a run with its channels, `describe(run_id)` without; `sampled` are those that are sampled records.
+    """
+
+    read: Callable[[str], IncomingRun]
+    describe: Callable[[str], IncomingRun]
+    sampled: frozenset[str]
+
+    def campaign_runs(self, events: Sequence[Event], *, origin: float) -> list[CampaignRun]:
+        """The runs of a life in order, sampled records left out."""
+        return [
+            without_record(self.describe(event.run_id), origin=origin)
+            if event.run_id in self.sampled
+            else run_of(self.read(event.run_id), origin=origin)
+            for event in events
+        ]
+
+    def stationary_tests(self, life: Life) -> Iterator[StationaryRun]:
+        """The stationary tests of a life in order, one after the other, with their records."""
+        for event in life.events:
+            if event.kind != STATIONARY:
+                continue
+            try:
+                run = run_of(self.read(event.run_id), origin=life.origin)
+            except ValueError as error:  # a record that this release cuts no longer
+                _log.warning("%s: %s", event.run_id, error)
+                continue
+            if isinstance(run, StationaryRun):
+                yield run
 
 
-def tests_of(connection: Connection, clutch_id: str, life: Life) -> Iterator[StationaryRun]:
-    """The stationary tests of a life in order, one after the other, with their records."""
-    for event in life.events:
-        if event.kind != STATIONARY:
-            continue
-        row = records.run(connection, clutch_id, event.run_id)
-        try:
-            run = run_of(row, channels.read(connection, row.run_key), origin=life.origin)
-        except ValueError as error:  # a record that this release cuts no longer
-            _log.warning("%s: %s", row.run_id, error)
-            continue
-        if isinstance(run, StationaryRun):
-            yield run
-
-
-def corrected(
-    extension: Extension, record: ClutchIn, life: Life, known: Sequence[Taken], tests: Iterable[StationaryRun]
-) -> dict[str, dict[float, Value]]:
+def corrected_cofs(
+    extension: Extension,
+    record: ClutchIn,
+    life: Life,
+    runs: Sequence[CampaignRun],
+    tests: Iterable[StationaryRun],
+) -> dict[str, ByPressure]:
     """run_id -> pressure [Pa] -> mean COF and its deviation, of the `tests` from which the extension takes something.
 
-    `known` are all runs of the life in order, as `neighbours` gives them.
+    `runs` are those of the life in order, up to the last of the tests at least.
     """
     if life.speed_range is None:
         return {}
     geometry = record.geometry.to_model()
     velocities = reference_velocities(life.speed_range, geometry)
-    place = {run.run_id: index for index, run in enumerate(known)}
-    found = {}
+    place = {event.run_id: index for index, event in enumerate(life.events)}
+    corrected: dict[str, ByPressure] = {}
     for test in tests:
-        artefact = _artefact(extension, test, campaign_of(record, known[: place[test.run_id]]))
+        artefact = _artefact(extension, test, campaign_of(record, runs[: place[test.run_id]]))
         if artefact is None:
             continue
         freed = loaded(replace(test.plateaus, torque=test.plateaus.torque - artefact))
         cofs = {} if freed is None else mean_cofs(levels_of(freed, geometry), velocities, geometry)
         if cofs:
-            found[test.run_id] = cofs
-    return found
+            corrected[test.run_id] = cofs
+    return corrected
 
 
 def _artefact(extension: Extension, run: StationaryRun, before: Campaign) -> FloatArray | None:
@@ -83,11 +98,47 @@ def _artefact(extension: Extension, run: StationaryRun, before: Campaign) -> Flo
     A test must be taken in whatever an adopted model makes of it: where it makes nonsense, nothing is taken off.
     """
     try:
-        found = extension.artefact(run, before)
-        sensible = found.shape == run.plateaus.torque.shape and bool(np.isfinite(found).all())
+        artefact = extension.artefact(run, before)
+        sensible = artefact.shape == run.plateaus.torque.shape and bool(np.isfinite(artefact).all())
     except (ArithmeticError, LookupError, ValueError):
         _log.exception("%s is not corrected", run.run_id)
         return None
     if not sensible:
         _log.error("%s is not corrected: its artefact is not finite or of another shape than its torque", run.run_id)
-    return found if sensible and found.any() else None
+    return artefact if sensible and artefact.any() else None
+
+
+def model_in_force(extension: Extension | None, life: Life | None, geometry: Geometry) -> ModelInForce:
+    """What an extension (None: the baseline) changes in the tracking of a life."""
+    if extension is None or life is None:
+        return ModelInForce()
+    return ModelInForce(
+        name={"name": "extended", "effects": list(extension.effects)},
+        course=course_of(extension, life, geometry),
+        severity_exponent=extension.severity_exponent,
+    )
+
+
+def course_of(extension: Extension, life: Life, geometry: Geometry) -> Course | None:
+    """Mean COF [m] that the effects of use add at cycles since new [m] at a pressure [Pa], 0 = the reference pressures.
+
+    None where they add nothing at any of many cycles, or no test has set a reference yet.
+    """
+    if life.speed_range is None or not life.reference:
+        return None
+    # every fifth of the protocol's speeds: their mean is that of all of them to half a per cent of the course
+    velocities = reference_velocities(life.speed_range, geometry)[2::5]
+    reference = np.array(sorted(life.reference))
+
+    @cache
+    def added(cycles: tuple[float, ...], pressure: float) -> FloatArray:
+        levels = np.array([pressure]) if pressure else reference
+        per_cof = np.array([geometry.torque_per_cof(float(level)) for level in levels])
+        since = np.maximum(np.array(cycles) - life.origin, 0.0)
+        course = extension.course(since, levels, velocities)
+        return np.asarray((course / per_cof).mean(axis=1), dtype=np.float64)
+
+    probes = tuple(np.concatenate([[0.0], np.geomspace(1.0, HORIZON, COURSE_PROBES)]).tolist())
+    if not added(probes, ALL_PRESSURES).any():
+        return None
+    return lambda cycles, pressure: added(tuple(cycles.tolist()), pressure)  # asked for the same cycles at every run

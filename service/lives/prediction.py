@@ -1,20 +1,28 @@
-"""A prediction in the public shape of `/remaining-useful-life`."""
+"""Predictions in the public shapes: `/remaining-useful-life`, a list's summary, the warning of a test off its track."""
 
+import math
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from typing import Any
 
 from models.prognosis.first_passage import HORIZON, QUANTILES, FirstPassage
-from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Basis
-from service.lives.history import Series
-from service.lives.receipt import bar
-from service.lives.run_analysis import Warned
+from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions
+from service.lives.criteria import MOST_LINE_POINTS
+from service.lives.history import Event, Series
+from service.lives.receipt import bar, notice_items
+from service.lives.run_analysis import Notice
 from service.schemas.base import whole
 
 INSUFFICIENT = "insufficient_data"
+OFF_TRACK = "off_track"
+#: What a list shows of a clutch, out of the particle filter's prediction.
+SUMMARY = ("status", "as_of_cycles", "current", "remaining_cycles", "model")
+#: A clutch without a prediction comes after all others in a list.
+RANK_UNKNOWN = 2 * HORIZON
 
 
-def unknown(basis: Basis, cycles: float | None, pressure: float, fraction: float) -> dict[str, Any]:
-    """What is said where nothing can be: `insufficient_data`."""
+def insufficient(assumptions: Assumptions, cycles: float | None, pressure: float, fraction: float) -> dict[str, Any]:
+    """The answer where nothing can be predicted: `insufficient_data`."""
     return {
         "as_of_cycles": None if cycles is None else whole(cycles),
         "runs_used": 0,
@@ -26,30 +34,24 @@ def unknown(basis: Basis, cycles: float | None, pressure: float, fraction: float
         "probability_of_reaching": None,
         "horizon_cycles": whole(HORIZON),
         "warnings": [],
-    } | named(basis)
+    } | assumptions.named()
 
 
-def named(basis: Basis) -> dict[str, Any]:
-    """The model, the prior and the severity behind an answer."""
-    severity = {"basis": basis.severity.basis.value, "exponent": basis.severity.exponent}
-    return {"model": dict(basis.model), "prior": dict(basis.prior), "severity": severity}
-
-
-def foretold(
+def predicted(
     passage: FirstPassage,
-    basis: Basis,
+    assumptions: Assumptions,
     series: Series,
     cycles: float,
     fraction: float,
     *,
     runs: int,
     enough: bool,
-    warnings: Sequence[Warned],
+    warnings: Sequence[Notice],
 ) -> dict[str, Any]:
-    """What is said of a first passage in ζ, led back to cycles; without `enough` tests only where it stands."""
+    """A first passage in ζ, led back to cycles; without `enough` tests only where the clutch stands."""
     mean, deviation = max(0.0, passage.current[0]), passage.current[1]
     left = mean / passage.initial if passage.initial > 0 else None
-    known = {
+    present = {
         "runs_used": runs,
         "criterion": _criterion(fraction, series.pressure, passage.initial, passage.threshold),
         "current": {
@@ -58,7 +60,7 @@ def foretold(
             "fraction_of_initial": left,
             "health": None if left is None else min(1.0, max(0.0, (left - fraction) / (1 - fraction))),
         },
-        "warnings": [{"code": each.code, "message": each.message} for each in warnings],
+        "warnings": notice_items(warnings),
     }
     ends = {q: None if zeta is None else float(series.scale.cycles(zeta)) for q, zeta in passage.end_of_life.items()}
     future = {
@@ -67,7 +69,45 @@ def foretold(
         "end_of_life_cycles": _quantiles(ends),
         "probability_of_reaching": passage.probability_of_reaching,
     }
-    return unknown(basis, cycles, series.pressure, fraction) | known | (future if enough else {})
+    return insufficient(assumptions, cycles, series.pressure, fraction) | present | (future if enough else {})
+
+
+def off_track(value: float, deviations: float) -> Notice:
+    """The warning of a last test whose mean COF lies so many deviations off what the tests before it predict."""
+    side = "below" if deviations < 0 else "above"
+    size = f"{abs(deviations):.1f}" if math.isfinite(deviations) else "very many"
+    message = (
+        f"the last test's mean COF of {value:.4g} lies {size} deviations {side} what the tests before it predict: "
+        "an outlying run, or the clutch has left its course"
+    )
+    return Notice(code=OFF_TRACK, message=message)
+
+
+def summary_of(payload: dict[str, Any]) -> tuple[dict[str, Any], float]:
+    """What a list shows of a clutch, and its rank: the fewer cycles remain, the earlier in the list."""
+    median = payload["remaining_cycles"]["0.5"]
+    remaining = HORIZON if median is None else float(median)
+    rank = RANK_UNKNOWN if payload["status"] == INSUFFICIENT else remaining
+    return {name: payload[name] for name in SUMMARY}, rank
+
+
+def recent(events: Sequence[Event], series: Series) -> dict[str, Any]:
+    """The run that was made last, and mean COF [-] of the present life as a short line, thinned evenly, its last value kept.
+
+    `events` is not empty; `series` is mean COF over the reference pressures, ordered by cycles.
+    """
+    last = max(events, key=lambda event: event.moment)
+    values = [measurement.value for measurement in series.measurements]
+    step = -(-len(values) // MOST_LINE_POINTS)  # rounded up
+    return {
+        "last_run": {
+            "run_id": last.run_id,
+            "kind": last.kind,
+            "cycles": whole(last.cycles),
+            "at": datetime.fromtimestamp(last.moment, UTC).isoformat(timespec="seconds"),
+        },
+        "mean_cof": [round(value, 6) for value in values[::-1][:: step or 1]][::-1],
+    }
 
 
 def _criterion(fraction: float, pressure: float, initial: float | None, threshold: float | None) -> dict[str, Any]:

@@ -1,7 +1,10 @@
-"""A run's own results, before its history is looked at: curves fitted, oddities noticed."""
+"""A run's own results, before its history is looked at: curves and loops fitted, oddities noticed.
+
+`analyse` is the first step of every run's way in; `mean_cofs` turns a test's curves into mean COF over a protocol's speeds.
+"""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,35 +13,29 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.friction.identification import FitStatus, StribeckFit, fit_curves, mean_torques
 from models.friction.speed_protocol import protocol_speeds
+from models.loops.lag_fit import StationaryCurve
+from models.loops.loops import Loop, evaluate_loops
 from models.records.plateaus import cut_plateaus
 from models.records.runs import UNLOADED, Plateaus, curves_by_pressure, loaded
 from service.errors import FieldError, InvalidError
-from service.lives.incoming_run import IncomingRun, SampledChannels, stationary_plateaus
+from service.lives.criteria import FEWEST_SPEEDS, POOR_FIT, WIDE_LEVEL
+from service.lives.incoming_run import IncomingRun, SampledChannels, sampled_record, stationary_plateaus
 from service.readers.units import PASCALS_PER_BAR
 
-#: Warnings that hang on what was known when the run arrived: cycles before those of an earlier run, other pressures.
+#: Warnings that depend on what was known when the run arrived: cycles before those of an earlier run, other pressures.
 LATE, OTHER_PRESSURES = "late_arrival", "other_pressures"
 NOTICED_ON_ARRIVAL = (LATE, OTHER_PRESSURES)
 
-
-#: Four parameters cannot be told from fewer distinct speeds, and a mean over the protocol would be an extrapolation.
-FEWEST_SPEEDS = 4
-#: A level whose pressures lie further apart than this share is worth a warning.
-WIDE_LEVEL = 0.06
-#: A fit that misses by less than this share of the static torque (rms) is no poor one, whatever eq. 5 makes of a flat curve.
-POOR = 0.02
+#: A value and its deviation.
+Value = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Warned:
-    """Something that was noticed and did not stop the run."""
+class Notice:
+    """A warning: something that was noticed and did not stop the run."""
 
     code: str
     message: str
-
-
-#: A value and its deviation.
-Value = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,16 +49,22 @@ class LevelFit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Analysis:
-    """What one run says by itself; `speed_range` [rad/s] is None for a run that holds no stationary test under pressure."""
+    """The results of one run by itself.
+
+    `speed_range` [rad/s] is None for a run that holds no stationary test under pressure; `plateaus` and the `times` [s] of
+    their middles (None where each row was sent as a plateau) are those of a stationary test.
+    """
 
     fits: tuple[LevelFit, ...] = ()
     speed_range: tuple[float, float] | None = None
-    warnings: tuple[Warned, ...] = ()
+    warnings: tuple[Notice, ...] = ()
+    plateaus: Plateaus | None = None
+    times: tuple[float, ...] | None = None
 
 
 def analyse(run: IncomingRun, geometry: Geometry) -> Analysis:
-    """Fit a stationary test's curves, from its plateaus or from its sampled record; other kinds are kept as they are, and
-    so is what was read with the clutch open.
+    """Fit a stationary test's curves, from its plateaus or from its sampled record; other kinds and tests of the open
+    clutch have no curve.
 
     Raises InvalidError where a sampled record holds no steady plateau.
     """
@@ -69,15 +72,16 @@ def analyse(run: IncomingRun, geometry: Geometry) -> Analysis:
         return Analysis()
     if "time_s" not in run.channels:
         plateaus = stationary_plateaus(run.channels)
-        return _analyse_stationary(plateaus, geometry, _row_warnings(run, plateaus))
+        return _analyse_stationary(plateaus, None, geometry, _row_warnings(run, plateaus))
     try:
         cut = cut_plateaus(SampledChannels(run.channels))
     except ValueError as error:
         message = f"time_s, pressure_bar, speed_rpm, torque_nm: {error}"
         errors = [FieldError(pointer="/channels/torque_nm", code="no_plateau", message=message)]
         raise InvalidError(message, errors=errors) from None
-    notes = [Warned(code=code, message=message) for code, message in cut.notes]
-    return _analyse_stationary(cut.plateaus, geometry, notes)
+    notices = [Notice(code=code, message=message) for code, message in cut.notes]
+    times = tuple((0.5 * (cut.start + cut.stop)).tolist())
+    return _analyse_stationary(cut.plateaus, times, geometry, notices)
 
 
 def levels_of(plateaus: Plateaus, geometry: Geometry) -> tuple[LevelFit, ...]:
@@ -89,41 +93,63 @@ def levels_of(plateaus: Plateaus, geometry: Geometry) -> tuple[LevelFit, ...]:
     )
 
 
-def _analyse_stationary(plateaus: Plateaus, geometry: Geometry, noticed: Sequence[Warned]) -> Analysis:
+def loops_of(channels: Mapping[str, FloatArray], geometry: Geometry, levels: Sequence[LevelFit]) -> tuple[Loop, ...]:
+    """The friction loops of a dynamic test, with the lag behind the curves of its stationary test.
+
+    A curve of which some parameter is undetermined counts all the same: what its covariance leaves open makes the lag less
+    certain, or unresolved.
+    """
+    curves = {
+        level.fit.pressure: StationaryCurve(parameters=level.fit.parameters, covariance=level.fit.covariance)
+        for level in levels
+        if level.speeds >= FEWEST_SPEEDS
+    }
+    return evaluate_loops(sampled_record(channels), geometry, curves or None)
+
+
+def _analyse_stationary(
+    plateaus: Plateaus, times: tuple[float, ...] | None, geometry: Geometry, noticed: Sequence[Notice]
+) -> Analysis:
     under_load = loaded(plateaus)
     noticed = [*_unloaded(plateaus, under_load), *noticed]
     if under_load is None:
-        return Analysis(warnings=tuple(noticed))
+        return Analysis(warnings=tuple(noticed), plateaus=plateaus, times=times)
     levels = levels_of(under_load, geometry)
     speed = np.abs(under_load.speed)
     low, high = float(speed.min()), float(speed.max())
-    telling = low < high and mean_cofs(levels, geometry.sliding_velocity(protocol_speeds(low, high)), geometry)
+    has_mean = low < high and mean_cofs(levels, geometry.sliding_velocity(protocol_speeds(low, high)), geometry)
     warnings = [
         *noticed,
-        *(warned for level in levels for warned in _level_warnings(level, under_load)),
-        *(warned for level in levels for warned in _fit_warnings(level.fit)),
+        *(notice for level in levels for notice in _level_warnings(level, under_load)),
+        *(notice for level in levels for notice in _fit_warnings(level.fit)),
     ]
-    if not telling:
-        message = "no pressure of this test says a mean COF: it sets no reference and no track uses it"
-        warnings.append(Warned(code="no_mean_cof", message=message))
-    return Analysis(fits=levels, speed_range=(low, high) if telling else None, warnings=tuple(warnings))
+    if not has_mean:
+        message = "no pressure of this test gives a mean COF: it sets no reference and no track uses it"
+        warnings.append(Notice(code="no_mean_cof", message=message))
+    return Analysis(
+        fits=levels,
+        speed_range=(low, high) if has_mean else None,
+        warnings=tuple(warnings),
+        plateaus=plateaus,
+        times=times,
+    )
 
 
 def mean_cofs(levels: Sequence[LevelFit], velocities: FloatArray, geometry: Geometry) -> dict[float, Value]:
-    """Mean COF over the protocol's velocities [m] m/s and its deviation by pressure [Pa], where a level can say it."""
-    telling = [level for level in levels if level.speeds >= FEWEST_SPEEDS]
-    if not telling:
+    """Mean COF over the protocol's velocities [m] m/s and its deviation by pressure [Pa], where a level determines it."""
+    usable = [level for level in levels if level.speeds >= FEWEST_SPEEDS]
+    if not usable:
         return {}
-    per_cof = np.array([geometry.torque_per_cof(level.mean_pressure) for level in telling])
-    values = (mean_torques([level.fit for level in telling], velocities) / per_cof[:, None]).tolist()
+    per_cof = np.array([geometry.torque_per_cof(level.mean_pressure) for level in usable])
+    values = (mean_torques([level.fit for level in usable], velocities) / per_cof[:, None]).tolist()
     return {
         level.fit.pressure: (cof, sd)
-        for level, (cof, sd) in zip(telling, values, strict=True)
+        for level, (cof, sd) in zip(usable, values, strict=True)
         if math.isfinite(cof) and 0 < sd < cof
     }
 
 
-def _level_warnings(level: LevelFit, plateaus: Plateaus) -> list[Warned]:
+def _level_warnings(level: LevelFit, plateaus: Plateaus) -> list[Notice]:
     """A level over whose rows the pressure varies widely may be several that ran together."""
     near = np.abs(plateaus.pressure - level.fit.pressure) <= WIDE_LEVEL * level.fit.pressure
     rows = int(np.count_nonzero(near))
@@ -133,35 +159,34 @@ def _level_warnings(level: LevelFit, plateaus: Plateaus) -> list[Warned]:
         f"at {level.fit.pressure / PASCALS_PER_BAR:g} bar: measured pressures scatter by more than {100 * WIDE_LEVEL:g} % "
         "within what was taken for one level; several may have run together"
     )
-    return [Warned(code="wide_level", message=message)]
+    return [Notice(code="wide_level", message=message)]
 
 
-def _unloaded(plateaus: Plateaus, under_load: Plateaus | None) -> list[Warned]:
+def _unloaded(plateaus: Plateaus, under_load: Plateaus | None) -> list[Notice]:
     below = f"below {UNLOADED / PASCALS_PER_BAR:g} bar"
     if under_load is None:
         message = (
             f"the clutch was open, all pressures lie {below}: no curve is fitted, no track uses it; a diagnosis does"
         )
-        return [Warned(code="open_clutch", message=message)]
+        return [Notice(code="open_clutch", message=message)]
     left_out = plateaus.torque.size - under_load.torque.size
     message = f"{left_out} plateaus {below} were left out of the fits"
-    return [Warned(code="unloaded_plateaus", message=message)] if left_out else []
+    return [Notice(code="unloaded_plateaus", message=message)] if left_out else []
 
 
-def _row_warnings(run: IncomingRun, plateaus: Plateaus) -> list[Warned]:
-    found = []
-    if "torque_sd_nm" in run.channels and plateaus.torque_sd is None:
-        message = "torque_sd_nm holds zeros, which no sensor has: the fits were not weighted by it"
-        found.append(Warned(code="torque_sd_ignored", message=message))
-    return found
+def _row_warnings(run: IncomingRun, plateaus: Plateaus) -> list[Notice]:
+    if "torque_sd_nm" not in run.channels or plateaus.torque_sd is not None:
+        return []
+    message = "torque_sd_nm holds zeros, which no sensor has: the fits were not weighted by it"
+    return [Notice(code="torque_sd_ignored", message=message)]
 
 
-def _fit_warnings(fit: StribeckFit) -> list[Warned]:
+def _fit_warnings(fit: StribeckFit) -> list[Notice]:
     at = f"at {fit.pressure / PASCALS_PER_BAR:g} bar"
     if fit.status is FitStatus.UNDETERMINED:
-        return [Warned(code="undetermined", message=f"{at}: {fit.message}")]
-    missed = fit.rmse > POOR * float(fit.parameters.static_torque)
-    if not fit.acceptable and fit.mse_percent is not None and missed:
+        return [Notice(code="undetermined", message=f"{at}: {fit.message}")]
+    poor = fit.rmse > POOR_FIT * float(fit.parameters.static_torque)
+    if not fit.acceptable and fit.mse_percent is not None and poor:
         message = f"{at}: the percentage MSE is {fit.mse_percent:.3g} %, 5 % or more, with an RMSE of {fit.rmse:.3g} Nm"
-        return [Warned(code="poor_fit", message=message)]
+        return [Notice(code="poor_fit", message=message)]
     return []

@@ -10,23 +10,32 @@ from models.engagements.simulation import Capacity, Drive, Engagement, PressureP
 from models.friction.pressure_laws import PressureLaws, fit_asymptotic, fit_linear
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters, torque
 from models.prognosis.first_passage import weighted_quantiles
+from service import records
 from service.errors import NotFoundError
-from service.lives.assumptions import Basis
-from service.lives.history import Event, Life, Series, lives
+from service.lives.assumptions import Assumptions
+from service.lives.history import Event, Life, Series, lives_of
+from service.lives.parameter_tracks import parameter_series, posterior_of, tests_of
 from service.lives.run_analysis import LevelFit
-from service.queries.trajectories import posterior_of
-from service.queries.views import parameter_series, tests_of
 from service.readers.units import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
 from service.schemas.base import whole
+from storage.engine.database import Database
 
 #: Pressure laws need this many pressures; with fewer, torque goes with pressure from the nearest one.
 _FEWEST_FOR_LAWS = 3
 
 
+def engaged(database: Database, clutch_id: str, *, at_cycles: float | None) -> dict[str, Any]:
+    """The engagement that the tracked clutch would give at `at_cycles`, or now. Raises NotFoundError."""
+    with database.reading() as connection:
+        state, levels = records.state(connection, clutch_id), records.levels(connection, clutch_id)
+    trace = engagement(clutch_id, state.events, state.assumptions(), levels, state.geometry, at_cycles=at_cycles)
+    return {"clutch_id": clutch_id, "origin": state.record.origin, "simulated": True} | trace
+
+
 def engagement(
     clutch_id: str,
     events: Sequence[Event],
-    basis: Basis,
+    assumptions: Assumptions,
     fits: Mapping[str, Sequence[LevelFit]],
     geometry: Geometry,
     *,
@@ -34,17 +43,17 @@ def engagement(
 ) -> dict[str, Any]:
     """The trace in the public shape. Raises NotFoundError before the first stationary test that tells all parameters."""
     happened = [event for event in events if at_cycles is None or event.cycles <= at_cycles]
-    found = lives(happened)
+    found = lives_of(happened)
     if not found:
         raise NotFoundError("no stationary test is known by then: there is no clutch to engage")
     life = found[-1]
     cycles = happened[-1].cycles if at_cycles is None else at_cycles
-    parameters = _parameters(clutch_id, life, basis, tests_of(life, fits), cycles)
+    parameters = _parameters(clutch_id, life, assumptions, tests_of(life, fits), cycles)
     profile, drive = PressureProfile(), Drive()
     trace = engage(_capacity(parameters), geometry.mean_radius, profile=profile, drive=drive)
     return {
         "at_cycles": whole(cycles),
-        "model": dict(basis.model),
+        "model": dict(assumptions.model.name),
         "initial_speed_rpm": drive.speed / RADIANS_PER_SECOND_PER_RPM,
         "maximum_pressure_bar": profile.maximum / PASCALS_PER_BAR,
         "motor_torque_limit_nm": drive.limit,
@@ -56,22 +65,22 @@ def engagement(
 
 
 def _parameters(
-    clutch_id: str, life: Life, basis: Basis, tests: Sequence[Sequence[LevelFit]], cycles: float
+    clutch_id: str, life: Life, assumptions: Assumptions, tests: Sequence[Sequence[LevelFit]], cycles: float
 ) -> dict[float, StribeckParameters]:
     """The tracked Stribeck parameters by pressure [Pa], each the median of its own eq. 6 at `cycles` since new."""
     at: dict[float, dict[str, float]] = {}
     for name in PARAMETER_NAMES:
-        for series in parameter_series(life, basis, tests, name):
+        for series in parameter_series(life, assumptions, tests, name):
             if series.measurements:
-                at.setdefault(series.pressure, {})[name] = _median(clutch_id, series, basis, cycles)
+                at.setdefault(series.pressure, {})[name] = _median(clutch_id, series, assumptions, cycles)
     told = {level: values for level, values in at.items() if len(values) == len(PARAMETER_NAMES)}
     if not told:
         raise NotFoundError("no stationary test tells all four Stribeck parameters by then")
     return {level: StribeckParameters(**{n: max(v, 0.0) for n, v in values.items()}) for level, values in told.items()}
 
 
-def _median(clutch_id: str, series: Series, basis: Basis, cycles: float) -> float:
-    posterior = posterior_of(clutch_id, series, basis)
+def _median(clutch_id: str, series: Series, assumptions: Assumptions, cycles: float) -> float:
+    posterior = posterior_of(clutch_id, series, assumptions)
     values = posterior.values(np.array([float(series.scale.progress(cycles))]))[0]
     return float(weighted_quantiles(values, posterior.weight, (0.5,))[0])
 

@@ -1,10 +1,11 @@
-"""How right the predictions were, once a clutch has reached its threshold: what would have been said at each of its tests.
+"""How right the predictions were, once a clutch has reached its threshold: those that would have been made at each test.
 
 The end of life that came is where straight lines between the tests first pass the threshold; the threshold is the
 criterion's fraction of the initial mean COF, as the exact filter has it from all tests. Every test before it is a prediction
 made of the tests up to then. Shares are of the whole life, from its origin to its end.
 """
 
+import json
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -14,12 +15,11 @@ import numpy as np
 from models.prognosis import scoring
 from models.prognosis.first_passage import HORIZON, QUANTILES
 from service import records
-from service.lives.assumptions import ALL_PRESSURES, Basis, basis_of
-from service.lives.history import Event, Life, lives
-from service.lives.prediction import INSUFFICIENT, named
-from service.lives.tracks import CARRIED
-from service.queries import views
-from service.queries.views import Remembered
+from service.lives.assumptions import ALL_PRESSURES, Assumptions
+from service.lives.history import Event, Life
+from service.lives.prediction import INSUFFICIENT
+from service.lives.tracks import CARRIED, predict_at
+from service.queries.cache import AnswerCache, to_json
 from service.schemas.base import whole
 from storage import clutches, predictions
 from storage.engine.database import Database
@@ -31,39 +31,32 @@ STAGES, HALF_STAGE = (0.2, 0.4, 0.6, 0.8), 0.1
 _LOW, _HIGH = "0.05", "0.95"
 
 
-def of_clutch(database: Database, remembered: Remembered, clutch_id: str, *, method: str) -> dict[str, Any]:
+def of_clutch(database: Database, clutch_id: str, *, method: str) -> dict[str, Any]:
     """The scores of a clutch's lives that came to their end; NotFoundError for an unknown clutch."""
     with database.reading() as connection:
-        row = records.clutch(connection, clutch_id)
-        key = (clutch_id, row.revision, "scores", method)
-        items = remembered.find(key)
-        if items is None:
-            events, basis = records.events(connection, clutch_id), basis_of(connection, row)
-            said = {
-                each.cycles: each.payload for each in predictions.history(connection, clutch_id, method, ALL_PRESSURES)
-            }
-    if items is None:
-        fraction = records.record(row).end_of_life.cof_fraction
-        items = []
-        for life in lives(events):
-            end = end_of_life(clutch_id, life, basis, fraction)
-            if end is not None:
-                told = said if method in CARRIED else _told(clutch_id, life, basis, fraction, method)
-                items.append(_scored(life, basis, end, told))
-        remembered.keep(key, items)
-    return {"clutch_id": clutch_id, "method": method, "revision": row.revision, "items": items, "next": None}
+        state = records.state(connection, clutch_id)
+        rows = predictions.history(connection, clutch_id, method, ALL_PRESSURES)
+    stored = {row.cycles: row.payload for row in rows}
+    assumptions = state.assumptions()
+    items = []
+    for life in state.lives:
+        end = end_of_life(clutch_id, life, assumptions, state.fraction)
+        if end is not None:
+            made = stored if method in CARRIED else _predictions(clutch_id, life, assumptions, state.fraction, method)
+            items.append(_scored(life, assumptions, end, made))
+    return {"clutch_id": clutch_id, "method": method, "revision": state.revision, "items": items, "next": None}
 
 
-def of_fleet(database: Database, remembered: Remembered, *, method: str) -> dict[str, Any]:
+def of_fleet(database: Database, cache: AnswerCache, *, method: str) -> dict[str, Any]:
     """All lives that came to their end, together and by stage of life."""
     with database.reading() as connection:
-        names = clutches.all_ids(connection)
-    found = [
-        item | {"clutch_id": clutch_id}
-        for clutch_id in names
-        for item in of_clutch(database, remembered, clutch_id, method=method)["items"]
+        revisions = clutches.revisions(connection)
+    lives = [
+        life | {"clutch_id": clutch_id}
+        for clutch_id, revision in revisions.items()
+        for life in _items(database, cache, clutch_id, revision, method)
     ]
-    tests = [test for item in found for test in item["predictions"]]
+    tests = [test for life in lives for test in life["predictions"]]
     stages = [
         {"share_of_life": stage} | summary([test for test in tests if abs(test["share_of_life"] - stage) <= HALF_STAGE])
         for stage in STAGES
@@ -71,7 +64,7 @@ def of_fleet(database: Database, remembered: Remembered, *, method: str) -> dict
     return {
         "method": method,
         "lives": [
-            {name: item[name] for name in ("clutch_id", "origin_cycles", "end_of_life_cycles")} for item in found
+            {name: life[name] for name in ("clutch_id", "origin_cycles", "end_of_life_cycles")} for life in lives
         ],
         "overall": summary(tests),
         "stages": stages,
@@ -79,18 +72,26 @@ def of_fleet(database: Database, remembered: Remembered, *, method: str) -> dict
     }
 
 
-def end_of_life(clutch_id: str, life: Life, basis: Basis, fraction: float) -> float | None:
+def _items(database: Database, cache: AnswerCache, clutch_id: str, revision: int, method: str) -> list[dict[str, Any]]:
+    """A clutch's scored lives, kept by its revision."""
+    key = (clutch_id, revision, "scores", method)
+    answer = cache.answer(key, lambda: to_json(of_clutch(database, clutch_id, method=method)))
+    items: list[dict[str, Any]] = json.loads(answer)["items"]
+    return items
+
+
+def end_of_life(clutch_id: str, life: Life, assumptions: Assumptions, fraction: float) -> float | None:
     """The cycles since new at which the tests have passed the threshold; None where they have not."""
-    series = life.pooled(basis)
+    series = life.pooled(assumptions)
     if not series.measurements:
         return None
-    said = views.foretell(clutch_id, life.events, basis, fraction, method="grid", pressure_bar=None, at_cycles=None)
-    threshold = said["criterion"]["threshold_mean_cof"]
-    if said["status"] == INSUFFICIENT or threshold is None:
+    prediction = predict_at(clutch_id, life.events, assumptions, fraction, method="grid")
+    threshold = prediction["criterion"]["threshold_mean_cof"]
+    if prediction["status"] == INSUFFICIENT or threshold is None:
         return None
     cycles = np.array([life.events[index].cycles for index in series.events])
-    values = np.array([each.value for each in series.measurements])
-    values = values + basis.offset(series.quantity, series.pressure, cycles)
+    values = np.array([measurement.value for measurement in series.measurements])
+    values = values + assumptions.offset(series.quantity, series.pressure, cycles)
     below = np.flatnonzero(values <= threshold)
     if below.size == 0 or below[0] == 0:
         return None
@@ -99,22 +100,22 @@ def end_of_life(clutch_id: str, life: Life, basis: Basis, fraction: float) -> fl
     return float(cycles[last] + share * (cycles[first] - cycles[last]))
 
 
-def _told(clutch_id: str, life: Life, basis: Basis, fraction: float, method: str) -> dict[float, dict[str, Any]]:
-    """What a method that is not stored would have said at each test."""
-    found = {}
+def _predictions(
+    clutch_id: str, life: Life, assumptions: Assumptions, fraction: float, method: str
+) -> dict[float, dict[str, Any]]:
+    """What a method whose predictions are not stored would have predicted at each test."""
+    made = {}
     for index, event in enumerate(life.events):
         if event.cofs:
             happened: Sequence[Event] = life.events[: index + 1]
-            found[event.cycles] = views.foretell(
-                clutch_id, happened, basis, fraction, method=method, pressure_bar=None, at_cycles=None
-            )
-    return found
+            made[event.cycles] = predict_at(clutch_id, happened, assumptions, fraction, method=method)
+    return made
 
 
-def _scored(life: Life, basis: Basis, end: float, said: dict[float, dict[str, Any]]) -> dict[str, Any]:
+def _scored(life: Life, assumptions: Assumptions, end: float, made: dict[float, dict[str, Any]]) -> dict[str, Any]:
     """A life's scores, with every prediction of it."""
     at = sorted({event.cycles for event in life.events if event.cofs and event.cycles < end})
-    tests = [_test(said[cycles], cycles, life.origin, end) for cycles in at if said[cycles]["status"] != INSUFFICIENT]
+    tests = [_test(made[cycles], cycles, life.origin, end) for cycles in at if made[cycles]["status"] != INSUFFICIENT]
     horizon = scoring.prognostic_horizon(
         [test["cycles"] - life.origin for test in tests],
         [test["remaining_cycles"]["0.5"] for test in tests],
@@ -128,18 +129,18 @@ def _scored(life: Life, basis: Basis, end: float, said: dict[float, dict[str, An
         "summary": summary(tests),
         "pit_histogram": _histogram(tests),
         "predictions": tests,
-    } | named(basis)
+    } | assumptions.named()
 
 
-def _test(said: dict[str, Any], cycles: float, origin: float, end: float) -> dict[str, Any]:
+def _test(prediction: dict[str, Any], cycles: float, origin: float, end: float) -> dict[str, Any]:
     """One prediction and how right it was; a quantile beyond the horizon is scored as if it were there."""
-    remaining, length = said["remaining_cycles"], end - origin
-    ends = [origin + HORIZON if value is None else value for value in said["end_of_life_cycles"].values()]
+    remaining, length = prediction["remaining_cycles"], end - origin
+    ends = [origin + HORIZON if value is None else value for value in prediction["end_of_life_cycles"].values()]
     crps = scoring.crps_of_quantiles(QUANTILES, ends, end)
-    low, high = (said["end_of_life_cycles"][quantile] for quantile in (_LOW, _HIGH))
+    low, high = (prediction["end_of_life_cycles"][quantile] for quantile in (_LOW, _HIGH))
     return {
         "cycles": whole(cycles),
-        "runs_used": said["runs_used"],
+        "runs_used": prediction["runs_used"],
         "share_of_life": (cycles - origin) / length,
         "true_remaining_cycles": end - cycles,
         "remaining_cycles": remaining,
@@ -171,8 +172,8 @@ def _histogram(tests: Sequence[dict[str, Any]]) -> list[float]:
     return scoring.pit_histogram([test["pit"] for test in tests]).tolist() if tests else []
 
 
-def flat(item: dict[str, Any]) -> list[dict[str, Any]]:
-    """A life's predictions as rows of a table."""
+def rows(items: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The scored predictions of lives as rows of a table."""
     names = (
         "cycles",
         "runs_used",
@@ -182,11 +183,12 @@ def flat(item: dict[str, Any]) -> list[dict[str, Any]]:
         "crps_share",
         "interval_share",
     )
-    told = ("covered", "pit", "alpha_lambda")
+    judged = ("covered", "pit", "alpha_lambda")
     return [
         {"end_of_life_cycles": item["end_of_life_cycles"]}
         | {name: test[name] for name in names}
         | {f"remaining_cycles_{quantile}": value for quantile, value in test["remaining_cycles"].items()}
-        | {name: test[name] for name in told}
+        | {name: test[name] for name in judged}
+        for item in items
         for test in item["predictions"]
     ]

@@ -14,24 +14,34 @@ from models.clutch import Geometry
 from models.friction.pressure_laws import FEWEST_PRESSURES, fit_asymptotic, fit_linear
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters, torque
 from models.prognosis.first_passage import weighted_quantiles
+from service import records
 from service.errors import NotFoundError
-from service.lives.assumptions import Basis
-from service.lives.history import Event, lives
+from service.lives.assumptions import Assumptions
+from service.lives.history import Event, lives_of
+from service.lives.parameter_tracks import Track, parameter_tracks, tests_of
 from service.lives.receipt import PARAMETER_UNITS, bar
 from service.lives.run_analysis import LevelFit
-from service.queries.rebuilt import Track
-from service.queries.views import parameter_tracks, tests_of
 from service.readers.units import RADIANS_PER_SECOND_PER_RPM
 from service.schemas.base import whole
+from storage.engine.database import Database
 
 #: Places along cycles, pressure and speed.
 CYCLES, PRESSURES, SPEEDS = 15, 13, 20
 
 
+def surface(database: Database, clutch_id: str) -> dict[str, Any]:
+    """`/surfaces` of a clutch as it is now. Raises NotFoundError."""
+    with database.reading() as connection:
+        state, levels = records.state(connection, clutch_id), records.levels(connection, clutch_id)
+    assumptions = state.assumptions()
+    grids = surfaces(clutch_id, state.events, assumptions, levels, state.geometry)
+    return {"clutch_id": clutch_id, "revision": state.revision} | grids | assumptions.named()
+
+
 def surfaces(
     clutch_id: str,
     events: Sequence[Event],
-    basis: Basis,
+    assumptions: Assumptions,
     fits: Mapping[str, Sequence[LevelFit]],
     geometry: Geometry,
 ) -> dict[str, Any]:
@@ -39,12 +49,12 @@ def surfaces(
 
     Raises NotFoundError before the first stationary test that tells all four parameters.
     """
-    found = lives(events)
+    found = lives_of(events)
     speed_range = found[-1].speed_range if found else None
     if speed_range is None:
         raise NotFoundError("no stationary test is known: there are no surfaces")
     life = found[-1]
-    tracks = parameter_tracks(clutch_id, life, basis, tests_of(life, fits))
+    tracks = parameter_tracks(clutch_id, life, assumptions, tests_of(life, fits))
     levels = sorted(level for level in life.reference if all((name, level) in tracks for name in PARAMETER_NAMES))
     if not levels:
         raise NotFoundError("no stationary test tells all four Stribeck parameters: there are no surfaces")
@@ -71,7 +81,7 @@ def surfaces(
     }
 
 
-def flat(said: Mapping[str, Any]) -> list[dict[str, Any]]:
+def rows(said: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The surfaces as rows of a table, a row a count of cycles, a pressure and a speed."""
     return [
         {"cycles": cycles, "pressure_bar": pressure, "speed_rpm": speed}

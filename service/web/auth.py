@@ -8,10 +8,14 @@ browser can reach the service under a name of its own.
 import hashlib
 import ipaddress
 import secrets
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
-from service.errors import ForbiddenError, UnauthorizedError
+from fastapi import Depends, Request
+
+from service.errors import FieldError, ForbiddenError, InvalidError, UnauthorizedError
+from service.web.context import Context
 from storage import keys
 from storage.engine.database import Database
 from storage.keys import KeyRow
@@ -22,7 +26,7 @@ SCOPES: tuple[Scope, ...] = get_args(Scope)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Caller:
-    """What a request says of its sender."""
+    """What a request tells of its sender."""
 
     authorization: str | None
     address: str | None
@@ -82,3 +86,58 @@ def is_loopback(name: str) -> bool:
         return ipaddress.ip_address(name).is_loopback
     except ValueError:
         return False
+
+
+def context_of(request: Request) -> Context:
+    """The running service's context."""
+    context = request.app.state.context
+    assert isinstance(context, Context)  # noqa: S101  (set when the service starts)
+    return context
+
+
+def caller_of(request: Request) -> Caller:
+    """What the request tells of its sender."""
+    return Caller(
+        authorization=request.headers.get("authorization"),
+        address=None if request.client is None else request.client.host,
+        host=request.headers.get("host"),
+        origin=request.headers.get("origin"),
+    )
+
+
+def allowed(scope: Scope) -> Callable[[Request], Context]:
+    """A dependency that gives the context to callers with that scope and stops the others."""
+
+    def check(request: Request) -> Context:
+        context = context_of(request)
+        _refuse_unknown_arguments(request)
+        authorise(context.database, caller_of(request), scope)
+        return context
+
+    return check
+
+
+#: Tables and short lists are answered whole, and take the arguments of a list.
+_OF_LISTS = {"limit", "cursor"}
+
+
+def _refuse_unknown_arguments(request: Request) -> None:
+    """A mistyped argument must not be answered as if it had not been there."""
+    route = request.scope["route"]
+    known = {field.alias for field in route.dependant.query_params} | _OF_LISTS
+    unknown = [name for name in request.query_params if name not in known]
+    if unknown:
+        errors = [
+            FieldError(
+                pointer=f"/query/{name}",
+                code="extra_forbidden",
+                message=f"{name} is no argument here; there are: {', '.join(sorted(known)) or 'none'}",
+                value=request.query_params[name][:80],
+            )
+            for name in unknown
+        ]
+        raise InvalidError(errors[0].message, errors=errors)
+
+
+Reader = Annotated[Context, Depends(allowed("read"))]
+Ingester = Annotated[Context, Depends(allowed("ingest"))]

@@ -1,18 +1,16 @@
 """Metrics for Prometheus: requests by route, and where every clutch stands."""
 
-import time
 from collections.abc import Iterator
 
 from prometheus_client import CollectorRegistry, Counter, Histogram, generate_latest
 from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.workflows import register_clutch as clutches
+from service.queries import clutch_list
+from service.web.limits import METRICS_PAGE
 from storage.engine.database import Database
 
 MEDIA_TYPE = "text/plain; version=0.0.4; charset=utf-8"
-_PAGE = 1000
 
 
 class Metrics:
@@ -45,7 +43,7 @@ class Clutches(Collector):
         remaining = GaugeMetricFamily("clutchlife_clutch_remaining_cycles", text, labels=["clutch", "quantile"])
         after = None
         while True:
-            items, after = clutches.page(self._database, limit=_PAGE, after=after)
+            items, after = clutch_list.page(self._database, limit=METRICS_PAGE, after=after)
             for item in items:
                 name, summary = item["clutch_id"], item["summary"]
                 runs.add_metric([name], item["runs"])
@@ -59,31 +57,3 @@ class Clutches(Collector):
             if after is None:
                 break
         yield from (runs, health, remaining)
-
-
-class Counting:
-    """Counts and times every request by its route's template, so that names of clutches do not become labels."""
-
-    def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
-        self.app = app
-        self.metrics = metrics
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        status, started = 500, time.perf_counter()
-
-        async def noting(message: Message) -> None:
-            nonlocal status
-            if message["type"] == "http.response.start":
-                status = message["status"]
-            await send(message)
-
-        try:
-            await self.app(scope, receive, noting)
-        finally:
-            route = getattr(scope.get("route"), "path", "unmatched")
-            method = scope["method"] if route != "unmatched" else "any"
-            self.metrics.requests.labels(method, route, str(status)).inc()
-            self.metrics.seconds.labels(method, route).observe(time.perf_counter() - started)

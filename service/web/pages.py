@@ -1,4 +1,7 @@
-"""Answers: JSON or CSV with a strong entity tag, 304 where the asker has it already, and cursors for pages."""
+"""Bodies in, answers out: JSON or CSV with a strong entity tag, 304 where the asker has it already, cursors for pages.
+
+What follows from a clutch's revision alone is computed once and kept (`clutch_answer`, `clutch_table`).
+"""
 
 import base64
 import binascii
@@ -7,39 +10,119 @@ import hashlib
 import io
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import Any
 
 from fastapi import Request
 from fastapi.responses import Response
+from pydantic import BaseModel
 
-from service.errors import FieldError, InvalidError
+from service.errors import FieldError, InvalidError, NotFoundError, UnsupportedMediaTypeError
+from service.queries.cache import to_json
+from service.web.context import Context
+from service.web.limits import ALL_ITEMS
+from storage import clutches
 
 JSON_TYPE = "application/json"
 CSV_TYPE = "text/csv; charset=utf-8"
 
-
-def encode(payload: object) -> bytes:
-    """JSON in UTF-8; ValueError on a number that JSON cannot carry: none may leave."""
-    return json.dumps(payload, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
+#: Where a page ended: a number, and a name where that is not unique.
+Place = tuple[float, str]
+Rows = Iterable[Mapping[str, Any]]
 
 
 def answer(request: Request, payload: object) -> Response:
-    """A GET's answer; its ETag is that of the bytes, so it changes when and only when they do."""
-    return tagged(request, encode(payload), JSON_TYPE)
+    """A GET's answer that is made anew each time; its ETag is that of the bytes: it changes when and only when they do."""
+    return tagged(request, to_json(payload), JSON_TYPE)
 
 
-def table(request: Request, columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> Response:
-    """A GET's answer as CSV."""
+def clutch_answer(
+    request: Request, context: Context, clutch_id: str, name: str, make: Callable[[], object], *arguments: Hashable
+) -> Response:
+    """A GET's answer that follows from a clutch's revision, JSON. Raises NotFoundError.
+
+    `name` and `arguments` tell the clutch's answers apart.
+    """
+    return tagged(request, _computed(context, clutch_id, name, make, arguments), JSON_TYPE)
+
+
+def clutch_list_answer(
+    request: Request,
+    context: Context,
+    clutch_id: str,
+    name: str,
+    make: Callable[[], dict[str, Any]],
+    limit: int = ALL_ITEMS,
+    cursor: str | None = None,
+    *arguments: Hashable,
+) -> Response:
+    """The same of an answer with `items` that is computed whole, a page of it where one was asked for."""
+    after = from_cursor(cursor)
+    if limit == ALL_ITEMS and after is None:
+        return clutch_answer(request, context, clutch_id, name, make, *arguments)
+
+    def paged() -> object:
+        whole = json.loads(_computed(context, clutch_id, name, make, arguments))
+        return whole | sliced(whole["items"], limit, after)
+
+    return clutch_answer(request, context, clutch_id, name, paged, *arguments, limit, after)
+
+
+def clutch_table(
+    request: Request,
+    context: Context,
+    clutch_id: str,
+    name: str,
+    make: Callable[[], object],
+    rows: Callable[[Any], Rows],
+    columns: Sequence[str],
+    *arguments: Hashable,
+) -> Response:
+    """The CSV export of an answer that follows from a clutch's revision: `rows` of its JSON. Raises NotFoundError."""
+
+    def table() -> bytes:
+        return encode_table(columns, rows(json.loads(_computed(context, clutch_id, name, make, arguments))))
+
+    key = (clutch_id, _revision(context, clutch_id), f"{name}.csv", *arguments)
+    return tagged(request, context.cache.answer(key, table), CSV_TYPE)
+
+
+def _computed(
+    context: Context, clutch_id: str, name: str, make: Callable[[], object], arguments: tuple[Hashable, ...]
+) -> bytes:
+    # before the rest is read: what is committed meanwhile is kept under a revision that nobody asks for again
+    key = (clutch_id, _revision(context, clutch_id), name, *arguments)
+    return context.cache.answer(key, lambda: to_json(make()))
+
+
+def _revision(context: Context, clutch_id: str) -> int:
+    with context.database.reading() as connection:
+        revision = clutches.revision(connection, clutch_id)
+    if revision is None:
+        raise NotFoundError(f"no clutch is known as {clutch_id!r}")
+    return revision
+
+
+def table(request: Request, columns: Sequence[str], rows: Rows) -> Response:
+    """A GET's answer as CSV that is made anew each time."""
     return tagged(request, encode_table(columns, rows), CSV_TYPE)
 
 
-def encode_table(columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> bytes:
-    """CSV after RFC 4180 in UTF-8, a header row first; null is an empty field."""
+def encode_table(columns: Sequence[str], rows: Rows) -> bytes:
+    """CSV after RFC 4180 in UTF-8, a header row first; null is an empty field.
+
+    A first row with other names than `columns` gives the columns.
+    """
     text = io.StringIO()
-    writer = csv.DictWriter(text, fieldnames=columns, extrasaction="raise", restval="")
-    writer.writeheader()
-    writer.writerows({name: "" if value is None else value for name, value in row.items()} for row in rows)
+    writer: csv.DictWriter[str] | None = None
+    for row in rows:
+        if writer is None:
+            names = columns if row.keys() == set(columns) else tuple(row)
+            writer = csv.DictWriter(text, fieldnames=names, extrasaction="raise", restval="")
+            writer.writeheader()
+        writer.writerow({name: "" if value is None else value for name, value in row.items()})
+    if writer is None:
+        csv.writer(text).writerow(columns)
     return text.getvalue().encode()
 
 
@@ -47,18 +130,18 @@ def tagged(request: Request, body: bytes, media_type: str) -> Response:
     """The body, or 304 where `If-None-Match` names it."""
     tag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
     headers = {"ETag": tag, "Cache-Control": "no-cache"}
-    asked = request.headers.get("if-none-match", "")
-    if asked.strip() == "*" or tag in (each.strip().removeprefix("W/") for each in asked.split(",")):
+    asked_for = request.headers.get("if-none-match", "")
+    if asked_for.strip() == "*" or tag in (name.strip().removeprefix("W/") for name in asked_for.split(",")):
         return Response(status_code=304, headers=headers)
     return Response(content=body, media_type=media_type, headers=headers)
 
 
-def to_cursor(place: tuple[float, str] | None) -> str | None:
+def to_cursor(place: Place | None) -> str | None:
     """Where a next page starts, as text that fits an address."""
     return None if place is None else base64.urlsafe_b64encode(json.dumps(place).encode()).decode().rstrip("=")
 
 
-def from_cursor(cursor: str | None) -> tuple[float, str] | None:
+def from_cursor(cursor: str | None) -> Place | None:
     """The inverse of `to_cursor`; InvalidError on anything else."""
     if cursor is None:
         return None
@@ -75,13 +158,28 @@ def from_cursor(cursor: str | None) -> tuple[float, str] | None:
     return place
 
 
-def sliced(items: Sequence[Any], limit: int, after: tuple[float, str] | None) -> dict[str, Any]:
+def sliced(items: Sequence[Any], limit: int, after: Place | None) -> dict[str, Any]:
     """A page out of a list that is known whole: the place in it is the cursor."""
     start = 0 if after is None else max(0, int(after[0]))
     stop = start + limit
     return page(items[start:stop], (float(stop), "") if stop < len(items) else None)
 
 
-def page(items: Sequence[Any], after: tuple[float, str] | None) -> dict[str, Any]:
+def page(items: Sequence[Any], after: Place | None) -> dict[str, Any]:
     """The shape of every list."""
     return {"items": items, "next": to_cursor(after)}
+
+
+async def json_body(request: Request) -> bytes:
+    """The body of a request that says it is JSON; a browser cannot send such a one across sites unasked."""
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if kind != "application/json" and not kind.endswith("+json"):
+        raise UnsupportedMediaTypeError(f"send the body as application/json, not as {kind[:80]!r}")
+    return await request.body()
+
+
+def described_body(schema: type[BaseModel] | dict[str, Any], example: dict[str, Any]) -> dict[str, Any]:
+    """The body for the API's description, since the routes read it themselves."""
+    described = schema if isinstance(schema, dict) else schema.model_json_schema()
+    content = {"application/json": {"schema": described, "example": example}}
+    return {"requestBody": {"required": True, "content": content}}

@@ -21,12 +21,13 @@ from service.errors import (
     UnauthorizedError,
     UnsupportedMediaTypeError,
 )
+from service.queries.cache import to_json
 from service.schemas.problem import Problem
-from service.web.pages import encode
+from service.web.limits import RETRY_AFTER_SECONDS
 from storage.engine.errors import DatabaseBusy, StorageError
 
 PROBLEM_TYPE = "application/problem+json"
-RETRY_AFTER_SECONDS = 1
+
 _log = logging.getLogger("clutchlife")
 
 
@@ -39,7 +40,7 @@ def problem(
         "title": title,
         "status": status,
         "detail": detail,
-        "errors": [_shown(each) for each in errors],
+        "errors": [_shown(error) for error in errors],
         "total_errors": total,
     }
     headers = {"Cache-Control": "no-store"}
@@ -47,7 +48,7 @@ def problem(
         headers["Retry-After"] = str(RETRY_AFTER_SECONDS)
     if status == http.HTTPStatus.UNAUTHORIZED:
         headers["WWW-Authenticate"] = "Bearer"
-    return Response(content=encode(body), status_code=status, media_type=PROBLEM_TYPE, headers=headers)
+    return Response(content=to_json(body), status_code=status, media_type=PROBLEM_TYPE, headers=headers)
 
 
 def _shown(error: FieldError) -> dict[str, Any]:
@@ -86,19 +87,19 @@ def _storage_error(_: Request, error: Exception) -> Response:
 
 def _request_error(_: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)  # noqa: S101  (registered for it)
-    found = [_argument_error(each) for each in error.errors()]
-    more = f"; {len(found)} errors in all" if len(found) > 1 else ""
-    detail = found[0].message + more
-    return problem(422, InvalidError.slug, InvalidError.title, detail, tuple(found[:MOST_ERRORS]), len(found))
+    errors = [_argument_error(details) for details in error.errors()]
+    more = f"; {len(errors)} errors in all" if len(errors) > 1 else ""
+    detail = errors[0].message + more
+    return problem(422, InvalidError.slug, InvalidError.title, detail, tuple(errors[:MOST_ERRORS]), len(errors))
 
 
-def _argument_error(found: dict[str, Any]) -> FieldError:
-    name = ".".join(str(part) for part in found["loc"][1:])
-    shown = repr(found.get("input"))[:80]
+def _argument_error(details: dict[str, Any]) -> FieldError:
+    name = ".".join(str(part) for part in details["loc"][1:])
+    shown = repr(details.get("input"))[:80]
     return FieldError(
-        pointer="/" + "/".join(str(part) for part in found["loc"]),
-        code=found["type"],
-        message=f"{name}: {found['msg']}, got {shown}",
+        pointer="/" + "/".join(str(part) for part in details["loc"]),
+        code=details["type"],
+        message=f"{name}: {details['msg']}, got {shown}",
         value=shown,
     )
 
@@ -120,8 +121,8 @@ def _unexpected(request: Request, error: Exception) -> Response:
 def described(*kinds: type[ServiceError]) -> dict[int | str, dict[str, Any]]:
     """OpenAPI responses for these problems and for those that every address has."""
     always: list[type[ServiceError]] = [UnauthorizedError, ForbiddenError, InvalidError]
-    found: dict[int | str, dict[str, Any]] = {kind.status: _described(kind.title) for kind in [*always, *kinds]}
-    return found | {503: _described("Busy, or the database cannot be used; try again after Retry-After")}
+    answers: dict[int | str, dict[str, Any]] = {kind.status: _described(kind.title) for kind in [*always, *kinds]}
+    return answers | {503: _described("Busy, or the database cannot be used; try again after Retry-After")}
 
 
 def _described(title: str) -> dict[str, Any]:

@@ -1,28 +1,50 @@
-"""A run comes in: fitted, stored, tracked, its remaining life foretold, in one transaction."""
+"""A run comes in: its curves are fitted, the clutch is tracked on or anew, and all is stored in one short transaction.
 
-from collections.abc import Sequence
+Everything is computed before the database is locked; where another run of the clutch was stored meanwhile, what depends on
+the history is computed again.
+"""
+
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from sqlalchemy import Connection
 
-from models.clutch import Geometry
-from models.degradation.severity import Block
 from service import records
 from service.errors import ConflictError
-from service.lives.history import ByPressure, Event, lives, nearest, order, reference_velocities
+from service.lives.arrival import (
+    Arrival,
+    changes_the_past,
+    cofs_of,
+    event_of,
+    has_dynamic_tests,
+    late_arrival,
+    other_pressures,
+    own_loops,
+    reader_with,
+    test_of,
+    tests_with,
+)
+from service.lives.history import DYNAMIC, ByPressure, Event, life_with, order
 from service.lives.incoming_run import IncomingRun
-from service.lives.loop_analysis import DYNAMIC, loops_of, refresh_loops
-from service.lives.receipt import bar, fit_receipt, receipt
-from service.lives.run_analysis import LATE, OTHER_PRESSURES, Analysis, Warned, analyse, mean_cofs
+from service.lives.receipt import receipt
+from service.lives.recomputation import ClutchState, Results, computed_anew, corrected_newest, loops_anew, track
+from service.lives.run_analysis import LevelFit, analyse
 from service.settings import CODE_VERSION
-from service.workflows.adopt_model import correct_newest, retrack_all
-from service.workflows.update_tracks import retrack
-from storage import adopted_models, channels, clutches, fits, runs
-from storage.clutches import ClutchRow
+from storage import channels, clutches, fits, runs
 from storage.engine.database import Database
 from storage.runs import NewRun, RunRow
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Outcome:
+    """What a run changes in a clutch at a revision: its receipt and mean COFs, and the results of what was there before."""
+
+    revision: int
+    receipt: dict[str, Any]
+    cofs: ByPressure
+    results: Results
 
 
 def ingest(database: Database, clutch_id: str, run: IncomingRun, *, received_at: str) -> tuple[dict[str, Any], bool]:
@@ -36,18 +58,24 @@ def ingest(database: Database, clutch_id: str, run: IncomingRun, *, received_at:
         known = runs.get(connection, clutch_id, run.run_id)
     if known is not None:
         return _repeat(known, run), False
-    geometry = records.record(clutch).geometry.to_model()
     with ThreadPoolExecutor(1) as beside:  # deflating a long record lets its cutting run
         encoding = beside.submit(channels.encoded, run.channels)
-        analysis = analyse(run, geometry)
+        analysis = analyse(run, records.record(clutch).geometry.to_model())
         columns = encoding.result()
-    if run.kind != DYNAMIC:  # whose loops are yet to be fitted; a long record need not be held twice
+    sampled = "time_s" in run.channels
+    if sampled and run.kind != DYNAMIC:  # loops are yet to be fitted; another long record need not be held twice
         run = replace(run, channels={})
-    with database.writing() as connection:
-        known = runs.get(connection, clutch_id, run.run_id)
-        if known is not None:
-            return _repeat(known, run), False
-        return _store(connection, clutch, geometry, run, columns, analysis, received_at), True
+    arrival = Arrival(run=run, sampled=sampled, analysis=analysis, received_at=received_at)
+    with database.turn(clutch_id):
+        while True:
+            outcome = _computed(database, clutch_id, arrival)
+            with database.writing() as connection:
+                known = runs.get(connection, clutch_id, run.run_id)
+                if known is not None:
+                    return _repeat(known, run), False
+                if records.unchanged(connection, clutch_id, outcome.revision):
+                    _store(connection, clutch_id, arrival, columns, outcome)
+                    return outcome.receipt, True
 
 
 def _repeat(known: RunRow, run: IncomingRun) -> dict[str, Any]:
@@ -59,115 +87,120 @@ def _repeat(known: RunRow, run: IncomingRun) -> dict[str, Any]:
     return known.receipt | {"duplicate": True}
 
 
-def _store(
-    connection: Connection,
-    clutch: ClutchRow,
-    geometry: Geometry,
-    run: IncomingRun,
-    columns: channels.Encoded,
-    analysis: Analysis,
-    received_at: str,
-) -> dict[str, Any]:
-    before = records.events(connection, clutch.clutch_id)
-    event = _event(run, analysis, received_at)
-    cofs = _cofs(order([*before, event]), event, analysis, geometry)
-    event = _event(run, analysis, received_at, cofs)
-    ordered = order([*before, event])
-    loops = (
-        loops_of(connection, clutch.clutch_id, ordered, event, run.channels, geometry) if run.kind == DYNAMIC else []
-    )
+def _computed(database: Database, clutch_id: str, arrival: Arrival) -> _Outcome:
+    """The results of the run in the clutch's history as it is now."""
+    with database.reading() as connection:
+        before = records.state(connection, clutch_id)
+    event = event_of(arrival)
+    life = life_with(order([*before.events, event]), event)
+    event = replace(event, cofs=cofs_of(life, arrival, before))
+    state = replace(before, events=order([*before.events, event]))
+    levels = _levels(database, state, event, arrival)
+    warnings = [*arrival.analysis.warnings, *late_arrival(before.events, event), *other_pressures(state.events, event)]
     answer = receipt(
-        clutch.clutch_id,
-        run,
-        received_at=received_at,
-        fits=[fit_receipt(level.fit, cofs.get(level.fit.pressure)) for level in analysis.fits],
-        warnings=[*analysis.warnings, *_late(before, event), *_absent(ordered, event)],
-        loops=loops,
+        clutch_id,
+        arrival.run,
+        received_at=arrival.received_at,
+        levels=arrival.analysis.fits,
+        cofs=event.cofs,
+        loops=own_loops(state, event, levels, arrival.run),
+        warnings=warnings,
     )
+    if changes_the_past(before, state.events, event):
+        results = _past_anew(database, state, levels, answer, arrival)
+    else:
+        results = _carried_on(database, state, event, arrival)
+        if (
+            results.tracking is not None
+            and event is state.events[-1]
+            and event.cofs
+            and not other_pressures(state.events, event)
+        ):
+            answer["warnings"] += results.tracking.warnings
+    if event.speed_range is not None:
+        results = _with_loops(database, state, event, levels, results)
+    others = {run_id: other for run_id, other in results.receipts.items() if run_id != event.run_id}
+    return _Outcome(
+        revision=before.revision, receipt=answer, cofs=event.cofs, results=replace(results, receipts=others)
+    )
+
+
+def _carried_on(database: Database, state: ClutchState, event: Event, arrival: Arrival) -> Results:
+    """The filters carried one step on."""
+    corrected = None
+    if state.extension is not None and event is state.events[-1]:
+        runs_before = records.run_reader(database, state.clutch_id)
+        corrected = corrected_newest(state, event, test_of(arrival, life_with(state.events, event)), runs_before)
+    if corrected is None:
+        return Results(tracking=track(state, newest=event))
+    newest = replace(event, cofs=corrected)
+    freed = replace(state, events=(*state.events[:-1], newest))
+    return Results(corrected={event.run_id: corrected}, tracking=track(freed, newest=newest))
+
+
+def _past_anew(
+    database: Database,
+    state: ClutchState,
+    levels: Mapping[str, Sequence[LevelFit]],
+    answer: dict[str, Any],
+    arrival: Arrival,
+) -> Results:
+    """Everything of the clutch computed anew, the run among the others."""
+    with database.reading() as connection:
+        receipts = records.receipts(connection, state.clutch_id)
+    reader = reader_with(records.run_reader(database, state.clutch_id), arrival)
+    tests = tests_with(reader, state.lives[-1], arrival)
+    _, results = computed_anew(state, levels, receipts | {arrival.run.run_id: answer}, tests, reader)
+    return results
+
+
+def _with_loops(
+    database: Database,
+    state: ClutchState,
+    event: Event,
+    levels: Mapping[str, Sequence[LevelFit]],
+    results: Results,
+) -> Results:
+    """With the loops of dynamic tests whose stationary test the run has become."""
+    if not has_dynamic_tests(state.events, event):
+        return results
+    loops = loops_anew(state, levels, records.run_reader(database, state.clutch_id), since=event)
+    with database.reading() as connection:
+        receipts = records.receipts(connection, state.clutch_id) | dict(results.receipts)
+    changed = {run_id: receipts[run_id] | {"loops": items} for run_id, items in loops.items()}
+    return replace(results, receipts={**results.receipts, **changed})
+
+
+def _levels(database: Database, state: ClutchState, event: Event, arrival: Arrival) -> Mapping[str, Sequence[LevelFit]]:
+    """The levels of all tests where they are needed, else those of the run alone."""
+    own = {event.run_id: arrival.analysis.fits} if arrival.analysis.fits else {}
+    if event.kind != DYNAMIC and event is state.events[-1] and not event.rebuild and state.adoption is None:
+        return own
+    with database.reading() as connection:
+        return records.levels(connection, state.clutch_id) | own
+
+
+def _store(
+    connection: Connection, clutch_id: str, arrival: Arrival, columns: channels.Encoded, outcome: _Outcome
+) -> None:
+    """The run, its channels and fits, and what it changes; the revision moves on."""
+    run = arrival.run
     run_key = runs.insert(
         connection,
         NewRun(
-            clutch_id=clutch.clutch_id,
+            clutch_id=clutch_id,
             run_id=run.run_id,
             kind=run.kind,
             cycles=run.cycles,
             started_at=run.started_at,
-            received_at=received_at,
+            received_at=arrival.received_at,
             content_sha256=run.content_sha256,
-            details=records.details(run, analysis),
-            receipt=answer,
+            details=records.details(run, arrival.analysis),
+            receipt=outcome.receipt,
             code_version=CODE_VERSION,
         ),
     )
     channels.write(connection, run_key, columns)
-    fits.write(connection, run_key, records.fit_rows(analysis.fits, cofs))
-    clutches.bump_revision(connection, clutch.clutch_id)
-    if _changes_the_past(connection, clutch.clutch_id, ordered, event):
-        retrack_all(connection, clutch)
-    else:
-        newest = correct_newest(connection, clutch, ordered, event)
-        noticed = retrack(connection, clutch, [newest if each is event else each for each in ordered], newest=newest)
-        if noticed and event is ordered[-1] and event.cofs and not _absent(ordered, event):
-            answer["warnings"] += noticed
-            runs.set_results(connection, run_key, records.details(run, analysis), answer, CODE_VERSION)
-    if event.speed_range is not None:
-        refresh_loops(connection, clutch.clutch_id, ordered, geometry, since=event)
-    return answer
-
-
-def _changes_the_past(connection: Connection, clutch_id: str, ordered: Sequence[Event], event: Event) -> bool:
-    """Whether what was said of earlier or later tests no longer holds.
-
-    A late test or rebuild may make another test the reference, and with it the protocol of all means; under an adopted
-    model any late run may bear on the corrections of those after it, and a rebuild ends the model.
-    """
-    late = event is not ordered[-1]
-    if adopted_models.current(connection, clutch_id) is not None and (late or event.rebuild):
-        return True
-    return late and (event.rebuild or event.speed_range is not None)
-
-
-def _event(run: IncomingRun, analysis: Analysis, received_at: str, cofs: ByPressure | None = None) -> Event:
-    return Event(
-        run_id=run.run_id,
-        kind=run.kind,
-        cycles=run.cycles,
-        moment=records.moment(run.started_at, received_at),
-        speed_range=analysis.speed_range,
-        cofs=cofs or {},
-        rebuild=run.details.get("event") == "rebuild",
-        shift=run.details.get("event") not in (None, "rebuild"),
-        duty=_duty(run),
-    )
-
-
-def _duty(run: IncomingRun) -> Block | None:
-    said = run.details.get("duty") or {}
-    names = ("cycles", "energy_per_cycle_kj", "initial_speed_rpm", "engagement_duration_s")
-    return records.duty_block(run.cycles, *(said.get(name) for name in names))
-
-
-def _cofs(events: Sequence[Event], event: Event, analysis: Analysis, geometry: Geometry) -> ByPressure:
-    """The run's mean COFs over the protocol of its life's first stationary test, which may be itself."""
-    life = next(life for life in lives(events) if event in life.events)
-    if life.speed_range is None:
-        return {}
-    return mean_cofs(analysis.fits, reference_velocities(life.speed_range, geometry), geometry)
-
-
-def _absent(events: Sequence[Event], new: Event) -> list[Warned]:
-    """A test none of whose pressures the reference test had cannot be compared with it."""
-    life = next(life for life in lives(events) if new in life.events)
-    if not new.cofs or any(nearest(level, new.cofs) is not None for level in life.reference):
-        return []
-    measured = ", ".join(f"{bar(level):g}" for level in sorted(life.reference))
-    message = f"none of its pressures is one of the first stationary test's ({measured} bar): no track uses it"
-    return [Warned(code=OTHER_PRESSURES, message=message)]
-
-
-def _late(before: Sequence[Event], new: Event) -> list[Warned]:
-    latest = max((event.cycles for event in before), default=0.0)
-    if new.cycles >= latest:
-        return []
-    message = f"the run's {new.cycles:g} cycles lie before the latest known {latest:g}: all was tracked anew"
-    return [Warned(code=LATE, message=message)]
+    fits.write(connection, run_key, records.fit_rows(arrival.analysis.fits, outcome.cofs))
+    records.store(connection, clutch_id, outcome.results)
+    clutches.bump_revision(connection, clutch_id)

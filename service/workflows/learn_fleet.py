@@ -4,28 +4,22 @@ No clutch is tracked under what was learned from itself: for each clutch that ta
 learned from the others.
 """
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
-
-from sqlalchemy import Connection
 
 from models.prognosis.fleet import FEWEST_TESTS, FleetPrior, Taught, population, taught
 from service import records
-from service.lives.assumptions import ALL_PRESSURES, Basis, basis_of, kind_of
-from service.lives.history import Life, lives
+from service.lives.assumptions import ALL_PRESSURES, Assumptions, kind_of
+from service.lives.history import Life
+from service.lives.recomputation import Results, track
 from service.lives.tracks import CARRIED
 from service.settings import CODE_VERSION
-from service.workflows.replay import results
-from service.workflows.update_tracks import retrack
 from storage import clutches, fleet_priors, predictions
-from storage.clutches import ClutchRow
 from storage.encoding.json_text import Json, to_text
 from storage.engine.database import Database
 from storage.fleet_priors import NOBODY, FleetPriorRow
 
-#: Fewer clutches than this are no fleet.
+#: Fewer clutches than this are no fleet [-]. Chosen; no table.
 FEWEST_CLUTCHES = 3
 
 
@@ -39,119 +33,104 @@ class Fleet:
     def without(self, clutch_id: str = NOBODY) -> FleetPrior | None:
         """What all clutches but one have taught; None where too few are left."""
         left = [lessons for name, lessons in sorted(self.lessons.items()) if name != clutch_id]
-        return population([each for lessons in left for each in lessons]) if len(left) >= FEWEST_CLUTCHES else None
+        return population([lesson for lessons in left for lesson in lessons]) if len(left) >= FEWEST_CLUTCHES else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Refreshed:
-    """What a refresh did: the newest versions, whether each is new, and the clutches whose answers have changed."""
+    """What a refresh did: the kinds of which a new version was stored, and the clutches whose answers have changed."""
 
-    priors: tuple[dict[str, Any], ...]
+    kinds: tuple[Json, ...]
     changed: tuple[str, ...]
 
 
 def refresh(database: Database, *, now: str) -> Refreshed:
-    """Learn every fleet's prior anew; one that says something else is a new version, and tracks are made anew."""
-    found: dict[str, Fleet] = {}
+    """Learn every fleet's prior anew; one that differs is a new version, and tracks are made anew."""
+    fleets: dict[str, Fleet] = {}
     with database.reading() as connection:
         names = clutches.all_ids(connection)
     for clutch_id in names:
-        with database.reading() as connection:
-            kind, lessons = _lessons(connection, clutch_id)
+        kind, lessons = _lessons(database, clutch_id)
         if lessons:
-            found.setdefault(to_text(kind), Fleet(kind=kind)).lessons[clutch_id] = lessons
-    fresh = []
-    for fleet in found.values():
-        with database.writing() as connection:
-            if _stored_anew(connection, fleet, now):
-                fresh.append(fleet.kind)
-    changed = tuple(clutch_id for clutch_id in names if _brought_up(database, clutch_id))
-    priors = [item | {"new": item["kind"] in fresh} for item in current(database)]
-    return Refreshed(priors=tuple(priors), changed=changed)
+            fleets.setdefault(to_text(kind), Fleet(kind=kind)).lessons[clutch_id] = lessons
+    fresh = [fleet.kind for fleet in fleets.values() if _stored_anew(database, fleet, now)]
+    return Refreshed(
+        kinds=tuple(fresh), changed=tuple(clutch_id for clutch_id in names if _brought_up(database, clutch_id))
+    )
 
 
-def current(database: Database) -> list[dict[str, Any]]:
-    """The newest version of every fleet's prior, in the public shape."""
+def _lessons(database: Database, clutch_id: str) -> tuple[Json, list[Taught]]:
     with database.reading() as connection:
-        return [_item(row) for row in fleet_priors.all_current(connection)]
+        state = records.state(connection, clutch_id)
+    assumptions = state.assumptions()
+    lessons = [_lesson(life, assumptions) for life in state.lives]
+    kind = kind_of(state.record, assumptions.severity)
+    return kind, [lesson for lesson in lessons if lesson is not None]
 
 
-def _lessons(connection: Connection, clutch_id: str) -> tuple[Json, list[Taught]]:
-    clutch = records.clutch(connection, clutch_id)
-    basis = basis_of(connection, clutch)
-    found = [_lesson(life, basis) for life in lives(records.events(connection, clutch_id))]
-    return kind_of(records.record(clutch), basis.severity), [each for each in found if each is not None]
-
-
-def _lesson(life: Life, basis: Basis) -> Taught | None:
+def _lesson(life: Life, assumptions: Assumptions) -> Taught | None:
     """What a life teaches, its ζ counted in standard cycles; None where it was tested too little."""
-    series = life.pooled(basis)
+    series = life.pooled(assumptions)
     if len(series.measurements) < FEWEST_TESTS:
         return None
     unit = series.scale.severity.unit
-    return taught([replace(each, progress=each.progress * unit) for each in series.measurements])
+    return taught([replace(measurement, progress=measurement.progress * unit) for measurement in series.measurements])
 
 
-def _stored_anew(connection: Connection, fleet: Fleet, now: str) -> bool:
+def _stored_anew(database: Database, fleet: Fleet, now: str) -> bool:
     """Store a fleet's prior and what it is without each of its clutches, where it is not what is stored already."""
     learned = fleet.without()
-    known = fleet_priors.current(connection, fleet.kind)
+    with database.reading() as connection:
+        known = fleet_priors.current(connection, fleet.kind)
     if learned is None or (known is not None and known.content == learned.to_dict()):
         return False
-    members = tuple(sorted(fleet.lessons))
     version = 1 if known is None else known.version + 1
-    for left_out in (NOBODY, *members):
-        prior = fleet.without(left_out)
-        if prior is not None:
-            row = FleetPriorRow(
-                fleet=fleet.kind,
-                version=version,
-                left_out=left_out,
-                created_at=now,
-                members=members,
-                content=prior.to_dict(),
-                code_version=CODE_VERSION,
-            )
+    rows = _versions(fleet, version, now)
+    with database.writing() as connection:
+        newest = fleet_priors.current(connection, fleet.kind)
+        if newest is not None and newest.version >= version:  # another refresh was quicker
+            return False
+        for row in rows:
             fleet_priors.insert(connection, row)
-    fleet_priors.forget_left_out(connection, fleet.kind, before=version)
+        fleet_priors.forget_left_out(connection, fleet.kind, before=version)
     return True
+
+
+def _versions(fleet: Fleet, version: int, now: str) -> Sequence[FleetPriorRow]:
+    """The prior of all clutches, and of all but each one, as they are stored."""
+    members = tuple(sorted(fleet.lessons))
+    priors = {left_out: fleet.without(left_out) for left_out in (NOBODY, *members)}
+    return [
+        FleetPriorRow(
+            fleet=fleet.kind,
+            version=version,
+            left_out=left_out,
+            created_at=now,
+            members=members,
+            content=prior.to_dict(),
+            code_version=CODE_VERSION,
+        )
+        for left_out, prior in priors.items()
+        if prior is not None
+    ]
 
 
 def _brought_up(database: Database, clutch_id: str) -> bool:
     """Track a clutch anew where its stored predictions were made under another prior; whether its answers have changed."""
-    with database.writing() as connection:
-        clutch: ClutchRow = records.clutch(connection, clutch_id)
-        last = predictions.at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)
-        if last is None or last.payload.get("prior") == dict(basis_of(connection, clutch).prior):
-            return False
-        before = results(connection, clutch_id)
-        retrack(connection, clutch, records.events(connection, clutch_id))
-        if results(connection, clutch_id) == before:
-            return False
-        clutches.bump_revision(connection, clutch_id)
-        return True
-
-
-def _item(row: FleetPriorRow) -> dict[str, Any]:
-    """A prior as it goes out: medians, and the factor or share by which two thirds of the clutches stay within."""
-    return {
-        "kind": row.fleet,
-        "version": row.version,
-        "created_at": row.created_at,
-        "clutches": len(row.members),
-        "members": list(row.members),
-        "population": _population(FleetPrior.from_dict(row.content)),
-    }
-
-
-def _population(prior: FleetPrior) -> Mapping[str, Any]:
-    names: Sequence[str] = ("change", "scale_cycles", "exponent", "scatter")
-    deviations = [math.sqrt(prior.scale[index, index]) for index in range(len(names))]
-    found: dict[str, Any] = {}
-    for index, name in enumerate(names):
-        middle = float(prior.mean[index])
-        if name == "change":
-            found[name] = {"median": middle, "sd": deviations[index]}
-        else:
-            found[name] = {"median": math.exp(middle), "log_sd": deviations[index]}
-    return found
+    with database.turn(clutch_id):
+        while True:
+            with database.reading() as connection:
+                state = records.state(connection, clutch_id)
+                last = predictions.at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)
+            if last is None or last.payload.get("prior") == dict(state.assumptions().prior.name):
+                return False
+            results = Results(tracking=track(state))
+            with database.writing() as connection:
+                if not records.unchanged(connection, clutch_id, state.revision):
+                    continue
+                before = records.answers(connection, clutch_id)
+                records.store(connection, clutch_id, results)
+                if records.answers(connection, clutch_id) == before:
+                    return False
+                clutches.bump_revision(connection, clutch_id)
+                return True

@@ -1,91 +1,53 @@
-"""Diagnoses: asked for, stored when they end, looked up."""
+"""A diagnosis is asked for, and its end is stored."""
 
 import secrets
+from collections.abc import Mapping
 from typing import Any
 
-from sqlalchemy import Connection
-
 from service import records
-from service.errors import NotFoundError
-from service.lives.diagnosis_report import empty
-from service.lives.history import lives
-from service.schemas.base import whole
+from service.lives.history import lives_of
 from service.settings import CODE_VERSION
-from service.workflows.adopt_model import in_force, present_life
 from storage import diagnoses
-from storage.diagnoses import DiagnosisRow, NewDiagnosis
+from storage.diagnoses import NewDiagnosis
 from storage.engine.database import Database
 
-#: What a list does not show.
-_LARGE = ("maps", "loops")
 
-
-def ask(connection: Connection, clutch_id: str, *, created_at: str) -> NewDiagnosis:
+def ask(database: Database, clutch_id: str, *, created_at: str) -> NewDiagnosis:
     """Store a diagnosis of all runs that are there now, to be run. Raises NotFoundError."""
-    clutch = records.clutch(connection, clutch_id)
-    found = lives(records.events(connection, clutch_id))
-    row = NewDiagnosis(
-        clutch_id=clutch_id,
-        diagnosis_id=secrets.token_hex(8),
-        created_at=created_at,
-        revision=clutch.revision,
-        last_run_key=diagnoses.last_run_key(connection, clutch_id),
-        life=present_life(connection, clutch_id),
-        as_of_cycles=found[-1].events[-1].cycles if found else None,
-        code_version=CODE_VERSION,
-    )
-    diagnoses.insert(connection, row)
+    with database.writing() as connection:
+        clutch = records.clutch(connection, clutch_id)
+        lives = lives_of(records.events(connection, clutch_id))
+        row = NewDiagnosis(
+            clutch_id=clutch_id,
+            diagnosis_id=secrets.token_hex(8),
+            created_at=created_at,
+            revision=clutch.revision,
+            last_run_key=diagnoses.last_run_key(connection, clutch_id),
+            life=lives[-1].name if lives else "",
+            as_of_cycles=lives[-1].events[-1].cycles if lives else None,
+            code_version=CODE_VERSION,
+        )
+        diagnoses.insert(connection, row)
     return row
 
 
-def running(connection: Connection, clutch_id: str) -> str | None:
+def running(database: Database, clutch_id: str) -> str | None:
     """The id of the diagnosis that is running of the very runs that are there now. Raises NotFoundError."""
-    records.clutch(connection, clutch_id)
-    return diagnoses.running(connection, clutch_id, diagnoses.last_run_key(connection, clutch_id))
-
-
-def one(database: Database, clutch_id: str, diagnosis_id: str) -> dict[str, Any]:
-    """A diagnosis as it is answered. Raises NotFoundError."""
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
-        row = diagnoses.get(connection, clutch_id, diagnosis_id)
-        if row is None:
-            raise NotFoundError(f"clutch {clutch_id!r} has no diagnosis {diagnosis_id!r}")
-        return _answers(connection, clutch_id, [row])[0]
+        return diagnoses.running(connection, clutch_id, diagnoses.last_run_key(connection, clutch_id))
 
 
-def page(
-    database: Database, clutch_id: str, *, limit: int, after: tuple[float, str] | None
-) -> tuple[list[dict[str, Any]], tuple[float, str] | None]:
-    """Diagnoses without their maps and loops, newest first, and where the next page starts. Raises NotFoundError."""
-    with database.reading() as connection:
-        records.clutch(connection, clutch_id)
-        rows = diagnoses.page(connection, clutch_id, limit=limit + 1, before=None if after is None else after[0])
-        items = _answers(connection, clutch_id, rows[:limit])
-    shown = [{name: value for name, value in item.items() if name not in _LARGE} for item in items]
-    return shown, (float(rows[limit - 1].diagnosis_key), "") if len(rows) > limit else None
+def finish(database: Database, diagnosis_id: str, ended: Mapping[str, Any], *, at: str) -> None:
+    """Store how a diagnosis ended: its `report` and `extension`, or its `problem`."""
+    with database.writing() as connection:
+        if "problem" in ended:
+            diagnoses.fail(connection, diagnosis_id, at, ended["problem"])
+        else:
+            diagnoses.finish(connection, diagnosis_id, at, ended["report"], ended["extension"])
 
 
-def _answers(connection: Connection, clutch_id: str, rows: list[DiagnosisRow]) -> list[dict[str, Any]]:
-    life, adopted = present_life(connection, clutch_id), in_force(connection, clutch_id)
-    latest = diagnoses.last_run_key(connection, clutch_id)
-    return [
-        {
-            "diagnosis_id": row.diagnosis_id,
-            "clutch_id": row.clutch_id,
-            "status": row.status,
-            "created_at": row.created_at,
-            "finished_at": row.finished_at,
-            "revision": row.revision,
-            "as_of_cycles": None if row.as_of_cycles is None else whole(row.as_of_cycles),
-            "stale": latest > row.last_run_key,
-            "earlier_life": row.life != life,
-            "adoptable": row.extension is not None and row.life == life,
-            "adopted": adopted is not None and adopted.diagnosis_id == row.diagnosis_id,
-            "problem": row.problem,
-            "code_version": row.code_version,
-        }
-        | empty()
-        | (row.report or {})
-        for row in rows
-    ]
+def fail_running(database: Database, problem: str, *, at: str) -> None:
+    """Say of all diagnoses that an earlier service left running why they have no report."""
+    with database.writing() as connection:
+        diagnoses.fail_all(connection, at, problem)

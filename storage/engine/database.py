@@ -61,6 +61,8 @@ class Database:
         self.journal_mode = journal_mode
         self._lock_timeout = lock_timeout
         self._writers_turn = threading.Lock()
+        self._turns: dict[str, threading.Lock] = {}
+        self._turns_lock = threading.Lock()
         self._closed = False
         self._readers = _engine(path, lock_timeout)
         self._writers = self._readers.execution_options(begin="BEGIN IMMEDIATE")
@@ -91,6 +93,17 @@ class Database:
                 yield connection
         finally:
             self._writers_turn.release()
+
+    @contextmanager
+    def turn(self, name: str) -> Iterator[None]:
+        """One thread of this process at a time for a name: who would compute the same results at once waits instead.
+
+        No lock of the database is held meanwhile.
+        """
+        with self._turns_lock:
+            turn = self._turns.setdefault(name, threading.Lock())
+        with turn:
+            yield
 
     def version(self) -> int:
         """A number that is another after every commit, whichever process made it; it means nothing but to this object.

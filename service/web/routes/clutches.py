@@ -5,11 +5,14 @@ from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
+from service.queries import clutch_list
+from service.queries.cache import to_json
 from service.run_files.json_run import invalid
 from service.schemas.clutch import ClutchIn, ClutchOut, ClutchPage
-from service.web.bodies import described_body, json_body
-from service.web.context import Context, Cursor, Ingester, Limit, Reader
-from service.web.pages import JSON_TYPE, answer, encode, from_cursor, page, tagged
+from service.web.auth import Ingester, Reader
+from service.web.context import Context, Cursor, Limit, now
+from service.web.limits import USUAL_ITEMS
+from service.web.pages import JSON_TYPE, answer, described_body, from_cursor, json_body, page, tagged
 from service.web.problems import READING, SENDING
 from service.workflows import register_clutch as registration
 
@@ -36,9 +39,9 @@ EXAMPLE = {
 async def register_clutch(request: Request, context: Ingester) -> Response:
     """Register a clutch. Everything but `clutch_id` has a default: the reference's clutch."""
     body = await json_body(request)
-    found, new = await run_in_threadpool(_register, context, body)
-    headers = {"Location": f"/v1/clutches/{found['clutch_id']}"}
-    return Response(content=encode(found), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
+    clutch, new = await run_in_threadpool(_register, context, body)
+    headers = {"Location": f"/v1/clutches/{clutch['clutch_id']}"}
+    return Response(content=to_json(clutch), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
 
 
 def _register(context: Context, body: bytes) -> tuple[dict[str, object], bool]:
@@ -46,22 +49,23 @@ def _register(context: Context, body: bytes) -> tuple[dict[str, object], bool]:
         clutch = ClutchIn.model_validate_json(body)
     except pydantic.ValidationError as error:
         raise invalid(error) from None
-    return registration.register(context.database, clutch, created_at=context.now())
+    new = registration.register(context.database, clutch, created_at=now())
+    return clutch_list.look_up(context.database, clutch.clutch_id), new
 
 
 @router.get("", response_model=ClutchPage, responses=READING)
-def list_clutches(request: Request, context: Reader, limit: Limit = 100, cursor: Cursor = None) -> Response:
+def list_clutches(request: Request, context: Reader, limit: Limit = USUAL_ITEMS, cursor: Cursor = None) -> Response:
     """All clutches with current health and remaining life, the fewest remaining cycles first."""
+    after = from_cursor(cursor)
     version = context.database.version()  # before the rows are read: what is committed meanwhile makes another
-    known = context.pages.find((limit, cursor))
-    if known is None or known[0] != version:
-        items, after = registration.page(context.database, limit=limit, after=from_cursor(cursor))
-        known = (version, encode(page(items, after)))
-        context.pages.keep((limit, cursor), known, len(known[1]))
-    return tagged(request, known[1], JSON_TYPE)
+
+    def make() -> bytes:
+        return to_json(page(*clutch_list.page(context.database, limit=limit, after=after)))
+
+    return tagged(request, context.cache.answer((version, limit, after), make), JSON_TYPE)
 
 
 @router.get("/{clutch_id}", response_model=ClutchOut, responses=READING)
 def read_clutch(request: Request, context: Reader, clutch_id: str) -> Response:
     """One clutch."""
-    return answer(request, registration.look_up(context.database, clutch_id))
+    return answer(request, clutch_list.look_up(context.database, clutch_id))

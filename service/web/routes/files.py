@@ -12,11 +12,13 @@ from pydantic import AwareDatetime
 from starlette.datastructures import UploadFile
 
 from service.errors import InvalidError
+from service.queries.cache import to_json
 from service.run_files.upload import read_file_run
 from service.schemas.base import IDENTIFIER_PATTERN, Origin
 from service.schemas.run import Receipt
-from service.web.context import Context, Ingester
-from service.web.pages import JSON_TYPE, encode
+from service.web.auth import Ingester
+from service.web.context import Context, now
+from service.web.pages import JSON_TYPE
 from service.web.problems import SENDING
 from service.workflows.ingest_run import ingest
 
@@ -55,10 +57,10 @@ async def post_run_file(
     with tempfile.TemporaryDirectory(prefix="clutchlife-") as folder:
         path = Path(folder) / "run"
         filename = await _save(request, path, filename)
-        asked = {"kind": kind, "cycles": cycles, "mapping": map, "run_id": run_id, "origin": origin}
-        receipt, new = await run_in_threadpool(_ingest, context, clutch_id, path, filename, started_at, asked)
+        parameters = {"kind": kind, "cycles": cycles, "mapping": map, "run_id": run_id, "origin": origin}
+        receipt, new = await run_in_threadpool(_ingest, context, clutch_id, path, filename, started_at, parameters)
     headers = {"Location": f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"}
-    return Response(content=encode(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
+    return Response(content=to_json(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
 
 
 async def _save(request: Request, path: Path, filename: str) -> str:
@@ -79,12 +81,12 @@ async def _save(request: Request, path: Path, filename: str) -> str:
 
 
 def _ingest(
-    context: Context, clutch_id: str, path: Path, filename: str, started_at: datetime | None, asked: dict[str, Any]
+    context: Context, clutch_id: str, path: Path, filename: str, started_at: datetime | None, parameters: dict[str, Any]
 ) -> tuple[dict[str, Any], bool]:
     # The run is named by none here, so that its columns can go when they are encoded.
     return ingest(
         context.database,
         clutch_id,
-        read_file_run(path, filename=filename, started_at=started_at, **asked),
-        received_at=context.now(),
+        read_file_run(path, filename=filename, started_at=started_at, **parameters),
+        received_at=now(),
     )

@@ -4,7 +4,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse, Response
 
 from service.settings import CODE_VERSION
-from service.web.context import Reader, context_of
+from service.web.auth import Reader, context_of
 from service.web.metrics import MEDIA_TYPE
 from service.web.problems import described
 

@@ -6,13 +6,14 @@ from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
-from service.queries import answers
+from service.queries import runs
+from service.queries.cache import to_json
 from service.run_files.json_run import read_run
 from service.schemas.run import RUN_IN, Receipt, RunOut, RunPage
-from service.web.bodies import described_body, json_body
-from service.web.context import Context, Cursor, Ingester, Limit, Reader
-from service.web.lasting import lasting_answer
-from service.web.pages import JSON_TYPE, answer, encode, from_cursor, page, table
+from service.web.auth import Ingester, Reader
+from service.web.context import Context, Cursor, Limit, now
+from service.web.limits import USUAL_ITEMS
+from service.web.pages import JSON_TYPE, answer, clutch_answer, described_body, from_cursor, json_body, page
 from service.web.problems import READING, SENDING
 from service.workflows.ingest_run import ingest
 
@@ -31,8 +32,6 @@ EXAMPLE = {
     },
 }
 
-COLUMNS = ("run_id", "kind", "cycles", "started_at", "received_at", "origin", "content_sha256", "warnings", "fits")
-
 
 @router.post(
     "",
@@ -46,39 +45,27 @@ async def post_run(request: Request, context: Ingester, clutch_id: str) -> Respo
     body = await json_body(request)
     receipt, new = await run_in_threadpool(_ingest, context, clutch_id, body)
     headers = {"Location": f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"}
-    return Response(content=encode(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
+    return Response(content=to_json(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
 
 
 def _ingest(context: Context, clutch_id: str, body: bytes) -> tuple[dict[str, Any], bool]:
-    return ingest(context.database, clutch_id, read_run(body), received_at=context.now())
+    return ingest(context.database, clutch_id, read_run(body), received_at=now())
 
 
 @router.get("", response_model=RunPage, responses=READING)
-def list_runs(request: Request, context: Reader, clutch_id: str, limit: Limit = 100, cursor: Cursor = None) -> Response:
+def list_runs(
+    request: Request, context: Reader, clutch_id: str, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
+) -> Response:
     """Receipts by cycles."""
     after = from_cursor(cursor)
 
-    def told() -> dict[str, Any]:
-        return page(*answers.run_page(context.database, clutch_id, limit=limit, after=after))
+    def make() -> object:
+        return page(*runs.page(context.database, clutch_id, limit=limit, after=after))
 
-    return lasting_answer(request, context, clutch_id, told)
+    return clutch_answer(request, context, clutch_id, "runs", make, limit, after)
 
 
 @router.get("/{run_id}", response_model=RunOut, responses=READING)
 def read_run_with_channels(request: Request, context: Reader, clutch_id: str, run_id: str) -> Response:
     """One receipt with the run's channels as they were sent."""
-    return answer(request, answers.one_run(context.database, clutch_id, run_id))
-
-
-twins = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["spreadsheets"])
-
-
-@twins.get("/runs.csv", response_class=Response, responses=READING)
-def list_runs_csv(
-    request: Request, context: Reader, clutch_id: str, limit: Limit = 1000, cursor: Cursor = None
-) -> Response:
-    """Receipts by cycles as CSV; warnings and fits are counted."""
-    items, _ = answers.run_page(context.database, clutch_id, limit=limit, after=from_cursor(cursor))
-    kept = ({name: item[name] for name in COLUMNS} for item in items)
-    rows = (row | {"warnings": len(row["warnings"]), "fits": len(row["fits"])} for row in kept)
-    return table(request, COLUMNS, rows)
+    return answer(request, runs.one_run(context.database, clutch_id, run_id))

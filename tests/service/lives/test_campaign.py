@@ -10,8 +10,9 @@ from fastapi.testclient import TestClient
 from models.diagnosis.campaign import Campaign, EventKind
 from models.diagnosis.design.design import build_design
 from models.records.runs import Record
+from service.jobs.diagnosis import read_life
 from service.lives import campaign as campaign_module
-from service.lives.campaign import Stored, read_campaign, thinned
+from service.lives.campaign import DiagnosedLife, thinned
 from storage.engine.database import open_database
 from tests.service.run_files.test_files_and_records import dynamic_record, raw_record
 from tests.support import PRESSURES_BAR, SPEEDS_RPM, stationary
@@ -27,10 +28,10 @@ def post(client: TestClient, *bodies: dict[str, Any]) -> None:
         assert answer.status_code == 201, answer.text
 
 
-def campaign(database_url: str, last_run_key: int = ALL) -> Stored:
+def campaign(database_url: str, last_run_key: int = ALL) -> DiagnosedLife:
     database = open_database(database_url)
     try:
-        return read_campaign(database, "c1", last_run_key=last_run_key)
+        return read_life(database, "c1", last_run_key=last_run_key)
     finally:
         database.close()
 

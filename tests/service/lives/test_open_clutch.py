@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from service.lives.model_correction import corrected
+from service.lives.model_correction import corrected_cofs
 from service.workflows.replay import replay_clutch
 from storage.engine.database import open_database
 from tests.service.lives.test_campaign import campaign, post
@@ -205,5 +205,5 @@ def test_an_adopted_model_corrects_no_open_test(client: TestClient, database_url
     known = campaign(database_url)
     assert known.life is not None
     shifted = SimpleNamespace(artefact=lambda run, _: np.ones_like(run.plateaus.torque))
-    found = corrected(shifted, known.record, known.life, known.taken, known.campaign.stationary)  # type: ignore[arg-type]
+    found = corrected_cofs(shifted, known.record, known.life, known.runs, known.campaign.stationary)  # type: ignore[arg-type]
     assert found.keys() == {"s0"}

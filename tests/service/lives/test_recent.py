@@ -7,9 +7,10 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from service.lives.criteria import MOST_LINE_POINTS
 from service.lives.history import Event
-from service.lives.recent import MOST_POINTS, recent
-from service.workflows import register_clutch
+from service.lives.prediction import recent
+from service.queries import clutch_list
 from storage import clutches, diagnoses
 from storage.diagnoses import NewDiagnosis
 from storage.engine.database import Database, open_database
@@ -32,12 +33,12 @@ def test_a_clutch_says_its_last_run_and_its_mean_cof(client: TestClient) -> None
     assert one["diagnosis"] is None
 
 
-@pytest.mark.parametrize("count", [1, MOST_POINTS, MOST_POINTS + 1, 1000])
+@pytest.mark.parametrize("count", [1, MOST_LINE_POINTS, MOST_LINE_POINTS + 1, 1000])
 def test_a_line_is_short_and_ends_with_the_last_value(count: int) -> None:
     series = SimpleNamespace(measurements=[SimpleNamespace(value=float(index)) for index in range(count)])
     events = [Event(run_id="a", kind="maintenance", cycles=5.0, moment=10.0)]
     said = recent(events, series)["mean_cof"]  # type: ignore[arg-type]
-    assert len(said) <= MOST_POINTS
+    assert len(said) <= MOST_LINE_POINTS
     assert said[-1] == count - 1
     assert len({after - before for before, after in itertools.pairwise(said)}) <= 1
 
@@ -85,13 +86,13 @@ def _forgotten(client: TestClient, database: Database) -> set[bool]:
 
 def test_a_list_is_made_anew_only_after_a_commit(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[int] = []
-    page = register_clutch.page
+    page = clutch_list.page
 
     def counted(*arguments: Any, **named: Any) -> Any:
         made.append(1)
         return page(*arguments, **named)
 
-    monkeypatch.setattr(register_clutch, "page", counted)
+    monkeypatch.setattr(clutch_list, "page", counted)
     first = client.get("/v1/clutches")
     again = client.get("/v1/clutches", headers={"If-None-Match": first.headers["etag"]})
     assert (again.status_code, len(made)) == (304, 1)

@@ -1,13 +1,11 @@
-"""Answers that are remembered by the clutch's revision: made once, and never told when they no longer hold."""
+"""Answers that are kept by the clutch's revision: computed once, and never given when they no longer hold."""
 
 import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
-from service.queries import answers
-from service.queries.views import Remembered
+from service.queries import series
 from service.settings import Settings
-from service.web.context import MOST_PAGES
 from service.workflows.replay import replay_clutch
 from storage.engine.database import open_database
 from tests.support import stationary
@@ -73,8 +71,8 @@ def test_a_replay_by_another_process_that_changes_nothing_keeps_the_tags(client:
 
 def test_nothing_is_made_twice_for_one_revision(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     made = []
-    ours = answers.series
-    monkeypatch.setattr(answers, "series", lambda *given: made.append(given) or ours(*given))
+    ours = series.series
+    monkeypatch.setattr(series, "series", lambda *given: made.append(given) or ours(*given))
     post(client, 0.0)
     first = client.get(f"{BASE}/series")
     again = client.get(f"{BASE}/series", headers={"If-None-Match": first.headers["ETag"]})
@@ -89,18 +87,3 @@ def test_nothing_is_made_twice_for_one_revision(client: TestClient, monkeypatch:
 def test_an_unknown_clutch_is_unknown_however_often_it_is_asked_for(client: TestClient) -> None:
     for name in ASKED:
         assert [client.get(f"/v1/clutches/nobody/{name}").status_code for _ in range(2)] == [404, 404]
-
-
-def test_answers_are_forgotten_by_their_size() -> None:
-    known = Remembered(most=10)
-    for name, size in (("a", 4), ("b", 4), ("c", 2)):
-        known.keep(name, name.upper(), size)
-    assert [known.find(name) for name in "bac"] == ["B", "A", "C"]
-    known.keep("d", "D", 3)  # the one not asked for longest goes, and no more than must
-    assert [known.find(name) for name in "abcd"] == ["A", None, "C", "D"]
-    known.keep("a", "AA", 1)  # in place of what was there: sizes are not counted twice
-    known.keep("e", "E", 4)
-    assert [known.find(name) for name in "acde"] == ["AA", "C", "D", "E"]
-    known.keep("f", "F", 11)  # would drive out everything, and not fit even so
-    assert [known.find(name) for name in "acdef"] == ["AA", "C", "D", "E", None]
-    assert MOST_PAGES < 2**27

@@ -18,10 +18,12 @@ from models.prognosis.first_passage import HORIZON, QUANTILES, ends_of_life, wei
 from models.prognosis.first_passage import paths as bare_paths
 from models.prognosis.from_parameters import correlation, first_below, joint, paired
 from models.tracking.posterior import Posterior
-from service.lives.assumptions import ALL_PRESSURES, Basis
+from service.lives.assumptions import ALL_PRESSURES, Assumptions
+from service.lives.criteria import FEWEST_TESTS
 from service.lives.history import Life, Series, nearest, reference_velocities
-from service.lives.run_analysis import LevelFit, Warned
-from service.lives.tracks import FEWEST_TESTS, offset_of, step_rng
+from service.lives.parameter_tracks import Track
+from service.lives.run_analysis import LevelFit, Notice
+from service.lives.tracks import offset_of, step_rng
 
 #: Draws of each track, and where the paths are looked at: up to now, and in equal ratios beyond.
 DRAWS, BEHIND, AHEAD = 200, 24, 48
@@ -30,13 +32,11 @@ FAR = 3.0
 _BAND = (0.05, 0.5, 0.95)
 _COVERED = 3.29  # deviations of a normal between its 5 and 95 % quantiles
 
-Track = tuple[Series, Posterior]
-
 
 def rebuilt(
     clutch_id: str,
     life: Life,
-    basis: Basis,
+    assumptions: Assumptions,
     tests: Sequence[Sequence[LevelFit]],
     tracks: Mapping[tuple[str, float], Track],
     direct: Mapping[float, Track],
@@ -64,17 +64,17 @@ def rebuilt(
     if not at_levels:
         return None
     paths = _together(at_levels, direct, rng) * _share(life, list(at_levels))
-    return _told(paths, zeta, series, posterior, basis, fraction)
+    return _told(paths, zeta, series, posterior, assumptions, fraction)
 
 
-def disagreements(said: Mapping[str, Any] | None) -> list[Warned]:
+def disagreements(said: Mapping[str, Any] | None) -> list[Notice]:
     """A warning where the two ways are further apart than their uncertainty."""
     if said is None:
         return []
     apart = {name: value for name, value in said["disagreement"].items() if value is not None and abs(value) > FAR}
     words = {"now_sd": "the value now", "end_of_life_sd": "the median end of life"}
     return [
-        Warned(
+        Notice(
             code="tracks_disagree",
             message=f"{words[name]} rebuilt from the Stribeck parameters is {value:+.1f} deviations off the direct track's",
         )
@@ -83,12 +83,12 @@ def disagreements(said: Mapping[str, Any] | None) -> list[Warned]:
 
 
 def _told(
-    paths: FloatArray, zeta: FloatArray, series: Series, posterior: Posterior, basis: Basis, fraction: float
+    paths: FloatArray, zeta: FloatArray, series: Series, posterior: Posterior, assumptions: Assumptions, fraction: float
 ) -> dict[str, Any]:
     """The paths [k, n] of mean COF at ζ [k] in the public shape, beside the direct track."""
     now, origin = zeta[BEHIND - 1], series.scale.origin
     ends = series.scale.cycles(first_below(paths, zeta, fraction * paths[0]))
-    offset = offset_of(series, basis)
+    offset = offset_of(series, assumptions)
     direct_now = bare_paths(posterior, np.array([now]), offset)[0]
     direct_ends = series.scale.cycles(ends_of_life(posterior, fraction, offset=offset, horizon=float(zeta[-1])))
     band = np.quantile(paths, _BAND, axis=1)

@@ -1,0 +1,33 @@
+"""The numbers by which a run and a track are judged on arrival.
+
+Each says what it means, its unit, and whether it is derived or chosen.
+"""
+
+#: Distinct speeds below which a curve gives no mean COF [-]. Derived: four parameters cannot be told from fewer, and a mean
+#: over the protocol would be an extrapolation.
+FEWEST_SPEEDS = 4
+#: Share of a level's pressure [-] beyond which its rows are reported as more than one level. Chosen; no table.
+WIDE_LEVEL = 0.06
+#: RMSE as a share of the static torque [-] below which a fit is not reported as poor, however large eq. 5 makes the
+#: percentage MSE of a flat curve. Chosen; no table.
+POOR_FIT = 0.02
+#: Least deviation of a mean torque, as a share of the torque [-]: a smaller one that was sent counts as this. Chosen; no
+#: table.
+LEAST_TORQUE_SD = 1e-4
+#: Pressure levels of one test [-]; more is a continuous pressure and no stationary test. Chosen: above any known protocol.
+MOST_LEVELS = 100
+#: Tests at different cycles [-] below which nothing is predicted. Chosen: with fewer, eq. 6's four coefficients rest on the
+#: prior alone.
+FEWEST_TESTS = 3
+#: Weighted draws of eq. 6's coefficients behind a stored prediction [-]. Chosen: `make score PARTS=exact`.
+PREDICTION_DRAWS = 1000
+#: Draws behind a trajectory's band [-], and the lattice of the exact filter behind it (nodes, rows, levels).
+#: Chosen; no table.
+TRAJECTORY_DRAWS, TRAJECTORY_LATTICE = 400, (13, 13, 7)
+#: Cycles [-] at which a course is evaluated to see whether it is zero throughout. Chosen; no table.
+COURSE_PROBES = 40
+#: Samples of sampled records that are kept in memory at 40 bytes each: of one record, and of all of a campaign together.
+#: Chosen: 80 MB and 240 MB, within the memory that a diagnosis is given.
+MOST_OF_RECORD, MOST_OF_CAMPAIGN = 2_000_000, 6_000_000
+#: Points of mean COF in the short line of a list [-]. Chosen: its width in pixels.
+MOST_LINE_POINTS = 32

@@ -1,0 +1,251 @@
+"""A clutch's state as one value, and everything that is computed of it anew; nothing here reads or writes a database.
+
+A workflow loads a `ClutchState`, computes `Results` with the functions below, and stores them in one short transaction that
+checks that the state's revision is still the newest.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from models.clutch import Geometry
+from models.degradation.severity import Severity
+from models.diagnosis.campaign import StationaryRun
+from models.diagnosis.extension import Extension
+from service.lives.assumptions import Assumptions, LearnedPrior, severity_under
+from service.lives.history import (
+    DYNAMIC,
+    ByPressure,
+    Event,
+    Life,
+    lives_of,
+    reference_velocities,
+    stationary_test_of,
+)
+from service.lives.model_correction import RunReader, corrected_cofs, model_in_force
+from service.lives.prediction import recent, summary_of
+from service.lives.receipt import fit_items, loop_items
+from service.lives.run_analysis import LevelFit, loops_of, mean_cofs
+from service.lives.tracks import CARRIED, Prediction, States, follow
+from service.schemas.clutch import ClutchIn
+
+#: The levels of stationary tests by run_id.
+Levels = Mapping[str, Sequence[LevelFit]]
+Receipt = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Adoption:
+    """The diagnosis whose extension was adopted last, and the life that it was made of."""
+
+    diagnosis_id: str
+    life: str
+    extension: Extension
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClutchState:
+    """What the next run's results depend on, at one revision.
+
+    `events` are all runs in the order of the history, mean COF as the model in force corrects it; `priors` what fleets have
+    taught for each severity that may come into force; `filters` the filters' states after the last test, None where another
+    release stored them.
+    """
+
+    record: ClutchIn
+    revision: int
+    events: tuple[Event, ...]
+    adoption: Adoption | None
+    priors: Mapping[Severity, LearnedPrior]
+    filters: States | None = None
+
+    @property
+    def clutch_id(self) -> str:
+        """The clutch's name."""
+        return self.record.clutch_id
+
+    @property
+    def geometry(self) -> Geometry:
+        """The clutch's geometry in SI units."""
+        return self.record.geometry.to_model()
+
+    @property
+    def fraction(self) -> float:
+        """The share of the initial mean COF that ends a life."""
+        return self.record.end_of_life.cof_fraction
+
+    @property
+    def lives(self) -> list[Life]:
+        """The history cut at its rebuilds."""
+        return lives_of(self.events)
+
+    @property
+    def extension(self) -> Extension | None:
+        """The extension that the present life is tracked under, None under the baseline: a rebuild ends an adoption."""
+        name = self.lives[-1].name if self.events else ""
+        return self.adoption.extension if self.adoption is not None and self.adoption.life == name else None
+
+    def assumptions(self) -> Assumptions:
+        """What the present life is tracked under."""
+        return self.assumptions_under(self.extension, self.lives[-1] if self.events else None)
+
+    def assumptions_under(self, extension: Extension | None, life: Life | None) -> Assumptions:
+        """What a life would be tracked under, were this extension in force."""
+        model = model_in_force(extension, life, self.geometry)
+        severity = severity_under(self.record, model.severity_exponent)
+        return Assumptions(severity=severity, prior=self.priors[severity], model=model)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tracking:
+    """Predictions after events, the filters' states after the last, the list's summary and rank, and warnings of the last
+    prediction; `anew` where all that was predicted before is replaced."""
+
+    predictions: tuple[Prediction, ...]
+    filters: States
+    summary: dict[str, Any]
+    rank: float
+    warnings: tuple[dict[str, str], ...]
+    anew: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Results:
+    """What is to be stored of a clutch: mean COFs by run_id beside their levels, receipts that change, corrected mean COFs
+    (in place of all where `corrected_anew`), and the tracking (None: it stays)."""
+
+    levels: Levels = field(default_factory=dict)
+    cofs: Mapping[str, ByPressure] = field(default_factory=dict)
+    receipts: Mapping[str, Receipt] = field(default_factory=dict)
+    corrected: Mapping[str, ByPressure] = field(default_factory=dict)
+    corrected_anew: bool = False
+    tracking: Tracking | None = None
+
+
+def computed_anew(
+    state: ClutchState,
+    levels: Levels,
+    receipts: Mapping[str, Receipt],
+    tests: Iterable[StationaryRun],
+    reader: RunReader,
+) -> tuple[ClutchState, Results]:
+    """Mean COFs over the protocol of each life, freed of the artefacts of the model in force, and all tracked anew.
+
+    `levels` and `receipts` are those of all runs; `tests` the stationary tests of the present life, read only where a model
+    is in force. Returns the state with its mean COFs, and what is to be stored.
+    """
+    cofs = _all_cofs(state.lives, levels, state.geometry)
+    plain = replace(state, events=tuple(replace(event, cofs=cofs.get(event.run_id, {})) for event in state.events))
+    corrected = _corrected(plain, tests, reader)
+    final = replace(
+        plain,
+        events=tuple(replace(event, cofs=corrected.get(event.run_id, event.cofs)) for event in plain.events),
+    )
+    fitted = {run_id: levels[run_id] for run_id in cofs}
+    results = Results(
+        levels=fitted,
+        cofs=cofs,
+        receipts={run_id: receipts[run_id] | {"fits": fit_items(levels[run_id], cofs[run_id])} for run_id in cofs},
+        corrected=corrected,
+        corrected_anew=True,
+        tracking=track(final),
+    )
+    return final, results
+
+
+def _all_cofs(lives: Sequence[Life], levels: Levels, geometry: Geometry) -> dict[str, ByPressure]:
+    """Mean COF of every test that has curves, over the protocol of its life's first test."""
+    cofs: dict[str, ByPressure] = {}
+    for life in lives:
+        velocities = None if life.speed_range is None else reference_velocities(life.speed_range, geometry)
+        for event in life.events:
+            if levels.get(event.run_id):
+                own = levels[event.run_id]
+                cofs[event.run_id] = {} if velocities is None else mean_cofs(own, velocities, geometry)
+    return cofs
+
+
+def _corrected(state: ClutchState, tests: Iterable[StationaryRun], reader: RunReader) -> dict[str, ByPressure]:
+    if state.extension is None or not state.events:
+        return {}
+    life = state.lives[-1]
+    runs = reader.campaign_runs(life.events, origin=life.origin)
+    return corrected_cofs(state.extension, state.record, life, runs, tests)
+
+
+def corrected_newest(
+    state: ClutchState, newest: Event, test: StationaryRun | None, reader: RunReader
+) -> ByPressure | None:
+    """The mean COFs of the test that comes last, freed of artefacts of the model in force; None where nothing changes."""
+    if state.extension is None or newest.speed_range is None or test is None:
+        return None
+    life = state.lives[-1]
+    runs = reader.campaign_runs(life.events[:-1], origin=life.origin)
+    return corrected_cofs(state.extension, state.record, life, runs, [test]).get(newest.run_id)
+
+
+def track(state: ClutchState, *, newest: Event | None = None) -> Tracking | None:
+    """Track what the history asks for: one step where `newest` comes last and the filters' states serve, else all of it.
+
+    None for a clutch without runs.
+    """
+    if not state.events:
+        return None
+    assumptions, lives = state.assumptions(), state.lives
+    carried = None if newest is None else _carried(state, lives[-1], assumptions, newest)
+    walks: list[tuple[Life, States, int]] = [(life, {}, 0) for life in lives]
+    if carried is not None:
+        walks = [(lives[-1], carried, len(lives[-1].events) - 1)]
+    predictions: dict[tuple[float, str], Prediction] = {}
+    filters: States = {}
+    for life, start, first_event in walks:
+        walk = follow(state.clutch_id, life, assumptions, state.fraction, start, first_event=first_event)
+        for after_event, made in walk:
+            filters = after_event
+            predictions |= {(prediction.cycles, prediction.method): prediction for prediction in made}
+    last = predictions[state.events[-1].cycles, "particle"].payload
+    summary, rank = summary_of(last)
+    summary |= {
+        "runs": len(state.events),
+        "recent": recent(state.events, lives[-1].pooled(assumptions)),
+        "life": lives[-1].name,
+    }
+    return Tracking(
+        predictions=tuple(predictions.values()),
+        filters=filters,
+        summary=summary,
+        rank=rank,
+        warnings=tuple(last["warnings"]),
+        anew=carried is None,
+    )
+
+
+def _carried(state: ClutchState, life: Life, assumptions: Assumptions, newest: Event) -> States | None:
+    """The stored states from before `newest`, or None where one step on from them would not give the same answer."""
+    last = life.events[-1]
+    is_test = newest.speed_range is not None
+    if newest.rebuild or newest not in life.events or (newest is not last and (is_test or newest.cycles < last.cycles)):
+        return None
+    if (newest is not last and newest.shift) or state.filters is None:
+        return None
+    index = life.events.index(newest)
+    before = sum(1 for event in life.pooled(assumptions).events if event != index)
+    if state.filters.keys() != (set(CARRIED) if before else set()):
+        return None
+    return None if any(tracked.runs != before for tracked in state.filters.values()) else state.filters
+
+
+def loops_anew(
+    state: ClutchState, levels: Levels, reader: RunReader, *, since: Event | None = None
+) -> dict[str, list[dict[str, Any]]]:
+    """run_id -> loops of dynamic tests evaluated anew: of all, or of those whose stationary test is `since`."""
+    loops = {}
+    for event in state.events:
+        if event.kind != DYNAMIC:
+            continue
+        test = stationary_test_of(state.events, event)
+        if since is None or (test is not None and test.run_id == since.run_id):
+            own = [] if test is None else levels.get(test.run_id, [])
+            channels = reader.read(event.run_id).channels
+            loops[event.run_id] = loop_items(loops_of(channels, state.geometry, own))
+    return loops

@@ -1,0 +1,65 @@
+"""`/v1/clutches`: clutches worst first, with what a list shows of each."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from sqlalchemy import Connection
+
+from service import records
+from service.lives.assumptions import BASELINE
+from service.lives.prediction import SUMMARY
+from storage import clutches, verdicts
+from storage.clutches import ClutchRow
+from storage.engine.database import Database
+from storage.verdicts import VerdictRow
+
+#: What summaries did not hold that were stored before models could be adopted.
+_BEFORE = {"model": dict(BASELINE)}
+
+
+def look_up(database: Database, clutch_id: str) -> dict[str, Any]:
+    """A clutch; raises NotFoundError."""
+    with database.reading() as connection:
+        return _described(connection, [records.clutch(connection, clutch_id)])[0]
+
+
+def page(
+    database: Database, *, limit: int, after: tuple[float, str] | None
+) -> tuple[list[dict[str, Any]], tuple[float, str] | None]:
+    """Clutches with the fewest remaining cycles first, and where the next page starts."""
+    with database.reading() as connection:
+        rows = clutches.page(connection, limit=limit + 1, after=after)
+        items = _described(connection, rows[:limit])
+    return items, (rows[limit - 1].rank, rows[limit - 1].clutch_id) if len(rows) > limit else None
+
+
+def _described(connection: Connection, rows: Sequence[ClutchRow]) -> list[dict[str, Any]]:
+    """Clutches as they go out."""
+    newest = verdicts.newest(connection, [row.clutch_id for row in rows])
+    return [_item(row, _latest(connection, row, newest.get(row.clutch_id))) for row in rows]
+
+
+def _latest(connection: Connection, row: ClutchRow, verdict: VerdictRow | None) -> dict[str, Any] | None:
+    """The newest finished diagnosis as it goes out; one of a life that a rebuild has ended is past."""
+    if verdict is None:
+        return None
+    life = row.summary.get("life")  # what was stored by earlier releases does not hold it
+    earlier = verdict.life != (records.present_life(connection, row.clutch_id) if life is None else life)
+    return {
+        "diagnosis_id": verdict.diagnosis_id,
+        "verdict": verdict.verdict,
+        "causes": list(verdict.causes),
+        "adopted": verdict.adopted and not earlier,
+        "earlier_life": earlier,
+    }
+
+
+def _item(row: ClutchRow, diagnosis: dict[str, Any] | None) -> dict[str, Any]:
+    return records.record(row).model_dump(mode="json") | {
+        "created_at": row.created_at,
+        "revision": row.revision,
+        "runs": row.summary.get("runs", 0),
+        "summary": {name: (_BEFORE | row.summary)[name] for name in SUMMARY} if row.summary else None,
+        "recent": row.summary.get("recent"),
+        "diagnosis": diagnosis,
+    }

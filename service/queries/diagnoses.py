@@ -1,0 +1,65 @@
+"""`/diagnoses`: reports as they are stored, and whether they still hold."""
+
+from typing import Any
+
+from sqlalchemy import Connection
+
+from service import records
+from service.errors import NotFoundError
+from service.lives.diagnosis_report import empty
+from service.schemas.base import whole
+from storage import diagnoses
+from storage.diagnoses import DiagnosisRow
+from storage.engine.database import Database
+
+#: What a list does not show.
+_LARGE = ("maps", "loops")
+
+
+def one(database: Database, clutch_id: str, diagnosis_id: str) -> dict[str, Any]:
+    """A diagnosis as it is answered. Raises NotFoundError."""
+    with database.reading() as connection:
+        records.clutch(connection, clutch_id)
+        row = diagnoses.get(connection, clutch_id, diagnosis_id)
+        if row is None:
+            raise NotFoundError(f"clutch {clutch_id!r} has no diagnosis {diagnosis_id!r}")
+        return _items(connection, clutch_id, [row])[0]
+
+
+def page(
+    database: Database, clutch_id: str, *, limit: int, after: tuple[float, str] | None
+) -> tuple[list[dict[str, Any]], tuple[float, str] | None]:
+    """Diagnoses without their maps and loops, newest first, and where the next page starts. Raises NotFoundError."""
+    with database.reading() as connection:
+        records.clutch(connection, clutch_id)
+        rows = diagnoses.page(connection, clutch_id, limit=limit + 1, before=None if after is None else after[0])
+        items = _items(connection, clutch_id, rows[:limit])
+    shown = [{name: value for name, value in item.items() if name not in _LARGE} for item in items]
+    return shown, (float(rows[limit - 1].diagnosis_key), "") if len(rows) > limit else None
+
+
+def _items(connection: Connection, clutch_id: str, rows: list[DiagnosisRow]) -> list[dict[str, Any]]:
+    life = records.present_life(connection, clutch_id)
+    adoption = records.adoption(connection, clutch_id)
+    in_force = adoption.diagnosis_id if adoption is not None and adoption.life == life else None
+    latest = diagnoses.last_run_key(connection, clutch_id)
+    return [
+        {
+            "diagnosis_id": row.diagnosis_id,
+            "clutch_id": row.clutch_id,
+            "status": row.status,
+            "created_at": row.created_at,
+            "finished_at": row.finished_at,
+            "revision": row.revision,
+            "as_of_cycles": None if row.as_of_cycles is None else whole(row.as_of_cycles),
+            "stale": latest > row.last_run_key,
+            "earlier_life": row.life != life,
+            "adoptable": row.extension is not None and row.life == life,
+            "adopted": row.diagnosis_id == in_force,
+            "problem": row.problem,
+            "code_version": row.code_version,
+        }
+        | empty()
+        | (row.report or {})
+        for row in rows
+    ]

@@ -1,0 +1,60 @@
+"""`/remaining-useful-life`: a stored prediction, or one computed from the clutch's state where none is stored."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from service import records
+from service.lives.assumptions import ALL_PRESSURES
+from service.lives.tracks import predict_at
+from storage import predictions
+from storage.engine.database import Database
+
+
+def remaining_life(
+    database: Database, clutch_id: str, *, method: str, pressure_bar: float | None, at_cycles: float | None
+) -> dict[str, Any]:
+    """The remaining useful life as it is now, or as it would have been predicted at `at_cycles`.
+
+    The carried filters' predictions over all pressures are stored; those of the exact filter and at one pressure are
+    computed. Raises NotFoundError for an unknown clutch or a pressure that its first stationary test did not measure.
+    """
+    with database.reading() as connection:
+        row = records.clutch(connection, clutch_id)
+        stored = (
+            predictions.at(connection, clutch_id, method, ALL_PRESSURES, at_cycles) if pressure_bar is None else None
+        )
+        state = records.state(connection, clutch_id) if stored is None else None
+    head = {
+        "clutch_id": clutch_id,
+        "method": method,
+        "revision": row.revision,
+        "origin": records.record(row).origin,
+    }
+    if stored is not None:
+        return head | stored.payload
+    if state is None:
+        raise AssertionError("a prediction is stored, or the state was loaded")
+    return head | predict_at(
+        clutch_id,
+        state.events,
+        state.assumptions(),
+        state.fraction,
+        method=method,
+        pressure_bar=pressure_bar,
+        at_cycles=at_cycles,
+    )
+
+
+def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """The quantiles as rows of a table."""
+    for quantile, remaining in payload["remaining_cycles"].items():
+        yield {
+            "as_of_cycles": payload["as_of_cycles"],
+            "status": payload["status"],
+            "quantile": quantile,
+            "remaining_cycles": remaining,
+            "end_of_life_cycles": payload["end_of_life_cycles"][quantile],
+        }
+
+
+COLUMNS = ("as_of_cycles", "status", "quantile", "remaining_cycles", "end_of_life_cycles")

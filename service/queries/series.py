@@ -1,0 +1,70 @@
+"""`/series`: flat rows for dashboards and spreadsheets, every fitted quantity and then the predictions."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from models.friction.fit_uncertainty import Z90
+from service import records
+from service.lives.assumptions import ALL_PRESSURES, MEAN_COF
+from service.lives.history import STATIONARY
+from service.lives.receipt import PARAMETER_UNITS
+from service.schemas.base import whole
+from storage import predictions, runs
+from storage.engine.database import Database
+from storage.predictions import PredictionRow
+
+
+def series(database: Database, clutch_id: str, quantity: str | None) -> list[dict[str, Any]]:
+    """Each quantity of each test by cycles, then the remaining cycles as they were predicted; of one quantity, or of all.
+
+    Raises NotFoundError.
+    """
+    with database.reading() as connection:
+        records.clutch(connection, clutch_id)
+        rows = runs.page(connection, clutch_id, kind=STATIONARY)
+        predicted = predictions.history(connection, clutch_id, "particle", ALL_PRESSURES)
+    measured = (item for row in rows for fit in row.receipt["fits"] for item in _measured(row.receipt, fit))
+    ahead = (item for row in predicted for item in _predicted(row))
+    return [item for items in (measured, ahead) for item in items if quantity in (None, item["quantity"])]
+
+
+def _measured(receipt: dict[str, Any], fit: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    values = [(MEAN_COF, "1", fit["mean_cof"], fit["mean_cof_sd"])]
+    for public, unit in PARAMETER_UNITS.values():
+        values.append((public, unit, fit["parameters"][public], fit["standard_errors"][public]))
+    for quantity, unit, value, sd in values:
+        yield {
+            "cycles": receipt["cycles"],
+            "time": receipt["started_at"] or receipt["received_at"],
+            "run_id": receipt["run_id"],
+            "quantity": quantity,
+            "unit": unit,
+            "pressure_bar": fit["pressure_bar"],
+            "value": value,
+            "lower": None if value is None else value - Z90 * sd,
+            "upper": None if value is None else value + Z90 * sd,
+        }
+
+
+def _predicted(row: PredictionRow) -> Iterator[dict[str, Any]]:
+    current, remaining = row.payload["current"], row.payload["remaining_cycles"]
+    mean, sd = current["mean_cof"], current["mean_cof_sd"]
+    bounds = (None, None) if mean is None else (mean - Z90 * sd, mean + Z90 * sd)
+    values = (
+        (MEAN_COF, "1", mean, *bounds),
+        ("health", "1", current["health"], None, None),
+        ("remaining_cycles", "cycles", remaining["0.5"], remaining["0.05"], remaining["0.95"]),
+        ("probability_of_reaching", "1", row.payload["probability_of_reaching"], None, None),
+    )
+    for quantity, unit, value, lower, upper in values:
+        yield {
+            "cycles": whole(row.cycles),
+            "time": None,
+            "run_id": None,
+            "quantity": quantity,
+            "unit": unit,
+            "pressure_bar": None,
+            "value": value,
+            "lower": lower,
+            "upper": upper,
+        }

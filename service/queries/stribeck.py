@@ -1,0 +1,62 @@
+"""`/stribeck`: the curves of the stationary tests, and the pressure laws through them (fig. 9)."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from models.friction.pressure_laws import LinearLaw, PressureLaws, fit_pressure_laws
+from service import records
+from service.lives.receipt import PARAMETER_UNITS
+from service.lives.run_analysis import LevelFit
+from service.readers.units import PASCALS_PER_BAR
+from service.schemas.base import whole
+from storage import runs
+from storage.engine.database import Database
+from storage.runs import RunRow
+
+Place = tuple[float, str]
+
+
+def page(
+    database: Database, clutch_id: str, *, limit: int, after: Place | None
+) -> tuple[list[dict[str, Any]], Place | None]:
+    """Stationary tests by cycles with their fits and pressure laws, and where the next page starts. Raises NotFoundError.
+
+    A test of the open clutch has neither fits nor laws.
+    """
+    with database.reading() as connection:
+        records.clutch(connection, clutch_id)
+        rows = runs.page(connection, clutch_id, limit=limit + 1, after=after, fitted=True)
+        levels = records.levels(connection, clutch_id)
+    items = [_item(row, levels.get(row.run_id, [])) for row in rows[:limit]]
+    return items, (rows[limit - 1].cycles, rows[limit - 1].run_id) if len(rows) > limit else None
+
+
+def rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
+    """The fits as rows of a table, a row a test and pressure."""
+    for item in items:
+        for fit in item["fits"]:
+            plain = {name: fit[name] for name in fit if name not in ("parameters", "standard_errors", "undetermined")}
+            errors = {f"{name}_se": value for name, value in fit["standard_errors"].items()}
+            yield {"run_id": item["run_id"], "cycles": item["cycles"], **plain, **fit["parameters"], **errors}
+
+
+def _item(row: RunRow, levels: Sequence[LevelFit]) -> dict[str, Any]:
+    laws = fit_pressure_laws([level.fit for level in levels])
+    return {
+        "run_id": row.run_id,
+        "cycles": whole(row.cycles),
+        "fits": row.receipt["fits"],
+        "pressure_laws": None if laws is None else _laws(laws),
+    }
+
+
+def _laws(laws: PressureLaws) -> dict[str, Any]:
+    """The pressure laws in bar, by public name."""
+    items: dict[str, Any] = {}
+    for name, (public, _) in PARAMETER_UNITS.items():
+        law = getattr(laws, name)
+        if isinstance(law, LinearLaw):
+            items[public] = {"intercept": law.intercept, "slope_per_bar": law.slope * PASCALS_PER_BAR}
+        else:
+            items[public] = {"asymptote": law.asymptote, "excess": law.excess, "decay_bar": law.decay / PASCALS_PER_BAR}
+    return items

@@ -1,0 +1,20 @@
+"""What one request may cost, and how much is kept for the next."""
+
+#: Bytes of computed answers that are kept together. Chosen: some hundred pages of `/degradation`.
+MOST_CACHED_BYTES = 96 << 20
+#: Items a page may hold, and those of lists that are answered whole where no limit is given.
+MOST_ITEMS, ALL_ITEMS = 1000, 1_000_000
+#: Items of a page where no limit is given.
+USUAL_ITEMS = 100
+#: Characters of a cursor that are read. Derived: a clutch's name has 128, base64 makes a third more of them.
+LONGEST_CURSOR = 600
+#: Pressure [bar] and cycles [-] that an argument may name. Derived: a channel's bound; a million times the horizon.
+MOST_PRESSURE_BAR = 1e4
+MOST_HORIZONS = 1e6
+#: Seconds that a POST of a diagnosis waits for its report where it does not say, and at most. Chosen: the contract's
+#: default; what proxies usually let pass.
+WAIT_SECONDS, LONGEST_WAIT_SECONDS = 30, 600
+#: Seconds after which a busy service may be asked again.
+RETRY_AFTER_SECONDS = 1
+#: Clutches that the metrics read at once.
+METRICS_PAGE = 1000

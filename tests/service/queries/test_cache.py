@@ -1,0 +1,77 @@
+"""The cache of computed answers: bounded by bytes, least lately asked for first, each answer made once."""
+
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from service.queries.cache import AnswerCache, to_json
+from service.web.limits import MOST_CACHED_BYTES
+
+
+def made(cache: AnswerCache, name: str, body: bytes) -> bool:
+    """Whether the answer had to be made."""
+    calls = []
+
+    def make() -> bytes:
+        calls.append(name)
+        return body
+
+    assert cache.answer(name, make) == body
+    return bool(calls)
+
+
+def test_the_least_lately_asked_for_goes_first_and_no_more_than_must() -> None:
+    cache = AnswerCache(10)
+    assert [made(cache, name, name.encode() * size) for name, size in (("a", 4), ("b", 4), ("c", 2))] == [True] * 3
+    assert not made(cache, "a", b"aaaa")  # b is now the one not asked for longest
+    assert made(cache, "d", b"ddd")
+    assert [made(cache, "a", b"aaaa"), made(cache, "c", b"cc"), made(cache, "d", b"ddd")] == [False] * 3
+    assert made(cache, "b", b"bbbb")
+
+
+def test_an_answer_larger_than_all_may_be_together_is_given_and_not_kept() -> None:
+    cache = AnswerCache(10)
+    assert made(cache, "small", b"s")
+    assert [made(cache, "large", b"l" * 11) for _ in range(2)] == [True, True]
+    assert not made(cache, "small", b"s")
+    assert MOST_CACHED_BYTES < 2**27
+
+
+def test_of_several_that_ask_at_once_one_computes() -> None:
+    cache, started, release, calls = AnswerCache(100), threading.Event(), threading.Event(), []
+
+    def make() -> bytes:
+        calls.append(1)
+        started.set()
+        assert release.wait(30)
+        return b"once"
+
+    with ThreadPoolExecutor(4) as pool:
+        first = pool.submit(cache.answer, "a", make)
+        assert started.wait(30)
+        others = [pool.submit(cache.answer, "a", make) for _ in range(3)]
+        assert cache.answer("b", lambda: b"not held up") == b"not held up"
+        release.set()
+        assert {answer.result(30) for answer in (first, *others)} == {b"once"}
+    assert len(calls) == 1
+
+
+def test_what_fails_fails_for_all_and_is_tried_again() -> None:
+    cache = AnswerCache(100)
+
+    def failing() -> bytes:
+        raise LookupError("not there")
+
+    attempts: list[Callable[[], bytes]] = [failing, failing]
+    for make in attempts:
+        with pytest.raises(LookupError, match="not there"):
+            cache.answer("a", make)
+    assert cache.answer("a", lambda: b"there") == b"there"
+
+
+def test_no_number_leaves_that_json_cannot_carry() -> None:
+    assert to_json({"µ": 0.1}) == '{"µ":0.1}'.encode()
+    with pytest.raises(ValueError, match="JSON"):
+        to_json({"mean_cof": float("nan")})
