@@ -7,6 +7,7 @@
 # make blind   hides effects and wants them found: the table of docs/diagnosis.md      (SEED= SIZE=small|full ONLY= ARGS=)
 # make real    what is said of real measurements; make benchmark: how long things take; make picture: README's pictures;
 #              make figures: the figures of docs/
+# make architecture  the picture, the ways and the examples of docs/architecture.md, from the code
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
@@ -16,7 +17,7 @@ ARGS ?=
 LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --exclude-newer "7 days" \
 	--custom-compile-command "make lock"
 
-.PHONY: demo test check lowest benchmark real figures blind score rivals picture lock clean
+.PHONY: demo test check lowest benchmark real figures architecture blind score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
@@ -51,6 +52,9 @@ real: $(VENV)/.tests
 
 figures: $(VENV)/.tests
 	$(BIN)/python -m tests.figures
+
+architecture: $(VENV)/.tests
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.architecture
 
 blind: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.blind $(ARGS)

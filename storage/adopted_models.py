@@ -1,4 +1,7 @@
-"""The models a clutch has been tracked under, and the mean COFs that the one in force corrects."""
+"""The models under which a clutch has been tracked, by version; the newest is in force.
+
+Beside the versions, the mean COFs of runs as the model in force corrects them; they go before those of the fits.
+"""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -18,12 +21,12 @@ class AdoptedRow:
     adopted_at: str
 
 
-_of_clutch = adopted_model.c.clutch_id == bindparam("of_clutch")
 _versions = (
     select(adopted_model.c.version, adopted_model.c.diagnosis_id, adopted_model.c.adopted_at)
-    .where(_of_clutch)
+    .where(adopted_model.c.clutch_id == bindparam("of_clutch"))
     .order_by(adopted_model.c.version.desc())
 )
+_newest = _versions.limit(1)
 _adopt = sa.insert(adopted_model)
 _cofs = (
     select(corrected_cof.c.run_key, corrected_cof.c.pressure, corrected_cof.c.mean_cof, corrected_cof.c.mean_cof_sd)
@@ -40,13 +43,13 @@ _clear = delete(corrected_cof).where(
 
 def current(connection: Connection, clutch_id: str) -> AdoptedRow | None:
     """The version in force, None before the first."""
-    found = connection.execute(_versions.limit(1), {"of_clutch": clutch_id}).first()
-    return None if found is None else AdoptedRow(**found._asdict())
+    row = connection.execute(_newest, {"of_clutch": clutch_id}).first()
+    return None if row is None else AdoptedRow(**row._asdict())
 
 
 def versions(connection: Connection, clutch_id: str) -> list[AdoptedRow]:
     """All versions, newest first."""
-    return [AdoptedRow(**found._asdict()) for found in connection.execute(_versions, {"of_clutch": clutch_id})]
+    return [AdoptedRow(**row._asdict()) for row in connection.execute(_versions, {"of_clutch": clutch_id})]
 
 
 def adopt(connection: Connection, clutch_id: str, row: AdoptedRow) -> None:
@@ -56,10 +59,10 @@ def adopt(connection: Connection, clutch_id: str, row: AdoptedRow) -> None:
 
 def corrected_cofs(connection: Connection, clutch_id: str) -> dict[int, dict[float, tuple[float, float]]]:
     """run_key -> pressure -> mean COF and its deviation under the model in force, where it corrects them."""
-    found: dict[int, dict[float, tuple[float, float]]] = {}
+    cofs: dict[int, dict[float, tuple[float, float]]] = {}
     for run_key, pressure, mean, deviation in connection.execute(_cofs, {"of_clutch": clutch_id}):
-        found.setdefault(run_key, {})[pressure] = (mean, deviation)
-    return found
+        cofs.setdefault(run_key, {})[pressure] = (mean, deviation)
+    return cofs
 
 
 def write_corrected(connection: Connection, run_key: int, cofs: Mapping[float, tuple[float, float]]) -> None:

@@ -1,4 +1,4 @@
-"""The raw channels of a run, as they were sent: kept for ever and bit for bit, written once, never changed."""
+"""The raw channels of a run, as they were sent: kept bit for bit, written once, never changed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection, bindparam, select
 
 from storage.encoding.codec import CODEC, decode, encode
-from storage.encoding.decimals import DECIMAL_CODEC, decode_decimals, encode_decimals
+from storage.encoding.decimals import DECIMAL_CODEC, LONG, decode_decimals, encode_decimals
 from storage.engine.errors import DamagedData
 from storage.tables import channel, run
 
@@ -34,12 +34,12 @@ class Encoded:
 
 
 def encoded(channels: Mapping[str, NDArray[np.float64]]) -> Encoded:
-    """The channels [n] of a run encoded. It takes time where they are long, and needs no connection."""
+    """The channels [n] of a run encoded. Slow for long records; needs no connection."""
     return Encoded(tuple((name, *_encoded(column)) for name, column in channels.items()))
 
 
 def _encoded(column: NDArray[np.float64]) -> tuple[str, int, bytearray]:
-    decimals = encode_decimals(column)
+    decimals = encode_decimals(column) if column.size >= LONG else None
     if decimals is not None:
         return DECIMAL_CODEC, column.size, decimals
     return CODEC, column.size, encode(column)
@@ -68,5 +68,5 @@ def read(connection: Connection, run_key: int) -> dict[str, NDArray[np.float64]]
 
 def samples(connection: Connection, clutch_id: str) -> dict[int, int]:
     """run_key -> how many samples its record has, of the runs of a clutch that are sampled records."""
-    found = connection.execute(_samples, {"of_clutch": clutch_id})
-    return {run_key: length for run_key, length in found}  # noqa: C416  (rows are no pairs to mypy)
+    rows = connection.execute(_samples, {"of_clutch": clutch_id})
+    return {run_key: length for run_key, length in rows}  # noqa: C416  (rows are no pairs to mypy)

@@ -52,17 +52,17 @@ def insert(connection: Connection, row: ClutchRow) -> None:
 
 def get(connection: Connection, clutch_id: str) -> ClutchRow | None:
     """The clutch, or None."""
-    found = connection.execute(_by_id, {"wanted": clutch_id}).first()
-    return None if found is None else _row(found)
+    row = connection.execute(_by_id, {"wanted": clutch_id}).first()
+    return None if row is None else _row(row)
 
 
 def page(connection: Connection, *, limit: int, after: tuple[float, str] | None = None) -> list[ClutchRow]:
-    """At most `limit` clutches, worst first; `after` is the (rank, clutch_id) of the last one already seen."""
+    """At most `limit` clutches, worst first; `after` is the (rank, clutch_id) of the last clutch of the page before."""
     if after is None:
-        found = connection.execute(_worst_first, {"most": limit})
+        rows = connection.execute(_worst_first, {"most": limit})
     else:
-        found = connection.execute(_worst_first_after, {"most": limit, "after_rank": after[0], "after_id": after[1]})
-    return [_row(each) for each in found]
+        rows = connection.execute(_worst_first_after, {"most": limit, "after_rank": after[0], "after_id": after[1]})
+    return [_row(row) for row in rows]
 
 
 def set_summary(connection: Connection, clutch_id: str, rank: float, summary: Json) -> None:
@@ -83,8 +83,8 @@ def bump_revision(connection: Connection, clutch_id: str) -> int:
 
 def revision(connection: Connection, clutch_id: str) -> int | None:
     """The clutch's revision, or None."""
-    found: int | None = connection.execute(_revision, {"wanted": clutch_id}).scalar_one_or_none()
-    return found
+    number: int | None = connection.execute(_revision, {"wanted": clutch_id}).scalar_one_or_none()
+    return number
 
 
 def all_ids(connection: Connection) -> list[str]:
@@ -97,8 +97,8 @@ def revisions(connection: Connection) -> dict[str, int]:
     return {row.clutch_id: row.revision for row in connection.execute(_revisions)}
 
 
-def _row(found: Row[tuple[object, ...]]) -> ClutchRow:
-    values = found._asdict()
+def _row(row: Row[tuple[object, ...]]) -> ClutchRow:
+    values = row._asdict()
     values["record"] = to_object(values["record"])
     values["summary"] = to_object(values["summary"])
     return ClutchRow(**values)

@@ -1,4 +1,4 @@
-"""Diagnoses of a clutch: asked for, then finished or failed; newest first."""
+"""Diagnoses of a clutch: running, then finished or failed; newest first."""
 
 from dataclasses import dataclass, fields
 
@@ -13,7 +13,7 @@ RUNNING, FINISHED, FAILED = "running", "finished", "failed"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NewDiagnosis:
-    """A diagnosis as it is asked for, of the runs up to `last_run_key` (0 where there are none).
+    """A diagnosis as it starts, of the runs up to `last_run_key` (0 where there are none).
 
     `life` is the run_id of the rebuild with which the diagnosed life began, "" for the first life.
     """
@@ -30,7 +30,7 @@ class NewDiagnosis:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DiagnosisRow(NewDiagnosis):
-    """A stored diagnosis: `report` once it is finished, `problem` where it failed, `extension` where one was found."""
+    """A stored diagnosis: `report` once it is finished, `problem` where it failed, `extension` where there is one."""
 
     diagnosis_key: int
     status: str
@@ -43,7 +43,7 @@ class DiagnosisRow(NewDiagnosis):
 _NEW = tuple(field.name for field in fields(NewDiagnosis))
 _insert = sa.insert(diagnosis)
 _of_clutch = diagnosis.c.clutch_id == bindparam("of_clutch")
-_one = select(diagnosis).where(_of_clutch, diagnosis.c.diagnosis_id == bindparam("wanted"))
+_by_id = select(diagnosis).where(_of_clutch, diagnosis.c.diagnosis_id == bindparam("wanted"))
 _newest = (
     select(diagnosis)
     .where(_of_clutch, diagnosis.c.diagnosis_key < bindparam("before"))
@@ -82,47 +82,47 @@ def insert(connection: Connection, row: NewDiagnosis) -> None:
 
 def get(connection: Connection, clutch_id: str, diagnosis_id: str) -> DiagnosisRow | None:
     """The diagnosis, or None."""
-    found = connection.execute(_one, {"of_clutch": clutch_id, "wanted": diagnosis_id}).first()
-    return None if found is None else _row(found)
+    row = connection.execute(_by_id, {"of_clutch": clutch_id, "wanted": diagnosis_id}).first()
+    return None if row is None else _row(row)
 
 
 def page(connection: Connection, clutch_id: str, *, limit: int, before: float | None = None) -> list[DiagnosisRow]:
-    """At most `limit` diagnoses, newest first; `before` is the key of the last one already seen."""
+    """At most `limit` diagnoses, newest first; `before` is the key of the last diagnosis of the page before."""
     values = {"of_clutch": clutch_id, "most": limit, "before": 2.0**62 if before is None else before}
-    return [_row(found) for found in connection.execute(_newest, values)]
+    return [_row(row) for row in connection.execute(_newest, values)]
 
 
 def running(connection: Connection, clutch_id: str, last_run_key: int) -> str | None:
-    """The id of the diagnosis of these very runs that is running, or None."""
-    found: str | None = connection.execute(_same, {"of_clutch": clutch_id, "up_to": last_run_key}).scalar()
-    return found
+    """The id of the diagnosis of the same runs that is running, or None."""
+    diagnosis_id: str | None = connection.execute(_same, {"of_clutch": clutch_id, "up_to": last_run_key}).scalar()
+    return diagnosis_id
 
 
 def finish(connection: Connection, diagnosis_id: str, at: str, report: Json, extension: Json | None) -> bool:
-    """Store what a running diagnosis said; False where it is no longer running."""
+    """Store the report of a running diagnosis; False where it is no longer running."""
     values = {"new_status": FINISHED, "new_report": to_text(report), "new_problem": None}
     values["new_extension"] = None if extension is None else to_text(extension)
     return connection.execute(_end, values | {"wanted": diagnosis_id, "at": at}).rowcount == 1
 
 
 def fail(connection: Connection, diagnosis_id: str, at: str, problem: str) -> bool:
-    """Say why a running diagnosis has no report; False where it is no longer running."""
+    """Store why a running diagnosis has no report; False where it is no longer running."""
     values = {"new_status": FAILED, "new_report": None, "new_extension": None, "new_problem": problem}
     return connection.execute(_end, values | {"wanted": diagnosis_id, "at": at}).rowcount == 1
 
 
 def fail_all(connection: Connection, at: str, problem: str) -> int:
-    """Say of all running diagnoses why they have no report; returns how many there were."""
+    """Store why all running diagnoses have no report; returns how many were running."""
     return connection.execute(_end_all, {"at": at, "new_problem": problem}).rowcount
 
 
 def last_run_key(connection: Connection, clutch_id: str) -> int:
-    """The key of the clutch's run that came last, 0 where there is none."""
+    """The key of the clutch's run that was stored last, 0 where there is none."""
     return connection.execute(_last_run, {"of_clutch": clutch_id}).scalar() or 0
 
 
-def _row(found: Row[tuple[object, ...]]) -> DiagnosisRow:
-    values = found._asdict()
+def _row(row: Row[tuple[object, ...]]) -> DiagnosisRow:
+    values = row._asdict()
     for name in ("report", "extension"):
         values[name] = None if values[name] is None else to_object(values[name])
     return DiagnosisRow(**values)

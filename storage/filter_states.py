@@ -76,5 +76,5 @@ def get(connection: Connection, clutch_id: str) -> dict[tuple[str, float], Filte
 
 
 def clear(connection: Connection, clutch_id: str) -> None:
-    """Drop all states of a clutch, which are about to be made anew."""
+    """Drop all states of a clutch, which are about to be computed again."""
     connection.execute(_clear, {"of_clutch": clutch_id})

@@ -15,7 +15,7 @@ from storage.tables import fit, run
 class FitRow:
     """One curve's fit. `covariance` is the 4 x 4 matrix, row by row, 16 numbers; `mse_percent` None on a flat curve.
 
-    `mean_cof` and its deviation, None where the curve cannot say them, are over the protocol of the first test.
+    `mean_cof` and its deviation, None where the curve does not determine them, are over the protocol of the first test.
     """
 
     pressure: float
@@ -68,18 +68,18 @@ def write(connection: Connection, run_key: int, rows: Sequence[FitRow]) -> None:
 def of_clutch(connection: Connection, clutch_id: str) -> dict[int, list[FitRow]]:
     """The fits of a clutch's runs by run_key, runs in order, pressures ascending; runs without fits are left out."""
     fits: dict[int, list[FitRow]] = {}
-    for found in connection.execute(_of_clutch, {"of_clutch": clutch_id}):
-        run_key, row = _row(found)
-        fits.setdefault(run_key, []).append(row)
+    for row in connection.execute(_of_clutch, {"of_clutch": clutch_id}):
+        run_key, curve = _row(row)
+        fits.setdefault(run_key, []).append(curve)
     return fits
 
 
 def cofs_of_clutch(connection: Connection, clutch_id: str) -> dict[int, dict[float, tuple[float, float]]]:
-    """run_key -> pressure -> mean COF and its deviation, of all curves that can say it: as much as tracking needs."""
-    found: dict[int, dict[float, tuple[float, float]]] = {}
+    """run_key -> pressure -> mean COF and its deviation, of all curves that determine it: as much as tracking needs."""
+    cofs: dict[int, dict[float, tuple[float, float]]] = {}
     for run_key, pressure, mean, deviation in connection.execute(_cofs_of_clutch, {"of_clutch": clutch_id}):
-        found.setdefault(run_key, {})[pressure] = (mean, deviation)
-    return found
+        cofs.setdefault(run_key, {})[pressure] = (mean, deviation)
+    return cofs
 
 
 def _values(run_key: int, row: FitRow) -> dict[str, object]:
@@ -91,9 +91,9 @@ def _values(run_key: int, row: FitRow) -> dict[str, object]:
     return {"run_key": run_key, **values}
 
 
-def _row(found: Row[Any]) -> tuple[int, FitRow]:
-    run_key: int = found[0]
-    values: dict[str, Any] = dict(zip(_NAMES, found[1:], strict=True))
+def _row(row: Row[Any]) -> tuple[int, FitRow]:
+    run_key: int = row[0]
+    values: dict[str, Any] = dict(zip(_NAMES, row[1:], strict=True))
     values["covariance"] = tuple(to_list(values["covariance"]))
     values["undetermined"] = tuple(to_list(values["undetermined"]))
     return run_key, FitRow(**values)

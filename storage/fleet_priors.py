@@ -1,4 +1,4 @@
-"""The priors that fleets have taught, by kind of clutch, version, and the clutch that was left out."""
+"""The priors learned from fleets, by kind of clutch, version, and the clutch that was left out."""
 
 from dataclasses import dataclass
 
@@ -72,24 +72,24 @@ def insert(connection: Connection, row: FleetPriorRow) -> None:
 
 def current(connection: Connection, fleet: Json) -> FleetPriorRow | None:
     """The newest version of a kind of clutch, learned from all of them; None before the first."""
-    found = connection.execute(_current, {"of_fleet": _key(fleet)}).first()
-    return None if found is None else _row(found)
+    row = connection.execute(_current, {"of_fleet": _key(fleet)}).first()
+    return None if row is None else _row(row)
 
 
-def without(connection: Connection, row: FleetPriorRow, clutch_id: str) -> FleetPriorRow | None:
+def without(connection: Connection, prior: FleetPriorRow, clutch_id: str) -> FleetPriorRow | None:
     """The same version learned from all but one clutch; None where too few were left."""
-    values = {"of_fleet": _key(row.fleet), "of_version": row.version, "wanted": clutch_id}
-    found = connection.execute(_without, values).first()
-    return None if found is None else _row(found)
+    values = {"of_fleet": _key(prior.fleet), "of_version": prior.version, "wanted": clutch_id}
+    row = connection.execute(_without, values).first()
+    return None if row is None else _row(row)
 
 
 def all_current(connection: Connection) -> list[FleetPriorRow]:
     """The newest version of every kind of clutch."""
-    return [_row(found) for found in connection.execute(_all_current)]
+    return [_row(row) for row in connection.execute(_all_current)]
 
 
 def forget_left_out(connection: Connection, fleet: Json, *, before: int) -> None:
-    """Drop what versions before one said with a clutch left out; what they said of all stays."""
+    """Drop the priors with a clutch left out of all versions before `before`; those learned from all clutches stay."""
     connection.execute(_forget, {"of_fleet": _key(fleet), "before": before})
 
 
@@ -97,8 +97,8 @@ def _key(fleet: Json) -> str:
     return to_text(dict(sorted(fleet.items())))
 
 
-def _row(found: Row[tuple[object, ...]]) -> FleetPriorRow:
-    values = found._asdict()
+def _row(row: Row[tuple[object, ...]]) -> FleetPriorRow:
+    values = row._asdict()
     values["fleet"] = to_object(values["fleet"])
     values["members"] = tuple(to_list(values["members"]))
     values["content"] = to_object(values["content"])

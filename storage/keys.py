@@ -1,4 +1,4 @@
-"""Access keys. Only the hash of a secret is kept; a revoked key stays listed and opens nothing."""
+"""Access keys. Only the hash of a secret is kept; a revoked key stays listed and grants nothing."""
 
 from dataclasses import asdict, dataclass
 
@@ -37,18 +37,18 @@ def insert(connection: Connection, row: KeyRow) -> None:
 
 def by_secret_hash(connection: Connection, secret_sha256: str) -> KeyRow | None:
     """The active key with this hash; None where there is none or it has been revoked."""
-    found = connection.execute(_by_hash, {"wanted": secret_sha256}).first()
-    return None if found is None else KeyRow(**found._asdict())
+    row = connection.execute(_by_hash, {"wanted": secret_sha256}).first()
+    return None if row is None else KeyRow(**row._asdict())
 
 
 def any_active(connection: Connection) -> bool:
-    """Whether any key opens anything: without one the service keeps to the loopback."""
+    """Whether any key is active: without one the service binds to the loopback only."""
     return bool(connection.execute(_any_active).scalar_one())
 
 
 def all_keys(connection: Connection) -> list[KeyRow]:
     """All keys, revoked ones too, oldest first."""
-    return [KeyRow(**found._asdict()) for found in connection.execute(_all)]
+    return [KeyRow(**row._asdict()) for row in connection.execute(_all)]
 
 
 def revoke(connection: Connection, key_id: str, revoked_at: str) -> bool:

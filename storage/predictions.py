@@ -1,4 +1,4 @@
-"""Remaining life as it was said after each run: one row a clutch, method, pressure (Pa; 0 = their mean) and cycles."""
+"""Remaining life as it was predicted after each run: one row a clutch, method, pressure (Pa; 0 = their mean) and cycles."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from storage.tables import prediction
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PredictionRow:
-    """What `method` says at `cycles` of the quantity at `pressure`."""
+    """The prediction of `method` at `cycles` for the quantity at `pressure`."""
 
     cycles: float
     method: str
@@ -59,20 +59,20 @@ def at(
     """The last prediction of a series, or the last one not beyond `at_cycles`; None where there is none."""
     values: dict[str, str | float] = {"of_clutch": clutch_id, "of_method": method, "of_pressure": pressure}
     if at_cycles is None:
-        found = connection.execute(_last, values).first()
+        row = connection.execute(_last, values).first()
     else:
-        found = connection.execute(_last_at, {**values, "at_most": at_cycles}).first()
-    return None if found is None else _row(*found)
+        row = connection.execute(_last_at, {**values, "at_most": at_cycles}).first()
+    return None if row is None else _row(*row)
 
 
 def history(connection: Connection, clutch_id: str, method: str, pressure: float) -> list[PredictionRow]:
     """All predictions of a series, cycles ascending."""
     values = {"of_clutch": clutch_id, "of_method": method, "of_pressure": pressure}
-    return [_row(*found) for found in connection.execute(_history, values)]
+    return [_row(*row) for row in connection.execute(_history, values)]
 
 
 def clear(connection: Connection, clutch_id: str) -> None:
-    """Drop all predictions of a clutch, which are about to be made anew."""
+    """Drop all predictions of a clutch, which are about to be computed again."""
     connection.execute(_clear, {"of_clutch": clutch_id})
 
 

@@ -1,4 +1,4 @@
-"""Runs: what was sent, and the receipt that was answered. Their order is by cycles, then by run_id."""
+"""Runs: the request as it was stored, and the receipt that answered it. Their order is by cycles, then by run_id."""
 
 from dataclasses import dataclass, fields
 
@@ -27,7 +27,7 @@ class NewRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunRow(NewRun):
-    """A stored run; `run_key` is what its channels and fits hang on."""
+    """A stored run; `run_key` is what the rows of its channels and fits refer to."""
 
     run_key: int
 
@@ -35,7 +35,7 @@ class RunRow(NewRun):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunInOrder:
     """As much of a run as tracking needs; a stationary test has the range of its speeds, maintenance its event, a block of
-    duty what it says of itself (in the units it came in)."""
+    duty its load (in the units in which it was sent)."""
 
     run_key: int
     run_id: str
@@ -54,7 +54,7 @@ class RunInOrder:
 
 _insert = sa.insert(run)
 _of_clutch = run.c.clutch_id == bindparam("of_clutch")
-_one = select(run).where(_of_clutch, run.c.run_id == bindparam("wanted"))
+_by_id = select(run).where(_of_clutch, run.c.run_id == bindparam("wanted"))
 _ordered = (
     select(run)
     .where(_of_clutch, or_(bindparam("of_kind").is_(None), run.c.kind == bindparam("of_kind")))
@@ -92,8 +92,8 @@ def insert(connection: Connection, row: NewRun) -> int:
 
 def get(connection: Connection, clutch_id: str, run_id: str) -> RunRow | None:
     """The run, or None."""
-    found = connection.execute(_one, {"of_clutch": clutch_id, "wanted": run_id}).first()
-    return None if found is None else _row(found)
+    row = connection.execute(_by_id, {"of_clutch": clutch_id, "wanted": run_id}).first()
+    return None if row is None else _row(row)
 
 
 def page(
@@ -105,28 +105,28 @@ def page(
     kind: str | None = None,
     fitted: bool = False,
 ) -> list[RunRow]:
-    """Runs of a clutch in order, of one kind or all, at most `limit`; `after` is the last (cycles, run_id) seen.
+    """Runs of a clutch in order, of one kind or all, at most `limit`, behind `after`, the (cycles, run_id) of another.
 
-    `fitted`: those alone through which a curve was fitted.
+    `fitted`: only runs through which a curve was fitted.
     """
     values: dict[str, object] = {"of_clutch": clutch_id, "of_kind": kind, "most": -1 if limit is None else limit}
     query = _ordered.where(_fitted) if fitted else _ordered
     if after is not None:
         query = query.where(_after)
         values |= {"after_cycles": after[0], "after_id": after[1]}
-    return [_row(each) for each in connection.execute(query, values)]
+    return [_row(row) for row in connection.execute(query, values)]
 
 
 def in_order(connection: Connection, clutch_id: str) -> list[RunInOrder]:
     """All runs of a clutch in order, without their receipts."""
-    found = connection.execute(_light, {"of_clutch": clutch_id})
-    return [RunInOrder(**dict(zip(_LIGHT, values, strict=True))) for values in found]
+    rows = connection.execute(_light, {"of_clutch": clutch_id})
+    return [RunInOrder(**dict(zip(_LIGHT, values, strict=True))) for values in rows]
 
 
 def rebuilds(connection: Connection, clutch_id: str) -> list[RunInOrder]:
     """The rebuilds of a clutch in order."""
-    found = connection.execute(_rebuilds, {"of_clutch": clutch_id})
-    return [RunInOrder(**dict(zip(_LIGHT, values, strict=True))) for values in found]
+    rows = connection.execute(_rebuilds, {"of_clutch": clutch_id})
+    return [RunInOrder(**dict(zip(_LIGHT, values, strict=True))) for values in rows]
 
 
 def set_results(connection: Connection, run_key: int, details: Json, receipt: Json, code_version: str) -> None:
@@ -143,8 +143,8 @@ def set_receipt(connection: Connection, run_key: int, receipt: Json) -> None:
         raise LookupError(f"run {run_key} is not stored")
 
 
-def _row(found: Row[tuple[object, ...]]) -> RunRow:
-    values = found._asdict()
+def _row(row: Row[tuple[object, ...]]) -> RunRow:
+    values = row._asdict()
     values["details"] = to_object(values["details"])
     values["receipt"] = to_object(values["receipt"])
     return RunRow(**values)

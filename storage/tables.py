@@ -1,7 +1,7 @@
-"""The tables. Everything that a request asks for is stored; raw channels are kept for ever and bit for bit.
+"""The tables. What a request reads is stored beside what it was computed from; raw channels are kept bit for bit.
 
 Units are SI (pressure in Pa; 0 stands for the mean over the reference pressures), cycles are duty cycles since new,
-times are ISO 8601 text that the caller makes. Columns that hold JSON are text, written by `storage.encoding.json_text`.
+times are ISO 8601 text made by the caller. Columns that hold JSON are text, written by `storage.encoding.json_text`.
 """
 
 from sqlalchemy import (
@@ -33,7 +33,7 @@ clutch = Table(
     Index("clutch_worst_first", "rank", "clutch_id"),
 )
 
-#: `details` holds what only some kinds have (duty, event, note, origin); `receipt` is exactly what was answered.
+#: `details` holds what only some kinds have (duty, event, note, origin); `receipt` is the answer, unchanged.
 run = Table(
     "run",
     metadata,
@@ -142,7 +142,7 @@ adopted_model = Table(
     Column("adopted_at", Text, nullable=False),
 )
 
-#: Mean COF under the adopted model, beside that of the fits, where the model takes an artefact off the measurement.
+#: Mean COF under the adopted model, beside that of the fits, where the model corrects the measurement for an artefact.
 corrected_cof = Table(
     "corrected_cof",
     metadata,
@@ -152,8 +152,8 @@ corrected_cof = Table(
     Column("mean_cof_sd", REAL, nullable=False),
 )
 
-#: What fleets of earlier lives say of the next, by version from 1 on. `fleet` names the kind of clutch (JSON), `left_out`
-#: the clutch that was not learned from, "" where all were; `members` are the clutches that taught it.
+#: Priors learned from fleets of earlier lives, by version from 1 on. `fleet` names the kind of clutch (JSON), `left_out`
+#: the clutch that was not learned from, "" where all were; `members` are the clutches that were learned from.
 fleet_prior = Table(
     "fleet_prior",
     metadata,

@@ -1,4 +1,4 @@
-"""The newest finished diagnosis of each of some clutches, in short: what a list shows of it."""
+"""The newest finished diagnosis of each clutch of a list, in short: its verdict, its causes, whether it is adopted."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -55,14 +55,14 @@ _verdicts = select(
 
 def newest(connection: Connection, clutch_ids: Sequence[str]) -> dict[str, VerdictRow]:
     """clutch_id -> its newest finished diagnosis, where it has one."""
-    found: dict[str, VerdictRow] = {}
+    verdicts: dict[str, VerdictRow] = {}
     for clutch_id, diagnosis_id, life, short, adopted in connection.execute(_verdicts, {"wanted": list(clutch_ids)}):
-        said = to_object(short)
-        found[clutch_id] = VerdictRow(
+        summary = to_object(short)
+        verdicts[clutch_id] = VerdictRow(
             diagnosis_id=diagnosis_id,
             life=life,
-            verdict=said["verdict"],
-            causes=tuple(said["causes"] or ()),
+            verdict=summary["verdict"],
+            causes=tuple(summary["causes"] or ()),
             adopted=bool(adopted),
         )
-    return found
+    return verdicts

@@ -51,7 +51,8 @@ def told() -> Iterator[None]:
 @contextmanager
 def existing(url: str) -> Iterator["Opened"]:
     """An open database that is there already: a mistyped address makes no new one."""
-    from storage.engine.database import open_database, path_of  # most commands open none
+    from storage.engine.connect import path_of  # most commands open no database
+    from storage.engine.database import open_database  # most commands open no database
 
     with told():
         path = path_of(url)

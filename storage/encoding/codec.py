@@ -1,15 +1,15 @@
 """Columns of 64-bit floats as bytes, bit for bit: signed zeros, subnormals and the payload of a NaN survive.
 
-`shuffle-zlib` keeps one column. The eight bytes of every little-endian float are dealt onto eight planes, so that signs
-and exponents, which hardly change from sample to sample, lie together and deflate well; a plane of mere noise (the low
-bytes of a measured mantissa) would cost time and gain nothing, and is kept as it is. In a plane where nothing repeats but
-neighbours only those are looked for, which is twice as fast; what inflates it is the same.
+`shuffle-zlib` stores one column. The eight bytes of every little-endian float go to eight planes, so that signs and
+exponents, which hardly change from sample to sample, lie together and deflate well; a plane of noise (the low bytes of a
+measured mantissa) would cost time and gain nothing, and is stored plain. A plane in which only neighbouring bytes repeat is
+deflated by run lengths alone (Z_RLE), which is twice as fast; the same code inflates it.
 
     crc32 of the rest (4 bytes) | bytes of each plane (8 x 4 bytes) | the planes, least significant byte first
 
 A plane as long as the column is stored plain, a shorter one is deflated.
 
-`pack` keeps several named arrays of any shape, plain: filter states, which are written anew at every run.
+`pack` stores several named arrays of any shape, plain: filter states, which are rewritten at every run.
 
     crc32 of the rest (4 bytes) | bytes of the index (4 bytes) | index, JSON [[name, shape], ...] | the arrays' bytes
 """
@@ -30,10 +30,10 @@ CODEC = "shuffle-zlib"
 _PLANES = 8
 _PLANE_SIZES = struct.Struct("<8I")
 _NUMBER = struct.Struct("<I")
-#: A longer plane is deflated only where its middle 16 KiB shrink below 80 %: less is not worth its time.
+#: A longer plane is deflated only where its middle 16 KiB shrink below 80 %: a smaller gain is not worth the time.
 _PROBE = 1 << 14
 _WORTH_IT = 0.8
-#: Runs of equal bytes alone are looked for where that makes the probe no longer than by this.
+#: A plane is deflated by run lengths alone where that makes the probe longer by no more than this factor.
 _NO_LONGER = 1.02
 
 
@@ -93,7 +93,7 @@ def _little_endian(array: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def append_planes(data: bytearray, planes: NDArray[np.uint8]) -> list[int]:
-    """Put planes [k, n] behind `data`, deflated where that is worth it; the bytes that each one takes."""
+    """Append planes [k, n] to `data`, deflated where that is worth it; returns the bytes that each plane takes."""
     sizes = []
     for plane in planes:
         before = len(data)
@@ -103,7 +103,7 @@ def append_planes(data: bytearray, planes: NDArray[np.uint8]) -> list[int]:
 
 
 def read_planes(body: memoryview, sizes: Sequence[int], length: int) -> NDArray[np.uint8]:
-    """The planes [k, length] that `append_planes` put there, of those sizes. Raises DamagedData."""
+    """The planes [k, length] that `append_planes` wrote, of the given sizes. Raises DamagedData."""
     planes = np.empty((len(sizes), length), dtype=np.uint8)
     start = 0
     for row, size in zip(planes, sizes, strict=True):
@@ -113,7 +113,7 @@ def read_planes(body: memoryview, sizes: Sequence[int], length: int) -> NDArray[
 
 
 def seal(data: bytearray) -> None:
-    """Put the check of what follows into the first four bytes."""
+    """Write the checksum of all bytes from the fifth on into the first four."""
     _NUMBER.pack_into(data, 0, zlib.crc32(memoryview(data)[_NUMBER.size :]))
 
 
@@ -156,7 +156,7 @@ def _sealed(*parts: bytes) -> bytes:
 
 
 def unsealed(data: bytes | bytearray, *, at_least: int) -> memoryview:
-    """What follows the first four bytes, which check it. Raises DamagedData."""
+    """The bytes from the fifth on, checked against the checksum in the first four. Raises DamagedData."""
     if len(data) < _NUMBER.size + at_least:
         raise DamagedData(f"stored numbers are cut off after {len(data)} bytes")
     body = memoryview(data)[_NUMBER.size :]

@@ -1,12 +1,12 @@
-"""Long columns of decimals, as recorders round them, in a third of the bytes: bit for bit all the same.
+"""Long columns of decimals, as recorders round them, bit for bit in a third of the bytes.
 
-`decimal-zlib` keeps a column whose values are all k / 10^d with whole k: d, the first k, and the steps from each k to the
-next, so that slow signals give small numbers. A step s is kept as 2s, or -2s - 1 where it is negative, in four bytes that
-are dealt onto planes as in `codec`. k below 2^53 and 10^d up to 10^15 are exact in 64-bit floats, so k / 10^d is rounded
-once: it is the double nearest to the decimal, and a column of other doubles is none of decimals.
+`decimal-zlib` stores a column whose values are all k / 10^d with whole k: d, the first k, and the steps from each k to the
+next, so that slow signals give small numbers. A step s is stored as 2s, or -2s - 1 where it is negative, in four bytes that
+go to planes as in `codec`. k below 2^53 and 10^d up to 10^15 are exact in 64-bit floats, so k / 10^d is rounded
+once: it is the double nearest to the decimal. A column that holds any other double is not stored this way.
 
     crc32 of the rest (4 bytes) | d (1 byte) | first k (8 bytes) | bytes of each plane (4 x 4 bytes) | the planes |
-    rows that are minus zero, which no k tells (4 bytes each)
+    rows that are minus zero, which k does not distinguish from zero (4 bytes each)
 """
 
 import struct
@@ -19,22 +19,20 @@ from storage.engine.errors import DamagedData
 
 DECIMAL_CODEC = "decimal-zlib"
 
-#: Shorter columns gain nothing worth having.
-_LONG = 1 << 12
+#: Shorter columns gain too little to be stored this way.
+LONG = 1 << 12
 _MOST_DECIMALS = 15
 _LARGEST_STEP = 1 << 30
-#: Values that are looked at first, and at a time.
+#: Values probed first, and encoded at a time.
 _PROBED, _PIECE = 64, 1 << 14
-_CHECK = 4
+_CHECKSUM_SIZE = 4
 _HEAD = struct.Struct("<Bq4I")
 _PLANES = 4
 
 
 def encode_decimals(column: NDArray[np.float64]) -> bytearray | None:
-    """A column [n] as bytes, to be read back by `decode_decimals`; None where it is short or none of decimals."""
-    if column.size < _LONG:
-        return None
-    probe = column[:: column.size // _PROBED]
+    """A column [n] as bytes, to be read back by `decode_decimals`; None where it does not hold decimals."""
+    probe = column[:: max(1, column.size // _PROBED)]
     decimals = next((d for d in range(_MOST_DECIMALS + 1) if _whole(probe, d) is not None), None)
     head = None if decimals is None else _whole(column[:1], decimals)
     if decimals is None or head is None:
@@ -50,10 +48,10 @@ def encode_decimals(column: NDArray[np.float64]) -> bytearray | None:
         folded[start : start + _PIECE] = (steps << 1) ^ (steps >> 63)
         last = whole[-1:]
     minus = np.flatnonzero((column == 0) & np.signbit(column))
-    data = bytearray(_CHECK + _HEAD.size)
+    data = bytearray(_CHECKSUM_SIZE + _HEAD.size)
     sizes = append_planes(data, folded.view(np.uint8).reshape(-1, _PLANES).T)
     data += minus.astype("<u4").tobytes()
-    _HEAD.pack_into(data, _CHECK, decimals, int(head[0]), *sizes)
+    _HEAD.pack_into(data, _CHECKSUM_SIZE, decimals, int(head[0]), *sizes)
     seal(data)
     return data
 

@@ -1,26 +1,19 @@
-"""JSON in text columns: compact, and nothing in it that JSON cannot carry."""
+"""JSON in text columns: compact, and without NaN or infinities.
+
+The library's functions under the types that the tables need: nothing of our own runs at every row.
+"""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 Json: TypeAlias = dict[str, Any]
 
-_encode = json.JSONEncoder(allow_nan=False, ensure_ascii=False, separators=(",", ":")).encode
-
-
-def to_text(value: Mapping[str, Any] | Sequence[Any]) -> str:
-    """Compact JSON text. Raises ValueError on NaN or an infinity, TypeError on what is no JSON value."""
-    return _encode(value)
-
-
-def to_object(text: str) -> Json:
-    """The object that `to_text` wrote."""
-    value: Json = json.loads(text)
-    return value
-
-
-def to_list(text: str) -> list[Any]:
-    """The list that `to_text` wrote."""
-    value: list[Any] = json.loads(text)
-    return value
+#: Compact JSON text. Raises ValueError on NaN or an infinity, TypeError on a value that JSON does not have.
+to_text: Callable[[Mapping[str, Any] | Sequence[Any]], str] = json.JSONEncoder(
+    allow_nan=False, ensure_ascii=False, separators=(",", ":")
+).encode
+#: The object that `to_text` wrote.
+to_object: Callable[[str], Json] = json.loads
+#: The list that `to_text` wrote.
+to_list: Callable[[str], list[Any]] = json.loads

@@ -4,8 +4,6 @@ The low byte of a result code is its class. Source: https://www.sqlite.org/resco
 """
 
 import sqlite3
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from sqlalchemy.exc import DBAPIError
@@ -25,29 +23,21 @@ _UNAVAILABLE = {
 }
 
 
-def translate(error: sqlite3.Error, path: Path) -> StorageError | None:
-    """The store's own error for a driver's, or None where it is a mistake of the program (a constraint, bad SQL)."""
-    code = getattr(error, "sqlite_errorcode", None)
+#: Everything that driver and pool raise.
+DRIVER_ERRORS = (PoolTimeoutError, DBAPIError, sqlite3.Error)
+
+
+def store_error(error: Exception, path: Path) -> StorageError | None:
+    """The store's own error for one of DRIVER_ERRORS, or None where it is the program's (a constraint, bad SQL)."""
+    if isinstance(error, PoolTimeoutError):
+        return DatabaseBusy(f"{path}: no free connection ({error})")
+    origin = error.orig if isinstance(error, DBAPIError) else error
+    code = getattr(origin, "sqlite_errorcode", None)
     if code is None:
         return None
     primary = code & 0xFF
     if primary in _BUSY:
-        return DatabaseBusy(f"{path}: {_BUSY[primary]} ({error})")
+        return DatabaseBusy(f"{path}: {_BUSY[primary]} ({origin})")
     if primary in _UNAVAILABLE:
-        return StorageUnavailable(f"{path}: {_UNAVAILABLE[primary]} ({error})")
+        return StorageUnavailable(f"{path}: {_UNAVAILABLE[primary]} ({origin})")
     return None
-
-
-@contextmanager
-def translated(path: Path) -> Iterator[None]:
-    """Raise the store's own errors, naming the file, for what driver and pool raise inside; all else passes."""
-    try:
-        yield
-    except PoolTimeoutError as error:
-        raise DatabaseBusy(f"{path}: no free connection ({error})") from error
-    except (DBAPIError, sqlite3.Error) as error:
-        origin = error.orig if isinstance(error, DBAPIError) else error
-        own = translate(origin, path) if isinstance(origin, sqlite3.Error) else None
-        if own is None:
-            raise
-        raise own from error

@@ -1,4 +1,4 @@
-# ruff: noqa: N818 - the names say what is the matter
+# ruff: noqa: N818 - the names say what is wrong
 """What can go wrong with the store, as the rest of the program sees it, under one base class. Loads no driver."""
 
 
@@ -7,7 +7,7 @@ class StorageError(Exception):
 
 
 class DatabaseBusy(StorageError):
-    """Another writer held the lock for longer than the store waits: nothing was written, the same again may succeed."""
+    """Another writer held the lock for longer than the store waits: nothing was written, a repeat may succeed."""
 
 
 class StorageUnavailable(StorageError):

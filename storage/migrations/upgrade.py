@@ -14,8 +14,6 @@ from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import Connection
 
-from storage.engine.errors import DatabaseTooNew
-
 # Alembic keeps the step that it runs in module globals: one at a time in a process.
 _one_at_a_time = threading.Lock()
 
@@ -37,23 +35,23 @@ def head() -> str:
     return revision
 
 
+@cache
+def revisions() -> frozenset[str]:
+    """All revisions that this code can bring to the head."""
+    return frozenset(step.revision for step in ScriptDirectory.from_config(_config()).walk_revisions())
+
+
 def current(connection: Connection) -> str | None:
     """The revision that the database is at; None where it is empty."""
     return MigrationContext.configure(connection).get_current_revision()
 
 
 def upgrade(connection: Connection) -> None:
-    """Run the steps that are missing, without committing. The transaction must have been begun as a writing one.
+    """Run the missing steps, without committing, on a database that is empty or at one of `revisions()`.
 
-    Raises DatabaseTooNew where the database is at a revision that this code does not know.
+    The transaction must have been begun as a writing one.
     """
     with _one_at_a_time:
         config = _config()
-        known = {step.revision for step in ScriptDirectory.from_config(config).walk_revisions()}
-        at = current(connection)
-        if at is not None and at not in known:
-            raise DatabaseTooNew(
-                f"the database is at revision {at}, this release knows up to {head()}: use a newer one"
-            )
         config.attributes["connection"] = connection
         command.upgrade(config, "head")

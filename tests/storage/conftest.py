@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from storage.engine import database as database_module
+from storage.engine import connect
 from storage.engine.database import Database, open_database
 
 
@@ -20,5 +20,5 @@ def database(tmp_path: Path) -> Iterator[Database]:
 def journal_mode(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     """Both modes are exercised whatever SQLite this is; the bug that forbids WAL is a rare race."""
     mode: str = request.param
-    monkeypatch.setattr(database_module, "preferred_journal_mode", lambda _: mode)
+    monkeypatch.setattr(connect, "preferred_journal_mode", lambda _: mode)
     return mode

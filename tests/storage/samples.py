@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection
 
-from storage import channels, clutches, runs
+from storage import channels, clutches, diagnoses, runs
 from storage.clutches import ClutchRow
+from storage.diagnoses import NewDiagnosis
+from storage.engine.database import Database
 from storage.fits import FitRow
 from storage.runs import NewRun
 
@@ -41,6 +43,19 @@ def new_run(number: int = 0, *, clutch_id: str = "bench3-017", cycles: float | N
         content_sha256=f"{number:064x}",
         details={"origin": "file", "duty": None},
         receipt={"run_id": f"run-{number:04d}", "mean_cof": 0.1 + 0.2},
+        code_version="0.1.0",
+    )
+
+
+def new_diagnosis(number: int, *, last_run_key: int = 1) -> NewDiagnosis:
+    return NewDiagnosis(
+        clutch_id="bench3-017",
+        diagnosis_id=f"d{number}",
+        created_at="2026-11-02T10:00:00+00:00",
+        revision=3,
+        last_run_key=last_run_key,
+        life="",
+        as_of_cycles=None if number % 2 else 1000.0,
         code_version="0.1.0",
     )
 
@@ -81,6 +96,16 @@ def store_run(connection: Connection, number: int, *, length: int = 40) -> int:
     return run_key
 
 
+def store_diagnoses(database: Database) -> Database:
+    """A clutch with one run and three running diagnoses, d0 to d2."""
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+        store_run(connection, 1)
+        for number in range(3):
+            diagnoses.insert(connection, new_diagnosis(number))
+    return database
+
+
 @contextmanager
 def child(script: str, *arguments: object) -> Iterator[tuple["subprocess.Popen[str]", IO[str], IO[str]]]:
     """A process that runs `script`, what it reads and what it says; killed at the end at the latest."""
@@ -98,5 +123,5 @@ def child(script: str, *arguments: object) -> Iterator[tuple["subprocess.Popen[s
 def integrity(path: Path) -> list[str]:
     """What SQLite itself finds wrong with a file: `["ok"]` where nothing."""
     with closing(sqlite3.connect(path)) as connection:
-        found = [row[0] for row in connection.execute("PRAGMA integrity_check")]
-        return found + [str(row) for row in connection.execute("PRAGMA foreign_key_check")]
+        problems = [row[0] for row in connection.execute("PRAGMA integrity_check")]
+        return problems + [str(row) for row in connection.execute("PRAGMA foreign_key_check")]

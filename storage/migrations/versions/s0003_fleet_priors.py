@@ -1,4 +1,4 @@
-"""What fleets of earlier lives say of the next clutch."""
+"""Priors learned from fleets of earlier lives."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -8,8 +8,8 @@ down_revision: str | None = "s0002_diagnoses"
 
 
 def upgrade() -> None:
-    """Make the table; filter states are dropped, for the next run makes them anew, and what the exact filter said, for it is
-    worked out when asked."""
+    """Make the table. Filter states are dropped: the next run computes them again. So are the exact filter's predictions:
+    they are computed when requested."""
     op.create_table(
         "fleet_prior",
         sa.Column("fleet", sa.Text, primary_key=True),

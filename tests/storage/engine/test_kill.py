@@ -18,11 +18,12 @@ CLUTCH = "bench3-017"
 #: Kills itself at a named moment of the second run's transaction.
 SUICIDE = """
 import os, signal, sys
+import storage.engine.connect
 import storage.engine.database
 from storage import channels, clutches, runs
 from tests.storage.samples import columns, new_run
 path, mode, moment, length = sys.argv[1], sys.argv[2], sys.argv[3], int(sys.argv[4])
-storage.engine.database.preferred_journal_mode = lambda _: mode
+storage.engine.connect.preferred_journal_mode = lambda _: mode
 database = storage.engine.database.open_database(f"sqlite:///{path}")
 def reached(name):
     if name == moment:
@@ -45,10 +46,11 @@ with database.writing() as connection:
 #: Commits run after run and says so, until it is killed.
 BUSY = """
 import sys
+import storage.engine.connect
 import storage.engine.database
 from tests.storage.samples import store_run
 path, mode = sys.argv[1], sys.argv[2]
-storage.engine.database.preferred_journal_mode = lambda _: mode
+storage.engine.connect.preferred_journal_mode = lambda _: mode
 database = storage.engine.database.open_database(f"sqlite:///{path}")
 for number in range(1, 100_000):
     with database.writing() as connection:

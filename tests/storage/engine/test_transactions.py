@@ -1,5 +1,6 @@
 """Writers queue, readers see one state, and what fails leaves nothing behind."""
 
+import contextlib
 import sqlite3
 import threading
 import time
@@ -19,10 +20,11 @@ CLUTCH = "bench3-017"
 
 WRITER = """
 import sys
+import storage.engine.connect
 import storage.engine.database
 from tests.storage.samples import store_run
 path, mode, first, number = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4])
-storage.engine.database.preferred_journal_mode = lambda _: mode
+storage.engine.connect.preferred_journal_mode = lambda _: mode
 database = storage.engine.database.open_database(f"sqlite:///{path}")
 print("open", flush=True)
 sys.stdin.readline()
@@ -183,3 +185,24 @@ def test_two_processes_lose_nothing(tmp_path: Path, journal_mode: str) -> None:
         assert clutch is not None
         assert clutch.revision == len(runs.in_order(connection, CLUTCH)) == 80
     assert integrity(path) == ["ok"]
+
+
+def test_the_version_changes_with_every_commit_and_with_nothing_else(database: Database) -> None:
+    numbers = [database.version(), database.version()]
+    with database.writing() as connection:
+        connection.exec_driver_sql("CREATE TABLE extra (x)")
+        numbers.append(database.version())  # not committed yet
+    assert len(set(numbers)) == 1
+    numbers.append(database.version())
+    with contextlib.suppress(RuntimeError), database.writing() as connection:
+        connection.exec_driver_sql("INSERT INTO extra VALUES (1)")
+        raise RuntimeError
+    assert database.version() == numbers[-1] != numbers[0]
+    with database.reading() as connection:
+        connection.exec_driver_sql("SELECT * FROM extra").fetchall()
+    assert database.version() == numbers[-1]
+    other = open_database(f"sqlite:///{database.path}")
+    with other.writing() as connection:
+        connection.exec_driver_sql("INSERT INTO extra VALUES (2)")
+    assert database.version() not in numbers
+    other.close()

@@ -5,21 +5,25 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 
 import pytest
+from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 
-from storage import clutches
+from storage import clutches, diagnoses, runs
 from storage.engine.database import Database, open_database
 from storage.engine.errors import DatabaseTooNew, StorageUnavailable
 from storage.migrations import upgrade as migrations
 from storage.tables import metadata
-from tests.storage.samples import child, clutch_row, integrity
+from tests.storage.samples import child, clutch_row, integrity, new_diagnosis, new_run
+
+CLUTCH = "bench3-017"
 
 STARTER = """
 import sys
+import storage.engine.connect
 import storage.engine.database
-storage.engine.database.preferred_journal_mode = lambda _: sys.argv[1]
+storage.engine.connect.preferred_journal_mode = lambda _: sys.argv[1]
 print("loaded", flush=True)
 for line in sys.stdin:
     database = storage.engine.database.open_database(f"sqlite:///{line.strip()}")
@@ -64,6 +68,27 @@ def test_a_second_start_changes_nothing(database: Database) -> None:
     assert database.path.read_bytes() == before
 
 
+def test_an_older_file_is_brought_up_and_keeps_what_it_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "old.db"
+    whole = command.upgrade
+    monkeypatch.setattr(command, "upgrade", lambda config, _: whole(config, "s0001_first_tables"))
+    with closing(open_database(f"sqlite:///{path}")) as old, old.writing() as connection:
+        clutches.insert(connection, clutch_row())
+        runs.insert(connection, new_run(1))
+    monkeypatch.undo()
+    with closing(sqlite3.connect(path)) as connection:
+        names = {row[0] for row in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+        assert "diagnosis" not in names
+        assert connection.execute("SELECT version_num FROM alembic_version").fetchall() == [("s0001_first_tables",)]
+    with closing(open_database(f"sqlite:///{path}")) as new, new.writing() as connection:
+        assert migrations.current(connection) == migrations.head()
+        assert clutches.get(connection, CLUTCH) == clutch_row()
+        assert [row.run_id for row in runs.page(connection, CLUTCH)] == ["run-0001"]
+        diagnoses.insert(connection, new_diagnosis(0))
+        assert diagnoses.running(connection, CLUTCH, 1) == "d0"
+    assert integrity(path) == ["ok"]
+
+
 def test_steps_are_one_line_and_named_after_their_files() -> None:
     steps = list(ScriptDirectory.from_config(migrations._config()).walk_revisions())
     assert [Path(step.path).stem for step in steps] == [step.revision for step in steps]
@@ -99,7 +124,7 @@ def test_a_step_that_breaks_references_is_undone(tmp_path: Path, monkeypatch: py
         connection.exec_driver_sql("INSERT INTO prediction VALUES ('nobody', 'q', 0, 0, '{}', '')")  # type: ignore[attr-defined]
 
     monkeypatch.setattr("storage.engine.database.upgrade", breaking)
-    with pytest.raises(StorageUnavailable, match="refer to nothing"):
+    with pytest.raises(StorageUnavailable, match="refer to missing rows"):
         open_database(f"sqlite:///{tmp_path}/a.db")
     monkeypatch.undo()
     with closing(open_database(f"sqlite:///{tmp_path}/a.db")) as database:

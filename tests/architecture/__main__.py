@@ -1,0 +1,18 @@
+"""`make architecture`: draws docs/architecture.svg and writes the parts of docs/architecture.md that come from the code."""
+
+import sys
+
+from tests.architecture import document, picture
+
+
+def main() -> int:
+    """Write both."""
+    picture.main()
+    text = document.DOCUMENT.read_text(encoding="utf-8")
+    text = document.filled(text, document.written() | document.measured())
+    document.DOCUMENT.write_text(text, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,63 @@
+"""The parts of docs/architecture.md that are written by the code: the ways of the common errands, and the examples.
+
+A part stands between `<!-- name -->` and `<!-- end -->`. `python -m tests.architecture` writes all of them anew.
+"""
+
+import re
+from collections.abc import Iterable
+
+from tests.architecture import examples, rooms
+from tests.architecture.source import CHAPTERS, ROOT, by_name, first_sentence
+
+DOCUMENT = ROOT / "docs" / "architecture.md"
+DIAGNOSIS = "models.diagnosis"
+
+
+def parts(text: str) -> dict[str, str]:
+    """The written parts of a document by name."""
+    found = re.findall(r"<!-- ([a-z-]+) -->\n(.*?)<!-- end -->", text, flags=re.DOTALL)
+    return {name: body.strip("\n") for name, body in found}
+
+
+def filled(text: str, bodies: dict[str, str]) -> str:
+    """The document with these parts written anew; each must be there."""
+    for name, body in bodies.items():
+        start, end = f"<!-- {name} -->\n", "<!-- end -->"
+        before, _, rest = text.partition(start)
+        if not rest:
+            raise ValueError(f"{DOCUMENT.name} must hold the part {start.strip()}")
+        text = f"{before}{start}\n{body}\n\n{end}{rest.partition(end)[2]}"
+    return text
+
+
+def way(paths: Iterable[str]) -> str:
+    """A numbered list of files, each with the first sentence of its docstring."""
+    modules = {module.shown: module for module in by_name().values()}
+    return "\n".join(
+        f"{number}. `{path}`: {first_sentence(modules[path].docstring)}" for number, path in enumerate(paths, start=1)
+    )
+
+
+def paths_of(body: str) -> list[str]:
+    """The files of a list that `way` wrote."""
+    return re.findall(r"^\d+\. `([^`]+)`", body, flags=re.MULTILINE)
+
+
+def chapters() -> str:
+    """The chapters of the diagnosis in reading order, each with its introduction's first sentence."""
+    present = [by_name()[name] for chapter in CHAPTERS if (name := f"{DIAGNOSIS}.{chapter}") in by_name()]
+    return "\n".join(
+        f"{number}. `{(module.path.parent if module.is_package else module.path).relative_to(ROOT).as_posix()}`: "
+        f"{first_sentence(module.docstring) or 'no introduction yet'}"
+        for number, module in enumerate(present, start=1)
+    )
+
+
+def written() -> dict[str, str]:
+    """The parts that need nothing to be run."""
+    return {"chapters": chapters()} | {f"example-{name}": examples.shown(name) for name in examples.NAMES}
+
+
+def measured() -> dict[str, str]:
+    """The parts that are taken down from a running service."""
+    return {"get": way(rooms.of_get()), "post": way(rooms.of_post()), "diagnosis": way(rooms.of_diagnosis())}

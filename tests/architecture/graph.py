@@ -1,0 +1,109 @@
+"""The packages of the product and what imports what, small enough to be drawn: boxes, arrows, rows."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from tests.architecture.source import PACKAGES, Module, by_name, first_sentence, imports, modules
+
+#: Files directly in storage hold the rows of one table each: one box, but for the schema.
+ROWS, SCHEMA = "storage.rows", "storage.tables"
+DIAGNOSIS = "models.diagnosis"
+
+Edges = Mapping[str, frozenset[str]]
+
+
+@dataclass(frozen=True)
+class Box:
+    """A package or a file at the top of one: its dotted name, how many files it holds, which lower packages they import
+    from, and its introduction."""
+
+    name: str
+    files: int
+    lower: tuple[str, ...]
+    introduction: str
+
+
+def package_of(module: str) -> str | None:
+    """The box of the large picture that a module belongs to; None for the three packages themselves."""
+    parts = module.split(".")
+    if parts[0] not in PACKAGES or len(parts) < 2:
+        return None
+    name = ".".join(parts[:2])
+    if parts[0] == "storage" and not by_name()[name].is_package and name != SCHEMA:
+        return ROWS
+    return name
+
+
+def chapter_of(module: str) -> str | None:
+    """The box of the diagnosis' picture that a module belongs to; None outside the diagnosis."""
+    return ".".join(module.split(".")[:3]) if module.startswith(f"{DIAGNOSIS}.") else None
+
+
+def boxes(belongs: Mapping[str, str | None]) -> dict[str, Box]:
+    """The boxes by name; `belongs`: module -> box."""
+    names = sorted({name for name in belongs.values() if name is not None})
+    return {name: _box(name, [module for module in modules() if belongs[module.name] == name]) for name in names}
+
+
+def _box(name: str, members: list[Module]) -> Box:
+    introduced = by_name().get(name)
+    docstring = "The rows of each table, a file a table." if introduced is None else introduced.docstring
+    files, names = sum(not module.is_package for module in members), {module.name for module in members}
+    tops = {statement.imported.split(".")[0] for statement in imports() if statement.importer in names}
+    lower = tuple(package for package in reversed(PACKAGES) if package in tops - {name.split(".")[0]})
+    return Box(name=name, files=files, lower=lower, introduction=first_sentence(docstring))
+
+
+def edges(belongs: Mapping[str, str | None]) -> dict[str, frozenset[str]]:
+    """box -> the boxes of its package that its modules import, itself left out; imports for types too."""
+    targets: dict[str, set[str]] = {name: set() for name in belongs.values() if name is not None}
+    for statement in imports():
+        importer, imported = belongs.get(statement.importer), belongs.get(statement.imported)
+        if importer is None or imported is None or importer == imported:
+            continue
+        if importer.split(".")[0] == imported.split(".")[0]:
+            targets[importer].add(imported)
+    return {name: frozenset(boxes_below) for name, boxes_below in targets.items()}
+
+
+def reachable(graph: Edges, start: str) -> frozenset[str]:
+    """All boxes that a box reaches by one arrow or more."""
+    reached: set[str] = set()
+    waiting = [start]
+    while waiting:
+        for target in graph[waiting.pop()] - reached:
+            reached.add(target)
+            waiting.append(target)
+    return frozenset(reached)
+
+
+def circles(graph: Edges) -> frozenset[tuple[str, str]]:
+    """The arrows that lie on a circle."""
+    reach = {name: reachable(graph, name) for name in graph}
+    return frozenset((name, target) for name, targets in graph.items() for target in targets if name in reach[target])
+
+
+def reduced(graph: Edges) -> dict[str, frozenset[str]]:
+    """The arrows that no longer way implies, circles left out: what is drawn."""
+    round_about = circles(graph)
+    straight = {name: frozenset(t for t in targets if (name, t) not in round_about) for name, targets in graph.items()}
+    reach = {name: reachable(straight, name) for name in straight}
+    return {
+        name: targets - frozenset().union(*(reach[target] for target in targets)) for name, targets in straight.items()
+    }
+
+
+def rows(graph: Edges, names: Iterable[str]) -> list[list[str]]:
+    """The boxes of one layer in rows, each box above all that it imports; a circle is cut at an arrow of it."""
+    chosen = sorted(names)
+    round_about = circles(graph)
+    depth: dict[str, int] = {}
+
+    def depth_of(name: str) -> int:
+        if name not in depth:
+            below = [t for t in graph[name] if t in chosen and (name, t) not in round_about]
+            depth[name] = 1 + max((depth_of(target) for target in below), default=-1)
+        return depth[name]
+
+    deepest = max((depth_of(name) for name in chosen), default=0)
+    return [[name for name in chosen if depth[name] == level] for level in range(deepest, -1, -1)]

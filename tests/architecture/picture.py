@@ -1,0 +1,172 @@
+"""`python -m tests.architecture.picture`: the picture of the code, drawn from its imports, into docs/architecture.svg.
+
+Four bands from the top: service, storage, models, and inside models the chapters of the diagnosis. A box imports only boxes
+below it; an arrow that a longer way implies is left out, and what a box takes from the bands below stands in it. An arrow on
+a circle, which import-linter forbids, is dashed red.
+"""
+
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+from tests.architecture import graph
+from tests.architecture.graph import Box
+from tests.architecture.source import PACKAGES, ROOT, modules
+
+PICTURE = ROOT / "docs" / "architecture.svg"
+
+WIDTH = 1120
+_LEFT, _RIGHT, _BOX, _ROW, _GAP, _BAND = 116, 16, 34, 62, 18, 26
+_LETTER, _SMALL_LETTER, _PADDING = 7.6, 5.6, 16
+#: A row that is wider than the picture is broken.
+_ROOM = WIDTH - _LEFT - _RIGHT
+_STYLE = (
+    ".ground{fill:#fff}.band{fill:#f3f5f8}.box{fill:#fff;stroke:#5b6b80}.name{fill:#1b2430;font-weight:600}"
+    ".files{fill:#5b6b80;font-size:10px}.layer{fill:#1b2430;font-size:14px;font-weight:700}"
+    ".arrow{fill:none;stroke:#7d8da3;stroke-width:1.1}"
+    ".circle{fill:none;stroke:#c2410c;stroke-width:1.4;stroke-dasharray:5 3}.head{fill:#7d8da3}"
+    "@media (prefers-color-scheme:dark){.ground{fill:#10151c}.band{fill:#18202a}.box{fill:#222d3a;stroke:#8fa1b8}"
+    ".name,.layer{fill:#e8edf3}.files{fill:#a9b7c8}.arrow{stroke:#8393a8}.head{fill:#8393a8}}"
+)
+
+Place = tuple[float, float, float]  # left, top, width
+
+
+def draw() -> str:
+    """The picture as SVG text."""
+    packages = {module.name: graph.package_of(module.name) for module in modules()}
+    chapters = {module.name: graph.chapter_of(module.name) for module in modules()}
+    large, inside = graph.edges(packages), graph.edges(chapters)
+    bands = [
+        (package, graph.rows(large, [n for n in large if n.startswith(f"{package}.")]))
+        for package in reversed(PACKAGES)
+    ]
+    bands.append(("the diagnosis", graph.rows(inside, inside)))
+    described = graph.boxes(packages) | graph.boxes(chapters)
+    places, grounds, height = _placed(bands, {**large, **inside}, described)
+    arrows = [*_arrows(large, places), *_arrows(inside, places)]
+    parts = [_band(label, top, tall) for label, top, tall in grounds]
+    parts += arrows
+    parts += [_box(described[name], place) for name, place in places.items()]
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" height="{height}" '
+        f'font-family="Helvetica, Arial, sans-serif" font-size="12"><style>{_STYLE}</style>'
+        f'<defs><marker id="head" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" markerHeight="7" orient="auto">'
+        f'<path class="head" d="M0 0.8L8 4L0 7.2z"/></marker></defs>'
+        f'<rect class="ground" width="{WIDTH}" height="{height}"/>{"".join(parts)}</svg>\n'
+    )
+
+
+def _placed(
+    bands: Sequence[tuple[str, list[list[str]]]], edges: Mapping[str, frozenset[str]], described: Mapping[str, Box]
+) -> tuple[dict[str, Place], list[tuple[str, float, float]], int]:
+    """Where each box stands, and each band's label, top and height; the picture's height."""
+    places: dict[str, Place] = {}
+    grounds = []
+    top = 12.0
+    for label, rows in bands:
+        begun = top
+        top += _BAND / 2
+        for row in _reading_order(rows, edges):
+            for part in _broken([described[name] for name in row]):
+                widths = [_width(box) for box in part]
+                gap = min(3.0 * _GAP, (_ROOM - sum(widths)) / max(1, len(part)))
+                left = _LEFT + (_ROOM - sum(widths) - gap * (len(part) - 1)) / 2
+                for box, width in zip(part, widths, strict=True):
+                    places[box.name] = (left, top, width)
+                    left += width + gap
+                top += _ROW
+        top += _BOX - _ROW + _BAND
+        grounds.append((label, begun, top - begun - _BAND / 2))
+    return places, grounds, round(top)
+
+
+def _reading_order(rows: list[list[str]], edges: Mapping[str, frozenset[str]]) -> list[list[str]]:
+    """Rows whose boxes stand below what imports them, as far as one sweep gets."""
+    middle: dict[str, float] = {}
+    sorted_rows = []
+    for row in rows:
+        importers = {name: [middle[above] for above in middle if name in edges.get(above, ())] for name in row}
+        placed = sorted(
+            row, key=lambda name: (sum(importers[name]) / len(importers[name]) if importers[name] else 0.5, name)
+        )
+        middle |= {name: (index + 0.5) / len(placed) for index, name in enumerate(placed)}
+        sorted_rows.append(placed)
+    return sorted_rows
+
+
+def _broken(row: list[Box]) -> list[list[Box]]:
+    """A row in as many lines as it needs."""
+    lines: list[list[Box]] = [[]]
+    for box in row:
+        if lines[-1] and sum(_width(other) + _GAP for other in (*lines[-1], box)) > _ROOM:
+            lines.append([])
+        lines[-1].append(box)
+    return lines
+
+
+def _label(name: str) -> str:
+    return "rows, a file a table" if name == graph.ROWS else name.split(".")[-1]
+
+
+def _second_line(box: Box) -> str:
+    files = f"{box.files} file{'s' if box.files != 1 else ''}"
+    return f"{files} → {', '.join(box.lower)}" if box.lower else files
+
+
+def _width(box: Box) -> float:
+    return max(len(_label(box.name)) * _LETTER, len(_second_line(box)) * _SMALL_LETTER) + _PADDING
+
+
+def _band(label: str, top: float, height: float) -> str:
+    return (
+        f'<rect class="band" x="8" y="{top:.0f}" width="{WIDTH - 16}" height="{height:.0f}" rx="6"/>'
+        f'<text class="layer" x="20" y="{top + 22:.0f}">{escape(label)}</text>'
+    )
+
+
+def _box(box: Box, place: Place) -> str:
+    left, top, width = place
+    middle = f'x="{left + width / 2:.1f}" text-anchor="middle"'
+    return (
+        f"<g><title>{escape(box.name)}: {escape(box.introduction)}</title>"
+        f'<rect class="box" x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{_BOX}" rx="4"/>'
+        f'<text class="name" {middle} y="{top + 15:.1f}">{escape(_label(box.name))}</text>'
+        f'<text class="files" {middle} y="{top + 28:.1f}">{escape(_second_line(box))}</text></g>'
+    )
+
+
+def _arrows(edges: Mapping[str, frozenset[str]], places: Mapping[str, Place]) -> list[str]:
+    round_about = graph.circles(edges)
+    kept = graph.reduced(edges)
+    drawn = [
+        _arrow(places[name], places[target], "arrow")
+        for name, targets in sorted(kept.items())
+        for target in sorted(targets)
+    ]
+    return drawn + [_arrow(places[name], places[target], "circle") for name, target in sorted(round_about)]
+
+
+def _arrow(start: Place, end: Place, kind: str) -> str:
+    x0, x1 = start[0] + start[2] / 2, end[0] + end[2] / 2
+    y0, y1 = (start[1] + _BOX, end[1]) if end[1] > start[1] else (start[1], end[1] + _BOX)
+    if start[1] == end[1]:
+        y0 = y1 = start[1] + _BOX
+    bend = max(20.0, abs(y1 - y0) * 0.45) * (1 if y1 >= y0 else -1)
+    back = bend if start[1] != end[1] else -bend
+    return (
+        f'<path class="{kind}" marker-end="url(#head)" d="M{x0:.1f} {y0:.1f}C{x0:.1f} {y0 + bend:.1f} '
+        f'{x1:.1f} {y1 - back:.1f} {x1:.1f} {y1:.1f}"/>'
+    )
+
+
+def main(path: Path = PICTURE) -> int:
+    """Draw the picture."""
+    path.write_text(draw(), encoding="utf-8")
+    print(f"{path.relative_to(ROOT)}: {path.stat().st_size} bytes")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

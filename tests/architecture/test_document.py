@@ -1,0 +1,45 @@
+"""docs/architecture.md and its picture are those of the code as it is."""
+
+import pytest
+
+from tests.architecture import document, graph, picture
+from tests.architecture.source import ROOT, none_of
+
+PARTS = document.parts(document.DOCUMENT.read_text(encoding="utf-8"))
+AGAIN = "write it anew: make architecture"
+
+
+def test_the_picture_is_that_of_the_code() -> None:
+    assert picture.PICTURE.read_text(encoding="utf-8") == picture.draw(), AGAIN
+
+
+@pytest.mark.parametrize("name", sorted(document.written()))
+def test_a_part_is_that_of_the_code(name: str) -> None:
+    assert PARTS[name] == document.written()[name].strip("\n"), AGAIN
+
+
+@pytest.mark.parametrize("name", ["get", "post", "diagnosis"])
+def test_every_file_of_a_way_exists(name: str) -> None:
+    paths = document.paths_of(PARTS[name])
+    assert paths
+    none_of([path for path in paths if not (ROOT / path).is_file()], f"files do not exist; {AGAIN}:")
+
+
+def test_every_part_is_written_by_the_code() -> None:
+    assert PARTS.keys() == document.written().keys() | {"get", "post", "diagnosis"}
+
+
+def test_a_part_that_is_missing_is_named() -> None:
+    text = "<!-- get -->\nold\n<!-- end -->\n\n<!-- post -->\n<!-- end -->\n"
+    filled = document.filled(text, {"get": "1. `a.py`: A.", "post": ""})
+    assert document.parts(filled) == {"get": "1. `a.py`: A.", "post": ""}
+    assert document.paths_of(filled) == ["a.py"]
+    with pytest.raises(ValueError, match="must hold the part <!-- chapters -->"):
+        document.filled(text, {"chapters": ""})
+
+
+def test_only_arrows_that_no_longer_way_implies_are_drawn() -> None:
+    edges = {name: frozenset(targets) for name, targets in {"a": "bc", "b": "c", "c": "", "d": "e", "e": "d"}.items()}
+    assert graph.reduced(edges) == {"a": {"b"}, "b": {"c"}, "c": set(), "d": set(), "e": set()}
+    assert graph.circles(edges) == {("d", "e"), ("e", "d")}
+    assert graph.rows(edges, edges) == [["a"], ["b"], ["c", "d", "e"]]

@@ -1,0 +1,101 @@
+"""A folder is a chapter: few files, an introduction, and tests in the folder of the same name."""
+
+import re
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from tests.architecture.source import PACKAGES, ROOT, Module, modules, none_of
+
+MOST_MODULES = 14
+MOST_LINES = 300
+#: One file an effect: these two grow with what is known of clutches.
+CATALOGUES = ("models/diagnosis/effects/catalogued", "models/diagnosis/effects/uncatalogued")
+
+#: An introduction says what goes in, what comes out, and which file of the folder to open first.
+GOES_IN = re.compile(r"\bIn:|\bgo(?:es)? in\b", flags=re.IGNORECASE)
+COMES_OUT = re.compile(r"\bOut:|\bcomes? out\b", flags=re.IGNORECASE)
+OPEN_FIRST = re.compile(r"\bOpen\s+`?([\w./]+?)(?:\.py)?`?[\s,].*?\bfirst\b", flags=re.DOTALL)
+SENTENCE = re.compile(r"[.!?](?:\s|$)")
+
+
+def folders() -> list[Path]:
+    """All folders of the product that hold Python modules or scripts."""
+    files = [path for package in PACKAGES for suffix in ("py", "js") for path in (ROOT / package).rglob(f"*.{suffix}")]
+    return sorted({path.parent for path in files})
+
+
+def test_a_folder_holds_few_modules() -> None:
+    wrong = []
+    for folder in folders():
+        shown = folder.relative_to(ROOT).as_posix()
+        names = [path.name for path in folder.iterdir() if path.suffix in {".py", ".js"} and path.name != "__init__.py"]
+        if len(names) > MOST_MODULES and shown not in CATALOGUES:
+            wrong.append(f"{shown}: {len(names)} modules, at most {MOST_MODULES}")
+    none_of(wrong, "folders with too many modules:")
+
+
+def lacks(introduction: str, files: set[str]) -> list[str]:
+    """What the docstring of a folder with those files lacks, in words; empty where it lacks nothing."""
+    opened = OPEN_FIRST.search(introduction)
+    first = "" if opened is None else opened[1].strip("/").split("/")[0]
+    lacking = [
+        (len(SENTENCE.findall(introduction)) >= 2, "two sentences"),
+        (GOES_IN.search(introduction) is not None, '"In: ..."'),
+        (COMES_OUT.search(introduction) is not None, '"Out: ..."'),
+        (opened is not None, '"Open `file.py` first"'),
+        (opened is None or first in files, f"the file {first!r} that it names"),
+    ]
+    return [description for holds, description in lacking if not holds]
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_a_folder_introduces_itself(package: str) -> None:
+    wrong = []
+    for module in modules():
+        if module.is_package and module.name.split(".")[0] == package:
+            files = {path.stem for path in module.path.parent.iterdir()} - {"__init__"}
+            wrong += [f"{module.shown} lacks {description}" for description in lacks(module.docstring, files)]
+    none_of(wrong, "things lacking in introductions:")
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_an_introduction_is_all_that_a_folder_says(package: str) -> None:
+    """No re-exports, no code: a name has one place."""
+    folder_modules = [module for module in modules() if module.is_package and module.name.split(".")[0] == package]
+    none_of([module.shown for module in folder_modules if len(module.tree.body) > 1], "introductions that hold code:")
+
+
+def test_what_an_introduction_lacks_is_noticed() -> None:
+    files = {"codec", "engine"}
+    whole = "Bytes and arrays.\n\nIn: arrays. Out: bytes. Open `codec.py` first, then the others."
+    assert lacks(whole, files) == []
+    assert lacks("Arrays go in; bytes come out. Open codec.py first: it is short.", files) == []
+    assert lacks("Bytes and arrays.\n\nIn: arrays. Out: bytes. Open `other.py` first.", files) == [
+        "the file 'other' that it names"
+    ]
+    assert len(lacks("", files)) == 4
+
+
+def too_long(module: Module) -> bool:
+    """Whether a module is more than a reader holds in mind."""
+    return module.text.count("\n") >= MOST_LINES
+
+
+def test_a_module_is_short() -> None:
+    long = [f"{module.shown}: {module.text.count(chr(10))} lines" for module in modules() if too_long(module)]
+    scripts = [path for package in PACKAGES for path in (ROOT / package).rglob("*.js")]
+    long += [
+        str(path.relative_to(ROOT)) for path in scripts if path.read_text(encoding="utf-8").count("\n") >= MOST_LINES
+    ]
+    none_of(long, f"files that are not under {MOST_LINES} lines:")
+
+
+def test_tests_stand_where_their_subject_stands() -> None:
+    """tests/<folder>/test_x.py tests what is in <folder>; the dashboard is tested in a browser, by journeys."""
+    tests = [path for package in PACKAGES for path in (ROOT / "tests" / package).rglob("test_*.py")]
+    subjects = Counter(path.parent.relative_to(ROOT / "tests") for path in tests)
+    none_of(
+        [str(subject) for subject in subjects if not (ROOT / subject).is_dir()], "folders of tests without a subject:"
+    )

@@ -1,0 +1,41 @@
+"""Plain words: what an engineer would have to look up or read twice is written nowhere."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.architecture.source import PACKAGES, ROOT, none_of
+
+QUAINT = re.compile(r"foretell|foretold|reckon|\bstrangers?\b|spoiled|swallowed", flags=re.IGNORECASE)
+TEXT = {".py", ".js", ".css", ".html", ".md", ".svg", ".toml"}
+
+
+def texts(place: str) -> list[Path]:
+    """The text files of a folder, or the file itself."""
+    path = ROOT / place
+    return [path] if path.is_file() else sorted(file for file in path.rglob("*") if file.suffix in TEXT)
+
+
+@pytest.mark.parametrize("place", [*PACKAGES, "docs", "README.md"])
+def test_no_quaint_word(place: str) -> None:
+    wrong = [
+        f"{path.relative_to(ROOT)}:{number}: {match[0]}"
+        for path in texts(place)
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
+        for match in QUAINT.finditer(line)
+    ]
+    none_of(wrong, "quaint words:")
+
+
+def test_the_words_are_noticed_in_names_and_sentences() -> None:
+    for text in (
+        "foretold_torque",
+        "It is foretelling.",
+        "Reckoned by hand",
+        "of a stranger.",
+        "spoiled_run",
+        "swallowed",
+    ):
+        assert QUAINT.search(text), text
+    assert not QUAINT.search("predicted, computed, an outlying run")

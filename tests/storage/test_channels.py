@@ -1,0 +1,69 @@
+"""The raw channels of runs: each function against a real file."""
+
+import numpy as np
+import pytest
+from sqlalchemy.exc import IntegrityError
+
+from storage import channels, clutches, runs
+from storage.encoding.decimals import LONG
+from storage.engine.database import Database
+from storage.engine.errors import DamagedData
+from tests.storage.samples import clutch_row, columns, new_run
+
+CLUTCH = "bench3-017"
+
+
+def test_channels_keep_their_order_and_their_bits(database: Database) -> None:
+    sent = {"time_s": np.array([0.0, -0.0, 5e-324, 1e308]), **columns(1, 5000), "empty": np.zeros(0)}
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+        key, bare = (runs.insert(connection, new_run(number)) for number in range(2))
+        channels.write(connection, key, channels.encoded(sent))
+        channels.write(connection, bare, channels.encoded({}))
+    with database.reading() as connection:
+        back = channels.read(connection, key)
+        assert list(back) == list(sent)
+        assert all(back[name].tobytes() == column.tobytes() for name, column in sent.items())
+        assert channels.read(connection, bare) == {}
+
+
+def test_long_channels_keep_their_order_and_their_bits(database: Database) -> None:
+    sent = columns(7, 50_000) | {"oil_temperature_c": np.zeros(50_000), "time_s": np.arange(50_000) / 1000}
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+        run_key = runs.insert(connection, new_run(0))
+        channels.write(connection, run_key, channels.encoded(sent))
+    with database.reading() as connection:
+        kept = channels.read(connection, run_key)
+        rows = connection.exec_driver_sql("SELECT name, codec FROM channel").fetchall()
+        stored = {name: codec for name, codec in rows}  # noqa: C416  (rows are no pairs to mypy)
+    assert list(kept) == list(sent)
+    assert all(kept[name].tobytes() == column.tobytes() for name, column in sent.items())
+    assert {stored["time_s"], stored["torque_nm"]} == {"decimal-zlib", "shuffle-zlib"}
+
+
+def test_short_channels_are_never_stored_as_decimals() -> None:
+    sent = {"short": np.arange(LONG - 1.0), "long": np.arange(float(LONG))}
+    codecs = [codec for _, codec, _, _ in channels.encoded(sent).columns]
+    assert codecs == ["shuffle-zlib", "decimal-zlib"]
+
+
+def test_channels_belong_to_a_run_and_are_written_once(database: Database) -> None:
+    with pytest.raises(IntegrityError, match="FOREIGN KEY"), database.writing() as connection:
+        channels.write(connection, 7, channels.encoded(columns(1)))
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+        key = runs.insert(connection, new_run())
+        channels.write(connection, key, channels.encoded(columns(1)))
+    with pytest.raises(IntegrityError, match="UNIQUE"), database.writing() as connection:
+        channels.write(connection, key, channels.encoded(columns(2)))
+
+
+def test_a_damaged_channel_is_named(database: Database) -> None:
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+        key = runs.insert(connection, new_run())
+        channels.write(connection, key, channels.encoded(columns(1)))
+        connection.exec_driver_sql("UPDATE channel SET data = substr(data, 1, 50) WHERE name = 'speed_rpm'")
+    with database.reading() as connection, pytest.raises(DamagedData, match=f"channel speed_rpm of run {key}"):
+        channels.read(connection, key)

@@ -1,0 +1,70 @@
+"""Filter states: each function against a real file."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sqlalchemy.exc import IntegrityError
+
+from storage import clutches, filter_states
+from storage.engine.database import Database
+from storage.engine.errors import DamagedData
+from storage.filter_states import FilterStateRow
+from tests.storage.samples import clutch_row
+
+CLUTCH = "bench3-017"
+
+
+@pytest.fixture
+def stocked(database: Database) -> Database:
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+        clutches.insert(connection, clutch_row("other"))
+    return database
+
+
+def state(method: str, pressure: float, runs: int = 8) -> FilterStateRow:
+    rng = np.random.default_rng(runs)
+    arrays = {"weight": rng.random(5), "mean": rng.random((5, 2)), "scatter": np.array(-0.0)}
+    return FilterStateRow(method=method, pressure=pressure, runs=runs, arrays=arrays, code_version="0.1.0")
+
+
+def assert_same(stored: FilterStateRow, expected: FilterStateRow) -> None:
+    assert replace(stored, arrays={}).__repr__() == replace(expected, arrays={}).__repr__()
+    assert list(stored.arrays) == list(expected.arrays)
+    for name, array in expected.arrays.items():
+        assert stored.arrays[name].shape == array.shape
+        assert stored.arrays[name].tobytes() == array.tobytes()
+
+
+def test_filter_states_come_back_are_replaced_and_cleared(stocked: Database) -> None:
+    with stocked.writing() as connection:
+        filter_states.put(connection, CLUTCH, [state("ukf", 0.0), state("grid", 5e5), state("grid", 0.0)])
+        filter_states.put(connection, CLUTCH, [state("grid", 0.0, runs=9)])
+        filter_states.put(connection, CLUTCH, [])
+        filter_states.put(connection, "other", [state("ukf", 0.0)])
+    with stocked.reading() as connection:
+        states = filter_states.get(connection, CLUTCH)
+        assert list(states) == [("grid", 0.0), ("grid", 5e5), ("ukf", 0.0)]
+        assert_same(states["grid", 0.0], state("grid", 0.0, runs=9))
+        assert_same(states["grid", 5e5], state("grid", 5e5))
+    with stocked.writing() as connection:
+        filter_states.clear(connection, CLUTCH)
+        assert filter_states.get(connection, CLUTCH) == {}
+        assert list(filter_states.get(connection, "other")) == [("ukf", 0.0)]
+
+
+def test_a_damaged_state_is_named(stocked: Database) -> None:
+    with stocked.writing() as connection:
+        filter_states.put(connection, CLUTCH, [state("ukf", 5e5)])
+        connection.exec_driver_sql("UPDATE filter_state SET arrays = x'00'")
+    with (
+        stocked.reading() as connection,
+        pytest.raises(DamagedData, match=r"state of ukf at 500000 Pa of clutch 'bench3"),
+    ):
+        filter_states.get(connection, CLUTCH)
+
+
+def test_states_belong_to_a_clutch(database: Database) -> None:
+    with pytest.raises(IntegrityError, match="FOREIGN KEY"), database.writing() as connection:
+        filter_states.put(connection, "nobody", [state("ukf", 0.0)])
