@@ -140,9 +140,9 @@ def severity_map(severity: Severity, blocks: Sequence[Block]) -> SeverityMap:
         for _, work in pieces
     ]
     lengths = np.array([length for length, _ in pieces])
-    told = np.array([rate is not None for rate in rates])
+    stated = np.array([rate is not None for rate in rates])
     filled = np.array([math.nan if rate is None else rate for rate in rates])
-    filled[~told] = np.average(filled[told], weights=lengths[told])
+    filled[~stated] = np.average(filled[stated], weights=lengths[stated])
     return SeverityMap(
         cycles=np.concatenate([[0.0], np.cumsum(lengths)]),
         zeta=np.concatenate([[0.0], np.cumsum(lengths * filled)]),

@@ -120,20 +120,20 @@ def engage(
         torque = clutch_torque(time, speed)
         return [(drive.torque(speed) - torque) / drive.inertia, torque * speed]
 
-    def standing(_time: float, state: FloatArray) -> float:
+    def stopped(_time: float, state: FloatArray) -> float:
         return float(state[0]) - 1e-3 * drive.speed
 
-    standing.terminal = True  # type: ignore[attr-defined]
+    stopped.terminal = True  # type: ignore[attr-defined]
     start = [drive.speed - drive.drag * drive.speed / drive.gain, 0.0]
-    found = solve_ivp(
-        slowing, (0.0, longest), start, events=standing, dense_output=True, max_step=0.02, rtol=1e-6, atol=1e-6
+    solution = solve_ivp(
+        slowing, (0.0, longest), start, events=stopped, dense_output=True, max_step=0.02, rtol=1e-6, atol=1e-6
     )
-    stops = bool(found.t_events[0].size)
-    end = float(found.t[-1])
+    stops = bool(solution.t_events[0].size)
+    end = float(solution.t[-1])
     after = min(0.5, longest - end) if stops else 0.0
     time = np.arange(0.0, end + after, 1.0 / rate)
-    speed = np.where(time < end, np.maximum(found.sol(np.minimum(time, end))[0], 0.0), 0.0)
-    motor = np.array([drive.torque(each) for each in speed.tolist()])
+    speed = np.where(time < end, np.maximum(solution.sol(np.minimum(time, end))[0], 0.0), 0.0)
+    motor = np.array([drive.torque(w) for w in speed.tolist()])
     turning = np.array([clutch_torque(t, w) for t, w in zip(time.tolist(), speed.tolist(), strict=True)])
     return Engagement(
         time=time,
@@ -142,5 +142,5 @@ def engage(
         torque=np.where(time < end, turning, motor),
         motor_torque=motor,
         duration=end - profile.contact if stops else None,
-        energy=float(found.y[1, -1]),
+        energy=float(solution.y[1, -1]),
     )

@@ -59,17 +59,17 @@ class Noise:
     shaped: NDArray[np.bool_]
 
 
-def estimate_noise(residual: FloatArray, freedom: FloatArray, known: FloatArray, level: FloatArray) -> Noise:
+def estimate_noise(residual: FloatArray, freedom: FloatArray, given_sd: FloatArray, level: FloatArray) -> Noise:
     """The noise of P curves from the weighted sum of squares [P], degrees of freedom [P] and known deviation [P].
 
     `known` is NaN where it is not given; `level` [P] is the root mean square torque.
     """
-    given, estimable = np.isfinite(known), freedom >= 1
+    given, estimable = np.isfinite(given_sd), freedom >= 1
     spare = np.maximum(freedom, 1.0)
-    known = np.where(given, known, 1.0)
-    inflated = given & estimable & (residual / known**2 > chdtri(spare, 0.01))
+    given_sd = np.where(given, given_sd, 1.0)
+    inflated = given & estimable & (residual / given_sd**2 > chdtri(spare, 0.01))
     estimated = (estimable & ~given) | inflated
-    sd = np.where(estimated, np.sqrt(residual / spare), np.where(given, known, ASSUMED_NOISE * level))
+    sd = np.where(estimated, np.sqrt(residual / spare), np.where(given, given_sd, ASSUMED_NOISE * level))
     return Noise(
         sd=np.maximum(sd, LEAST_NOISE * level),
         widening=np.where(estimated, stdtrit(spare, 0.95) / Z90, 1.0),

@@ -67,14 +67,14 @@ class PressureLaws:
 
 def fit_pressure_laws(fits: Sequence[StribeckFit]) -> PressureLaws | None:
     """The laws over the fits of one test, or None where a parameter is determined at fewer than three pressures."""
-    told = [_determined(fits, index) for index in range(len(PARAMETER_NAMES))]
-    if any(np.unique(pressure).size < FEWEST_PRESSURES for pressure, _, _ in told):
+    determined = [_determined(fits, index) for index in range(len(PARAMETER_NAMES))]
+    if any(np.unique(pressure).size < FEWEST_PRESSURES for pressure, _, _ in determined):
         return None
     return PressureLaws(
-        static_torque=fit_linear(*told[0]),
-        coulomb_ratio=fit_asymptotic(*told[1]),
-        stribeck_velocity=fit_linear(*told[2]),
-        viscous_coefficient=fit_linear(*told[3]),
+        static_torque=fit_linear(*determined[0]),
+        coulomb_ratio=fit_asymptotic(*determined[1]),
+        stribeck_velocity=fit_linear(*determined[2]),
+        viscous_coefficient=fit_linear(*determined[3]),
     )
 
 
@@ -96,8 +96,10 @@ def fit_asymptotic(pressure: FloatArray, value: FloatArray, deviation: FloatArra
 
     def solve(log_decay: float) -> tuple[FloatArray, float]:
         falling = np.exp((least - pressure) / (span * np.exp(log_decay)))
-        found, norm = nnls(np.stack([np.ones_like(pressure), falling], axis=1) / deviation[:, None], value / deviation)
-        return np.asarray(found), float(norm)
+        coefficients, norm = nnls(
+            np.stack([np.ones_like(pressure), falling], axis=1) / deviation[:, None], value / deviation
+        )
+        return np.asarray(coefficients), float(norm)
 
     logs = np.log(_DECAYS)
     best = int(np.argmin([solve(float(log))[1] for log in logs]))

@@ -231,14 +231,14 @@ def minimise(problem: Problem) -> tuple[Profile, Profile]:
             array[:, 0] for array in _bracket(problem, vertex, half[:, 0], np.linspace(-1.0, 1.0, POINTS) ** 3)
         )
     bottom, vertex, _ = _narrow(points, f)
-    found = profile(problem, np.hstack([bottom, vertex, _tie(problem, scan, f.min(axis=1))]))
-    best = found.residual.argmin(axis=1)[:, None]
-    tied = found.residual[:, 2:] <= found.residual.min(axis=1, keepdims=True) + _tolerance(problem)[:, None]
+    candidates = profile(problem, np.hstack([bottom, vertex, _tie(problem, scan, f.min(axis=1))]))
+    best = candidates.residual.argmin(axis=1)[:, None]
+    tied = candidates.residual[:, 2:] <= candidates.residual.min(axis=1, keepdims=True) + _tolerance(problem)[:, None]
     best = np.where(tied, 2, best)
     optimum = Profile(
-        log_velocity=np.take_along_axis(found.log_velocity, best, axis=1),
-        coefficients=np.take_along_axis(found.coefficients, best[..., None], axis=1),
-        residual=np.take_along_axis(found.residual, best, axis=1),
+        log_velocity=np.take_along_axis(candidates.log_velocity, best, axis=1),
+        coefficients=np.take_along_axis(candidates.coefficients, best[..., None], axis=1),
+        residual=np.take_along_axis(candidates.residual, best, axis=1),
     )
     return optimum, scan
 

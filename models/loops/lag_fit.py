@@ -25,8 +25,9 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.friction.stribeck import StribeckParameters, torque
-from models.loops.lag import attractor_torque, squeeze_film_torque
-from models.loops.lag_problem import LagProblem, lag_problem
+from models.loops.attractor import attractor_torque
+from models.loops.lag_problem import LagProblem, make_lag_problem
+from models.loops.squeeze_film import squeeze_film_torque
 from models.records.periods import Cycle
 
 #: Two-sided 90 %.
@@ -112,17 +113,17 @@ def fit_lag(law: Law, cycle: Cycle, phase: FloatArray, measured: FloatArray, cur
     none, first = posed.near_none(scanned[0])
     if first < -AGAINST * none or (best == 0 and first <= NINETY * none):
         slant = _by_curve(lambda moved: _posed(law, cycle, phase, measured, moved).near_none()[1], curve)
-        found = _Estimate(first, none, slant)
-        status = LagStatus.AGAINST if first < -AGAINST * found.sd else LagStatus.UNRESOLVED
-        return _told(posed.problem, torque(posed.problem.speed, curve.parameters), None, found, status)
+        estimate = _Estimate(first, none, slant)
+        status = LagStatus.AGAINST if first < -AGAINST * estimate.sd else LagStatus.UNRESOLVED
+        return _result(posed.problem, torque(posed.problem.speed, curve.parameters), None, estimate, status)
     lag = _refine(posed.problem, posed.course, law.lags, misses, best)
     middle, change = posed.about(lag)
     sd, gain = posed.problem.deviation(middle, change, lag, cycle, law.scaled)
     share = 1 / gain if law.scaled else 1.0
     slant = _by_curve(lambda moved: _posed(law, cycle, phase, measured, moved).stepped(lag), curve)
-    found = _Estimate(lag * share, sd * share, slant)
-    status = LagStatus.DETERMINED if found.lag > NINETY * found.sd else LagStatus.UNRESOLVED
-    return _told(posed.problem, middle, found.lag if status is LagStatus.DETERMINED else None, found, status)
+    estimate = _Estimate(lag * share, sd * share, slant)
+    status = LagStatus.DETERMINED if estimate.lag > NINETY * estimate.sd else LagStatus.UNRESOLVED
+    return _result(posed.problem, middle, estimate.lag if status is LagStatus.DETERMINED else None, estimate, status)
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,18 +195,20 @@ class _Posed:
 
 
 def _posed(law: Law, cycle: Cycle, phase: FloatArray, measured: FloatArray, curve: StribeckParameters) -> _Posed:
-    return _Posed(law=law, problem=lag_problem(cycle, phase, measured, curve), course=_Course(law, cycle, curve))
+    return _Posed(law=law, problem=make_lag_problem(cycle, phase, measured, curve), course=_Course(law, cycle, curve))
 
 
-def _told(problem: LagProblem, course: FloatArray, lag: float | None, found: _Estimate, status: LagStatus) -> LagFit:
+def _result(
+    problem: LagProblem, course: FloatArray, lag: float | None, estimate: _Estimate, status: LagStatus
+) -> LagFit:
     left = problem.without(course)
     gain = problem.gain(left)
     miss = float(np.square(problem.left - gain * left).sum())
     size = problem.measured.size
     return LagFit(
         lag=lag,
-        lag_sd=found.sd,
-        interval=found.interval(),
+        lag_sd=estimate.sd,
+        interval=estimate.interval(),
         gain=gain,
         noise=math.sqrt(miss / max(size - problem.absorbed.shape[1] - 2, 1)),
         log_likelihood=-0.5 * size * math.log(max(miss, 1e-300) / size),
@@ -240,19 +243,19 @@ def _refine(problem: LagProblem, course: _Course, lags: FloatArray, misses: list
     """The minimum about the best of the scan, in log u: three finer scans, each a ninth of the last, and a parabola."""
     low = math.log(lags[max(best - 1, 0)])
     high = math.log(lags[min(best + 1, lags.size - 1)])
-    found = math.log(lags[best])
+    optimum = math.log(lags[best])
     least = misses[best]
     for _ in range(3):
         points = np.linspace(low, high, 9)
         values = np.array([problem.miss(row) for row in course.at(np.exp(points), problem.phase)])
         i = int(np.argmin(values))
         if values[i] <= least:
-            found, least = float(points[i]), float(values[i])
+            optimum, least = float(points[i]), float(values[i])
         width = (high - low) / 8
         if 0 < i < 8:
             left, here, right = values[i - 1 : i + 2]
             bend = left - 2 * here + right
             if bend > 0:
-                found = float(points[i] + 0.5 * width * (left - right) / bend)
-        low, high = found - width, found + width
-    return math.exp(found)
+                optimum = float(points[i] + 0.5 * width * (left - right) / bend)
+        low, high = optimum - width, optimum + width
+    return math.exp(optimum)

@@ -77,8 +77,8 @@ class LagProblem:
         information[1] = information[0, 1], gain**2 * (slope @ slope)
         variance = sd**2 * np.linalg.inv(information + 1e-12 * np.diag(np.diag(information)))
         along = np.array([-lag / gain if scaled else 0.0, 1.0])
-        told = max(float(along @ variance @ along), 0.0)
-        return math.hypot(math.sqrt(told), self._by_phase(slope, course, gain, cycle)), gain
+        along_variance = max(float(along @ variance @ along), 0.0)
+        return math.hypot(math.sqrt(along_variance), self._by_phase(slope, course, gain, cycle)), gain
 
     def _by_phase(self, slope: FloatArray, course: FloatArray, gain: float, cycle: Cycle) -> float:
         """What the speed's own noise adds: a phase that is wrong makes a loop of a curve."""
@@ -111,7 +111,7 @@ def _spread(phase: FloatArray) -> FloatArray:
     return np.asarray(np.mod(phase, 2 * math.pi) + 1e-9 * np.arange(phase.size), dtype=np.float64)
 
 
-def lag_problem(cycle: Cycle, phase: FloatArray, measured: FloatArray, curve: StribeckParameters) -> LagProblem:
+def make_lag_problem(cycle: Cycle, phase: FloatArray, measured: FloatArray, curve: StribeckParameters) -> LagProblem:
     speed = cycle.value(phase)
     highest = float(speed.max())
     rows = speed > LEAST_SPEED * highest

@@ -71,7 +71,7 @@ class Samples:
     outliers: int
 
 
-def loop_area(cycle: Cycle, time: FloatArray, torque: FloatArray) -> Area:
+def measured_area(cycle: Cycle, time: FloatArray, torque: FloatArray) -> Area:
     """Eq. 8 of torque [n] Nm at time [n] s (ascending) over the whole periods of a cycle of sliding velocity in m/s.
 
     The deviation is of the residual noise of torque and speed, and of the scatter from period to period where there are
@@ -96,7 +96,7 @@ def clean_samples(cycle: Cycle, time: FloatArray, torque: FloatArray) -> Samples
 
 
 def area_of(cycle: Cycle, samples: Samples) -> Area:
-    """`loop_area` of samples that are clean already."""
+    """`measured_area` of samples that are clean already."""
     phase, measured = samples.phase, samples.torque
     if phase.size < LEAST_SAMPLES:
         raise ValueError(f"at least {LEAST_SAMPLES} samples must lie in the whole periods, got {phase.size}")

@@ -54,7 +54,7 @@ class FirstPassage:
     current: tuple[float, float]
 
 
-def first_passage(
+def predict_first_passage(
     posterior: Posterior,
     *,
     fraction: float,
@@ -76,8 +76,8 @@ def first_passage(
         raise ValueError(f"horizon must be finite and positive, got {horizon}")
     horizon = max(horizon, as_of)
     passages = ends_of_life(posterior, fraction, offset=offset, horizon=horizon)
-    found = weighted_quantiles(np.minimum(passages, 10.0 * horizon), posterior.weight, quantiles)
-    end = {q: float(x) if x <= horizon else None for q, x in zip(quantiles, found, strict=True)}
+    values = weighted_quantiles(np.minimum(passages, 10.0 * horizon), posterior.weight, quantiles)
+    end = {q: float(x) if x <= horizon else None for q, x in zip(quantiles, values, strict=True)}
     fresh, now = (paths(posterior, np.array([zeta]), offset)[0] for zeta in (0.0, as_of))
     initial = float(posterior.weight @ fresh)
     return FirstPassage(
@@ -101,16 +101,16 @@ def ends_of_life(
     """
     threshold = fraction * posterior.initial
     crossing = general_order.first_passage(threshold, posterior.degradation)
-    found = np.where(posterior.initial <= threshold, 0.0, crossing)
+    passages = np.where(posterior.initial <= threshold, 0.0, crossing)
     beside = posterior.discrepancy
     if offset is None and beside is None:
-        return found
-    walked = np.ones(found.size, dtype=bool) if offset is not None or beside is None else beside.present
+        return passages
+    walked = np.ones(passages.size, dtype=bool) if offset is not None or beside is None else beside.present
     index = np.flatnonzero(walked)
     if index.size:
-        some = posterior.taken(index, posterior.weight[index])
-        found[index] = _along_paths(some, fraction, offset, horizon)
-    return found
+        walked_draws = posterior.taken(index, posterior.weight[index])
+        passages[index] = _along_paths(walked_draws, fraction, offset, horizon)
+    return passages
 
 
 def paths(posterior: Posterior, progress: FloatArray, offset: Offset | None = None) -> FloatArray:
@@ -130,12 +130,12 @@ def bands(
 def _along_paths(posterior: Posterior, fraction: float, offset: Offset | None, horizon: float) -> FloatArray:
     """First passages [n], linear between places; a step of the level or of the offset is a crossing where it is."""
     beside = posterior.discrepancy
-    known = 1.0 if beside is None else beside.span
+    span = 1.0 if beside is None else beside.span
     places = np.unique(
         np.concatenate(
             [
-                np.linspace(0.0, min(known, horizon), BEHIND),
-                np.geomspace(min(known, horizon), horizon, AHEAD),
+                np.linspace(0.0, min(span, horizon), BEHIND),
+                np.geomspace(min(span, horizon), horizon, AHEAD),
                 np.zeros(0) if beside is None else beside.at[beside.at <= horizon],
             ]
         )

@@ -166,15 +166,15 @@ def population(fleet: Sequence[Taught]) -> FleetPrior:
         raise ValueError(f"a fleet needs a clutch with {FEWEST_TESTS} tests or more")
     centre = weak(Measurement(progress=0.0, value=1.0, variance=0.0), falling=True)
     believed = np.array([centre.change_mean, centre.log_scale_mean, centre.log_exponent_mean, centre.log_scatter_mean])
-    found = FleetPrior(
+    learned = FleetPrior(
         clutches=len(fleet),
         mean=believed,
         scale=np.diag([centre.change_sd, centre.log_scale_sd, centre.log_exponent_sd, centre.log_scatter_sd]) ** 2,
         freedom=HYPER_CLUTCHES,
     )
     for _ in range(_ROUNDS):
-        found = _learnt(found, fleet, believed)
-    return found
+        learned = _learnt(learned, fleet, believed)
+    return learned
 
 
 def pooled(first: Posterior, second: Posterior) -> Posterior:
@@ -254,7 +254,7 @@ def _log_evidence_ratio(
     low, high = float(both.min()) - 1.0, float(both.max()) + 1.0
 
     def excess(c: float) -> float:
-        one = logsumexp(log_expit(lean_first - c), b=weight_first)
-        return float(one - logsumexp(log_expit(c - lean_second), b=weight_second))
+        log_first = logsumexp(log_expit(lean_first - c), b=weight_first)
+        return float(log_first - logsumexp(log_expit(c - lean_second), b=weight_second))
 
     return float(brentq(excess, low, high, xtol=1e-6))

@@ -57,7 +57,7 @@ def _pinball(low: float, high: float, under: bool) -> float:
 
 def covered(low: float | None, high: float | None, truth: float | None) -> bool:
     """Whether an interval holds what came; None is beyond the horizon, for a bound as for the truth."""
-    lower, upper, came = (np.inf if each is None else each for each in (low, high, truth))
+    lower, upper, came = (np.inf if bound is None else bound for bound in (low, high, truth))
     return bool(lower <= came <= upper)
 
 
@@ -105,9 +105,9 @@ def prognostic_horizon(
 
     `predicted` are remaining lives at ascending progress `at` <= end. None where not even the last one is.
     """
-    found = None
+    horizon = None
     for progress, remaining in zip(reversed(at), reversed(predicted), strict=True):
         if remaining is None or abs(remaining - (end - progress)) > alpha * end:
             break
-        found = end - progress
-    return found
+        horizon = end - progress
+    return horizon

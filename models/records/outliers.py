@@ -5,12 +5,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from models.arrays import FloatArray
-
-#: A sample further off a fit than this many deviations, and than this share of the largest value, is an outlier.
-OUTLIER = 6.0
-OUTLIER_SHARE = 0.005
-#: Samples whose median a sample is held against.
-NEIGHBOURS = 5
+from models.records.criteria import NEIGHBOURS, OUTLIER, OUTLIER_SHARE
 
 
 def inliers(residual: FloatArray, value: FloatArray) -> NDArray[np.bool_]:

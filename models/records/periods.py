@@ -20,29 +20,31 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from models.arrays import FloatArray
-from models.records.outliers import NEIGHBOURS, OUTLIER, beside, near
+from models.records.criteria import (
+    CORNERS,
+    FOLLOWED,
+    INSIDE,
+    LINGERS,
+    MOST_SWING_SHARE,
+    NEIGHBOURS,
+    OFF_SWING,
+    OUTLIER,
+    PERIODIC,
+    REST_INSIDE,
+    REST_SHARE,
+    SPEED_HARMONICS,
+    STILL_SHARE,
+    SWING_SHARE,
+    TAKEN,
+    WHOLE,
+)
+from models.records.outliers import beside, near
 
-#: Harmonics of the speed.
-SPEED_HARMONICS = 4
-#: A period counts as whole where this share of it was sampled: a fit of harmonics bridges the rest.
-WHOLE = 0.99
-#: A speed that misses its fit by more than this share of its swing (rms) does not swing periodically.
-PERIODIC = 0.15
-#: Standing still for longer than this share of a period, or so many times as long as a sine lingers (standing is within so
-#: much of the swing), before or after, is no part of the swing; away from its ends the lower share of the record holds.
-_REST_SHARE, _REST_INSIDE, _INSIDE = 0.1, 0.02, (0.1, 0.9)
-_LINGERS, _STILL = 1.6, 1e-3
-_SWING_SHARE, _MOST_SHARE = 0.02, 0.05
-#: Where speed at a record's ends is further off the swing than OUTLIER deviations and this share of its amplitude, it does
-#: not swing yet, or no more; ends are cut so many times at most.
-_OFF_SWING, _CUTS = 0.02, 6
+#: Ends that do not swing are cut so many times at most.
+_CUTS = 6
 #: A frequency is known to so much of 1/duration where the first harmonic alone looks for it, and at last.
 _NEAR, _EXACT = 1e-3, 1e-10
-#: Harmonics of motions with corners, tried one after the other while what is missed (rms) is more than such a share of the
-#: swing and falls to this share.
-CORNERS = (8, 16, 32)
-_FOLLOWED, _TAKEN = 0.002, 0.7
-#: They are fitted to so many samples at most, evenly taken.
+#: Harmonics of motions with corners are fitted to so many samples at most, evenly taken.
 _MOST_WITH_CORNERS = 8000
 
 
@@ -151,17 +153,17 @@ def _with_corners(time: FloatArray, value: FloatArray, cycle: Cycle) -> Cycle:
     most = t.size / (3 * max((t[-1] - t[0]) * cycle.frequency, 1.0))
     richer = cycle
     for count in CORNERS:
-        if richer.noise < _FOLLOWED * cycle.amplitude or count > most or t.size < 4 * (2 * count + 2):
+        if richer.noise < FOLLOWED * cycle.amplitude or count > most or t.size < 4 * (2 * count + 2):
             break
         again = _refine(t, y, richer.frequency, count, _EXACT)
-        if isinstance(again, str) or again.noise > _TAKEN * richer.noise:
+        if isinstance(again, str) or again.noise > TAKEN * richer.noise:
             break
         richer = again
     if richer is cycle:
         return cycle
     # a corner at an end may have been taken for no part of the swing
     whole = _without_ends(time, value, richer.frequency, richer.cosine.size)
-    return richer if isinstance(whole, str) or whole.noise > richer.noise / _TAKEN else whole
+    return richer if isinstance(whole, str) or whole.noise > richer.noise / TAKEN else whole
 
 
 def _following(time: FloatArray, value: FloatArray, cycle: Cycle) -> slice:
@@ -169,7 +171,7 @@ def _following(time: FloatArray, value: FloatArray, cycle: Cycle) -> slice:
     residual = value - cycle.value(cycle.phase(time))
     usual = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
     smooth = median_filter(residual, size=min(NEIGHBOURS, residual.size), mode="nearest")
-    off = np.abs(smooth) > max(OUTLIER * usual, _OFF_SWING * cycle.amplitude)
+    off = np.abs(smooth) > max(OUTLIER * usual, OFF_SWING * cycle.amplitude)
     before, after = leading(off), leading(off[::-1])
     return slice(before, off.size - after) if before + after < off.size else slice(0, off.size)
 
@@ -185,17 +187,17 @@ def _without_rest(time: FloatArray, value: FloatArray, period: float) -> slice:
     """Without standing still before and after, where that lasts for a swing of this period [s] at most."""
     smooth = median_filter(value, size=min(3, value.size), mode="nearest")
     swing, noise = float(np.ptp(smooth)), float(np.median(np.abs(value - smooth)))
-    least = min(_SWING_SHARE * swing + 4 * noise, _MOST_SHARE * swing)
+    least = min(SWING_SHARE * swing + 4 * noise, MOST_SWING_SHARE * swing)
     # so long does a sine stay so near an end of its swing, where the record begins or stops there
-    lingers = _LINGERS * math.acos(1 - 2 * least / swing) / (2 * math.pi) if swing > 0 else _REST_SHARE
-    lowest, still = float(smooth.min()), max(4 * noise, _STILL * swing)
+    lingers = LINGERS * math.acos(1 - 2 * least / swing) / (2 * math.pi) if swing > 0 else REST_SHARE
+    lowest, still = float(smooth.min()), max(4 * noise, STILL_SHARE * swing)
 
     def rest(course: FloatArray, passed: FloatArray) -> int:
         """Samples of the course that stand still at its beginning, `passed` [n] s being its clock."""
         off = np.abs(course - course[0])
-        inside = _INSIDE[0] * swing < course[0] - lowest < _INSIDE[1] * swing
+        inside = INSIDE[0] * swing < course[0] - lowest < INSIDE[1] * swing
         moved = np.flatnonzero(off > least)
-        longest = _REST_INSIDE * (time[-1] - time[0]) if inside else min(_REST_SHARE, lingers) * period
+        longest = REST_INSIDE * (time[-1] - time[0]) if inside else min(REST_SHARE, lingers) * period
         if not moved.size or passed[moved[0]] <= longest:
             return 0
         return int(moved[0]) if inside else int(np.flatnonzero(off[: moved[0]] <= still)[-1]) + 1

@@ -89,8 +89,10 @@ class SimulatedClutch:
         lowest = float(PROTOCOL_PRESSURES[0])
 
         def transferred(pressure: float, velocity: float) -> float:
-            known = max(pressure, lowest)
-            return float(torque(np.array(velocity), self.parameters(known, cycles))) * pressure / known
+            curve_pressure = max(pressure, lowest)
+            return (
+                float(torque(np.array(velocity), self.parameters(curve_pressure, cycles))) * pressure / curve_pressure
+            )
 
         return transferred
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.tracking.data import History
+from models.tracking.history import History
 from models.tracking.prior import Prior
 
 #: The deviation of δ at the end of what was measured, as a share of the quantity, and how the probability that there

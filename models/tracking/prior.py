@@ -2,7 +2,7 @@
 
 Independent normals on ξ0, Δ, log φ, log ε and the logarithm of the run-to-run scatter, as plain numbers, so that a
 prior learned from other clutches of the same material can take the place of the weak one; and what is believed of a
-measurement beyond scatter: how often a run is spoiled and by how much, how likely it is that the clutch follows one
+measurement beyond scatter: how often a run is outlying and by how much, how likely it is that the clutch follows one
 eq. 6 at all, and how far an event such as an oil change may shift the level.
 """
 
@@ -19,7 +19,7 @@ from models.tracking.measurement import Measurement
 class Prior:
     """Means and deviations; ξ0, Δ and the scatter in the unit of the quantity, φ in cycles.
 
-    `spoiled_share` of the runs are off by a further normal of deviation `spoiled_size`, `law_share` is the probability
+    `outlying_share` of the runs are off by a further normal of deviation `outlying_size`, `law_share` is the probability
     that there is no discrepancy beside eq. 6, `step_size` the deviation of the level's shift at an event; both sizes
     are shares of `size`. Raises ValueError where a number is not finite, a deviation or size not positive or a share
     not within [0, 1).
@@ -35,8 +35,8 @@ class Prior:
     log_exponent_sd: float
     log_scatter_mean: float
     log_scatter_sd: float
-    spoiled_share: float = 0.05
-    spoiled_size: float = 0.1
+    outlying_share: float = 0.05
+    outlying_size: float = 0.1
     law_share: float = 0.95
     step_size: float = 0.05
 
@@ -47,8 +47,8 @@ class Prior:
                 raise ValueError(f"{field.name} must be finite, got {number}")
             if field.name.endswith(("_sd", "_size")) and number <= 0:
                 raise ValueError(f"{field.name} must be positive, got {number}")
-        if not 0.0 <= self.spoiled_share < 1.0:
-            raise ValueError(f"spoiled_share must lie within [0, 1), got {self.spoiled_share}")
+        if not 0.0 <= self.outlying_share < 1.0:
+            raise ValueError(f"outlying_share must lie within [0, 1), got {self.outlying_share}")
         if not 0.0 < self.law_share <= 1.0:
             raise ValueError(f"law_share must lie within (0, 1], got {self.law_share}")
 

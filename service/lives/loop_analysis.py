@@ -7,8 +7,8 @@ from sqlalchemy import Connection
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
+from models.loops.dynamic_test import Loop, evaluate_loops
 from models.loops.lag_fit import StationaryCurve
-from models.loops.loops import Loop, evaluate_loops
 from service import records
 from service.lives.history import Event, lives
 from service.lives.incoming_run import sampled_record

@@ -10,8 +10,9 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.friction.identification import FitStatus, StribeckFit, fit_curves, mean_torques
 from models.friction.speed_protocol import protocol_speeds
+from models.records.criteria import UNLOADED
 from models.records.plateaus import cut_plateaus
-from models.records.runs import UNLOADED, Plateaus, curves_by_pressure, loaded
+from models.records.runs import Plateaus, curves_by_pressure, loaded
 from service.errors import FieldError, InvalidError
 from service.lives.incoming_run import IncomingRun, SampledChannels, stationary_plateaus
 from service.readers.units import PASCALS_PER_BAR

@@ -1,8 +1,9 @@
 """Whether the last test lies where the tests before it had it: the standardised innovation.
 
 A filter's draws know the last test too. Weighted by one over the probability that each gives to its value, they foretell
-it as the tests before it did; the heavy tail of a run that may be spoiled keeps these weights within bounds. How improbable
-the measured value is under all draws together, each with its own run-to-run scatter and none with a spoiled run, is told in
+it as the tests before it did; the heavy tail of a run that may be outlying keeps these weights within bounds. How
+improbable the measured value is under all draws together, each with its own run-to-run scatter and none with an outlying
+run, is told in
 deviations of a normal: what is not known yet about scatter and coefficients raises no alarm.
 
 Source: A. E. Gelfand, D. K. Dey, H. Chang, Bayesian Statistics 4 (1992) 147-167, for the weights.
@@ -30,13 +31,13 @@ FEWEST_BEFORE = 4
 def innovation(posterior: Posterior, last: Measurement, prior: Prior) -> float:
     """How far the last measurement lies off what those before it foretold, in deviations with its sign.
 
-    `posterior` knows all of them; `prior` says how often a run is spoiled and by how much.
+    `posterior` knows all of them; `prior` says how often a run is outlying and by how much.
     """
     off = last.value - posterior.values(np.array([last.progress]))[0]
     variance = posterior.scatter**2 + last.variance
-    sound = math.log1p(-prior.spoiled_share) + _log_normal(off, variance)
-    spoiled = _log_normal(off, variance + (prior.spoiled_size * prior.size) ** 2)
-    told = sound if prior.spoiled_share == 0.0 else np.logaddexp(sound, math.log(prior.spoiled_share) + spoiled)
+    sound = math.log1p(-prior.outlying_share) + _log_normal(off, variance)
+    outlying = _log_normal(off, variance + (prior.outlying_size * prior.size) ** 2)
+    told = sound if prior.outlying_share == 0.0 else np.logaddexp(sound, math.log(prior.outlying_share) + outlying)
     with np.errstate(divide="ignore"):
         log_weight = np.log(posterior.weight) - told
     log_weight = log_weight - logsumexp(log_weight)

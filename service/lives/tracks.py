@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from models.prognosis.first_passage import HORIZON, Offset, first_passage
+from models.prognosis.first_passage import HORIZON, Offset, predict_first_passage
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.filters.particle import Particle, ParticleState
 from models.tracking.filters.ukf import Ukf, UkfState
@@ -156,7 +156,7 @@ def predict(
     if tracked is None:
         return unknown(basis, cycles, series.pressure, fraction)
     posterior = draws(clutch_id, method, series, basis, tracked)
-    passage = first_passage(
+    passage = predict_first_passage(
         posterior,
         fraction=fraction,
         as_of=float(series.scale.progress(cycles)),

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from models.arrays import FloatArray
-from models.tracking.data import History
 from models.tracking.discrepancy import PAST, drawn
 from models.tracking.filters import lattice
 from models.tracking.filters.lattice import Frame, Kinds
 from models.tracking.filters.outlying_refinement import completed
+from models.tracking.history import History
 from models.tracking.linear_model import Points, conditional, drawn_terms, evidence, pointwise
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
@@ -118,7 +118,7 @@ class Grid:
         initial, change = given.initial + pair[:, 0], given.change + pair[:, 1]
         normals = rng.standard_normal((count, PAST + history.steps.size))
         further = drawn_terms(terms, initial - prior.initial_mean, change, normals)
-        found = Posterior(
+        sample = Posterior(
             weight=weight / weight.sum(),
             initial=initial,
             change=change,
@@ -127,7 +127,7 @@ class Grid:
             scatter=np.exp(points.log_scatter),
             discrepancy=drawn(history, prior, points.size, further, rng),
         )
-        return found if count == size else thinned(found, size, float(offset[6]))
+        return sample if count == size else thinned(sample, size, float(offset[6]))
 
 
 def _blended(mass: FloatArray) -> FloatArray:
@@ -152,10 +152,10 @@ def _placed(laid: Laid, cell: tuple[NDArray[np.intp], ...], uniform: FloatArray)
     log_scatter = _within(frame.log_scatter, kind, level, uniform[:, 0])
     log_exponent = _within(frame.log_exponent, kind, row, uniform[:, 1])
     lower, upper = np.empty(kind.size), np.empty(kind.size)
-    for each in range(frame.lower.shape[0]):
-        here = kind == each
-        lower[here] = np.interp(log_exponent[here], frame.log_exponent[each], frame.lower[each])
-        upper[here] = np.interp(log_exponent[here], frame.log_exponent[each], frame.upper[each])
+    for k in range(frame.lower.shape[0]):
+        here = kind == k
+        lower[here] = np.interp(log_exponent[here], frame.log_exponent[k], frame.lower[k])
+        upper[here] = np.interp(log_exponent[here], frame.log_exponent[k], frame.upper[k])
     nodes = laid.mass.shape[3]
     steps = np.ptp(frame.log_exponent, axis=1) * np.ptp(frame.log_scatter, axis=1)
     log_rate = lower + (upper - lower) * (node + uniform[:, 2] - 0.5) / (nodes - 1)
@@ -164,7 +164,7 @@ def _placed(laid: Laid, cell: tuple[NDArray[np.intp], ...], uniform: FloatArray)
         log_exponent=log_exponent,
         log_scatter=log_scatter,
         size=laid.kinds.size[kind],
-        spoiled=laid.kinds.spoiled[kind].T,
+        outlying=laid.kinds.outlying[kind].T,
     )
     return points, (upper - lower) * steps[kind]
 

@@ -1,4 +1,4 @@
-"""Sets of spoiled runs that the first search overlooked.
+"""Sets of outlying runs that the first search overlooked.
 
 The first lattice is blurred, and a run that lies three deviations off lies less far off a blurred course. Once the lattices
 have closed in nothing is blurred any more: what turning a run would gain is weighed up again at nodes of the leading kinds,
@@ -10,9 +10,9 @@ Apart from its shares of the posterior a set that is overlooked would bias the s
 import numpy as np
 
 from models.arrays import FloatArray
-from models.tracking.data import History
 from models.tracking.filters.lattice import COARSE, Frame, Kinds, joined, log_density, log_masses, shrunk, tabled
-from models.tracking.linear_model import log_spoiled
+from models.tracking.history import History
+from models.tracking.linear_model import log_outlying
 from models.tracking.outlying_runs import MOST, TEMPER, Nodes, gains
 from models.tracking.prior import Prior
 
@@ -22,34 +22,37 @@ LEADING, NODES, WORTH = 3, 32, 3.0
 
 def completed(prior: Prior, history: History, kinds: Kinds, frame: Frame) -> tuple[Kinds, Frame]:
     """The kinds and their lattices, with those of the sets that were overlooked."""
-    if prior.spoiled_share == 0.0 or history.value.size < 2:
+    if prior.outlying_share == 0.0 or history.value.size < 2:
         return kinds, frame
     table = tabled(frame, COARSE[0], history.progress)
     density = log_density(prior, history, kinds, frame, table)
     mass = density + np.log(frame.cells(COARSE[0]))[:, None, :, None]
     mass -= log_masses(density, frame.cells(COARSE[0])).max()
-    known = {_name(size, spoiled) for size, spoiled in zip(kinds.size, kinds.spoiled, strict=True)}
-    found: dict[bytes, tuple[float, int, FloatArray]] = {}
+    laid = {_name(size, outlying) for size, outlying in zip(kinds.size, kinds.outlying, strict=True)}
+    overlooked: dict[bytes, tuple[float, int, FloatArray]] = {}
     for leader in np.argsort(-mass.max(axis=(1, 2, 3)))[:LEADING].tolist():
-        gain = gains(prior, history, kinds.spoiled[leader], _nodes(kinds, frame, table, mass, leader))
+        gain = gains(prior, history, kinds.outlying[leader], _nodes(kinds, frame, table, mass, leader))
         for run in np.flatnonzero(gain > -WORTH).tolist():
-            spoiled = kinds.spoiled[leader].copy()
-            spoiled[run] = 1.0 - spoiled[run]
-            name = _name(kinds.size[leader], spoiled)
-            if name not in known and gain[run] > found.get(name, (-np.inf,))[0]:
-                found[name] = (float(gain[run]), leader, spoiled)
-    if not found:
+            outlying = kinds.outlying[leader].copy()
+            outlying[run] = 1.0 - outlying[run]
+            name = _name(kinds.size[leader], outlying)
+            if name not in laid and gain[run] > overlooked.get(name, (-np.inf,))[0]:
+                overlooked[name] = (float(gain[run]), leader, outlying)
+    if not overlooked:
         return kinds, frame
-    best = sorted(found.values(), key=lambda each: each[0], reverse=True)[:MOST]
-    leaders, spoiled = np.array([leader for _, leader, _ in best]), np.stack([each for _, _, each in best])
-    weight = kinds.log_weight[leaders] - log_spoiled(prior, kinds.spoiled[leaders].T) + log_spoiled(prior, spoiled.T)
-    more, there = Kinds(size=kinds.size[leaders], spoiled=spoiled, log_weight=weight), frame.taken(leaders)
+    best = sorted(overlooked.values(), key=lambda candidate: candidate[0], reverse=True)[:MOST]
+    leaders, outlying = np.array([leader for _, leader, _ in best]), np.stack([runs for _, _, runs in best])
+    weight = (
+        kinds.log_weight[leaders] - log_outlying(prior, kinds.outlying[leaders].T) + log_outlying(prior, outlying.T)
+    )
+    more, there = Kinds(size=kinds.size[leaders], outlying=outlying, log_weight=weight), frame.taken(leaders)
     closer = shrunk(there, log_density(prior, history, more, there, table[leaders]))
     return joined(kinds, more), joined(frame, closer)
 
 
 def _nodes(kinds: Kinds, frame: Frame, table: FloatArray, mass: FloatArray, kind: int) -> Nodes:
-    """NODES nodes of one kind, drawn evenly by a power of their log mass so that what a spoiled run hides is among them."""
+    """NODES nodes of one kind, drawn evenly by a power of their log mass so that what an
+    outlying run hides is among them."""
     cells = mass.shape[2] * mass.shape[3]
     flat = mass[kind].ravel()
     edges = np.cumsum(np.exp(TEMPER * (flat - flat.max())))
@@ -64,5 +67,5 @@ def _nodes(kinds: Kinds, frame: Frame, table: FloatArray, mass: FloatArray, kind
     )
 
 
-def _name(size: float, spoiled: FloatArray) -> bytes:
-    return np.append(spoiled, size).tobytes()
+def _name(size: float, outlying: FloatArray) -> bytes:
+    return np.append(outlying, size).tobytes()

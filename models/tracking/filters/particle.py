@@ -1,6 +1,6 @@
 """A particle filter for eq. 6 that marginalises what is linear and keeps its particles apart.
 
-Particles carry (log φ, log ε, log s), the size q of the discrepancy and, of every run, whether it was spoiled; given
+Particles carry (log φ, log ε, log s), the size q of the discrepancy and, of every run, whether it was outlying; given
 these, all else is linear and integrated out in closed form (Rao-Blackwell). The coefficients do not move, so
 resampling alone would soon leave copies of one particle. After it every particle takes Metropolis-Hastings steps that
 leave the exact marginal posterior over the whole history as it is (iterated batch importance sampling), until nine in
@@ -20,9 +20,9 @@ import numpy as np
 from scipy.special import ndtri
 
 from models.arrays import FloatArray
-from models.tracking.data import History
 from models.tracking.discrepancy import PAST, SIZES, drawn, log_size_weight
 from models.tracking.filters.cloud import Bridge, Cloud, effective, log_target_of, merged, table_of, weights
+from models.tracking.history import History
 from models.tracking.linear_model import conditional, drawn_terms, pointwise
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
@@ -40,6 +40,9 @@ RESIZED, TURNED = 0.25, 0.1
 #: Degrees by which a measurement may be let in, and halvings in the search for each.
 DEGREES, HALVINGS = 30, 20
 
+#: Names of arrays in stored states, where they are not those of the fields: databases of earlier versions stay readable.
+_STORED = {"outlying": "spoiled"}
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParticleState:
@@ -51,7 +54,7 @@ class ParticleState:
 
     def to_arrays(self) -> dict[str, FloatArray]:
         """The state as named arrays; `from_arrays` gives it back exactly."""
-        cloud = {field.name: getattr(self.cloud, field.name) for field in fields(self.cloud)}
+        cloud = {_STORED.get(field.name, field.name): getattr(self.cloud, field.name) for field in fields(self.cloud)}
         return {"prior": self.prior.to_array()} | self.history.to_arrays() | cloud
 
     @classmethod
@@ -60,7 +63,7 @@ class ParticleState:
         return cls(
             prior=Prior.from_array(arrays["prior"]),
             history=History.from_arrays(arrays),
-            cloud=Cloud(**{field.name: arrays[field.name] for field in fields(Cloud)}),
+            cloud=Cloud(**{field.name: arrays[_STORED.get(field.name, field.name)] for field in fields(Cloud)}),
         )
 
 
@@ -85,7 +88,7 @@ class Particle:
         cloud = Cloud(
             points=centre + spread * ndtri(even[:, :3]),
             size=sizes.astype(np.float64),
-            spoiled=np.zeros((self.particles, 0)),
+            outlying=np.zeros((self.particles, 0)),
             log_weight=np.zeros(self.particles),
             log_target=np.zeros(self.particles),
         )
@@ -172,17 +175,17 @@ class Particle:
 def _proposed(cloud: Cloud, shape: FloatArray, rng: np.random.Generator) -> Cloud:
     """A step of every particle, as likely as the step back: in its points always, in its size and its beliefs at
     times."""
-    count, runs = cloud.spoiled.shape
+    count, runs = cloud.outlying.shape
     stride = rng.uniform(0.2, 1.6, size=(count, 1))
     points = cloud.points + stride * rng.standard_normal(cloud.points.shape) @ shape.T
     step = np.where(rng.random(count) < RESIZED, rng.choice([-1.0, 1.0], size=count), 0.0)
     size = cloud.size + step
-    spoiled = cloud.spoiled.copy()
+    outlying = cloud.outlying.copy()
     turned = np.flatnonzero(rng.random(count) < TURNED)
     run = rng.integers(runs, size=turned.size)
-    spoiled[turned, run] = 1.0 - spoiled[turned, run]
+    outlying[turned, run] = 1.0 - outlying[turned, run]
     inside = (size >= 0) & (size < SIZES.size)
-    return replace(cloud, points=points, size=np.where(inside, size, cloud.size), spoiled=spoiled)
+    return replace(cloud, points=points, size=np.where(inside, size, cloud.size), outlying=outlying)
 
 
 def _next_degree(start: FloatArray, gap: FloatArray, degree: float) -> float:

@@ -53,7 +53,7 @@ class Way:
 @dataclass(frozen=True, slots=True)
 class Step:
     """One filter's step: its state, how probable the measurement was, and the squared innovation in deviations, those of
-    a sound and of a spoiled run mixed as the step is."""
+    a sound and of an outlying run mixed as the step is."""
 
     mean: FloatArray
     covariance: FloatArray
@@ -67,9 +67,9 @@ def stepped(prior: Prior, normal: Normal, way: Way) -> Step:
     unit = prior.initial_sd
 
     def moved(point: FloatArray, _: float) -> FloatArray:
-        found = point.copy()
-        found[4] += found[5] * (way.after - way.before) / way.reference
-        return found
+        propagated = point.copy()
+        propagated[4] += propagated[5] * (way.after - way.before) / way.reference
+        return propagated
 
     def expected(point: FloatArray) -> FloatArray:
         initial, at_reference, log_scale, log_exponent, course, _, step = unscaled(prior, point)
@@ -78,7 +78,7 @@ def stepped(prior: Prior, normal: Normal, way: Way) -> Step:
         )
         return np.array([(initial + (at_reference - initial) * share / whole + course + step) / unit])
 
-    further = (prior.spoiled_size * prior.size / unit) ** 2
+    further = (prior.outlying_size * prior.size / unit) ** 2
     scatter = float(normal.scatter[0])
     ukf = UnscentedKalmanFilter(
         dim_x=DIMENSION, dim_z=1, dt=1.0, hx=expected, fx=moved, points=MerweScaledSigmaPoints(**SIGMA)
@@ -89,7 +89,7 @@ def stepped(prior: Prior, normal: Normal, way: Way) -> Step:
     ukf.predict()
     ukf.update(np.array([way.value / unit]))
     off, variance = float(ukf.y[0]), float(ukf.S[0, 0])
-    shares = np.array([1.0 - prior.spoiled_share, prior.spoiled_share])
+    shares = np.array([1.0 - prior.outlying_share, prior.outlying_share])
     variances = np.array([variance, variance + further])
     density = shares * np.exp(-0.5 * np.minimum(off**2 / variances, 1400.0)) / np.sqrt(2.0 * np.pi * variances)
     total = float(density.sum())
@@ -129,24 +129,24 @@ def units(prior: Prior) -> tuple[FloatArray, FloatArray]:
 def scaled(prior: Prior, points: FloatArray) -> FloatArray:
     """Rows of (ξ0, ξ at the reference, log φ, log ε, δ, T δ', step) as states [n, 7]."""
     centre, unit = units(prior)
-    found = points.copy()
-    found[:, 2] -= found[:, 3]
-    return np.asarray((found - centre) / unit)
+    rows = points.copy()
+    rows[:, 2] -= rows[:, 3]
+    return np.asarray((rows - centre) / unit)
 
 
 def unscaled(prior: Prior, state: FloatArray) -> FloatArray:
     """The inverse of `scaled`, for states [..., 7]; what is far out of the domain is taken to lie at its edge."""
     centre, unit = units(prior)
-    found = centre + unit * np.clip(state, -2.0 * DOMAIN, 2.0 * DOMAIN)
-    found[..., 2] += found[..., 3]
-    return np.asarray(found)
+    rows = centre + unit * np.clip(state, -2.0 * DOMAIN, 2.0 * DOMAIN)
+    rows[..., 2] += rows[..., 3]
+    return np.asarray(rows)
 
 
 def scatter_learnt(prior: Prior, scatter: FloatArray, surprise: float, variance: float, sound: float) -> FloatArray:
     """Variance and worth of the scatter after an innovation; `variance` in units of the prior's deviation of ξ0."""
-    known, worth = scatter.tolist()
-    share = known / (variance * prior.initial_sd**2)
-    learnt = known * (1.0 + sound * share * (min(surprise, OUTLIER**2) - 1.0) / (worth + sound))
+    scatter_variance, worth = scatter.tolist()
+    share = scatter_variance / (variance * prior.initial_sd**2)
+    learnt = scatter_variance * (1.0 + sound * share * (min(surprise, OUTLIER**2) - 1.0) / (worth + sound))
     low, high = (math.exp(2.0 * (prior.log_scatter_mean + k * prior.log_scatter_sd)) for k in (-DOMAIN, DOMAIN))
     return np.array([min(max(learnt, low), high), worth + sound])
 

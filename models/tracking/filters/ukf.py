@@ -10,7 +10,7 @@ So the first measurements are taken together, and the normals that have the mean
 posterior, one for each size, are where the filters start. They start so again when the innovations say that they are
 lost, when progress has doubled (the law bends, and the reference moves along), or when a run comes out of order.
 
-A run may be spoiled: each update is that of a sound run and of a spoiled one, mixed by how probable either is. The
+A run may be outlying: each update is that of a sound run and of an outlying one, mixed by how probable either is. The
 scatter between runs is learnt from the innovations: of an innovation with y²/S = κ, the share g = s²/S is scatter, and
 E[e²] = s² (1 + g (κ - 1)) is averaged into s² with the weight of one observation (the step of an
 expectation-maximisation). A normal on a bent ridge is still a rough picture: the other filters are the reference.
@@ -23,10 +23,10 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.degradation.general_order import progress_fraction
-from models.tracking.data import History
 from models.tracking.discrepancy import PAST, SIZES, at_end, drawn
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.filters.sigma_points import DIMENSION, DOMAIN, Normal, Way, definite, scaled, stepped, unscaled
+from models.tracking.history import History
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
@@ -197,7 +197,7 @@ def _started(prior: Prior, history: History) -> UkfState:
         log_weight=np.log(shares[kept] / shares[kept].max()),
         mean=np.stack([mean for mean, _ in moments]),
         covariance=np.stack([covariance for _, covariance in moments]),
-        scatter=np.array([(each, worth) for each in variance]),
+        scatter=np.array([(s_squared, worth) for s_squared in variance]),
     )
 
 

@@ -1,4 +1,4 @@
-"""Dynamic Stribeck tests as a rig would record them, for the tests of loops and lag; made apart from `models.loops.lag`.
+"""Dynamic Stribeck tests as a rig would record them, for the tests of loops and lag; made apart from `models.loops`.
 
 The torque comes from scipy's stiff integrator on the laws as they are written in the paper, over a run-in before the
 record starts; the rest (noise, jitter, lost samples, spikes) is what recorders do.

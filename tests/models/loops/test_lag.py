@@ -7,10 +7,11 @@ import pytest
 
 from models.friction.stribeck import StribeckParameters
 from models.loops import lag_problem
-from models.loops.lag import attractor_area, attractor_torque, film_speed, film_time_at, squeeze_film_torque
+from models.loops.attractor import attractor_area, attractor_torque
+from models.loops.dynamic_test import LoopStatus, evaluate_loops
 from models.loops.lag_fit import ATTRACTOR, NINETY, SQUEEZE_FILM, LagFit, LagStatus, StationaryCurve, fit_lag
 from models.loops.loop_area import Direction, clean_samples
-from models.loops.loops import LoopStatus, evaluate_loops
+from models.loops.squeeze_film import film_speed, film_time_at, squeeze_film_torque
 from models.records.periods import fit_cycle
 from tests.models.loops.dynamic_records import (
     FALLING,

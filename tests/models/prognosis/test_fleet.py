@@ -121,8 +121,8 @@ def test_the_mixture_is_that_of_importance_sampling() -> None:
     prior = fleet(6, 8)
     truth = life(rng, 5000.0)
     seen = [replace(m, variance=(0.003 * m.value) ** 2) for m in measured(truth, 3000.0, 3, rng)]
-    believed = replace(weak(seen[0], falling=True), spoiled_share=0.0, law_share=1.0)
-    learned = replace(prior.prior_for(seen[0]), spoiled_share=0.0, law_share=1.0)
+    believed = replace(weak(seen[0], falling=True), outlying_share=0.0, law_share=1.0)
+    learned = replace(prior.prior_for(seen[0]), outlying_share=0.0, law_share=1.0)
     under = [GRID.posterior(GRID.from_history(each, seen), 4000, rng) for each in (believed, learned)]
     mixed = prior.together(under[0], under[1], seen[0])
     reference = _brute(prior, seen, rng)

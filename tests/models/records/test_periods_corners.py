@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from models.arrays import FloatArray
-from models.records.periods import CORNERS, SPEED_HARMONICS, Cycle, fit_cycle
+from models.records.criteria import CORNERS, SPEED_HARMONICS
+from models.records.periods import Cycle, fit_cycle
 
 RATE, AMPLITUDE = 100.0, 0.5
 

@@ -11,7 +11,7 @@ from models.friction.identification import fit_curves
 from models.friction.pressure_laws import LinearLaw
 from models.friction.speed_protocol import REFERENCE_SPEEDS, RPM
 from models.friction.stribeck import torque
-from models.loops.lag import attractor_torque
+from models.loops.attractor import attractor_torque
 from models.records.plateaus import cut_plateaus
 from models.records.runs import curves_by_pressure
 from models.rig.campaign import end_of_life, simulate, simulated_clutch

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from models.prognosis import first_passage
+from models.prognosis.first_passage import predict_first_passage
 from models.tracking import linear_model
-from models.tracking.data import History
 from models.tracking.discrepancy import log_size_weight
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from models.tracking.filters.sigma_points import scatter_learnt
 from models.tracking.filters.ukf import Ukf
+from models.tracking.history import History
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
 from tests.models.tracking.tracked_series import (
@@ -62,7 +62,7 @@ def test_any_series_leaves_finite_numbers(tracker: Any, state_type: Any, falling
     assert np.isfinite(posterior.values(np.array([0.0, 1e3, 1e6]))).all()
     assert posterior.weight.sum() == pytest.approx(1.0)
     assert min(posterior.scale.min(), posterior.exponent.min(), posterior.scatter.min()) > 0.0
-    first_passage(posterior, fraction=0.5, as_of=measurements[-1].progress)
+    predict_first_passage(posterior, fraction=0.5, as_of=measurements[-1].progress)
     assert isinstance(state, state_type)
 
 
@@ -144,7 +144,7 @@ def test_the_marginal_of_log_scale_against_plain_quadrature() -> None:
         log_exponent=np.full(4_001, -0.36),
         log_scatter=np.full(4_001, -7.8),
         size=np.zeros(4_001),
-        spoiled=np.zeros((len(CAMPAIGN), 4_001)),
+        outlying=np.zeros((len(CAMPAIGN), 4_001)),
     )
     sums, _ = linear_model.pointwise(history, prior, points)
     density = linear_model.evidence(sums, prior) - 0.5 * ((log_scale - prior.log_scale_mean) / prior.log_scale_sd) ** 2
@@ -186,7 +186,7 @@ def test_a_measurement_let_in_by_degrees_still_counts_once() -> None:
     state = followed(Particle(particles=200), PRIOR, measured([0.0, 1e3, 7e3, 15e3], [0.13, 0.115, 0.085, 0.068]))
     placed = state.cloud.placed()
     target = linear_model.evidence(linear_model.pointwise(state.history, PRIOR, placed)[0], PRIOR)
-    target += PRIOR.log_density(*state.cloud.points.T) + linear_model.log_spoiled(PRIOR, placed.spoiled)
+    target += PRIOR.log_density(*state.cloud.points.T) + linear_model.log_outlying(PRIOR, placed.outlying)
     target += log_size_weight(PRIOR)[state.cloud.size.astype(int)]
     np.testing.assert_allclose(state.cloud.log_target, target, rtol=1e-7, atol=1e-7)
 
@@ -239,7 +239,7 @@ def test_the_weak_prior_scales_with_the_quantity() -> None:
     lives = []
     for measurements in (CAMPAIGN, big):
         state = Grid().from_history(weak(measurements[0], falling=True), measurements)
-        passage = first_passage(Grid().posterior(state, 500, np.random.default_rng(3)), fraction=0.5, as_of=0.0)
+        passage = predict_first_passage(Grid().posterior(state, 500, np.random.default_rng(3)), fraction=0.5, as_of=0.0)
         lives.append(passage.end_of_life[0.5])
     assert lives[0] == pytest.approx(lives[1], rel=1e-6)
 
@@ -249,7 +249,7 @@ def test_lives_of_any_length_are_tractable(life: float) -> None:
     """Measured to 90 % of its life, the end is found within 10 %, whatever the length of the life."""
     d = replace(TYPICAL, scale=life / 7.4)
     state = Grid().from_history(PRIOR, series(d, np.linspace(0.0, 0.9, 30) * life, 2e-4))
-    passage = first_passage(
+    passage = predict_first_passage(
         Grid().posterior(state, 1_000, np.random.default_rng(3)), fraction=0.5, as_of=0.9 * life, horizon=1e7
     )
     true_end = d.scale * ((1.0 - 0.067 / 0.1) ** (-1.0 / 0.7) - 1.0)

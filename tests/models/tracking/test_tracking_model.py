@@ -1,4 +1,4 @@
-"""What the filters believe of measurements beyond scatter: spoiled runs, other laws, steps at events."""
+"""What the filters believe of measurements beyond scatter: outlying runs, other laws, steps at events."""
 
 import math
 from dataclasses import replace
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from models.degradation.general_order import Degradation, value
-from models.prognosis import first_passage
+from models.prognosis.first_passage import predict_first_passage
 from models.tracking.filters import grid as grid_module
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
@@ -18,25 +18,25 @@ from models.tracking.prior import Prior, weak
 from tests.models.tracking.tracked_series import FILTERS, NAMES, PRIOR, TYPICAL, followed, series
 
 
-def test_one_spoiled_run_widens_and_does_not_derail() -> None:
+def test_one_outlying_run_widens_and_does_not_derail() -> None:
     """One of the last runs off by 10 %: every filter's median stays within 2 % of what it says without it, while filters
-    that know of no spoiled runs are off by more."""
+    that know of no outlying runs are off by more."""
     long = series(TYPICAL, np.linspace(0.0, 12_000.0, 19), 3e-4)
-    spoiled = [replace(m, value=1.1 * m.value) if i == 17 else m for i, m in enumerate(long)]
+    outlying = [replace(m, value=1.1 * m.value) if i == 17 else m for i, m in enumerate(long)]
 
     def median(tracker: Any, prior: Prior, measurements: list[Measurement]) -> float:
         posterior = tracker.posterior(followed(tracker, prior, measurements), 2_000, np.random.default_rng(1))
-        found = first_passage(posterior, fraction=0.5, as_of=12_000.0).end_of_life[0.5]
+        found = predict_first_passage(posterior, fraction=0.5, as_of=12_000.0).end_of_life[0.5]
         assert found is not None
         return found
 
     for tracker, _ in FILTERS:
         clean = median(tracker, PRIOR, long)
-        assert median(tracker, PRIOR, spoiled) == pytest.approx(clean, rel=0.02)
-    assert median(Grid(), replace(PRIOR, spoiled_share=0.0), spoiled) != pytest.approx(clean, rel=0.04)
+        assert median(tracker, PRIOR, outlying) == pytest.approx(clean, rel=0.02)
+    assert median(Grid(), replace(PRIOR, outlying_share=0.0), outlying) != pytest.approx(clean, rel=0.04)
 
 
-def test_several_spoiled_runs_that_hide_one_another_are_all_found() -> None:
+def test_several_outlying_runs_that_hide_one_another_are_all_found() -> None:
     """Nine of sixty, either way: turning any one of them alone gains nothing."""
     rng = np.random.default_rng(3)
     long = series(TYPICAL, np.linspace(0.0, 14_000.0, 60), 4e-4)
@@ -44,13 +44,13 @@ def test_several_spoiled_runs_that_hide_one_another_are_all_found() -> None:
     off = {index: 1.0 + 0.1 * sign for index, sign in zip(chosen, rng.choice([-1, 1], 9), strict=True)}
     measurements = [replace(m, value=off.get(i, 1.0) * m.value) for i, m in enumerate(long)]
     laid = Grid().laid(Grid().from_history(PRIOR, measurements))
-    probability = np.einsum("k,kt->t", laid.mass.sum(axis=(1, 2, 3)), laid.kinds.spoiled)
+    probability = np.einsum("k,kt->t", laid.mass.sum(axis=(1, 2, 3)), laid.kinds.outlying)
     assert np.flatnonzero(probability > 0.9).tolist() == chosen
     assert np.delete(probability, chosen).max() < 0.5
 
 
-def test_a_run_a_little_off_may_be_spoiled(monkeypatch: pytest.MonkeyPatch) -> None:
-    """60 runs of little scatter, the 56th nearly four deviations off: how probable it is that it was spoiled, by the
+def test_a_run_a_little_off_may_be_outlying(monkeypatch: pytest.MonkeyPatch) -> None:
+    """60 runs of little scatter, the 56th nearly four deviations off: how probable it is that it was outlying, by the
     particles and by the grid, within 0.06. The grid's first search is blurred and knows nothing of it."""
     scatter = 2.5e-4
     plain = series(TYPICAL, np.linspace(0.0, 14_000.0, 60), scatter, seed=5)
@@ -60,11 +60,11 @@ def test_a_run_a_little_off_may_be_spoiled(monkeypatch: pytest.MonkeyPatch) -> N
 
     def probability() -> float:
         laid = Grid().laid(Grid().from_history(PRIOR, measurements))
-        return float(laid.mass.sum(axis=(1, 2, 3)) @ laid.kinds.spoiled[:, 55])
+        return float(laid.mass.sum(axis=(1, 2, 3)) @ laid.kinds.outlying[:, 55])
 
     cloud = followed(Particle(), PRIOR, measurements).cloud
     share = np.exp(cloud.log_weight)
-    expected = float(cloud.spoiled[:, 55] @ share / share.sum())
+    expected = float(cloud.outlying[:, 55] @ share / share.sum())
     found = probability()
     monkeypatch.setattr(grid_module, "completed", lambda prior, history, kinds, frame: (kinds, frame))  # noqa: ARG005
     print(f"particles {expected:.3f}, grid {found:.3f}, without a second look {probability():.3f}")
@@ -83,11 +83,11 @@ def test_a_straight_line_is_no_eq_6_and_the_data_say_so() -> None:
     prior = weak(line[0], falling=True)
     for tracker in (Grid(), Particle(), Ukf()):
         posterior = tracker.posterior(followed(tracker, prior, line), 1_000, np.random.default_rng(2))  # type: ignore[arg-type]
-        found = first_passage(posterior, fraction=0.5, as_of=6_000.0).end_of_life
+        found = predict_first_passage(posterior, fraction=0.5, as_of=6_000.0).end_of_life
         assert found[0.05] is not None
         assert found[0.05] < 10_000.0 < (found[0.95] or math.inf)
     sure = Grid().from_history(replace(prior, law_share=1.0), line)
-    told = first_passage(Grid().posterior(sure, 1_000, np.random.default_rng(2)), fraction=0.5, as_of=6_000.0)
+    told = predict_first_passage(Grid().posterior(sure, 1_000, np.random.default_rng(2)), fraction=0.5, as_of=6_000.0)
     assert told.end_of_life[0.05] is not None
     assert told.end_of_life[0.05] > 10_000.0
 
@@ -102,7 +102,7 @@ def test_after_an_event_the_forecast_widens_and_then_settles(tracker: Any) -> No
 
     def width(measurements: list[Measurement]) -> float:
         posterior = tracker.posterior(followed(tracker, PRIOR, measurements), 2_000, np.random.default_rng(1))
-        ends = first_passage(posterior, fraction=0.5, as_of=measurements[-1].progress).end_of_life
+        ends = predict_first_passage(posterior, fraction=0.5, as_of=measurements[-1].progress).end_of_life
         assert ends[0.05] is not None
         return (ends[0.95] or 1e6) - ends[0.05]
 

@@ -9,8 +9,8 @@ from scipy.stats import multivariate_normal
 
 from models.degradation.general_order import Degradation, value
 from models.tracking import linear_model, sampling
-from models.tracking.data import History
 from models.tracking.discrepancy import smooth
+from models.tracking.history import History
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior, weak
 from tests import dense
@@ -28,7 +28,7 @@ POINTS = linear_model.Points(
     log_exponent=np.array([-0.3, 0.4, -1.0]),
     log_scatter=np.array([-8.0, -6.5, -9.0]),
     size=np.array([0.0, 0.03, 0.1]),
-    spoiled=np.eye(13)[:, [4, 4, 12]] * [0.0, 1.0, 1.0],
+    outlying=np.eye(13)[:, [4, 4, 12]] * [0.0, 1.0, 1.0],
 )
 #: The last four runs come after an event.
 EPOCHS = [replace(each, epoch=int(index > 8)) for index, each in enumerate(CAMPAIGN)]
@@ -72,16 +72,16 @@ def test_the_table_and_the_points_are_one_sum() -> None:
     history = History.of(EPOCHS, PRIOR)
     table = linear_model.basis(history.progress[:, None], POINTS.log_scale, POINTS.log_exponent)
     levels = np.array([-8.0, -7.0])
-    kinds, spoiled = np.array([0.0, 0.03]), np.eye(13)[:, [0, 5]]
+    kinds, outlying = np.array([0.0, 0.03]), np.eye(13)[:, [0, 5]]
     tabled = linear_model.evidence(
-        linear_model.tabulated(history, PRIOR, table, np.stack([levels, levels]), kinds, spoiled), PRIOR
+        linear_model.tabulated(history, PRIOR, table, np.stack([levels, levels]), kinds, outlying), PRIOR
     )
     for kind, level in np.ndindex(2, 2):
         points = replace(
             POINTS,
             log_scatter=np.full(3, levels[level]),
             size=np.full(3, kinds[kind]),
-            spoiled=np.repeat(spoiled[:, kind : kind + 1], 3, axis=1),
+            outlying=np.repeat(outlying[:, kind : kind + 1], 3, axis=1),
         )
         pointed = linear_model.evidence(linear_model.pointwise(history, PRIOR, points)[0], PRIOR)
         np.testing.assert_allclose(tabled[kind, level], pointed, rtol=1e-9)
@@ -96,7 +96,7 @@ def test_drawn_terms_have_the_posterior_of_the_discrepancy() -> None:
         log_exponent=np.full(count, 0.4),
         log_scatter=np.full(count, -6.5),
         size=np.full(count, 0.03),
-        spoiled=np.repeat(POINTS.spoiled[:, 1:2], count, axis=1),
+        outlying=np.repeat(POINTS.outlying[:, 1:2], count, axis=1),
     )
     sums, terms = linear_model.pointwise(history, PRIOR, points)
     given = linear_model.conditional(sums, PRIOR)
@@ -129,8 +129,8 @@ def test_a_prior_survives_its_array_and_checks_itself() -> None:
         replace(PRIOR, change_sd=0.0)
     with pytest.raises(ValueError, match="initial_mean must be finite"):
         replace(PRIOR, initial_mean=math.nan)
-    with pytest.raises(ValueError, match="spoiled_share must lie within"):
-        replace(PRIOR, spoiled_share=1.0)
+    with pytest.raises(ValueError, match="outlying_share must lie within"):
+        replace(PRIOR, outlying_share=1.0)
     with pytest.raises(ValueError, match="law_share must lie within"):
         replace(PRIOR, law_share=0.0)
 

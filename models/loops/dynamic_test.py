@@ -2,8 +2,8 @@
 
 A record holds several pressures one after another, each with one period and a half or more of a swinging speed. The last
 whole periods of each give the loop area of eq. 8 (`loops.loop_area`) and, given the state's stationary curve, the
-attractor C and the film time τ_1 of the two laws of lag (`loops.lag`, `loops.lag_fit`). Which law describes the loop
-better is said where the likelihoods tell; neither is thereby true.
+attractor C and the film time τ_1 of the two laws of lag (`loops.attractor`, `loops.squeeze_film`, `loops.lag_fit`). Which
+law describes the loop better is stated where the likelihoods differ by enough; neither is thereby true.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, sections 2.3.4 and 3.2.
 """
@@ -21,8 +21,9 @@ from models.friction.stribeck import torque as stationary_torque
 from models.loops.lag_fit import ATTRACTOR, SQUEEZE_FILM, LagFit, LagStatus, StationaryCurve, fit_lag
 from models.loops.loop_area import LEAST_SAMPLES, Area, Direction, Samples, area_of, clean_samples
 from models.records.periods import Cycle, fit_cycle
-from models.records.pressure_levels import pressure_stretches
-from models.records.runs import LEVEL_GAP, LEVEL_GAP_SHARE, Record, pressure_levels
+from models.records.pressure_levels import level_width, levels_of
+from models.records.pressure_stretches import pressure_stretches
+from models.records.runs import Record
 
 #: A speed whose lowest is below minus this share of its swing reverses.
 REVERSES = 0.02
@@ -86,7 +87,7 @@ def evaluate_loops(
     loops = []
     for stretch in pressure_stretches(time, pressure):
         rows = slice(stretch.start, stretch.stop)
-        level = float(pressure_levels(np.array([stretch.pressure]))[0])
+        level = float(levels_of(np.array([stretch.pressure]))[0])
         mean = float(pressure[rows].mean())
         loops.append(_loop(level, mean, time[rows], velocity[rows], torque[rows], _nearest(stationary, mean)))
     return tuple(loops)
@@ -95,8 +96,8 @@ def evaluate_loops(
 def _nearest(stationary: Mapping[float, StationaryCurve] | None, pressure: float) -> StationaryCurve | None:
     if not stationary:
         return None
-    level = min(stationary, key=lambda known: abs(known - pressure))
-    return stationary[level] if abs(level - pressure) <= max(LEVEL_GAP, LEVEL_GAP_SHARE * pressure) else None
+    level = min(stationary, key=lambda candidate: abs(candidate - pressure))
+    return stationary[level] if abs(level - pressure) <= level_width(pressure) else None
 
 
 def _loop(
@@ -182,7 +183,7 @@ def _better(attractor: LagFit, film: LagFit) -> str | None:
 
 def _message(status: LoopStatus, area: Area, attractor: LagFit | None, film: LagFit | None) -> str:
     """A sentence or two for a person."""
-    said = {
+    sentence = {
         LoopStatus.DETERMINED: "The attractor is determined.",
         LoopStatus.UNRESOLVED: "The record shows no lag by the attractor law beyond its noise: C is bounded from below.",
         LoopStatus.AGAINST_THE_LAW: "Torque lags against what the attractor law can give on this stationary curve.",
@@ -190,7 +191,7 @@ def _message(status: LoopStatus, area: Area, attractor: LagFit | None, film: Lag
         LoopStatus.REVERSES: "The speed changes sign: the lag laws, which hold while sliding, were not fitted.",
         LoopStatus.NO_PERIOD: "",
     }[status]
-    parts = [said]
+    parts = [sentence]
     if attractor is not None and film is not None:
         better = _better(attractor, film)
         if better is not None:

@@ -49,7 +49,7 @@ class History:
     def steps(self) -> FloatArray:
         """The progress at which each epoch after the first begins, as far as it was measured [e]."""
         later = np.unique(self.epoch)[1:]
-        return np.array([self.progress[self.epoch >= each].min() for each in later], dtype=np.float64)
+        return np.array([self.progress[self.epoch >= epoch].min() for epoch in later], dtype=np.float64)
 
     def to_arrays(self) -> dict[str, FloatArray]:
         """The columns by name."""
