@@ -27,9 +27,9 @@ from scipy.optimize import brentq
 from scipy.special import gammaln, log_expit, logsumexp
 
 from models.arrays import FloatArray
+from models.tracking.criteria import REACH
 from models.tracking.discrepancy import Discrepancy
 from models.tracking.filters.grid import Grid
-from models.tracking.filters.lattice import REACH
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior, weak

@@ -19,16 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
+from models.tracking.criteria import LEVELLING, SHARES
 from models.tracking.history import History
 from models.tracking.prior import Prior
 
-#: The deviation of δ at the end of what was measured, as a share of the quantity, and how the probability that there
-#: is a discrepancy is divided among those that are not 0.
-SIZES = np.array([0.0, 0.01, 0.03, 0.1])
-SHARES = np.array([0.4, 0.35, 0.25])
-#: Stretches of constant curvature: equal ones up to T, then growing ones, up to REACH times T; there δ levels off.
-PAST, FUTURE, REACH = 6, 16, 10.0
-_EDGES = np.concatenate([np.arange(PAST) / PAST, np.geomspace(1.0, REACH, FUTURE + 1)])
+#: Stretches of constant curvature: equal ones up to T, then growing ones, up to LEVELLING times T; there δ levels off.
+PAST, FUTURE = 6, 16
+_EDGES = np.concatenate([np.arange(PAST) / PAST, np.geomspace(1.0, LEVELLING, FUTURE + 1)])
 _LENGTHS = np.diff(_EDGES)
 
 
@@ -43,7 +40,7 @@ def smooth(progress: FloatArray, span: float, stretches: int = PAST + FUTURE) ->
 
     On a stretch of length h, in units of T, curvature has the deviation √(3/h): the deviation of δ at T is then 1.
     """
-    u = np.minimum(np.asarray(progress)[:, None] / span, REACH)
+    u = np.minimum(np.asarray(progress)[:, None] / span, LEVELLING)
     low, length = _EDGES[:stretches], _LENGTHS[:stretches]
     within = np.clip(u - low, 0.0, length)
     return np.asarray((0.5 * within**2 + length * np.maximum(u - low - length, 0.0)) * np.sqrt(3.0 / length))

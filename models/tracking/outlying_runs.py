@@ -12,18 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
+from models.tracking.criteria import EXPANSIONS, LOOK, MOST, NEAR
 from models.tracking.discrepancy import column_sds, columns
 from models.tracking.history import History
 from models.tracking.linear_model import log_outlying
 from models.tracking.prior import Prior
 
-#: Sets are kept where their log probability is less than NEAR below the best, and MOST of them; a set is looked into
-#: where it may come within LOOK, at most EXPANSIONS of them.
-NEAR, MOST, LOOK, EXPANSIONS = 4.5, 6, 1.5, 24
 #: Nodes of each level of s at which turning a run is weighed up, and the power of their mass by which they are drawn.
 NODES, TEMPER = 16, 0.25
 #: How often a node turns all the runs that it would turn.
-ROUNDS = 4
+_ROUNDS = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,7 +92,7 @@ def at_once(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes) 
     """
     start = verdicts(prior, history, outlying, nodes)
     sets, verdict = np.tile(outlying, (nodes.b.shape[0], 1)), start
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         if not (verdict.gain > 0.0).any():
             break
         sets = np.where(verdict.gain > 0.0, 1.0 - sets, sets)

@@ -12,6 +12,21 @@ from dataclasses import astuple, dataclass, fields
 import numpy as np
 
 from models.arrays import FloatArray
+from models.tracking.criteria import (
+    EITHER_CHANGE,
+    EXPONENT_MEDIAN,
+    FALLING_CHANGE,
+    INITIAL_SD,
+    LAW_SHARE,
+    LOG_EXPONENT_SD,
+    LOG_SCALE_SD,
+    LOG_SCATTER_SD,
+    OUTLYING_SHARE,
+    OUTLYING_SIZE,
+    SCALE_MEDIAN,
+    SCATTER_MEDIAN,
+    STEP_SIZE,
+)
 from models.tracking.measurement import Measurement
 
 
@@ -35,10 +50,10 @@ class Prior:
     log_exponent_sd: float
     log_scatter_mean: float
     log_scatter_sd: float
-    outlying_share: float = 0.05
-    outlying_size: float = 0.1
-    law_share: float = 0.95
-    step_size: float = 0.05
+    outlying_share: float = OUTLYING_SHARE
+    outlying_size: float = OUTLYING_SIZE
+    law_share: float = LAW_SHARE
+    step_size: float = STEP_SIZE
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -88,15 +103,16 @@ def weak(first: Measurement, *, falling: bool) -> Prior:
     a, two deviations covering 0.06 % to 1.5 %.
     """
     size = math.hypot(first.value, math.sqrt(first.variance)) or 1.0
+    change_mean, change_sd = FALLING_CHANGE if falling else EITHER_CHANGE
     return Prior(
         initial_mean=first.value,
-        initial_sd=0.5 * size,
-        change_mean=-0.6 * size if falling else 0.0,
-        change_sd=0.4 * size if falling else size,
-        log_scale_mean=math.log(4_000.0),
-        log_scale_sd=2.3,
-        log_exponent_mean=math.log(0.8),
-        log_exponent_sd=0.7,
-        log_scatter_mean=math.log(0.003 * size),
-        log_scatter_sd=0.8,
+        initial_sd=INITIAL_SD * size,
+        change_mean=change_mean * size,
+        change_sd=change_sd * size,
+        log_scale_mean=math.log(SCALE_MEDIAN),
+        log_scale_sd=LOG_SCALE_SD,
+        log_exponent_mean=math.log(EXPONENT_MEDIAN),
+        log_exponent_sd=LOG_EXPONENT_SD,
+        log_scatter_mean=math.log(SCATTER_MEDIAN * size),
+        log_scatter_sd=LOG_SCATTER_SD,
     )

@@ -9,7 +9,8 @@ import numpy as np
 
 from models.prognosis.first_passage import ends_of_life, predict_first_passage
 from models.rig.truth import draw
-from models.tracking.discrepancy import FUTURE, PAST, SIZES, Discrepancy, log_size_weight
+from models.tracking.criteria import SIZES
+from models.tracking.discrepancy import FUTURE, PAST, Discrepancy, log_size_weight
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior

@@ -11,7 +11,8 @@ from models.degradation.general_order import Degradation, first_passage, value
 from models.prognosis.first_passage import ends_of_life, weighted_quantiles
 from models.prognosis.scoring import crps_of_sample
 from models.tracking import linear_model, sampling
-from models.tracking.discrepancy import PAST, SIZES, drawn, log_size_weight
+from models.tracking.criteria import SIZES
+from models.tracking.discrepancy import PAST, drawn, log_size_weight
 from models.tracking.filters.particle import ParticleState
 from models.tracking.history import History
 from models.tracking.linear_model import Points

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.tracking.discrepancy import SIZES, log_size_weight
+from models.tracking.criteria import SIZES
+from models.tracking.discrepancy import log_size_weight
 from models.tracking.history import History
 from models.tracking.linear_model import Points, basis, evidence, log_outlying, pointwise, turned_last
 from models.tracking.prior import Prior

@@ -17,26 +17,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.tracking.discrepancy import SIZES, log_size_weight
+from models.tracking.criteria import DEPTH, NEGLIGIBLE, REACH, SIZES, SLIGHT
+from models.tracking.discrepancy import log_size_weight
 from models.tracking.history import History
 from models.tracking.linear_model import basis, evidence, log_outlying, tabulated
 from models.tracking.outlying_runs import NODES, TEMPER, Nodes, Search
 from models.tracking.prior import Prior
 
-#: The prior's range in deviations to either side.
-REACH = 4.0
-#: A node belongs to the mass where its log density is less than this below the highest: 4.2 deviations of a normal. A
-#: kind is dropped where its log mass is by so much below that of the best: on the first coarse lattice, which is
-#: blurred, and once the lattice has closed in.
-DEPTH, NEGLIGIBLE, SLIGHT = 9.0, 10.0, 6.0
 #: Blur of a coarse grid for each e-fold of τ between nodes, as a share of the observed change. A node off by half a
 #: step changes b by 0.18 at most, and most of that goes into ξ0 and Δ.
-BLUR = 0.03
+_BLUR = 0.03
 #: Nodes along log τ (the first time, and then), log ε and log s while closing in; how often; what shrinking is worth
 #: it.
-FIRST, COARSE = 65, (11, 8, 7)
-CLOSINGS = 8
-WORTHWHILE = 0.7
+_FIRST, COARSE = 65, (11, 8, 7)
+_CLOSINGS = 8
+_WORTHWHILE = 0.7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,15 +141,15 @@ def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame]:
         kinds = Kinds.of(prior, np.zeros((1, 0)))
         return kinds, first.taken(np.zeros(kinds.size.size, dtype=np.intp))
     nodes, rows, levels = COARSE
-    share = BLUR * float(np.ptp(history.value))
-    table = tabled(first, FIRST, history.progress)[0]
-    blur = share * float((first.upper - first.lower).max()) / (FIRST - 1)
+    share = _BLUR * float(np.ptp(history.value))
+    table = tabled(first, _FIRST, history.progress)[0]
+    blur = share * float((first.upper - first.lower).max()) / (_FIRST - 1)
     kinds, density = _first(prior, history, first, table, blur)
     frame = shrunk(first.taken(np.zeros(kinds.size.size, dtype=np.intp)), density)
-    kinds, frame = _weighty(kinds, frame.resized(rows, levels), log_masses(density, first.cells(FIRST)), NEGLIGIBLE)
+    kinds, frame = _weighty(kinds, frame.resized(rows, levels), log_masses(density, first.cells(_FIRST)), NEGLIGIBLE)
     shares, left = np.full(kinds.size.size, share), np.ones(kinds.size.size, dtype=bool)
     log_mass = np.zeros(kinds.size.size)
-    for _ in range(CLOSINGS):
+    for _ in range(_CLOSINGS):
         now = np.flatnonzero(left)
         if now.size == 0:
             break
@@ -164,7 +159,7 @@ def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame]:
         density = log_density(prior, history, kinds.taken(now), wide, tabled(wide, nodes, history.progress), blurs)
         closer = shrunk(wide, density)
         log_mass[now] = log_masses(density, wide.cells(nodes))
-        settled = _shrinkage(wide, closer) > WORTHWHILE
+        settled = _shrinkage(wide, closer) > _WORTHWHILE
         left[now] = ~(settled & (blurs < 0.5 * np.exp(closer.log_scatter.mean(axis=1))))
         shares[now] *= np.where(settled, 0.3, 1.0)
         for field in fields(Frame):
@@ -183,7 +178,7 @@ def _first(prior: Prior, history: History, frame: Frame, table: FloatArray, blur
         return densities[outlying.tobytes()]
 
     while (outlying := search.next()) is not None:
-        plain = looked_at(outlying) - log_outlying(prior, outlying) + np.log(frame.cells(FIRST))[:, None, :, None]
+        plain = looked_at(outlying) - log_outlying(prior, outlying) + np.log(frame.cells(_FIRST))[:, None, :, None]
         total = float(plain.max() + np.log(np.exp(plain - plain.max()).sum()))
         search.learn(outlying, total, *_chosen(prior, frame, table, plain - total, blur))
     sets = search.kept()

@@ -10,14 +10,15 @@ Apart from its shares of the posterior a set that is overlooked would bias the s
 import numpy as np
 
 from models.arrays import FloatArray
+from models.tracking.criteria import LEADING, MOST, WORTH
 from models.tracking.filters.lattice import COARSE, Frame, Kinds, joined, log_density, log_masses, shrunk, tabled
 from models.tracking.history import History
 from models.tracking.linear_model import log_outlying
-from models.tracking.outlying_runs import MOST, TEMPER, Nodes, gains
+from models.tracking.outlying_runs import TEMPER, Nodes, gains
 from models.tracking.prior import Prior
 
-#: So many kinds lead, at so many nodes each; a set counts where its log probability is less than this below the best's.
-LEADING, NODES, WORTH = 3, 32, 3.0
+#: Nodes of each leading kind.
+_NODES = 32
 
 
 def completed(prior: Prior, history: History, kinds: Kinds, frame: Frame) -> tuple[Kinds, Frame]:
@@ -56,13 +57,13 @@ def _nodes(kinds: Kinds, frame: Frame, table: FloatArray, mass: FloatArray, kind
     cells = mass.shape[2] * mass.shape[3]
     flat = mass[kind].ravel()
     edges = np.cumsum(np.exp(TEMPER * (flat - flat.max())))
-    drawn = np.searchsorted(edges, (np.arange(NODES) + 0.5) / NODES * edges[-1])
-    log_share = np.log(NODES) + TEMPER * (flat[drawn] - flat.max()) - np.log(edges[-1])
+    drawn = np.searchsorted(edges, (np.arange(_NODES) + 0.5) / _NODES * edges[-1])
+    log_share = np.log(_NODES) + TEMPER * (flat[drawn] - flat.max()) - np.log(edges[-1])
     level, cell = np.divmod(drawn, cells)
     return Nodes(
         b=table[kind][:, cell].T,
         noise=np.exp(2.0 * frame.log_scatter[kind, level]),
-        size=np.full(NODES, kinds.size[kind]),
+        size=np.full(_NODES, kinds.size[kind]),
         log_weight=flat[drawn] - log_share,
     )
 

@@ -20,7 +20,8 @@ import numpy as np
 from scipy.special import ndtri
 
 from models.arrays import FloatArray
-from models.tracking.discrepancy import PAST, SIZES, drawn, log_size_weight
+from models.tracking.criteria import HEALTHY, MOVED, MOVES, SIZES, STARVED
+from models.tracking.discrepancy import PAST, drawn, log_size_weight
 from models.tracking.filters.cloud import Bridge, Cloud, effective, log_target_of, merged, table_of, weights
 from models.tracking.history import History
 from models.tracking.linear_model import conditional, drawn_terms, pointwise
@@ -29,16 +30,12 @@ from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
 from models.tracking.sampling import correlated_pair, spread_normals, spread_points, systematic
 
-#: Resample below this share of effective particles; let no single step bring them below the second share.
-HEALTHY, STARVED = 0.5, 0.25
-#: Steps of a move: at most so many, until this share of particles has moved since resampling.
-MOVES, MOVED = 8, 0.9
 #: Where a smaller share of steps than the first is accepted, the next are shorter by the second.
-TIMID, SHORTER = 0.2, 0.5
+_TIMID, _SHORTER = 0.2, 0.5
 #: In a step, how often another size is tried, and how often another belief about one run.
-RESIZED, TURNED = 0.25, 0.1
+_RESIZED, _TURNED = 0.25, 0.1
 #: Degrees by which a measurement may be let in, and halvings in the search for each.
-DEGREES, HALVINGS = 30, 20
+_DEGREES, _HALVINGS = 30, 20
 
 #: Names of arrays in stored states, where they are not those of the fields: databases of earlier versions stay readable.
 _STORED = {"outlying": "spoiled"}
@@ -101,10 +98,10 @@ class Particle:
         bridge = Bridge(state.prior, state.history, state.history.append(measurement, state.prior))
         cloud, before, after = bridge.entered(state.cloud, rng)
         held, degree = 1.0, 0.0
-        for attempt in range(DEGREES):
+        for attempt in range(_DEGREES):
             gap = after - before
             start = cloud.log_weight - held * gap
-            degree = 1.0 if attempt == DEGREES - 1 else _next_degree(start, gap, degree)
+            degree = 1.0 if attempt == _DEGREES - 1 else _next_degree(start, gap, degree)
             log_weight = start + degree * gap
             cloud = replace(cloud, log_weight=log_weight - log_weight.max())
             if degree < 1.0 or effective(cloud.log_weight) < HEALTHY * self.particles:
@@ -143,7 +140,7 @@ class Particle:
             after = np.where(accepted, offered_after, after)
             before = np.where(accepted, offered_before, before)
             moved |= accepted
-            reach *= SHORTER if accepted.mean() < TIMID else 1.0
+            reach *= _SHORTER if accepted.mean() < _TIMID else 1.0
             if moved.mean() >= MOVED:
                 break
         return cloud, before, after
@@ -178,10 +175,10 @@ def _proposed(cloud: Cloud, shape: FloatArray, rng: np.random.Generator) -> Clou
     count, runs = cloud.outlying.shape
     stride = rng.uniform(0.2, 1.6, size=(count, 1))
     points = cloud.points + stride * rng.standard_normal(cloud.points.shape) @ shape.T
-    step = np.where(rng.random(count) < RESIZED, rng.choice([-1.0, 1.0], size=count), 0.0)
+    step = np.where(rng.random(count) < _RESIZED, rng.choice([-1.0, 1.0], size=count), 0.0)
     size = cloud.size + step
     outlying = cloud.outlying.copy()
-    turned = np.flatnonzero(rng.random(count) < TURNED)
+    turned = np.flatnonzero(rng.random(count) < _TURNED)
     run = rng.integers(runs, size=turned.size)
     outlying[turned, run] = 1.0 - outlying[turned, run]
     inside = (size >= 0) & (size < SIZES.size)
@@ -194,10 +191,10 @@ def _next_degree(start: FloatArray, gap: FloatArray, degree: float) -> float:
     if effective(start + gap) >= enough:
         return 1.0
     low, high = degree, 1.0
-    for _ in range(HALVINGS):
+    for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if effective(start + middle * gap) >= enough else (low, middle)
-    return low if low > degree else degree + (1.0 - degree) * 2.0**-HALVINGS
+    return low if low > degree else degree + (1.0 - degree) * 2.0**-_HALVINGS
 
 
 def _root(covariance: FloatArray) -> FloatArray:

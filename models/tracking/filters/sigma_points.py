@@ -12,14 +12,11 @@ from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 
 from models.arrays import FloatArray
 from models.degradation.general_order import progress_fraction
+from models.tracking.criteria import DOMAIN, OUTLIER
 from models.tracking.prior import Prior
 
 #: Process noise of a step, and the least variance along any axis, in units of the prior's variance.
-PROCESS, FLOOR = 1e-9, 1e-10
-#: Deviations from the prior mean that the state may reach.
-DOMAIN = 6.0
-#: An innovation counts at most as one of this many deviations.
-OUTLIER = 5.0
+_PROCESS, _FLOOR = 1e-9, 1e-10
 #: The state's dimension; sigma points at ±√7 deviations with no weight on the centre: all weights are positive, so S
 #: and P stay positive definite.
 DIMENSION = 7
@@ -59,7 +56,7 @@ class Step:
     covariance: FloatArray
     scatter: FloatArray
     log_likelihood: float
-    surprise: float
+    squared_innovation: float
 
 
 def stepped(prior: Prior, normal: Normal, way: Way) -> Step:
@@ -104,13 +101,13 @@ def stepped(prior: Prior, normal: Normal, way: Way) -> Step:
         covariance=definite(learnt),
         scatter=scatter_learnt(prior, normal.scatter, off**2 / variance, variance, float(share[0])),
         log_likelihood=math.log(max(total, 1e-300)),
-        surprise=min(float(share @ (off**2 / variances)), OUTLIER**2),
+        squared_innovation=min(float(share @ (off**2 / variances)), OUTLIER**2),
     )
 
 
 def process(prior: Prior, size: float, way: Way) -> FloatArray:
     """Process noise of δ and its slope over the way to the last measurement, and of the level at an event."""
-    noise = PROCESS * np.eye(DIMENSION)
+    noise = _PROCESS * np.eye(DIMENSION)
     gap = (way.after - way.before) / way.reference
     density = 3.0 * (size * prior.size / prior.initial_sd) ** 2 * (way.reference / way.after) ** 3
     noise[4:6, 4:6] += density * np.array([[gap**3 / 3.0, gap**2 / 2.0], [gap**2 / 2.0, gap]])
@@ -142,11 +139,11 @@ def unscaled(prior: Prior, state: FloatArray) -> FloatArray:
     return np.asarray(rows)
 
 
-def scatter_learnt(prior: Prior, scatter: FloatArray, surprise: float, variance: float, sound: float) -> FloatArray:
-    """Variance and worth of the scatter after an innovation; `variance` in units of the prior's deviation of ξ0."""
+def scatter_learnt(prior: Prior, scatter: FloatArray, squared: float, variance: float, sound: float) -> FloatArray:
+    """Variance and worth of the scatter after an innovation, `squared` in its deviations; `variance` in the prior's units."""
     scatter_variance, worth = scatter.tolist()
     share = scatter_variance / (variance * prior.initial_sd**2)
-    learnt = scatter_variance * (1.0 + sound * share * (min(surprise, OUTLIER**2) - 1.0) / (worth + sound))
+    learnt = scatter_variance * (1.0 + sound * share * (min(squared, OUTLIER**2) - 1.0) / (worth + sound))
     low, high = (math.exp(2.0 * (prior.log_scatter_mean + k * prior.log_scatter_sd)) for k in (-DOMAIN, DOMAIN))
     return np.array([min(max(learnt, low), high), worth + sound])
 
@@ -155,7 +152,7 @@ def definite(covariance: FloatArray) -> FloatArray:
     """Symmetrised, with no eigenvalue below FLOOR."""
     symmetric = 0.5 * (covariance + covariance.T)
     values, vectors = np.linalg.eigh(symmetric)
-    if values[0] >= FLOOR:
+    if values[0] >= _FLOOR:
         return np.asarray(symmetric)
-    lifted = vectors * np.maximum(values, FLOOR) @ vectors.T
+    lifted = vectors * np.maximum(values, _FLOOR) @ vectors.T
     return np.asarray(0.5 * (lifted + lifted.T))

@@ -23,22 +23,18 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.degradation.general_order import progress_fraction
-from models.tracking.discrepancy import PAST, SIZES, at_end, drawn
+from models.tracking.criteria import DOMAIN, FEW, FORGET, GROWN, LOST, SIZES
+from models.tracking.discrepancy import PAST, at_end, drawn
 from models.tracking.filters.grid import Grid, GridState
-from models.tracking.filters.sigma_points import DIMENSION, DOMAIN, Normal, Way, definite, scaled, stepped, unscaled
+from models.tracking.filters.sigma_points import DIMENSION, Normal, Way, definite, scaled, stepped, unscaled
 from models.tracking.history import History
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
 from models.tracking.sampling import spread_normals, systematic
 
-#: The running mean of squared innovations forgets at this rate, and above the second number the filter is lost.
-FORGET, LOST = 0.3, 4.0
-#: The filters start anew when progress has grown by this factor.
-GROWN = 2.0
-#: The grid that starts the filter, the draws from it whose moments are taken, and the share of them below which a size
-#: is left out.
-STARTER, DRAWS, FEW = Grid(nodes=13, rows=13, levels=7), 1_000, 0.01
+#: The grid that starts the filter, and the draws from it whose moments are taken.
+_STARTER, _DRAWS = Grid(nodes=13, rows=13, levels=7), 1_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,14 +42,14 @@ class UkfState:
     """One filter for each of k sizes q: size [k], log_weight [k], mean [k, 7], covariance [k, 7, 7] in units of the
     prior, and scatter [k, 2]: its variance in the quantity's unit squared and how many observations it is worth.
 
-    `history` is everything measured, `reference` the progress at which the filters started, `surprise` the running mean
-    of squared innovations.
+    `history` is everything measured, `reference` the progress at which the filters started, `squared_innovation` the
+    running mean of squared innovations.
     """
 
     prior: Prior
     history: History
     reference: float
-    surprise: float
+    squared_innovation: float
     size: FloatArray
     log_weight: FloatArray
     mean: FloatArray
@@ -72,18 +68,18 @@ class UkfState:
     def to_arrays(self) -> dict[str, FloatArray]:
         """The state as named arrays; `from_arrays` gives it back exactly."""
         named = {name: getattr(self, name) for name in ("size", "log_weight", "mean", "covariance", "scatter")}
-        lone = {"prior": self.prior.to_array(), "place": np.array([self.reference, self.surprise])}
+        lone = {"prior": self.prior.to_array(), "place": np.array([self.reference, self.squared_innovation])}
         return self.history.to_arrays() | lone | named
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, FloatArray]) -> "UkfState":
         """The inverse of `to_arrays`."""
-        reference, surprise = arrays["place"].tolist()
+        reference, squared_innovation = arrays["place"].tolist()
         return cls(
             prior=Prior.from_array(arrays["prior"]),
             history=History.from_arrays(arrays),
             reference=reference,
-            surprise=surprise,
+            squared_innovation=squared_innovation,
             **{name: arrays[name] for name in ("size", "log_weight", "mean", "covariance", "scatter")},
         )
 
@@ -122,14 +118,14 @@ class Ukf:
         parts = [stepped(prior, state.normal(kind), way) for kind in range(state.size.size)]
         log_weight = state.log_weight + np.array([part.log_likelihood for part in parts])
         weight = _weights(log_weight)
-        surprise = float(weight @ [part.surprise for part in parts])
-        surprise = (1.0 - FORGET) * state.surprise + FORGET * surprise
-        if surprise > LOST:
+        squared_innovation = float(weight @ [part.squared_innovation for part in parts])
+        squared_innovation = (1.0 - FORGET) * state.squared_innovation + FORGET * squared_innovation
+        if squared_innovation > LOST:
             return _started(prior, history)
         return replace(
             state,
             history=history,
-            surprise=surprise,
+            squared_innovation=squared_innovation,
             log_weight=log_weight - log_weight.max(),
             mean=np.stack([part.mean for part in parts]),
             covariance=np.stack([part.covariance for part in parts]),
@@ -165,7 +161,7 @@ class Ukf:
 
 def _started(prior: Prior, history: History) -> UkfState:
     """The normals with the moments of the exact posterior, by size, from evenly spread draws."""
-    draws = STARTER.posterior(GridState(prior=prior, history=history), DRAWS, np.random.default_rng(0))
+    draws = _STARTER.posterior(GridState(prior=prior, history=history), _DRAWS, np.random.default_rng(0))
     reference = history.span
     size, course, step = _beside(draws)
     points = scaled(
@@ -192,7 +188,7 @@ def _started(prior: Prior, history: History) -> UkfState:
         prior=prior,
         history=history,
         reference=reference,
-        surprise=1.0,
+        squared_innovation=1.0,
         size=SIZES[kept],
         log_weight=np.log(shares[kept] / shares[kept].max()),
         mean=np.stack([mean for mean, _ in moments]),
