@@ -9,7 +9,8 @@ from sqlalchemy import Connection
 
 from models.arrays import FloatArray
 from models.degradation.severity import Block
-from models.friction.identification import ACCEPTABLE_MSE, FitStatus, StribeckFit
+from models.friction.criteria import ACCEPTABLE_MSE
+from models.friction.identification import FitStatus, StribeckFit
 from models.friction.stribeck import StribeckParameters
 from service.errors import NotFoundError
 from service.lives.history import ByPressure, Event, order

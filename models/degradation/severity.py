@@ -22,15 +22,17 @@ from enum import StrEnum
 import numpy as np
 
 from models.arrays import FloatArray
+from models.degradation.criteria import (
+    DECELERATION,
+    HARSHEST,
+    LARGEST_EXPONENT,
+    MILDEST,
+    RECENT_CYCLES,
+    RECENT_SHARE,
+    STANDARD_ANGLE,
+    STANDARD_ENERGY,
+)
 from models.degradation.general_order import Number
-
-#: Recent duty: the blocks of the last share of the cycles so far, but of so many cycles at least.
-RECENT_SHARE, RECENT_CYCLES = 0.1, 1_000.0
-#: One cycle counts as so many reference cycles at least and at most: a slip of the pen must not end or stop a life.
-MILDEST, HARSHEST = 1e-3, 1e3
-#: Where a block does not say how long an engagement lasts, the speed is taken to fall evenly by this much, rad/s²: 2,000 rpm
-#: come to rest in about one second.
-DECELERATION = 200.0
 
 
 class SeverityBasis(StrEnum):
@@ -41,8 +43,8 @@ class SeverityBasis(StrEnum):
     DISSIPATED_ENERGY = "dissipated_energy"
 
 
-#: The work of a standard cycle: about what the life test's engagements dissipate [J], and how far they slide [rad].
-STANDARD = {SeverityBasis.DISSIPATED_ENERGY: 20e3, SeverityBasis.SLIDING_DISTANCE: 100.0}
+#: The work of a standard cycle [J] or [rad].
+_STANDARD = {SeverityBasis.DISSIPATED_ENERGY: STANDARD_ENERGY, SeverityBasis.SLIDING_DISTANCE: STANDARD_ANGLE}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,15 +92,15 @@ class Severity:
     exponent: float = 1.0
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.exponent <= 10.0:
-            raise ValueError(f"exponent must lie between 0 and 10, got {self.exponent}")
+        if not 0.0 <= self.exponent <= LARGEST_EXPONENT:
+            raise ValueError(f"exponent must lie between 0 and {LARGEST_EXPONENT:g}, got {self.exponent}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SeverityMap:
     """ζ over cycles: knots (cycles [k], zeta [k]), both ascending from 0, straight between, `rate` dζ/dN beyond.
 
-    A cycle of ζ is worth `unit` cycles of STANDARD work: by it the ζ of clutches can be compared.
+    A cycle of ζ is worth `unit` cycles of standard work: by it the ζ of clutches can be compared.
     """
 
     cycles: FloatArray
@@ -147,7 +149,7 @@ def severity_map(severity: Severity, blocks: Sequence[Block]) -> SeverityMap:
         cycles=np.concatenate([[0.0], np.cumsum(lengths)]),
         zeta=np.concatenate([[0.0], np.cumsum(lengths * filled)]),
         rate=_recent(lengths, filled),
-        unit=(reference / STANDARD[severity.basis]) ** severity.exponent,
+        unit=(reference / _STANDARD[severity.basis]) ** severity.exponent,
     )
 
 

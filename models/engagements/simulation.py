@@ -13,16 +13,13 @@ Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3.1, 2
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from models.arrays import FloatArray
-
-#: Torque [Nm] of the closed clutch at line pressure [Pa] and sliding velocity [m/s] >= 0.
-Capacity = Callable[[float, float], float]
+from models.engagements.capacity import Capacity
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -29,18 +29,18 @@ from numpy.typing import NDArray
 from scipy.special import chdtri, stdtrit
 
 from models.arrays import FloatArray
+from models.friction.criteria import (
+    ASSUMED_NOISE,
+    DISBELIEVED,
+    LEAST_NOISE,
+    PRIOR_LOG_VELOCITY,
+    PRIOR_TERM,
+    STRAY,
+    UNDETERMINED_SHARE,
+    Z90,
+)
 from models.friction.variable_projection import Problem, Profile, jacobian
 
-#: Noise where nothing tells it, and the least that is believed, as shares of the root mean square torque.
-ASSUMED_NOISE, LEAST_NOISE = 0.05, 1e-6
-#: Prior deviations: of each term in root mean square torques, and of log V_S.
-PRIOR_TERM, PRIOR_LOG_VELOCITY = 3.0, 5.0
-#: A parameter with a standard error above this share of its scale is undetermined.
-UNDETERMINED_SHARE = 0.5
-#: V_S is undetermined where values this far from the optimum in log V_S are as likely as the 90 % interval allows.
-STRAY = 1.0
-#: The normal quantile of a two-sided 90 % interval.
-Z90 = 1.6448536269514722
 #: An eigenvalue of JᵀJ below this share of the largest is rounding.
 _ROUNDING = 1e-14
 
@@ -67,7 +67,7 @@ def estimate_noise(residual: FloatArray, freedom: FloatArray, given_sd: FloatArr
     given, estimable = np.isfinite(given_sd), freedom >= 1
     spare = np.maximum(freedom, 1.0)
     given_sd = np.where(given, given_sd, 1.0)
-    inflated = given & estimable & (residual / given_sd**2 > chdtri(spare, 0.01))
+    inflated = given & estimable & (residual / given_sd**2 > chdtri(spare, DISBELIEVED))
     estimated = (estimable & ~given) | inflated
     sd = np.where(estimated, np.sqrt(residual / spare), np.where(given, given_sd, ASSUMED_NOISE * level))
     return Noise(

@@ -20,17 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.friction.fit_uncertainty import ASSUMED_NOISE, Noise, Uncertainty, estimate_noise, uncertainty
+from models.friction.criteria import ACCEPTABLE_MSE, ASSUMED_NOISE, LEAST_STATIC
+from models.friction.fit_uncertainty import Noise, Uncertainty, estimate_noise, uncertainty
 from models.friction.stribeck import GAMMA, PARAMETER_NAMES, STANDSTILL, StribeckParameters, gradient, torque
 from models.friction.variable_projection import Problem, Profile, make_problem, minimise
 from models.records.runs import Curve
 
-#: A fit with an error of eq. 5 below this is acceptable [%].
-ACCEPTABLE_MSE = 5.0
-#: M_s is not taken below this share of the torque: M̄_c = b/M_s must exist where the optimum has M_s = 0.
-LEAST_STATIC = 1e-6
 #: Points that are fitted at once, which bounds the memory of a scan.
-BATCH = 20_000
+_BATCH = 20_000
 #: Torques or speeds beyond any sense can overflow a variance: it is cut here.
 _LARGEST = 1e300
 
@@ -98,7 +95,7 @@ def fit_curves(curves: Sequence[Curve]) -> tuple[StribeckFit, ...]:
         stop, longest = start, 0
         while stop < len(folded):
             longest = max(longest, folded[stop].speed.size)
-            if stop > start and longest * (stop - start + 1) > BATCH:
+            if stop > start and longest * (stop - start + 1) > _BATCH:
                 break
             stop += 1
         fits.extend(_fit_batch(folded[start:stop]))

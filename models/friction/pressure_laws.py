@@ -16,11 +16,10 @@ import numpy as np
 from scipy.optimize import minimize_scalar, nnls
 
 from models.arrays import FloatArray
+from models.friction.criteria import FEWEST_PRESSURES
 from models.friction.identification import StribeckFit
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
 
-#: A law is fitted through at least this many pressures.
-FEWEST_PRESSURES = 3
 #: The decay p_0 is looked for between these multiples of the pressures' range.
 _DECAYS = np.geomspace(0.05, 20.0, 41)
 
@@ -76,6 +75,26 @@ def fit_pressure_laws(fits: Sequence[StribeckFit]) -> PressureLaws | None:
         stribeck_velocity=fit_linear(*determined[2]),
         viscous_coefficient=fit_linear(*determined[3]),
     )
+
+
+def laws_of(levels: FloatArray, columns: FloatArray) -> PressureLaws:
+    """The laws through parameters [l, 4] in the order of PARAMETER_NAMES at FEWEST_PRESSURES or more levels [l] Pa, equally
+    weighted."""
+    equal = np.ones_like(levels)
+    m_s, m_c, v_s, c_v = columns.T
+    return PressureLaws(
+        static_torque=fit_linear(levels, m_s, equal),
+        coulomb_ratio=fit_asymptotic(levels, m_c, equal),
+        stribeck_velocity=fit_linear(levels, v_s, equal),
+        viscous_coefficient=fit_linear(levels, c_v, equal),
+    )
+
+
+def over_pressure(name: str, levels: FloatArray, values: FloatArray, pressures: FloatArray) -> FloatArray:
+    """A parameter at pressures [p] Pa by its law through values [l, k] of k states at levels [l] Pa; [p, k]."""
+    fit = fit_asymptotic if name == "coulomb_ratio" else fit_linear
+    equal = np.ones_like(levels)
+    return np.stack([fit(levels, column, equal)(pressures) for column in values.T], axis=1)
 
 
 def fit_linear(pressure: FloatArray, value: FloatArray, deviation: FloatArray) -> LinearLaw:

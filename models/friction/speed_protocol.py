@@ -9,12 +9,11 @@ import math
 import numpy as np
 
 from models.arrays import FloatArray
+from models.friction.criteria import END_TOLERANCE
 
 RPM = 2 * math.pi / 60
 STEPS = 40
 REFERENCE_SPEEDS: FloatArray = np.linspace(20.0, 1970.0, STEPS) * RPM
-#: A test counts as the reference's where its ends lie within two steps of the reference's ends.
-END_TOLERANCE = 105.0 * RPM
 
 
 def protocol_speeds(lowest: float, highest: float) -> FloatArray:

@@ -18,19 +18,13 @@ import numpy as np
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.friction.stribeck import torque as stationary_torque
+from models.loops.criteria import FEWEST_SAMPLES, LEAST_CURVE, REVERSES, TELLING
 from models.loops.lag_fit import ATTRACTOR, SQUEEZE_FILM, LagFit, LagStatus, StationaryCurve, fit_lag
-from models.loops.loop_area import LEAST_SAMPLES, Area, Direction, Samples, area_of, clean_samples
+from models.loops.loop_area import Area, Direction, Samples, area_of, clean_samples
 from models.records.periods import Cycle, fit_cycle
 from models.records.pressure_levels import level_width, levels_of
 from models.records.pressure_stretches import pressure_stretches
 from models.records.runs import Record
-
-#: A speed whose lowest is below minus this share of its swing reverses.
-REVERSES = 0.02
-#: Log likelihoods apart by this much tell one law from the other.
-TELLING = 5.0
-#: A stationary curve below this share of the measured torque is none to lag behind.
-_LEAST_SHARE = 0.01
 
 
 class LoopStatus(StrEnum):
@@ -112,7 +106,7 @@ def _loop(
         velocity, torque = -velocity, -torque
     cycle = fit_cycle(time, velocity)
     samples = None if isinstance(cycle, str) else clean_samples(cycle, time, torque)
-    if isinstance(cycle, str) or samples is None or samples.phase.size < LEAST_SAMPLES:
+    if isinstance(cycle, str) or samples is None or samples.phase.size < FEWEST_SAMPLES:
         return Loop(
             pressure=level,
             mean_pressure=mean_pressure,
@@ -140,7 +134,7 @@ def _loop(
         attractor_interval=None if attractor is None else _inverted(attractor),
         film_time=None if film is None else film.lag,
         film_time_sd=None if film is None or film.lag is None else film.lag_sd,
-        film_time_interval=None if film is None or film.status is LagStatus.AGAINST else _positive(film),
+        film_time_interval=None if film is None or film.status is LagStatus.AGAINST_THE_LAW else _positive(film),
         better_law=None if attractor is None or film is None else _better(attractor, film),
         status=status,
         message=_message(status, area, attractor, film),
@@ -151,7 +145,7 @@ def _lags(
     cycle: Cycle, samples: Samples, curve: StationaryCurve | None
 ) -> tuple[LoopStatus, tuple[LagFit, LagFit] | None]:
     turn = cycle.value(np.linspace(0.0, 2 * np.pi, 361))
-    least = _LEAST_SHARE * float(np.abs(samples.torque).max())
+    least = LEAST_CURVE * float(np.abs(samples.torque).max())
     if curve is None or float(stationary_torque(np.maximum(turn, 0.0), curve.parameters).min()) < least:
         return LoopStatus.NO_CURVE, None
     if float(turn.min()) < -REVERSES * cycle.amplitude:
@@ -164,7 +158,7 @@ def _lags(
 def _inverted(fit: LagFit) -> tuple[float, float | None] | None:
     """The interval of C from that of 1/C; None where no C > 0 is in it."""
     low, high = fit.interval
-    if high <= 0 or fit.status is LagStatus.AGAINST:
+    if high <= 0 or fit.status is LagStatus.AGAINST_THE_LAW:
         return None
     return 1 / high, 1 / low if low > 0 else None
 

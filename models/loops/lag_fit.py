@@ -24,16 +24,14 @@ from enum import StrEnum
 import numpy as np
 
 from models.arrays import FloatArray
+from models.friction.criteria import Z90
 from models.friction.stribeck import StribeckParameters, torque
 from models.loops.attractor import attractor_torque
+from models.loops.criteria import AGAINST
 from models.loops.lag_problem import LagProblem, make_lag_problem
 from models.loops.squeeze_film import squeeze_film_torque
 from models.records.periods import Cycle
 
-#: Two-sided 90 %.
-NINETY = 1.6448536269514722
-#: A lag is against the law where it is this many deviations below none.
-AGAINST = 3.0
 _GRID = 1000  # steps of a period
 _RUN_IN = 5.0  # s before the periodic state, half a period at least and 12 at most
 #: A parameter is moved by this share of its deviation.
@@ -41,11 +39,11 @@ _MOVED = 0.01
 
 
 class LagStatus(StrEnum):
-    """DETERMINED; UNRESOLVED: no lag that noise would not make; AGAINST: torque lags the other way than the law can."""
+    """DETERMINED; UNRESOLVED: no lag that noise would not make; AGAINST_THE_LAW: torque lags as the law cannot."""
 
     DETERMINED = "determined"
     UNRESOLVED = "unresolved"
-    AGAINST = "against_the_law"
+    AGAINST_THE_LAW = "against_the_law"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,10 +109,10 @@ def fit_lag(law: Law, cycle: Cycle, phase: FloatArray, measured: FloatArray, cur
     misses = [posed.problem.miss(row) for row in scanned]
     best = int(np.argmin(misses))
     none, first = posed.near_none(scanned[0])
-    if first < -AGAINST * none or (best == 0 and first <= NINETY * none):
+    if first < -AGAINST * none or (best == 0 and first <= Z90 * none):
         slant = _by_curve(lambda moved: _posed(law, cycle, phase, measured, moved).near_none()[1], curve)
         estimate = _Estimate(first, none, slant)
-        status = LagStatus.AGAINST if first < -AGAINST * estimate.sd else LagStatus.UNRESOLVED
+        status = LagStatus.AGAINST_THE_LAW if first < -AGAINST * estimate.sd else LagStatus.UNRESOLVED
         return _result(posed.problem, torque(posed.problem.speed, curve.parameters), None, estimate, status)
     lag = _refine(posed.problem, posed.course, law.lags, misses, best)
     middle, change = posed.about(lag)
@@ -122,7 +120,7 @@ def fit_lag(law: Law, cycle: Cycle, phase: FloatArray, measured: FloatArray, cur
     share = 1 / gain if law.scaled else 1.0
     slant = _by_curve(lambda moved: _posed(law, cycle, phase, measured, moved).stepped(lag), curve)
     estimate = _Estimate(lag * share, sd * share, slant)
-    status = LagStatus.DETERMINED if estimate.lag > NINETY * estimate.sd else LagStatus.UNRESOLVED
+    status = LagStatus.DETERMINED if estimate.lag > Z90 * estimate.sd else LagStatus.UNRESOLVED
     return _result(posed.problem, middle, estimate.lag if status is LagStatus.DETERMINED else None, estimate, status)
 
 
@@ -140,8 +138,8 @@ class _Estimate:
 
     def interval(self) -> tuple[float, float]:
         """Fieller's, 90 %; an end that is not bounded is infinite."""
-        spare = 1 - (NINETY * self.slant / self.lag) ** 2 if self.lag else 1.0
-        clear = self.lag**2 - (NINETY * self.noise) ** 2
+        spare = 1 - (Z90 * self.slant / self.lag) ** 2 if self.lag else 1.0
+        clear = self.lag**2 - (Z90 * self.noise) ** 2
         if spare > 0:
             half = math.sqrt(max(self.lag**2 - spare * clear, 0.0))
             return (self.lag - half) / spare, (self.lag + half) / spare

@@ -13,12 +13,9 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.friction.stribeck import StribeckParameters, torque
+from models.loops.criteria import FEWEST_SLIDING, GAIN_SD, LEAST_SPEED, NOT_WHITE
 from models.records.periods import Cycle
 
-#: The gain's prior deviation [-].
-GAIN_SD = 0.05
-#: Speeds below this share of the highest are sticking or next to it, and no stationary test reaches them.
-LEAST_SPEED = 0.01
 _SHAPES = 6
 _BLOCKS = 24
 
@@ -103,7 +100,7 @@ class LagProblem:
         filled = count > 0
         freedom = max(int(filled.sum()) - self.absorbed.shape[1] - 2, 4)
         ratio = float((total[filled] ** 2 / count[filled]).sum()) / freedom / max(variance, 1e-300)
-        return math.sqrt(variance * (ratio if ratio > 1 + 2.5 * math.sqrt(2 / freedom) else 1.0))
+        return math.sqrt(variance * (ratio if ratio > 1 + NOT_WHITE * math.sqrt(2 / freedom) else 1.0))
 
 
 def _spread(phase: FloatArray) -> FloatArray:
@@ -115,8 +112,8 @@ def make_lag_problem(cycle: Cycle, phase: FloatArray, measured: FloatArray, curv
     speed = cycle.value(phase)
     highest = float(speed.max())
     rows = speed > LEAST_SPEED * highest
-    if rows.sum() < 20:
-        raise ValueError(f"at least 20 samples must slide, got {int(rows.sum())}")
+    if rows.sum() < FEWEST_SLIDING:
+        raise ValueError(f"at least {FEWEST_SLIDING} samples must slide, got {int(rows.sum())}")
     phase, speed, measured = phase[rows], speed[rows], measured[rows]
     span = max(highest - float(speed.min()), 1e-12)
     shapes = np.polynomial.chebyshev.chebvander(2 * (speed - speed.min()) / span - 1, _SHAPES + 1)

@@ -16,13 +16,11 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.degradation import general_order
+from models.prognosis.criteria import BAND, HORIZON, QUANTILES
 from models.tracking.posterior import Posterior
 
-QUANTILES = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95)
-#: Cycles beyond which an end of life is not told from never.
-HORIZON = 1_000_000.0
-#: Places at which a path is looked at: evenly over what was measured, and then in equal ratios up to the horizon.
-BEHIND, AHEAD = 40, 240
+#: Places of a path: evenly over what was measured, and then in equal ratios up to the horizon.
+_BEHIND, _AHEAD = 40, 240
 
 #: A known course of the quantity over ζ [k] that is no part of eq. 6, in the quantity's unit [k].
 Offset: TypeAlias = Callable[[FloatArray], FloatArray]
@@ -120,7 +118,7 @@ def paths(posterior: Posterior, progress: FloatArray, offset: Offset | None = No
 
 
 def bands(
-    posterior: Posterior, progress: FloatArray, quantiles: Sequence[float] = (0.05, 0.5, 0.95)
+    posterior: Posterior, progress: FloatArray, quantiles: Sequence[float] = BAND
 ) -> tuple[FloatArray, FloatArray]:
     """The mean of ξ at progress [k], and its quantiles [k, q]: what a plot of the course shows."""
     values = posterior.values(progress)
@@ -134,22 +132,27 @@ def _along_paths(posterior: Posterior, fraction: float, offset: Offset | None, h
     places = np.unique(
         np.concatenate(
             [
-                np.linspace(0.0, min(span, horizon), BEHIND),
-                np.geomspace(min(span, horizon), horizon, AHEAD),
+                np.linspace(0.0, min(span, horizon), _BEHIND),
+                np.geomspace(min(span, horizon), horizon, _AHEAD),
                 np.zeros(0) if beside is None else beside.at[beside.at <= horizon],
             ]
         )
     )
     values = paths(posterior, places, offset)
-    over = values - fraction * values[0]
-    below = over <= 0.0
+    return first_below(values - fraction * values[0], places, np.zeros(values.shape[1]))
+
+
+def first_below(paths: FloatArray, progress: FloatArray, level: FloatArray) -> FloatArray:
+    """The ζ [n] at which each path [k, n] over ascending progress [k] first comes down to its level [n], linear between
+    places; inf where it never does."""
+    below = paths <= level
     first = below.argmax(axis=0)
-    draws = np.arange(first.size)
     before = np.maximum(first - 1, 0)
-    high, low = over[before, draws], over[first, draws]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(first > 0, high / (high - low), 0.0)
-    crossed = places[before] + share * (places[first] - places[before])
+    draws = np.arange(paths.shape[1])
+    high, low = paths[before, draws], paths[first, draws]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.where(first > 0, (high - level) / (high - low), 0.0)
+    crossed = progress[before] + share * (progress[first] - progress[before])
     return np.where(below.any(axis=0), crossed, np.inf)
 
 

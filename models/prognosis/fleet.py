@@ -27,6 +27,7 @@ from scipy.optimize import brentq
 from scipy.special import gammaln, log_expit, logsumexp
 
 from models.arrays import FloatArray
+from models.prognosis.criteria import DOUBT, FEWEST_TESTS_TO_LEARN, HYPER_CENTRE, HYPER_CLUTCHES, HYPER_SD, TRUST, WIDER
 from models.tracking.criteria import REACH
 from models.tracking.discrepancy import Discrepancy
 from models.tracking.filters.grid import Grid
@@ -34,18 +35,8 @@ from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior, weak
 
-#: A clutch with fewer tests than this says too little to teach anything.
-FEWEST_TESTS = 6
-#: The hyperprior: the deviations of x among clutches of one kind, how many clutches that is worth, and how many the centre
-#: of the weak prior is worth as the population's mean.
-HYPER_SD = np.array([0.15, 0.6, 0.4, 0.5])
-HYPER_CLUTCHES, HYPER_CENTRE = 6.0, 0.03
-#: A fleet of n has the share TRUST n/(n + DOUBT) of the mixture: most of it stays weak, for the evidence soon speaks for a
-#: fleet that is right, and slowly against one that is wrong.
-TRUST, DOUBT = 0.25, 3.0
-#: A filter runs under a normal that is wider than the population by this factor: a clutch at the edge of its fleet must not
-#: lie at the edge of what the filter looks at, REACH deviations to either side. Beyond, it has no draws: log of nothing.
-WIDER, NEVER = 1.5, -700.0
+#: Log of nothing: the filter has no draws beyond REACH deviations of its prior.
+_NEVER = -700.0
 _DRAWS, _ROUNDS = 2000, 40
 _GRID = Grid()
 
@@ -103,7 +94,7 @@ class FleetPrior:
         drawn = pooled(under_weak, under_fleet)
         ours, theirs = weak(first, falling=True), self.prior_for(first)
         log_weak = _log_prior(drawn, ours)
-        lean = np.where(_within(drawn, theirs), _log_prior(drawn, theirs) - log_weak, NEVER)
+        lean = np.where(_within(drawn, theirs), _log_prior(drawn, theirs) - log_weak, _NEVER)
         split = under_weak.weight.size
         ratio = _log_evidence_ratio(lean[:split], under_weak.weight, lean[split:], under_fleet.weight)
         learned = self.log_density(_coordinates(drawn)) - np.log(np.abs(drawn.initial)) - log_weak
@@ -141,9 +132,9 @@ class Taught:
 
 
 def taught(history: Sequence[Measurement], seed: int = 0) -> Taught:
-    """What a clutch's measurements of mean COF say of x. Raises ValueError where there are fewer than FEWEST_TESTS."""
-    if len(history) < FEWEST_TESTS:
-        raise ValueError(f"a clutch needs {FEWEST_TESTS} tests to teach a fleet's prior, got {len(history)}")
+    """What a clutch's measurements of mean COF say of x. Raises ValueError below FEWEST_TESTS_TO_LEARN of them."""
+    if len(history) < FEWEST_TESTS_TO_LEARN:
+        raise ValueError(f"a clutch needs {FEWEST_TESTS_TO_LEARN} tests to teach a fleet's prior, got {len(history)}")
     prior = weak(history[0], falling=True)
     drawn = _GRID.posterior(_GRID.from_history(prior, history), _DRAWS, np.random.default_rng(seed))
     sound = drawn.initial > 0.0
@@ -155,15 +146,15 @@ def taught(history: Sequence[Measurement], seed: int = 0) -> Taught:
 def learn(histories: Sequence[Sequence[Measurement]]) -> FleetPrior:
     """The population behind clutches of one kind, each by its measurements of mean COF in order.
 
-    Those with fewer than FEWEST_TESTS measurements are left out. Raises ValueError where none is left.
+    Those with fewer than FEWEST_TESTS_TO_LEARN measurements are left out. Raises ValueError where none is left.
     """
-    return population([taught(history) for history in histories if len(history) >= FEWEST_TESTS])
+    return population([taught(history) for history in histories if len(history) >= FEWEST_TESTS_TO_LEARN])
 
 
 def population(fleet: Sequence[Taught]) -> FleetPrior:
     """The population behind what clutches have taught. Raises ValueError where there are none."""
     if not fleet:
-        raise ValueError(f"a fleet needs a clutch with {FEWEST_TESTS} tests or more")
+        raise ValueError(f"a fleet needs a clutch with {FEWEST_TESTS_TO_LEARN} tests or more")
     centre = weak(Measurement(progress=0.0, value=1.0, variance=0.0), falling=True)
     believed = np.array([centre.change_mean, centre.log_scale_mean, centre.log_exponent_mean, centre.log_scatter_mean])
     learned = FleetPrior(

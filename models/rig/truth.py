@@ -22,7 +22,7 @@ from scipy.optimize import brentq
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.degradation.general_order import Degradation, value
-from models.engagements.simulation import Capacity
+from models.engagements.capacity import Capacity
 from models.friction.pressure_laws import AsymptoticLaw, LinearLaw
 from models.friction.speed_protocol import REFERENCE_SPEEDS
 from models.friction.stribeck import StribeckParameters, torque

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from typing import Any
 
-from models.prognosis.first_passage import HORIZON, QUANTILES, FirstPassage
+from models.prognosis.criteria import HORIZON, QUANTILES
+from models.prognosis.first_passage import FirstPassage
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Basis
 from service.lives.history import Series
 from service.lives.receipt import bar

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from models.prognosis.first_passage import HORIZON, Offset, predict_first_passage
+from models.prognosis.criteria import FEWEST_TESTS, HORIZON
+from models.prognosis.first_passage import Offset, predict_first_passage
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.filters.particle import Particle, ParticleState
 from models.tracking.filters.ukf import Ukf, UkfState
@@ -26,8 +27,6 @@ from service.lives.surprise import off_track
 
 FilterState = ParticleState | UkfState | GridState
 
-#: Eq. 6 has four coefficients; from fewer tests at different cycles nothing is foretold.
-FEWEST_TESTS = 3
 _DRAWS = 1000
 _GRID = Grid()
 _TRACKERS: Mapping[str, Tracker[Any]] = {tracker.name: tracker for tracker in (Particle(), Ukf(), _GRID)}

@@ -5,7 +5,7 @@ from typing import Any
 
 from sqlalchemy import Connection
 
-from models.friction.fit_uncertainty import Z90
+from models.friction.criteria import Z90
 from models.friction.pressure_laws import LinearLaw, PressureLaws, fit_pressure_laws
 from service import records
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, basis_of

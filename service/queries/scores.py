@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from models.prognosis import scoring
-from models.prognosis.first_passage import HORIZON, QUANTILES
+from models.prognosis.criteria import HORIZON, QUANTILES
 from service import records
 from service.lives.assumptions import ALL_PRESSURES, Basis, basis_of
 from service.lives.history import Event, Life, lives

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from fastapi import Depends, Query, Request
 
-from models.prognosis.first_passage import HORIZON
+from models.prognosis.criteria import HORIZON
 from service.errors import FieldError, InvalidError
 from service.jobs.queue import Worker
 from service.queries.views import Remembered

@@ -15,7 +15,7 @@ from sqlalchemy import Connection
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.diagnosis.extension import Extension
-from models.prognosis.first_passage import HORIZON
+from models.prognosis.criteria import HORIZON
 from service import records
 from service.errors import NotFoundError, NothingToAdoptError
 from service.lives.adopted_model import BASELINE, Adopted, Course

@@ -11,7 +11,8 @@ from typing import Any
 
 from sqlalchemy import Connection
 
-from models.prognosis.fleet import FEWEST_TESTS, FleetPrior, Taught, population, taught
+from models.prognosis.criteria import FEWEST_TESTS_TO_LEARN
+from models.prognosis.fleet import FleetPrior, Taught, population, taught
 from service import records
 from service.lives.assumptions import ALL_PRESSURES, Basis, basis_of, kind_of
 from service.lives.history import Life, lives
@@ -86,7 +87,7 @@ def _lessons(connection: Connection, clutch_id: str) -> tuple[Json, list[Taught]
 def _lesson(life: Life, basis: Basis) -> Taught | None:
     """What a life teaches, its ζ counted in standard cycles; None where it was tested too little."""
     series = life.pooled(basis)
-    if len(series.measurements) < FEWEST_TESTS:
+    if len(series.measurements) < FEWEST_TESTS_TO_LEARN:
         return None
     unit = series.scale.severity.unit
     return taught([replace(each, progress=each.progress * unit) for each in series.measurements])

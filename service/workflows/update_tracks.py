@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection
 
-from models.prognosis.first_passage import HORIZON
+from models.prognosis.criteria import HORIZON
 from models.tracking.filters.particle import ParticleState
 from models.tracking.filters.ukf import UkfState
 from service import records

@@ -140,7 +140,7 @@ def unscaled(prior: Prior, state: FloatArray) -> FloatArray:
 
 
 def scatter_learnt(prior: Prior, scatter: FloatArray, squared: float, variance: float, sound: float) -> FloatArray:
-    """Variance and worth of the scatter after an innovation, `squared` in its deviations; `variance` in the prior's units."""
+    """Variance and worth of the scatter after a `squared` innovation in its deviations; `variance` in prior's units."""
     scatter_variance, worth = scatter.tolist()
     share = scatter_variance / (variance * prior.initial_sd**2)
     learnt = scatter_variance * (1.0 + sound * share * (min(squared, OUTLIER**2) - 1.0) / (worth + sound))

@@ -131,3 +131,13 @@ def record(
         keep = rng.random(p.size) >= lost
         time, p, speed, m = time[keep], p[keep], speed[keep], m[keep]
     return Record(time=time, pressure=p, speed=speed, torque=m)
+
+
+#: A fine clock over two periods of the swing, of which the last is taken.
+FINE = np.linspace(-10.0, 10.0, 20_001)
+PERIOD = slice(10_000, None)
+
+
+def dense_area(torque: np.ndarray) -> float:
+    """Eq. 8 by trapezoids over the last period of FINE."""
+    return float(np.trapezoid(torque[PERIOD], velocity(FINE)[PERIOD]))

@@ -14,6 +14,7 @@ from models.prognosis.first_passage import (
     PassageStatus,
     bands,
     ends_of_life,
+    first_below,
     predict_first_passage,
     weighted_quantiles,
 )
@@ -213,3 +214,10 @@ def test_a_horizon_before_now_is_now() -> None:
     passage = predict_first_passage(sample([-1.0]), fraction=0.5, as_of=2_000.0, horizon=500.0)
     assert passage.probability_of_reaching == 1.0
     assert passage.end_of_life[0.5] == pytest.approx(1_000.0)
+
+
+def test_first_below_is_straight_between_places_and_inf_where_never() -> None:
+    paths = np.array([[1.0, 0.4, 1.0], [0.6, 0.3, 0.9], [0.2, 0.1, 0.8]])
+    found = first_below(paths, np.array([0.0, 10.0, 30.0]), np.full(3, 0.5))
+    assert found[:2] == pytest.approx([15.0, 0.0])
+    assert np.isinf(found[2])

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from models.degradation.general_order import Degradation, value
+from models.prognosis.criteria import FEWEST_TESTS_TO_LEARN
 from models.prognosis.first_passage import ends_of_life
-from models.prognosis.fleet import FEWEST_TESTS, FleetPrior, learn, pooled
+from models.prognosis.fleet import FleetPrior, learn, pooled
 from models.prognosis.scoring import crps_of_sample
 from models.tracking import linear_model
 from models.tracking.filters.grid import Grid
@@ -70,8 +71,8 @@ def test_it_survives_json_and_counts_in_other_units() -> None:
 
 def test_too_few_tests_teach_nothing() -> None:
     rng = np.random.default_rng(4)
-    with pytest.raises(ValueError, match=f"{FEWEST_TESTS} tests or more"):
-        learn([measured(life(rng, 5000.0), 9000.0, FEWEST_TESTS - 1, rng)])
+    with pytest.raises(ValueError, match=f"{FEWEST_TESTS_TO_LEARN} tests or more"):
+        learn([measured(life(rng, 5000.0), 9000.0, FEWEST_TESTS_TO_LEARN - 1, rng)])
 
 
 def crps(posterior: Posterior, truth: float) -> float:
