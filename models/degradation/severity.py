@@ -1,14 +1,14 @@
-"""Severity: what a clutch has been through, as cycles, as sliding distance or as dissipated energy.
+"""Severity: what a clutch has been through, counted as cycles, as sliding distance or as dissipated energy.
 
 Eq. 6 is general-order kinetics, dD/dζ = -k Dⁿ, and the severity of the load enters through the rate k. A block of duty whose
 cycles are w times as severe as a reference cycle therefore counts w times:
 
     ζ(N) = ∫ (w(n)/w_ref)^q dn
 
-with N the duty cycles, w the sliding distance or the energy [J] of one cycle and q an exponent. The distance is told as
-an angle [rad]: the mean radius, the same in all of a clutch's cycles, cancels. ζ stays in cycles: in
-cycles of the first block that says its severity. It is piecewise linear; beyond the last block it goes on as recent duty
-did, and so remaining cycles are cycles of recent duty.
+with N the duty cycles, w the sliding distance or the energy [J] of one cycle and q an exponent. The distance is given as
+an angle [rad]: the mean radius, the same in all of a clutch's cycles, cancels. ζ is still counted in cycles, those of the
+first block that states its severity. It is piecewise linear; beyond the last block it continues at the rate of recent
+duty, and so remaining cycles are cycles of recent duty.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, eq. 6; J. F. Archard, J. Appl. Phys. 24 (1953) 981-988, for
 wear by work done.
@@ -49,7 +49,7 @@ _STANDARD = {SeverityBasis.DISSIPATED_ENERGY: STANDARD_ENERGY, SeverityBasis.SLI
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Block:
-    """Duty cycles that end at `end` cycles; the energy [J] of one, its initial speed [rad/s] and duration [s] where told.
+    """Duty cycles that end at `end` cycles; the energy [J] of one, its initial speed [rad/s] and duration [s] where stated.
 
     Raises ValueError where `cycles` is not positive or another number is negative or not finite.
     """
@@ -73,9 +73,9 @@ class Block:
         return replace(self, end=self.end - origin)
 
     def work(self, basis: SeverityBasis) -> float | None:
-        """The energy [J] or the slid angle [rad] of one cycle; None where the block does not say it.
+        """The energy [J] or the slid angle [rad] of one cycle; None where the block does not state it.
 
-        The speed falls evenly to rest, so the angle is ω t/2, with t = ω/DECELERATION where it is not told.
+        The speed falls evenly to rest, so the angle is ω t/2, with t = ω/DECELERATION where it is not stated.
         """
         if basis is SeverityBasis.DISSIPATED_ENERGY:
             return self.energy
@@ -126,9 +126,9 @@ IDENTITY = SeverityMap(cycles=np.zeros(1), zeta=np.zeros(1), rate=1.0)
 
 
 def severity_map(severity: Severity, blocks: Sequence[Block]) -> SeverityMap:
-    """ζ over cycles for blocks in any order; cycles that no block tells of are as severe as the rest on average.
+    """ζ over cycles for blocks in any order; cycles that no block covers are as severe as the rest on average.
 
-    Where blocks overlap the one that ends first counts. The identity where ζ counts cycles, or no block says its severity.
+    Where blocks overlap the one that ends first counts. The identity where ζ counts cycles, or no block states its severity.
     """
     if severity.basis is SeverityBasis.CYCLES:
         return IDENTITY
@@ -154,7 +154,7 @@ def severity_map(severity: Severity, blocks: Sequence[Block]) -> SeverityMap:
 
 
 def _pieces(ordered: Sequence[Block], works: Sequence[float | None]) -> list[tuple[float, float | None]]:
-    """Lengths [cycles] and works from 0 to the end of the last block, without overlaps; None where nothing is said."""
+    """Lengths [cycles] and works from 0 to the end of the last block, without overlaps; None where no severity is stated."""
     pieces: list[tuple[float, float | None]] = []
     reached = 0.0
     for block, work in zip(ordered, works, strict=True):

@@ -3,12 +3,12 @@
 The estimate is the global optimum of eq. 4 (see `friction.variable_projection`), weighted by 1/torque_sd where that is
 given.
 
-How uncertain it is, and how that was decided, stands in `friction.fit_uncertainty`: the covariance is always finite, and
-estimate ± 1.645 standard errors holds the truth in 90 % of tests for every parameter that is not called undetermined.
+Its uncertainty is computed in `friction.fit_uncertainty`: the covariance is always finite, and estimate ± 1.645 standard
+errors holds the truth in 90 % of tests for every parameter that is not called undetermined.
 
-Where the optimum has M_s = 0 with M_s M̄_c finite (a torque that only rises), M_s is put at a millionth of the torque,
-so that M̄_c exists and the curve is right to a millionth; M̄_c is then called undetermined. Where V_S does not matter to
-the fit it is the one in the middle of the speeds, and a single speed is answered with a constant torque.
+Where the optimum has M_s = 0 with M_s M̄_c finite (a torque that only rises), M_s is set to a millionth of the torque,
+so that M̄_c exists and the curve is right to a millionth; M̄_c is then called undetermined. Where V_S has no influence on
+the fit it is set to the middle of the speeds, and a single speed is fitted by a constant torque.
 """
 
 import math
@@ -26,14 +26,14 @@ from models.friction.stribeck import GAMMA, PARAMETER_NAMES, STANDSTILL, Stribec
 from models.friction.variable_projection import Problem, Profile, make_problem, minimise
 from models.records.runs import Curve
 
-#: Points that are fitted at once, which bounds the memory of a scan.
+#: Points that are fitted at once: this bounds the memory of a scan.
 _BATCH = 20_000
-#: Torques or speeds beyond any sense can overflow a variance: it is cut here.
+#: Absurd torques or speeds can overflow a variance: it is cut here.
 _LARGEST = 1e300
 
 
 class FitStatus(StrEnum):
-    """DETERMINED; AT_BOUND: a parameter is zero; UNDETERMINED: the data do not tell some parameters."""
+    """DETERMINED; AT_BOUND: a parameter is zero; UNDETERMINED: the data do not determine some of them."""
 
     DETERMINED = "determined"
     AT_BOUND = "at_bound"
@@ -82,11 +82,11 @@ class _Folded:
 
 
 def fit_curves(curves: Sequence[Curve]) -> tuple[StribeckFit, ...]:
-    """Eq. 4-5 for every curve: the global optimum with all four parameters >= 0, its covariance and what it is worth.
+    """Eq. 4-5 for every curve: the global optimum with all four parameters >= 0, its covariance and status.
 
     Velocity [n] m/s of either sign (the model is odd: folded by the sign bit), torque [n] Nm, n >= 1.
     Raises ValueError where a curve is empty, has unequal lengths, a value that is not finite, or torque_sd <= 0;
-    numerically hard input is answered with a status.
+    numerically hard input gets a status.
     """
     folded = [_fold(curve) for curve in curves]
     fits: list[StribeckFit] = []
@@ -232,7 +232,7 @@ def _describe(
 
 
 def _undetermined(folded: _Folded, too_wide: NDArray[np.bool_]) -> tuple[str, ...]:
-    """Names by the width of their uncertainty; with fewer than four speeds all, but M_s where it is seen at rest."""
+    """Names by the width of their uncertainty; with fewer than four speeds all, except M_s where it was measured at rest."""
     few = folded.distinct < len(PARAMETER_NAMES)
     seen_at_rest = bool((folded.speed == 0).any())
     return tuple(
@@ -253,7 +253,7 @@ def _message(folded: _Folded, undetermined: tuple[str, ...], at_zero: tuple[str,
     parts = []
     if undetermined and folded.distinct < len(PARAMETER_NAMES):
         parts.append(
-            f"{folded.distinct} distinct speeds cannot tell four parameters apart: {', '.join(undetermined)} undetermined."
+            f"{folded.distinct} distinct speeds cannot determine four parameters: {', '.join(undetermined)} undetermined."
         )
     elif undetermined:
         parts.append(f"The measured speeds and torques do not determine {', '.join(undetermined)}.")

@@ -3,10 +3,10 @@
     M_s, V_S, C_v = α + β p          M̄_c = c_∞ + a e^{-p/p_0},   a, c_∞ >= 0,  p_0 > 0
 
 Weighted least squares through the parameters of one test's pressures, each with the variance of its fit. Given p_0 the
-falling law is linear in a and c_∞, so a search over p_0 alone finds the optimum.
+falling law is linear in a and c_∞, so a search over p_0 alone gives the optimum.
 
-Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, fig. 9 and section 3.1.2, which names the shapes and not
-the formula of the falling one.
+Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, fig. 9 and section 3.1.2, which gives the shapes but no
+formula of the falling one.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from models.friction.criteria import FEWEST_PRESSURES
 from models.friction.identification import StribeckFit
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
 
-#: The decay p_0 is looked for between these multiples of the pressures' range.
+#: The decay p_0 is sought between these multiples of the pressures' range.
 _DECAYS = np.geomspace(0.05, 20.0, 41)
 
 
@@ -135,6 +135,6 @@ def _determined(fits: Sequence[StribeckFit], index: int) -> tuple[FloatArray, Fl
     usable = [fit for fit in fits if PARAMETER_NAMES[index] not in fit.undetermined]
     value = np.array([fit.parameters.as_array()[index] for fit in usable])
     deviation = np.array([fit.standard_errors[index] for fit in usable])
-    # the fits of noiseless data must not weigh without bound, nor divide by zero
+    # the weights of noiseless fits must stay finite
     least = max(1e-6 * float(np.abs(value).max(initial=0.0)), 1e-100)
     return np.array([fit.pressure for fit in usable]), value, np.maximum(deviation, least)

@@ -1,7 +1,7 @@
 """The speeds over which a mean is taken, so that a missing or repeated plateau does not shift it.
 
 The reference steps 20 to 1970 rpm by 50 rpm at every pressure (section 2.3.3). A mean over the fitted curve at these
-speeds is a property of the clutch; a mean over whatever rows arrived is not.
+speeds is a property of the clutch; a mean over the rows of one test is not.
 """
 
 import math

@@ -29,7 +29,7 @@ from models.records.runs import Record
 
 class LoopStatus(StrEnum):
     """DETERMINED, UNRESOLVED, AGAINST_THE_LAW are the attractor's; NO_CURVE: no stationary curve at this pressure;
-    REVERSES: the speed changes sign, which the laws leave to others; NO_PERIOD: nothing closed to be evaluated."""
+    REVERSES: the speed changes sign, which the laws do not describe; NO_PERIOD: no whole period."""
 
     DETERMINED = "determined"
     UNRESOLVED = "unresolved"
@@ -43,9 +43,10 @@ class LoopStatus(StrEnum):
 class Loop:
     """One pressure of a dynamic test. `pressure` [Pa] names the level, `mean_pressure` [Pa] was measured.
 
-    frequency [Hz], periods, area and area_sd [Nm m/s] are None, 0, None and None where nothing closed. attractor C
-    [Nm/s] and film_time τ_1 [s] with deviations and 90 % intervals (an end None: no bound) are None where the record
-    cannot tell; `better_law` is "attractor", "squeeze film" or None where neither stands out. `message` is a sentence.
+    frequency [Hz], periods, area and area_sd [Nm m/s] are None, 0, None and None where there is no whole period. attractor
+    C [Nm/s] and film_time τ_1 [s] with deviations and 90 % intervals (an end None: no bound) are None where the record does
+    not determine them; `better_law` is "attractor", "squeeze film" or None where neither is clearly better. `message` is a
+    sentence.
     """
 
     pressure: float
@@ -69,10 +70,10 @@ class Loop:
 def evaluate_loops(
     record: Record, geometry: Geometry, stationary: Mapping[float, StationaryCurve] | None
 ) -> tuple[Loop, ...]:
-    """A loop for each stretch of constant pressure, in the record's order; empty where the pressure never stands.
+    """A loop for each stretch of constant pressure, in the record's order; empty where the pressure is never constant.
 
-    `stationary` maps pressure levels [Pa] to the state's stationary curves, whose covariance becomes part of what is said
-    of the lag: the nearest within a level's width is taken; without one there is area and direction and no lag. Times that
+    `stationary` maps pressure levels [Pa] to the state's stationary curves, whose covariance contributes to the lag's
+    deviation: the nearest within a level's width is taken; without one there is area and direction and no lag. Times that
     fall are put in order.
     """
     order = np.argsort(record.time, kind="stable")
@@ -102,7 +103,7 @@ def _loop(
     torque: FloatArray,
     curve: StationaryCurve | None,
 ) -> Loop:
-    if np.median(velocity) < 0:  # the same swing from the other side: the model is odd, the area keeps
+    if np.median(velocity) < 0:  # the same swing in the other direction: the model is odd, the area unchanged
         velocity, torque = -velocity, -torque
     cycle = fit_cycle(time, velocity)
     samples = None if isinstance(cycle, str) else clean_samples(cycle, time, torque)
@@ -181,7 +182,7 @@ def _message(status: LoopStatus, area: Area, attractor: LagFit | None, film: Lag
         LoopStatus.DETERMINED: "The attractor is determined.",
         LoopStatus.UNRESOLVED: "The record shows no lag by the attractor law beyond its noise: C is bounded from below.",
         LoopStatus.AGAINST_THE_LAW: "Torque lags against what the attractor law can give on this stationary curve.",
-        LoopStatus.NO_CURVE: "No stationary curve of such torque is known at this pressure: the lag laws were not fitted.",
+        LoopStatus.NO_CURVE: "There is no stationary curve of such torque at this pressure: the lag laws were not fitted.",
         LoopStatus.REVERSES: "The speed changes sign: the lag laws, which hold while sliding, were not fitted.",
         LoopStatus.NO_PERIOD: "",
     }[status]

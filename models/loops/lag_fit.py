@@ -1,19 +1,19 @@
 """How far friction lags, fitted to whole periods of a dynamic record given the stationary curve S.
 
-One number u is sought, 1/C [s/Nm] of the attractor law or τ_1 [s] of the squeezed film: the torque is nearly linear
-in it, so its likelihood is nearly normal, which that of C itself is not. With a gain, a zero and single-valued shapes
-beside it (`models.loops.lag_problem`), none of which has a loop area, u is judged by how the torque differs between
-accelerating and decelerating. u maximises the likelihood (the others are profiled out); its deviation comes from the
-curvature there, with the noise taken from the residual and raised where that is not white: what no u explains makes u
-less certain.
+One number u is estimated, 1/C [s/Nm] of the attractor law or τ_1 [s] of the squeezed film: the torque is nearly linear
+in it, so its likelihood is nearly normal, which that of C itself is not. Beside it a gain, a zero and single-valued shapes
+are fitted (`models.loops.lag_problem`), none of which has a loop area, so that u follows from how the torque differs
+between accelerating and decelerating. u maximises the likelihood (the others are profiled out); its deviation comes from
+the curvature there, with the noise taken from the residual and raised where that is not white: what no u explains makes
+u less certain.
 
-The curve's own error is part of it: the lag is S S' v̇/C, so that C is off by 9 to 18 % with M̄_c 2 % off, by up to 3 %
+The curve's own error contributes: the lag is S S' v̇/C, so that C is off by 9 to 18 % with M̄_c 2 % off, by up to 3 %
 with V_S 5 % off, by up to 5 % with C_v 5 % off. u's gradient by the four parameters, each from one Gauss-Newton step at a
 curve moved by a little, carries their covariance (delta method). To first order u is a measured loop over S S' v̇², noisy
 both: its interval is Fieller's, |û - u| <= 1.645 √(n² + u² r²) with n the noise's deviation and r the curve's share, which
 is open at the top where the curve's slope might be none.
 
-By scaling, a torque g S is followed at C when S is followed at C/g: the attractor told is g/u.
+By scaling, a torque g S is followed at C when S is followed at C/g: the attractor reported is g/u.
 """
 
 import math
@@ -48,7 +48,7 @@ class LagStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StationaryCurve:
-    """The curve that torque lags behind, and its covariance [4, 4] as `StribeckFit` has it; none where it is exact."""
+    """The curve that torque lags behind, and its covariance [4, 4] as in `StribeckFit`; zero where it is exact."""
 
     parameters: StribeckParameters
     covariance: FloatArray = field(default_factory=lambda: np.zeros((4, 4)))
@@ -106,15 +106,15 @@ def fit_lag(law: Law, cycle: Cycle, phase: FloatArray, measured: FloatArray, cur
     """
     posed = _posed(law, cycle, phase, measured, curve.parameters)
     scanned = posed.course.at(law.lags, posed.problem.phase)
-    misses = [posed.problem.miss(row) for row in scanned]
-    best = int(np.argmin(misses))
+    misfits = [posed.problem.misfit(row) for row in scanned]
+    best = int(np.argmin(misfits))
     none, first = posed.near_none(scanned[0])
     if first < -AGAINST * none or (best == 0 and first <= Z90 * none):
         slant = _by_curve(lambda moved: _posed(law, cycle, phase, measured, moved).near_none()[1], curve)
         estimate = _Estimate(first, none, slant)
         status = LagStatus.AGAINST_THE_LAW if first < -AGAINST * estimate.sd else LagStatus.UNRESOLVED
         return _result(posed.problem, torque(posed.problem.speed, curve.parameters), None, estimate, status)
-    lag = _refine(posed.problem, posed.course, law.lags, misses, best)
+    lag = _refine(posed.problem, posed.course, law.lags, misfits, best)
     middle, change = posed.about(lag)
     sd, gain = posed.problem.deviation(middle, change, lag, cycle, law.scaled)
     share = 1 / gain if law.scaled else 1.0
@@ -237,23 +237,23 @@ class _Course:
         return np.asarray(courses[:, cell] * (1 - part) + courses[:, cell + 1] * part, dtype=np.float64)
 
 
-def _refine(problem: LagProblem, course: _Course, lags: FloatArray, misses: list[float], best: int) -> float:
+def _refine(problem: LagProblem, course: _Course, lags: FloatArray, misfits: list[float], best: int) -> float:
     """The minimum about the best of the scan, in log u: three finer scans, each a ninth of the last, and a parabola."""
     low = math.log(lags[max(best - 1, 0)])
     high = math.log(lags[min(best + 1, lags.size - 1)])
     optimum = math.log(lags[best])
-    least = misses[best]
+    least = misfits[best]
     for _ in range(3):
         points = np.linspace(low, high, 9)
-        values = np.array([problem.miss(row) for row in course.at(np.exp(points), problem.phase)])
+        values = np.array([problem.misfit(row) for row in course.at(np.exp(points), problem.phase)])
         i = int(np.argmin(values))
         if values[i] <= least:
             optimum, least = float(points[i]), float(values[i])
         width = (high - low) / 8
         if 0 < i < 8:
             left, here, right = values[i - 1 : i + 2]
-            bend = left - 2 * here + right
-            if bend > 0:
-                optimum = float(points[i] + 0.5 * width * (left - right) / bend)
+            curvature = left - 2 * here + right
+            if curvature > 0:
+                optimum = float(points[i] + 0.5 * width * (left - right) / curvature)
         low, high = optimum - width, optimum + width
     return math.exp(optimum)

@@ -1,9 +1,9 @@
-"""The least squares of a lag, given the stationary curve S: what is absorbed, what is left, and how noisy that is.
+"""The least squares of a lag, given the stationary curve S: what is absorbed, the residual, and how noisy that is.
 
     M_i = g m(θ_i; u) + m_0 + Σ_h e_h T_h(v_i) + noise
 
-g, within 5 % of 1, and m_0 are the sensor's and the day's; the T_h are single-valued functions of speed, orthogonal to S
-and 1, and take what S has wrong in shape. None of them has a loop area. `models.loops.lag_fit` seeks u.
+g, within 5 % of 1, and m_0 are gain and zero of the sensor that day; the T_h are single-valued functions of speed,
+orthogonal to S and 1, and absorb errors of S in shape. None of them has a loop area. `models.loops.lag_fit` estimates u.
 """
 
 import math
@@ -38,14 +38,14 @@ class LagProblem:
         weight = (self.noise / GAIN_SD) ** 2
         return float((left @ self.left + weight) / (left @ left + weight))
 
-    def miss(self, course: FloatArray) -> float:
+    def misfit(self, course: FloatArray) -> float:
         """-2 log likelihood x noise², profiled over gain, zero and shapes."""
         left = self.without(course)
         gain = self.gain(left)
         return float(np.square(self.left - gain * left).sum() + ((gain - 1) * self.noise / GAIN_SD) ** 2)
 
     def linear(self, still: FloatArray, little: FloatArray, lag: float) -> tuple[float, float]:
-        """Deviation and estimate of u by linearising about no lag: tells its sign."""
+        """Deviation and estimate of u by linearising about no lag: it gives the sign."""
         base = self.without(still)
         change = self.without((little - still) / lag)
         gain = self.gain(base)
@@ -78,7 +78,7 @@ class LagProblem:
         return math.hypot(math.sqrt(along_variance), self._by_phase(slope, course, gain, cycle)), gain
 
     def _by_phase(self, slope: FloatArray, course: FloatArray, gain: float, cycle: Cycle) -> float:
-        """What the speed's own noise adds: a phase that is wrong makes a loop of a curve."""
+        """The part of the speed's own noise: an error of the phase opens a curve into a loop."""
         order = np.argsort(np.mod(self.phase, 2 * math.pi))
         turned = np.empty_like(course)
         turned[order] = np.gradient(course[order], np.maximum.accumulate(_spread(self.phase[order])))

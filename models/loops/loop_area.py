@@ -75,7 +75,7 @@ def measured_area(cycle: Cycle, time: FloatArray, torque: FloatArray) -> Area:
 
 
 def clean_samples(cycle: Cycle, time: FloatArray, torque: FloatArray) -> Samples:
-    """Those of torque [n] Nm at time [n] s (ascending) within the whole periods, without outliers from the loop."""
+    """The samples of torque [n] Nm at time [n] s (ascending) within the whole periods, without outliers from the loop."""
     inside = (time >= cycle.start) & (time < cycle.stop)
     phase, measured = cycle.phase(time[inside]), torque[inside]
     keep = np.ones(phase.size, dtype=np.bool_)

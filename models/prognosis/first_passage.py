@@ -1,10 +1,10 @@
-"""Remaining useful life: when a quantity first passes the threshold, with the uncertainty of everything that decides it.
+"""Remaining useful life: when a quantity first passes the threshold, with the uncertainty of everything it depends on.
 
 The criterion is ξ(ζ) <= fraction · ξ0, with ξ0 the value at ζ = 0. Each draw of the coefficients has its own ξ0,
 hence its own threshold. Eq. 6 alone passes it in closed form, and saturates: a draw whose ξ0 + Δ stays above its
 threshold never gets there. With a discrepancy beside eq. 6, or a known further course of the quantity, the first
-passage is found along the draw's path. How probable it is to get there, is an answer; a quantile that lies beyond the
-horizon is None, never an infinity.
+passage is computed along the draw's path. The probability of getting there is part of the result; a quantile that lies
+beyond the horizon is None, never an infinity.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,7 +22,7 @@ from models.tracking.posterior import Posterior
 #: Places of a path: evenly over what was measured, and then in equal ratios up to the horizon.
 _BEHIND, _AHEAD = 40, 240
 
-#: A known course of the quantity over ζ [k] that is no part of eq. 6, in the quantity's unit [k].
+#: A given course over ζ [k] that is added to eq. 6, in the quantity's unit [k].
 Offset: TypeAlias = Callable[[FloatArray], FloatArray]
 
 
@@ -95,7 +95,7 @@ def ends_of_life(
 ) -> FloatArray:
     """The ζ [n] at which each draw first has ξ(ζ) <= fraction · ξ0; inf where it never has.
 
-    Of a draw that has a discrepancy, or with an offset, only what happens up to the horizon is known.
+    Of a draw that has a discrepancy, or with an offset, only passages up to the horizon are computed.
     """
     threshold = fraction * posterior.initial
     crossing = general_order.first_passage(threshold, posterior.degradation)

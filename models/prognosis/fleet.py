@@ -1,16 +1,16 @@
-"""What a fleet of earlier lives says of the next one: the population of eq. 6's coefficients, learned by empirical Bayes.
+"""What a fleet of earlier lives says about the next: the population of eq. 6's coefficients, learned by empirical Bayes.
 
 Each clutch of a fleet has x = (Δ/ξ0, log φ, log ε, log s/ξ0), drawn from a normal population N(μ, Σ). None of them is
 known exactly, so each clutch gives a weighted sample of its posterior under the weak prior, and an
-expectation-maximisation goes to and fro between the clutches' moments given the population (the samples, weighted by
+expectation-maximisation alternates between the clutches' moments given the population (the samples, weighted by
 population over weak prior) and the population given those moments. The hyperprior, normal-inverse-Wishart, stands for
-clutches that differ by 0.15 in Δ/ξ0 and about half in φ, ε and s: it decides where the fleet is small, and is soon
-forgotten. What is foretold of the next clutch is then Student's t.
+clutches that differ by 0.15 in Δ/ξ0 and about half in φ, ε and s: it decides where the fleet is small, and loses weight
+quickly as the fleet grows. The prediction for the next clutch is then Student's t.
 
 A clutch may be of another kind than its fleet. The prior is therefore a mixture, `share` of the learned population and the
 rest weak, and the clutch's own measurements decide between them. A filter runs under the weak prior and under the normal
-nearest to the population; the two samples are put together with the weights that make them one sample of the posterior
-under the mixture. Only the ratio of the two evidences is needed for that, and the samples tell it themselves (Bennett).
+nearest to the population; the two samples are combined with the weights that make them one sample of the posterior under
+the mixture. This needs only the ratio of the two evidences, which is estimated from the samples (Bennett).
 
 Sources: B. P. Carlin, T. A. Louis, Bayesian Methods for Data Analysis (2008) ch. 5, for empirical Bayes; C. H. Bennett,
 J. Comput. Phys. 22 (1976) 245-268, and M. R. Shirts, J. D. Chodera, J. Chem. Phys. 129 (2008) 124105, for the weights.
@@ -35,7 +35,7 @@ from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior, weak
 
-#: Log of nothing: the filter has no draws beyond REACH deviations of its prior.
+#: The logarithm of a vanishing density: the filter has no draws beyond REACH deviations of its prior.
 _NEVER = -700.0
 _DRAWS, _ROUNDS = 2000, 40
 _GRID = Grid()
@@ -43,7 +43,7 @@ _GRID = Grid()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FleetPrior:
-    """The population that `clutches` clutches taught: Student's t of x [4], `mean` [4], `scale` [4, 4] and `freedom` > 2.
+    """The population learned from `clutches` clutches: Student's t of x [4], `mean` [4], `scale` [4, 4] and `freedom` > 2.
 
     x is (Δ/ξ0, log φ, log ε, log s/ξ0), φ in cycles.
     """
@@ -125,14 +125,14 @@ class FleetPrior:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Taught:
-    """What one clutch says of x: a sample [n, 4] of its posterior, with the weak prior divided out of the weights."""
+    """What one clutch says about x: a sample [n, 4] of its posterior, with the weak prior divided out of the weights."""
 
     x: FloatArray
     log_weight: FloatArray
 
 
 def taught(history: Sequence[Measurement], seed: int = 0) -> Taught:
-    """What a clutch's measurements of mean COF say of x. Raises ValueError below FEWEST_TESTS_TO_LEARN of them."""
+    """What a clutch's measurements of mean COF say about x. Raises ValueError below FEWEST_TESTS_TO_LEARN of them."""
     if len(history) < FEWEST_TESTS_TO_LEARN:
         raise ValueError(f"a clutch needs {FEWEST_TESTS_TO_LEARN} tests to teach a fleet's prior, got {len(history)}")
     prior = weak(history[0], falling=True)
@@ -152,7 +152,7 @@ def learn(histories: Sequence[Sequence[Measurement]]) -> FleetPrior:
 
 
 def population(fleet: Sequence[Taught]) -> FleetPrior:
-    """The population behind what clutches have taught. Raises ValueError where there are none."""
+    """The population behind the samples of clutches. Raises ValueError where there are none."""
     if not fleet:
         raise ValueError(f"a fleet needs a clutch with {FEWEST_TESTS_TO_LEARN} tests or more")
     centre = weak(Measurement(progress=0.0, value=1.0, variance=0.0), falling=True)

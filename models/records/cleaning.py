@@ -1,8 +1,8 @@
-"""A raw record made fit to be cut: times in order, spikes taken out, and what was found said.
+"""Cleaning a raw record before it is cut: times in order, spikes removed, and notes of both.
 
-Recorders lose samples, swap or repeat neighbouring times and let a spike through now and then. Times that are slightly
-out of order are sorted; a clock that falls back further cannot be trusted and is refused. A spike is a few samples (up
-to 6 ms, at least three) that stand off the median of their surroundings by more than ten deviations of the noise.
+Recorders lose samples, swap or repeat neighbouring times and sometimes record a spike. Times that are slightly out of
+order are sorted; a clock that falls back further cannot be trusted and is refused. A spike is a few samples (up to 6 ms,
+at least three) that are off the median of their surroundings by more than ten deviations of the noise.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ _CHANNELS = ("pressure", "speed", "torque", "oil_temperature")
 
 
 class Sampled(Protocol):
-    """What a `Record` holds, in SI units; a channel may be made anew each time that it is asked for."""
+    """What a `Record` holds, in SI units; a channel may be computed anew at each access."""
 
     @property
     def time(self) -> FloatArray: ...
@@ -49,7 +49,7 @@ class Sampled(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cleaning:
-    """What is to be kept of a record: `rows` in order of time (None: all as they stand), its sampling period [s], notes."""
+    """What is kept of a record: `rows` in order of time (None: all, unchanged), its sampling period [s], notes."""
 
     rows: NDArray[np.intp] | None
     period: float
@@ -61,7 +61,7 @@ class Cleaning:
 
 
 def clean(record: Record) -> tuple[Record, float, tuple[Note, ...]]:
-    """The record with times in order and without spikes, its sampling period [s], and notes on what was found.
+    """The record with times in order and without spikes, its sampling period [s], and notes.
 
     Raises ValueError as `plan_cleaning` does.
     """
@@ -79,7 +79,7 @@ def clean(record: Record) -> tuple[Record, float, tuple[Note, ...]]:
 
 
 def plan_cleaning(record: Sampled) -> Cleaning:
-    """What is to be kept of a record that times be in order and spikes out; channels are looked at one by one.
+    """The rows of a record to keep, with times in order and without spikes; channels are examined one by one.
 
     Raises ValueError on fewer than 16 samples, values beyond ±1e15, times that do not advance, a clock that falls back,
     and samples that lie less than 1 µs or more than 10 s apart.
@@ -117,13 +117,13 @@ def _require_measurements(name: str, channel: FloatArray) -> None:
 
 
 def _in_order(time: FloatArray) -> tuple[NDArray[np.intp] | None, float, list[Note]]:
-    """The rows in order of time (None: as they stand), the sampling period [s], and notes."""
+    """The rows in order of time (None: unchanged), the sampling period [s], and notes."""
     order, notes = None, list[Note]()
     steps = np.diff(time)
     forward = steps[:: max(1, steps.size // SCALE_SAMPLES)]
     forward = forward[forward > 0]
     if forward.size == 0 or time.max() <= time.min():
-        raise ValueError(f"time must advance, but no sampled interval of the {time.size} samples does")
+        raise ValueError(f"time must advance, but no interval of the {time.size} samples does")
     period = float(np.median(forward))
     swapped = int(np.count_nonzero(steps < 0))
     if swapped:
@@ -131,8 +131,8 @@ def _in_order(time: FloatArray) -> tuple[NDArray[np.intp] | None, float, list[No
         worst = int(fallback.argmax())
         if fallback[worst] > max(LARGEST_SWAP, 10 * period):
             raise ValueError(
-                f"time must run forwards, but time[{worst}] = {time[worst]} s lies {fallback[worst]:.6g} s before a "
-                "sample that stands earlier in the record"
+                f"time must run forwards, but time[{worst}] = {time[worst]} s lies {fallback[worst]:.6g} s before an "
+                "earlier sample of the record"
             )
         order = np.argsort(time, kind="stable")
         time = time[order]
@@ -177,7 +177,7 @@ def _spikes(channel: FloatArray, longest: int) -> NDArray[np.intp]:
 
 
 def _jumps(channel: FloatArray, most: float) -> NDArray[np.intp]:
-    """Indices of samples from which the next one lies further than `most`, looked for piece by piece."""
+    """Indices of samples from which the next one lies further than `most`, piece by piece."""
     jumps = [
         np.flatnonzero(np.abs(np.diff(channel[start : start + SCALE_SAMPLES + 1])) > most) + start
         for start in range(0, channel.size - 1, SCALE_SAMPLES)

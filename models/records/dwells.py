@@ -1,8 +1,8 @@
-"""The dwells of a stationary test, found in its speed and pressure without knowing its protocol.
+"""The dwells of a stationary test, detected in its speed and pressure without knowing its protocol.
 
 The record is averaged over blocks of some 10 ms. A block is steady where the means of 0.2 s after it and of 0.2 s before
 it agree within six deviations of their difference, in speed and in pressure; runs of steady blocks are dwells, widened
-again up to where speed or pressure leaves the level. Where the clutch is open throughout, pressure is its sensor's noise:
+again up to where speed or pressure leaves the level. Where the clutch is open throughout, pressure is sensor noise:
 the dwells are those of speed.
 """
 
@@ -39,7 +39,7 @@ from models.records.criteria import (
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Blocks:
     """Means over `size` samples each: time [m] s, pressure, speed, torque, oil_temperature; scatter [m] Nm², the
-    variance of torque within a block; gap [m]: samples are missing for long before or in this block.
+    variance of torque within a block; gap [m]: many samples are missing before or in this block.
     """
 
     size: int
@@ -62,7 +62,7 @@ class Dwell:
 
 
 def average(record: Sampled, cleaning: Cleaning) -> Blocks:
-    """Means over blocks of some 10 ms of what is kept of a record; a remainder at its end is left out."""
+    """Means over blocks of about 10 ms of the kept rows of a record; a remainder at its end is left out."""
     period = cleaning.period
     size = max(1, round(BLOCK_DURATION / period))
     time = cleaning.of(record.time)
@@ -116,7 +116,7 @@ def find_dwells(blocks: Blocks) -> tuple[list[Dwell], list[Note]]:
 
 
 def _highest(pressure: FloatArray, window: int) -> float:
-    """What means [Pa] over a window of blocks hardly ever reach: a gauge's noise and its negative offset are no pressure."""
+    """The 99.5 % quantile [Pa] of means over a window of blocks: a gauge's noise and its negative offset are no pressure."""
     size = min(window, pressure.size)
     total = np.concatenate([[0.0], np.cumsum(pressure)])
     return float(np.quantile((total[size:] - total[:-size]) / size, 0.995))
@@ -134,19 +134,19 @@ class _Channel:
         self._levels: dict[tuple[int, int], tuple[float, float]] = {}
 
     def judge(self, active: NDArray[np.bool_]) -> None:
-        """Steady where the windows after and before agree; the ends of the record are as what lies next to them."""
+        """Steady where the windows after and before agree; the record's ends are as the blocks next to them."""
         size = self.values.size
         window = min(self.window, size // 2)
         total = np.concatenate([[0.0], np.cumsum(self.values - self.values.mean())])
         apart = np.abs(total[2 * window :] - 2 * total[window : size - window + 1] + total[: size - 2 * window + 1])
         apart = (apart / window)[np.clip(np.arange(size) - window, 0, size - 2 * window)]
-        # A quarter of a normal variable's absolute values lies below 0.3186 deviations: ramps do not reach that far down.
+        # A quarter of a normal variable's absolute values lies below 0.3186 deviations: ramps are above that.
         deviation = float(np.quantile(apart[active] if active.any() else apart, 0.25)) / 0.3186
         self.threshold = max(self.threshold, min(STEP_DEVIATIONS * deviation, PLAIN_STEP_SHARE * self.highest))
         self.steady = apart <= self.threshold
 
     def level(self, core: tuple[int, int]) -> tuple[float, float]:
-        """The level of a core and how far a block may lie off it, once it has been judged what is steady."""
+        """The level of a core and how far a block may lie off it; only after `judge`."""
         if core not in self._levels:
             part = self.values[slice(*core)]
             self._levels[core] = float(np.median(part)), max(LEAVING_DEVIATIONS * float(part.std()), self.threshold)
@@ -200,7 +200,7 @@ def _reach(off: FloatArray, tolerance: float) -> int:
 def _sorted_out(
     dwells: list[Dwell], blocks: Blocks, channels: tuple[_Channel, ...], least: float
 ) -> tuple[list[Dwell], list[Note]]:
-    """Those worth a mean; the last of `channels` is speed, `least` a pressure [Pa] below which there is none."""
+    """The dwells that give a mean; the last of `channels` is speed, `least` [Pa] the pressure below which there is none."""
     kept: list[Dwell] = []
     speed = channels[-1]
     left: dict[str, list[float]] = {code: [] for code in _SENTENCES}
@@ -232,8 +232,8 @@ def _sorted_out(
 
 
 def _crest(channels: tuple[_Channel, ...], before: Dwell, dwell: Dwell, following: list[Dwell]) -> bool:
-    """Whether a dwell is no more than a crest of an overshoot, or the trough after it, on the way from the one before to the
-    first long one of those that follow: the way led beyond that one's level."""
+    """Whether a dwell is only a crest of an overshoot, or the trough after it, between the dwell before and the first long
+    dwell that follows: speed or pressure went beyond the latter's level."""
     long = (later for later in following if dwell.stop - dwell.start < CREST_SHARE * (later.stop - later.start))
     after = next(long, None)
     if after is None:
@@ -266,5 +266,5 @@ def _ramps(channel: _Channel, where: slice) -> bool:
 
 
 def listed(times: FloatArray) -> str:
-    """The first five of some times [s], for a note."""
+    """The first five of times [s], for a note."""
     return ", ".join(f"{time:.2f}" for time in times[:5]) + (", ..." if len(times) > 5 else "")

@@ -1,9 +1,9 @@
-"""The deviation of a mean over noise that remembers: Var(mean) = s²/n [1 + 2 Σ (1 - k/n) ρ(k)].
+"""The deviation of a mean over autocorrelated noise: Var(mean) = s²/n [1 + 2 Σ (1 - k/n) ρ(k)].
 
-The correlation ρ is estimated over all dwells of a record together, where it is known well, up to 2.5 times its own
-integrated time (Sokal's window) and free of the bias that removing a mean and a trend from each dwell has. A dwell may
-have another one: its batch means say so, and are followed as far as dwells differ by more than batch means scatter
-(Smyth's moderation of variances). Where ρ has not faded within the dwells its tail is that of `models.records.slow_noise`.
+The correlation ρ is estimated from all dwells of a record together, up to 2.5 times its own integrated time (Sokal's
+window) and without the bias that removing a mean and a trend from each dwell causes. A dwell may have another one: its
+batch means show it, and are followed as far as dwells differ by more than batch means scatter (Smyth's moderation of
+variances). Where ρ has not faded within the dwells its tail is that of `models.records.slow_noise`.
 """
 
 from collections.abc import Sequence
@@ -43,7 +43,7 @@ class Correlation:
     resolved: bool = True
 
     def factor(self, count: int) -> float:
-        """By what the variance of a mean over `count` exceeds that over as many independent values."""
+        """The variance of a mean over `count` values over that of as many independent ones."""
         lag = np.arange(1, self.lags.size + 1)
         return max(float(1 + 2 * (np.maximum(1 - lag / count, 0.0) * self.lags).sum()), LEAST_FACTOR)
 
@@ -64,7 +64,7 @@ def pooled_correlation(residuals: Sequence[FloatArray], removed: int) -> Correla
     if count[0] == 0.0:
         return Correlation(lags=np.zeros(0))
     covariance = total / count
-    # What was removed takes `removed` Λ/n off every lag, Λ = γ_0 + 2 Σ γ_k being what is looked for: solved for each window.
+    # What was removed takes `removed` Λ/n off every lag, Λ = γ_0 + 2 Σ γ_k being unknown: solved for each window.
     lag = np.arange(longest + 1)
     raw = covariance[0] + 2 * np.cumsum(np.where(lag > 0, covariance, 0.0))
     long_run = raw / np.maximum(1 - (1 + 2 * lag) * removed / length, 0.5 * (1 - LOST_SHARE))
@@ -82,7 +82,7 @@ def pooled_correlation(residuals: Sequence[FloatArray], removed: int) -> Correla
 class MeanDeviations:
     """One row a dwell: of its mean [n] Nm, its drift [n] Nm/s, the drift's deviation [n] Nm/s, of an average [n] Nm.
 
-    resolved is false where noise remembers for longer than a dwell can show: its memory is then a model's.
+    resolved is false where noise is autocorrelated over longer times than a dwell: its correlation is then modelled.
     """
 
     mean: FloatArray
@@ -105,7 +105,7 @@ def deviations(stretches: Sequence[Stretch]) -> MeanDeviations:
     correlation = pooled_correlation(residuals, removed=2)
     rows = [_moments(residual, correlation) for residual in residuals]
     variance, factor, ratio, freedom = np.array(rows).T
-    if not correlation.resolved and variance.any():  # a dwell of few independent values hardly tells its own variance
+    if not correlation.resolved and variance.any():  # few independent values hardly determine a variance
         independent = np.maximum(np.array([residual.size for residual in residuals]) / factor - 2, 1.0)
         variance = variance.mean() * _moderated(variance / variance.mean(), independent)
     long_run = variance * factor * _moderated(ratio, freedom)
@@ -120,7 +120,7 @@ def deviations(stretches: Sequence[Stretch]) -> MeanDeviations:
 
 
 def _moments(residual: FloatArray, correlation: Correlation) -> tuple[float, float, float, float]:
-    """Variance of an average, the factor of its mean, batch means over what the factor says, their degrees of freedom."""
+    """Variance of an average, the factor of its mean, batch means' variance over that by the factor, degrees of freedom."""
     size = residual.size
     factor = correlation.factor(size)
     variance = float(residual @ residual) / max(size - 2 * factor, 0.5 * size)
@@ -134,7 +134,7 @@ def _moments(residual: FloatArray, correlation: Correlation) -> tuple[float, flo
 
 
 def _moderated(ratio: FloatArray, freedom: FloatArray) -> FloatArray:
-    """Each dwell's own ratio [n], drawn towards 1 by as much as ratios scatter by chance (G. Smyth 2004)."""
+    """Each dwell's own ratio [n], shrunk towards 1 by as much as ratios scatter by chance (G. Smyth 2004)."""
     if ratio.size < FEWEST_FOR_MODERATION:
         return np.ones_like(ratio)
     log_ratio = np.log(np.maximum(ratio, 1e-6)) - digamma(freedom / 2) + np.log(freedom / 2)

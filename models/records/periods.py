@@ -6,8 +6,8 @@ first half holds the start. The swing is fitted by
 
     v(t) = v_0 + Σ_h a_h cos hθ + b_h sin hθ,    θ = 2π f (t - t_0),    h = 1 ... 4, or up to 32 where ramps have corners
 
-with f free (Gauss-Newton on all of the level's samples, outliers left out), so that nothing is asked of the clock's
-evenness, of the rate, or of a period being a whole number of samples.
+with f free (Gauss-Newton on all of the level's samples, outliers left out), so that neither an even clock, nor a certain
+rate, nor a whole number of samples a period is needed.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3.4.
 """
@@ -42,7 +42,7 @@ from models.records.outliers import beside, near
 
 #: Ends that do not swing are cut so many times at most.
 _CUTS = 6
-#: A frequency is known to so much of 1/duration where the first harmonic alone looks for it, and at last.
+#: The frequency is refined to so much of 1/duration: with the first harmonic alone, and at last.
 _NEAR, _EXACT = 1e-3, 1e-10
 #: Harmonics of motions with corners are fitted to so many samples at most, evenly taken.
 _MOST_WITH_CORNERS = 8000
@@ -109,7 +109,7 @@ def sample_interval(time: FloatArray) -> float:
 def fit_cycle(time: FloatArray, value: FloatArray) -> Cycle | str:
     """The swing of value [n] over time [n] s (ascending), and its last whole periods; a sentence where there is none.
 
-    SPEED_HARMONICS for a motor told to follow a sine, more for motions with corners.
+    SPEED_HARMONICS harmonics for a motor commanded to follow a sine, more for motions with corners.
     """
     moving = _without_rest(time, value, float(time[-1] - time[0])) if time.size else slice(0)
     t, y = time[moving], value[moving]
@@ -126,12 +126,12 @@ def fit_cycle(time: FloatArray, value: FloatArray) -> Cycle | str:
         return fitted
     if not (fitted.noise < PERIODIC * fitted.amplitude and fitted.outliers <= 0.2 * t.size):
         miss = fitted.noise / max(fitted.amplitude, 1e-3 * fitted.noise, 1e-300)
-        return f"The speed does not swing periodically: it misses its best fit by {miss:.0%} of its swing."
+        return f"The speed does not swing periodically: the error of its best fit is {miss:.0%} of its swing (RMS)."
     return _with_corners(t, y, fitted)
 
 
 def _without_ends(time: FloatArray, value: FloatArray, frequency: float, count: int) -> Cycle | str:
-    """A fit of `count` harmonics to what follows the swing."""
+    """A fit of `count` harmonics to the part of the record that follows the swing."""
     fitted: Cycle | str = ""
     for _ in range(_CUTS):
         fitted = _refine(time, value, frequency, count, _EXACT)
@@ -161,7 +161,7 @@ def _with_corners(time: FloatArray, value: FloatArray, cycle: Cycle) -> Cycle:
         richer = again
     if richer is cycle:
         return cycle
-    # a corner at an end may have been taken for no part of the swing
+    # a corner at an end may have been cut off as no part of the swing
     whole = _without_ends(time, value, richer.frequency, richer.cosine.size)
     return richer if isinstance(whole, str) or whole.noise > richer.noise / TAKEN else whole
 
@@ -188,7 +188,7 @@ def _without_rest(time: FloatArray, value: FloatArray, period: float) -> slice:
     smooth = median_filter(value, size=min(3, value.size), mode="nearest")
     swing, noise = float(np.ptp(smooth)), float(np.median(np.abs(value - smooth)))
     least = min(SWING_SHARE * swing + 4 * noise, MOST_SWING_SHARE * swing)
-    # so long does a sine stay so near an end of its swing, where the record begins or stops there
+    # the share of a period that a sine spends so near an end of its swing, where the record begins or stops there
     lingers = LINGERS * math.acos(1 - 2 * least / swing) / (2 * math.pi) if swing > 0 else REST_SHARE
     lowest, still = float(smooth.min()), max(4 * noise, STILL_SHARE * swing)
 
@@ -238,7 +238,7 @@ def _explained(time: FloatArray, value: FloatArray, frequencies: FloatArray) -> 
 
 def _refine(time: FloatArray, value: FloatArray, frequency: float, count: int, tolerance: float) -> Cycle | str:
     """Gauss-Newton on frequency, mean and `count` harmonics until the frequency moves by less than `tolerance`/duration;
-    outliers judged anew in the first steps."""
+    outliers are determined anew in the first steps."""
     origin, duration = 0.5 * float(time[0] + time[-1]), float(time[-1] - time[0])
     order, highest = np.arange(1, count + 1), 0.5 / max(sample_interval(time), 1e-12)
     keep, steady = np.ones(time.size, dtype=np.bool_), beside(value)

@@ -1,8 +1,8 @@
 """A raw stationary record (section 2.3.3 of the reference) cut into steady plateaus.
 
 Clean the record (`records.cleaning`), find the dwells in its speed and pressure (`records.dwells`), drop the transient of
-torque at the start of each (`records.settling`), and take the mean of the rest with its deviation under noise that
-remembers (`records.mean_deviation`). What is dropped, and why, is said in notes.
+torque at the start of each (`records.settling`), and take the mean of the rest with its deviation under autocorrelated
+noise (`records.mean_deviation`). Notes say what is dropped, and why.
 """
 
 import math
@@ -19,27 +19,27 @@ from models.records.mean_deviation import Stretch, deviations
 from models.records.runs import Plateaus
 from models.records.settling import Transients, dropped, fit_transients, mean_decay
 
-#: What is dropped had made the means look less sure than they are, so that more may have to be: so often at most.
+#: Dropping a transient makes the means' deviations smaller, so that more may have to be dropped: so often at most.
 _ROUNDS = 4
 #: No mean is known better than to this share of itself.
 _LEAST_SHARE = 1e-9
 SLOW_NOISE = (
     "slow_noise",
-    "The noise of torque remembers for longer than a dwell can show: deviations of means rest on a white and a slow part "
-    "of it, estimated from all dwells together.",
+    "The noise of torque is autocorrelated over longer times than a dwell: deviations of means rest on a white and a slow "
+    "part of it, estimated from all dwells together.",
 )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlateauCut:
-    """Plateaus in the order measured, one row [n] each, and how they were come by.
+    """Plateaus in the order measured, one row [n] each, and how they were computed.
 
     `plateaus.torque_sd` [n] Nm is the deviation of the mean torque. `count` [n] samples were used; `noise` [n] Nm is the
     deviation of a sample about its dwell; `drift` [n] Nm/s the slope of torque over the samples used, with its deviation
     `drift_sd`; `time_constant` [n] s that of torque's exponential approach and `settling_time` [n] s four times that,
-    both nan where no transient stands out of the noise. `settled` [n] is false where more of the transient than the
+    both nan where no transient exceeds the noise. `settled` [n] is false where more of the transient than the
     mean's deviation was left at the end of the dwell: that mean is taken over the last quarter, is not extrapolated, and
-    what its transient is estimated to shift it by is part of its torque_sd. `start` and `stop` [n] s bound the samples
+    the shift by its transient is part of its torque_sd. `start` and `stop` [n] s bound the samples
     used. `notes` are pairs of a code and a sentence.
     """
 
@@ -116,7 +116,7 @@ def _stretches(blocks: Blocks, dwells: list[Dwell]) -> list[Stretch]:
 
 
 def _shift(transients: Transients, drop: FloatArray, duration: FloatArray) -> FloatArray:
-    """What the transient is thought to shift the mean by [n] Nm; nan where no transient is seen."""
+    """The estimated shift of the mean by its transient [n] Nm; nan where no transient is resolved."""
     amplitude = np.hypot(transients.amplitude, transients.amplitude_sd)
     return np.asarray(amplitude * mean_decay(transients.time_constant, drop, duration))
 
@@ -164,7 +164,7 @@ def _mean(channel: FloatArray, dwells: list[Dwell]) -> FloatArray:
 
 
 def _rounding(torque: FloatArray, noise: FloatArray) -> float:
-    """What rounding to counts of q leaves in a mean [Nm]: q/√12 exp(-2π² σ²/q²), σ the noise [n] Nm before rounding."""
+    """The error of a mean [Nm] by rounding to counts of q: q/√12 exp(-2π² σ²/q²), σ the noise [n] Nm before rounding."""
     levels = np.unique(torque[:: max(1, torque.size // SCALE_SAMPLES)])
     if levels.size < 2:
         return 0.0

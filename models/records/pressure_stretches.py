@@ -30,7 +30,7 @@ def pressure_stretches(time: FloatArray, pressure: FloatArray) -> Iterator[Press
     """The stretches of time [n] s, ascending, in which pressure [n] Pa is constant, in their order.
 
     Medians over a quarter of a second that stay within LEVEL_GAP of the stretch's own median belong together; where
-    pressure still moves towards the level or already away from it is cut off. Ramps between levels leave stretches that
+    pressure still moves towards the level or already away from it is cut off. Ramps between levels give stretches that
     are too short (under 2 s) to count, or straight lines, which do not count either.
     """
     smooth = median_filter(pressure, size=min(5, pressure.size), mode="nearest")
@@ -80,7 +80,7 @@ def _without_ramps(smooth: FloatArray, start: int, stop: int, gap: float) -> tup
     """[start, stop) without the rows at its ends where pressure is off the level by more than its usual wander.
 
     Level and wander are those of the middle half, so that a pressure which wanders all the time keeps its ends. They are
-    judged anew after each cut: half of a long ramp may lie in the first middle.
+    computed anew after each cut: half of a long ramp may lie in the first middle.
     """
     for _ in range(_CUTS):
         quarter = (stop - start) // 4

@@ -85,7 +85,7 @@ def _require_columns(columns: Plateaus | Record, names: tuple[str, ...]) -> None
 
 
 def loaded(plateaus: Plateaus) -> Plateaus | None:
-    """The plateaus through which curves go, those of UNLOADED or more; None where the clutch was open on all."""
+    """The plateaus at a pressure of UNLOADED or more, through which curves go; None where the clutch was open on all."""
     rows = plateaus.pressure >= UNLOADED
     if not rows.any():
         return None

@@ -1,9 +1,9 @@
-"""How torque approaches its steady value on a dwell, and from when on a mean may be taken.
+"""The settling transient of torque on a dwell, and from when on a mean may be taken.
 
-After a step the torque approaches like M(t) = M_inf + A exp(-t/τ): the attractor law dM/dt = C (1 - M/S) at constant S is
+After a step the torque settles like M(t) = M_inf + A exp(-t/τ): the attractor law dM/dt = C (1 - M/S) at constant S is
 this with τ = S/C. M_inf, A and a drift beside fast transients are linear given τ, which is scanned; every dwell has its
-own τ, held near the one that explains all dwells of the record together, because most steps of a test are too small to
-tell τ alone.
+own τ with a prior about the one that explains all dwells of the record together, because most steps of a test are too
+small to determine τ by themselves.
 
 The settling time is 4 τ: what is left of the transient then is 1.8 %.
 """
@@ -40,8 +40,8 @@ _CACHED_CLOCKS = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Transients:
-    """One row a dwell: time_constant [n] s (nan where no transient is seen), slowest [n] s, a time constant that it hardly
-    exceeds, amplitude [n] Nm at the dwell's start, amplitude_sd [n] Nm.
+    """One row a dwell: time_constant [n] s (nan where no transient is resolved), slowest [n] s its upper limit, amplitude
+    [n] Nm at the dwell's start, amplitude_sd [n] Nm.
     """
 
     time_constant: FloatArray
@@ -59,7 +59,7 @@ class _Scan:
 
 
 def fit_transients(stretches: Sequence[Stretch], shortest: float) -> Transients:
-    """The exponential approach of every dwell. `shortest` [s] is a block."""
+    """The settling transient of every dwell. `shortest` [s] is a block."""
     longest = max(float(stretch.time[-1]) for stretch in stretches)
     taus = np.geomspace(
         shortest, max(min(SLOWEST_TRANSIENT_SHARE * longest, SLOWEST_TRANSIENT), 4 * shortest), _SCANNED
@@ -100,7 +100,7 @@ class _Basis:
 
 
 class _Bases:
-    """The transients tried over the times of a dwell: one clock gives most dwells the same times, to the microsecond."""
+    """The transients tried over the times of a dwell, cached: to the microsecond, most dwells have the same times."""
 
     def __init__(self, taus: FloatArray) -> None:
         self._taus = taus
@@ -140,7 +140,7 @@ class _Common:
 
 
 def _common(worth: FloatArray, gain: FloatArray, place: FloatArray) -> _Common | None:
-    """What explains all dwells [n, J] best, if a transient explains them at all."""
+    """What explains all dwells [n, J] best, None where no transient does."""
     share = np.minimum(GAIN_CAP / np.maximum(worth.max(axis=1), GAIN_CAP), 1.0)
     together = share @ worth
     dwells = worth.shape[0]
@@ -163,16 +163,16 @@ def _peak(worth: FloatArray, place: FloatArray) -> tuple[float, float]:
     if not 0 < best < worth.size - 1:
         return float(place[best]), 1.0
     left, middle, right = (float(height) for height in worth[best - 1 : best + 2])
-    bend = left - 2 * middle + right
-    if bend >= 0:
+    curvature = left - 2 * middle + right
+    if curvature >= 0:
         return float(place[best]), 1.0
-    return float(place[best]) + 0.5 * (left - right) / bend * step, min(step * float(np.sqrt(-2 / bend)), 1.0)
+    return float(place[best]) + 0.5 * (left - right) / curvature * step, min(step * float(np.sqrt(-2 / curvature)), 1.0)
 
 
 def _fit(
     stretch: Stretch, place: FloatArray, worth: FloatArray, gain: FloatArray, long_run: float, common: _Common | None
 ) -> tuple[float, float, float, float]:
-    """τ, the slowest τ to reckon with, A and its deviation."""
+    """τ, its upper limit, A and its deviation."""
     if common is None and gain[worth.argmax()] < OWN_GAIN:
         return np.nan, np.nan, 0.0, 0.0
     held = 0.0 if common is None else ((place - common.place) / common.spread) ** 2
@@ -185,7 +185,7 @@ def _fit(
 
 
 def dropped(transients: Transients, duration: FloatArray, deviation: FloatArray) -> FloatArray:
-    """How much of each dwell to drop [n] s: from then on, the transient shifts the mean by < 0.1 of its deviation.
+    """How much of each dwell to drop [n] s: from then on the transient shifts the mean by < 0.1 of its deviation.
 
     duration [n] s of the dwells, deviation [n] Nm of a mean over the whole of each. At most three quarters are dropped.
     """

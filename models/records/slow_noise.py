@@ -1,10 +1,10 @@
-"""Noise that remembers for longer than a dwell shows: how much, by the likelihood of all dwells of a record together.
+"""Noise autocorrelated over longer times than a dwell shows: how much, by the likelihood of all dwells of a record.
 
-A sum of lagged products (`mean_deviation`) stops at the longest lag that a dwell can show. Beyond that something must
-be assumed of the noise: that it is a white part and a slow one, ρ(k) = a e^{-k/T} at lags k >= 1. The likelihood of a and T
-is the restricted one, of what is left of each dwell without its mean and its trend (H. D. Patterson, R. Thompson, Biometrika
-58, 1971), over a grid, each dwell with a deviation of its own; and ρ is its mean over that grid, all places of it alike
-beforehand. So where dwells do not tell T, the longer ones that they allow count too.
+A sum of lagged products (`mean_deviation`) stops at the longest lag that a dwell can show. Beyond that the noise is assumed
+to be a white part and a slow one, ρ(k) = a e^{-k/T} at lags k >= 1. The likelihood of a and T is the restricted one, of
+the residuals of each dwell from its mean and its trend (H. D. Patterson, R. Thompson, Biometrika 58, 1971), over a grid,
+each dwell with a deviation of its own; ρ is averaged over that grid with a uniform prior. So where the dwells do not
+determine T, the longer values that they allow count too.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from scipy.linalg import solve_triangular, toeplitz
 from models.arrays import FloatArray
 from models.records.criteria import LONGEST_SLOW_TIME, SLOW_SHARES
 
-#: Averages of a dwell that are used, at most, and correlation times on the grid.
+#: Averages of a dwell that are used, at most, and number of correlation times on the grid.
 _MOST_AVERAGES, _TIMES = 64, 16
 
 
@@ -55,7 +55,7 @@ def slow_correlation(residuals: Sequence[FloatArray]) -> FloatArray:
 
 
 def _averaged(time: float, group: int, size: int) -> FloatArray:
-    """Covariances [size] of means over `group` of slow noise of variance 1 and memory `time`."""
+    """Covariances [size] of means over `group` of slow noise of variance 1 and correlation time `time`."""
     inner = np.arange(1, group)
     within = (1 + 2 * float(((1 - inner / group) * np.exp(-inner / time)).sum())) / group
     step = np.exp(-np.arange(group) / time).mean() * np.exp(np.arange(group) / time).mean()

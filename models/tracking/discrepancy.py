@@ -1,11 +1,11 @@
-"""What a clutch does beside eq. 6: a smooth course δ(ζ), and steps of the level at events.
+"""What a clutch does beside eq. 6: a smooth discrepancy δ(ζ), and steps of the level at events.
 
-No clutch follows eq. 6 exactly, and what it does instead is no scatter: it runs on smoothly. δ starts at 0 with slope
-0, and its curvature is drawn anew on each of a few stretches of progress (an integrated random walk). With T the
-progress measured so far, its deviation at T is q · size: q = 0 is eq. 6 itself, and the data choose among a few others.
-Past T it runs on with the slope it has and further curvature on stretches that grow with ζ, so that its deviation grows
-as (ζ/T)^1.5: a misfit seen today says how little is known of the day after tomorrow. At ten times T it levels off: what
-is seen over a tenth of a course must not make every course pass every threshold in the end.
+No clutch follows eq. 6 exactly, and its deviation is no scatter: it is smooth. δ starts at 0 with slope 0, and its
+curvature is drawn anew on each of a few stretches of progress (an integrated random walk). With T the progress measured
+so far, its deviation at T is q · size: q = 0 is eq. 6 itself, and the data choose among a few others. Beyond T it
+continues with the slope it has and further curvature on stretches that grow with ζ, so that its deviation grows as
+(ζ/T)^1.5: a discrepancy observed today widens every forecast, the further ahead the more. At ten times T it levels off:
+what is observed over a tenth of a course must not make every course pass every threshold in the end.
 
 An event such as an oil change begins an epoch, whose level is off by a normal step from the one before.
 
@@ -30,7 +30,7 @@ _LENGTHS = np.diff(_EDGES)
 
 
 def log_size_weight(prior: Prior) -> FloatArray:
-    """Log prior probability of each of SIZES; those but the first are -inf where the prior is sure of eq. 6."""
+    """Log prior probability of each of SIZES; all but the first are -inf where the prior is sure of eq. 6."""
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(np.concatenate([[prior.law_share], (1.0 - prior.law_share) * SHARES])))
 
@@ -47,7 +47,7 @@ def smooth(progress: FloatArray, span: float, stretches: int = PAST + FUTURE) ->
 
 
 def at_end() -> FloatArray:
-    """What each stretch of the past gives to δ(T) and to T δ'(T); [2, PAST]."""
+    """The contribution of each stretch of the past to δ(T) and to T δ'(T); [2, PAST]."""
     gain = np.sqrt(3.0 / _LENGTHS[:PAST])
     left = 1.0 - _EDGES[:PAST] - 0.5 * _LENGTHS[:PAST]
     return np.asarray(np.stack([gain * _LENGTHS[:PAST] * left, gain * _LENGTHS[:PAST]]))
@@ -96,7 +96,7 @@ class Discrepancy:
 
 
 def drawn(history: History, prior: Prior, size: FloatArray, terms: FloatArray, rng: np.random.Generator) -> Discrepancy:
-    """Courses from drawn terms [n, PAST + e] in the unit of the quantity; what is yet to come is drawn here."""
+    """Courses from drawn terms [n, PAST + e] in the unit of the quantity; the future is drawn here."""
     ahead = np.zeros((size.size, FUTURE))
     alive = size > 0.0
     ahead[alive] = rng.standard_normal((int(alive.sum()), FUTURE)) * (size[alive] * prior.size)[:, None]

@@ -1,4 +1,4 @@
-"""What has been measured so far, as columns."""
+"""All measurements of a quantity so far, as columns."""
 
 import math
 from collections.abc import Sequence
@@ -10,9 +10,9 @@ from models.arrays import FloatArray
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
 
-#: Values are told apart to this share of the prior's deviations. Where a series is free of noise its likelihood grows
+#: Values are resolved to this share of the prior's deviations. Where a series is free of noise its likelihood grows
 #: without bound as the scatter vanishes, and differences of sums weighted by 1/s² would be rounding alone.
-RESOLUTION = 1e-6
+_RESOLUTION = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,5 +62,5 @@ class History:
 
 
 def _row(measurement: Measurement, prior: Prior) -> tuple[float, float, float, int]:
-    resolution = RESOLUTION * math.hypot(prior.initial_sd, prior.change_sd)
+    resolution = _RESOLUTION * math.hypot(prior.initial_sd, prior.change_sd)
     return measurement.progress, measurement.value, measurement.variance + resolution**2, measurement.epoch

@@ -1,4 +1,4 @@
-"""The closed form that the filters share: all is linear once φ, ε, the scatter s and the size q are given.
+"""The closed form that the filters share: the model is linear once φ, ε, the scatter s and the size q are given.
 
 With y_t = ξ0 + Δ b_t + Σ_k w_k Z_tk + e_t, b_t = 1 - (1 + ζ_t/φ)^-ε and e_t ~ N(0, d_t), d_t = v_t + s², normal priors
 on ξ0, Δ and w (the discrepancy and the steps, `models.tracking.discrepancy`) lead to a normal posterior and to the
@@ -57,7 +57,7 @@ class Points:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Terms:
-    """What is left of the further terms of the points `where` [j]: their prior deviations σ [j, p], L [j, p, p] and N
+    """The further terms of the points `where` [j] after elimination: their prior deviations σ [j, p], L [j, p, p] and N
     [j, p, 3] of the columns (1, y, b)."""
 
     where: NDArray[np.intp]
@@ -110,7 +110,7 @@ def basis(progress: FloatArray, log_scale: FloatArray, log_exponent: FloatArray)
     """b = 1 - (1 + ζ/φ)^-ε, in the shape of ζ/φ, to which ε is broadcast: `degradation.progress_fraction`, three times as
     quick.
 
-    Accurate to 2e-16 absolute, not relative: here b only ever stands beside measurement noise.
+    Accurate to 2e-16 absolute, not relative: here b is only compared with measurement noise.
     """
     power = np.asarray(progress * np.exp(-log_scale))
     power += 1.0
@@ -130,7 +130,7 @@ def log_outlying(prior: Prior, outlying: FloatArray) -> FloatArray:
 
 
 def pointwise(history: History, prior: Prior, points: Points, table: FloatArray | None = None) -> tuple[Sums, Terms]:
-    """The sums at n points, each [n], and what is left of the further terms; `table` may hold their b [t, n]."""
+    """The sums at n points, each [n], and the further terms after elimination; `table` may hold their b [t, n]."""
     b = basis(history.progress[:, None], points.log_scale, points.log_exponent) if table is None else table
     d = np.multiply(points.outlying, (prior.outlying_size * prior.size) ** 2, out=np.empty(b.shape))
     d += history.variance[:, None]

@@ -1,9 +1,9 @@
-"""Which runs may be outlying: the few sets of them that hold nearly all of the posterior's mass.
+"""Which runs may be outlying: the few sets of runs that hold nearly all of the posterior's mass.
 
 A run is outlying with a small probability, and then off by a normal as wide as a misread gain. Whether a set of runs is
-outlying is decided by the evidence of the whole history, φ, ε, s and all else summed out on a coarse grid. Sets are
-searched from the empty one, the best first, by turning one run at a time, or all that a node would turn: what turning a
-run would gain is known in closed form at every node, from how far the run lies off the others' prediction.
+outlying is decided by the evidence of the whole history, with φ, ε, s and all else summed out on a coarse grid. The search
+starts from the empty set, best set first, and turns one run at a time (from sound to outlying or back), or all that a node
+would turn: the gain of turning a run has a closed form at every node, by how far the run is off the others' prediction.
 """
 
 import math
@@ -37,8 +37,8 @@ class Nodes:
 
 @dataclass(frozen=True, slots=True)
 class Verdicts:
-    """What every node says of every run: by how much the log posterior at the node would change if it were turned
-    [n, t]; and the log probability of the data at the node as things stand [n]."""
+    """By how much the log posterior at every node would change if a run were turned [n, t], and the log probability of the
+    data at the node [n]."""
 
     gain: FloatArray
     log_evidence: FloatArray
@@ -85,8 +85,8 @@ def gains(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes) ->
 
 
 def at_once(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes) -> tuple[FloatArray, FloatArray]:
-    """The set [n, t] that each node comes to by turning all the runs that it would turn, again and again, from
-    `outlying` [t]; and what it says of that set: by how much it betters the log posterior, summed over nodes, at least.
+    """The set [n, t] that each node arrives at by repeatedly turning all the runs that it would turn, from `outlying` [t];
+    and a lower bound of that set's gain in log posterior, summed over nodes.
 
     Where several runs hide one another no single one of them is worth turning.
     """
@@ -103,7 +103,7 @@ def at_once(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes) 
 
 @dataclass(slots=True)
 class Search:
-    """The sets looked at so far, as bytes of their flags [t], with their log probability."""
+    """The sets examined so far, as bytes of their flags [t], with their log probability."""
 
     prior: Prior
     history: History
@@ -117,7 +117,7 @@ class Search:
         return cls(prior=prior, history=history, log_probability={none.tobytes(): 0.0}, expanded=set())
 
     def next(self) -> FloatArray | None:
-        """The most promising set not looked into, or None where nothing is left to gain."""
+        """The most promising set not yet expanded, or None where nothing is left to gain."""
         best = max(self.log_probability.values())
         left = [key for key, value in self.log_probability.items() if key not in self.expanded and value > best - LOOK]
         if (
@@ -130,7 +130,7 @@ class Search:
         return np.frombuffer(max(left, key=self.log_probability.__getitem__))
 
     def learn(self, outlying: FloatArray, log_evidence: float, nodes: Nodes, best: Nodes) -> None:
-        """A set's own evidence, and estimates of its neighbours' and of what the `best` nodes make of it."""
+        """Take in a set's own evidence, and estimates of its neighbours' and of the sets that the `best` nodes arrive at."""
         total = log_evidence + float(log_outlying(self.prior, outlying))
         self.log_probability[outlying.tobytes()] = total
         self.expanded.add(outlying.tobytes())

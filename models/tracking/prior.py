@@ -1,8 +1,8 @@
-"""What is believed of eq. 6's coefficients before a clutch has been measured.
+"""The prior of eq. 6's coefficients, before a clutch has been measured.
 
 Independent normals on ξ0, Δ, log φ, log ε and the logarithm of the run-to-run scatter, as plain numbers, so that a
-prior learned from other clutches of the same material can take the place of the weak one; and what is believed of a
-measurement beyond scatter: how often a run is outlying and by how much, how likely it is that the clutch follows one
+prior learned from other clutches of the same material can take the place of the weak one; and the prior of what affects
+measurements beyond scatter: how often a run is outlying and by how much, the probability that the clutch follows one
 eq. 6 at all, and how far an event such as an oil change may shift the level.
 """
 
@@ -94,7 +94,7 @@ class Prior:
 
 
 def weak(first: Measurement, *, falling: bool) -> Prior:
-    """A prior that knows little more than the size of the quantity, taken from its first measurement.
+    """A weak prior: little more than the size of the quantity, taken from its first measurement.
 
     With the size a = √(value² + variance): ξ0 is within some 50 % of a, for the first run need not be at ζ = 0. The
     change Δ is -0.6 a ± 0.4 a where the quantity is known to be `falling` (mean COF; 7 % remains for a rise) and 0 ±

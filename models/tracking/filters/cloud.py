@@ -49,8 +49,8 @@ class Bridge:
     after: History
 
     def entered(self, cloud: Cloud, rng: np.random.Generator) -> tuple[Cloud, FloatArray, FloatArray]:
-        """The particles with a belief about the new run, drawn from its posterior given the rest of each; and their log
-        targets before (with the prior of that belief) and after."""
+        """The particles with a flag for the new run, drawn from its posterior given the rest of each; and their log targets
+        before (with the prior of that flag) and after."""
         count = cloud.size.size
         as_sound = replace(cloud, outlying=np.column_stack([cloud.outlying, np.zeros(count)]))
         as_outlying = replace(cloud, outlying=np.column_stack([cloud.outlying, np.ones(count)]))
@@ -78,7 +78,7 @@ class Bridge:
         return sound, outlying
 
     def log_before(self, cloud: Cloud, table: FloatArray) -> FloatArray:
-        """The target before the new run, with the prior of what is believed of it; `table` is that of the runs after."""
+        """The target before the new run, with the prior of its flag; `table` is that of the runs after."""
         without = replace(cloud, outlying=cloud.outlying[:, :-1])
         return log_target_of(self.before, self.prior, without, table[:-1]) + _log_prior_of_last(self.prior, cloud)
 

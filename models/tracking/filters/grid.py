@@ -1,4 +1,4 @@
-"""The exact posterior of eq. 6 on a grid: the witness of the other filters, and quick enough to be one itself.
+"""The exact posterior of eq. 6 on a grid: the reference of the other filters, and quick enough to be one itself.
 
 ξ0, Δ, the discrepancy and the steps are integrated out in closed form at every node (`tracking.linear_model`), for all
 scatter levels at once by matrix products; the grid lies where the mass is (`tracking.filters.lattice`). The integrand is
@@ -35,7 +35,7 @@ BLEND = 0.15
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GridState:
-    """Everything measured: the posterior is laid anew over the whole history, so nothing else is carried on."""
+    """All measurements: the posterior is computed anew over the whole history, so nothing else is carried on."""
 
     prior: Prior
     history: History
@@ -64,8 +64,8 @@ class Laid:
 class Grid:
     """The filter: `nodes` of log τ on each of `rows` of log ε, at `levels` of log s; each at least 2.
 
-    A measurement is noted, no more: the discrepancy is told in shares of what has been measured so far, so that with
-    every test all sums over the history are others. The grid is laid once, when its draws are asked for.
+    An update only stores the measurement: the discrepancy is expressed in shares of the progress measured so far, so that
+    all sums over the history change with every test. The grid is computed when draws are requested.
     """
 
     nodes: int = 21
@@ -82,7 +82,7 @@ class Grid:
         return self.from_history(prior, ())
 
     def update(self, state: GridState, measurement: Measurement, rng: np.random.Generator | None = None) -> GridState:  # noqa: ARG002
-        """One more measurement; exact, so chance is not used."""
+        """One more measurement; exact, so `rng` is not used."""
         return GridState(prior=state.prior, history=state.history.append(measurement, state.prior))
 
     @staticmethod

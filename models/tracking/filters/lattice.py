@@ -1,10 +1,10 @@
 """Where the grid lies, and how it closes in on the posterior's mass.
 
-The axes are log τ = log φ - log ε, log ε and log s. The data speak of the initial rate Δ/τ long before they tell φ
-from ε, so along these axes the ridge of the posterior is nearly straight; the prior stays independent in log φ and
-log ε. There is one such lattice for each kind of history: a size q of the discrepancy and a set of outlying runs.
+The axes are log τ = log φ - log ε, log ε and log s. The data determine the initial rate Δ/τ long before they
+distinguish φ from ε, so along these axes the ridge of the posterior is nearly straight; the prior stays independent in
+log φ and log ε. There is one such lattice for each kind of history: a size q of the discrepancy and a set of outlying runs.
 
-Each row of a lattice (one ε) spans its own interval of log τ, so that the lattice follows the ridge where it bends. As
+Each row of a lattice (one ε) spans its own interval of log τ, so that the lattice follows the curved ridge. As
 the posterior shrinks a hundredfold over a life the lattice closes in on it: a coarse one over the prior's range finds
 where the mass is, the next is laid there, until nothing shrinks any more. A coarse row could step over a narrow peak,
 so every measurement is blurred on it by about what the model changes from node to node.

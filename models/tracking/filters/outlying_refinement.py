@@ -1,10 +1,11 @@
 """Sets of outlying runs that the first search overlooked.
 
-The first lattice is blurred, and a run that lies three deviations off lies less far off a blurred course. Once the lattices
-have closed in nothing is blurred any more: what turning a run would gain is weighed up again at nodes of the leading kinds,
-and the sets that are worth it are laid where those kinds lie.
+The first lattice is blurred, and a run that is three deviations off is less far off a blurred course. Once the lattices
+have closed in nothing is blurred any more: the gain of turning a run is computed again at nodes of the leading kinds, and
+the sets with a sufficient gain get lattices where those kinds have theirs.
 
-Apart from its shares of the posterior a set that is overlooked would bias the scatter, which then has to explain the run.
+A set that is overlooked would not only lack its share of the posterior: it would also bias the scatter, which then has
+to explain the run.
 """
 
 import numpy as np

@@ -6,7 +6,7 @@ resampling alone would soon leave copies of one particle. After it every particl
 leave the exact marginal posterior over the whole history as it is (iterated batch importance sampling), until nine in
 ten have moved.
 
-A measurement that would starve the cloud at once is let in by degrees: the cloud passes through targets that lie
+A measurement that would starve the cloud at once is introduced by degrees: the cloud passes through targets that lie
 between the old posterior and the new one, their logarithms mixed (1 - β) : β, with resampling and moves in between.
 The last target is the posterior itself, so nothing is approximated.
 
@@ -32,9 +32,9 @@ from models.tracking.sampling import correlated_pair, spread_normals, spread_poi
 
 #: Where a smaller share of steps than the first is accepted, the next are shorter by the second.
 _TIMID, _SHORTER = 0.2, 0.5
-#: In a step, how often another size is tried, and how often another belief about one run.
+#: In a step, how often another size is tried, and how often the flag of one run is turned.
 _RESIZED, _TURNED = 0.25, 0.1
-#: Degrees by which a measurement may be let in, and halvings in the search for each.
+#: Degrees by which a measurement may be introduced, and halvings in the search for each.
 _DEGREES, _HALVINGS = 30, 20
 
 #: Names of arrays in stored states, where they are not those of the fields: databases of earlier versions stay readable.
@@ -66,7 +66,7 @@ class ParticleState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Particle:
-    """The filter. `moves` = 0 leaves a plain resampling filter, which starves: it is there to be compared with."""
+    """The filter. `moves` = 0 leaves a plain resampling filter, which starves: it serves for comparison."""
 
     particles: int = 2_000
     moves: int = MOVES
@@ -170,8 +170,8 @@ class Particle:
 
 
 def _proposed(cloud: Cloud, shape: FloatArray, rng: np.random.Generator) -> Cloud:
-    """A step of every particle, as likely as the step back: in its points always, in its size and its beliefs at
-    times."""
+    """A step of every particle, as likely as the step back: always in its points, at times in its size and its
+    flags."""
     count, runs = cloud.outlying.shape
     stride = rng.uniform(0.2, 1.6, size=(count, 1))
     points = cloud.points + stride * rng.standard_normal(cloud.points.shape) @ shape.T

@@ -50,7 +50,7 @@ class Way:
 @dataclass(frozen=True, slots=True)
 class Step:
     """One filter's step: its state, how probable the measurement was, and the squared innovation in deviations, those of
-    a sound and of an outlying run mixed as the step is."""
+    a sound and of an outlying run mixed like the step."""
 
     mean: FloatArray
     covariance: FloatArray
@@ -60,7 +60,7 @@ class Step:
 
 
 def stepped(prior: Prior, normal: Normal, way: Way) -> Step:
-    """One filter carried on to the next run."""
+    """One filter advanced to the next run."""
     unit = prior.initial_sd
 
     def moved(point: FloatArray, _: float) -> FloatArray:
@@ -132,7 +132,7 @@ def scaled(prior: Prior, points: FloatArray) -> FloatArray:
 
 
 def unscaled(prior: Prior, state: FloatArray) -> FloatArray:
-    """The inverse of `scaled`, for states [..., 7]; what is far out of the domain is taken to lie at its edge."""
+    """The inverse of `scaled`, for states [..., 7]; states far out of the domain are moved to its edge."""
     centre, unit = units(prior)
     rows = centre + unit * np.clip(state, -2.0 * DOMAIN, 2.0 * DOMAIN)
     rows[..., 2] += rows[..., 3]

@@ -6,14 +6,14 @@ from the prior mean, in units of the prior's deviations, so that the numbers are
 The law does not move between runs; δ is an integrated random walk, and an event lets the level step.
 
 The prior is far too wide for sigma points: φ spans decades within them, and a filter started there does not recover.
-So the first measurements are taken together, and the normals that have the means and covariances of their exact
-posterior, one for each size, are where the filters start. They start so again when the innovations say that they are
-lost, when progress has doubled (the law bends, and the reference moves along), or when a run comes out of order.
+So the filters start, one for each size, from the means and covariances of the exact posterior of the first measurements
+together. They start anew when their innovations become too large, when progress has doubled (the law is curved, and
+the reference moves along), or when a run comes out of order.
 
 A run may be outlying: each update is that of a sound run and of an outlying one, mixed by how probable either is. The
 scatter between runs is learnt from the innovations: of an innovation with y²/S = κ, the share g = s²/S is scatter, and
 E[e²] = s² (1 + g (κ - 1)) is averaged into s² with the weight of one observation (the step of an
-expectation-maximisation). A normal on a bent ridge is still a rough picture: the other filters are the reference.
+expectation-maximisation). A normal on a curved ridge is only approximate: the other filters are the reference.
 """
 
 import math
@@ -86,7 +86,7 @@ class UkfState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ukf:
-    """The filter, started from the first `together` measurements; nothing in its updates is left to chance."""
+    """The filter, started from the first `together` measurements; its updates use no random numbers."""
 
     together: int = 8
 
@@ -96,7 +96,7 @@ class Ukf:
         return "ukf"
 
     def start(self, prior: Prior) -> UkfState:
-        """The prior itself, as far as normals can say it."""
+        """The prior itself, approximated by normals."""
         return _started(prior, History.of((), prior))
 
     def update(self, state: UkfState, measurement: Measurement, rng: np.random.Generator | None = None) -> UkfState:  # noqa: ARG002
