@@ -27,3 +27,10 @@ def near(off: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
     distance = np.abs(off - np.median(off))
     share = OUTLIER_SHARE * float(np.abs(value).max())
     return np.asarray(distance <= max(OUTLIER * 1.4826 * float(np.median(distance)), share), dtype=np.bool_)
+
+
+def leading(off: NDArray[np.bool_]) -> int:
+    """How many rows at the beginning to cut: up to the last that is `off` [n] together with most of those before it."""
+    share = np.cumsum(off) / np.arange(1, off.size + 1)
+    rows = np.flatnonzero(off & (share > 0.5))
+    return int(rows[-1]) + 1 if rows.size else 0

@@ -16,7 +16,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from models.arrays import FloatArray
@@ -38,14 +37,13 @@ from models.records.criteria import (
     TAKEN,
     WHOLE,
 )
-from models.records.outliers import beside, near
+from models.records.outliers import beside, leading, near
 
-#: Ends that do not swing are cut so many times at most.
-_CUTS = 6
+#: Cuts of ends that do not swing, and steps of a fit, at most.
+_CUTS, _STEPS = 6, 25
 #: The frequency is refined to so much of 1/duration: with the first harmonic alone, and at last.
 _NEAR, _EXACT = 1e-3, 1e-10
-#: Harmonics of motions with corners are fitted to so many samples at most, evenly taken.
-_MOST_WITH_CORNERS = 8000
+_MOST_WITH_CORNERS = 8000  # samples, evenly taken
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +51,8 @@ class Cycle:
     """A fitted swing: frequency [Hz], origin t_0 [s], mean v_0, cosine and sine [h], in the unit of what was fitted.
 
     `covariance` [2h, 2h] is that of (cosine, sine) with f free; `noise` the deviation of a sample; the swing begins at
-    `begin` [s], its last whole periods are those of start <= t < stop [s]; `outliers` samples were left out.
+    `begin` [s], its last whole periods are those of start <= t < stop [s]; `outliers` samples were left out;
+    `converged` says whether the last step moved the frequency by less than the tolerance.
     """
 
     frequency: float
@@ -68,6 +67,7 @@ class Cycle:
     start: float
     stop: float
     outliers: int
+    converged: bool
 
     @property
     def amplitude(self) -> float:
@@ -167,20 +167,13 @@ def _with_corners(time: FloatArray, value: FloatArray, cycle: Cycle) -> Cycle:
 
 
 def _following(time: FloatArray, value: FloatArray, cycle: Cycle) -> slice:
-    """Without the ends that do not follow the swing: holds between two pressures, the way back to where the next begins."""
+    """Without the ends that do not follow the swing: holds between two pressures, the way to where the next begins."""
     residual = value - cycle.value(cycle.phase(time))
     usual = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
     smooth = median_filter(residual, size=min(NEIGHBOURS, residual.size), mode="nearest")
     off = np.abs(smooth) > max(OUTLIER * usual, OFF_SWING * cycle.amplitude)
     before, after = leading(off), leading(off[::-1])
     return slice(before, off.size - after) if before + after < off.size else slice(0, off.size)
-
-
-def leading(off: NDArray[np.bool_]) -> int:
-    """How many of `off` [n] at the beginning are, up to the last before most that follow are not."""
-    share = np.cumsum(off) / np.arange(1, off.size + 1)
-    rows = np.flatnonzero(off & (share > 0.5))
-    return int(rows[-1]) + 1 if rows.size else 0
 
 
 def _without_rest(time: FloatArray, value: FloatArray, period: float) -> slice:
@@ -245,7 +238,8 @@ def _refine(time: FloatArray, value: FloatArray, frequency: float, count: int, t
     coefficients: FloatArray = np.zeros(2 * count + 1)
     gram: FloatArray = np.zeros((0, 0))
     residual: FloatArray = value
-    for step in range(25):
+    move = math.inf
+    for step in range(_STEPS):
         basis = harmonics(2 * math.pi * frequency * (time - origin), count)
         design = np.column_stack([np.ones_like(time), basis])
         kept = design[keep]
@@ -266,7 +260,8 @@ def _refine(time: FloatArray, value: FloatArray, frequency: float, count: int, t
             break
     noise = math.sqrt(float((residual[keep] ** 2).sum()) / max(int(keep.sum()) - 2 * count - 2, 1))
     inverse = np.asarray(np.linalg.pinv(gram, hermitian=True), dtype=np.float64)
-    return _cycle(time, frequency, origin, coefficients, inverse[1:-1, 1:-1] * noise**2, noise, int((~keep).sum()))
+    covariance, converged = inverse[1:-1, 1:-1] * noise**2, abs(move) < tolerance
+    return _cycle(time, frequency, origin, coefficients, covariance, noise, int((~keep).sum()), converged)
 
 
 def _cycle(
@@ -277,8 +272,9 @@ def _cycle(
     covariance: FloatArray,
     noise: float,
     outliers: int,
+    converged: bool,
 ) -> Cycle | str:
-    """Count the whole periods."""
+    """The swing with its whole periods counted."""
     interval = sample_interval(time)
     sampled = (float(time[-1] - time[0]) + interval) * frequency
     periods = math.floor(sampled + 1 - WHOLE)
@@ -299,4 +295,5 @@ def _cycle(
         start=stop - periods / frequency,
         stop=stop,
         outliers=outliers,
+        converged=converged,
     )

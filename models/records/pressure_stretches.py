@@ -10,7 +10,8 @@ from scipy.ndimage import median_filter
 
 from models.arrays import FloatArray
 from models.records.criteria import MEDIAN_DURATION, OFF_LEVEL, OFF_LEVEL_SHARE, RAMP_WIDTHS, SHORTEST_STRETCH, STRAIGHT
-from models.records.periods import leading, sample_interval
+from models.records.outliers import leading
+from models.records.periods import sample_interval
 from models.records.pressure_levels import level_width
 
 #: Ends are cut so many times at most.
