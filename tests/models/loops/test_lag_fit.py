@@ -63,7 +63,7 @@ def test_film_time_of_a_record_without_noise(parameters, film_time):
 
 
 @pytest.mark.parametrize(("parameters", "name"), [(FALLING, "attractor"), (RISING, "squeeze film")])
-def test_the_law_that_made_the_record_is_told(parameters, name):
+def test_the_law_that_made_the_record_is_reported(parameters, name):
     rng = np.random.default_rng(4)
     torque = attractor(parameters, 60.0) if name == "attractor" else squeezed(parameters, 0.2)
     loop = evaluated(torque, parameters, noise=0.01, rng=rng, lost=0.01, jitter=0.3, spikes=1)

@@ -12,7 +12,7 @@ def rng(seed: int = 2) -> np.random.Generator:
 
 
 class TestRecorder:
-    def test_noise_is_what_was_asked_for_and_remembers(self) -> None:
+    def test_noise_is_what_was_asked_for_and_autocorrelated(self) -> None:
         count = 200_000
         still = np.full(count, 20.0)
         recorder = Recorder(torque_noise=0.3, memory=0.02, torque_counts=0.0, speed_noise=0.2, speed_counts=0.0)
