@@ -1,7 +1,7 @@
 """The clutch: geometry, the sliding velocity of eq. 1, and the step from torque to coefficient of friction and back.
 
 Eq. 1 of the reference prints r_m = (d_i + d_o)/2. With diameters that is the mean *diameter*; the mean radius is
-(d_i + d_o)/4, 58 mm for the 99/133 mm disc, and that is what is computed here. A rig that knows better overrides it.
+(d_i + d_o)/4, 58 mm for the 99/133 mm disc, and that is what is computed here, unless a better known value overrides it.
 
 Source: Ompusunggu, Janssens, Sas, "Friction Behavior of a Wet Clutch Subjected to Accelerated Degradation",
 ISRN Tribology 2013, 607279, section 2.2 and eq. 1.

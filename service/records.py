@@ -12,7 +12,8 @@ from sqlalchemy import Connection
 
 from models.degradation.severity import Severity
 from models.diagnosis.extension import Extension
-from models.friction.identification import ACCEPTABLE_MSE, FitStatus, StribeckFit
+from models.friction.criteria import ACCEPTABLE_MSE
+from models.friction.identification import FitStatus, StribeckFit
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
 from models.prognosis.fleet import FleetPrior
 from models.tracking.filters.particle import ParticleState

@@ -31,7 +31,7 @@ def normal(prior: Prior, measurements: list[Measurement], points: Points) -> tup
     b = 1.0 - growth ** -np.exp(points.log_exponent)[:, None]
     size = max(abs(prior.initial_mean), prior.initial_sd)
     noise = variance + (1e-6 * math.hypot(prior.initial_sd, prior.change_sd)) ** 2
-    noise = noise + np.exp(2 * points.log_scatter)[:, None] + points.spoiled.T * (prior.spoiled_size * size) ** 2
+    noise = noise + np.exp(2 * points.log_scatter)[:, None] + points.outlying.T * (prior.outlying_size * size) ** 2
     covariance = prior.initial_sd**2 + prior.change_sd**2 * b[:, :, None] * b[:, None, :]
     covariance += noise[:, :, None] * np.eye(progress.size)
     covariance += (points.size * size)[:, None, None] ** 2 * integrated(progress)

@@ -2,8 +2,9 @@
 
     ξ(ζ) = ξ0 + Δ [1 - (1 + ζ/φ)^-ε]
 
-The share D = (1 + ζ/φ)^-ε that is still to be lost obeys general-order kinetics, dD/dζ = -k Dⁿ with n = 1 + 1/ε and
-k = ε/φ. The rate k is where the severity of the load enters, so ζ may be an energy as well as a number of cycles.
+The share D = (1 + ζ/φ)^-ε of the change that is still to come obeys general-order kinetics, dD/dζ = -k Dⁿ with
+n = 1 + 1/ε and k = ε/φ. The severity of the load enters through the rate k, so ζ may be an energy as well as a number
+of cycles.
 Given (φ, ε) the law is linear in ξ0 and Δ. It saturates at ξ0 + Δ: a level beyond that is never reached.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, eq. 6.

@@ -1,14 +1,14 @@
-"""Severity: what a clutch has been through, as cycles, as sliding distance or as dissipated energy.
+"""Severity: what a clutch has been through, counted as cycles, as sliding distance or as dissipated energy.
 
 Eq. 6 is general-order kinetics, dD/dζ = -k Dⁿ, and the severity of the load enters through the rate k. A block of duty whose
 cycles are w times as severe as a reference cycle therefore counts w times:
 
     ζ(N) = ∫ (w(n)/w_ref)^q dn
 
-with N the duty cycles, w the sliding distance or the energy [J] of one cycle and q an exponent. The distance is told as
-an angle [rad]: the mean radius, the same in all of a clutch's cycles, cancels. ζ stays in cycles: in
-cycles of the first block that says its severity. It is piecewise linear; beyond the last block it goes on as recent duty
-did, and so remaining cycles are cycles of recent duty.
+with N the duty cycles, w the sliding distance or the energy [J] of one cycle and q an exponent. The distance is given as
+an angle [rad]: the mean radius, the same in all of a clutch's cycles, cancels. ζ is still counted in cycles, those of the
+first block that states its severity. It is piecewise linear; beyond the last block it continues at the rate of recent
+duty, and so remaining cycles are cycles of recent duty.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, eq. 6; J. F. Archard, J. Appl. Phys. 24 (1953) 981-988, for
 wear by work done.
@@ -22,15 +22,17 @@ from enum import StrEnum
 import numpy as np
 
 from models.arrays import FloatArray
+from models.degradation.criteria import (
+    DECELERATION,
+    HARSHEST,
+    LARGEST_EXPONENT,
+    MILDEST,
+    RECENT_CYCLES,
+    RECENT_SHARE,
+    STANDARD_ANGLE,
+    STANDARD_ENERGY,
+)
 from models.degradation.general_order import Number
-
-#: Recent duty: the blocks of the last share of the cycles so far, but of so many cycles at least.
-RECENT_SHARE, RECENT_CYCLES = 0.1, 1_000.0
-#: One cycle counts as so many reference cycles at least and at most: a slip of the pen must not end or stop a life.
-MILDEST, HARSHEST = 1e-3, 1e3
-#: Where a block does not say how long an engagement lasts, the speed is taken to fall evenly by this much, rad/s²: 2,000 rpm
-#: come to rest in about one second.
-DECELERATION = 200.0
 
 
 class SeverityBasis(StrEnum):
@@ -41,13 +43,13 @@ class SeverityBasis(StrEnum):
     DISSIPATED_ENERGY = "dissipated_energy"
 
 
-#: The work of a standard cycle: about what the life test's engagements dissipate [J], and how far they slide [rad].
-STANDARD = {SeverityBasis.DISSIPATED_ENERGY: 20e3, SeverityBasis.SLIDING_DISTANCE: 100.0}
+#: The work of a standard cycle [J] or [rad].
+_STANDARD = {SeverityBasis.DISSIPATED_ENERGY: STANDARD_ENERGY, SeverityBasis.SLIDING_DISTANCE: STANDARD_ANGLE}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Block:
-    """Duty cycles that end at `end` cycles; the energy [J] of one, its initial speed [rad/s] and duration [s] where told.
+    """Duty cycles that end at `end` cycles; the energy [J] of one, its initial speed [rad/s] and duration [s] where stated.
 
     Raises ValueError where `cycles` is not positive or another number is negative or not finite.
     """
@@ -71,9 +73,9 @@ class Block:
         return replace(self, end=self.end - origin)
 
     def work(self, basis: SeverityBasis) -> float | None:
-        """The energy [J] or the slid angle [rad] of one cycle; None where the block does not say it.
+        """The energy [J] or the slid angle [rad] of one cycle; None where the block does not state it.
 
-        The speed falls evenly to rest, so the angle is ω t/2, with t = ω/DECELERATION where it is not told.
+        The speed falls evenly to rest, so the angle is ω t/2, with t = ω/DECELERATION where it is not stated.
         """
         if basis is SeverityBasis.DISSIPATED_ENERGY:
             return self.energy
@@ -90,15 +92,15 @@ class Severity:
     exponent: float = 1.0
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.exponent <= 10.0:
-            raise ValueError(f"exponent must lie between 0 and 10, got {self.exponent}")
+        if not 0.0 <= self.exponent <= LARGEST_EXPONENT:
+            raise ValueError(f"exponent must lie between 0 and {LARGEST_EXPONENT:g}, got {self.exponent}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SeverityMap:
     """ζ over cycles: knots (cycles [k], zeta [k]), both ascending from 0, straight between, `rate` dζ/dN beyond.
 
-    A cycle of ζ is worth `unit` cycles of STANDARD work: by it the ζ of clutches can be compared.
+    A cycle of ζ is worth `unit` cycles of standard work: by it the ζ of clutches can be compared.
     """
 
     cycles: FloatArray
@@ -124,9 +126,9 @@ IDENTITY = SeverityMap(cycles=np.zeros(1), zeta=np.zeros(1), rate=1.0)
 
 
 def severity_map(severity: Severity, blocks: Sequence[Block]) -> SeverityMap:
-    """ζ over cycles for blocks in any order; cycles that no block tells of are as severe as the rest on average.
+    """ζ over cycles for blocks in any order; cycles that no block covers are as severe as the rest on average.
 
-    Where blocks overlap the one that ends first counts. The identity where ζ counts cycles, or no block says its severity.
+    Where blocks overlap the one that ends first counts. The identity where ζ counts cycles, or no block states its severity.
     """
     if severity.basis is SeverityBasis.CYCLES:
         return IDENTITY
@@ -140,19 +142,19 @@ def severity_map(severity: Severity, blocks: Sequence[Block]) -> SeverityMap:
         for _, work in pieces
     ]
     lengths = np.array([length for length, _ in pieces])
-    told = np.array([rate is not None for rate in rates])
+    stated = np.array([rate is not None for rate in rates])
     filled = np.array([math.nan if rate is None else rate for rate in rates])
-    filled[~told] = np.average(filled[told], weights=lengths[told])
+    filled[~stated] = np.average(filled[stated], weights=lengths[stated])
     return SeverityMap(
         cycles=np.concatenate([[0.0], np.cumsum(lengths)]),
         zeta=np.concatenate([[0.0], np.cumsum(lengths * filled)]),
         rate=_recent(lengths, filled),
-        unit=(reference / STANDARD[severity.basis]) ** severity.exponent,
+        unit=(reference / _STANDARD[severity.basis]) ** severity.exponent,
     )
 
 
 def _pieces(ordered: Sequence[Block], works: Sequence[float | None]) -> list[tuple[float, float | None]]:
-    """Lengths [cycles] and works from 0 to the end of the last block, without overlaps; None where nothing is said."""
+    """Lengths [cycles] and works from 0 to the end of the last block, without overlaps; None where no severity is stated."""
     pieces: list[tuple[float, float | None]] = []
     reached = 0.0
     for block, work in zip(ordered, works, strict=True):

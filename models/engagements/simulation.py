@@ -2,32 +2,32 @@
 
     J dω/dt = T_motor(ω) - T_clutch(p, ω),      T_motor = clip(k (ω_set - ω), 0, T_max)
 
-The motor holds its speed until the clutch asks for more than its limit of 20 Nm; from there on the shaft slows down and
-stands. Before the discs touch (the filling phase) only drag is transferred. Below the lowest pressure at which curves are
-known, torque goes with pressure; above the highest, the pressure laws are followed on.
+The motor holds its speed until the clutch takes more than the motor's limit of 20 Nm; from then on the shaft slows down
+until it stops. Before the discs touch (the filling phase) only drag is transferred. What the closed clutch transfers is its
+`Capacity`.
 
-Once the shaft stands the clutch carries what the motor gives. Inertia, gain and the times of the profile are assumed: the
-reference prints none.
+Once the shaft has stopped the clutch carries the motor's torque. Inertia, gain and the times of the profile are assumed:
+the reference prints none.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3.1, 2.3.2 and fig. 3.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from models.arrays import FloatArray
+from models.engagements.capacity import Capacity
 
-#: Torque [Nm] of the closed clutch at line pressure [Pa] and sliding velocity [m/s] >= 0.
-Capacity = Callable[[float, float], float]
+#: The shaft counts as stopped below this share of the drive's speed.
+_STOPPED = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressureProfile:
-    """Fig. 3: nothing, a filling pulse p2, a plateau p3 on which the piston comes to rest, then a ramp to the maximum p4.
+    """Fig. 3: no pressure, a filling pulse p2, a plateau p3 on which the piston comes to rest, a ramp to the maximum p4.
 
     Pressures in Pa, times in s from the start: the pulse from `fill` to `settle`, the ramp from `contact` to `full`.
     Raises ValueError unless the times increase and 0 < plateau < pulse < maximum.
@@ -79,8 +79,8 @@ class Drive:
 class Engagement:
     """A trace: time [n] s, pressure [n] Pa, speed [n] rad/s, torque [n] Nm of the clutch, motor_torque [n] Nm.
 
-    `duration` [s] from contact until the shaft stands, None where it still turns at the end; `energy` [J] that the clutch
-    turned into heat.
+    `duration` [s] from contact until the shaft stops, None where it still turns at the end; `energy` [J] that the clutch
+    dissipated.
     """
 
     time: FloatArray
@@ -101,7 +101,7 @@ def engage(
     longest: float = 4.0,
     rate: float = 200.0,
 ) -> Engagement:
-    """Close the clutch on the turning shaft; `longest` [s] is when it is given up, `rate` [Hz] that of the trace."""
+    """Close the clutch on the turning shaft; `longest` [s] bounds the simulation, `rate` [Hz] is the trace's."""
     profile = PressureProfile() if profile is None else profile
     drive = Drive() if drive is None else drive
     if longest <= profile.contact:
@@ -120,20 +120,20 @@ def engage(
         torque = clutch_torque(time, speed)
         return [(drive.torque(speed) - torque) / drive.inertia, torque * speed]
 
-    def standing(_time: float, state: FloatArray) -> float:
-        return float(state[0]) - 1e-3 * drive.speed
+    def stopped(_time: float, state: FloatArray) -> float:
+        return float(state[0]) - _STOPPED * drive.speed
 
-    standing.terminal = True  # type: ignore[attr-defined]
+    stopped.terminal = True  # type: ignore[attr-defined]
     start = [drive.speed - drive.drag * drive.speed / drive.gain, 0.0]
-    found = solve_ivp(
-        slowing, (0.0, longest), start, events=standing, dense_output=True, max_step=0.02, rtol=1e-6, atol=1e-6
+    solution = solve_ivp(
+        slowing, (0.0, longest), start, events=stopped, dense_output=True, max_step=0.02, rtol=1e-6, atol=1e-6
     )
-    stops = bool(found.t_events[0].size)
-    end = float(found.t[-1])
+    stops = bool(solution.t_events[0].size)
+    end = float(solution.t[-1])
     after = min(0.5, longest - end) if stops else 0.0
     time = np.arange(0.0, end + after, 1.0 / rate)
-    speed = np.where(time < end, np.maximum(found.sol(np.minimum(time, end))[0], 0.0), 0.0)
-    motor = np.array([drive.torque(each) for each in speed.tolist()])
+    speed = np.where(time < end, np.maximum(solution.sol(np.minimum(time, end))[0], 0.0), 0.0)
+    motor = np.array([drive.torque(w) for w in speed.tolist()])
     turning = np.array([clutch_torque(t, w) for t, w in zip(time.tolist(), speed.tolist(), strict=True)])
     return Engagement(
         time=time,
@@ -142,5 +142,5 @@ def engage(
         torque=np.where(time < end, turning, motor),
         motor_torque=motor,
         duration=end - profile.contact if stops else None,
-        energy=float(found.y[1, -1]),
+        energy=float(solution.y[1, -1]),
     )

@@ -1,23 +1,24 @@
-"""What an identified Stribeck curve is worth: noise, covariance and the parameters that the data do not tell.
+"""How uncertain an identified Stribeck curve is: noise, covariance and the parameters that the data do not determine.
 
-The covariance is the linearised one, σ² (JᵀJ)^-1 in (M_s, M_s M̄_c e_max, C_v, log V_S), carried to the four parameters
-by the delta method. J holds all four columns also where a parameter sits at its bound, so an interval there has an
-honest width.
+The covariance is the linearised one, σ² (JᵀJ)^-1 in (M_s, M_s M̄_c e_max, C_v, log V_S), transformed to the four
+parameters by the delta method. J has all four columns also where a parameter is at its bound, so that an interval there
+is not too narrow.
 
 - σ² is the residual variance with n - (free parameters) degrees of freedom, and the covariance is widened by the square
   of Student's over the normal 95 % quantile, so that estimate ± 1.645 standard errors holds the truth 90 % of the time.
-  With that factor the linearised covariance holds what it says (tests/statistical measures it): no correction for the
+  With that factor the coverage is as stated (tests/statistical measures it): no correction for the
   curvature in V_S is needed while V_S is determined.
-- How the noise depends on the torque is not known: sensors have noise in proportion to torque and noise that is constant.
-  Its variance is taken as half of each, (1 + S²/mean S²)/2, in the middle of the covariance ("sandwich"). That holds
-  90 ± 2 % for noise of either kind; (JᵀJ)^-1 alone held 87.5 % for M_s under noise in proportion.
+- How the noise depends on the torque is unknown: sensors have noise in proportion to torque and noise that is constant.
+  Its variance is taken as half of each, (1 + S²/mean S²)/2, in the middle of the covariance ("sandwich"). Intervals then
+  hold the truth in 90 ± 2 % of tests for noise of either kind; with (JᵀJ)^-1 alone it was 87.5 % for M_s under noise in
+  proportion.
 - Where the deviation of the points is given it is the noise, unless the weighted residuals exceed the 99 % point of χ²:
-  then the residuals rule, as above.
+  then the noise follows from the residuals, as above.
 - Without any degree of freedom, and without given deviations, noise of 5 % of the torque is assumed.
-- A weak prior keeps it finite: each term of the torque may be three times the torque, log V_S may stray by 5. What the
-  data do not say (rank deficiency, one speed) gets that variance.
-- Where the profile over V_S leaves values a factor e away as likely (90 %), V_S is not determined, and the covariance
-  is widened along the profile's direction up to them.
+- A weak prior keeps the covariance finite: each term of the torque has a deviation of three times the torque, log V_S one
+  of 5. What the data do not determine (rank deficiency, one speed) gets that variance.
+- Where values of V_S a factor e away lie within the 90 % interval of the profile, V_S is not determined, and the
+  covariance is widened along the profile's direction up to them.
 
 All quantities are in the scaled units of `models.friction.variable_projection.Problem`.
 """
@@ -29,18 +30,18 @@ from numpy.typing import NDArray
 from scipy.special import chdtri, stdtrit
 
 from models.arrays import FloatArray
+from models.friction.criteria import (
+    ASSUMED_NOISE,
+    DISBELIEVED,
+    LEAST_NOISE,
+    PRIOR_LOG_VELOCITY,
+    PRIOR_TERM,
+    STRAY,
+    UNDETERMINED_SHARE,
+    Z90,
+)
 from models.friction.variable_projection import Problem, Profile, jacobian
 
-#: Noise where nothing tells it, and the least that is believed, as shares of the root mean square torque.
-ASSUMED_NOISE, LEAST_NOISE = 0.05, 1e-6
-#: Prior deviations: of each term in root mean square torques, and of log V_S.
-PRIOR_TERM, PRIOR_LOG_VELOCITY = 3.0, 5.0
-#: A parameter with a standard error above this share of its scale is undetermined.
-UNDETERMINED_SHARE = 0.5
-#: V_S is undetermined where values this far from the optimum in log V_S are as likely as the 90 % interval allows.
-STRAY = 1.0
-#: The normal quantile of a two-sided 90 % interval.
-Z90 = 1.6448536269514722
 #: An eigenvalue of JᵀJ below this share of the largest is rounding.
 _ROUNDING = 1e-14
 
@@ -49,7 +50,7 @@ _ROUNDING = 1e-14
 class Noise:
     """sd [P] of a point of weight 1, widening [P]: Student's over the normal quantile, inflated [P], assumed [P].
 
-    shaped [P]: part of the noise goes with the torque, nobody having said how it is distributed over the points.
+    shaped [P]: part of the noise is taken to go with the torque, because deviations of the points were not given.
     """
 
     sd: FloatArray
@@ -59,17 +60,17 @@ class Noise:
     shaped: NDArray[np.bool_]
 
 
-def estimate_noise(residual: FloatArray, freedom: FloatArray, known: FloatArray, level: FloatArray) -> Noise:
+def estimate_noise(residual: FloatArray, freedom: FloatArray, given_sd: FloatArray, level: FloatArray) -> Noise:
     """The noise of P curves from the weighted sum of squares [P], degrees of freedom [P] and known deviation [P].
 
     `known` is NaN where it is not given; `level` [P] is the root mean square torque.
     """
-    given, estimable = np.isfinite(known), freedom >= 1
+    given, estimable = np.isfinite(given_sd), freedom >= 1
     spare = np.maximum(freedom, 1.0)
-    known = np.where(given, known, 1.0)
-    inflated = given & estimable & (residual / known**2 > chdtri(spare, 0.01))
+    given_sd = np.where(given, given_sd, 1.0)
+    inflated = given & estimable & (residual / given_sd**2 > chdtri(spare, DISBELIEVED))
     estimated = (estimable & ~given) | inflated
-    sd = np.where(estimated, np.sqrt(residual / spare), np.where(given, known, ASSUMED_NOISE * level))
+    sd = np.where(estimated, np.sqrt(residual / spare), np.where(given, given_sd, ASSUMED_NOISE * level))
     return Noise(
         sd=np.maximum(sd, LEAST_NOISE * level),
         widening=np.where(estimated, stdtrit(spare, 0.95) / Z90, 1.0),
@@ -88,7 +89,7 @@ class Uncertainty:
 
 
 def uncertainty(problem: Problem, optimum: Profile, scan: Profile, noise: Noise, level: FloatArray) -> Uncertainty:
-    """Covariance of the optimum [P, 1] with a > 0, and which parameters the data do not tell."""
+    """Covariance of the optimum [P, 1] with a > 0, and which parameters the data do not determine."""
     columns = jacobian(problem, optimum)
     points = (problem.weight**2).sum(axis=1)
     size = np.sqrt((columns**2).sum(axis=1) / points[:, None])

@@ -3,12 +3,12 @@
 The estimate is the global optimum of eq. 4 (see `friction.variable_projection`), weighted by 1/torque_sd where that is
 given.
 
-How uncertain it is, and how that was decided, stands in `friction.fit_uncertainty`: the covariance is always finite, and
-estimate ± 1.645 standard errors holds the truth in 90 % of tests for every parameter that is not called undetermined.
+Its uncertainty is computed in `friction.fit_uncertainty`: the covariance is always finite, and estimate ± 1.645 standard
+errors holds the truth in 90 % of tests for every parameter that is not called undetermined.
 
-Where the optimum has M_s = 0 with M_s M̄_c finite (a torque that only rises), M_s is put at a millionth of the torque,
-so that M̄_c exists and the curve is right to a millionth; M̄_c is then called undetermined. Where V_S does not matter to
-the fit it is the one in the middle of the speeds, and a single speed is answered with a constant torque.
+Where the optimum has M_s = 0 with M_s M̄_c finite (a torque that only rises), M_s is set to a millionth of the torque,
+so that M̄_c exists and the curve is right to a millionth; M̄_c is then called undetermined. Where V_S has no influence on
+the fit it is set to the middle of the speeds, and a single speed is fitted by a constant torque.
 """
 
 import math
@@ -20,23 +20,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.friction.fit_uncertainty import ASSUMED_NOISE, Noise, Uncertainty, estimate_noise, uncertainty
+from models.friction.criteria import ACCEPTABLE_MSE, ASSUMED_NOISE, LEAST_STATIC
+from models.friction.fit_uncertainty import Noise, Uncertainty, estimate_noise, uncertainty
 from models.friction.stribeck import GAMMA, PARAMETER_NAMES, STANDSTILL, StribeckParameters, gradient, torque
 from models.friction.variable_projection import Problem, Profile, make_problem, minimise
 from models.records.runs import Curve
 
-#: A fit with an error of eq. 5 below this is acceptable [%].
-ACCEPTABLE_MSE = 5.0
-#: M_s is not taken below this share of the torque: M̄_c = b/M_s must exist where the optimum has M_s = 0.
-LEAST_STATIC = 1e-6
-#: Points that are fitted at once, which bounds the memory of a scan.
-BATCH = 20_000
-#: Torques or speeds beyond any sense can overflow a variance: it is cut here.
+#: Points that are fitted at once: this bounds the memory of a scan.
+_BATCH = 20_000
+#: Absurd torques or speeds can overflow a variance: it is cut here.
 _LARGEST = 1e300
 
 
 class FitStatus(StrEnum):
-    """DETERMINED; AT_BOUND: a parameter is zero; UNDETERMINED: the data do not tell some parameters."""
+    """DETERMINED; AT_BOUND: a parameter is zero; UNDETERMINED: the data do not determine some of them."""
 
     DETERMINED = "determined"
     AT_BOUND = "at_bound"
@@ -85,11 +82,11 @@ class _Folded:
 
 
 def fit_curves(curves: Sequence[Curve]) -> tuple[StribeckFit, ...]:
-    """Eq. 4-5 for every curve: the global optimum with all four parameters >= 0, its covariance and what it is worth.
+    """Eq. 4-5 for every curve: the global optimum with all four parameters >= 0, its covariance and status.
 
     Velocity [n] m/s of either sign (the model is odd: folded by the sign bit), torque [n] Nm, n >= 1.
     Raises ValueError where a curve is empty, has unequal lengths, a value that is not finite, or torque_sd <= 0;
-    numerically hard input is answered with a status.
+    numerically hard input gets a status.
     """
     folded = [_fold(curve) for curve in curves]
     fits: list[StribeckFit] = []
@@ -98,7 +95,7 @@ def fit_curves(curves: Sequence[Curve]) -> tuple[StribeckFit, ...]:
         stop, longest = start, 0
         while stop < len(folded):
             longest = max(longest, folded[stop].speed.size)
-            if stop > start and longest * (stop - start + 1) > BATCH:
+            if stop > start and longest * (stop - start + 1) > _BATCH:
                 break
             stop += 1
         fits.extend(_fit_batch(folded[start:stop]))
@@ -153,25 +150,25 @@ def _fold(curve: Curve) -> _Folded:
 
 
 def _fit_batch(folded: Sequence[_Folded]) -> list[StribeckFit]:
-    shape = (len(folded), max(one.speed.size for one in folded))
+    shape = (len(folded), max(curve.speed.size for curve in folded))
     speed, measured, weight = np.ones(shape), np.zeros(shape), np.zeros(shape)
-    for row, one in enumerate(folded):
-        n = one.speed.size
-        speed[row, :n], measured[row, :n], weight[row, :n] = one.speed, one.torque, one.weight
+    for row, curve in enumerate(folded):
+        n = curve.speed.size
+        speed[row, :n], measured[row, :n], weight[row, :n] = curve.speed, curve.torque, curve.weight
     problem = make_problem(speed, measured, weight)
     optimum, scan = minimise(problem)
     level = np.sqrt((problem.torque**2).sum(axis=1) / (weight**2).sum(axis=1))
     level = np.maximum(level, 1e-9)
-    distinct = np.array([one.distinct for one in folded])
+    distinct = np.array([curve.distinct for curve in folded])
     optimum, bound = _at_bound(_constant(problem, optimum, distinct == 1), level)
     noise = estimate_noise(
         optimum.residual[:, 0],
-        np.array([one.speed.size for one in folded]) - np.minimum(distinct, 4 - bound.sum(axis=1)),
-        np.array([np.nan if one.known_noise is None else one.known_noise for one in folded]),
+        np.array([curve.speed.size for curve in folded]) - np.minimum(distinct, 4 - bound.sum(axis=1)),
+        np.array([np.nan if curve.known_noise is None else curve.known_noise for curve in folded]),
         level,
     )
-    told = uncertainty(problem, optimum, scan, noise, level)
-    return [_describe(one, row, optimum, bound, noise, told) for row, one in enumerate(folded)]
+    uncertainties = uncertainty(problem, optimum, scan, noise, level)
+    return [_describe(curve, row, optimum, bound, noise, uncertainties) for row, curve in enumerate(folded)]
 
 
 def _constant(problem: Problem, optimum: Profile, single: NDArray[np.bool_]) -> Profile:
@@ -201,43 +198,43 @@ def _at_bound(optimum: Profile, level: FloatArray) -> tuple[Profile, NDArray[np.
 
 
 def _describe(
-    one: _Folded, row: int, optimum: Profile, bound: NDArray[np.bool_], noise: Noise, told: Uncertainty
+    folded: _Folded, row: int, optimum: Profile, bound: NDArray[np.bool_], noise: Noise, uncertainties: Uncertainty
 ) -> StribeckFit:
     a, b, c = optimum.coefficients[row, 0].tolist()
     v_s = math.exp(optimum.log_velocity[row, 0])
-    fastest = 1.0 if one.speed.any() else 0.0
-    scale = np.array([one.torque_scale, 1.0, one.speed_scale, one.torque_scale / one.speed_scale**GAMMA])
+    fastest = 1.0 if folded.speed.any() else 0.0
+    scale = np.array([folded.torque_scale, 1.0, folded.speed_scale, folded.torque_scale / folded.speed_scale**GAMMA])
     values = np.array([a, b * math.exp(v_s * fastest) / a, v_s, c]) * scale
     parameters = StribeckParameters.from_array(np.minimum(values, _LARGEST))
     with np.errstate(over="ignore"):
-        covariance = np.clip(told.covariance[row] * (scale[:, None] * scale), -_LARGEST, _LARGEST)
-    miss = one.torque - np.abs(torque(one.curve.velocity, parameters)) / one.torque_scale
+        covariance = np.clip(uncertainties.covariance[row] * (scale[:, None] * scale), -_LARGEST, _LARGEST)
+    miss = folded.torque - np.abs(torque(folded.curve.velocity, parameters)) / folded.torque_scale
     mean_square = float((miss**2).mean())
-    variance = float(one.torque.var())
-    varies = variance > (1e-9 * float(np.abs(one.torque).max())) ** 2
+    variance = float(folded.torque.var())
+    varies = variance > (1e-9 * float(np.abs(folded.torque).max())) ** 2
     mse = 100 * mean_square / variance if varies else None
-    undetermined = _undetermined(one, told.undetermined[row])
+    undetermined = _undetermined(folded, uncertainties.undetermined[row])
     at_zero = tuple(PARAMETER_NAMES[i] for i, zero in zip((0, 1, 3), bound[row], strict=True) if zero)
-    sd_share = 1.0 if one.known_noise is None else math.sqrt(float((one.weight**-2.0).mean()))
+    sd_share = 1.0 if folded.known_noise is None else math.sqrt(float((folded.weight**-2.0).mean()))
     return StribeckFit(
-        pressure=one.curve.pressure,
+        pressure=folded.curve.pressure,
         parameters=parameters,
         covariance=covariance,
         status=_status(undetermined, at_zero),
         undetermined=undetermined,
-        noise=float(noise.sd[row]) * sd_share * one.torque_scale,
+        noise=float(noise.sd[row]) * sd_share * folded.torque_scale,
         mse_percent=mse,
-        rmse=math.sqrt(mean_square) * one.torque_scale,
+        rmse=math.sqrt(mean_square) * folded.torque_scale,
         acceptable=mse is not None and mse < ACCEPTABLE_MSE,
-        points=one.speed.size,
-        message=_message(one, undetermined, at_zero, noise, row),
+        points=folded.speed.size,
+        message=_message(folded, undetermined, at_zero, noise, row),
     )
 
 
-def _undetermined(one: _Folded, too_wide: NDArray[np.bool_]) -> tuple[str, ...]:
-    """Names by the width of their uncertainty; with fewer than four speeds all, but M_s where it is seen at rest."""
-    few = one.distinct < len(PARAMETER_NAMES)
-    seen_at_rest = bool((one.speed == 0).any())
+def _undetermined(folded: _Folded, too_wide: NDArray[np.bool_]) -> tuple[str, ...]:
+    """Names by the width of their uncertainty; with fewer than four speeds all, except M_s where it was measured at rest."""
+    few = folded.distinct < len(PARAMETER_NAMES)
+    seen_at_rest = bool((folded.speed == 0).any())
     return tuple(
         name
         for name, wide in zip(PARAMETER_NAMES, too_wide, strict=True)
@@ -251,12 +248,12 @@ def _status(undetermined: tuple[str, ...], at_zero: tuple[str, ...]) -> FitStatu
     return FitStatus.AT_BOUND if at_zero else FitStatus.DETERMINED
 
 
-def _message(one: _Folded, undetermined: tuple[str, ...], at_zero: tuple[str, ...], noise: Noise, row: int) -> str:
+def _message(folded: _Folded, undetermined: tuple[str, ...], at_zero: tuple[str, ...], noise: Noise, row: int) -> str:
     """A sentence or two for a person."""
     parts = []
-    if undetermined and one.distinct < len(PARAMETER_NAMES):
+    if undetermined and folded.distinct < len(PARAMETER_NAMES):
         parts.append(
-            f"{one.distinct} distinct speeds cannot tell four parameters apart: {', '.join(undetermined)} undetermined."
+            f"{folded.distinct} distinct speeds cannot determine four parameters: {', '.join(undetermined)} undetermined."
         )
     elif undetermined:
         parts.append(f"The measured speeds and torques do not determine {', '.join(undetermined)}.")

@@ -3,10 +3,10 @@
     M_s, V_S, C_v = α + β p          M̄_c = c_∞ + a e^{-p/p_0},   a, c_∞ >= 0,  p_0 > 0
 
 Weighted least squares through the parameters of one test's pressures, each with the variance of its fit. Given p_0 the
-falling law is linear in a and c_∞, so a search over p_0 alone finds the optimum.
+falling law is linear in a and c_∞, so a search over p_0 alone gives the optimum.
 
-Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, fig. 9 and section 3.1.2, which names the shapes and not
-the formula of the falling one.
+Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, fig. 9 and section 3.1.2, which gives the shapes but no
+formula of the falling one.
 """
 
 from collections.abc import Sequence
@@ -16,12 +16,11 @@ import numpy as np
 from scipy.optimize import minimize_scalar, nnls
 
 from models.arrays import FloatArray
+from models.friction.criteria import FEWEST_PRESSURES
 from models.friction.identification import StribeckFit
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
 
-#: A law is fitted through at least this many pressures.
-FEWEST_PRESSURES = 3
-#: The decay p_0 is looked for between these multiples of the pressures' range.
+#: The decay p_0 is sought between these multiples of the pressures' range.
 _DECAYS = np.geomspace(0.05, 20.0, 41)
 
 
@@ -67,15 +66,35 @@ class PressureLaws:
 
 def fit_pressure_laws(fits: Sequence[StribeckFit]) -> PressureLaws | None:
     """The laws over the fits of one test, or None where a parameter is determined at fewer than three pressures."""
-    told = [_determined(fits, index) for index in range(len(PARAMETER_NAMES))]
-    if any(np.unique(pressure).size < FEWEST_PRESSURES for pressure, _, _ in told):
+    determined = [_determined(fits, index) for index in range(len(PARAMETER_NAMES))]
+    if any(np.unique(pressure).size < FEWEST_PRESSURES for pressure, _, _ in determined):
         return None
     return PressureLaws(
-        static_torque=fit_linear(*told[0]),
-        coulomb_ratio=fit_asymptotic(*told[1]),
-        stribeck_velocity=fit_linear(*told[2]),
-        viscous_coefficient=fit_linear(*told[3]),
+        static_torque=fit_linear(*determined[0]),
+        coulomb_ratio=fit_asymptotic(*determined[1]),
+        stribeck_velocity=fit_linear(*determined[2]),
+        viscous_coefficient=fit_linear(*determined[3]),
     )
+
+
+def laws_of(levels: FloatArray, columns: FloatArray) -> PressureLaws:
+    """The laws through parameters [l, 4] in the order of PARAMETER_NAMES at FEWEST_PRESSURES or more levels [l] Pa, equally
+    weighted."""
+    equal = np.ones_like(levels)
+    m_s, m_c, v_s, c_v = columns.T
+    return PressureLaws(
+        static_torque=fit_linear(levels, m_s, equal),
+        coulomb_ratio=fit_asymptotic(levels, m_c, equal),
+        stribeck_velocity=fit_linear(levels, v_s, equal),
+        viscous_coefficient=fit_linear(levels, c_v, equal),
+    )
+
+
+def over_pressure(name: str, levels: FloatArray, values: FloatArray, pressures: FloatArray) -> FloatArray:
+    """A parameter at pressures [p] Pa by its law through values [l, k] of k states at levels [l] Pa; [p, k]."""
+    fit = fit_asymptotic if name == "coulomb_ratio" else fit_linear
+    equal = np.ones_like(levels)
+    return np.stack([fit(levels, column, equal)(pressures) for column in values.T], axis=1)
 
 
 def fit_linear(pressure: FloatArray, value: FloatArray, deviation: FloatArray) -> LinearLaw:
@@ -96,8 +115,10 @@ def fit_asymptotic(pressure: FloatArray, value: FloatArray, deviation: FloatArra
 
     def solve(log_decay: float) -> tuple[FloatArray, float]:
         falling = np.exp((least - pressure) / (span * np.exp(log_decay)))
-        found, norm = nnls(np.stack([np.ones_like(pressure), falling], axis=1) / deviation[:, None], value / deviation)
-        return np.asarray(found), float(norm)
+        coefficients, norm = nnls(
+            np.stack([np.ones_like(pressure), falling], axis=1) / deviation[:, None], value / deviation
+        )
+        return np.asarray(coefficients), float(norm)
 
     logs = np.log(_DECAYS)
     best = int(np.argmin([solve(float(log))[1] for log in logs]))
@@ -114,6 +135,6 @@ def _determined(fits: Sequence[StribeckFit], index: int) -> tuple[FloatArray, Fl
     usable = [fit for fit in fits if PARAMETER_NAMES[index] not in fit.undetermined]
     value = np.array([fit.parameters.as_array()[index] for fit in usable])
     deviation = np.array([fit.standard_errors[index] for fit in usable])
-    # the fits of noiseless data must not weigh without bound, nor divide by zero
+    # the weights of noiseless fits must stay finite
     least = max(1e-6 * float(np.abs(value).max(initial=0.0)), 1e-100)
     return np.array([fit.pressure for fit in usable]), value, np.maximum(deviation, least)

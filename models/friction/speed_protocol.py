@@ -1,7 +1,7 @@
 """The speeds over which a mean is taken, so that a missing or repeated plateau does not shift it.
 
 The reference steps 20 to 1970 rpm by 50 rpm at every pressure (section 2.3.3). A mean over the fitted curve at these
-speeds is a property of the clutch; a mean over whatever rows arrived is not.
+speeds is a property of the clutch; a mean over the rows of one test is not.
 """
 
 import math
@@ -9,12 +9,11 @@ import math
 import numpy as np
 
 from models.arrays import FloatArray
+from models.friction.criteria import END_TOLERANCE
 
 RPM = 2 * math.pi / 60
 STEPS = 40
 REFERENCE_SPEEDS: FloatArray = np.linspace(20.0, 1970.0, STEPS) * RPM
-#: A test counts as the reference's where its ends lie within two steps of the reference's ends.
-END_TOLERANCE = 105.0 * RPM
 
 
 def protocol_speeds(lowest: float, highest: float) -> FloatArray:

@@ -32,7 +32,7 @@ from models.friction.stribeck import GAMMA
 #: V_S is sought from LOW times the lowest to HIGH times the highest speed of a curve. Below, e is 1 - V_S/v to 1e-5 and
 #: M_s V_S is all that can be known; above, e^-100 has left only the highest speed in e.
 LOW, HIGH = 1e-5, 100.0
-#: The lowest speed that is told from standstill, as a share of the highest.
+#: The lowest speed that is distinguished from standstill, as a share of the highest.
 SLOWEST = 1e-6
 #: Scan points over log V_S; the spacing is 0.33 for speeds that span a factor 100. The curve e(log V_S) is 1 wide.
 SCAN = 64
@@ -231,14 +231,14 @@ def minimise(problem: Problem) -> tuple[Profile, Profile]:
             array[:, 0] for array in _bracket(problem, vertex, half[:, 0], np.linspace(-1.0, 1.0, POINTS) ** 3)
         )
     bottom, vertex, _ = _narrow(points, f)
-    found = profile(problem, np.hstack([bottom, vertex, _tie(problem, scan, f.min(axis=1))]))
-    best = found.residual.argmin(axis=1)[:, None]
-    tied = found.residual[:, 2:] <= found.residual.min(axis=1, keepdims=True) + _tolerance(problem)[:, None]
+    candidates = profile(problem, np.hstack([bottom, vertex, _tie(problem, scan, f.min(axis=1))]))
+    best = candidates.residual.argmin(axis=1)[:, None]
+    tied = candidates.residual[:, 2:] <= candidates.residual.min(axis=1, keepdims=True) + _tolerance(problem)[:, None]
     best = np.where(tied, 2, best)
     optimum = Profile(
-        log_velocity=np.take_along_axis(found.log_velocity, best, axis=1),
-        coefficients=np.take_along_axis(found.coefficients, best[..., None], axis=1),
-        residual=np.take_along_axis(found.residual, best, axis=1),
+        log_velocity=np.take_along_axis(candidates.log_velocity, best, axis=1),
+        coefficients=np.take_along_axis(candidates.coefficients, best[..., None], axis=1),
+        residual=np.take_along_axis(candidates.residual, best, axis=1),
     )
     return optimum, scan
 
@@ -276,11 +276,11 @@ def _narrow(points: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray, 
         (np.take_along_axis(points, middle + k, axis=1), np.take_along_axis(f, middle + k, axis=1)) for k in (-1, 0, 1)
     )
     falling, rising = (f1 - f0) * (t2 - t1), (f2 - f1) * (t1 - t0)
-    bend = (rising - falling) * 2
-    step = np.divide(falling * (t2 - t0), bend, out=np.zeros_like(f0), where=bend > 0)
+    curvature = (rising - falling) * 2
+    step = np.divide(falling * (t2 - t0), curvature, out=np.zeros_like(f0), where=curvature > 0)
     left, right = (np.take_along_axis(points, np.clip(low + k, 0, last), axis=1) for k in (-1, 1))
     lowest = np.take_along_axis(points, low, axis=1)
-    vertex = np.clip(np.where(bend > 0, (t0 + t1) / 2 - step, lowest), left, right)
+    vertex = np.clip(np.where(curvature > 0, (t0 + t1) / 2 - step, lowest), left, right)
     return lowest, vertex, np.maximum(right - vertex, vertex - left)
 
 

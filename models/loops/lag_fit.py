@@ -1,19 +1,19 @@
 """How far friction lags, fitted to whole periods of a dynamic record given the stationary curve S.
 
-One number u is sought, 1/C [s/Nm] of the attractor law or τ_1 [s] of the squeezed film: the torque is nearly linear
-in it, so its likelihood is nearly normal, which that of C itself is not. With a gain, a zero and single-valued shapes
-beside it (`models.loops.lag_problem`), none of which has a loop area, u is judged by how the torque differs between
-accelerating and decelerating. u maximises the likelihood (the others are profiled out); its deviation comes from the
-curvature there, with the noise taken from the residual and raised where that is not white: what no u explains makes u
-less certain.
+One number u is estimated, 1/C [s/Nm] of the attractor law or τ_1 [s] of the squeezed film: the torque is nearly linear
+in it, so its likelihood is nearly normal, which that of C itself is not. Beside it a gain, a zero and single-valued shapes
+are fitted (`models.loops.lag_problem`), none of which has a loop area, so that u follows from how the torque differs
+between accelerating and decelerating. u maximises the likelihood (the others are profiled out); its deviation comes from
+the curvature there, with the noise taken from the residual and raised where that is not white: what no u explains makes
+u less certain.
 
-The curve's own error is part of it: the lag is S S' v̇/C, so that C is off by 9 to 18 % with M̄_c 2 % off, by up to 3 %
+The curve's own error contributes: the lag is S S' v̇/C, so that C is off by 9 to 18 % with M̄_c 2 % off, by up to 3 %
 with V_S 5 % off, by up to 5 % with C_v 5 % off. u's gradient by the four parameters, each from one Gauss-Newton step at a
 curve moved by a little, carries their covariance (delta method). To first order u is a measured loop over S S' v̇², noisy
 both: its interval is Fieller's, |û - u| <= 1.645 √(n² + u² r²) with n the noise's deviation and r the curve's share, which
 is open at the top where the curve's slope might be none.
 
-By scaling, a torque g S is followed at C when S is followed at C/g: the attractor told is g/u.
+By scaling, a torque g S is followed at C when S is followed at C/g: the attractor reported is g/u.
 """
 
 import math
@@ -24,15 +24,14 @@ from enum import StrEnum
 import numpy as np
 
 from models.arrays import FloatArray
+from models.friction.criteria import Z90
 from models.friction.stribeck import StribeckParameters, torque
-from models.loops.lag import attractor_torque, squeeze_film_torque
-from models.loops.lag_problem import LagProblem, lag_problem
+from models.loops.attractor import attractor_torque
+from models.loops.criteria import AGAINST
+from models.loops.lag_problem import LagProblem, make_lag_problem
+from models.loops.squeeze_film import squeeze_film_torque
 from models.records.periods import Cycle
 
-#: Two-sided 90 %.
-NINETY = 1.6448536269514722
-#: A lag is against the law where it is this many deviations below none.
-AGAINST = 3.0
 _GRID = 1000  # steps of a period
 _RUN_IN = 5.0  # s before the periodic state, half a period at least and 12 at most
 #: A parameter is moved by this share of its deviation.
@@ -40,16 +39,16 @@ _MOVED = 0.01
 
 
 class LagStatus(StrEnum):
-    """DETERMINED; UNRESOLVED: no lag that noise would not make; AGAINST: torque lags the other way than the law can."""
+    """DETERMINED; UNRESOLVED: no lag that noise would not make; AGAINST_THE_LAW: torque lags as the law cannot."""
 
     DETERMINED = "determined"
     UNRESOLVED = "unresolved"
-    AGAINST = "against_the_law"
+    AGAINST_THE_LAW = "against_the_law"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StationaryCurve:
-    """The curve that torque lags behind, and its covariance [4, 4] as `StribeckFit` has it; none where it is exact."""
+    """The curve that torque lags behind, and its covariance [4, 4] as in `StribeckFit`; zero where it is exact."""
 
     parameters: StribeckParameters
     covariance: FloatArray = field(default_factory=lambda: np.zeros((4, 4)))
@@ -107,22 +106,22 @@ def fit_lag(law: Law, cycle: Cycle, phase: FloatArray, measured: FloatArray, cur
     """
     posed = _posed(law, cycle, phase, measured, curve.parameters)
     scanned = posed.course.at(law.lags, posed.problem.phase)
-    misses = [posed.problem.miss(row) for row in scanned]
-    best = int(np.argmin(misses))
+    misfits = [posed.problem.misfit(row) for row in scanned]
+    best = int(np.argmin(misfits))
     none, first = posed.near_none(scanned[0])
-    if first < -AGAINST * none or (best == 0 and first <= NINETY * none):
+    if first < -AGAINST * none or (best == 0 and first <= Z90 * none):
         slant = _by_curve(lambda moved: _posed(law, cycle, phase, measured, moved).near_none()[1], curve)
-        found = _Estimate(first, none, slant)
-        status = LagStatus.AGAINST if first < -AGAINST * found.sd else LagStatus.UNRESOLVED
-        return _told(posed.problem, torque(posed.problem.speed, curve.parameters), None, found, status)
-    lag = _refine(posed.problem, posed.course, law.lags, misses, best)
+        estimate = _Estimate(first, none, slant)
+        status = LagStatus.AGAINST_THE_LAW if first < -AGAINST * estimate.sd else LagStatus.UNRESOLVED
+        return _result(posed.problem, torque(posed.problem.speed, curve.parameters), None, estimate, status)
+    lag = _refine(posed.problem, posed.course, law.lags, misfits, best)
     middle, change = posed.about(lag)
     sd, gain = posed.problem.deviation(middle, change, lag, cycle, law.scaled)
     share = 1 / gain if law.scaled else 1.0
     slant = _by_curve(lambda moved: _posed(law, cycle, phase, measured, moved).stepped(lag), curve)
-    found = _Estimate(lag * share, sd * share, slant)
-    status = LagStatus.DETERMINED if found.lag > NINETY * found.sd else LagStatus.UNRESOLVED
-    return _told(posed.problem, middle, found.lag if status is LagStatus.DETERMINED else None, found, status)
+    estimate = _Estimate(lag * share, sd * share, slant)
+    status = LagStatus.DETERMINED if estimate.lag > Z90 * estimate.sd else LagStatus.UNRESOLVED
+    return _result(posed.problem, middle, estimate.lag if status is LagStatus.DETERMINED else None, estimate, status)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,8 +138,8 @@ class _Estimate:
 
     def interval(self) -> tuple[float, float]:
         """Fieller's, 90 %; an end that is not bounded is infinite."""
-        spare = 1 - (NINETY * self.slant / self.lag) ** 2 if self.lag else 1.0
-        clear = self.lag**2 - (NINETY * self.noise) ** 2
+        spare = 1 - (Z90 * self.slant / self.lag) ** 2 if self.lag else 1.0
+        clear = self.lag**2 - (Z90 * self.noise) ** 2
         if spare > 0:
             half = math.sqrt(max(self.lag**2 - spare * clear, 0.0))
             return (self.lag - half) / spare, (self.lag + half) / spare
@@ -194,18 +193,20 @@ class _Posed:
 
 
 def _posed(law: Law, cycle: Cycle, phase: FloatArray, measured: FloatArray, curve: StribeckParameters) -> _Posed:
-    return _Posed(law=law, problem=lag_problem(cycle, phase, measured, curve), course=_Course(law, cycle, curve))
+    return _Posed(law=law, problem=make_lag_problem(cycle, phase, measured, curve), course=_Course(law, cycle, curve))
 
 
-def _told(problem: LagProblem, course: FloatArray, lag: float | None, found: _Estimate, status: LagStatus) -> LagFit:
+def _result(
+    problem: LagProblem, course: FloatArray, lag: float | None, estimate: _Estimate, status: LagStatus
+) -> LagFit:
     left = problem.without(course)
     gain = problem.gain(left)
     miss = float(np.square(problem.left - gain * left).sum())
     size = problem.measured.size
     return LagFit(
         lag=lag,
-        lag_sd=found.sd,
-        interval=found.interval(),
+        lag_sd=estimate.sd,
+        interval=estimate.interval(),
         gain=gain,
         noise=math.sqrt(miss / max(size - problem.absorbed.shape[1] - 2, 1)),
         log_likelihood=-0.5 * size * math.log(max(miss, 1e-300) / size),
@@ -236,23 +237,23 @@ class _Course:
         return np.asarray(courses[:, cell] * (1 - part) + courses[:, cell + 1] * part, dtype=np.float64)
 
 
-def _refine(problem: LagProblem, course: _Course, lags: FloatArray, misses: list[float], best: int) -> float:
+def _refine(problem: LagProblem, course: _Course, lags: FloatArray, misfits: list[float], best: int) -> float:
     """The minimum about the best of the scan, in log u: three finer scans, each a ninth of the last, and a parabola."""
     low = math.log(lags[max(best - 1, 0)])
     high = math.log(lags[min(best + 1, lags.size - 1)])
-    found = math.log(lags[best])
-    least = misses[best]
+    optimum = math.log(lags[best])
+    least = misfits[best]
     for _ in range(3):
         points = np.linspace(low, high, 9)
-        values = np.array([problem.miss(row) for row in course.at(np.exp(points), problem.phase)])
+        values = np.array([problem.misfit(row) for row in course.at(np.exp(points), problem.phase)])
         i = int(np.argmin(values))
         if values[i] <= least:
-            found, least = float(points[i]), float(values[i])
+            optimum, least = float(points[i]), float(values[i])
         width = (high - low) / 8
         if 0 < i < 8:
             left, here, right = values[i - 1 : i + 2]
-            bend = left - 2 * here + right
-            if bend > 0:
-                found = float(points[i] + 0.5 * width * (left - right) / bend)
-        low, high = found - width, found + width
-    return math.exp(found)
+            curvature = left - 2 * here + right
+            if curvature > 0:
+                optimum = float(points[i] + 0.5 * width * (left - right) / curvature)
+        low, high = optimum - width, optimum + width
+    return math.exp(optimum)

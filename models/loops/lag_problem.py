@@ -1,9 +1,9 @@
-"""The least squares of a lag, given the stationary curve S: what is absorbed, what is left, and how noisy that is.
+"""The least squares of a lag, given the stationary curve S: what is absorbed, the residual, and how noisy that is.
 
     M_i = g m(θ_i; u) + m_0 + Σ_h e_h T_h(v_i) + noise
 
-g, within 5 % of 1, and m_0 are the sensor's and the day's; the T_h are single-valued functions of speed, orthogonal to S
-and 1, and take what S has wrong in shape. None of them has a loop area. `models.loops.lag_fit` seeks u.
+g, within 5 % of 1, and m_0 are gain and zero of the sensor that day; the T_h are single-valued functions of speed,
+orthogonal to S and 1, and absorb errors of S in shape. None of them has a loop area. `models.loops.lag_fit` estimates u.
 """
 
 import math
@@ -13,12 +13,9 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.friction.stribeck import StribeckParameters, torque
+from models.loops.criteria import FEWEST_SLIDING, GAIN_SD, LEAST_SPEED, NOT_WHITE
 from models.records.periods import Cycle
 
-#: The gain's prior deviation [-].
-GAIN_SD = 0.05
-#: Speeds below this share of the highest are sticking or next to it, and no stationary test reaches them.
-LEAST_SPEED = 0.01
 _SHAPES = 6
 _BLOCKS = 24
 
@@ -41,14 +38,14 @@ class LagProblem:
         weight = (self.noise / GAIN_SD) ** 2
         return float((left @ self.left + weight) / (left @ left + weight))
 
-    def miss(self, course: FloatArray) -> float:
+    def misfit(self, course: FloatArray) -> float:
         """-2 log likelihood x noise², profiled over gain, zero and shapes."""
         left = self.without(course)
         gain = self.gain(left)
         return float(np.square(self.left - gain * left).sum() + ((gain - 1) * self.noise / GAIN_SD) ** 2)
 
     def linear(self, still: FloatArray, little: FloatArray, lag: float) -> tuple[float, float]:
-        """Deviation and estimate of u by linearising about no lag: tells its sign."""
+        """Deviation and estimate of u by linearising about no lag: it gives the sign."""
         base = self.without(still)
         change = self.without((little - still) / lag)
         gain = self.gain(base)
@@ -77,11 +74,11 @@ class LagProblem:
         information[1] = information[0, 1], gain**2 * (slope @ slope)
         variance = sd**2 * np.linalg.inv(information + 1e-12 * np.diag(np.diag(information)))
         along = np.array([-lag / gain if scaled else 0.0, 1.0])
-        told = max(float(along @ variance @ along), 0.0)
-        return math.hypot(math.sqrt(told), self._by_phase(slope, course, gain, cycle)), gain
+        along_variance = max(float(along @ variance @ along), 0.0)
+        return math.hypot(math.sqrt(along_variance), self._by_phase(slope, course, gain, cycle)), gain
 
     def _by_phase(self, slope: FloatArray, course: FloatArray, gain: float, cycle: Cycle) -> float:
-        """What the speed's own noise adds: a phase that is wrong makes a loop of a curve."""
+        """The part of the speed's own noise: an error of the phase opens a curve into a loop."""
         order = np.argsort(np.mod(self.phase, 2 * math.pi))
         turned = np.empty_like(course)
         turned[order] = np.gradient(course[order], np.maximum.accumulate(_spread(self.phase[order])))
@@ -103,7 +100,7 @@ class LagProblem:
         filled = count > 0
         freedom = max(int(filled.sum()) - self.absorbed.shape[1] - 2, 4)
         ratio = float((total[filled] ** 2 / count[filled]).sum()) / freedom / max(variance, 1e-300)
-        return math.sqrt(variance * (ratio if ratio > 1 + 2.5 * math.sqrt(2 / freedom) else 1.0))
+        return math.sqrt(variance * (ratio if ratio > 1 + NOT_WHITE * math.sqrt(2 / freedom) else 1.0))
 
 
 def _spread(phase: FloatArray) -> FloatArray:
@@ -111,12 +108,12 @@ def _spread(phase: FloatArray) -> FloatArray:
     return np.asarray(np.mod(phase, 2 * math.pi) + 1e-9 * np.arange(phase.size), dtype=np.float64)
 
 
-def lag_problem(cycle: Cycle, phase: FloatArray, measured: FloatArray, curve: StribeckParameters) -> LagProblem:
+def make_lag_problem(cycle: Cycle, phase: FloatArray, measured: FloatArray, curve: StribeckParameters) -> LagProblem:
     speed = cycle.value(phase)
     highest = float(speed.max())
     rows = speed > LEAST_SPEED * highest
-    if rows.sum() < 20:
-        raise ValueError(f"at least 20 samples must slide, got {int(rows.sum())}")
+    if rows.sum() < FEWEST_SLIDING:
+        raise ValueError(f"at least {FEWEST_SLIDING} samples must slide, got {int(rows.sum())}")
     phase, speed, measured = phase[rows], speed[rows], measured[rows]
     span = max(highest - float(speed.min()), 1e-12)
     shapes = np.polynomial.chebyshev.chebvander(2 * (speed - speed.min()) / span - 1, _SHAPES + 1)

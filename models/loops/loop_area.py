@@ -23,17 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
+from models.friction.criteria import Z90
 from models.friction.stribeck import GAMMA
-from models.loops.lag_fit import NINETY
+from models.loops.criteria import FEWEST_SAMPLES, NEAR_ZERO, NOT_WHITE, TORQUE_HARMONICS
 from models.records.outliers import inliers
 from models.records.periods import Cycle, harmonics
-
-#: Harmonics of the torque, where there are samples for them.
-TORQUE_HARMONICS = 16
-#: Fewer samples tell no loop.
-LEAST_SAMPLES = 32
-#: A speed whose lowest is below this share of its swing comes near zero.
-NEAR_ZERO = 0.05
 
 
 class Direction(StrEnum):
@@ -57,7 +51,7 @@ class Area:
     @property
     def direction(self) -> Direction:
         """By the sign of the area, where that is beyond its noise."""
-        if abs(self.area) <= NINETY * self.area_sd:
+        if abs(self.area) <= Z90 * self.area_sd:
             return Direction.NONE
         return Direction.HIGHER_ACCELERATING if self.area > 0 else Direction.HIGHER_DECELERATING
 
@@ -71,7 +65,7 @@ class Samples:
     outliers: int
 
 
-def loop_area(cycle: Cycle, time: FloatArray, torque: FloatArray) -> Area:
+def measured_area(cycle: Cycle, time: FloatArray, torque: FloatArray) -> Area:
     """Eq. 8 of torque [n] Nm at time [n] s (ascending) over the whole periods of a cycle of sliding velocity in m/s.
 
     The deviation is of the residual noise of torque and speed, and of the scatter from period to period where there are
@@ -81,11 +75,11 @@ def loop_area(cycle: Cycle, time: FloatArray, torque: FloatArray) -> Area:
 
 
 def clean_samples(cycle: Cycle, time: FloatArray, torque: FloatArray) -> Samples:
-    """Those of torque [n] Nm at time [n] s (ascending) within the whole periods, without outliers from the loop."""
+    """The samples of torque [n] Nm at time [n] s (ascending) within the whole periods, without outliers from the loop."""
     inside = (time >= cycle.start) & (time < cycle.stop)
     phase, measured = cycle.phase(time[inside]), torque[inside]
     keep = np.ones(phase.size, dtype=np.bool_)
-    if phase.size >= LEAST_SAMPLES:
+    if phase.size >= FEWEST_SAMPLES:
         design = _design(cycle, phase, _harmonics_for(phase))
         for _ in range(4):
             before = keep
@@ -96,10 +90,10 @@ def clean_samples(cycle: Cycle, time: FloatArray, torque: FloatArray) -> Samples
 
 
 def area_of(cycle: Cycle, samples: Samples) -> Area:
-    """`loop_area` of samples that are clean already."""
+    """`measured_area` of samples that are clean already."""
     phase, measured = samples.phase, samples.torque
-    if phase.size < LEAST_SAMPLES:
-        raise ValueError(f"at least {LEAST_SAMPLES} samples must lie in the whole periods, got {phase.size}")
+    if phase.size < FEWEST_SAMPLES:
+        raise ValueError(f"at least {FEWEST_SAMPLES} samples must lie in the whole periods, got {phase.size}")
     count = _harmonics_for(phase)
     design = _design(cycle, phase, count)
     inverse, solution = _solve(design, measured, np.ones(phase.size, dtype=np.bool_))
@@ -169,7 +163,7 @@ def _noise(cycle: Cycle, residual: FloatArray, parameters: int) -> tuple[float, 
     edges = np.linspace(0, residual.size, blocks + 1).astype(np.int64)[:-1]
     size = np.diff(np.append(edges, residual.size))
     ratio = float((np.add.reduceat(residual, edges) ** 2 / size).sum()) / freedom / max(variance, 1e-300)
-    factor = ratio if ratio > 1 + 2.5 * math.sqrt(2 / freedom) else 1.0
+    factor = ratio if ratio > 1 + NOT_WHITE * math.sqrt(2 / freedom) else 1.0
     return math.sqrt(variance), math.sqrt(variance * factor)
 
 

@@ -1,10 +1,10 @@
-"""Remaining useful life: when a quantity first passes the threshold, with the uncertainty of everything that decides it.
+"""Remaining useful life: when a quantity first passes the threshold, with the uncertainty of everything it depends on.
 
 The criterion is ξ(ζ) <= fraction · ξ0, with ξ0 the value at ζ = 0. Each draw of the coefficients has its own ξ0,
 hence its own threshold. Eq. 6 alone passes it in closed form, and saturates: a draw whose ξ0 + Δ stays above its
 threshold never gets there. With a discrepancy beside eq. 6, or a known further course of the quantity, the first
-passage is found along the draw's path. How probable it is to get there, is an answer; a quantile that lies beyond the
-horizon is None, never an infinity.
+passage is computed along the draw's path. The probability of getting there is part of the result; a quantile that lies
+beyond the horizon is None, never an infinity.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,15 +16,13 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.degradation import general_order
+from models.prognosis.criteria import BAND, HORIZON, QUANTILES
 from models.tracking.posterior import Posterior
 
-QUANTILES = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95)
-#: Cycles beyond which an end of life is not told from never.
-HORIZON = 1_000_000.0
-#: Places at which a path is looked at: evenly over what was measured, and then in equal ratios up to the horizon.
-BEHIND, AHEAD = 40, 240
+#: Places of a path: evenly over what was measured, and then in equal ratios up to the horizon.
+_BEHIND, _AHEAD = 40, 240
 
-#: A known course of the quantity over ζ [k] that is no part of eq. 6, in the quantity's unit [k].
+#: A given course over ζ [k] that is added to eq. 6, in the quantity's unit [k].
 Offset: TypeAlias = Callable[[FloatArray], FloatArray]
 
 
@@ -54,7 +52,7 @@ class FirstPassage:
     current: tuple[float, float]
 
 
-def first_passage(
+def predict_first_passage(
     posterior: Posterior,
     *,
     fraction: float,
@@ -76,8 +74,8 @@ def first_passage(
         raise ValueError(f"horizon must be finite and positive, got {horizon}")
     horizon = max(horizon, as_of)
     passages = ends_of_life(posterior, fraction, offset=offset, horizon=horizon)
-    found = weighted_quantiles(np.minimum(passages, 10.0 * horizon), posterior.weight, quantiles)
-    end = {q: float(x) if x <= horizon else None for q, x in zip(quantiles, found, strict=True)}
+    values = weighted_quantiles(np.minimum(passages, 10.0 * horizon), posterior.weight, quantiles)
+    end = {q: float(x) if x <= horizon else None for q, x in zip(quantiles, values, strict=True)}
     fresh, now = (paths(posterior, np.array([zeta]), offset)[0] for zeta in (0.0, as_of))
     initial = float(posterior.weight @ fresh)
     return FirstPassage(
@@ -97,20 +95,20 @@ def ends_of_life(
 ) -> FloatArray:
     """The ζ [n] at which each draw first has ξ(ζ) <= fraction · ξ0; inf where it never has.
 
-    Of a draw that has a discrepancy, or with an offset, only what happens up to the horizon is known.
+    Of a draw that has a discrepancy, or with an offset, only passages up to the horizon are computed.
     """
     threshold = fraction * posterior.initial
     crossing = general_order.first_passage(threshold, posterior.degradation)
-    found = np.where(posterior.initial <= threshold, 0.0, crossing)
+    passages = np.where(posterior.initial <= threshold, 0.0, crossing)
     beside = posterior.discrepancy
     if offset is None and beside is None:
-        return found
-    walked = np.ones(found.size, dtype=bool) if offset is not None or beside is None else beside.present
+        return passages
+    walked = np.ones(passages.size, dtype=bool) if offset is not None or beside is None else beside.present
     index = np.flatnonzero(walked)
     if index.size:
-        some = posterior.taken(index, posterior.weight[index])
-        found[index] = _along_paths(some, fraction, offset, horizon)
-    return found
+        walked_draws = posterior.taken(index, posterior.weight[index])
+        passages[index] = _along_paths(walked_draws, fraction, offset, horizon)
+    return passages
 
 
 def paths(posterior: Posterior, progress: FloatArray, offset: Offset | None = None) -> FloatArray:
@@ -120,7 +118,7 @@ def paths(posterior: Posterior, progress: FloatArray, offset: Offset | None = No
 
 
 def bands(
-    posterior: Posterior, progress: FloatArray, quantiles: Sequence[float] = (0.05, 0.5, 0.95)
+    posterior: Posterior, progress: FloatArray, quantiles: Sequence[float] = BAND
 ) -> tuple[FloatArray, FloatArray]:
     """The mean of ξ at progress [k], and its quantiles [k, q]: what a plot of the course shows."""
     values = posterior.values(progress)
@@ -130,26 +128,31 @@ def bands(
 def _along_paths(posterior: Posterior, fraction: float, offset: Offset | None, horizon: float) -> FloatArray:
     """First passages [n], linear between places; a step of the level or of the offset is a crossing where it is."""
     beside = posterior.discrepancy
-    known = 1.0 if beside is None else beside.span
+    span = 1.0 if beside is None else beside.span
     places = np.unique(
         np.concatenate(
             [
-                np.linspace(0.0, min(known, horizon), BEHIND),
-                np.geomspace(min(known, horizon), horizon, AHEAD),
+                np.linspace(0.0, min(span, horizon), _BEHIND),
+                np.geomspace(min(span, horizon), horizon, _AHEAD),
                 np.zeros(0) if beside is None else beside.at[beside.at <= horizon],
             ]
         )
     )
     values = paths(posterior, places, offset)
-    over = values - fraction * values[0]
-    below = over <= 0.0
+    return first_below(values - fraction * values[0], places, np.zeros(values.shape[1]))
+
+
+def first_below(paths: FloatArray, progress: FloatArray, level: FloatArray) -> FloatArray:
+    """The ζ [n] at which each path [k, n] over ascending progress [k] first comes down to its level [n], linear between
+    places; inf where it never does."""
+    below = paths <= level
     first = below.argmax(axis=0)
-    draws = np.arange(first.size)
     before = np.maximum(first - 1, 0)
-    high, low = over[before, draws], over[first, draws]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(first > 0, high / (high - low), 0.0)
-    crossed = places[before] + share * (places[first] - places[before])
+    draws = np.arange(paths.shape[1])
+    high, low = paths[before, draws], paths[first, draws]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.where(first > 0, (high - level) / (high - low), 0.0)
+    crossed = progress[before] + share * (progress[first] - progress[before])
     return np.where(below.any(axis=0), crossed, np.inf)
 
 

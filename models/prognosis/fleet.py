@@ -1,16 +1,16 @@
-"""What a fleet of earlier lives says of the next one: the population of eq. 6's coefficients, learned by empirical Bayes.
+"""What a fleet of earlier lives says about the next: the population of eq. 6's coefficients, learned by empirical Bayes.
 
 Each clutch of a fleet has x = (Δ/ξ0, log φ, log ε, log s/ξ0), drawn from a normal population N(μ, Σ). None of them is
 known exactly, so each clutch gives a weighted sample of its posterior under the weak prior, and an
-expectation-maximisation goes to and fro between the clutches' moments given the population (the samples, weighted by
+expectation-maximisation alternates between the clutches' moments given the population (the samples, weighted by
 population over weak prior) and the population given those moments. The hyperprior, normal-inverse-Wishart, stands for
-clutches that differ by 0.15 in Δ/ξ0 and about half in φ, ε and s: it decides where the fleet is small, and is soon
-forgotten. What is foretold of the next clutch is then Student's t.
+clutches that differ by 0.15 in Δ/ξ0 and about half in φ, ε and s: it decides where the fleet is small, and loses weight
+quickly as the fleet grows. The prediction for the next clutch is then Student's t.
 
 A clutch may be of another kind than its fleet. The prior is therefore a mixture, `share` of the learned population and the
 rest weak, and the clutch's own measurements decide between them. A filter runs under the weak prior and under the normal
-nearest to the population; the two samples are put together with the weights that make them one sample of the posterior
-under the mixture. Only the ratio of the two evidences is needed for that, and the samples tell it themselves (Bennett).
+nearest to the population; the two samples are combined with the weights that make them one sample of the posterior under
+the mixture. This needs only the ratio of the two evidences, which is estimated from the samples (Bennett).
 
 Sources: B. P. Carlin, T. A. Louis, Bayesian Methods for Data Analysis (2008) ch. 5, for empirical Bayes; C. H. Bennett,
 J. Comput. Phys. 22 (1976) 245-268, and M. R. Shirts, J. D. Chodera, J. Chem. Phys. 129 (2008) 124105, for the weights.
@@ -27,32 +27,32 @@ from scipy.optimize import brentq
 from scipy.special import gammaln, log_expit, logsumexp
 
 from models.arrays import FloatArray
+from models.prognosis.criteria import (
+    DOUBT,
+    FEWEST_TESTS_TO_LEARN,
+    HYPER_CENTRE,
+    HYPER_CLUTCHES,
+    HYPER_SD,
+    SETTLED,
+    TRUST,
+    WIDER,
+)
+from models.tracking.criteria import REACH
 from models.tracking.discrepancy import Discrepancy
 from models.tracking.filters.grid import Grid
-from models.tracking.filters.lattice import REACH
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior, weak
 
-#: A clutch with fewer tests than this says too little to teach anything.
-FEWEST_TESTS = 6
-#: The hyperprior: the deviations of x among clutches of one kind, how many clutches that is worth, and how many the centre
-#: of the weak prior is worth as the population's mean.
-HYPER_SD = np.array([0.15, 0.6, 0.4, 0.5])
-HYPER_CLUTCHES, HYPER_CENTRE = 6.0, 0.03
-#: A fleet of n has the share TRUST n/(n + DOUBT) of the mixture: most of it stays weak, for the evidence soon speaks for a
-#: fleet that is right, and slowly against one that is wrong.
-TRUST, DOUBT = 0.25, 3.0
-#: A filter runs under a normal that is wider than the population by this factor: a clutch at the edge of its fleet must not
-#: lie at the edge of what the filter looks at, REACH deviations to either side. Beyond, it has no draws: log of nothing.
-WIDER, NEVER = 1.5, -700.0
+#: The logarithm of a vanishing density: the filter has no draws beyond REACH deviations of its prior.
+_NEVER = -700.0
 _DRAWS, _ROUNDS = 2000, 40
 _GRID = Grid()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FleetPrior:
-    """The population that `clutches` clutches taught: Student's t of x [4], `mean` [4], `scale` [4, 4] and `freedom` > 2.
+    """The population learned from `clutches` clutches: Student's t of x [4], `mean` [4], `scale` [4, 4] and `freedom` > 2.
 
     x is (Δ/ξ0, log φ, log ε, log s/ξ0), φ in cycles.
     """
@@ -103,7 +103,7 @@ class FleetPrior:
         drawn = pooled(under_weak, under_fleet)
         ours, theirs = weak(first, falling=True), self.prior_for(first)
         log_weak = _log_prior(drawn, ours)
-        lean = np.where(_within(drawn, theirs), _log_prior(drawn, theirs) - log_weak, NEVER)
+        lean = np.where(_within(drawn, theirs), _log_prior(drawn, theirs) - log_weak, _NEVER)
         split = under_weak.weight.size
         ratio = _log_evidence_ratio(lean[:split], under_weak.weight, lean[split:], under_fleet.weight)
         learned = self.log_density(_coordinates(drawn)) - np.log(np.abs(drawn.initial)) - log_weak
@@ -134,16 +134,16 @@ class FleetPrior:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Taught:
-    """What one clutch says of x: a sample [n, 4] of its posterior, with the weak prior divided out of the weights."""
+    """What one clutch says about x: a sample [n, 4] of its posterior, with the weak prior divided out of the weights."""
 
     x: FloatArray
     log_weight: FloatArray
 
 
 def taught(history: Sequence[Measurement], seed: int = 0) -> Taught:
-    """What a clutch's measurements of mean COF say of x. Raises ValueError where there are fewer than FEWEST_TESTS."""
-    if len(history) < FEWEST_TESTS:
-        raise ValueError(f"a clutch needs {FEWEST_TESTS} tests to teach a fleet's prior, got {len(history)}")
+    """What a clutch's measurements of mean COF say about x. Raises ValueError below FEWEST_TESTS_TO_LEARN of them."""
+    if len(history) < FEWEST_TESTS_TO_LEARN:
+        raise ValueError(f"a clutch needs {FEWEST_TESTS_TO_LEARN} tests to teach a fleet's prior, got {len(history)}")
     prior = weak(history[0], falling=True)
     drawn = _GRID.posterior(_GRID.from_history(prior, history), _DRAWS, np.random.default_rng(seed))
     sound = drawn.initial > 0.0
@@ -155,26 +155,46 @@ def taught(history: Sequence[Measurement], seed: int = 0) -> Taught:
 def learn(histories: Sequence[Sequence[Measurement]]) -> FleetPrior:
     """The population behind clutches of one kind, each by its measurements of mean COF in order.
 
-    Those with fewer than FEWEST_TESTS measurements are left out. Raises ValueError where none is left.
+    Those with fewer than FEWEST_TESTS_TO_LEARN measurements are left out. Raises ValueError where none is left.
     """
-    return population([taught(history) for history in histories if len(history) >= FEWEST_TESTS])
+    return population([taught(history) for history in histories if len(history) >= FEWEST_TESTS_TO_LEARN])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PopulationFit:
+    """A learned population, and the largest change of its mean in the last round, in the population's deviations."""
+
+    prior: FleetPrior
+    change: float
+
+    @property
+    def converged(self) -> bool:
+        """Whether further rounds would hardly change it."""
+        return self.change < SETTLED
 
 
 def population(fleet: Sequence[Taught]) -> FleetPrior:
-    """The population behind what clutches have taught. Raises ValueError where there are none."""
+    """The population behind the samples of clutches. Raises ValueError where there are none."""
+    return fit_population(fleet).prior
+
+
+def fit_population(fleet: Sequence[Taught], rounds: int = _ROUNDS) -> PopulationFit:
+    """`population` after so many rounds, and whether it has converged. Raises ValueError where `fleet` is empty."""
     if not fleet:
-        raise ValueError(f"a fleet needs a clutch with {FEWEST_TESTS} tests or more")
+        raise ValueError(f"a fleet needs a clutch with {FEWEST_TESTS_TO_LEARN} tests or more")
     centre = weak(Measurement(progress=0.0, value=1.0, variance=0.0), falling=True)
     believed = np.array([centre.change_mean, centre.log_scale_mean, centre.log_exponent_mean, centre.log_scatter_mean])
-    found = FleetPrior(
+    learned = FleetPrior(
         clutches=len(fleet),
         mean=believed,
         scale=np.diag([centre.change_sd, centre.log_scale_sd, centre.log_exponent_sd, centre.log_scatter_sd]) ** 2,
         freedom=HYPER_CLUTCHES,
     )
-    for _ in range(_ROUNDS):
-        found = _learnt(found, fleet, believed)
-    return found
+    change = math.inf
+    for _ in range(rounds):
+        before, learned = learned, _learnt(learned, fleet, believed)
+        change = float((np.abs(learned.mean - before.mean) / np.sqrt(np.diag(learned.scale))).max())
+    return PopulationFit(prior=learned, change=change)
 
 
 def pooled(first: Posterior, second: Posterior) -> Posterior:
@@ -254,7 +274,7 @@ def _log_evidence_ratio(
     low, high = float(both.min()) - 1.0, float(both.max()) + 1.0
 
     def excess(c: float) -> float:
-        one = logsumexp(log_expit(lean_first - c), b=weight_first)
-        return float(one - logsumexp(log_expit(c - lean_second), b=weight_second))
+        log_first = logsumexp(log_expit(lean_first - c), b=weight_first)
+        return float(log_first - logsumexp(log_expit(c - lean_second), b=weight_second))
 
     return float(brentq(excess, low, high, xtol=1e-6))

@@ -1,143 +1,188 @@
-"""Eq. 6 of several quantities at once whose measurements err together: the Stribeck parameters of one pressure.
+"""Mean COF from the Stribeck parameters' own tracks: a second way to the number that its direct track gives.
 
-The four parameters of one fit err together: where M_s comes out too large, C_v comes out too small, and the torque hardly
-changes. Tracked each by itself they lose what only their sum knows. Given φ and ε of each, ξ0 and Δ of all are jointly
-normal (generalised least squares with the covariance of every fit), and the evidence is closed; so draws of (φ, ε) from the
-quantities' own tracks, in random company, are weighted by joint evidence over the product of their own:
+Each parameter at each reference pressure follows its own eq. 6. At any ζ eq. 3 gives the torque over the protocol's
+velocities, and the mean of that over velocities and pressures, divided by the torque of a unit COF, is mean COF again:
 
-    y_t = ξ0 + Δ ∘ b_t(φ, ε) + e_t,   e_t ~ N(0, V_t + S)
+    μ(ζ) = Σ_p mean_v S(v; θ_p(ζ)) / (torque per COF at p) / (number of pressures)
 
-Where a few combinations would take all weight, the weights are tempered until FEWEST of them count. `paired` puts draws of
-several pressures together again: a normal with the wanted correlation is drawn, and each column's draws are put into the
-order of its ranks.
-
-Source: R. L. Iman, W. J. Conover, Commun. Stat. Simul. Comput. 11 (1982) 311-334, for the pairing.
+The parameters of one pressure are drawn jointly (`joint_draws.draw_jointly`), the pressures are combined with the
+correlation that their tests' direct mean COF shows (`joint_draws.paired`). Where pressures lack parameters the paths are
+scaled by mean COF of the reference test over all its pressures to that over those that take part. Where the two ways
+disagree by more than their uncertainty, eq. 6 cannot hold of both.
 """
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.tracking.linear_model import basis
+from models.friction.stribeck import StribeckParameters, torque
+from models.prognosis.criteria import BAND, FAR_APART, FEWEST_TESTS, HORIZON
+from models.prognosis.first_passage import first_below, weighted_quantiles
+from models.prognosis.joint_draws import draw_jointly, paired, shrunk_correlation
 from models.tracking.posterior import Posterior
-from models.tracking.sampling import systematic
 
-#: Combinations that are tried, and how many must count in the end.
-TRIED, FEWEST = 3_000, 60
-#: Prior deviations of ξ0 and Δ, in sizes of the quantity.
-_INITIAL, _CHANGE = 0.5, 1.0
-#: No correlation at all is worth this many tests beside the correlation that is seen from test to test.
-NONE_WORTH = 5.0
+#: Draws, and places of the paths: evenly up to now, and in equal ratios beyond.
+_DRAWS, _BEHIND, _AHEAD = 200, 24, 48
+_COVERED = 3.29  # deviations of a normal between its 5 and 95 % quantiles
 
 
-def joint(
-    progress: FloatArray,
-    values: FloatArray,
-    covariance: FloatArray,
-    own: Sequence[Posterior],
-    size: int,
-    rng: np.random.Generator,
-) -> list[Posterior]:
-    """`size` equal draws of each of q quantities, row by row together, from their own tracks.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PressureLevel:
+    """What is known at one reference pressure.
 
-    `progress` [t] >= 0 and `values` [t, q] with `covariance` [t, q, q], positive definite: that of the fit and the scatter
-    between tests. `own` are the quantities' own samples: of these only φ and ε are used.
+    progress [t], parameters [t, 4] and covariance [t, 4, 4]: the fits that determine all four parameters. parameter_tracks:
+    a sample of eq. 6 for each parameter, in the order of PARAMETER_NAMES. tests [m] numbers the tests whose mean COF was
+    measured at cof_progress [m] as cof [m], m >= 1; cof_track is its sample. torque_per_cof [Nm] of a unit COF and
+    reference_cof [-] are those of the reference test.
     """
-    quantities = values.shape[1]
-    index = np.stack([systematic(each.weight, TRIED, float(rng.random())) for each in own], axis=1)
-    index = np.take_along_axis(index, np.argsort(rng.random(index.shape), axis=0), axis=0)
-    scale = np.stack([np.log(each.scale[i]) for each, i in zip(own, index.T, strict=True)])
-    exponent = np.stack([np.log(each.exponent[i]) for each, i in zip(own, index.T, strict=True)])
-    b = basis(progress[:, None, None], scale, exponent)  # [t, q, n]
-    typical = np.maximum(np.abs(values).max(axis=0), 1e-300)
-    scaled, spread = values / typical, covariance / np.outer(typical, typical)
-    mean, root, evidence = _solved(b, scaled, np.asarray(np.linalg.inv(spread), dtype=np.float64))
-    for each in range(quantities):
-        alone = 1.0 / spread[:, each, each]
-        evidence -= _solved(b[:, [each]], scaled[:, [each]], alone[:, None, None])[2]
-    kept = systematic(_tempered(evidence), size, float(rng.random()))
-    drawn = mean[kept] + np.linalg.solve(
-        np.swapaxes(root[kept], 1, 2), rng.standard_normal((size, 2 * quantities, 1))
-    ).squeeze(2)
-    drawn = drawn.reshape(size, 2, quantities) * typical
-    return [
-        Posterior(
-            weight=np.full(size, 1.0 / size),
-            initial=drawn[:, 0, each],
-            change=drawn[:, 1, each],
-            scale=np.exp(scale[each, kept]),
-            exponent=np.exp(exponent[each, kept]),
-            scatter=own[each].scatter[index[kept, each]],
+
+    progress: FloatArray
+    parameters: FloatArray
+    covariance: FloatArray
+    parameter_tracks: Sequence[Posterior]
+    tests: Sequence[int]
+    cof_progress: FloatArray
+    cof: FloatArray
+    cof_track: Posterior
+    torque_per_cof: float
+    reference_cof: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CofPaths:
+    """Mean COF [k, n] of n draws at progress [k], of which row `now` is at the last measurement."""
+
+    progress: FloatArray
+    paths: FloatArray
+    now: int
+
+    @property
+    def present(self) -> FloatArray:
+        """Mean COF [n] at the last measurement."""
+        return np.asarray(self.paths[self.now])
+
+    def band(self) -> FloatArray:
+        """The quantiles BAND of mean COF at progress [k]; [3, k]."""
+        return np.asarray(np.quantile(self.paths, BAND, axis=1))
+
+    def ends_of_life(self, fraction: float) -> FloatArray:
+        """The ζ [n] at which each draw first comes down to `fraction` of its value at ζ = 0; inf where it never does."""
+        return first_below(self.paths, self.progress, fraction * self.paths[0])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disagreement:
+    """COF from parameters less the direct track: of the value now, in deviations of both together, and of the median end of
+    life, in those of its logarithm. None where there is no uncertainty, or one of them lies beyond the horizon."""
+
+    now: float | None
+    end_of_life: float | None
+
+
+def far_apart(deviations: float | None) -> bool:
+    """Whether two ways to one number, so many deviations apart, disagree."""
+    return deviations is not None and abs(deviations) > FAR_APART
+
+
+def mean_cof_paths(
+    levels: Sequence[PressureLevel],
+    *,
+    now: float,
+    horizon: float,
+    velocities: FloatArray,
+    reference_cofs: Sequence[float],
+    rng: np.random.Generator,
+) -> CofPaths | None:
+    """Mean COF from `now` >= 0, the last progress measured, back to 0 and on to `horizon`; None where it cannot be computed.
+
+    velocities [v] m/s are the protocol's, `reference_cofs` the reference test's mean COF at every pressure. Levels with
+    fewer than FEWEST_TESTS tests at different progress take no part.
+    """
+    progress = _places(now, horizon)
+    parts, at_levels = [], []
+    for level in levels:
+        if np.unique(level.progress).size >= FEWEST_TESTS:
+            parts.append(level)
+            at_levels.append(_mean_torque(_drawn(level, rng), progress, velocities) / level.torque_per_cof)
+    if not parts:
+        return None
+    taking_part = math.fsum(level.reference_cof for level in parts) / len(parts)
+    share = math.fsum(reference_cofs) / len(reference_cofs) / taking_part
+    return CofPaths(progress=progress, paths=_together(parts, at_levels, rng) * share, now=_BEHIND - 1)
+
+
+def disagreement(
+    now: FloatArray,
+    ends: FloatArray,
+    direct_now: FloatArray,
+    direct_ends: FloatArray,
+    weight: FloatArray,
+    origin: float,
+) -> Disagreement:
+    """How far mean COF `now` [n] and `ends` of life [n] cycles from the parameters are from those of the direct track, [m]
+    each with weight [m]; the life began at `origin` [cycles]."""
+    mean = float(weight @ direct_now)
+    variance = float(weight @ np.square(direct_now - mean))
+    both = math.sqrt(0.5 * (variance + float(now.var())))
+    cap = 10.0 * HORIZON
+    logarithms = [
+        np.log(np.maximum(quantiles - origin, 1.0))
+        for quantiles in (
+            np.quantile(np.minimum(ends, origin + cap), BAND),
+            weighted_quantiles(np.minimum(direct_ends, origin + cap), weight, BAND),
         )
-        for each in range(quantities)
     ]
+    beyond = any(math.exp(median) > HORIZON for _, median, _ in logarithms)
+    spread = math.sqrt(0.5 * sum(((high - low) / _COVERED) ** 2 for low, _, high in logarithms))
+    return Disagreement(
+        now=(float(now.mean()) - mean) / both if both > 0.0 else None,
+        end_of_life=None if beyond or spread == 0.0 else float(logarithms[0][1] - logarithms[1][1]) / spread,
+    )
 
 
-def _solved(b: FloatArray, values: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Of (ξ0 [q], Δ [q]) given b [t, q, n]: mean [n, 2q], Cholesky root of the precision [n, 2q, 2q], log evidence [n]."""
-    q, n = values.shape[1], b.shape[2]
-    around = values[0]
-    precision = np.empty((n, 2 * q, 2 * q))
-    precision[:, :q, :q] = weight.sum(axis=0)
-    precision[:, :q, q:] = np.einsum("tjk,tkn->njk", weight, b)
-    precision[:, q:, :q] = np.swapaxes(precision[:, :q, q:], 1, 2)
-    precision[:, q:, q:] = np.einsum("tjn,tjk,tkn->njk", b, weight, b, optimize=True)
-    precision += np.diag(np.repeat([_INITIAL**-2, _CHANGE**-2], q))
-    pulled = np.einsum("tjk,tk->tj", weight, values - around)
-    right = np.empty((n, 2 * q))
-    right[:, :q] = pulled.sum(axis=0)
-    right[:, q:] = np.einsum("tjn,tj->nj", b, pulled)
-    root = np.linalg.cholesky(precision)
-    half = np.linalg.solve(root, right[:, :, None])
-    mean = np.linalg.solve(np.swapaxes(root, 1, 2), half).squeeze(2)
-    mean[:, :q] += around
-    log_root = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
-    return mean, root, np.asarray(0.5 * np.square(half).sum(axis=(1, 2)) - log_root)
+def _places(now: float, horizon: float) -> FloatArray:
+    """ζ at which the paths are computed: evenly up to now, and in equal ratios to the horizon."""
+    start = max(now, 1.0)
+    last = max(horizon, 2.0 * start)
+    return np.concatenate([np.linspace(0.0, now, _BEHIND), np.geomspace(start * 1.02, last, _AHEAD)])
 
 
-def _tempered(log_weight: FloatArray) -> FloatArray:
-    """Weights [n] that sum to one, their logarithms shrunk until FEWEST count."""
-    off = log_weight - log_weight.max()
-    while True:
-        weight = np.exp(off)
-        weight /= weight.sum()
-        if 1.0 / np.square(weight).sum() >= min(FEWEST, weight.size):
-            return np.asarray(weight)
-        off = 0.8 * off
+def _drawn(level: PressureLevel, rng: np.random.Generator) -> list[Posterior]:
+    """Joint draws of the four parameters at a pressure, under the fits' covariance and the scatter between tests."""
+    values, covariance = level.parameters, level.covariance
+    scatter = np.array([track.weight @ np.square(track.scatter) for track in level.parameter_tracks])
+    gain = float(level.cof_track.weight @ level.cof_track.scatter) / float(level.cof[0])
+    # what shifts a whole test's level shifts both torques alike; what else scatters does so as the fits err
+    common = gain * values.mean(axis=0) * np.array([1.0, 0.0, 0.0, 1.0])
+    usual = covariance.mean(axis=0)
+    deviation = np.sqrt(np.maximum(np.diag(usual), 1e-300))
+    further = usual / np.outer(deviation, deviation) * np.sqrt(np.outer(scatter, scatter))
+    floor = np.diag((1e-5 * np.abs(values).max(axis=0)) ** 2 + 1e-300)
+    total = covariance + further + np.outer(common, common) + floor
+    return draw_jointly(level.progress, values, total, level.parameter_tracks, _DRAWS, rng)
 
 
-def correlation(residuals: FloatArray) -> FloatArray:
-    """The correlation [k, k] of residuals [t, k] from test to test, shrunk towards none."""
-    count, size = residuals.shape
-    spread = residuals.std(axis=0) if count > 1 else np.zeros(size)
-    if not (spread > 0.0).all():
-        return np.eye(size)
-    scaled = (residuals - residuals.mean(axis=0)) / spread
-    share = count / (count + NONE_WORTH)
-    return np.asarray(share * scaled.T @ scaled / count + (1.0 - share) * np.eye(size))
+def _mean_torque(draws: Sequence[Posterior], progress: FloatArray, velocities: FloatArray) -> FloatArray:
+    """Mean torque over velocities [m] at ζ [k] of every draw of the four parameters; [k, n]."""
+    values = np.maximum(np.stack([track.values(progress) for track in draws]), 0.0)
+    parameters = StribeckParameters.from_array(values)
+    total: FloatArray = np.zeros(values.shape[1:])
+    for velocity in velocities.tolist():
+        total += torque(np.array(velocity), parameters)
+    return np.asarray(total / velocities.size)
 
 
-def paired(values: FloatArray, wanted: FloatArray, rng: np.random.Generator) -> NDArray[np.intp]:
-    """Which draw of each column stands in each row [n, k], so that values [n, k] have about the correlation [k, k]."""
-    n, k = values.shape
-    roots, vectors = np.linalg.eigh(wanted)
-    normals = rng.standard_normal((n, k)) @ (vectors * np.sqrt(np.maximum(roots, 0.0))).T
-    order = np.argsort(values, axis=0, kind="stable")
-    ranks = np.argsort(np.argsort(normals, axis=0, kind="stable"), axis=0, kind="stable")
-    return np.asarray(np.take_along_axis(order, ranks, axis=0), dtype=np.intp)
-
-
-def first_below(paths: FloatArray, at: FloatArray, level: FloatArray) -> FloatArray:
-    """Where each of n paths [k, n] over ascending `at` [k] first comes down to its level [n], straight between; or inf."""
-    below = paths <= level
-    reached = below.any(axis=0)
-    first = below.argmax(axis=0)
-    before = np.maximum(first - 1, 0)
-    column = np.arange(paths.shape[1])
-    high, low = paths[before, column], paths[first, column]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        share = np.where(first > 0, (high - level) / (high - low), 0.0)
-    found = at[before] + share * (at[first] - at[before])
-    return np.where(reached, found, np.inf)
+def _together(levels: Sequence[PressureLevel], at_levels: Sequence[FloatArray], rng: np.random.Generator) -> FloatArray:
+    """The mean over levels of paths [k, n], paired so that they are correlated as the levels' tests are."""
+    residuals: dict[int, list[float]] = {}
+    for level in levels:
+        expected = level.cof_track.values(level.cof_progress) @ level.cof_track.weight
+        for test, residual in zip(level.tests, (level.cof - expected).tolist(), strict=True):
+            residuals.setdefault(test, []).append(residual)
+    whole = [row for _, row in sorted(residuals.items()) if len(row) == len(levels)]
+    wanted = shrunk_correlation(np.array(whole).reshape(-1, len(levels)))
+    index = paired(np.stack([paths[_BEHIND - 1] for paths in at_levels], axis=1), wanted, rng)
+    return np.asarray(np.mean([paths[:, index[:, i]] for i, paths in enumerate(at_levels)], axis=0))

@@ -1,8 +1,8 @@
 """How good a prognosis was, once the end of life is known.
 
-- CRPS: how far a predicted distribution is from what came, in cycles; the absolute error of a certain prediction
+- CRPS: how far a predicted distribution is from the outcome, in cycles; the absolute error of a certain prediction
   (Gneiting, Raftery 2007).
-- Coverage: the share of intervals that hold what came, nominally 0.9 for the 5 and 95 % quantiles; the interval's width
+- Coverage: the share of intervals that hold the outcome, nominally 0.9 for the 5 and 95 % quantiles; the interval's width
   is the prediction's sharpness.
 - PIT: where in its predicted distribution each outcome lies; uniform where predictions are calibrated (Dawid 1984).
 - α-λ accuracy: whether at the share λ of life the predicted remaining life is within ±α of the true one (Saxena 2010).
@@ -56,9 +56,9 @@ def _pinball(low: float, high: float, under: bool) -> float:
 
 
 def covered(low: float | None, high: float | None, truth: float | None) -> bool:
-    """Whether an interval holds what came; None is beyond the horizon, for a bound as for the truth."""
-    lower, upper, came = (np.inf if each is None else each for each in (low, high, truth))
-    return bool(lower <= came <= upper)
+    """Whether an interval holds the outcome; None is beyond the horizon, for a bound as for the truth."""
+    lower, upper, outcome = (np.inf if bound is None else bound for bound in (low, high, truth))
+    return bool(lower <= outcome <= upper)
 
 
 def coverage(held: Sequence[bool]) -> tuple[float, float]:
@@ -76,7 +76,7 @@ def pit_of_sample(sample: FloatArray, weight: FloatArray, truth: float) -> float
 
 
 def pit_of_quantiles(levels: Sequence[float], quantiles: Sequence[float], truth: float) -> float:
-    """The level of the truth, linear between quantiles; outside of them, the middle of what is left."""
+    """The level of the truth, linear between quantiles; outside of them, the middle of the remaining probability."""
     x = np.asarray(quantiles, dtype=np.float64)
     if truth < x[0]:
         return 0.5 * levels[0]
@@ -105,9 +105,9 @@ def prognostic_horizon(
 
     `predicted` are remaining lives at ascending progress `at` <= end. None where not even the last one is.
     """
-    found = None
+    horizon = None
     for progress, remaining in zip(reversed(at), reversed(predicted), strict=True):
         if remaining is None or abs(remaining - (end - progress)) > alpha * end:
             break
-        found = end - progress
-    return found
+        horizon = end - progress
+    return horizon

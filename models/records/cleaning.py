@@ -1,8 +1,8 @@
-"""A raw record made fit to be cut: times in order, spikes taken out, and what was found said.
+"""Cleaning a raw record before it is cut: times in order, spikes removed, and notes of both.
 
-Recorders lose samples, swap or repeat neighbouring times and let a spike through now and then. Times that are slightly
-out of order are sorted; a clock that falls back further cannot be trusted and is refused. A spike is a few samples (up
-to 6 ms, at least three) that stand off the median of their surroundings by more than ten deviations of the noise.
+Recorders lose samples, swap or repeat neighbouring times and sometimes record a spike. Times that are slightly out of
+order are sorted; a clock that falls back further cannot be trusted and is refused. A spike is a few samples (up to 6 ms,
+at least three) that are off the median of their surroundings by more than ten deviations of the noise.
 """
 
 from dataclasses import dataclass
@@ -12,29 +12,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
+from models.records.criteria import (
+    FASTEST,
+    FEWEST_SAMPLES,
+    JITTER,
+    LARGEST_SWAP,
+    LARGEST_VALUE,
+    SLOWEST,
+    SPIKE,
+    SPIKE_DURATION,
+    SPIKE_EDGE,
+)
 from models.records.runs import Record
 
 Note = tuple[str, str]
 
-#: Samples below which nothing can be said of a record.
-FEWEST_SAMPLES = 16
-#: Values beyond this are no measurements; samples lie this far apart [s], at the least and at the most.
-LARGEST, FASTEST, SLOWEST = 1e15, 1e-6, 10.0
-#: A clock may fall back by this much [s], or by ten samples: neighbours that were written in the wrong order.
-LARGEST_SWAP = 0.1
-#: Intervals scatter by more than this share of their median: the clock jitters.
-JITTER = 0.01
-#: A spike stands off by more deviations than this, and its edge jumps by more than that.
-SPIKE, EDGE = 10.0, 6.0
-#: The longest spike [s].
-SPIKE_DURATION = 0.006
 #: Samples from which a scale is estimated.
 SCALE_SAMPLES = 50_000
 _CHANNELS = ("pressure", "speed", "torque", "oil_temperature")
 
 
 class Sampled(Protocol):
-    """What a `Record` holds, in SI units; a channel may be made anew each time that it is asked for."""
+    """What a `Record` holds, in SI units; a channel may be computed anew at each access."""
 
     @property
     def time(self) -> FloatArray: ...
@@ -50,7 +49,7 @@ class Sampled(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cleaning:
-    """What is to be kept of a record: `rows` in order of time (None: all as they stand), its sampling period [s], notes."""
+    """What is kept of a record: `rows` in order of time (None: all, unchanged), its sampling period [s], notes."""
 
     rows: NDArray[np.intp] | None
     period: float
@@ -62,25 +61,25 @@ class Cleaning:
 
 
 def clean(record: Record) -> tuple[Record, float, tuple[Note, ...]]:
-    """The record with times in order and without spikes, its sampling period [s], and notes on what was found.
+    """The record with times in order and without spikes, its sampling period [s], and notes.
 
-    Raises ValueError as `cleaning` does.
+    Raises ValueError as `plan_cleaning` does.
     """
-    found = cleaning(record)
-    if found.rows is not None:
+    kept = plan_cleaning(record)
+    if kept.rows is not None:
         oil = record.oil_temperature
         record = Record(
-            time=found.of(record.time),
-            pressure=found.of(record.pressure),
-            speed=found.of(record.speed),
-            torque=found.of(record.torque),
-            oil_temperature=None if oil is None else found.of(oil),
+            time=kept.of(record.time),
+            pressure=kept.of(record.pressure),
+            speed=kept.of(record.speed),
+            torque=kept.of(record.torque),
+            oil_temperature=None if oil is None else kept.of(oil),
         )
-    return record, found.period, found.notes
+    return record, kept.period, kept.notes
 
 
-def cleaning(record: Sampled) -> Cleaning:
-    """What is to be kept of a record that times be in order and spikes out; channels are looked at one by one.
+def plan_cleaning(record: Sampled) -> Cleaning:
+    """The rows of a record to keep, with times in order and without spikes; channels are examined one by one.
 
     Raises ValueError on fewer than 16 samples, values beyond ±1e15, times that do not advance, a clock that falls back,
     and samples that lie less than 1 µs or more than 10 s apart.
@@ -94,7 +93,7 @@ def cleaning(record: Sampled) -> Cleaning:
     if not FASTEST <= period <= SLOWEST:
         raise ValueError(f"samples must lie {FASTEST:g} to {SLOWEST:g} s apart, got {period:.3g} s")
     spikes: NDArray[np.bool_] = np.zeros(size, dtype=np.bool_)
-    told = []
+    removed = []
     for name in _CHANNELS:
         channel = getattr(record, name)
         if channel is None:
@@ -102,29 +101,29 @@ def cleaning(record: Sampled) -> Cleaning:
         _require_measurements(name, channel)
         where = _spikes(ordered.of(channel), max(3, min(12, round(SPIKE_DURATION / period))))
         if where.size:
-            told.append(f"{where.size} of {name}")
+            removed.append(f"{where.size} of {name}")
             spikes[where] = True
-    if not told:
+    if not removed:
         return Cleaning(rows=order, period=period, notes=tuple(notes))
     times = ordered.of(record.time)[spikes]
-    notes.append(("spikes_removed", f"Spiking samples removed: {', '.join(told)}, {_at(times, 1.0)}."))
+    notes.append(("spikes_removed", f"Spiking samples removed: {', '.join(removed)}, {_at(times, 1.0)}."))
     rows = np.flatnonzero(~spikes)
     return Cleaning(rows=rows if order is None else order[rows], period=period, notes=tuple(notes))
 
 
 def _require_measurements(name: str, channel: FloatArray) -> None:
-    if max(float(channel.max()), -float(channel.min())) > LARGEST:
-        raise ValueError(f"{name} must lie within ±{LARGEST:g}, got {float(channel[np.abs(channel).argmax()])}")
+    if max(float(channel.max()), -float(channel.min())) > LARGEST_VALUE:
+        raise ValueError(f"{name} must lie within ±{LARGEST_VALUE:g}, got {float(channel[np.abs(channel).argmax()])}")
 
 
 def _in_order(time: FloatArray) -> tuple[NDArray[np.intp] | None, float, list[Note]]:
-    """The rows in order of time (None: as they stand), the sampling period [s], and notes."""
+    """The rows in order of time (None: unchanged), the sampling period [s], and notes."""
     order, notes = None, list[Note]()
     steps = np.diff(time)
     forward = steps[:: max(1, steps.size // SCALE_SAMPLES)]
     forward = forward[forward > 0]
     if forward.size == 0 or time.max() <= time.min():
-        raise ValueError(f"time must advance, but no sampled interval of the {time.size} samples does")
+        raise ValueError(f"time must advance, but no interval of the {time.size} samples does")
     period = float(np.median(forward))
     swapped = int(np.count_nonzero(steps < 0))
     if swapped:
@@ -132,8 +131,8 @@ def _in_order(time: FloatArray) -> tuple[NDArray[np.intp] | None, float, list[No
         worst = int(fallback.argmax())
         if fallback[worst] > max(LARGEST_SWAP, 10 * period):
             raise ValueError(
-                f"time must run forwards, but time[{worst}] = {time[worst]} s lies {fallback[worst]:.6g} s before a "
-                "sample that stands earlier in the record"
+                f"time must run forwards, but time[{worst}] = {time[worst]} s lies {fallback[worst]:.6g} s before an "
+                "earlier sample of the record"
             )
         order = np.argsort(time, kind="stable")
         time = time[order]
@@ -144,14 +143,14 @@ def _in_order(time: FloatArray) -> tuple[NDArray[np.intp] | None, float, list[No
         period = float(steps.mean(where=regular))
         scatter = float(steps.std(where=regular, mean=period)) / period
         if scatter > JITTER or swapped or repeated:
-            told = f"Sampling intervals scatter by {scatter:.1%}; {repeated} repeated and {swapped} swapped times."
-            notes.append(("clock_jitter", told))
+            sentence = f"Sampling intervals scatter by {scatter:.1%}; {repeated} repeated and {swapped} swapped times."
+            notes.append(("clock_jitter", sentence))
     lost = round((time[-1] - time[0]) / period) + 1 - time.size
     gaps = np.flatnonzero(steps > 1.5 * period)
     if lost > 0 and gaps.size:
         longest = int(gaps[steps[gaps].argmax()])
-        told = f"About {lost} samples ({lost / (lost + time.size):.2%}) are missing; the longest gap is"
-        notes.append(("samples_missing", f"{told} {steps[longest]:.4g} s at {time[longest]:.3f} s."))
+        sentence = f"About {lost} samples ({lost / (lost + time.size):.2%}) are missing; the longest gap is"
+        notes.append(("samples_missing", f"{sentence} {steps[longest]:.4g} s at {time[longest]:.3f} s."))
     return order, period, notes
 
 
@@ -163,7 +162,7 @@ def _spikes(channel: FloatArray, longest: int) -> NDArray[np.intp]:
     moved = np.abs(channel[1::stride] - channel[:-1:stride])
     if scale == 0.0 and moved.any():  # a coarse recorder: its count
         scale = float(moved[moved > 0].min())
-    edges = _jumps(channel, EDGE * scale)
+    edges = _jumps(channel, SPIKE_EDGE * scale)
     if edges.size > channel.size // 20:  # more than spikes: a signal that moves by itself
         edges = _jumps(channel, float(np.quantile(moved, 0.95)))
     if edges.size == 0:
@@ -178,15 +177,15 @@ def _spikes(channel: FloatArray, longest: int) -> NDArray[np.intp]:
 
 
 def _jumps(channel: FloatArray, most: float) -> NDArray[np.intp]:
-    """Indices of samples from which the next one lies further than `most`, looked for piece by piece."""
-    found = [
+    """Indices of samples from which the next one lies further than `most`, piece by piece."""
+    jumps = [
         np.flatnonzero(np.abs(np.diff(channel[start : start + SCALE_SAMPLES + 1])) > most) + start
         for start in range(0, channel.size - 1, SCALE_SAMPLES)
     ]
-    return np.concatenate(found)
+    return np.concatenate(jumps)
 
 
 def _at(times: FloatArray, apart: float) -> str:
     """ "at 1.20, 61.4, ... s": the first few of times that lie further apart than `apart` [s]."""
     first = times[np.concatenate([[True], np.diff(times) > apart])]
-    return f"at {', '.join(f'{one:.2f}' for one in first[:5])}{', ...' if first.size > 5 else ''} s"
+    return f"at {', '.join(f'{time:.2f}' for time in first[:5])}{', ...' if first.size > 5 else ''} s"

@@ -1,8 +1,8 @@
-"""The dwells of a stationary test, found in its speed and pressure without knowing its protocol.
+"""The dwells of a stationary test, detected in its speed and pressure without knowing its protocol.
 
 The record is averaged over blocks of some 10 ms. A block is steady where the means of 0.2 s after it and of 0.2 s before
 it agree within six deviations of their difference, in speed and in pressure; runs of steady blocks are dwells, widened
-again up to where speed or pressure leaves the level. Where the clutch is open throughout, pressure is its sensor's noise:
+again up to where speed or pressure leaves the level. Where the clutch is open throughout, pressure is sensor noise:
 the dwells are those of speed.
 """
 
@@ -14,36 +14,32 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.records.cleaning import Cleaning, Note, Sampled
-from models.records.runs import UNLOADED
-
-#: A block [s].
-BLOCK = 0.01
-#: The windows before and after that are compared [s], at least this many blocks.
-WINDOW, FEWEST_BLOCKS = 0.2, 4
-#: Deviations that make a step of a difference of windows; those that make a block leave its level.
-STEP, LEAVE = 6.0, 5.0
-#: Changes smaller than the first share of the highest speed or pressure are never steps, larger than the second always.
-RESOLUTION, PLAIN = 5e-4, 0.02
-#: No lining is loaded below this share of the highest pressure, and nothing slides below this share of the highest speed.
-NO_PRESSURE, STANDSTILL = 0.02, 1e-3
-#: A dwell ends at a gap in the record longer than this [s] and than so many blocks.
-GAP, GAP_BLOCKS = 0.25, 6
-#: Speed or pressure that changes by more than this share over a dwell is a slow ramp.
-RAMP = 0.01
-#: Pieces of a dwell whose means are compared for that.
-PIECES = 6
-#: Blocks below which a dwell is not worth a mean.
-SHORTEST = 8
-
-#: A crest is shorter than this share of the dwell that follows, and off its level by this share of the step to it at most;
-#: so many may follow each other.
-CREST, OVERSHOOT, CRESTS = 0.25, 0.3, 4
+from models.records.criteria import (
+    BLOCK_DURATION,
+    CREST_SHARE,
+    FEWEST_WINDOW_BLOCKS,
+    GAP_BLOCKS,
+    GAP_DURATION,
+    LEAVING_DEVIATIONS,
+    MOST_CRESTS,
+    NO_PRESSURE_SHARE,
+    NO_STEP_SHARE,
+    OVERSHOOT_SHARE,
+    PLAIN_STEP_SHARE,
+    RAMP_PIECES,
+    RAMP_SHARE,
+    SHORTEST_DWELL,
+    STANDSTILL_SHARE,
+    STEP_DEVIATIONS,
+    UNLOADED,
+    WINDOW_DURATION,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Blocks:
     """Means over `size` samples each: time [m] s, pressure, speed, torque, oil_temperature; scatter [m] Nm², the
-    variance of torque within a block; gap [m]: samples are missing for long before or in this block.
+    variance of torque within a block; gap [m]: many samples are missing before or in this block.
     """
 
     size: int
@@ -66,9 +62,9 @@ class Dwell:
 
 
 def average(record: Sampled, cleaning: Cleaning) -> Blocks:
-    """Means over blocks of some 10 ms of what is kept of a record; a remainder at its end is left out."""
+    """Means over blocks of about 10 ms of the kept rows of a record; a remainder at its end is left out."""
     period = cleaning.period
-    size = max(1, round(BLOCK / period))
+    size = max(1, round(BLOCK_DURATION / period))
     time = cleaning.of(record.time)
     count = time.size // size
     share = np.full(size, 1.0 / size)
@@ -83,7 +79,7 @@ def average(record: Sampled, cleaning: Cleaning) -> Blocks:
         off = blocks_of(channel) - mean(channel)[:, np.newaxis]
         return np.asarray(np.einsum("ij,ij->i", off, off) / size, dtype=np.float64)
 
-    late = np.flatnonzero(np.diff(time) > max(GAP, GAP_BLOCKS * size * period)) + 1
+    late = np.flatnonzero(np.diff(time) > max(GAP_DURATION, GAP_BLOCKS * size * period)) + 1
     gap: NDArray[np.bool_] = np.zeros(count, dtype=np.bool_)
     gap[np.minimum(late // size, count - 1)] = True
     oil = record.oil_temperature
@@ -102,13 +98,13 @@ def average(record: Sampled, cleaning: Cleaning) -> Blocks:
 
 def find_dwells(blocks: Blocks) -> tuple[list[Dwell], list[Note]]:
     """The dwells in motion, and under pressure where there is any, in the order of time, and notes on those left out."""
-    if blocks.time.size < SHORTEST:
+    if blocks.time.size < SHORTEST_DWELL:
         return [], []
-    window = max(FEWEST_BLOCKS, round(WINDOW / blocks.duration))
+    window = max(FEWEST_WINDOW_BLOCKS, round(WINDOW_DURATION / blocks.duration))
     pressure, speed = _Channel(blocks.pressure, window), _Channel(blocks.speed, window)
     idle = _highest(blocks.pressure, window) < UNLOADED
-    channels, least = ((speed,), -math.inf) if idle else ((pressure, speed), NO_PRESSURE * pressure.highest)
-    active = (np.abs(blocks.pressure) > least) & (np.abs(blocks.speed) > STANDSTILL * speed.highest)
+    channels, least = ((speed,), -math.inf) if idle else ((pressure, speed), NO_PRESSURE_SHARE * pressure.highest)
+    active = (np.abs(blocks.pressure) > least) & (np.abs(blocks.speed) > STANDSTILL_SHARE * speed.highest)
     steady = ~blocks.gap
     for channel in channels:
         channel.judge(active)
@@ -120,7 +116,7 @@ def find_dwells(blocks: Blocks) -> tuple[list[Dwell], list[Note]]:
 
 
 def _highest(pressure: FloatArray, window: int) -> float:
-    """What means [Pa] over a window of blocks hardly ever reach: a gauge's noise and its negative offset are no pressure."""
+    """The 99.5 % quantile [Pa] of means over a window of blocks: a gauge's noise and its negative offset are no pressure."""
     size = min(window, pressure.size)
     total = np.concatenate([[0.0], np.cumsum(pressure)])
     return float(np.quantile((total[size:] - total[:-size]) / size, 0.995))
@@ -133,27 +129,27 @@ class _Channel:
         self.values = values
         self.highest = float(np.quantile(np.abs(values), 0.995))
         self.steady: NDArray[np.bool_] = np.ones(values.size, dtype=np.bool_)
-        self.threshold = RESOLUTION * self.highest
+        self.threshold = NO_STEP_SHARE * self.highest
         self.window = window
         self._levels: dict[tuple[int, int], tuple[float, float]] = {}
 
     def judge(self, active: NDArray[np.bool_]) -> None:
-        """Steady where the windows after and before agree; the ends of the record are as what lies next to them."""
+        """Steady where the windows after and before agree; the record's ends are as the blocks next to them."""
         size = self.values.size
         window = min(self.window, size // 2)
         total = np.concatenate([[0.0], np.cumsum(self.values - self.values.mean())])
         apart = np.abs(total[2 * window :] - 2 * total[window : size - window + 1] + total[: size - 2 * window + 1])
         apart = (apart / window)[np.clip(np.arange(size) - window, 0, size - 2 * window)]
-        # A quarter of a normal variable's absolute values lies below 0.3186 deviations: ramps do not reach that far down.
+        # A quarter of a normal variable's absolute values lies below 0.3186 deviations: ramps are above that.
         deviation = float(np.quantile(apart[active] if active.any() else apart, 0.25)) / 0.3186
-        self.threshold = max(self.threshold, min(STEP * deviation, PLAIN * self.highest))
+        self.threshold = max(self.threshold, min(STEP_DEVIATIONS * deviation, PLAIN_STEP_SHARE * self.highest))
         self.steady = apart <= self.threshold
 
     def level(self, core: tuple[int, int]) -> tuple[float, float]:
-        """The level of a core and how far a block may lie off it, once it has been judged what is steady."""
+        """The level of a core and how far a block may lie off it; only after `judge`."""
         if core not in self._levels:
             part = self.values[slice(*core)]
-            self._levels[core] = float(np.median(part)), max(LEAVE * float(part.std()), self.threshold)
+            self._levels[core] = float(np.median(part)), max(LEAVING_DEVIATIONS * float(part.std()), self.threshold)
         return self._levels[core]
 
 
@@ -165,10 +161,10 @@ def _merged(cores: list[tuple[int, int]], blocks: Blocks, channels: tuple[_Chann
             last = merged[-1]
             same = True
             for channel in channels:
-                (one, wide), (other, narrow) = channel.level(last), channel.level(core)
-                between = np.abs(channel.values[last[1] : core[0]] - 0.5 * (one + other))
-                same &= abs(one - other) <= channel.threshold
-                same &= bool((between <= max(wide, narrow) + 0.5 * abs(one - other)).all())
+                (first, wide), (second, narrow) = channel.level(last), channel.level(core)
+                between = np.abs(channel.values[last[1] : core[0]] - 0.5 * (first + second))
+                same &= abs(first - second) <= channel.threshold
+                same &= bool((between <= max(wide, narrow) + 0.5 * abs(first - second)).all())
             if same:
                 merged[-1] = (last[0], core[1])
                 continue
@@ -202,17 +198,17 @@ def _reach(off: FloatArray, tolerance: float) -> int:
 
 
 def _sorted_out(
-    found: list[Dwell], blocks: Blocks, channels: tuple[_Channel, ...], least: float
+    dwells: list[Dwell], blocks: Blocks, channels: tuple[_Channel, ...], least: float
 ) -> tuple[list[Dwell], list[Note]]:
-    """Those worth a mean; the last of `channels` is speed, `least` a pressure [Pa] below which there is none."""
+    """The dwells that give a mean; the last of `channels` is speed, `least` [Pa] the pressure below which there is none."""
     kept: list[Dwell] = []
     speed = channels[-1]
     left: dict[str, list[float]] = {code: [] for code in _SENTENCES}
     settled: Dwell | None = None
-    for row, dwell in enumerate(found):
+    for row, dwell in enumerate(dwells):
         where = slice(dwell.start, dwell.stop)
         following = [
-            each for each in found[row + 1 : row + 1 + CRESTS] if not blocks.gap[dwell.stop : each.start].any()
+            later for later in dwells[row + 1 : row + 1 + MOST_CRESTS] if not blocks.gap[dwell.stop : later.start].any()
         ]
         if settled is not None and _crest(channels, settled, dwell, following):
             left["overshoot"].append(float(blocks.time[dwell.start]))
@@ -220,9 +216,9 @@ def _sorted_out(
         settled = dwell
         if float(blocks.pressure[where].mean()) <= least:
             reason = "no_pressure"
-        elif abs(float(blocks.speed[where].mean())) <= STANDSTILL * speed.highest:
+        elif abs(float(blocks.speed[where].mean())) <= STANDSTILL_SHARE * speed.highest:
             reason = "standstill"
-        elif dwell.stop - dwell.start < SHORTEST:
+        elif dwell.stop - dwell.start < SHORTEST_DWELL:
             reason = "dwell_too_short"
         elif any(_ramps(channel, where) for channel in channels):
             reason = "not_steady"
@@ -236,16 +232,16 @@ def _sorted_out(
 
 
 def _crest(channels: tuple[_Channel, ...], before: Dwell, dwell: Dwell, following: list[Dwell]) -> bool:
-    """Whether a dwell is no more than a crest of an overshoot, or the trough after it, on the way from the one before to the
-    first long one of those that follow: the way led beyond that one's level."""
-    long = (each for each in following if dwell.stop - dwell.start < CREST * (each.stop - each.start))
+    """Whether a dwell is only a crest of an overshoot, or the trough after it, between the dwell before and the first long
+    dwell that follows: speed or pressure went beyond the latter's level."""
+    long = (later for later in following if dwell.stop - dwell.start < CREST_SHARE * (later.stop - later.start))
     after = next(long, None)
     if after is None:
         return False
     beyond = False
     for channel in channels:
-        first, here, last = (float(channel.values[each.start : each.stop].mean()) for each in (before, dwell, after))
-        if abs(here - last) > OVERSHOOT * abs(last - first) + channel.threshold:
+        first, here, last = (float(channel.values[part.start : part.stop].mean()) for part in (before, dwell, after))
+        if abs(here - last) > OVERSHOOT_SHARE * abs(last - first) + channel.threshold:
             return False
         on_the_way = np.copysign(1.0, last - first) * (channel.values[before.stop : dwell.stop] - last)
         beyond |= abs(last - first) > 2 * channel.threshold and bool(on_the_way.max() > channel.threshold)
@@ -263,12 +259,12 @@ _SENTENCES = {
 
 def _ramps(channel: _Channel, where: slice) -> bool:
     part = channel.values[where]
-    pieces = min(PIECES, part.size // 2)
+    pieces = min(RAMP_PIECES, part.size // 2)
     means = part[: part.size // pieces * pieces].reshape(pieces, -1).mean(axis=1)
-    noise = LEAVE * float(np.diff(part).std()) * np.sqrt(pieces / part.size)
-    return bool(np.ptp(means) > max(2 * channel.threshold, noise, RAMP * abs(float(part.mean()))))
+    noise = LEAVING_DEVIATIONS * float(np.diff(part).std()) * np.sqrt(pieces / part.size)
+    return bool(np.ptp(means) > max(2 * channel.threshold, noise, RAMP_SHARE * abs(float(part.mean()))))
 
 
 def listed(times: FloatArray) -> str:
-    """The first five of some times [s], for a note."""
-    return ", ".join(f"{one:.2f}" for one in times[:5]) + (", ..." if len(times) > 5 else "")
+    """The first five of times [s], for a note."""
+    return ", ".join(f"{time:.2f}" for time in times[:5]) + (", ..." if len(times) > 5 else "")

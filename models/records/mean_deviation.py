@@ -1,9 +1,9 @@
-"""The deviation of a mean over noise that remembers: Var(mean) = s²/n [1 + 2 Σ (1 - k/n) ρ(k)].
+"""The deviation of a mean over autocorrelated noise: Var(mean) = s²/n [1 + 2 Σ (1 - k/n) ρ(k)].
 
-The correlation ρ is estimated over all dwells of a record together, where it is known well, up to 2.5 times its own
-integrated time (Sokal's window) and free of the bias that removing a mean and a trend from each dwell has. A dwell may
-have another one: its batch means say so, and are followed as far as dwells differ by more than batch means scatter
-(Smyth's moderation of variances). Where ρ has not faded within the dwells its tail is that of `models.records.slow_noise`.
+The correlation ρ is estimated from all dwells of a record together, up to 2.5 times its own integrated time (Sokal's
+window) and without the bias that removing a mean and a trend from each dwell causes. A dwell may have another one: its
+batch means show it, and are followed as far as dwells differ by more than batch means scatter (Smyth's moderation of
+variances). Where ρ has not faded within the dwells its tail is that of `models.records.slow_noise`.
 """
 
 from collections.abc import Sequence
@@ -13,20 +13,17 @@ import numpy as np
 from scipy.special import digamma, polygamma
 
 from models.arrays import FloatArray
+from models.records.criteria import (
+    BATCH_TIMES,
+    BATCHES,
+    FADED,
+    FEWEST_FOR_MODERATION,
+    LEAST_FACTOR,
+    LONGEST_LAG,
+    LOST_SHARE,
+    SOKAL,
+)
 from models.records.slow_noise import slow_correlation
-
-#: The window of the sum, in integrated correlation times 1 + 2 Σ ρ.
-SOKAL = 2.5
-#: The longest lag: the share of the sum that removing a mean and a trend may take off, and in averages.
-LOST_SHARE, LONGEST = 0.6, 400
-#: A correlation below this at the longest lag has faded.
-FADED = 0.1
-#: Batches of a dwell, each at least this many correlation times long.
-BATCHES, BATCH_TIMES = 16, 3.0
-#: Dwells that it takes to tell how much they differ.
-FEWEST_DWELLS = 8
-#: Anticorrelated noise averages out faster, but no more is believed than this.
-LEAST_FACTOR = 0.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,28 +43,28 @@ class Correlation:
     resolved: bool = True
 
     def factor(self, count: int) -> float:
-        """By what the variance of a mean over `count` exceeds that over as many independent values."""
+        """The variance of a mean over `count` values over that of as many independent ones."""
         lag = np.arange(1, self.lags.size + 1)
         return max(float(1 + 2 * (np.maximum(1 - lag / count, 0.0) * self.lags).sum()), LEAST_FACTOR)
 
 
 def pooled_correlation(residuals: Sequence[FloatArray], removed: int) -> Correlation:
     """ρ of all residuals together, each of which `removed` coefficients of low frequency were fitted to."""
-    length = float(np.median([one.size for one in residuals]))
-    longest = max(1, min(LONGEST, int(LOST_SHARE * length / (2 * removed))))
+    length = float(np.median([residual.size for residual in residuals]))
+    longest = max(1, min(LONGEST_LAG, int(LOST_SHARE * length / (2 * removed))))
     total, count = np.zeros(longest + 1), np.zeros(longest + 1)
-    for one in residuals:
-        power = float(one @ one)
-        if one.size <= longest or power == 0.0:
+    for residual in residuals:
+        power = float(residual @ residual)
+        if residual.size <= longest or power == 0.0:
             continue
-        padded = np.fft.rfft(one, 1 << int(one.size + longest).bit_length())
+        padded = np.fft.rfft(residual, 1 << int(residual.size + longest).bit_length())
         products = np.fft.irfft(padded.real**2 + padded.imag**2)[: longest + 1]
-        total += products * (one.size / power)
-        count += one.size - np.arange(longest + 1)
+        total += products * (residual.size / power)
+        count += residual.size - np.arange(longest + 1)
     if count[0] == 0.0:
         return Correlation(lags=np.zeros(0))
     covariance = total / count
-    # What was removed takes `removed` Λ/n off every lag, Λ = γ_0 + 2 Σ γ_k being what is looked for: solved for each window.
+    # What was removed takes `removed` Λ/n off every lag, Λ = γ_0 + 2 Σ γ_k being unknown: solved for each window.
     lag = np.arange(longest + 1)
     raw = covariance[0] + 2 * np.cumsum(np.where(lag > 0, covariance, 0.0))
     long_run = raw / np.maximum(1 - (1 + 2 * lag) * removed / length, 0.5 * (1 - LOST_SHARE))
@@ -85,7 +82,7 @@ def pooled_correlation(residuals: Sequence[FloatArray], removed: int) -> Correla
 class MeanDeviations:
     """One row a dwell: of its mean [n] Nm, its drift [n] Nm/s, the drift's deviation [n] Nm/s, of an average [n] Nm.
 
-    resolved is false where noise remembers for longer than a dwell can show: its memory is then a model's.
+    resolved is false where noise is autocorrelated over longer times than a dwell: its correlation is then modelled.
     """
 
     mean: FloatArray
@@ -98,21 +95,21 @@ class MeanDeviations:
 def deviations(stretches: Sequence[Stretch]) -> MeanDeviations:
     """The deviation of the mean of every stretch."""
     slopes, squares, residuals = [], [], []
-    for one in stretches:
-        centred = one.time - one.time.mean()
+    for stretch in stretches:
+        centred = stretch.time - stretch.time.mean()
         square = max(float(centred @ centred), 1e-12)
-        slope = float(centred @ one.torque) / square
-        residuals.append(one.torque - one.torque.mean() - slope * centred)
+        slope = float(centred @ stretch.torque) / square
+        residuals.append(stretch.torque - stretch.torque.mean() - slope * centred)
         slopes.append(slope)
         squares.append(square)
     correlation = pooled_correlation(residuals, removed=2)
-    rows = [_moments(one, correlation) for one in residuals]
+    rows = [_moments(residual, correlation) for residual in residuals]
     variance, factor, ratio, freedom = np.array(rows).T
-    if not correlation.resolved and variance.any():  # a dwell of few independent values hardly tells its own variance
-        independent = np.maximum(np.array([one.size for one in residuals]) / factor - 2, 1.0)
+    if not correlation.resolved and variance.any():  # few independent values hardly determine a variance
+        independent = np.maximum(np.array([residual.size for residual in residuals]) / factor - 2, 1.0)
         variance = variance.mean() * _moderated(variance / variance.mean(), independent)
     long_run = variance * factor * _moderated(ratio, freedom)
-    count = np.array([one.size for one in residuals])
+    count = np.array([residual.size for residual in residuals])
     return MeanDeviations(
         mean=np.sqrt(long_run / count),
         drift=np.array(slopes),
@@ -123,7 +120,7 @@ def deviations(stretches: Sequence[Stretch]) -> MeanDeviations:
 
 
 def _moments(residual: FloatArray, correlation: Correlation) -> tuple[float, float, float, float]:
-    """Variance of an average, the factor of its mean, batch means over what the factor says, their degrees of freedom."""
+    """Variance of an average, the factor of its mean, batch means' variance over that by the factor, degrees of freedom."""
     size = residual.size
     factor = correlation.factor(size)
     variance = float(residual @ residual) / max(size - 2 * factor, 0.5 * size)
@@ -137,8 +134,8 @@ def _moments(residual: FloatArray, correlation: Correlation) -> tuple[float, flo
 
 
 def _moderated(ratio: FloatArray, freedom: FloatArray) -> FloatArray:
-    """Each dwell's own ratio [n], drawn towards 1 by as much as ratios scatter by chance (G. Smyth 2004)."""
-    if ratio.size < FEWEST_DWELLS:
+    """Each dwell's own ratio [n], shrunk towards 1 by as much as ratios scatter by chance (G. Smyth 2004)."""
+    if ratio.size < FEWEST_FOR_MODERATION:
         return np.ones_like(ratio)
     log_ratio = np.log(np.maximum(ratio, 1e-6)) - digamma(freedom / 2) + np.log(freedom / 2)
     excess = float(log_ratio.var(ddof=1) - polygamma(1, freedom / 2).mean())

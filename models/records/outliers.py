@@ -1,23 +1,18 @@
-"""Samples of a record that no fit should heed: spikes."""
+"""Samples of a record that no fit should use: spikes."""
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from models.arrays import FloatArray
-
-#: A sample further off a fit than this many deviations, and than this share of the largest value, is an outlier.
-OUTLIER = 6.0
-OUTLIER_SHARE = 0.005
-#: Samples whose median a sample is held against.
-NEIGHBOURS = 5
+from models.records.criteria import NEIGHBOURS, OUTLIER, OUTLIER_SHARE
 
 
 def inliers(residual: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
     """[n]: value [n], ordered in time, that is near the fit *or* near its neighbours' median: a spike is neither.
 
-    Near is within OUTLIER deviations (from the median absolute one), or within OUTLIER_SHARE of the largest value. What
-    a fit only bends around (a cusp) stays in.
+    Near is within OUTLIER deviations (from the median absolute one), or within OUTLIER_SHARE of the largest value. A
+    cusp that the fit cannot follow stays in.
     """
     return near(residual, value) | beside(value)
 
@@ -28,7 +23,14 @@ def beside(value: FloatArray) -> NDArray[np.bool_]:
 
 
 def near(off: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
-    """[n]: value [n] no further `off` [n] something than is usual."""
+    """[n]: value [n] whose distance `off` [n] from a fit or a median is no larger than usual."""
     distance = np.abs(off - np.median(off))
     share = OUTLIER_SHARE * float(np.abs(value).max())
     return np.asarray(distance <= max(OUTLIER * 1.4826 * float(np.median(distance)), share), dtype=np.bool_)
+
+
+def leading(off: NDArray[np.bool_]) -> int:
+    """How many rows at the beginning to cut: up to the last that is `off` [n] together with most of those before it."""
+    share = np.cumsum(off) / np.arange(1, off.size + 1)
+    rows = np.flatnonzero(off & (share > 0.5))
+    return int(rows[-1]) + 1 if rows.size else 0

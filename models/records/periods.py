@@ -6,8 +6,8 @@ first half holds the start. The swing is fitted by
 
     v(t) = v_0 + Σ_h a_h cos hθ + b_h sin hθ,    θ = 2π f (t - t_0),    h = 1 ... 4, or up to 32 where ramps have corners
 
-with f free (Gauss-Newton on all of the level's samples, outliers left out), so that nothing is asked of the clock's
-evenness, of the rate, or of a period being a whole number of samples.
+with f free (Gauss-Newton on all of the level's samples, outliers left out), so that neither an even clock, nor a certain
+rate, nor a whole number of samples a period is needed.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3.4.
 """
@@ -16,34 +16,34 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from models.arrays import FloatArray
-from models.records.outliers import NEIGHBOURS, OUTLIER, beside, near
+from models.records.criteria import (
+    CORNERS,
+    FOLLOWED,
+    INSIDE,
+    LINGERS,
+    MOST_SWING_SHARE,
+    NEIGHBOURS,
+    OFF_SWING,
+    OUTLIER,
+    PERIODIC,
+    REST_INSIDE,
+    REST_SHARE,
+    SPEED_HARMONICS,
+    STILL_SHARE,
+    SWING_SHARE,
+    TAKEN,
+    WHOLE,
+)
+from models.records.outliers import beside, leading, near
 
-#: Harmonics of the speed.
-SPEED_HARMONICS = 4
-#: A period counts as whole where this share of it was sampled: a fit of harmonics bridges the rest.
-WHOLE = 0.99
-#: A speed that misses its fit by more than this share of its swing (rms) does not swing periodically.
-PERIODIC = 0.15
-#: Standing still for longer than this share of a period, or so many times as long as a sine lingers (standing is within so
-#: much of the swing), before or after, is no part of the swing; away from its ends the lower share of the record holds.
-_REST_SHARE, _REST_INSIDE, _INSIDE = 0.1, 0.02, (0.1, 0.9)
-_LINGERS, _STILL = 1.6, 1e-3
-_SWING_SHARE, _MOST_SHARE = 0.02, 0.05
-#: Where speed at a record's ends is further off the swing than OUTLIER deviations and this share of its amplitude, it does
-#: not swing yet, or no more; ends are cut so many times at most.
-_OFF_SWING, _CUTS = 0.02, 6
-#: A frequency is known to so much of 1/duration where the first harmonic alone looks for it, and at last.
+#: Cuts of ends that do not swing, and steps of a fit, at most.
+_CUTS, _STEPS = 6, 25
+#: The frequency is refined to so much of 1/duration: with the first harmonic alone, and at last.
 _NEAR, _EXACT = 1e-3, 1e-10
-#: Harmonics of motions with corners, tried one after the other while what is missed (rms) is more than such a share of the
-#: swing and falls to this share.
-CORNERS = (8, 16, 32)
-_FOLLOWED, _TAKEN = 0.002, 0.7
-#: They are fitted to so many samples at most, evenly taken.
-_MOST_WITH_CORNERS = 8000
+_MOST_WITH_CORNERS = 8000  # samples, evenly taken
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +51,8 @@ class Cycle:
     """A fitted swing: frequency [Hz], origin t_0 [s], mean v_0, cosine and sine [h], in the unit of what was fitted.
 
     `covariance` [2h, 2h] is that of (cosine, sine) with f free; `noise` the deviation of a sample; the swing begins at
-    `begin` [s], its last whole periods are those of start <= t < stop [s]; `outliers` samples were left out.
+    `begin` [s], its last whole periods are those of start <= t < stop [s]; `outliers` samples were left out;
+    `converged` says whether the last step moved the frequency by less than the tolerance.
     """
 
     frequency: float
@@ -66,6 +67,7 @@ class Cycle:
     start: float
     stop: float
     outliers: int
+    converged: bool
 
     @property
     def amplitude(self) -> float:
@@ -107,7 +109,7 @@ def sample_interval(time: FloatArray) -> float:
 def fit_cycle(time: FloatArray, value: FloatArray) -> Cycle | str:
     """The swing of value [n] over time [n] s (ascending), and its last whole periods; a sentence where there is none.
 
-    SPEED_HARMONICS for a motor told to follow a sine, more for motions with corners.
+    SPEED_HARMONICS harmonics for a motor commanded to follow a sine, more for motions with corners.
     """
     moving = _without_rest(time, value, float(time[-1] - time[0])) if time.size else slice(0)
     t, y = time[moving], value[moving]
@@ -124,12 +126,12 @@ def fit_cycle(time: FloatArray, value: FloatArray) -> Cycle | str:
         return fitted
     if not (fitted.noise < PERIODIC * fitted.amplitude and fitted.outliers <= 0.2 * t.size):
         miss = fitted.noise / max(fitted.amplitude, 1e-3 * fitted.noise, 1e-300)
-        return f"The speed does not swing periodically: it misses its best fit by {miss:.0%} of its swing."
+        return f"The speed does not swing periodically: the error of its best fit is {miss:.0%} of its swing (RMS)."
     return _with_corners(t, y, fitted)
 
 
 def _without_ends(time: FloatArray, value: FloatArray, frequency: float, count: int) -> Cycle | str:
-    """A fit of `count` harmonics to what follows the swing."""
+    """A fit of `count` harmonics to the part of the record that follows the swing."""
     fitted: Cycle | str = ""
     for _ in range(_CUTS):
         fitted = _refine(time, value, frequency, count, _EXACT)
@@ -151,51 +153,44 @@ def _with_corners(time: FloatArray, value: FloatArray, cycle: Cycle) -> Cycle:
     most = t.size / (3 * max((t[-1] - t[0]) * cycle.frequency, 1.0))
     richer = cycle
     for count in CORNERS:
-        if richer.noise < _FOLLOWED * cycle.amplitude or count > most or t.size < 4 * (2 * count + 2):
+        if richer.noise < FOLLOWED * cycle.amplitude or count > most or t.size < 4 * (2 * count + 2):
             break
         again = _refine(t, y, richer.frequency, count, _EXACT)
-        if isinstance(again, str) or again.noise > _TAKEN * richer.noise:
+        if isinstance(again, str) or again.noise > TAKEN * richer.noise:
             break
         richer = again
     if richer is cycle:
         return cycle
-    # a corner at an end may have been taken for no part of the swing
+    # a corner at an end may have been cut off as no part of the swing
     whole = _without_ends(time, value, richer.frequency, richer.cosine.size)
-    return richer if isinstance(whole, str) or whole.noise > richer.noise / _TAKEN else whole
+    return richer if isinstance(whole, str) or whole.noise > richer.noise / TAKEN else whole
 
 
 def _following(time: FloatArray, value: FloatArray, cycle: Cycle) -> slice:
-    """Without the ends that do not follow the swing: holds between two pressures, the way back to where the next begins."""
+    """Without the ends that do not follow the swing: holds between two pressures, the way to where the next begins."""
     residual = value - cycle.value(cycle.phase(time))
     usual = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
     smooth = median_filter(residual, size=min(NEIGHBOURS, residual.size), mode="nearest")
-    off = np.abs(smooth) > max(OUTLIER * usual, _OFF_SWING * cycle.amplitude)
+    off = np.abs(smooth) > max(OUTLIER * usual, OFF_SWING * cycle.amplitude)
     before, after = leading(off), leading(off[::-1])
     return slice(before, off.size - after) if before + after < off.size else slice(0, off.size)
-
-
-def leading(off: NDArray[np.bool_]) -> int:
-    """How many of `off` [n] at the beginning are, up to the last before most that follow are not."""
-    share = np.cumsum(off) / np.arange(1, off.size + 1)
-    rows = np.flatnonzero(off & (share > 0.5))
-    return int(rows[-1]) + 1 if rows.size else 0
 
 
 def _without_rest(time: FloatArray, value: FloatArray, period: float) -> slice:
     """Without standing still before and after, where that lasts for a swing of this period [s] at most."""
     smooth = median_filter(value, size=min(3, value.size), mode="nearest")
     swing, noise = float(np.ptp(smooth)), float(np.median(np.abs(value - smooth)))
-    least = min(_SWING_SHARE * swing + 4 * noise, _MOST_SHARE * swing)
-    # so long does a sine stay so near an end of its swing, where the record begins or stops there
-    lingers = _LINGERS * math.acos(1 - 2 * least / swing) / (2 * math.pi) if swing > 0 else _REST_SHARE
-    lowest, still = float(smooth.min()), max(4 * noise, _STILL * swing)
+    least = min(SWING_SHARE * swing + 4 * noise, MOST_SWING_SHARE * swing)
+    # the share of a period that a sine spends so near an end of its swing, where the record begins or stops there
+    lingers = LINGERS * math.acos(1 - 2 * least / swing) / (2 * math.pi) if swing > 0 else REST_SHARE
+    lowest, still = float(smooth.min()), max(4 * noise, STILL_SHARE * swing)
 
     def rest(course: FloatArray, passed: FloatArray) -> int:
         """Samples of the course that stand still at its beginning, `passed` [n] s being its clock."""
         off = np.abs(course - course[0])
-        inside = _INSIDE[0] * swing < course[0] - lowest < _INSIDE[1] * swing
+        inside = INSIDE[0] * swing < course[0] - lowest < INSIDE[1] * swing
         moved = np.flatnonzero(off > least)
-        longest = _REST_INSIDE * (time[-1] - time[0]) if inside else min(_REST_SHARE, lingers) * period
+        longest = REST_INSIDE * (time[-1] - time[0]) if inside else min(REST_SHARE, lingers) * period
         if not moved.size or passed[moved[0]] <= longest:
             return 0
         return int(moved[0]) if inside else int(np.flatnonzero(off[: moved[0]] <= still)[-1]) + 1
@@ -236,14 +231,15 @@ def _explained(time: FloatArray, value: FloatArray, frequencies: FloatArray) -> 
 
 def _refine(time: FloatArray, value: FloatArray, frequency: float, count: int, tolerance: float) -> Cycle | str:
     """Gauss-Newton on frequency, mean and `count` harmonics until the frequency moves by less than `tolerance`/duration;
-    outliers judged anew in the first steps."""
+    outliers are determined anew in the first steps."""
     origin, duration = 0.5 * float(time[0] + time[-1]), float(time[-1] - time[0])
     order, highest = np.arange(1, count + 1), 0.5 / max(sample_interval(time), 1e-12)
     keep, steady = np.ones(time.size, dtype=np.bool_), beside(value)
     coefficients: FloatArray = np.zeros(2 * count + 1)
     gram: FloatArray = np.zeros((0, 0))
     residual: FloatArray = value
-    for step in range(25):
+    move = math.inf
+    for step in range(_STEPS):
         basis = harmonics(2 * math.pi * frequency * (time - origin), count)
         design = np.column_stack([np.ones_like(time), basis])
         kept = design[keep]
@@ -264,7 +260,8 @@ def _refine(time: FloatArray, value: FloatArray, frequency: float, count: int, t
             break
     noise = math.sqrt(float((residual[keep] ** 2).sum()) / max(int(keep.sum()) - 2 * count - 2, 1))
     inverse = np.asarray(np.linalg.pinv(gram, hermitian=True), dtype=np.float64)
-    return _cycle(time, frequency, origin, coefficients, inverse[1:-1, 1:-1] * noise**2, noise, int((~keep).sum()))
+    covariance, converged = inverse[1:-1, 1:-1] * noise**2, abs(move) < tolerance
+    return _cycle(time, frequency, origin, coefficients, covariance, noise, int((~keep).sum()), converged)
 
 
 def _cycle(
@@ -275,8 +272,9 @@ def _cycle(
     covariance: FloatArray,
     noise: float,
     outliers: int,
+    converged: bool,
 ) -> Cycle | str:
-    """Count the whole periods."""
+    """The swing with its whole periods counted."""
     interval = sample_interval(time)
     sampled = (float(time[-1] - time[0]) + interval) * frequency
     periods = math.floor(sampled + 1 - WHOLE)
@@ -297,4 +295,5 @@ def _cycle(
         start=stop - periods / frequency,
         stop=stop,
         outliers=outliers,
+        converged=converged,
     )

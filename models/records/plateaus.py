@@ -1,8 +1,8 @@
 """A raw stationary record (section 2.3.3 of the reference) cut into steady plateaus.
 
 Clean the record (`records.cleaning`), find the dwells in its speed and pressure (`records.dwells`), drop the transient of
-torque at the start of each (`records.settling`), and take the mean of the rest with its deviation under noise that
-remembers (`records.mean_deviation`). What is dropped, and why, is said in notes.
+torque at the start of each (`records.settling`), and take the mean of the rest with its deviation under autocorrelated
+noise (`records.mean_deviation`). Notes say what is dropped, and why.
 """
 
 import math
@@ -12,35 +12,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.records.cleaning import SCALE_SAMPLES, Note, Sampled, cleaning
+from models.records.cleaning import SCALE_SAMPLES, Note, Sampled, plan_cleaning
+from models.records.criteria import DRIFTING, SETTLING
 from models.records.dwells import Blocks, Dwell, average, find_dwells, listed
 from models.records.mean_deviation import Stretch, deviations
 from models.records.runs import Plateaus
-from models.records.settling import SETTLING, Transients, dropped, fit_transients, mean_decay
+from models.records.settling import Transients, dropped, fit_transients, mean_decay
 
-#: A drift of more deviations than this is worth a note.
-DRIFTING = 4.0
-#: What is dropped had made the means look less sure than they are, so that more may have to be: so often at most.
-ROUNDS = 4
+#: Dropping a transient makes the means' deviations smaller, so that more may have to be dropped: so often at most.
+_ROUNDS = 4
 #: No mean is known better than to this share of itself.
-LEAST_SHARE = 1e-9
+_LEAST_SHARE = 1e-9
 SLOW_NOISE = (
     "slow_noise",
-    "The noise of torque remembers for longer than a dwell can show: deviations of means rest on a white and a slow part "
-    "of it, estimated from all dwells together.",
+    "The noise of torque is autocorrelated over longer times than a dwell: deviations of means rest on a white and a slow "
+    "part of it, estimated from all dwells together.",
 )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlateauCut:
-    """Plateaus in the order measured, one row [n] each, and how they were come by.
+    """Plateaus in the order measured, one row [n] each, and how they were computed.
 
     `plateaus.torque_sd` [n] Nm is the deviation of the mean torque. `count` [n] samples were used; `noise` [n] Nm is the
     deviation of a sample about its dwell; `drift` [n] Nm/s the slope of torque over the samples used, with its deviation
     `drift_sd`; `time_constant` [n] s that of torque's exponential approach and `settling_time` [n] s four times that,
-    both nan where no transient stands out of the noise. `settled` [n] is false where more of the transient than the
+    both nan where no transient exceeds the noise. `settled` [n] is false where more of the transient than the
     mean's deviation was left at the end of the dwell: that mean is taken over the last quarter, is not extrapolated, and
-    what its transient is estimated to shift it by is part of its torque_sd. `start` and `stop` [n] s bound the samples
+    the shift by its transient is part of its torque_sd. `start` and `stop` [n] s bound the samples
     used. `notes` are pairs of a code and a sentence.
     """
 
@@ -64,7 +63,7 @@ def cut_plateaus(record: Sampled) -> PlateauCut:
     samples spike, signals be quantised. Raises ValueError on fewer than 16 samples, a clock that does not advance or
     falls back, and a record without any steady dwell in motion, and under pressure where there is any.
     """
-    kept = cleaning(record)
+    kept = plan_cleaning(record)
     blocks = average(record, kept)
     dwells, left_out = find_dwells(blocks)
     if not dwells:
@@ -72,52 +71,52 @@ def cut_plateaus(record: Sampled) -> PlateauCut:
         raise ValueError(
             f"the record has no steady dwell in motion and, where it has any, under pressure. {reasons}".rstrip()
         )
-    duration = np.array([blocks.time[one.stop - 1] - blocks.time[one.start] + blocks.duration for one in dwells])
+    duration = np.array([blocks.time[dwell.stop - 1] - blocks.time[dwell.start] + blocks.duration for dwell in dwells])
     transients = fit_transients(_stretches(blocks, dwells), blocks.duration)
-    used, drop, told = dwells, np.zeros(duration.size), deviations(_stretches(blocks, dwells))
-    for _ in range(ROUNDS):
-        further = np.maximum(drop, dropped(transients, duration, told.mean * np.sqrt(1 - drop / duration)))
+    used, drop, moments = dwells, np.zeros(duration.size), deviations(_stretches(blocks, dwells))
+    for _ in range(_ROUNDS):
+        further = np.maximum(drop, dropped(transients, duration, moments.mean * np.sqrt(1 - drop / duration)))
         if (further == drop).all():
             break
         drop = further
-        used = [_used(blocks, one, float(drop[row])) for row, one in enumerate(dwells)]
-        told = deviations(_stretches(blocks, used))
+        used = [_used(blocks, dwell, float(drop[row])) for row, dwell in enumerate(dwells)]
+        moments = deviations(_stretches(blocks, used))
     settled = ~(
         np.hypot(transients.amplitude, transients.amplitude_sd) * np.exp(-duration / transients.time_constant)
-        > told.mean
+        > moments.mean
     )
-    noise = np.sqrt(_mean(blocks.scatter, used) + told.average**2)
+    noise = np.sqrt(_mean(blocks.scatter, used) + moments.average**2)
     shift = np.nan_to_num(_shift(transients, drop, duration))
     half = 0.5 * (blocks.duration - kept.period)
     cut = PlateauCut(
         plateaus=_plateaus(
-            blocks, used, np.sqrt(told.mean**2 + _rounding(kept.of(record.torque), noise) ** 2 + shift**2)
+            blocks, used, np.sqrt(moments.mean**2 + _rounding(kept.of(record.torque), noise) ** 2 + shift**2)
         ),
-        count=np.array([(one.stop - one.start) * blocks.size for one in used]),
-        drift=told.drift,
-        drift_sd=told.drift_sd,
+        count=np.array([(dwell.stop - dwell.start) * blocks.size for dwell in used]),
+        drift=moments.drift,
+        drift_sd=moments.drift_sd,
         settling_time=SETTLING * transients.time_constant,
         time_constant=transients.time_constant,
         settled=settled,
         noise=noise,
-        start=np.array([blocks.time[one.start] for one in used]) - half,
-        stop=np.array([blocks.time[one.stop - 1] for one in used]) + half,
+        start=np.array([blocks.time[dwell.start] for dwell in used]) - half,
+        stop=np.array([blocks.time[dwell.stop - 1] for dwell in used]) + half,
         notes=(*kept.notes, *left_out),
     )
-    slow = () if told.resolved else (SLOW_NOISE,)
+    slow = () if moments.resolved else (SLOW_NOISE,)
     return replace(cut, notes=(*cut.notes, *_notes(cut, drop), *slow))
 
 
 def _stretches(blocks: Blocks, dwells: list[Dwell]) -> list[Stretch]:
     stretches = []
-    for one in dwells:
-        time = blocks.time[one.start : one.stop]
-        stretches.append(Stretch(time=time - time[0], torque=blocks.torque[one.start : one.stop]))
+    for dwell in dwells:
+        time = blocks.time[dwell.start : dwell.stop]
+        stretches.append(Stretch(time=time - time[0], torque=blocks.torque[dwell.start : dwell.stop]))
     return stretches
 
 
 def _shift(transients: Transients, drop: FloatArray, duration: FloatArray) -> FloatArray:
-    """What the transient is thought to shift the mean by [n] Nm; nan where no transient is seen."""
+    """The estimated shift of the mean by its transient [n] Nm; nan where no transient is resolved."""
     amplitude = np.hypot(transients.amplitude, transients.amplitude_sd)
     return np.asarray(amplitude * mean_decay(transients.time_constant, drop, duration))
 
@@ -128,7 +127,7 @@ def _plateaus(blocks: Blocks, used: list[Dwell], torque_sd: FloatArray) -> Plate
         pressure=_mean(blocks.pressure, used),
         speed=_mean(blocks.speed, used),
         torque=torque,
-        torque_sd=np.maximum(torque_sd, LEAST_SHARE * np.maximum(np.abs(torque), 1e-9)),
+        torque_sd=np.maximum(torque_sd, _LEAST_SHARE * np.maximum(np.abs(torque), 1e-9)),
         oil_temperature=None if blocks.oil_temperature is None else _mean(blocks.oil_temperature, used),
     )
 
@@ -150,8 +149,8 @@ def _notes(cut: PlateauCut, drop: FloatArray) -> list[Note]:
         ),
     ):
         if rows.any():
-            told = sentence.format(n=np.count_nonzero(rows), all=rows.size, at=listed(cut.start[rows]))
-            notes.append((code, told))
+            text = sentence.format(n=np.count_nonzero(rows), all=rows.size, at=listed(cut.start[rows]))
+            notes.append((code, text))
     return notes
 
 
@@ -161,11 +160,11 @@ def _used(blocks: Blocks, dwell: Dwell, drop: float) -> Dwell:
 
 
 def _mean(channel: FloatArray, dwells: list[Dwell]) -> FloatArray:
-    return np.array([channel[one.start : one.stop].mean() for one in dwells])
+    return np.array([channel[dwell.start : dwell.stop].mean() for dwell in dwells])
 
 
 def _rounding(torque: FloatArray, noise: FloatArray) -> float:
-    """What rounding to counts of q leaves in a mean [Nm]: q/√12 exp(-2π² σ²/q²), σ the noise [n] Nm before rounding."""
+    """The error of a mean [Nm] by rounding to counts of q: q/√12 exp(-2π² σ²/q²), σ the noise [n] Nm before rounding."""
     levels = np.unique(torque[:: max(1, torque.size // SCALE_SAMPLES)])
     if levels.size < 2:
         return 0.0

@@ -1,101 +1,33 @@
-"""Where the pressure of a record stands: the stretches at one level, without the ramps to and from it."""
-
-import bisect
-from collections.abc import Iterator
-from dataclasses import dataclass
+"""Levels of pressure: which measured pressures belong together, and the pressure [Pa] by which a level is called."""
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 from models.arrays import FloatArray
-from models.records.periods import leading, sample_interval
-from models.records.runs import LEVEL_GAP, LEVEL_GAP_SHARE
-
-#: The pressure is looked at in medians over this long [s]; a level lasts so many of them or more.
-_BLOCK = 0.25
-_LEAST_BLOCKS = 8
-#: Pressure still moves where it is off its level by more than so many deviations and than this share of a level's gap.
-_OFF_LEVEL, _OFF_SHARE = 4.0, 0.05
-#: What spans this many gaps, as a straight line would, is a ramp and no level.
-_RAMP, _STRAIGHT = 1.5, 0.98
-#: Ends are cut so many times at most.
-_CUTS = 6
+from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE, LEVEL_SNAP, LEVEL_STEP
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Stretch:
-    """Consecutive rows [start, stop) at one pressure [Pa] (their median)."""
-
-    pressure: float
-    start: int
-    stop: int
+def level_width(pressure: float) -> float:
+    """How far apart [Pa] pressures of one level may lie at this pressure [Pa]: LEVEL_GAP, or its share if more."""
+    return max(LEVEL_GAP, LEVEL_GAP_SHARE * pressure)
 
 
-def pressure_stretches(time: FloatArray, pressure: FloatArray) -> Iterator[Stretch]:
-    """The stretches of time [n] s, ascending, in which pressure [n] Pa stands still, in their order.
+def levels_of(pressure: FloatArray) -> FloatArray:
+    """The level [n] Pa of each measured pressure [n] Pa: equal values, same level.
 
-    Medians over a quarter of a second that stay within LEVEL_GAP of the stretch's own median belong together; where
-    pressure still moves towards the level or already away from it is cut off. Ramps between levels leave stretches that
-    are too short (under 2 s) to count, or straight lines, which do not count either.
+    Sorted pressures are cut where neighbours lie further apart than LEVEL_GAP (or LEVEL_GAP_SHARE); where every distinct
+    value occurs in three rows or more, pressures are nominal already and each distinct value is a level.
     """
-    smooth = median_filter(pressure, size=min(5, pressure.size), mode="nearest")
-    block = np.floor((time - time[0]) / max(_BLOCK, 5 * sample_interval(time))).astype(np.int64)
-    edges = np.concatenate([[0], np.flatnonzero(np.diff(block)) + 1, [time.size]])
-    medians = _block_medians(smooth, block, edges)
-    first = 0
-    ordered: list[float] = []  # the medians [first, i), ascending
-    for i in range(1, medians.size + 1):
-        bisect.insort(ordered, float(medians[i - 1]))
-        level = 0.5 * (ordered[(i - first - 1) // 2] + ordered[(i - first) // 2])
-        allowed = max(LEVEL_GAP, LEVEL_GAP_SHARE * abs(level))
-        if i < medians.size and abs(medians[i] - level) <= allowed:
-            continue
-        if i - first >= _LEAST_BLOCKS:
-            near = np.abs(smooth - level) <= allowed
-            lowest, highest = edges[max(first - 1, 0)], edges[min(i + 1, medians.size)]
-            inside_start, inside_stop = edges[first + 1], edges[i - 1]
-            before = np.flatnonzero(~near[lowest:inside_start])
-            after = np.flatnonzero(~near[inside_stop:highest])
-            start = int(lowest + before[-1] + 1) if before.size else int(lowest)
-            stop = int(inside_stop + after[0]) if after.size else int(highest)
-            if _ramps(medians[first:i], allowed):
-                first, ordered = i, []
-                continue
-            start, stop = _standing(smooth, start, stop, allowed)
-            if time[stop - 1] - time[start] >= _LEAST_BLOCKS * _BLOCK - _BLOCK:
-                yield Stretch(pressure=float(np.median(pressure[start:stop])), start=start, stop=stop)
-        first, ordered = i, []
+    distinct, inverse, counts = np.unique(pressure, return_inverse=True, return_counts=True)
+    gaps = np.diff(distinct)
+    if counts.min() >= 3:
+        group = np.arange(distinct.size)
+    else:
+        group = np.concatenate([[0], np.cumsum(gaps > np.maximum(LEVEL_GAP, LEVEL_GAP_SHARE * distinct[1:]))])
+    member = group[inverse]
+    names = np.array([_rounded_level(float(np.median(pressure[member == g]))) for g in range(group[-1] + 1)])
+    return np.asarray(names[member], dtype=np.float64)
 
 
-def _block_medians(values: FloatArray, block: NDArray[np.int64], edges: NDArray[np.int64]) -> FloatArray:
-    """The median of values [n] in each block [n], ascending, that starts at its edge."""
-    ordered = values[np.lexsort((values, block))]
-    first, count = edges[:-1], np.diff(edges)
-    return np.asarray(0.5 * (ordered[first + (count - 1) // 2] + ordered[first + count // 2]), dtype=np.float64)
-
-
-def _ramps(medians: FloatArray, gap: float) -> bool:
-    """Whether medians [b] over equal times are a straight line across the gap."""
-    if float(np.ptp(medians)) < _RAMP * gap:
-        return False
-    return abs(float(np.corrcoef(np.arange(medians.size), medians)[0, 1])) > _STRAIGHT
-
-
-def _standing(smooth: FloatArray, start: int, stop: int, gap: float) -> tuple[int, int]:
-    """[start, stop) without the rows at its ends where pressure is off the level by more than its usual wander.
-
-    Level and wander are those of the middle half, so that a pressure which wanders all the time keeps its ends. They are
-    judged anew after each cut: half of a long ramp may lie in the first middle.
-    """
-    for _ in range(_CUTS):
-        quarter = (stop - start) // 4
-        middle = smooth[start + quarter : stop - quarter]
-        level = float(np.median(middle))
-        wander = 1.4826 * float(np.median(np.abs(middle - level)))
-        off = np.abs(smooth[start:stop] - level) > max(_OFF_LEVEL * wander, _OFF_SHARE * gap)
-        before, after = leading(off), leading(off[::-1])
-        if before + after == 0 or before + after >= off.size:
-            break
-        start, stop = start + before, stop - after
-    return start, stop
+def _rounded_level(median: float) -> float:
+    snapped = round(median / LEVEL_STEP) * LEVEL_STEP
+    return snapped if snapped > 0 and abs(median - snapped) <= LEVEL_SNAP else round(median, 1)

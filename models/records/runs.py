@@ -1,7 +1,7 @@
-"""The shape-checked values that flow through everything: the steady plateaus of a stationary test and its curves.
+"""The shape-checked values of all that is measured: the steady plateaus of a stationary test, a sampled record, a curve.
 
 A stationary Stribeck test holds pressure and speed on a plateau and measures torque; one row is one plateau. A curve is
-the rows of one pressure level. Measured pressures scatter about their level, so levels are found, not assumed.
+the rows of one pressure level. Measured pressures scatter about their level, so levels are estimated, not assumed.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -11,15 +11,8 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
-
-#: Pressures further apart than this belong to different levels: 0.12 bar, or 2.5 % of the pressure where that is more.
-LEVEL_GAP = 0.12e5
-LEVEL_GAP_SHARE = 0.025
-#: Below this [Pa] the clutch is open: what is read says nothing of the lining's friction.
-UNLOADED = 0.05e5
-#: A level within 0.02 bar of a multiple of 0.05 bar is called by that multiple.
-LEVEL_STEP = 0.05e5
-LEVEL_SNAP = 0.02e5
+from models.records.criteria import UNLOADED
+from models.records.pressure_levels import levels_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,8 +33,8 @@ class Plateaus:
         _require_columns(self, ("pressure", "speed", "torque", "torque_sd", "oil_temperature"))
 
     def take(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> "Plateaus":
-        """Those rows, at least one."""
-        columns = {each.name: getattr(self, each.name) for each in fields(self)}
+        """The plateaus at `rows`, at least one."""
+        columns = {field.name: getattr(self, field.name) for field in fields(self)}
         return replace(self, **{name: column[rows] for name, column in columns.items() if column is not None})
 
 
@@ -92,38 +85,16 @@ def _require_columns(columns: Plateaus | Record, names: tuple[str, ...]) -> None
 
 
 def loaded(plateaus: Plateaus) -> Plateaus | None:
-    """The plateaus through which curves go, those of UNLOADED or more; None where the clutch was open on all."""
+    """The plateaus at a pressure of UNLOADED or more, through which curves go; None where the clutch was open on all."""
     rows = plateaus.pressure >= UNLOADED
     if not rows.any():
         return None
     return plateaus.take(rows)
 
 
-def pressure_levels(pressure: FloatArray) -> FloatArray:
-    """Name the level of each measured pressure [n] Pa: equal names, same level. Returns [n] Pa.
-
-    Sorted pressures are cut where neighbours lie further apart than LEVEL_GAP (or LEVEL_GAP_SHARE); where every distinct
-    value stands in three rows or more they are nominal values already, and each is a level.
-    """
-    distinct, inverse, counts = np.unique(pressure, return_inverse=True, return_counts=True)
-    gaps = np.diff(distinct)
-    if counts.min() >= 3:
-        group = np.arange(distinct.size)
-    else:
-        group = np.concatenate([[0], np.cumsum(gaps > np.maximum(LEVEL_GAP, LEVEL_GAP_SHARE * distinct[1:]))])
-    member = group[inverse]
-    names = np.array([_level_name(float(np.median(pressure[member == g]))) for g in range(group[-1] + 1)])
-    return np.asarray(names[member], dtype=np.float64)
-
-
-def _level_name(median: float) -> float:
-    snapped = round(median / LEVEL_STEP) * LEVEL_STEP
-    return snapped if snapped > 0 and abs(median - snapped) <= LEVEL_SNAP else round(median, 1)
-
-
 def curves_by_pressure(plateaus: Plateaus, geometry: Geometry) -> tuple[Curve, ...]:
     """The curves of a stationary test, one a pressure level, pressures ascending, rows in the order they were sent."""
-    levels = pressure_levels(plateaus.pressure)
+    levels = levels_of(plateaus.pressure)
     velocity = geometry.sliding_velocity(plateaus.speed)
     curves = []
     for level in np.unique(levels):

@@ -1,9 +1,9 @@
-"""How torque approaches its steady value on a dwell, and from when on a mean may be taken.
+"""The settling transient of torque on a dwell, and from when on a mean may be taken.
 
-After a step the torque approaches like M(t) = M_inf + A exp(-t/τ): the attractor law dM/dt = C (1 - M/S) at constant S is
+After a step the torque settles like M(t) = M_inf + A exp(-t/τ): the attractor law dM/dt = C (1 - M/S) at constant S is
 this with τ = S/C. M_inf, A and a drift beside fast transients are linear given τ, which is scanned; every dwell has its
-own τ, held near the one that explains all dwells of the record together, because most steps of a test are too small to
-tell τ alone.
+own τ with a prior about the one that explains all dwells of the record together, because most steps of a test are too
+small to determine τ by themselves.
 
 The settling time is 4 τ: what is left of the transient then is 1.8 %.
 """
@@ -15,33 +15,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
+from models.records.criteria import (
+    DRIFT_SHARE,
+    FEWEST_FOR_SPREAD,
+    GAIN_CAP,
+    LATE,
+    LEAST_DROPPED,
+    LEAST_SPREAD,
+    LEFT_IN_MEAN,
+    MOST_DROPPED,
+    MOST_SPREAD,
+    OWN_GAIN,
+    POOLED_GAIN,
+    SLOWEST_TRANSIENT,
+    SLOWEST_TRANSIENT_SHARE,
+)
 from models.records.mean_deviation import Stretch, pooled_correlation
 
-#: Time constants that make a settling time.
-SETTLING = 4.0
-#: Time constants tried: so many, from one block to this many of the longest dwell, no longer than this [s].
-SCANNED, LONGEST_SHARE, LONGEST = 40, 2.0, 6.0
-#: Beside a transient faster than this share of its dwell, torque may drift; a slower one cannot be told from a drift.
-DRIFT_SHARE = 1 / 6
-#: How far (in its logarithm, one deviation) a dwell's time constant lies from the record's at most and at least, and how
-#: many dwells it takes to tell.
-SPREAD, LEAST_SPREAD, FEWEST_DWELLS = 0.5, 0.1, 8
-#: Deviations by which all dwells together must gain from a transient, and squared deviations by which a single one must.
-POOLED_GAIN, OWN_GAIN = 5.0, 25.0
-#: No dwell counts for more than this among all, in squared deviations.
-GAIN_CAP = 1e3
-#: What a discarded transient may leave in the mean, in deviations of the mean; least and most of a dwell that is dropped.
-LEFT, LEAST_DROPPED, MOST_DROPPED = 0.1, 0.05, 0.75
-#: So many sets of times are remembered.
-KNOWN_TIMES = 4
-#: Deviations of amplitude and of the time constant that are reckoned with.
-LATE = 2.0
+#: Time constants that are tried.
+_SCANNED = 40
+#: So many sets of times are cached.
+_CACHED_CLOCKS = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Transients:
-    """One row a dwell: time_constant [n] s (nan where no transient is seen), slowest [n] s, a time constant that it hardly
-    exceeds, amplitude [n] Nm at the dwell's start, amplitude_sd [n] Nm.
+    """One row a dwell: time_constant [n] s (nan where no transient is resolved), slowest [n] s its upper limit, amplitude
+    [n] Nm at the dwell's start, amplitude_sd [n] Nm.
     """
 
     time_constant: FloatArray
@@ -59,19 +59,23 @@ class _Scan:
 
 
 def fit_transients(stretches: Sequence[Stretch], shortest: float) -> Transients:
-    """The exponential approach of every dwell. `shortest` [s] is a block."""
-    longest = max(float(one.time[-1]) for one in stretches)
-    taus = np.geomspace(shortest, max(min(LONGEST_SHARE * longest, LONGEST), 4 * shortest), SCANNED)
+    """The settling transient of every dwell. `shortest` [s] is a block."""
+    longest = max(float(stretch.time[-1]) for stretch in stretches)
+    taus = np.geomspace(
+        shortest, max(min(SLOWEST_TRANSIENT_SHARE * longest, SLOWEST_TRANSIENT), 4 * shortest), _SCANNED
+    )
     basis = _Bases(taus)
-    scans = [_scan(one, basis.of(one.time)) for one in stretches]
+    scans = [_scan(stretch, basis.of(stretch.time)) for stretch in stretches]
     correlation = pooled_correlation([scan.residual for scan in scans], removed=3)
     long_run = np.array([[scan.variance * correlation.factor(scan.residual.size)] for scan in scans])
     gain = np.stack([scan.gain for scan in scans]) / long_run
-    drifts = taus < DRIFT_SHARE * np.array([[one.time[-1]] for one in stretches])
+    drifts = taus < DRIFT_SHARE * np.array([[stretch.time[-1]] for stretch in stretches])
     worth = np.stack([scan.total for scan in scans]) / long_run - drifts  # a drift is worth 1 by chance
     place = np.log(taus)
     common = _common(worth, gain, place)
-    rows = [_fit(one, place, worth[i], gain[i], float(long_run[i, 0]), common) for i, one in enumerate(stretches)]
+    rows = [
+        _fit(stretch, place, worth[i], gain[i], float(long_run[i, 0]), common) for i, stretch in enumerate(stretches)
+    ]
     tau, slowest, amplitude, deviation = np.array(rows).T
     return Transients(time_constant=tau, slowest=slowest, amplitude=amplitude, amplitude_sd=deviation)
 
@@ -96,22 +100,22 @@ class _Basis:
 
 
 class _Bases:
-    """The transients tried over the times of a dwell: one clock gives most dwells the same times, to the microsecond."""
+    """The transients tried over the times of a dwell, cached: to the microsecond, most dwells have the same times."""
 
     def __init__(self, taus: FloatArray) -> None:
         self._taus = taus
-        self._known: dict[bytes, _Basis] = {}
+        self._cache: dict[bytes, _Basis] = {}
 
     def of(self, time: FloatArray) -> _Basis:
         key = np.round(time, 6).tobytes()
-        if key not in self._known:
+        if key not in self._cache:
             decay, trend = _decays(time, self._taus)
             square = np.maximum(np.einsum("jk,jk->j", decay, decay), 1e-12)
-            if len(self._known) == KNOWN_TIMES:
-                self._known.clear()
+            if len(self._cache) == _CACHED_CLOCKS:
+                self._cache.clear()
             drifts = self._taus < DRIFT_SHARE * time[-1]
-            self._known[key] = _Basis(decay=decay, trend=trend, square=square, drifts=drifts)
-        return self._known[key]
+            self._cache[key] = _Basis(decay=decay, trend=trend, square=square, drifts=drifts)
+        return self._cache[key]
 
 
 def _scan(stretch: Stretch, basis: _Basis) -> _Scan:
@@ -136,21 +140,21 @@ class _Common:
 
 
 def _common(worth: FloatArray, gain: FloatArray, place: FloatArray) -> _Common | None:
-    """What explains all dwells [n, J] best, if a transient explains them at all."""
+    """What explains all dwells [n, J] best, None where no transient does."""
     share = np.minimum(GAIN_CAP / np.maximum(worth.max(axis=1), GAIN_CAP), 1.0)
     together = share @ worth
     dwells = worth.shape[0]
     if share @ gain[:, together.argmax()] - dwells <= POOLED_GAIN * np.sqrt(2.0 * dwells):
         return None
-    own = np.array([_peak(one, place) for one in worth])
-    seen = gain[np.arange(dwells), worth.argmax(axis=1)] > OWN_GAIN
-    known = own[seen & (own[:, 1] < SPREAD)]
+    own = np.array([_peak(row, place) for row in worth])
+    visible = gain[np.arange(dwells), worth.argmax(axis=1)] > OWN_GAIN
+    determined = own[visible & (own[:, 1] < MOST_SPREAD)]
     centre = _peak(together, place)[0]
-    if known.shape[0] < FEWEST_DWELLS:
-        return _Common(place=centre, spread=SPREAD)
+    if determined.shape[0] < FEWEST_FOR_SPREAD:
+        return _Common(place=centre, spread=MOST_SPREAD)
     # The median of a squared normal variable is 0.455 of its variance.
-    beyond = float(np.median((known[:, 0] - centre) ** 2)) / 0.455 - float(np.median(known[:, 1] ** 2))
-    return _Common(place=centre, spread=min(max(float(np.sqrt(max(beyond, 0.0))), LEAST_SPREAD), SPREAD))
+    beyond = float(np.median((determined[:, 0] - centre) ** 2)) / 0.455 - float(np.median(determined[:, 1] ** 2))
+    return _Common(place=centre, spread=min(max(float(np.sqrt(max(beyond, 0.0))), LEAST_SPREAD), MOST_SPREAD))
 
 
 def _peak(worth: FloatArray, place: FloatArray) -> tuple[float, float]:
@@ -158,17 +162,17 @@ def _peak(worth: FloatArray, place: FloatArray) -> tuple[float, float]:
     best, step = int(worth.argmax()), float(place[1] - place[0])
     if not 0 < best < worth.size - 1:
         return float(place[best]), 1.0
-    left, middle, right = (float(one) for one in worth[best - 1 : best + 2])
-    bend = left - 2 * middle + right
-    if bend >= 0:
+    left, middle, right = (float(height) for height in worth[best - 1 : best + 2])
+    curvature = left - 2 * middle + right
+    if curvature >= 0:
         return float(place[best]), 1.0
-    return float(place[best]) + 0.5 * (left - right) / bend * step, min(step * float(np.sqrt(-2 / bend)), 1.0)
+    return float(place[best]) + 0.5 * (left - right) / curvature * step, min(step * float(np.sqrt(-2 / curvature)), 1.0)
 
 
 def _fit(
     stretch: Stretch, place: FloatArray, worth: FloatArray, gain: FloatArray, long_run: float, common: _Common | None
 ) -> tuple[float, float, float, float]:
-    """τ, the slowest τ to reckon with, A and its deviation."""
+    """τ, its upper limit, A and its deviation."""
     if common is None and gain[worth.argmax()] < OWN_GAIN:
         return np.nan, np.nan, 0.0, 0.0
     held = 0.0 if common is None else ((place - common.place) / common.spread) ** 2
@@ -181,7 +185,7 @@ def _fit(
 
 
 def dropped(transients: Transients, duration: FloatArray, deviation: FloatArray) -> FloatArray:
-    """How much of each dwell to drop [n] s: from then on, the transient shifts the mean by < 0.1 of its deviation.
+    """How much of each dwell to drop [n] s: from then on the transient shifts the mean by < 0.1 of its deviation.
 
     duration [n] s of the dwells, deviation [n] Nm of a mean over the whole of each. At most three quarters are dropped.
     """
@@ -191,7 +195,7 @@ def dropped(transients: Transients, duration: FloatArray, deviation: FloatArray)
     for amplitude, tau in ((size + wide, transients.time_constant), (size, transients.slowest)):
         left = mean_decay(tau[:, np.newaxis], share * duration[:, np.newaxis], duration[:, np.newaxis])
         shift = np.maximum(shift, amplitude[:, np.newaxis] * left)
-    small = shift <= LEFT * deviation[:, np.newaxis] / np.sqrt(1 - share)
+    small = shift <= LEFT_IN_MEAN * deviation[:, np.newaxis] / np.sqrt(1 - share)
     small[np.isnan(transients.time_constant)] = True
     return np.asarray(np.where(small.any(axis=1), share[small.argmax(axis=1)], MOST_DROPPED) * duration)
 

@@ -1,10 +1,10 @@
-"""Noise that remembers for longer than a dwell shows: how much, by the likelihood of all dwells of a record together.
+"""Noise autocorrelated over longer times than a dwell shows: how much, by the likelihood of all dwells of a record.
 
-A sum of lagged products (`mean_deviation`) stops at the longest lag that a dwell can show. Beyond that something must
-be assumed of the noise: that it is a white part and a slow one, ρ(k) = a e^{-k/T} at lags k >= 1. The likelihood of a and T
-is the restricted one, of what is left of each dwell without its mean and its trend (H. D. Patterson, R. Thompson, Biometrika
-58, 1971), over a grid, each dwell with a deviation of its own; and ρ is its mean over that grid, all places of it alike
-beforehand. So where dwells do not tell T, the longer ones that they allow count too.
+A sum of lagged products (`mean_deviation`) stops at the longest lag that a dwell can show. Beyond that the noise is assumed
+to be a white part and a slow one, ρ(k) = a e^{-k/T} at lags k >= 1. The likelihood of a and T is the restricted one, of
+the residuals of each dwell from its mean and its trend (H. D. Patterson, R. Thompson, Biometrika 58, 1971), over a grid,
+each dwell with a deviation of its own; ρ is averaged over that grid with a uniform prior. So where the dwells do not
+determine T, the longer values that they allow count too.
 """
 
 from collections.abc import Sequence
@@ -14,12 +14,10 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular, toeplitz
 
 from models.arrays import FloatArray
+from models.records.criteria import LONGEST_SLOW_TIME, SLOW_SHARES
 
-#: Averages of a dwell that are looked at, at most.
-MOST_AVERAGES = 64
-#: Memories T from half an average to so many times the longest dwell, and shares a of the slow noise.
-TIMES, LONGEST_TIME = 16, 2.0
-SHARES = (0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95, 1.0)
+#: Averages of a dwell that are used, at most, and number of correlation times on the grid.
+_MOST_AVERAGES, _TIMES = 64, 16
 
 
 def slow_correlation(residuals: Sequence[FloatArray]) -> FloatArray:
@@ -27,20 +25,20 @@ def slow_correlation(residuals: Sequence[FloatArray]) -> FloatArray:
 
     Empty where none of them has as many as eight averages.
     """
-    longest = max(one.size for one in residuals)
-    group = -(-longest // MOST_AVERAGES)
-    means = [one[: one.size // group * group].reshape(-1, group).mean(axis=1) for one in residuals]
-    kept = [k for k, one in enumerate(means) if one.size >= 8 and float(one @ one) > 0]
+    longest = max(residual.size for residual in residuals)
+    group = -(-longest // _MOST_AVERAGES)
+    means = [residual[: residual.size // group * group].reshape(-1, group).mean(axis=1) for residual in residuals]
+    kept = [k for k, average in enumerate(means) if average.size >= 8 and float(average @ average) > 0]
     if not kept:
         return np.zeros(0)
     size = np.array([means[k].size for k in kept])
     table = np.zeros((int(size.max()), len(kept)))
     for column, k in enumerate(kept):
         table[: size[column], column] = means[k]
-    times = np.geomspace(0.5 * group, LONGEST_TIME * longest, TIMES)
-    places = [(float(time), share) for time in times for share in SHARES]
-    told = [_restricted(table, size, _averaged(time, group, table.shape[0]), share) for time, share in places]
-    fit = np.array([one[0] for one in told])
+    times = np.geomspace(0.5 * group, LONGEST_SLOW_TIME * longest, _TIMES)
+    places = [(float(time), share) for time in times for share in SLOW_SHARES]
+    restricted = [_restricted(table, size, _averaged(time, group, table.shape[0]), share) for time, share in places]
+    fit = np.array([row[0] for row in restricted])
     weight = np.exp(fit - fit.max())
     weight /= weight.sum()
     lost = sum(
@@ -48,16 +46,16 @@ def slow_correlation(residuals: Sequence[FloatArray]) -> FloatArray:
         for k in kept
     )
     lag = np.arange(1, longest)
-    found = np.zeros(lag.size)
-    for (time, share), (_, scale, variance), part in zip(places, told, weight, strict=True):
+    correlation = np.zeros(lag.size)
+    for (time, share), (_, scale, variance), part in zip(places, restricted, weight, strict=True):
         if part > 1e-9:
             # averaging takes off the white part what the averages' mean squares have less than those of all
-            found += part * share * scale / (variance + lost / len(kept)) * np.exp(-lag / time)
-    return found
+            correlation += part * share * scale / (variance + lost / len(kept)) * np.exp(-lag / time)
+    return correlation
 
 
 def _averaged(time: float, group: int, size: int) -> FloatArray:
-    """Covariances [size] of means over `group` of slow noise of variance 1 and memory `time`."""
+    """Covariances [size] of means over `group` of slow noise of variance 1 and correlation time `time`."""
     inner = np.arange(1, group)
     within = (1 + 2 * float(((1 - inner / group) * np.exp(-inner / time)).sum())) / group
     step = np.exp(-np.arange(group) / time).mean() * np.exp(np.arange(group) / time).mean()
@@ -80,11 +78,13 @@ def _restricted(
     # The first m rows are those of a dwell of m averages: sums up to each row serve dwells of every size.
     last = size - 1
     ranks = np.cumsum(np.log(np.diag(factor)))[last]
-    one, slant, cross = (np.cumsum(each)[last] for each in (x[:, 0] ** 2, x[:, 1] ** 2, x[:, 0] * x[:, 1]))
+    ones, slant, cross = (np.cumsum(products)[last] for products in (x[:, 0] ** 2, x[:, 1] ** 2, x[:, 0] * x[:, 1]))
     column = np.arange(size.size)
-    by_one, by_slant, square = (np.cumsum(each, axis=0)[last, column] for each in (x[:, :1] * y, x[:, 1:] * y, y**2))
-    gram = one * slant - cross**2
-    left = square - (slant * by_one**2 + one * by_slant**2 - 2 * cross * by_one * by_slant) / gram
+    by_one, by_slant, square = (
+        np.cumsum(products, axis=0)[last, column] for products in (x[:, :1] * y, x[:, 1:] * y, y**2)
+    )
+    gram = ones * slant - cross**2
+    left = square - (slant * by_one**2 + ones * by_slant**2 - 2 * cross * by_one * by_slant) / gram
     left = np.maximum(left, 1e-12 * square + 1e-300)
     likelihood = -ranks - 0.5 * np.log(gram) - 0.5 * (size - 2) * np.log(left)
     scale = float((left / (size - 2)).mean())

@@ -1,0 +1,4 @@
+"""The simulated rig: `truth` (the clutch) first, then its tests (`stationary`, `sampled`, `recorder`) and `campaign`.
+
+In: a seed and a programme. Out: the runs of a campaign as values, whose true end of life is known. Nothing was measured.
+"""

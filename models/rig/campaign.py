@@ -1,9 +1,8 @@
 """A whole simulated campaign in the rig's order (fig. 2): run-in, then duty blocks with the tests after each.
 
 Run-in of 200 engagements before cycle 0, tests at 0, then at 500, 1000, 2000, 3000, ... duty cycles, until the true mean
-COF has fallen below `stop_fraction` of its initial value or `most_tests` stationary tests are made. What the tests are is
-a `Programme`. All of it is simulated, and every run id says so. When a run was made is not known here; that is for
-whoever sends it.
+COF has fallen below `stop_fraction` of its initial value or `most_tests` stationary tests are made. The tests are those of
+a `Programme`. All of it is simulated, and every run id says so. Runs have no time of day: the sender adds it.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3.
 """
@@ -46,7 +45,7 @@ def simulate(
     stop_fraction: float = 0.45,
     most_tests: int = 40,
 ) -> Iterator[SimulatedRun]:
-    """The runs of one simulated campaign, in rig order, made as they are asked for. The same seed gives the same bits.
+    """The runs of one simulated campaign, in rig order, computed as they are consumed. The same seed gives the same bits.
 
     `clutch` is `simulated_clutch(seed)` unless given. A test's noise depends on the seed and its cycles alone. Raises
     ValueError on a negative seed, stop_fraction outside (0, 1) or most_tests < 1.

@@ -1,14 +1,15 @@
-"""How the simulated clutch's friction lags its speed: a film that is squeezed, an attractor, or both.
+"""How the simulated clutch's friction lags its speed: by a squeezed film, an attractor, or both.
 
-The film time τ_1 of `models.loops.lag` stands when new and is lost with use, the more the higher the pressure,
+The film time τ_1 of `models.loops.squeeze_film` is largest when new and falls with use, the more the higher the pressure,
 
     τ_1(p, ζ) = τ_0 e^{-λ(p) g(ζ)},    λ(p) = max(α + β p, 0),    g(ζ) = 1 - (1 + ζ/φ)^-ε
 
-as a lining does that loses its pores: at high pressure its film no longer follows. The loop area goes with τ_1 and with
-how steep the stationary curve is, which grows as that sinks. The nominal values are made so that the two together show
-figs. 14 and 17: areas near proportional to pressure when new, growing over life up to 6 bar, falling above, and in the
-end falling with pressure. The attractor C, where there is one, adds what its torque differs from the stationary one by:
-exact to the first order in both lags. Alone it gives loops of the wrong sign where curves rise (see `models.loops.lag`).
+as a lining does that loses its pores: at high pressure its film no longer lags. The loop area goes with τ_1 and with the
+slope of the stationary curve, which steepens as the curve sinks. The nominal values are chosen so that both together
+show figs. 14 and 17: areas nearly proportional to pressure when new, growing over life up to 6 bar, falling above, and
+in the end falling with pressure. The attractor C, where there is one, adds the difference of its torque from the
+stationary one: exact to the first order in both lags. Alone it gives loops of the wrong sign where curves rise (see
+`models.loops.attractor`).
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, eq. 7 and section 3.2. The formulas of λ and g are this
 project's: the reference prints none.
@@ -23,7 +24,8 @@ from models.arrays import FloatArray
 from models.degradation.general_order import progress_fraction
 from models.friction.pressure_laws import LinearLaw
 from models.friction.stribeck import StribeckParameters, torque
-from models.loops.lag import attractor_torque, squeeze_film_torque
+from models.loops.attractor import attractor_torque
+from models.loops.squeeze_film import squeeze_film_torque
 
 _LOSS = LinearLaw(intercept=-2.75, slope=0.7e-5)
 
@@ -60,12 +62,12 @@ class FrictionLag:
         At the first sample the film is that of its velocity at rest.
         """
         stationary = torque(velocity, curve)
-        found = stationary
+        lagging = stationary
         if self.film_time > 0:
-            found = squeeze_film_torque(time, velocity, curve, self.film_time_at(pressure, cycles))
+            lagging = squeeze_film_torque(time, velocity, curve, self.film_time_at(pressure, cycles))
         if self.attractor is not None:
-            found = found + attractor_torque(time, velocity, curve, self.attractor) - stationary
-        return found
+            lagging = lagging + attractor_torque(time, velocity, curve, self.attractor) - stationary
+        return lagging
 
 
 NO_LAG = FrictionLag(film_time=0.0)

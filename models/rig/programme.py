@@ -1,4 +1,4 @@
-"""What a simulated campaign is made of: which tests beside the stationary one, and what ages the clutch.
+"""What a simulated campaign consists of: which tests beside the stationary one, and what ages the clutch.
 
 The default is the quick one: plateaus, and duty blocks whose energies are assumed. `WHOLE` is all of fig. 2.
 
@@ -27,7 +27,7 @@ class Programme:
     """`dynamic`: the dynamic test after each stationary one, None: none. `raw`: stationary tests as sampled records,
     None: as plateaus. `engagements`: integrate one a block, for its energy and its trace.
 
-    Raises ValueError where energy is to age the clutch and no engagement tells it.
+    Raises ValueError where energy is to age the clutch and no engagement gives it.
     """
 
     dynamic: DynamicTest | None = None

@@ -1,6 +1,6 @@
-"""What the simulated rig's recorder makes of a course of pressure, speed and torque: noise, counts, losses, spikes.
+"""The simulated rig's recorder adds noise, counts, losses and spikes to a course of pressure, speed and torque.
 
-Torque noise remembers: a first-order autoregression of `memory` seconds. The gain is one number a run, as for plateaus.
+Torque noise is a first-order autoregression of `memory` seconds. The gain is one number a run, as for plateaus.
 
 Source: this project's; the reference says which channels are recorded (section 2.1) and not how well.
 """
@@ -21,7 +21,7 @@ from models.rig.stationary import Sensor, oil_temperature, rounded
 class Recorder:
     """Deviations of a sample: torque [Nm] (with `memory` [s]), speed [rad/s], pressure [Pa]; counts [1/unit], 0: none.
 
-    `lost` is the share of samples that are missing, `spikes_per_minute` how often torque shows a wild sample. Raises
+    `lost` is the share of samples that are missing, `spikes_per_minute` how often torque has a spike. Raises
     ValueError on negative or not finite values and where lost is not below 1.
     """
 

@@ -36,7 +36,7 @@ class SimulatedRun:
     """One simulated run; `cycles` = duty cycles accumulated at its end.
 
     A stationary test has plateaus, or a record where it is raw; a dynamic test has a record; the rest a duty block and
-    perhaps the record of its first engagement. `wear` is the truth, which no rig knows: the ζ of eq. 6 at the run's end.
+    perhaps the record of its first engagement. `wear` is the truth, unknown to a rig: the ζ of eq. 6 at the run's end.
     """
 
     run_id: str

@@ -5,7 +5,7 @@ The measured torque of plateau i is simulated as
     M_i = g S(v_i, p_i) (1 + s η_i) + f ν_i ,    g = 1 + r κ,    η_i, ν_i, κ standard normal
 
 with sensor noise s, additive floor f and a gain g that is one number a run, rounded to the recorder's counts. Oil
-temperature is recorded and swings about its set point as a thermostat lets it; it does not act on the torque.
+temperature is recorded and swings about its set point as under a thermostat; it does not act on the torque.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3.
 """
@@ -23,7 +23,7 @@ from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
 
 #: Time on one plateau [s] (section 2.3.3).
 PLATEAU_DURATION = 5.0
-#: Middle of the range in which the oil is kept, 80 to 90 °C [K], and the most that the simulated oil leaves it [K].
+#: Middle of the range in which the oil is kept, 80 to 90 °C [K], and the largest deviation of the simulated oil from it [K].
 OIL_TEMPERATURE = 273.15 + 85.0
 OIL_SWING = 4.5
 
@@ -58,7 +58,7 @@ def stationary_test(
 ) -> Plateaus:
     """Simulate one stationary test after cycles >= 0: 280 rows in the reference's order, by pressure, speed rising.
 
-    Every random number is drawn whatever the sensor, so two sensors see the same clutch in the same mood.
+    Every random number is drawn whatever the sensor, so that two sensors measure the same test.
     """
     sensor = Sensor() if sensor is None else sensor
     true = torque(

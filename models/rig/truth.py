@@ -1,4 +1,4 @@
-"""The simulated clutch: what a rig would see if it had no noise. Everything here is simulated, nothing was measured.
+"""The simulated clutch: what a rig would measure without noise. Everything here is simulated, nothing was measured.
 
 Stribeck curve of eq. 3, its parameters over pressure in the shapes of fig. 9,
 
@@ -7,8 +7,8 @@ Stribeck curve of eq. 3, its parameters over pressure in the shapes of fig. 9,
 and each of them over life multiplied by its own eq. 6 with ξ0 = 1, so that Δ is a share of the fresh value. How torque
 lags that curve while speed changes is in `models.rig.hysteresis`.
 
-The reference's figures carry no numbers that survive, so the nominal ones are made: 25 Nm fresh at 5 bar and 1000 rpm,
-the signs and shapes of figs. 6, 7, 9 and 10, and a mean coefficient of friction (COF) halved near 15,000 duty cycles.
+The reference's figures give no legible numbers, so the nominal ones are chosen: 25 Nm fresh at 5 bar and 1000 rpm, the
+signs and shapes of figs. 6, 7, 9 and 10, and a mean coefficient of friction (COF) halved near 15,000 duty cycles.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, eqs. 2, 3 and 6, sections 2.3.3 and 3.1.
 """
@@ -22,7 +22,7 @@ from scipy.optimize import brentq
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.degradation.general_order import Degradation, value
-from models.engagements.simulation import Capacity
+from models.engagements.capacity import Capacity
 from models.friction.pressure_laws import AsymptoticLaw, LinearLaw
 from models.friction.speed_protocol import REFERENCE_SPEEDS
 from models.friction.stribeck import StribeckParameters, torque
@@ -31,7 +31,7 @@ from models.rig.hysteresis import FrictionLag
 #: The protocol's pressures (section 2.3.3): 4 to 7 bar by 0.5 bar [7] Pa; its 40 speeds are REFERENCE_SPEEDS.
 PROTOCOL_PRESSURES: FloatArray = np.linspace(4.0e5, 7.0e5, 7)
 
-#: The end of life is looked for between new and this many duty cycles, on a grid as fine as this.
+#: The end of life is sought between new and HORIZON duty cycles, on this grid.
 HORIZON = 1_000_000.0
 _BRACKETS = np.concatenate([[0.0], np.geomspace(1.0, HORIZON, 240)])
 
@@ -81,16 +81,18 @@ class SimulatedClutch:
         )
 
     def moving_torque(self, time: FloatArray, velocity: FloatArray, pressure: FloatArray, cycles: float) -> FloatArray:
-        """True torque [n] Nm, lag and all, at time [n] s (ascending), velocity [n] m/s and pressure [n] > 0 Pa."""
+        """True torque [n] Nm, including its lag, at time [n] s (ascending), velocity [n] m/s and pressure [n] > 0 Pa."""
         return self.lag.torque(time, velocity, pressure, self.parameters(pressure, cycles), cycles)
 
     def capacity(self, cycles: float) -> Capacity:
-        """What the clutch can transfer after cycles >= 0; below the protocol's lowest pressure it goes with pressure."""
+        """What the clutch can transfer after cycles >= 0; below the protocol's lowest pressure torque goes with pressure."""
         lowest = float(PROTOCOL_PRESSURES[0])
 
         def transferred(pressure: float, velocity: float) -> float:
-            known = max(pressure, lowest)
-            return float(torque(np.array(velocity), self.parameters(known, cycles))) * pressure / known
+            curve_pressure = max(pressure, lowest)
+            return (
+                float(torque(np.array(velocity), self.parameters(curve_pressure, cycles))) * pressure / curve_pressure
+            )
 
         return transferred
 

@@ -1,11 +1,11 @@
-"""What a clutch does beside eq. 6: a smooth course δ(ζ), and steps of the level at events.
+"""What a clutch does beside eq. 6: a smooth discrepancy δ(ζ), and steps of the level at events.
 
-No clutch follows eq. 6 exactly, and what it does instead is no scatter: it runs on smoothly. δ starts at 0 with slope
-0, and its curvature is drawn anew on each of a few stretches of progress (an integrated random walk). With T the
-progress measured so far, its deviation at T is q · size: q = 0 is eq. 6 itself, and the data choose among a few others.
-Past T it runs on with the slope it has and further curvature on stretches that grow with ζ, so that its deviation grows
-as (ζ/T)^1.5: a misfit seen today says how little is known of the day after tomorrow. At ten times T it levels off: what
-is seen over a tenth of a course must not make every course pass every threshold in the end.
+No clutch follows eq. 6 exactly, and its deviation is no scatter: it is smooth. δ starts at 0 with slope 0, and its
+curvature is drawn anew on each of a few stretches of progress (an integrated random walk). With T the progress measured
+so far, its deviation at T is q · size: q = 0 is eq. 6 itself, and the data choose among a few others. Beyond T it
+continues with the slope it has and further curvature on stretches that grow with ζ, so that its deviation grows as
+(ζ/T)^1.5: a discrepancy observed today widens every forecast, the further ahead the more. At ten times T it levels off:
+what is observed over a tenth of a course must not make every course pass every threshold in the end.
 
 An event such as an oil change begins an epoch, whose level is off by a normal step from the one before.
 
@@ -19,21 +19,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.tracking.data import History
+from models.tracking.criteria import LEVELLING, SHARES
+from models.tracking.history import History
 from models.tracking.prior import Prior
 
-#: The deviation of δ at the end of what was measured, as a share of the quantity, and how the probability that there
-#: is a discrepancy is divided among those that are not 0.
-SIZES = np.array([0.0, 0.01, 0.03, 0.1])
-SHARES = np.array([0.4, 0.35, 0.25])
-#: Stretches of constant curvature: equal ones up to T, then growing ones, up to REACH times T; there δ levels off.
-PAST, FUTURE, REACH = 6, 16, 10.0
-_EDGES = np.concatenate([np.arange(PAST) / PAST, np.geomspace(1.0, REACH, FUTURE + 1)])
+#: Stretches of constant curvature: equal ones up to T, then growing ones, up to LEVELLING times T; there δ levels off.
+PAST, FUTURE = 6, 16
+_EDGES = np.concatenate([np.arange(PAST) / PAST, np.geomspace(1.0, LEVELLING, FUTURE + 1)])
 _LENGTHS = np.diff(_EDGES)
 
 
 def log_size_weight(prior: Prior) -> FloatArray:
-    """Log prior probability of each of SIZES; those but the first are -inf where the prior is sure of eq. 6."""
+    """Log prior probability of each of SIZES; all but the first are -inf where the prior is sure of eq. 6."""
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(np.concatenate([[prior.law_share], (1.0 - prior.law_share) * SHARES])))
 
@@ -43,14 +40,14 @@ def smooth(progress: FloatArray, span: float, stretches: int = PAST + FUTURE) ->
 
     On a stretch of length h, in units of T, curvature has the deviation √(3/h): the deviation of δ at T is then 1.
     """
-    u = np.minimum(np.asarray(progress)[:, None] / span, REACH)
+    u = np.minimum(np.asarray(progress)[:, None] / span, LEVELLING)
     low, length = _EDGES[:stretches], _LENGTHS[:stretches]
     within = np.clip(u - low, 0.0, length)
     return np.asarray((0.5 * within**2 + length * np.maximum(u - low - length, 0.0)) * np.sqrt(3.0 / length))
 
 
 def at_end() -> FloatArray:
-    """What each stretch of the past gives to δ(T) and to T δ'(T); [2, PAST]."""
+    """The contribution of each stretch of the past to δ(T) and to T δ'(T); [2, PAST]."""
     gain = np.sqrt(3.0 / _LENGTHS[:PAST])
     left = 1.0 - _EDGES[:PAST] - 0.5 * _LENGTHS[:PAST]
     return np.asarray(np.stack([gain * _LENGTHS[:PAST] * left, gain * _LENGTHS[:PAST]]))
@@ -99,7 +96,7 @@ class Discrepancy:
 
 
 def drawn(history: History, prior: Prior, size: FloatArray, terms: FloatArray, rng: np.random.Generator) -> Discrepancy:
-    """Courses from drawn terms [n, PAST + e] in the unit of the quantity; what is yet to come is drawn here."""
+    """Courses from drawn terms [n, PAST + e] in the unit of the quantity; the future is drawn here."""
     ahead = np.zeros((size.size, FUTURE))
     alive = size > 0.0
     ahead[alive] = rng.standard_normal((int(alive.sum()), FUTURE)) * (size[alive] * prior.size)[:, None]

@@ -1,54 +1,71 @@
-"""Whether the last test lies where the tests before it predict it: the standardised innovation.
+"""Whether the last test lies where the tests before it predicted it: the standardised innovation.
 
-A filter's draws know the last test too. Weighted by one over the probability that each gives to its value, they predict
-it as the tests before it did; the heavy tail of a run that may be outlying keeps these weights within bounds. How improbable
-the measured value is under all draws together, each with its own run-to-run scatter and none with an outlying run, is given in
-deviations of a normal: what is not known yet about scatter and coefficients raises no alarm.
+A filter's draws are conditioned on the last test too. Weighted by one over the probability that each gives to the last
+value, they predict that value as the tests before it did,
+
+    p(y_t | y_1..t-1) = Σ_i w_i p(y_t | θ_i),    w_i ∝ W_i / p(y_t | θ_i)
+
+with W the posterior's weights. In p the run may be outlying, whose heavy tail keeps the weights w within bounds. How
+improbable the measured value is under all draws together, each with its own run-to-run scatter and none with an outlying
+run, is converted to deviations of a normal: uncertainty about scatter and coefficients widens the prediction, so that it
+raises no alarm.
 
 Source: A. E. Gelfand, D. K. Dey, H. Chang, Bayesian Statistics 4 (1992) 147-167, for the weights.
 """
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import log_ndtr, logsumexp, ndtri_exp
 
 from models.arrays import FloatArray
+from models.tracking.criteria import FAR, FEWEST_BEFORE
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
 
-#: Deviations beyond which a test is off the track: one in 16,000 of a clutch that follows eq. 6.
-FAR = 4.0
-#: Tests that must have been before anything is off their track.
-FEWEST_BEFORE = 4
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Innovation:
+    """How far the last test is off its prediction, in deviations with its sign; infinite beyond what a float can express."""
+
+    value: float
+
+    @property
+    def off_track(self) -> bool:
+        """Whether that is farther than FAR deviations."""
+        return abs(self.value) > FAR
+
+
+def last_innovation(posterior: Posterior, measurements: Sequence[Measurement], prior: Prior) -> Innovation | None:
+    """The innovation of the last of `measurements`, all of which `posterior` is conditioned on.
+
+    None where fewer than FEWEST_BEFORE come before it, or where an event that may shift the level lies between.
+    """
+    if len(measurements) <= FEWEST_BEFORE or measurements[-1].epoch != measurements[-2].epoch:
+        return None
+    return Innovation(value=innovation(posterior, measurements[-1], prior))
 
 
 def innovation(posterior: Posterior, last: Measurement, prior: Prior) -> float:
-    """How far the last measurement lies off what those before it predict, in deviations with its sign.
+    """How far the last measurement lies off the prediction of those before it, in deviations with its sign.
 
-    `posterior` knows all of them; `prior` says how often a run is outlying and by how much.
+    `posterior` is conditioned on all of them; `prior` says how often a run is outlying and by how much.
     """
     off = last.value - posterior.values(np.array([last.progress]))[0]
     variance = posterior.scatter**2 + last.variance
-    sound = math.log1p(-prior.spoiled_share) + _log_normal(off, variance)
-    outlying = _log_normal(off, variance + (prior.spoiled_size * prior.size) ** 2)
-    likelihood = sound if prior.spoiled_share == 0.0 else np.logaddexp(sound, math.log(prior.spoiled_share) + outlying)
+    log_density = math.log1p(-prior.outlying_share) + _log_normal(off, variance)
+    if prior.outlying_share > 0.0:
+        outlying = _log_normal(off, variance + (prior.outlying_size * prior.size) ** 2)
+        log_density = np.logaddexp(log_density, math.log(prior.outlying_share) + outlying)
     with np.errstate(divide="ignore"):
-        log_weight = np.log(posterior.weight) - likelihood
+        log_weight = np.log(posterior.weight) - log_density
     log_weight = log_weight - logsumexp(log_weight)
     scaled = off / np.sqrt(variance)
     below, above = (min(float(logsumexp(log_weight + log_ndtr(sign * scaled))), 0.0) for sign in (1.0, -1.0))
     return float(ndtri_exp(below)) if below < above else -float(ndtri_exp(above))
-
-
-def off_track_by(posterior: Posterior, measurements: Sequence[Measurement], prior: Prior) -> float | None:
-    """The innovation of the last measurement [deviations] where it is off the track and no event lies before it; else None."""
-    if len(measurements) <= FEWEST_BEFORE or measurements[-1].epoch != measurements[-2].epoch:
-        return None
-    far = innovation(posterior, measurements[-1], prior)
-    return far if abs(far) > FAR else None
 
 
 def _log_normal(off: FloatArray, variance: FloatArray) -> FloatArray:

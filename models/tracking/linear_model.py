@@ -1,8 +1,8 @@
-"""The closed form that the filters share: all is linear once φ, ε, the scatter s and the size q are given.
+"""The closed form that the filters share: the model is linear once φ, ε, the scatter s and the size q are given.
 
 With y_t = ξ0 + Δ b_t + Σ_k w_k Z_tk + e_t, b_t = 1 - (1 + ζ_t/φ)^-ε and e_t ~ N(0, d_t), d_t = v_t + s², normal priors
 on ξ0, Δ and w (the discrepancy and the steps, `models.tracking.discrepancy`) lead to a normal posterior and to the
-probability of the data with all of them integrated out. For a spoiled run d_t has a further W². A few weighted sums
+probability of the data with all of them integrated out. For an outlying run d_t has a further W². A few weighted sums
 over the measurements are all that is needed, with weights r_t = 1/d_t and y_t taken from the prior mean of ξ0. The
 further terms go first: with M = I + σZᵀRZσ = LLᵀ and N = L⁻¹ σZᵀR (1, y, b), each sum loses the product of its columns
 of N.
@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.tracking.data import History
 from models.tracking.discrepancy import column_sds, columns
+from models.tracking.history import History
 from models.tracking.prior import Prior
 
 
@@ -46,18 +46,18 @@ class Conditional:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Points:
-    """Where the closed form is taken: log φ, log ε, log s and q, each [n], and which runs are spoiled [t, n] (0, 1)."""
+    """Where the closed form is taken: log φ, log ε, log s and q, each [n], and which runs are outlying [t, n] (0, 1)."""
 
     log_scale: FloatArray
     log_exponent: FloatArray
     log_scatter: FloatArray
     size: FloatArray
-    spoiled: FloatArray
+    outlying: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Terms:
-    """What is left of the further terms of the points `where` [j]: their prior deviations σ [j, p], L [j, p, p] and N
+    """The further terms of the points `where` [j] after elimination: their prior deviations σ [j, p], L [j, p, p] and N
     [j, p, 3] of the columns (1, y, b)."""
 
     where: NDArray[np.intp]
@@ -110,29 +110,29 @@ def basis(progress: FloatArray, log_scale: FloatArray, log_exponent: FloatArray)
     """b = 1 - (1 + ζ/φ)^-ε, in the shape of ζ/φ, to which ε is broadcast: `degradation.progress_fraction`, three times as
     quick.
 
-    Accurate to 2e-16 absolute, not relative: here b only ever stands beside measurement noise.
+    Accurate to 2e-16 absolute, not relative: here b is only compared with measurement noise.
     """
-    found = np.asarray(progress * np.exp(-log_scale))
-    found += 1.0
-    np.log(found, out=found)
-    found *= -np.exp(log_exponent)
-    np.exp(found, out=found)
-    return np.asarray(np.subtract(1.0, found, out=found))
+    power = np.asarray(progress * np.exp(-log_scale))
+    power += 1.0
+    np.log(power, out=power)
+    power *= -np.exp(log_exponent)
+    np.exp(power, out=power)
+    return np.asarray(np.subtract(1.0, power, out=power))
 
 
-def log_spoiled(prior: Prior, spoiled: FloatArray) -> FloatArray:
-    """Log prior probability of which runs are spoiled, along the first axis of [t, ...]."""
-    count = spoiled.sum(axis=0)
-    if prior.spoiled_share == 0.0:
+def log_outlying(prior: Prior, outlying: FloatArray) -> FloatArray:
+    """Log prior probability of which runs are outlying, along the first axis of [t, ...]."""
+    count = outlying.sum(axis=0)
+    if prior.outlying_share == 0.0:
         return np.where(count > 0, -np.inf, 0.0)
-    sound = spoiled.shape[0] - count
-    return np.asarray(count * math.log(prior.spoiled_share) + sound * math.log1p(-prior.spoiled_share))
+    sound = outlying.shape[0] - count
+    return np.asarray(count * math.log(prior.outlying_share) + sound * math.log1p(-prior.outlying_share))
 
 
 def pointwise(history: History, prior: Prior, points: Points, table: FloatArray | None = None) -> tuple[Sums, Terms]:
-    """The sums at n points, each [n], and what is left of the further terms; `table` may hold their b [t, n]."""
+    """The sums at n points, each [n], and the further terms after elimination; `table` may hold their b [t, n]."""
     b = basis(history.progress[:, None], points.log_scale, points.log_exponent) if table is None else table
-    d = np.multiply(points.spoiled, (prior.spoiled_size * prior.size) ** 2, out=np.empty(b.shape))
+    d = np.multiply(points.outlying, (prior.outlying_size * prior.size) ** 2, out=np.empty(b.shape))
     d += history.variance[:, None]
     d += np.exp(2.0 * points.log_scatter)
     log_r = -_log_product(d) - b.shape[0] * math.log(2.0 * math.pi)
@@ -164,13 +164,13 @@ def pointwise(history: History, prior: Prior, points: Points, table: FloatArray 
 def turned_last(
     history: History, prior: Prior, points: Points, sums: Sums, last: FloatArray, plain: NDArray[np.intp]
 ) -> Sums:
-    """The sums at the points `plain` where the last run, whose b is `last` [n], is taken to be spoiled and was not before.
+    """The sums at the points `plain` where the last run, whose b is `last` [n], is taken to be outlying and was not before.
 
     For points without further terms alone: one run's share of each sum is exchanged.
     """
     d = history.variance[-1] + np.exp(2.0 * points.log_scatter[plain])
-    spoiled = d + (prior.spoiled_size * prior.size) ** 2
-    change, b = 1.0 / spoiled - 1.0 / d, last[plain]
+    outlying = d + (prior.outlying_size * prior.size) ** 2
+    change, b = 1.0 / outlying - 1.0 / d, last[plain]
     y = float(history.value[-1]) - prior.initial_mean
     return Sums(
         r=sums.r[plain] + change,
@@ -179,7 +179,7 @@ def turned_last(
         ry=sums.ry[plain] + change * y,
         rby=sums.rby[plain] + change * y * b,
         ryy=sums.ryy[plain] + change * y**2,
-        log_r=sums.log_r[plain] + np.log(d / spoiled),
+        log_r=sums.log_r[plain] + np.log(d / outlying),
     )
 
 
@@ -196,16 +196,16 @@ def tabulated(
     table: FloatArray,
     log_scatter: FloatArray,
     size: FloatArray,
-    spoiled: FloatArray,
+    outlying: FloatArray,
     blur: FloatArray | float = 0.0,
 ) -> Sums:
     """The sums of k kinds by scatter levels by cells, by matrix products; [k, l, g], those without b [k, l, 1].
 
-    `table` holds b, [t, g] or [k, t, g]; a kind has its own levels log_scatter [k, l], size q [k] and spoiled runs
+    `table` holds b, [t, g] or [k, t, g]; a kind has its own levels log_scatter [k, l], size q [k] and outlying runs
     [t, k]. `blur` is a further deviation of every measurement, one or [k].
     """
-    further = (prior.spoiled_size * prior.size) ** 2
-    fixed = history.variance + further * spoiled.T + (np.zeros(size.size) + blur)[:, None] ** 2
+    further = (prior.outlying_size * prior.size) ** 2
+    fixed = history.variance + further * outlying.T + (np.zeros(size.size) + blur)[:, None] ** 2
     r = 1.0 / (fixed[:, None, :] + np.exp(2.0 * log_scatter)[:, :, None])
     y = history.value - prior.initial_mean
     rb, rby = np.split(np.concatenate([r, r * y], axis=1) @ table, 2, axis=1)
@@ -247,13 +247,13 @@ def drawn_terms(terms: Terms, off_initial: FloatArray, change: FloatArray, norma
 
     w = σ L⁻ᵀ (N_y - ξ0 N_1 - Δ N_b + z); zero where there are none.
     """
-    found = np.zeros_like(normals)
+    drawn = np.zeros_like(normals)
     if terms.where.size:
         at = terms.where
         n = terms.cross
         right = n[:, :, 1] - off_initial[at, None] * n[:, :, 0] - change[at, None] * n[:, :, 2] + normals[at]
-        found[at] = terms.sd * np.linalg.solve(np.swapaxes(terms.root, 1, 2), right[:, :, None])[:, :, 0]
-    return found
+        drawn[at] = terms.sd * np.linalg.solve(np.swapaxes(terms.root, 1, 2), right[:, :, None])[:, :, 0]
+    return drawn
 
 
 def _reduced(gram: FloatArray, cross: FloatArray, sd: FloatArray, where: NDArray[np.intp]) -> Terms:
@@ -279,9 +279,9 @@ def _without(sums: Sums, terms: Terms) -> Sums:
 
 
 def _less(sums: Sums, lost: dict[str, FloatArray], where: NDArray[np.intp]) -> Sums:
-    found = {}
+    reduced = {}
     for name, loss in lost.items():
         column = getattr(sums, name)
         column[where] -= loss
-        found[name] = column
-    return Sums(**found)
+        reduced[name] = column
+    return Sums(**reduced)

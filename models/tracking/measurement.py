@@ -1,4 +1,4 @@
-"""What goes into a filter: the fitted value of a quantity, with the variance of its fit."""
+"""The input of a filter: the fitted value of a quantity, with the variance of its fit."""
 
 import math
 from dataclasses import dataclass

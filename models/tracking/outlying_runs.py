@@ -1,9 +1,9 @@
-"""Which runs may be spoiled: the few sets of them that hold nearly all of the posterior's mass.
+"""Which runs may be outlying: the few sets of runs that hold nearly all of the posterior's mass.
 
-A run is spoiled with a small probability, and then off by a normal as wide as a misread gain. Whether a set of runs is
-spoiled is decided by the evidence of the whole history, φ, ε, s and all else summed out on a coarse grid. Sets are
-searched from the empty one, the best first, by turning one run at a time, or all that a node would turn: what turning a
-run would gain is known in closed form at every node, from how far the run lies off the others' prediction.
+A run is outlying with a small probability, and then off by a normal as wide as a misread gain. Whether a set of runs is
+outlying is decided by the evidence of the whole history, with φ, ε, s and all else summed out on a coarse grid. The search
+starts from the empty set, best set first, and turns one run at a time (from sound to outlying or back), or all that a node
+would turn: the gain of turning a run has a closed form at every node, by how far the run is off the others' prediction.
 """
 
 import math
@@ -12,18 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
-from models.tracking.data import History
+from models.tracking.criteria import EXPANSIONS, LOOK, MOST, NEAR
 from models.tracking.discrepancy import column_sds, columns
-from models.tracking.linear_model import log_spoiled
+from models.tracking.history import History
+from models.tracking.linear_model import log_outlying
 from models.tracking.prior import Prior
 
-#: Sets are kept where their log probability is less than NEAR below the best, and MOST of them; a set is looked into
-#: where it may come within LOOK, at most EXPANSIONS of them.
-NEAR, MOST, LOOK, EXPANSIONS = 4.5, 6, 1.5, 24
 #: Nodes of each level of s at which turning a run is weighed up, and the power of their mass by which they are drawn.
 NODES, TEMPER = 16, 0.25
 #: How often a node turns all the runs that it would turn.
-ROUNDS = 4
+_ROUNDS = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,21 +37,21 @@ class Nodes:
 
 @dataclass(frozen=True, slots=True)
 class Verdicts:
-    """What every node says of every run: by how much the log posterior at the node would change if it were turned
-    [n, t]; and the log probability of the data at the node as things stand [n]."""
+    """By how much the log posterior at every node would change if a run were turned [n, t], and the log probability of the
+    data at the node [n]."""
 
     gain: FloatArray
     log_evidence: FloatArray
 
 
-def verdicts(prior: Prior, history: History, spoiled: FloatArray, nodes: Nodes) -> Verdicts:
-    """The verdicts of all nodes on sets of spoiled runs, one for all [t] or one a node [n, t], of 0 and 1.
+def verdicts(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes) -> Verdicts:
+    """The verdicts of all nodes on sets of outlying runs, one for all [t] or one a node [n, t], of 0 and 1.
 
     With the rows x = (1, b, Z)σ of the linear terms, H = X (XᵀRX + I)⁻¹ Xᵀ and h = rH: a run lies off the prediction of
     the others by e/(1 - h), e being its residual, with the variance d/(1 - h).
     """
-    further = (prior.spoiled_size * prior.size) ** 2
-    d = history.variance + further * spoiled + nodes.noise[:, None]
+    further = (prior.outlying_size * prior.size) ** 2
+    d = history.variance + further * outlying + nodes.noise[:, None]
     sd = column_sds(prior, nodes.size, history.steps.size)
     needed = np.flatnonzero(sd.any(axis=0))
     sd, terms = sd[:, needed], columns(history)[:, needed]
@@ -71,76 +69,87 @@ def verdicts(prior: Prior, history: History, spoiled: FloatArray, nodes: Nodes) 
     solved = inverse @ pull
     off = (y - (x @ solved)[..., 0]) / (1.0 - leverage)
     variance = d / (1.0 - leverage)
-    turned = variance + np.where(spoiled > 0, -further, further)
-    odds = math.log(prior.spoiled_share) - math.log1p(-prior.spoiled_share)
+    turned = variance + np.where(outlying > 0, -further, further)
+    odds = math.log(prior.outlying_share) - math.log1p(-prior.outlying_share)
     gain = 0.5 * (np.log(variance / turned) + off**2 / variance - off**2 / turned)
     quadratic = (y**2 / d).sum(axis=1) - (pull * solved).sum(axis=(1, 2))
     log_volume = np.linalg.slogdet(precision)[1] + np.log(2.0 * math.pi * d).sum(axis=1)
-    return Verdicts(gain + np.where(spoiled > 0, -odds, odds), -0.5 * (log_volume + quadratic))
+    return Verdicts(gain + np.where(outlying > 0, -odds, odds), -0.5 * (log_volume + quadratic))
 
 
-def gains(prior: Prior, history: History, spoiled: FloatArray, nodes: Nodes) -> FloatArray:
+def gains(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes) -> FloatArray:
     """By how much turning each run [t] of one set [t] would change the log posterior, the nodes summed over."""
-    total = nodes.log_weight[:, None] + verdicts(prior, history, spoiled, nodes).gain
+    total = nodes.log_weight[:, None] + verdicts(prior, history, outlying, nodes).gain
     top = total.max(axis=0)
     return np.asarray(top + np.log(np.exp(total - top).sum(axis=0)))
 
 
-def at_once(prior: Prior, history: History, spoiled: FloatArray, nodes: Nodes) -> tuple[FloatArray, FloatArray]:
-    """The set [n, t] that each node comes to by turning all the runs that it would turn, again and again, from
-    `spoiled` [t]; and what it says of that set: by how much it betters the log posterior, summed over nodes, at least.
+def at_once(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes) -> tuple[FloatArray, FloatArray]:
+    """The set [n, t] that each node arrives at by repeatedly turning all the runs that it would turn, from `outlying` [t];
+    and a lower bound of that set's gain in log posterior, summed over nodes.
 
     Where several runs hide one another no single one of them is worth turning.
     """
-    start = verdicts(prior, history, spoiled, nodes)
-    sets, found = np.tile(spoiled, (nodes.b.shape[0], 1)), start
-    for _ in range(ROUNDS):
-        if not (found.gain > 0.0).any():
+    start = verdicts(prior, history, outlying, nodes)
+    sets, verdict = np.tile(outlying, (nodes.b.shape[0], 1)), start
+    for _ in range(_ROUNDS):
+        if not (verdict.gain > 0.0).any():
             break
-        sets = np.where(found.gain > 0.0, 1.0 - sets, sets)
-        found = verdicts(prior, history, sets, nodes)
-    change = log_spoiled(prior, sets.T) - log_spoiled(prior, spoiled)
-    return sets, nodes.log_weight + found.log_evidence - start.log_evidence + change
+        sets = np.where(verdict.gain > 0.0, 1.0 - sets, sets)
+        verdict = verdicts(prior, history, sets, nodes)
+    change = log_outlying(prior, sets.T) - log_outlying(prior, outlying)
+    return sets, nodes.log_weight + verdict.log_evidence - start.log_evidence + change
 
 
 @dataclass(slots=True)
 class Search:
-    """The sets looked at so far, as bytes of their flags [t], with their log probability."""
+    """The sets examined so far, as bytes of their flags [t], with their log probability."""
 
     prior: Prior
     history: History
-    known: dict[bytes, float]
-    looked: set[bytes]
+    log_probability: dict[bytes, float]
+    expanded: set[bytes]
 
     @classmethod
     def begun(cls, prior: Prior, history: History) -> "Search":
         """From the empty set."""
         none = np.zeros(history.value.size)
-        return cls(prior=prior, history=history, known={none.tobytes(): 0.0}, looked=set())
+        return cls(prior=prior, history=history, log_probability={none.tobytes(): 0.0}, expanded=set())
 
     def next(self) -> FloatArray | None:
-        """The most promising set not looked into, or None where nothing is left to gain."""
-        best = max(self.known.values())
-        left = [key for key, found in self.known.items() if key not in self.looked and found > best - LOOK]
-        if not left or len(self.looked) >= EXPANSIONS or self.prior.spoiled_share == 0.0 or self.history.value.size < 2:
+        """The most promising set not yet expanded, or None where nothing is left to gain."""
+        best = max(self.log_probability.values())
+        left = [key for key, value in self.log_probability.items() if key not in self.expanded and value > best - LOOK]
+        if (
+            not left
+            or len(self.expanded) >= EXPANSIONS
+            or self.prior.outlying_share == 0.0
+            or self.history.value.size < 2
+        ):
             return None
-        return np.frombuffer(max(left, key=self.known.__getitem__))
+        return np.frombuffer(max(left, key=self.log_probability.__getitem__))
 
-    def learn(self, spoiled: FloatArray, log_evidence: float, nodes: Nodes, best: Nodes) -> None:
-        """A set's own evidence, and estimates of its neighbours' and of what the `best` nodes make of it."""
-        found = log_evidence + float(log_spoiled(self.prior, spoiled))
-        self.known[spoiled.tobytes()] = found
-        self.looked.add(spoiled.tobytes())
-        count = spoiled.size
-        turned = np.abs(np.eye(count) - spoiled)
-        sets, leap = at_once(self.prior, self.history, spoiled, best)
-        estimates = np.concatenate([gains(self.prior, self.history, spoiled, nodes), leap])
-        for each, gain in zip(np.concatenate([turned, sets]), estimates, strict=True):
-            if each.tobytes() not in self.looked:
-                self.known[each.tobytes()] = max(found + float(gain), self.known.get(each.tobytes(), -math.inf))
+    def learn(self, outlying: FloatArray, log_evidence: float, nodes: Nodes, best: Nodes) -> None:
+        """Take in a set's own evidence, and estimates of its neighbours' and of the sets that the `best` nodes arrive at."""
+        total = log_evidence + float(log_outlying(self.prior, outlying))
+        self.log_probability[outlying.tobytes()] = total
+        self.expanded.add(outlying.tobytes())
+        count = outlying.size
+        turned = np.abs(np.eye(count) - outlying)
+        sets, leap = at_once(self.prior, self.history, outlying, best)
+        estimates = np.concatenate([gains(self.prior, self.history, outlying, nodes), leap])
+        for neighbour, gain in zip(np.concatenate([turned, sets]), estimates, strict=True):
+            if neighbour.tobytes() not in self.expanded:
+                self.log_probability[neighbour.tobytes()] = max(
+                    total + float(gain), self.log_probability.get(neighbour.tobytes(), -math.inf)
+                )
 
     def kept(self) -> FloatArray:
         """The sets that hold nearly all of the mass, [c, t]."""
-        best = max(self.known.values())
-        keys = sorted((k for k, v in self.known.items() if v > best - NEAR), key=self.known.__getitem__, reverse=True)
+        best = max(self.log_probability.values())
+        keys = sorted(
+            (k for k, v in self.log_probability.items() if v > best - NEAR),
+            key=self.log_probability.__getitem__,
+            reverse=True,
+        )
         return np.stack([np.frombuffer(key) for key in keys[:MOST]])

@@ -1,8 +1,8 @@
-"""What goes into a filter, what comes out of it, and the steps that all of them have.
+"""What a filter gives, and the steps that all filters have.
 
 A filter follows one quantity ξ (mean COF, or one Stribeck parameter at one pressure) along eq. 6. A step returns a
-new state; chance comes in as an argument; a measurement is the fitted value with the fit's variance, and the scatter
-between runs that comes on top of it is unknown and the filter's business.
+new state; randomness is an argument; a measurement is the fitted value with the fit's variance, to which the unknown
+scatter between runs is added, which the filter estimates.
 """
 
 import math
@@ -23,8 +23,8 @@ from models.tracking.prior import Prior
 class Posterior:
     """A weighted sample of eq. 6's coefficients, all arrays [n]; weight >= 0 sums to one.
 
-    `scatter` is the deviation from run to run, in the unit of the quantity; `discrepancy` what each draw does beside
-    eq. 6, if anything.
+    `scatter` is the deviation from run to run, in the unit of the quantity; `discrepancy` the deviation of
+    each draw from eq. 6, if there is one.
     """
 
     weight: FloatArray
@@ -77,7 +77,7 @@ class Tracker(Protocol[State]):
         """The state before the first measurement."""
 
     def update(self, state: State, measurement: Measurement, rng: np.random.Generator) -> State:
-        """The state that also knows `measurement`; they may come in any order of progress."""
+        """The state after one more measurement; measurements may come in any order of progress."""
 
     def posterior(self, state: State, size: int, rng: np.random.Generator) -> Posterior:
         """About `size` weighted draws of the coefficients given all measurements so far."""

@@ -1,8 +1,8 @@
-"""What is believed of eq. 6's coefficients before a clutch has been measured.
+"""The prior of eq. 6's coefficients, before a clutch has been measured.
 
 Independent normals on ξ0, Δ, log φ, log ε and the logarithm of the run-to-run scatter, as plain numbers, so that a
-prior learned from other clutches of the same material can take the place of the weak one; and what is believed of a
-measurement beyond scatter: how often a run is spoiled and by how much, how likely it is that the clutch follows one
+prior learned from other clutches of the same material can take the place of the weak one; and the prior of what affects
+measurements beyond scatter: how often a run is outlying and by how much, the probability that the clutch follows one
 eq. 6 at all, and how far an event such as an oil change may shift the level.
 """
 
@@ -12,6 +12,21 @@ from dataclasses import astuple, dataclass, fields
 import numpy as np
 
 from models.arrays import FloatArray
+from models.tracking.criteria import (
+    EITHER_CHANGE,
+    EXPONENT_MEDIAN,
+    FALLING_CHANGE,
+    INITIAL_SD,
+    LAW_SHARE,
+    LOG_EXPONENT_SD,
+    LOG_SCALE_SD,
+    LOG_SCATTER_SD,
+    OUTLYING_SHARE,
+    OUTLYING_SIZE,
+    SCALE_MEDIAN,
+    SCATTER_MEDIAN,
+    STEP_SIZE,
+)
 from models.tracking.measurement import Measurement
 
 
@@ -19,7 +34,7 @@ from models.tracking.measurement import Measurement
 class Prior:
     """Means and deviations; ξ0, Δ and the scatter in the unit of the quantity, φ in cycles.
 
-    `spoiled_share` of the runs are off by a further normal of deviation `spoiled_size`, `law_share` is the probability
+    `outlying_share` of the runs are off by a further normal of deviation `outlying_size`, `law_share` is the probability
     that there is no discrepancy beside eq. 6, `step_size` the deviation of the level's shift at an event; both sizes
     are shares of `size`. Raises ValueError where a number is not finite, a deviation or size not positive or a share
     not within [0, 1).
@@ -35,10 +50,10 @@ class Prior:
     log_exponent_sd: float
     log_scatter_mean: float
     log_scatter_sd: float
-    spoiled_share: float = 0.05
-    spoiled_size: float = 0.1
-    law_share: float = 0.95
-    step_size: float = 0.05
+    outlying_share: float = OUTLYING_SHARE
+    outlying_size: float = OUTLYING_SIZE
+    law_share: float = LAW_SHARE
+    step_size: float = STEP_SIZE
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -47,8 +62,8 @@ class Prior:
                 raise ValueError(f"{field.name} must be finite, got {number}")
             if field.name.endswith(("_sd", "_size")) and number <= 0:
                 raise ValueError(f"{field.name} must be positive, got {number}")
-        if not 0.0 <= self.spoiled_share < 1.0:
-            raise ValueError(f"spoiled_share must lie within [0, 1), got {self.spoiled_share}")
+        if not 0.0 <= self.outlying_share < 1.0:
+            raise ValueError(f"outlying_share must lie within [0, 1), got {self.outlying_share}")
         if not 0.0 < self.law_share <= 1.0:
             raise ValueError(f"law_share must lie within (0, 1], got {self.law_share}")
 
@@ -79,7 +94,7 @@ class Prior:
 
 
 def weak(first: Measurement, *, falling: bool) -> Prior:
-    """A prior that knows little more than the size of the quantity, taken from its first measurement.
+    """A weak prior: little more than the size of the quantity, taken from its first measurement.
 
     With the size a = √(value² + variance): ξ0 is within some 50 % of a, for the first run need not be at ζ = 0. The
     change Δ is -0.6 a ± 0.4 a where the quantity is known to be `falling` (mean COF; 7 % remains for a rise) and 0 ±
@@ -88,15 +103,16 @@ def weak(first: Measurement, *, falling: bool) -> Prior:
     a, two deviations covering 0.06 % to 1.5 %.
     """
     size = math.hypot(first.value, math.sqrt(first.variance)) or 1.0
+    change_mean, change_sd = FALLING_CHANGE if falling else EITHER_CHANGE
     return Prior(
         initial_mean=first.value,
-        initial_sd=0.5 * size,
-        change_mean=-0.6 * size if falling else 0.0,
-        change_sd=0.4 * size if falling else size,
-        log_scale_mean=math.log(4_000.0),
-        log_scale_sd=2.3,
-        log_exponent_mean=math.log(0.8),
-        log_exponent_sd=0.7,
-        log_scatter_mean=math.log(0.003 * size),
-        log_scatter_sd=0.8,
+        initial_sd=INITIAL_SD * size,
+        change_mean=change_mean * size,
+        change_sd=change_sd * size,
+        log_scale_mean=math.log(SCALE_MEDIAN),
+        log_scale_sd=LOG_SCALE_SD,
+        log_exponent_mean=math.log(EXPONENT_MEDIAN),
+        log_exponent_sd=LOG_EXPONENT_SD,
+        log_scatter_mean=math.log(SCATTER_MEDIAN * size),
+        log_scatter_sd=LOG_SCATTER_SD,
     )

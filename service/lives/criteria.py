@@ -16,9 +16,6 @@ POOR_FIT = 0.02
 LEAST_TORQUE_SD = 1e-4
 #: Pressure levels of one test [-]; more is a continuous pressure and no stationary test. Chosen: above any known protocol.
 MOST_LEVELS = 100
-#: Tests at different cycles [-] below which nothing is predicted. Chosen: with fewer, eq. 6's four coefficients rest on the
-#: prior alone.
-FEWEST_TESTS = 3
 #: Weighted draws of eq. 6's coefficients behind a stored prediction [-]. Chosen: `make score PARTS=exact`.
 PREDICTION_DRAWS = 1000
 #: Draws behind a trajectory's band [-], and the lattice of the exact filter behind it (nodes, rows, levels).

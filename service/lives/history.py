@@ -17,7 +17,7 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.degradation.severity import Block
 from models.friction.speed_protocol import protocol_speeds
-from models.records.runs import LEVEL_GAP, LEVEL_GAP_SHARE
+from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE
 from models.tracking.measurement import Measurement
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions, Scale
 from service.lives.run_analysis import Value

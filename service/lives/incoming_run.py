@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from models.arrays import FloatArray
-from models.records.runs import UNLOADED, Plateaus, Record, pressure_levels
+from models.records.criteria import UNLOADED
+from models.records.pressure_levels import levels_of
+from models.records.runs import Plateaus, Record
 from service.errors import FieldError, InvalidError
 from service.lives.criteria import LEAST_TORQUE_SD, MOST_LEVELS
 from service.readers.units import CHANNELS
@@ -144,7 +146,7 @@ def _require_readings(channels: Mapping[str, FloatArray]) -> None:
 def _require_curve(torque: FloatArray, speed: FloatArray, pressure: FloatArray) -> None:
     if torque.size == 1:
         _refuse("torque_nm", torque, "too_few_points", "a Stribeck curve needs more than one point")
-    if np.unique(pressure_levels(pressure * CHANNELS["pressure_bar"].factor)).size > MOST_LEVELS:
+    if np.unique(levels_of(pressure * CHANNELS["pressure_bar"].factor)).size > MOST_LEVELS:
         _refuse("pressure_bar", pressure, "too_many_levels", f"a test may have at most {MOST_LEVELS} pressure levels")
     if (speed == speed[0]).all():
         _refuse("speed_rpm", speed, "speeds_all_equal", "a Stribeck curve needs more than one speed")

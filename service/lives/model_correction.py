@@ -17,7 +17,7 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.diagnosis.campaign import Campaign, StationaryRun
 from models.diagnosis.extension import Extension
-from models.prognosis.first_passage import HORIZON
+from models.prognosis.criteria import HORIZON
 from models.records.runs import loaded
 from service.lives.assumptions import ALL_PRESSURES, Course, ModelInForce
 from service.lives.campaign import CampaignRun, campaign_of, run_of, without_record

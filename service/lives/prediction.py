@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any
 
-from models.prognosis.first_passage import HORIZON, QUANTILES, FirstPassage
+from models.prognosis.criteria import HORIZON, QUANTILES
+from models.prognosis.first_passage import FirstPassage
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions
 from service.lives.criteria import MOST_LINE_POINTS
 from service.lives.history import Event, Series

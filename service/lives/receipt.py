@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from models.friction.identification import StribeckFit
-from models.loops.loops import Loop
+from models.loops.dynamic_test import Loop
 from service.lives.history import ByPressure
 from service.lives.incoming_run import IncomingRun
 from service.lives.run_analysis import LevelFit, Notice, Value

@@ -13,17 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from models.prognosis.first_passage import HORIZON, Offset, first_passage
+from models.prognosis.criteria import FEWEST_TESTS, HORIZON
+from models.prognosis.first_passage import Offset, predict_first_passage
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.filters.particle import Particle, ParticleState
 from models.tracking.filters.ukf import Ukf, UkfState
-from models.tracking.innovation import off_track_by
+from models.tracking.innovation import last_innovation
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior, Tracker
 from models.tracking.prior import Prior
 from service.errors import NotFoundError
 from service.lives.assumptions import ALL_PRESSURES, WEAK, Assumptions
-from service.lives.criteria import FEWEST_TESTS, PREDICTION_DRAWS
+from service.lives.criteria import PREDICTION_DRAWS
 from service.lives.history import Event, Life, Series, lives_of, nearest_pressure
 from service.lives.prediction import insufficient, off_track, predicted
 from service.lives.receipt import bar
@@ -167,7 +168,7 @@ def predict(
     if tracked is None:
         return insufficient(assumptions, cycles, series.pressure, fraction)
     posterior = draws(clutch_id, method, series, assumptions, tracked)
-    passage = first_passage(
+    passage = predict_first_passage(
         posterior,
         fraction=fraction,
         as_of=float(series.scale.progress(cycles)),
@@ -192,8 +193,10 @@ def _off_track(
 ) -> list[Notice]:
     """A warning where the last test is far off what the tests before it predict, and no event lies between."""
     prior = assumptions.priors(series.quantity, measurements[0], series.scale)[WEAK]
-    deviations = off_track_by(posterior, measurements, prior)
-    return [] if deviations is None else [off_track(measurements[-1].value, deviations)]
+    innovation = last_innovation(posterior, measurements, prior)
+    if innovation is None or not innovation.off_track:
+        return []
+    return [off_track(measurements[-1].value, innovation.value)]
 
 
 def offset_of(series: Series, assumptions: Assumptions) -> Offset | None:

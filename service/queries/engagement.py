@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from models.clutch import Geometry
-from models.engagements.simulation import Capacity, Drive, Engagement, PressureProfile, engage
-from models.friction.pressure_laws import PressureLaws, fit_asymptotic, fit_linear
-from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters, torque
+from models.engagements.capacity import capacity_of
+from models.engagements.simulation import Drive, Engagement, PressureProfile, engage
+from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
 from models.prognosis.first_passage import weighted_quantiles
 from service import records
 from service.errors import NotFoundError
@@ -19,9 +19,6 @@ from service.lives.run_analysis import LevelFit
 from service.readers.units import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
 from service.schemas.base import whole
 from storage.engine.database import Database
-
-#: Pressure laws need this many pressures; with fewer, torque goes with pressure from the nearest one.
-_FEWEST_FOR_LAWS = 3
 
 
 def engaged(database: Database, clutch_id: str, *, at_cycles: float | None) -> dict[str, Any]:
@@ -41,16 +38,16 @@ def engagement(
     *,
     at_cycles: float | None,
 ) -> dict[str, Any]:
-    """The trace in the public shape. Raises NotFoundError before the first stationary test that tells all parameters."""
+    """The trace in the public shape. Raises NotFoundError before the first stationary test with all parameters."""
     happened = [event for event in events if at_cycles is None or event.cycles <= at_cycles]
-    found = lives_of(happened)
-    if not found:
-        raise NotFoundError("no stationary test is known by then: there is no clutch to engage")
-    life = found[-1]
+    history = lives_of(happened)
+    if not history:
+        raise NotFoundError("there is no stationary test by then, and so no clutch to engage")
+    life = history[-1]
     cycles = happened[-1].cycles if at_cycles is None else at_cycles
     parameters = _parameters(clutch_id, life, assumptions, tests_of(life, fits), cycles)
     profile, drive = PressureProfile(), Drive()
-    trace = engage(_capacity(parameters), geometry.mean_radius, profile=profile, drive=drive)
+    trace = engage(capacity_of(parameters), geometry.mean_radius, profile=profile, drive=drive)
     return {
         "at_cycles": whole(cycles),
         "model": dict(assumptions.model.name),
@@ -73,47 +70,19 @@ def _parameters(
         for series in parameter_series(life, assumptions, tests, name):
             if series.measurements:
                 at.setdefault(series.pressure, {})[name] = _median(clutch_id, series, assumptions, cycles)
-    told = {level: values for level, values in at.items() if len(values) == len(PARAMETER_NAMES)}
-    if not told:
-        raise NotFoundError("no stationary test tells all four Stribeck parameters by then")
-    return {level: StribeckParameters(**{n: max(v, 0.0) for n, v in values.items()}) for level, values in told.items()}
+    complete = {level: values for level, values in at.items() if len(values) == len(PARAMETER_NAMES)}
+    if not complete:
+        raise NotFoundError("no stationary test determines all four Stribeck parameters by then")
+    return {
+        level: StribeckParameters(**{name: max(value, 0.0) for name, value in values.items()})
+        for level, values in complete.items()
+    }
 
 
 def _median(clutch_id: str, series: Series, assumptions: Assumptions, cycles: float) -> float:
     posterior = posterior_of(clutch_id, series, assumptions)
     values = posterior.values(np.array([float(series.scale.progress(cycles))]))[0]
     return float(weighted_quantiles(values, posterior.weight, (0.5,))[0])
-
-
-def _capacity(parameters: Mapping[float, StribeckParameters]) -> Capacity:
-    """Torque over pressure and velocity: the pressure laws where there are enough pressures, never below the lowest one."""
-    levels = np.array(sorted(parameters))
-    columns = np.stack([parameters[level].as_array() for level in levels.tolist()])
-    laws = _laws(levels, columns) if levels.size >= _FEWEST_FOR_LAWS else None
-
-    def capacity(pressure: float, velocity: float) -> float:
-        known = max(pressure, float(levels[0]))
-        if laws is None:
-            known = float(levels[np.argmin(np.abs(levels - pressure))])
-            at = parameters[known]
-        else:
-            at = laws.parameters(np.array(known))
-        return float(torque(np.array(velocity), at)) * pressure / known
-
-    return capacity
-
-
-def _laws(
-    levels: np.ndarray[tuple[int], np.dtype[np.float64]], columns: np.ndarray[Any, np.dtype[np.float64]]
-) -> PressureLaws:
-    equal = np.ones_like(levels)
-    m_s, m_c, v_s, c_v = columns.T
-    return PressureLaws(
-        static_torque=fit_linear(levels, m_s, equal),
-        coulomb_ratio=fit_asymptotic(levels, m_c, equal),
-        stribeck_velocity=fit_linear(levels, v_s, equal),
-        viscous_coefficient=fit_linear(levels, c_v, equal),
-    )
 
 
 def _channels(trace: Engagement) -> dict[str, list[float]]:
@@ -123,5 +92,5 @@ def _channels(trace: Engagement) -> dict[str, list[float]]:
         "speed_rpm": trace.speed,
         "torque_nm": trace.torque,
     }
-    found = {name: (column / CHANNELS[name].factor).round(6).tolist() for name, column in columns.items()}
-    return found | {"motor_torque_nm": trace.motor_torque.round(6).tolist()}
+    channels = {name: (column / CHANNELS[name].factor).round(6).tolist() for name, column in columns.items()}
+    return channels | {"motor_torque_nm": trace.motor_torque.round(6).tolist()}

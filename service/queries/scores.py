@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from models.prognosis import scoring
-from models.prognosis.first_passage import HORIZON, QUANTILES
+from models.prognosis.criteria import HORIZON, QUANTILES
 from service import records
 from service.lives.assumptions import ALL_PRESSURES, Assumptions
 from service.lives.history import Event, Life

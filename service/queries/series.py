@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from models.friction.fit_uncertainty import Z90
+from models.friction.criteria import Z90
 from service import records
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF
 from service.lives.history import STATIONARY

@@ -1,7 +1,7 @@
 """Surfaces over pressure and cycles (figs. 10, 11): Stribeck parameters as their tracks have them, torque over speed.
 
 At every count of cycles each parameter's eq. 6 gives its median at the reference pressures, and the pressure laws of fig. 9
-go through these; with fewer than three pressures the surface stands at the measured ones alone.
+go through them; with fewer than three pressures the surface is at the measured ones alone.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,8 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
-from models.friction.pressure_laws import FEWEST_PRESSURES, fit_asymptotic, fit_linear
+from models.friction.criteria import FEWEST_PRESSURES
+from models.friction.pressure_laws import over_pressure
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters, torque
 from models.prognosis.first_passage import weighted_quantiles
 from service import records
@@ -47,49 +48,52 @@ def surfaces(
 ) -> dict[str, Any]:
     """Parameters over cycles [k] by pressure [p], torque over cycles, pressure and speed [v], of the present life.
 
-    Raises NotFoundError before the first stationary test that tells all four parameters.
+    Raises NotFoundError before the first stationary test that determines all four parameters.
     """
-    found = lives_of(events)
-    speed_range = found[-1].speed_range if found else None
+    history = lives_of(events)
+    speed_range = history[-1].speed_range if history else None
     if speed_range is None:
-        raise NotFoundError("no stationary test is known: there are no surfaces")
-    life = found[-1]
+        raise NotFoundError("there is no stationary test, and so no surfaces")
+    life = history[-1]
     tracks = parameter_tracks(clutch_id, life, assumptions, tests_of(life, fits))
     levels = sorted(level for level in life.reference if all((name, level) in tracks for name in PARAMETER_NAMES))
     if not levels:
-        raise NotFoundError("no stationary test tells all four Stribeck parameters: there are no surfaces")
+        raise NotFoundError("no stationary test determines all four Stribeck parameters: there are no surfaces")
     cycles = np.linspace(life.origin, life.events[-1].cycles, CYCLES if life.events[-1].cycles > life.origin else 1)
     tracked = np.array([[_medians(tracks[name, level], cycles) for level in levels] for name in PARAMETER_NAMES])
     pressures = np.array(levels)
     if len(levels) >= FEWEST_PRESSURES:
         pressures = np.linspace(levels[0], levels[-1], PRESSURES)
         tracked = np.array(
-            [_over(name, np.array(levels), row, pressures) for name, row in zip(PARAMETER_NAMES, tracked, strict=True)]
+            [
+                over_pressure(name, np.array(levels), row, pressures)
+                for name, row in zip(PARAMETER_NAMES, tracked, strict=True)
+            ]
         )
     surface = np.maximum(np.swapaxes(tracked, 1, 2), 0.0)
     speed = np.linspace(*speed_range, SPEEDS)
     parameters = StribeckParameters.from_array(surface[..., None])
-    told = torque(geometry.sliding_velocity(speed), parameters)
+    torques = torque(geometry.sliding_velocity(speed), parameters)
     return {
-        "cycles": [whole(round(each, 3)) for each in cycles.tolist()],
-        "pressure_bar": [bar(each) for each in pressures.tolist()],
+        "cycles": [whole(round(cycle, 3)) for cycle in cycles.tolist()],
+        "pressure_bar": [bar(pressure) for pressure in pressures.tolist()],
         "speed_rpm": (speed / RADIANS_PER_SECOND_PER_RPM).round(6).tolist(),
         "parameters": {
             PARAMETER_UNITS[name][0]: grid.tolist() for name, grid in zip(PARAMETER_NAMES, surface, strict=True)
         },
-        "torque_nm": told.tolist(),
+        "torque_nm": torques.tolist(),
     }
 
 
-def rows(said: Mapping[str, Any]) -> list[dict[str, Any]]:
+def rows(grids: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The surfaces as rows of a table, a row a count of cycles, a pressure and a speed."""
     return [
         {"cycles": cycles, "pressure_bar": pressure, "speed_rpm": speed}
-        | {name: grid[i][j] for name, grid in said["parameters"].items()}
-        | {"torque_nm": said["torque_nm"][i][j][k]}
-        for i, cycles in enumerate(said["cycles"])
-        for j, pressure in enumerate(said["pressure_bar"])
-        for k, speed in enumerate(said["speed_rpm"])
+        | {name: grid[i][j] for name, grid in grids["parameters"].items()}
+        | {"torque_nm": grids["torque_nm"][i][j][k]}
+        for i, cycles in enumerate(grids["cycles"])
+        for j, pressure in enumerate(grids["pressure_bar"])
+        for k, speed in enumerate(grids["speed_rpm"])
     ]
 
 
@@ -97,10 +101,3 @@ def _medians(track: Track, cycles: FloatArray) -> list[float]:
     series, posterior = track
     values = posterior.values(series.scale.progress(cycles))
     return [float(weighted_quantiles(row, posterior.weight, (0.5,))[0]) for row in values]
-
-
-def _over(name: str, levels: FloatArray, values: FloatArray, pressures: FloatArray) -> FloatArray:
-    """A parameter at pressures [p] from its medians at levels [l] and cycles [k]; [p, k]."""
-    fit = fit_asymptotic if name == "coulomb_ratio" else fit_linear
-    equal = np.ones_like(levels)
-    return np.stack([fit(levels, column, equal)(pressures) for column in values.T], axis=1)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fastapi import Query
 
-from models.prognosis.first_passage import HORIZON
+from models.prognosis.criteria import HORIZON
 from service.jobs.queue import DiagnosisQueue
 from service.queries.cache import AnswerCache
 from service.web.limits import ALL_ITEMS, LONGEST_CURSOR, MOST_HORIZONS, MOST_ITEMS, MOST_PRESSURE_BAR

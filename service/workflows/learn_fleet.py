@@ -7,7 +7,8 @@ learned from the others.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from models.prognosis.fleet import FEWEST_TESTS, FleetPrior, Taught, population, taught
+from models.prognosis.criteria import FEWEST_TESTS_TO_LEARN
+from models.prognosis.fleet import FleetPrior, Taught, population, taught
 from service import records
 from service.lives.assumptions import ALL_PRESSURES, Assumptions, kind_of
 from service.lives.history import Life
@@ -71,7 +72,7 @@ def _lessons(database: Database, clutch_id: str) -> tuple[Json, list[Taught]]:
 def _lesson(life: Life, assumptions: Assumptions) -> Taught | None:
     """What a life teaches, its ζ counted in standard cycles; None where it was tested too little."""
     series = life.pooled(assumptions)
-    if len(series.measurements) < FEWEST_TESTS:
+    if len(series.measurements) < FEWEST_TESTS_TO_LEARN:
         return None
     unit = series.scale.severity.unit
     return taught([replace(measurement, progress=measurement.progress * unit) for measurement in series.measurements])

@@ -12,7 +12,7 @@ import numpy as np
 
 from models.diagnosis.diagnose import diagnose
 from models.rig import campaign
-from models.rig.oil_warmth import warmed
+from models.rig.oil_viscosity import warmed
 from models.rig.programme import QUICK, WHOLE, Programme
 from models.rig.simulated_runs import SimulatedRun
 from service.run_files.simulated import simulated_body

@@ -15,8 +15,9 @@ from scipy.optimize import least_squares
 
 from models.arrays import FloatArray
 from models.friction.stribeck import StribeckParameters
-from models.loops.lag import attractor_area, attractor_torque, film_time_at, squeeze_film_torque
-from models.loops.loop_area import loop_area
+from models.loops.attractor import attractor_area, attractor_torque
+from models.loops.loop_area import measured_area
+from models.loops.squeeze_film import film_time_at, squeeze_film_torque
 from models.records.periods import Cycle, fit_cycle
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
 from tests.real.loaders import FOLDER, TRACTION_SWEEPS
@@ -76,7 +77,7 @@ def micro_loops() -> list[Row]:
     rows = []
     for name, t, x, f in _tens():
         place = _position(t, x)
-        work, lag = loop_area(place, t, f), loop_area(_speed_of(place), t, f)
+        work, lag = measured_area(place, t, f), measured_area(_speed_of(place), t, f)
         whole = (t >= place.start) & (t < place.stop)
         v = np.gradient(x, t)[whole]
         rows.append(

@@ -9,7 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.tracking.discrepancy import SIZES, log_size_weight
+from models.tracking.criteria import SIZES
+from models.tracking.discrepancy import log_size_weight
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior, weak

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.prognosis import first_passage as foretold
-from models.prognosis.first_passage import ends_of_life
+from models.prognosis.first_passage import ends_of_life, predict_first_passage
 from models.rig.truth import draw
-from models.tracking.discrepancy import FUTURE, PAST, SIZES, Discrepancy, log_size_weight
+from models.tracking.criteria import SIZES
+from models.tracking.discrepancy import FUTURE, PAST, Discrepancy, log_size_weight
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
@@ -56,12 +56,12 @@ def rig_lives(count: int, seed: int) -> list[tuple[Callable[[float], float], flo
 
 def never(count: int, seed: int) -> str:
     """Lives from the prior, whether they ever reach half of their COF or not: is the stated probability right? Once for
-    lives of eq. 6 alone, and once for lives of all that is believed: some with a discrepancy, some runs spoiled."""
+    lives of eq. 6 alone, and once for lives of all that is believed: some with a discrepancy, some runs outlying."""
     found = {"eq. 6 alone": stated(count, seed, whole=False), "the whole prior": stated(count, seed + 100, whole=True)}
     shares = ", ".join(f"{100 * np.mean(came):.0f} % of those of {name}" for name, (_, came) in found.items())
     lines = [
         f"{count} lives each, seeds {seed} and {seed + 100}; half of the COF is reached within a million cycles by "
-        f"{shares}; nothing foretold was infinite\n",
+        f"{shares}; no prediction was infinite\n",
         "| stated probability | "
         + " | ".join(f"{name}: lives | mean stated, % | reached it, %" for name in found)
         + " |",
@@ -102,14 +102,16 @@ def stated(count: int, seed: int, *, whole: bool) -> tuple[np.ndarray, np.ndarra
                 span=last, size=np.full(1, size), curvature=course, at=np.zeros(0), height=np.zeros((1, 0))
             )
             truth = replace(truth, discrepancy=beside)
-            spoiled = rng.random(runs) < PRIOR.spoiled_share
-            noise += spoiled * PRIOR.spoiled_size * PRIOR.size * rng.standard_normal(runs)
+            outlying = rng.random(runs) < PRIOR.outlying_share
+            noise += outlying * PRIOR.outlying_size * PRIOR.size * rng.standard_normal(runs)
         zeta = np.linspace(0.0, last, runs)
         values = truth.values(zeta)[:, 0] + noise
         seen = [
             Measurement(progress=z, value=y, variance=0.0) for z, y in zip(zeta.tolist(), values.tolist(), strict=True)
         ]
-        passage = foretold(grid.posterior(grid.from_history(PRIOR, seen), 1_000, rng), fraction=0.5, as_of=last)
+        passage = predict_first_passage(
+            grid.posterior(grid.from_history(PRIOR, seen), 1_000, rng), fraction=0.5, as_of=last
+        )
         assert all(x is None or math.isfinite(x) for x in passage.end_of_life.values())
         told.append(passage.probability_of_reaching)
         came.append(float(ends_of_life(truth, 0.5)[0]) <= CAP)
@@ -138,8 +140,8 @@ def after_event(count: int, seed: int) -> str:
             for since in (1, 2, 5):
                 some = seen[: 11 + since]
                 posterior = grid.posterior(grid.from_history(weak(some[0], falling=True), some), 1_000, rng)
-                told = foretold(posterior, fraction=0.5, as_of=some[-1].progress).end_of_life
-                low, high = told[0.05] or math.inf, told[0.95] or math.inf
+                found = predict_first_passage(posterior, fraction=0.5, as_of=some[-1].progress).end_of_life
+                low, high = found[0.05] or math.inf, found[0.95] or math.inf
                 tallies.setdefault((known, since), []).append((low <= end <= high, min(high, CAP) - min(low, CAP)))
     lines = [
         f"{count} lives, seed {seed}\n",

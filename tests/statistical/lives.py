@@ -11,9 +11,10 @@ from models.degradation.general_order import Degradation, first_passage, value
 from models.prognosis.first_passage import ends_of_life, weighted_quantiles
 from models.prognosis.scoring import crps_of_sample
 from models.tracking import linear_model, sampling
-from models.tracking.data import History
-from models.tracking.discrepancy import PAST, SIZES, drawn, log_size_weight
+from models.tracking.criteria import SIZES
+from models.tracking.discrepancy import PAST, drawn, log_size_weight
 from models.tracking.filters.particle import ParticleState
+from models.tracking.history import History
 from models.tracking.linear_model import Points
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
@@ -34,12 +35,12 @@ class Life:
     scatter: float
     end: float
 
-    def measured(self, share: float, runs: int, rng: np.random.Generator, spoiled: float = 0.0) -> list[Measurement]:
-        """Runs up to a share of life; of each, with the probability `spoiled`, the gain is off by 10 %."""
+    def measured(self, share: float, runs: int, rng: np.random.Generator, outlying: float = 0.0) -> list[Measurement]:
+        """Runs up to a share of life; of each, with the probability `outlying`, the gain is off by 10 %."""
         progress = np.linspace(0.0, share * self.end, runs)
         values = value(progress, self.truth) + self.scatter * rng.standard_normal(runs)
-        if spoiled > 0.0:
-            values *= np.where(rng.random(runs) < spoiled, 1.0 + 0.1 * rng.choice([-1.0, 1.0], runs), 1.0)
+        if outlying > 0.0:
+            values *= np.where(rng.random(runs) < outlying, 1.0 + 0.1 * rng.choice([-1.0, 1.0], runs), 1.0)
         return [
             Measurement(progress=float(z), value=float(y), variance=0.0) for z, y in zip(progress, values, strict=True)
         ]
@@ -155,8 +156,8 @@ def weighted(
 
 def log_prior(prior: Prior, points: Points) -> np.ndarray:
     """Log prior density of points [n], without the constant of the normals."""
-    count, share = points.spoiled.sum(axis=0), max(prior.spoiled_share, 1e-300)
-    chance = count * math.log(share) + (points.spoiled.shape[0] - count) * math.log1p(-prior.spoiled_share)
+    count, share = points.outlying.sum(axis=0), max(prior.outlying_share, 1e-300)
+    chance = count * math.log(share) + (points.outlying.shape[0] - count) * math.log1p(-prior.outlying_share)
     size = log_size_weight(prior)[np.abs(points.size[:, None] - SIZES).argmin(axis=1)]
     return prior.log_density(points.log_scale, points.log_exponent, points.log_scatter) + size + chance
 
@@ -173,7 +174,7 @@ def from_prior(
         log_exponent=normals[:, 1],
         log_scatter=normals[:, 2],
         size=rng.choice(SIZES, size=count, p=np.exp(log_size_weight(prior))),
-        spoiled=(rng.random((len(measurements), count)) < prior.spoiled_share).astype(float),
+        outlying=(rng.random((len(measurements), count)) < prior.outlying_share).astype(float),
     )
     log_weight, effective_count = weighted(prior, measurements, points, log_prior(prior, points))
     return sampled(prior, measurements, points, log_weight, 4_000), effective_count
@@ -185,7 +186,7 @@ def exact(
     """The exact posterior by importance sampling, late in life too; and how many draws it counts for.
 
     A particle cloud says where to look, nothing more: points come from Student's t with 4 degrees around random
-    particles (a tenth of the cloud's covariance), sizes and sets of spoiled runs as often as among the particles, one
+    particles (a tenth of the cloud's covariance), sizes and sets of outlying runs as often as among the particles, one
     time in ten any size. Every point is weighted by the density written out in full over that of its proposal.
     """
     prior, cloud = state.prior, state.cloud
@@ -204,7 +205,7 @@ def exact(
         tails = 1.0 + np.maximum(apart, 0.0) / 4.0
         near[chunk] = np.log((1.0 / (tails * tails * tails * np.sqrt(tails))) @ share)
     sizes = 0.9 * np.bincount(cloud.size.astype(int), weights=share, minlength=SIZES.size) + 0.1 / SIZES.size
-    sets, which = np.unique(cloud.spoiled, axis=0, return_inverse=True)
+    sets, which = np.unique(cloud.outlying, axis=0, return_inverse=True)
     chances = np.bincount(which.ravel(), weights=share)
     chances = 0.9 * chances + 0.1 / chances.size
     size, group = rng.choice(SIZES.size, size=count, p=sizes), rng.choice(chances.size, size=count, p=chances)
@@ -214,7 +215,7 @@ def exact(
         log_exponent=back[:, 1],
         log_scatter=back[:, 2],
         size=SIZES[size],
-        spoiled=sets[group].T,
+        outlying=sets[group].T,
     )
     log_weight, effective_count = weighted(
         prior, measurements, points, near + np.log(sizes)[size] + np.log(chances)[group]

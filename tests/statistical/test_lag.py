@@ -5,12 +5,14 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from models.friction.criteria import Z90
 from models.friction.identification import fit_curves
 from models.friction.stribeck import StribeckParameters
 from models.friction.stribeck import torque as curve_torque
-from models.loops.lag import attractor_torque, squeeze_film_torque
-from models.loops.lag_fit import ATTRACTOR, NINETY, SQUEEZE_FILM, Law, StationaryCurve, fit_lag
+from models.loops.attractor import attractor_torque
+from models.loops.lag_fit import ATTRACTOR, SQUEEZE_FILM, Law, StationaryCurve, fit_lag
 from models.loops.loop_area import area_of, clean_samples
+from models.loops.squeeze_film import squeeze_film_torque
 from models.records.periods import fit_cycle
 from models.records.runs import Curve
 from tests.models.loops.dynamic_records import FALLING, GEOMETRY, RISING, SWING, velocity
@@ -75,7 +77,7 @@ def test_intervals_hold_what_they_promise(law, records):
         low += truth < centre - half
         high += truth > centre + half
         halved += abs(truth - centre) <= half / 2
-        held_area += abs(area.area - true_area) <= NINETY * area.area_sd
+        held_area += abs(area.area - true_area) <= Z90 * area.area_sd
     print(f"{law.name}: {held} of {records}, below {low}, above {high}; area {held_area}; halved {halved}")
     within = max(WITHIN, 3 * float(np.sqrt(COVERAGE * (1 - COVERAGE) / records)))
     assert abs(held / records - COVERAGE) <= within

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.prognosis import first_passage
+from models.prognosis.first_passage import predict_first_passage
 from models.rig.truth import draw
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
@@ -54,7 +54,7 @@ def test_a_filter_sure_of_eq_6_is_wrong_about_a_line() -> None:
         ]
         prior = replace(weak(seen[0], falling=True), law_share=1.0)
         posterior = Grid().posterior(Grid().from_history(prior, seen), 1_000, rng)
-        found = first_passage(posterior, fraction=0.5, as_of=6_000.0).end_of_life
+        found = predict_first_passage(posterior, fraction=0.5, as_of=6_000.0).end_of_life
         held.append((found[0.05] or math.inf) <= 10_000.0)
     assert np.mean(held) < 0.2
 

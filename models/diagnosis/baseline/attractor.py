@@ -1,6 +1,6 @@
 """The GMS attractor law in its periodic state, linear in each loop.
 
-    dM/dt = C (1 - M/S) = (S - M)/τ,   τ = S/C                               (models.loops.lag)
+    dM/dt = C (1 - M/S) = (S - M)/τ,   τ = S/C                               (models.loops.attractor)
 
 Given τ at evenly spaced phases, M is the periodic solution R[S] of a linear relaxation (exact where S is linear in the
 relaxation's own time between phases), and so are its sensitivities: a change δS of the stationary curve gives

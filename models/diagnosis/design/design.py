@@ -20,7 +20,7 @@ from models.diagnosis.design.loop_bins import BINS, PHASES, BinnedLoop, binned_l
 from models.diagnosis.design.points import IntArray, Points, joined, opened
 from models.diagnosis.design.sample_autocorrelation import bins_remember
 from models.diagnosis.design.thinning import MOST_PLATEAUS, thinned
-from models.records.runs import pressure_levels
+from models.records.pressure_levels import levels_of
 
 #: Time on one plateau [s] where nothing else is known (the reference's section 2.3.3).
 PLATEAU_DURATION = 5.0
@@ -153,7 +153,7 @@ def _assembled(
         samples = [*samples, filled[bins]]
         deviations = [*deviations, np.full(bins.size, np.nan)]
     level, closed = np.zeros(rows.run.size), rows.engaged > 0
-    level[closed] = pressure_levels(rows.pressure[closed]) if closed.any() else 0.0
+    level[closed] = levels_of(rows.pressure[closed]) if closed.any() else 0.0
     _, curve = np.unique(np.stack([rows.run, level]), axis=1, return_inverse=True)
     return Design(
         points=points,

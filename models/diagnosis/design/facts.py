@@ -9,7 +9,8 @@ import numpy as np
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, Oil, StationaryRun
-from models.records.runs import UNLOADED, Plateaus, Record
+from models.records.criteria import UNLOADED
+from models.records.runs import Plateaus, Record
 
 #: The oil temperature to which everything refers where none was measured: the middle of the reference's 80 to 90 °C [K].
 REFERENCE_TEMPERATURE = 273.15 + 85.0

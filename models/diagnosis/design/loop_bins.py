@@ -11,9 +11,10 @@ from models.diagnosis.design.period_differences import repeats_of
 from models.diagnosis.design.sample_autocorrelation import LEAST_SPEED as MEMORY_SPEED
 from models.diagnosis.design.sample_autocorrelation import Memory, memory_of
 from models.friction.stribeck import GAMMA
+from models.records.criteria import SPEED_HARMONICS
 from models.records.outliers import beside, inliers
-from models.records.periods import SPEED_HARMONICS, Cycle, fit_cycle, harmonics
-from models.records.pressure_levels import pressure_stretches
+from models.records.periods import Cycle, fit_cycle, harmonics
+from models.records.pressure_stretches import pressure_stretches
 from models.records.runs import Record
 
 #: Phases at which a loop is computed, and bins in which it is compared; a bin holds a whole number of phases.

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.records.runs import UNLOADED
+from models.records.criteria import UNLOADED
 
 IntArray = NDArray[np.intp]
 

@@ -13,7 +13,9 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, MaintenanceEvent, StationaryRun
 from models.diagnosis.design.design import PLATEAU_DURATION
-from models.records.runs import UNLOADED, Plateaus, Record, pressure_levels
+from models.records.criteria import UNLOADED
+from models.records.pressure_levels import levels_of
+from models.records.runs import Plateaus, Record
 
 #: The dynamic test of the reference (section 2.3.4): a swing of 1000 rpm about 1000 rpm, sampled at 200 a period.
 SWING = 1000 * 2 * np.pi / 60
@@ -196,7 +198,7 @@ def _distance(states: FloatArray) -> float:
 def _sweep(pattern: StationaryRun, trial: Trial, cycles: float, number: int, rested: float) -> StationaryRun:
     """The trial's test of that number, after so many seconds of pauses."""
     table = pattern.plateaus
-    levels = pressure_levels(table.pressure)
+    levels = levels_of(table.pressure)
     rows = np.arange(table.torque.size)
     if trial.falling:
         rows = np.lexsort((-table.speed, levels))
@@ -224,7 +226,7 @@ def _sweep(pattern: StationaryRun, trial: Trial, cycles: float, number: int, res
 def _loops(pattern: DynamicRun, trial: Trial, cycles: float) -> DynamicRun:
     """The pressures of a dynamic test, or a share of them, at another frequency."""
     record = pattern.record
-    levels = np.unique(pressure_levels(record.pressure[:: max(1, record.pressure.size // 5000)]))
+    levels = np.unique(levels_of(record.pressure[:: max(1, record.pressure.size // 5000)]))
     levels = levels[levels >= UNLOADED]
     if trial.pressure != 1.0:
         levels = trial.pressure * float(levels[0]) * np.array(LIGHT if trial.pressure > 0.0 else LIGHT[:1])

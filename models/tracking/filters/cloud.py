@@ -6,20 +6,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.tracking.data import History
-from models.tracking.discrepancy import SIZES, log_size_weight
-from models.tracking.linear_model import Points, basis, evidence, log_spoiled, pointwise, turned_last
+from models.tracking.criteria import SIZES
+from models.tracking.discrepancy import log_size_weight
+from models.tracking.history import History
+from models.tracking.linear_model import Points, basis, evidence, log_outlying, pointwise, turned_last
 from models.tracking.prior import Prior
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cloud:
-    """n particles: points [n, 3] of (log φ, log ε, log s), size [n] an index into SIZES, spoiled [n, t] (0, 1),
+    """n particles: points [n, 3] of (log φ, log ε, log s), size [n] an index into SIZES, outlying [n, t] (0, 1),
     log_weight [n] and log_target [n] (log prior plus evidence)."""
 
     points: FloatArray
     size: FloatArray
-    spoiled: FloatArray
+    outlying: FloatArray
     log_weight: FloatArray
     log_target: FloatArray
 
@@ -35,7 +36,7 @@ class Cloud:
             log_exponent=self.points[:, 1],
             log_scatter=self.points[:, 2],
             size=SIZES[self.size.astype(np.intp)],
-            spoiled=self.spoiled.T,
+            outlying=self.outlying.T,
         )
 
 
@@ -48,42 +49,42 @@ class Bridge:
     after: History
 
     def entered(self, cloud: Cloud, rng: np.random.Generator) -> tuple[Cloud, FloatArray, FloatArray]:
-        """The particles with a belief about the new run, drawn from its posterior given the rest of each; and their log
-        targets before (with the prior of that belief) and after."""
+        """The particles with a flag for the new run, drawn from its posterior given the rest of each; and their log targets
+        before (with the prior of that flag) and after."""
         count = cloud.size.size
-        as_sound = replace(cloud, spoiled=np.column_stack([cloud.spoiled, np.zeros(count)]))
-        as_spoiled = replace(cloud, spoiled=np.column_stack([cloud.spoiled, np.ones(count)]))
+        as_sound = replace(cloud, outlying=np.column_stack([cloud.outlying, np.zeros(count)]))
+        as_outlying = replace(cloud, outlying=np.column_stack([cloud.outlying, np.ones(count)]))
         table = table_of(self.after, cloud)
-        sound, spoiled = self._either_way(as_sound, as_spoiled, table)
-        total = np.logaddexp(sound, spoiled)
-        turned = np.log(rng.random(total.size)) < spoiled - total
-        entered = merged(as_sound, as_spoiled, turned)
-        after = np.where(turned, spoiled, sound)
+        sound, outlying = self._either_way(as_sound, as_outlying, table)
+        total = np.logaddexp(sound, outlying)
+        turned = np.log(rng.random(total.size)) < outlying - total
+        entered = merged(as_sound, as_outlying, turned)
+        after = np.where(turned, outlying, sound)
         before = cloud.log_target + _log_prior_of_last(self.prior, entered)
         return replace(entered, log_weight=cloud.log_weight + total - cloud.log_target), before, after
 
-    def _either_way(self, as_sound: Cloud, as_spoiled: Cloud, table: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The log targets with the new run sound and spoiled; where there are no further terms, by its share of the sums
+    def _either_way(self, as_sound: Cloud, as_outlying: Cloud, table: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The log targets with the new run sound and outlying; where there are no further terms, by its share of the sums
         alone."""
         points = as_sound.placed()
         sums, terms = pointwise(self.after, self.prior, points, table)
         sound = evidence(sums, self.prior) + _log_prior(self.prior, as_sound)
-        spoiled, plain = np.empty(sound.size), np.setdiff1d(np.arange(sound.size), terms.where)
-        spoiled[plain] = evidence(turned_last(self.after, self.prior, points, sums, table[-1], plain), self.prior)
-        spoiled[plain] += _log_prior(self.prior, as_spoiled)[plain]
+        outlying, plain = np.empty(sound.size), np.setdiff1d(np.arange(sound.size), terms.where)
+        outlying[plain] = evidence(turned_last(self.after, self.prior, points, sums, table[-1], plain), self.prior)
+        outlying[plain] += _log_prior(self.prior, as_outlying)[plain]
         if terms.where.size:
-            some = as_spoiled.taken(terms.where)
-            spoiled[terms.where] = log_target_of(self.after, self.prior, some, table[:, terms.where])
-        return sound, spoiled
+            with_terms = as_outlying.taken(terms.where)
+            outlying[terms.where] = log_target_of(self.after, self.prior, with_terms, table[:, terms.where])
+        return sound, outlying
 
     def log_before(self, cloud: Cloud, table: FloatArray) -> FloatArray:
-        """The target before the new run, with the prior of what is believed of it; `table` is that of the runs after."""
-        without = replace(cloud, spoiled=cloud.spoiled[:, :-1])
+        """The target before the new run, with the prior of its flag; `table` is that of the runs after."""
+        without = replace(cloud, outlying=cloud.outlying[:, :-1])
         return log_target_of(self.before, self.prior, without, table[:-1]) + _log_prior_of_last(self.prior, cloud)
 
 
 def _log_prior_of_last(prior: Prior, cloud: Cloud) -> FloatArray:
-    return log_spoiled(prior, cloud.spoiled[:, -1:].T)
+    return log_outlying(prior, cloud.outlying[:, -1:].T)
 
 
 def table_of(history: History, cloud: Cloud) -> FloatArray:
@@ -98,7 +99,7 @@ def log_target_of(history: History, prior: Prior, cloud: Cloud, table: FloatArra
 
 def _log_prior(prior: Prior, cloud: Cloud) -> FloatArray:
     flat = prior.log_density(*cloud.points.T) + log_size_weight(prior)[cloud.size.astype(np.intp)]
-    return np.asarray(flat + log_spoiled(prior, cloud.spoiled.T))
+    return np.asarray(flat + log_outlying(prior, cloud.outlying.T))
 
 
 def merged(old: Cloud, new: Cloud, accepted: NDArray[np.bool_]) -> Cloud:

@@ -1,4 +1,4 @@
-"""The exact posterior of eq. 6 on a grid: the witness of the other filters, and quick enough to be one itself.
+"""The exact posterior of eq. 6 on a grid: the reference of the other filters, and quick enough to be one itself.
 
 ξ0, Δ, the discrepancy and the steps are integrated out in closed form at every node (`tracking.linear_model`), for all
 scatter levels at once by matrix products; the grid lies where the mass is (`tracking.filters.lattice`). The integrand is
@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from models.arrays import FloatArray
-from models.tracking.data import History
 from models.tracking.discrepancy import PAST, drawn
 from models.tracking.filters import lattice
 from models.tracking.filters.lattice import Frame, Kinds
 from models.tracking.filters.outlying_refinement import completed
+from models.tracking.history import History
 from models.tracking.linear_model import Points, conditional, drawn_terms, evidence, pointwise
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
@@ -35,7 +35,7 @@ BLEND = 0.15
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GridState:
-    """Everything measured: the posterior is laid anew over the whole history, so nothing else is carried on."""
+    """All measurements: the posterior is computed anew over the whole history, so nothing else is carried on."""
 
     prior: Prior
     history: History
@@ -64,8 +64,8 @@ class Laid:
 class Grid:
     """The filter: `nodes` of log τ on each of `rows` of log ε, at `levels` of log s; each at least 2.
 
-    A measurement is noted, no more: the discrepancy is told in shares of what has been measured so far, so that with
-    every test all sums over the history are others. The grid is laid once, when its draws are asked for.
+    An update only stores the measurement: the discrepancy is expressed in shares of the progress measured so far, so that
+    all sums over the history change with every test. The grid is computed when draws are requested.
     """
 
     nodes: int = 21
@@ -82,7 +82,7 @@ class Grid:
         return self.from_history(prior, ())
 
     def update(self, state: GridState, measurement: Measurement, rng: np.random.Generator | None = None) -> GridState:  # noqa: ARG002
-        """One more measurement; exact, so chance is not used."""
+        """One more measurement; exact, so `rng` is not used."""
         return GridState(prior=state.prior, history=state.history.append(measurement, state.prior))
 
     @staticmethod
@@ -118,7 +118,7 @@ class Grid:
         initial, change = given.initial + pair[:, 0], given.change + pair[:, 1]
         normals = rng.standard_normal((count, PAST + history.steps.size))
         further = drawn_terms(terms, initial - prior.initial_mean, change, normals)
-        found = Posterior(
+        sample = Posterior(
             weight=weight / weight.sum(),
             initial=initial,
             change=change,
@@ -127,7 +127,7 @@ class Grid:
             scatter=np.exp(points.log_scatter),
             discrepancy=drawn(history, prior, points.size, further, rng),
         )
-        return found if count == size else thinned(found, size, float(offset[6]))
+        return sample if count == size else thinned(sample, size, float(offset[6]))
 
 
 def _blended(mass: FloatArray) -> FloatArray:
@@ -152,10 +152,10 @@ def _placed(laid: Laid, cell: tuple[NDArray[np.intp], ...], uniform: FloatArray)
     log_scatter = _within(frame.log_scatter, kind, level, uniform[:, 0])
     log_exponent = _within(frame.log_exponent, kind, row, uniform[:, 1])
     lower, upper = np.empty(kind.size), np.empty(kind.size)
-    for each in range(frame.lower.shape[0]):
-        here = kind == each
-        lower[here] = np.interp(log_exponent[here], frame.log_exponent[each], frame.lower[each])
-        upper[here] = np.interp(log_exponent[here], frame.log_exponent[each], frame.upper[each])
+    for k in range(frame.lower.shape[0]):
+        here = kind == k
+        lower[here] = np.interp(log_exponent[here], frame.log_exponent[k], frame.lower[k])
+        upper[here] = np.interp(log_exponent[here], frame.log_exponent[k], frame.upper[k])
     nodes = laid.mass.shape[3]
     steps = np.ptp(frame.log_exponent, axis=1) * np.ptp(frame.log_scatter, axis=1)
     log_rate = lower + (upper - lower) * (node + uniform[:, 2] - 0.5) / (nodes - 1)
@@ -164,7 +164,7 @@ def _placed(laid: Laid, cell: tuple[NDArray[np.intp], ...], uniform: FloatArray)
         log_exponent=log_exponent,
         log_scatter=log_scatter,
         size=laid.kinds.size[kind],
-        spoiled=laid.kinds.spoiled[kind].T,
+        outlying=laid.kinds.outlying[kind].T,
     )
     return points, (upper - lower) * steps[kind]
 

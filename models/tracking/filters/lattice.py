@@ -1,10 +1,10 @@
 """Where the grid lies, and how it closes in on the posterior's mass.
 
-The axes are log τ = log φ - log ε, log ε and log s. The data speak of the initial rate Δ/τ long before they tell φ
-from ε, so along these axes the ridge of the posterior is nearly straight; the prior stays independent in log φ and
-log ε. There is one such lattice for each kind of history: a size q of the discrepancy and a set of spoiled runs.
+The axes are log τ = log φ - log ε, log ε and log s. The data determine the initial rate Δ/τ long before they
+distinguish φ from ε, so along these axes the ridge of the posterior is nearly straight; the prior stays independent in
+log φ and log ε. There is one such lattice for each kind of history: a size q of the discrepancy and a set of outlying runs.
 
-Each row of a lattice (one ε) spans its own interval of log τ, so that the lattice follows the ridge where it bends. As
+Each row of a lattice (one ε) spans its own interval of log τ, so that the lattice follows the curved ridge. As
 the posterior shrinks a hundredfold over a life the lattice closes in on it: a coarse one over the prior's range finds
 where the mass is, the next is laid there, until nothing shrinks any more. A coarse row could step over a narrow peak,
 so every measurement is blurred on it by about what the model changes from node to node.
@@ -17,47 +17,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.tracking.data import History
-from models.tracking.discrepancy import SIZES, log_size_weight
-from models.tracking.linear_model import basis, evidence, log_spoiled, tabulated
+from models.tracking.criteria import DEPTH, NEGLIGIBLE, REACH, SIZES, SLIGHT
+from models.tracking.discrepancy import log_size_weight
+from models.tracking.history import History
+from models.tracking.linear_model import basis, evidence, log_outlying, tabulated
 from models.tracking.outlying_runs import NODES, TEMPER, Nodes, Search
 from models.tracking.prior import Prior
 
-#: The prior's range in deviations to either side.
-REACH = 4.0
-#: A node belongs to the mass where its log density is less than this below the highest: 4.2 deviations of a normal. A
-#: kind is dropped where its log mass is by so much below that of the best: on the first coarse lattice, which is
-#: blurred, and once the lattice has closed in.
-DEPTH, NEGLIGIBLE, SLIGHT = 9.0, 10.0, 6.0
 #: Blur of a coarse grid for each e-fold of τ between nodes, as a share of the observed change. A node off by half a
 #: step changes b by 0.18 at most, and most of that goes into ξ0 and Δ.
-BLUR = 0.03
+_BLUR = 0.03
 #: Nodes along log τ (the first time, and then), log ε and log s while closing in; how often; what shrinking is worth
 #: it.
-FIRST, COARSE = 65, (11, 8, 7)
-CLOSINGS = 8
-WORTHWHILE = 0.7
+_FIRST, COARSE = 65, (11, 8, 7)
+_CLOSINGS = 8
+_WORTHWHILE = 0.7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kinds:
-    """k kinds of history: the discrepancy's q [k], which runs are spoiled [k, t] (0, 1), log prior probability [k]."""
+    """k kinds of history: the discrepancy's q [k], which runs are outlying [k, t] (0, 1), log prior probability [k]."""
 
     size: FloatArray
-    spoiled: FloatArray
+    outlying: FloatArray
     log_weight: FloatArray
 
     @classmethod
-    def of(cls, prior: Prior, spoiled: FloatArray) -> "Kinds":
+    def of(cls, prior: Prior, outlying: FloatArray) -> "Kinds":
         """Every size with each of the sets [c, t]."""
         weight = log_size_weight(prior)
-        known = np.flatnonzero(np.isfinite(weight))
-        sets = np.repeat(spoiled, known.size, axis=0)
-        sizes = np.tile(SIZES[known], spoiled.shape[0])
+        possible = np.flatnonzero(np.isfinite(weight))
+        sets = np.repeat(outlying, possible.size, axis=0)
+        sizes = np.tile(SIZES[possible], outlying.shape[0])
         return cls(
             size=sizes,
-            spoiled=sets,
-            log_weight=np.tile(weight[known], spoiled.shape[0]) + log_spoiled(prior, sets.T),
+            outlying=sets,
+            log_weight=np.tile(weight[possible], outlying.shape[0]) + log_outlying(prior, sets.T),
         )
 
     def taken(self, index: NDArray[np.intp]) -> "Kinds":
@@ -87,7 +82,7 @@ class Frame:
 
     def at(self, log_exponent: FloatArray, edge: FloatArray) -> FloatArray:
         """An edge [k, r] of the rows' intervals at other rows [k, n], linear between rows."""
-        return np.stack([np.interp(*each) for each in zip(log_exponent, self.log_exponent, edge, strict=True)])
+        return np.stack([np.interp(*row) for row in zip(log_exponent, self.log_exponent, edge, strict=True)])
 
     def log_rate(self, nodes: int) -> FloatArray:
         """Nodes of log τ, [k, rows, nodes]."""
@@ -131,12 +126,12 @@ def log_density(
     """Log posterior density up to a constant, [k, levels, rows, nodes]; a frame and table of one kind serve all."""
     count, rows = kinds.size.size, frame.log_exponent.shape[1]
     levels = np.broadcast_to(frame.log_scatter, (count, frame.log_scatter.shape[1]))
-    sums = tabulated(history, prior, table, levels, kinds.size, kinds.spoiled.T, blur)
+    sums = tabulated(history, prior, table, levels, kinds.size, kinds.outlying.T, blur)
     log_exponent = frame.log_exponent[:, None, :, None]
     log_scale = frame.log_rate(table.shape[-1] // rows)[:, None] + log_exponent
     flat = prior.log_density(log_scale, log_exponent, frame.log_scatter[:, :, None, None])
-    found = evidence(sums, prior).reshape(count, levels.shape[1], rows, -1)
-    return np.asarray(found + flat + kinds.log_weight[:, None, None, None])
+    log_evidence = evidence(sums, prior).reshape(count, levels.shape[1], rows, -1)
+    return np.asarray(log_evidence + flat + kinds.log_weight[:, None, None, None])
 
 
 def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame]:
@@ -146,15 +141,15 @@ def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame]:
         kinds = Kinds.of(prior, np.zeros((1, 0)))
         return kinds, first.taken(np.zeros(kinds.size.size, dtype=np.intp))
     nodes, rows, levels = COARSE
-    share = BLUR * float(np.ptp(history.value))
-    table = tabled(first, FIRST, history.progress)[0]
-    blur = share * float((first.upper - first.lower).max()) / (FIRST - 1)
+    share = _BLUR * float(np.ptp(history.value))
+    table = tabled(first, _FIRST, history.progress)[0]
+    blur = share * float((first.upper - first.lower).max()) / (_FIRST - 1)
     kinds, density = _first(prior, history, first, table, blur)
     frame = shrunk(first.taken(np.zeros(kinds.size.size, dtype=np.intp)), density)
-    kinds, frame = _weighty(kinds, frame.resized(rows, levels), log_masses(density, first.cells(FIRST)), NEGLIGIBLE)
+    kinds, frame = _weighty(kinds, frame.resized(rows, levels), log_masses(density, first.cells(_FIRST)), NEGLIGIBLE)
     shares, left = np.full(kinds.size.size, share), np.ones(kinds.size.size, dtype=bool)
     log_mass = np.zeros(kinds.size.size)
-    for _ in range(CLOSINGS):
+    for _ in range(_CLOSINGS):
         now = np.flatnonzero(left)
         if now.size == 0:
             break
@@ -164,7 +159,7 @@ def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame]:
         density = log_density(prior, history, kinds.taken(now), wide, tabled(wide, nodes, history.progress), blurs)
         closer = shrunk(wide, density)
         log_mass[now] = log_masses(density, wide.cells(nodes))
-        settled = _shrinkage(wide, closer) > WORTHWHILE
+        settled = _shrinkage(wide, closer) > _WORTHWHILE
         left[now] = ~(settled & (blurs < 0.5 * np.exp(closer.log_scatter.mean(axis=1))))
         shares[now] *= np.where(settled, 0.3, 1.0)
         for field in fields(Frame):
@@ -173,43 +168,43 @@ def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame]:
 
 
 def _first(prior: Prior, history: History, frame: Frame, table: FloatArray, blur: float) -> tuple[Kinds, FloatArray]:
-    """The kinds, once it is known which runs may be spoiled, and their density on the first coarse lattice."""
-    search, found = Search.begun(prior, history), {}
+    """The kinds, once it is known which runs may be outlying, and their density on the first coarse lattice."""
+    search, densities = Search.begun(prior, history), {}
 
-    def looked_at(spoiled: FloatArray) -> FloatArray:
-        if spoiled.tobytes() not in found:
-            kinds = Kinds.of(prior, spoiled[None])
-            found[spoiled.tobytes()] = log_density(prior, history, kinds, frame, table, blur)
-        return found[spoiled.tobytes()]
+    def looked_at(outlying: FloatArray) -> FloatArray:
+        if outlying.tobytes() not in densities:
+            kinds = Kinds.of(prior, outlying[None])
+            densities[outlying.tobytes()] = log_density(prior, history, kinds, frame, table, blur)
+        return densities[outlying.tobytes()]
 
-    while (spoiled := search.next()) is not None:
-        plain = looked_at(spoiled) - log_spoiled(prior, spoiled) + np.log(frame.cells(FIRST))[:, None, :, None]
+    while (outlying := search.next()) is not None:
+        plain = looked_at(outlying) - log_outlying(prior, outlying) + np.log(frame.cells(_FIRST))[:, None, :, None]
         total = float(plain.max() + np.log(np.exp(plain - plain.max()).sum()))
-        search.learn(spoiled, total, *_chosen(prior, frame, table, plain - total, blur))
+        search.learn(outlying, total, *_chosen(prior, frame, table, plain - total, blur))
     sets = search.kept()
-    return Kinds.of(prior, sets), np.concatenate([looked_at(each) for each in sets])
+    return Kinds.of(prior, sets), np.concatenate([looked_at(outlying) for outlying in sets])
 
 
 def _chosen(prior: Prior, frame: Frame, table: FloatArray, log_mass: FloatArray, blur: float) -> tuple[Nodes, Nodes]:
-    """NODES nodes of each level of s, drawn evenly by a power of their mass so that what a spoiled run hides is among
+    """NODES nodes of each level of s, drawn evenly by a power of their mass so that what an outlying run hides is among
     them; and the best one of each level."""
     _, levels, rows, nodes = log_mass.shape
     by_level = np.moveaxis(log_mass, 1, 0).reshape(levels, -1)
     chance = np.exp(TEMPER * (by_level - by_level.max(axis=1, keepdims=True)))
     edges = np.cumsum(chance, axis=1)
     places = (np.arange(NODES) + 0.5) / NODES
-    drawn = np.stack([np.searchsorted(each, places * each[-1]) for each in edges])
+    drawn = np.stack([np.searchsorted(row, places * row[-1]) for row in edges])
     log_share = np.log(NODES * np.take_along_axis(chance, drawn, axis=1) / edges[:, -1:])
     best = by_level.argmax(axis=1)[:, None]
 
-    def at(found: NDArray[np.intp], log_share: FloatArray | float) -> Nodes:
-        level = np.repeat(np.arange(levels), found.shape[1])
-        kind, cell = np.divmod(found.ravel(), rows * nodes)
+    def at(cells: NDArray[np.intp], log_share: FloatArray | float) -> Nodes:
+        level = np.repeat(np.arange(levels), cells.shape[1])
+        kind, cell = np.divmod(cells.ravel(), rows * nodes)
         return Nodes(
             b=table[:, cell].T,
             noise=np.exp(2.0 * frame.log_scatter[0, level]) + blur**2,
             size=SIZES[np.isfinite(log_size_weight(prior))][kind],
-            log_weight=(np.take_along_axis(by_level, found, axis=1) - log_share).ravel(),
+            log_weight=(np.take_along_axis(by_level, cells, axis=1) - log_share).ravel(),
         )
 
     return at(drawn, log_share), at(best, 0.0)
@@ -228,7 +223,7 @@ Part = TypeVar("Part", Kinds, Frame)
 def joined(first: Part, second: Part) -> Part:
     """The kinds of both, or their lattices, one after the other."""
     columns = {
-        each.name: np.concatenate([getattr(one, each.name) for one in (first, second)]) for each in fields(first)
+        field.name: np.concatenate([getattr(part, field.name) for part in (first, second)]) for field in fields(first)
     }
     return replace(first, **columns)
 

@@ -1,68 +1,73 @@
-"""Sets of spoiled runs that the first search overlooked.
+"""Sets of outlying runs that the first search overlooked.
 
-The first lattice is blurred, and a run that lies three deviations off lies less far off a blurred course. Once the lattices
-have closed in nothing is blurred any more: what turning a run would gain is weighed up again at nodes of the leading kinds,
-and the sets that are worth it are laid where those kinds lie.
+The first lattice is blurred, and a run that is three deviations off is less far off a blurred course. Once the lattices
+have closed in nothing is blurred any more: the gain of turning a run is computed again at nodes of the leading kinds, and
+the sets with a sufficient gain get lattices where those kinds have theirs.
 
-Apart from its shares of the posterior a set that is overlooked would bias the scatter, which then has to explain the run.
+A set that is overlooked would not only lack its share of the posterior: it would also bias the scatter, which then has
+to explain the run.
 """
 
 import numpy as np
 
 from models.arrays import FloatArray
-from models.tracking.data import History
+from models.tracking.criteria import LEADING, MOST, WORTH
 from models.tracking.filters.lattice import COARSE, Frame, Kinds, joined, log_density, log_masses, shrunk, tabled
-from models.tracking.linear_model import log_spoiled
-from models.tracking.outlying_runs import MOST, TEMPER, Nodes, gains
+from models.tracking.history import History
+from models.tracking.linear_model import log_outlying
+from models.tracking.outlying_runs import TEMPER, Nodes, gains
 from models.tracking.prior import Prior
 
-#: So many kinds lead, at so many nodes each; a set counts where its log probability is less than this below the best's.
-LEADING, NODES, WORTH = 3, 32, 3.0
+#: Nodes of each leading kind.
+_NODES = 32
 
 
 def completed(prior: Prior, history: History, kinds: Kinds, frame: Frame) -> tuple[Kinds, Frame]:
     """The kinds and their lattices, with those of the sets that were overlooked."""
-    if prior.spoiled_share == 0.0 or history.value.size < 2:
+    if prior.outlying_share == 0.0 or history.value.size < 2:
         return kinds, frame
     table = tabled(frame, COARSE[0], history.progress)
     density = log_density(prior, history, kinds, frame, table)
     mass = density + np.log(frame.cells(COARSE[0]))[:, None, :, None]
     mass -= log_masses(density, frame.cells(COARSE[0])).max()
-    known = {_name(size, spoiled) for size, spoiled in zip(kinds.size, kinds.spoiled, strict=True)}
-    found: dict[bytes, tuple[float, int, FloatArray]] = {}
+    laid = {_name(size, outlying) for size, outlying in zip(kinds.size, kinds.outlying, strict=True)}
+    overlooked: dict[bytes, tuple[float, int, FloatArray]] = {}
     for leader in np.argsort(-mass.max(axis=(1, 2, 3)))[:LEADING].tolist():
-        gain = gains(prior, history, kinds.spoiled[leader], _nodes(kinds, frame, table, mass, leader))
+        gain = gains(prior, history, kinds.outlying[leader], _nodes(kinds, frame, table, mass, leader))
         for run in np.flatnonzero(gain > -WORTH).tolist():
-            spoiled = kinds.spoiled[leader].copy()
-            spoiled[run] = 1.0 - spoiled[run]
-            name = _name(kinds.size[leader], spoiled)
-            if name not in known and gain[run] > found.get(name, (-np.inf,))[0]:
-                found[name] = (float(gain[run]), leader, spoiled)
-    if not found:
+            outlying = kinds.outlying[leader].copy()
+            outlying[run] = 1.0 - outlying[run]
+            name = _name(kinds.size[leader], outlying)
+            if name not in laid and gain[run] > overlooked.get(name, (-np.inf,))[0]:
+                overlooked[name] = (float(gain[run]), leader, outlying)
+    if not overlooked:
         return kinds, frame
-    best = sorted(found.values(), key=lambda each: each[0], reverse=True)[:MOST]
-    leaders, spoiled = np.array([leader for _, leader, _ in best]), np.stack([each for _, _, each in best])
-    weight = kinds.log_weight[leaders] - log_spoiled(prior, kinds.spoiled[leaders].T) + log_spoiled(prior, spoiled.T)
-    more, there = Kinds(size=kinds.size[leaders], spoiled=spoiled, log_weight=weight), frame.taken(leaders)
+    best = sorted(overlooked.values(), key=lambda candidate: candidate[0], reverse=True)[:MOST]
+    leaders, outlying = np.array([leader for _, leader, _ in best]), np.stack([runs for _, _, runs in best])
+    weight = (
+        kinds.log_weight[leaders] - log_outlying(prior, kinds.outlying[leaders].T) + log_outlying(prior, outlying.T)
+    )
+    more, there = Kinds(size=kinds.size[leaders], outlying=outlying, log_weight=weight), frame.taken(leaders)
     closer = shrunk(there, log_density(prior, history, more, there, table[leaders]))
     return joined(kinds, more), joined(frame, closer)
 
 
 def _nodes(kinds: Kinds, frame: Frame, table: FloatArray, mass: FloatArray, kind: int) -> Nodes:
-    """NODES nodes of one kind, drawn evenly by a power of their log mass so that what a spoiled run hides is among them."""
+    """NODES nodes of one kind, drawn evenly by a power of their log mass so that what an
+    outlying run hides is among them."""
     cells = mass.shape[2] * mass.shape[3]
     flat = mass[kind].ravel()
     edges = np.cumsum(np.exp(TEMPER * (flat - flat.max())))
-    drawn = np.searchsorted(edges, (np.arange(NODES) + 0.5) / NODES * edges[-1])
-    log_share = np.log(NODES) + TEMPER * (flat[drawn] - flat.max()) - np.log(edges[-1])
+    drawn = np.searchsorted(edges, (np.arange(_NODES) + 0.5) / _NODES * edges[-1])
+    log_share = np.log(_NODES) + TEMPER * (flat[drawn] - flat.max()) - np.log(edges[-1])
     level, cell = np.divmod(drawn, cells)
     return Nodes(
         b=table[kind][:, cell].T,
         noise=np.exp(2.0 * frame.log_scatter[kind, level]),
-        size=np.full(NODES, kinds.size[kind]),
+        size=np.full(_NODES, kinds.size[kind]),
         log_weight=flat[drawn] - log_share,
     )
 
 
-def _name(size: float, spoiled: FloatArray) -> bytes:
-    return np.append(spoiled, size).tobytes()
+def _name(size: float, outlying: FloatArray) -> bytes:
+    return np.append(outlying, size).tobytes()

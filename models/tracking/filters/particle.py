@@ -1,12 +1,12 @@
 """A particle filter for eq. 6 that marginalises what is linear and keeps its particles apart.
 
-Particles carry (log φ, log ε, log s), the size q of the discrepancy and, of every run, whether it was spoiled; given
+Particles carry (log φ, log ε, log s), the size q of the discrepancy and, of every run, whether it was outlying; given
 these, all else is linear and integrated out in closed form (Rao-Blackwell). The coefficients do not move, so
 resampling alone would soon leave copies of one particle. After it every particle takes Metropolis-Hastings steps that
 leave the exact marginal posterior over the whole history as it is (iterated batch importance sampling), until nine in
 ten have moved.
 
-A measurement that would starve the cloud at once is let in by degrees: the cloud passes through targets that lie
+A measurement that would starve the cloud at once is introduced by degrees: the cloud passes through targets that lie
 between the old posterior and the new one, their logarithms mixed (1 - β) : β, with resampling and moves in between.
 The last target is the posterior itself, so nothing is approximated.
 
@@ -20,25 +20,25 @@ import numpy as np
 from scipy.special import ndtri
 
 from models.arrays import FloatArray
-from models.tracking.data import History
-from models.tracking.discrepancy import PAST, SIZES, drawn, log_size_weight
+from models.tracking.criteria import HEALTHY, MOVED, MOVES, SIZES, STARVED
+from models.tracking.discrepancy import PAST, drawn, log_size_weight
 from models.tracking.filters.cloud import Bridge, Cloud, effective, log_target_of, merged, table_of, weights
+from models.tracking.history import History
 from models.tracking.linear_model import conditional, drawn_terms, pointwise
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
 from models.tracking.sampling import correlated_pair, spread_normals, spread_points, systematic
 
-#: Resample below this share of effective particles; let no single step bring them below the second share.
-HEALTHY, STARVED = 0.5, 0.25
-#: Steps of a move: at most so many, until this share of particles has moved since resampling.
-MOVES, MOVED = 8, 0.9
 #: Where a smaller share of steps than the first is accepted, the next are shorter by the second.
-TIMID, SHORTER = 0.2, 0.5
-#: In a step, how often another size is tried, and how often another belief about one run.
-RESIZED, TURNED = 0.25, 0.1
-#: Degrees by which a measurement may be let in, and halvings in the search for each.
-DEGREES, HALVINGS = 30, 20
+_TIMID, _SHORTER = 0.2, 0.5
+#: In a step, how often another size is tried, and how often the flag of one run is turned.
+_RESIZED, _TURNED = 0.25, 0.1
+#: Degrees by which a measurement may be introduced, and halvings in the search for each.
+_DEGREES, _HALVINGS = 30, 20
+
+#: Names of arrays in stored states, where they are not those of the fields: databases of earlier versions stay readable.
+_STORED = {"outlying": "spoiled"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +51,7 @@ class ParticleState:
 
     def to_arrays(self) -> dict[str, FloatArray]:
         """The state as named arrays; `from_arrays` gives it back exactly."""
-        cloud = {field.name: getattr(self.cloud, field.name) for field in fields(self.cloud)}
+        cloud = {_STORED.get(field.name, field.name): getattr(self.cloud, field.name) for field in fields(self.cloud)}
         return {"prior": self.prior.to_array()} | self.history.to_arrays() | cloud
 
     @classmethod
@@ -60,13 +60,13 @@ class ParticleState:
         return cls(
             prior=Prior.from_array(arrays["prior"]),
             history=History.from_arrays(arrays),
-            cloud=Cloud(**{field.name: arrays[field.name] for field in fields(Cloud)}),
+            cloud=Cloud(**{field.name: arrays[_STORED.get(field.name, field.name)] for field in fields(Cloud)}),
         )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Particle:
-    """The filter. `moves` = 0 leaves a plain resampling filter, which starves: it is there to be compared with."""
+    """The filter. `moves` = 0 leaves a plain resampling filter, which starves: it serves for comparison."""
 
     particles: int = 2_000
     moves: int = MOVES
@@ -85,7 +85,7 @@ class Particle:
         cloud = Cloud(
             points=centre + spread * ndtri(even[:, :3]),
             size=sizes.astype(np.float64),
-            spoiled=np.zeros((self.particles, 0)),
+            outlying=np.zeros((self.particles, 0)),
             log_weight=np.zeros(self.particles),
             log_target=np.zeros(self.particles),
         )
@@ -98,10 +98,10 @@ class Particle:
         bridge = Bridge(state.prior, state.history, state.history.append(measurement, state.prior))
         cloud, before, after = bridge.entered(state.cloud, rng)
         held, degree = 1.0, 0.0
-        for attempt in range(DEGREES):
+        for attempt in range(_DEGREES):
             gap = after - before
             start = cloud.log_weight - held * gap
-            degree = 1.0 if attempt == DEGREES - 1 else _next_degree(start, gap, degree)
+            degree = 1.0 if attempt == _DEGREES - 1 else _next_degree(start, gap, degree)
             log_weight = start + degree * gap
             cloud = replace(cloud, log_weight=log_weight - log_weight.max())
             if degree < 1.0 or effective(cloud.log_weight) < HEALTHY * self.particles:
@@ -140,7 +140,7 @@ class Particle:
             after = np.where(accepted, offered_after, after)
             before = np.where(accepted, offered_before, before)
             moved |= accepted
-            reach *= SHORTER if accepted.mean() < TIMID else 1.0
+            reach *= _SHORTER if accepted.mean() < _TIMID else 1.0
             if moved.mean() >= MOVED:
                 break
         return cloud, before, after
@@ -170,19 +170,19 @@ class Particle:
 
 
 def _proposed(cloud: Cloud, shape: FloatArray, rng: np.random.Generator) -> Cloud:
-    """A step of every particle, as likely as the step back: in its points always, in its size and its beliefs at
-    times."""
-    count, runs = cloud.spoiled.shape
+    """A step of every particle, as likely as the step back: always in its points, at times in its size and its
+    flags."""
+    count, runs = cloud.outlying.shape
     stride = rng.uniform(0.2, 1.6, size=(count, 1))
     points = cloud.points + stride * rng.standard_normal(cloud.points.shape) @ shape.T
-    step = np.where(rng.random(count) < RESIZED, rng.choice([-1.0, 1.0], size=count), 0.0)
+    step = np.where(rng.random(count) < _RESIZED, rng.choice([-1.0, 1.0], size=count), 0.0)
     size = cloud.size + step
-    spoiled = cloud.spoiled.copy()
-    turned = np.flatnonzero(rng.random(count) < TURNED)
+    outlying = cloud.outlying.copy()
+    turned = np.flatnonzero(rng.random(count) < _TURNED)
     run = rng.integers(runs, size=turned.size)
-    spoiled[turned, run] = 1.0 - spoiled[turned, run]
+    outlying[turned, run] = 1.0 - outlying[turned, run]
     inside = (size >= 0) & (size < SIZES.size)
-    return replace(cloud, points=points, size=np.where(inside, size, cloud.size), spoiled=spoiled)
+    return replace(cloud, points=points, size=np.where(inside, size, cloud.size), outlying=outlying)
 
 
 def _next_degree(start: FloatArray, gap: FloatArray, degree: float) -> float:
@@ -191,10 +191,10 @@ def _next_degree(start: FloatArray, gap: FloatArray, degree: float) -> float:
     if effective(start + gap) >= enough:
         return 1.0
     low, high = degree, 1.0
-    for _ in range(HALVINGS):
+    for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if effective(start + middle * gap) >= enough else (low, middle)
-    return low if low > degree else degree + (1.0 - degree) * 2.0**-HALVINGS
+    return low if low > degree else degree + (1.0 - degree) * 2.0**-_HALVINGS
 
 
 def _root(covariance: FloatArray) -> FloatArray:

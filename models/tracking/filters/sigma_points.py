@@ -12,14 +12,11 @@ from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 
 from models.arrays import FloatArray
 from models.degradation.general_order import progress_fraction
+from models.tracking.criteria import DOMAIN, OUTLIER
 from models.tracking.prior import Prior
 
 #: Process noise of a step, and the least variance along any axis, in units of the prior's variance.
-PROCESS, FLOOR = 1e-9, 1e-10
-#: Deviations from the prior mean that the state may reach.
-DOMAIN = 6.0
-#: An innovation counts at most as one of this many deviations.
-OUTLIER = 5.0
+_PROCESS, _FLOOR = 1e-9, 1e-10
 #: The state's dimension; sigma points at ±√7 deviations with no weight on the centre: all weights are positive, so S
 #: and P stay positive definite.
 DIMENSION = 7
@@ -53,23 +50,23 @@ class Way:
 @dataclass(frozen=True, slots=True)
 class Step:
     """One filter's step: its state, how probable the measurement was, and the squared innovation in deviations, those of
-    a sound and of a spoiled run mixed as the step is."""
+    a sound and of an outlying run mixed like the step."""
 
     mean: FloatArray
     covariance: FloatArray
     scatter: FloatArray
     log_likelihood: float
-    surprise: float
+    squared_innovation: float
 
 
 def stepped(prior: Prior, normal: Normal, way: Way) -> Step:
-    """One filter carried on to the next run."""
+    """One filter advanced to the next run."""
     unit = prior.initial_sd
 
     def moved(point: FloatArray, _: float) -> FloatArray:
-        found = point.copy()
-        found[4] += found[5] * (way.after - way.before) / way.reference
-        return found
+        propagated = point.copy()
+        propagated[4] += propagated[5] * (way.after - way.before) / way.reference
+        return propagated
 
     def expected(point: FloatArray) -> FloatArray:
         initial, at_reference, log_scale, log_exponent, course, _, step = unscaled(prior, point)
@@ -78,7 +75,7 @@ def stepped(prior: Prior, normal: Normal, way: Way) -> Step:
         )
         return np.array([(initial + (at_reference - initial) * share / whole + course + step) / unit])
 
-    further = (prior.spoiled_size * prior.size / unit) ** 2
+    further = (prior.outlying_size * prior.size / unit) ** 2
     scatter = float(normal.scatter[0])
     ukf = UnscentedKalmanFilter(
         dim_x=DIMENSION, dim_z=1, dt=1.0, hx=expected, fx=moved, points=MerweScaledSigmaPoints(**SIGMA)
@@ -89,7 +86,7 @@ def stepped(prior: Prior, normal: Normal, way: Way) -> Step:
     ukf.predict()
     ukf.update(np.array([way.value / unit]))
     off, variance = float(ukf.y[0]), float(ukf.S[0, 0])
-    shares = np.array([1.0 - prior.spoiled_share, prior.spoiled_share])
+    shares = np.array([1.0 - prior.outlying_share, prior.outlying_share])
     variances = np.array([variance, variance + further])
     density = shares * np.exp(-0.5 * np.minimum(off**2 / variances, 1400.0)) / np.sqrt(2.0 * np.pi * variances)
     total = float(density.sum())
@@ -104,13 +101,13 @@ def stepped(prior: Prior, normal: Normal, way: Way) -> Step:
         covariance=definite(learnt),
         scatter=scatter_learnt(prior, normal.scatter, off**2 / variance, variance, float(share[0])),
         log_likelihood=math.log(max(total, 1e-300)),
-        surprise=min(float(share @ (off**2 / variances)), OUTLIER**2),
+        squared_innovation=min(float(share @ (off**2 / variances)), OUTLIER**2),
     )
 
 
 def process(prior: Prior, size: float, way: Way) -> FloatArray:
     """Process noise of δ and its slope over the way to the last measurement, and of the level at an event."""
-    noise = PROCESS * np.eye(DIMENSION)
+    noise = _PROCESS * np.eye(DIMENSION)
     gap = (way.after - way.before) / way.reference
     density = 3.0 * (size * prior.size / prior.initial_sd) ** 2 * (way.reference / way.after) ** 3
     noise[4:6, 4:6] += density * np.array([[gap**3 / 3.0, gap**2 / 2.0], [gap**2 / 2.0, gap]])
@@ -129,24 +126,24 @@ def units(prior: Prior) -> tuple[FloatArray, FloatArray]:
 def scaled(prior: Prior, points: FloatArray) -> FloatArray:
     """Rows of (ξ0, ξ at the reference, log φ, log ε, δ, T δ', step) as states [n, 7]."""
     centre, unit = units(prior)
-    found = points.copy()
-    found[:, 2] -= found[:, 3]
-    return np.asarray((found - centre) / unit)
+    rows = points.copy()
+    rows[:, 2] -= rows[:, 3]
+    return np.asarray((rows - centre) / unit)
 
 
 def unscaled(prior: Prior, state: FloatArray) -> FloatArray:
-    """The inverse of `scaled`, for states [..., 7]; what is far out of the domain is taken to lie at its edge."""
+    """The inverse of `scaled`, for states [..., 7]; states far out of the domain are moved to its edge."""
     centre, unit = units(prior)
-    found = centre + unit * np.clip(state, -2.0 * DOMAIN, 2.0 * DOMAIN)
-    found[..., 2] += found[..., 3]
-    return np.asarray(found)
+    rows = centre + unit * np.clip(state, -2.0 * DOMAIN, 2.0 * DOMAIN)
+    rows[..., 2] += rows[..., 3]
+    return np.asarray(rows)
 
 
-def scatter_learnt(prior: Prior, scatter: FloatArray, surprise: float, variance: float, sound: float) -> FloatArray:
-    """Variance and worth of the scatter after an innovation; `variance` in units of the prior's deviation of ξ0."""
-    known, worth = scatter.tolist()
-    share = known / (variance * prior.initial_sd**2)
-    learnt = known * (1.0 + sound * share * (min(surprise, OUTLIER**2) - 1.0) / (worth + sound))
+def scatter_learnt(prior: Prior, scatter: FloatArray, squared: float, variance: float, sound: float) -> FloatArray:
+    """Variance and worth of the scatter after a `squared` innovation in its deviations; `variance` in prior's units."""
+    scatter_variance, worth = scatter.tolist()
+    share = scatter_variance / (variance * prior.initial_sd**2)
+    learnt = scatter_variance * (1.0 + sound * share * (min(squared, OUTLIER**2) - 1.0) / (worth + sound))
     low, high = (math.exp(2.0 * (prior.log_scatter_mean + k * prior.log_scatter_sd)) for k in (-DOMAIN, DOMAIN))
     return np.array([min(max(learnt, low), high), worth + sound])
 
@@ -155,7 +152,7 @@ def definite(covariance: FloatArray) -> FloatArray:
     """Symmetrised, with no eigenvalue below FLOOR."""
     symmetric = 0.5 * (covariance + covariance.T)
     values, vectors = np.linalg.eigh(symmetric)
-    if values[0] >= FLOOR:
+    if values[0] >= _FLOOR:
         return np.asarray(symmetric)
-    lifted = vectors * np.maximum(values, FLOOR) @ vectors.T
+    lifted = vectors * np.maximum(values, _FLOOR) @ vectors.T
     return np.asarray(0.5 * (lifted + lifted.T))

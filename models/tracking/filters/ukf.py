@@ -6,14 +6,14 @@ from the prior mean, in units of the prior's deviations, so that the numbers are
 The law does not move between runs; δ is an integrated random walk, and an event lets the level step.
 
 The prior is far too wide for sigma points: φ spans decades within them, and a filter started there does not recover.
-So the first measurements are taken together, and the normals that have the means and covariances of their exact
-posterior, one for each size, are where the filters start. They start so again when the innovations say that they are
-lost, when progress has doubled (the law bends, and the reference moves along), or when a run comes out of order.
+So the filters start, one for each size, from the means and covariances of the exact posterior of the first measurements
+together. They start anew when their innovations become too large, when progress has doubled (the law is curved, and
+the reference moves along), or when a run comes out of order.
 
-A run may be spoiled: each update is that of a sound run and of a spoiled one, mixed by how probable either is. The
+A run may be outlying: each update is that of a sound run and of an outlying one, mixed by how probable either is. The
 scatter between runs is learnt from the innovations: of an innovation with y²/S = κ, the share g = s²/S is scatter, and
 E[e²] = s² (1 + g (κ - 1)) is averaged into s² with the weight of one observation (the step of an
-expectation-maximisation). A normal on a bent ridge is still a rough picture: the other filters are the reference.
+expectation-maximisation). A normal on a curved ridge is only approximate: the other filters are the reference.
 """
 
 import math
@@ -23,22 +23,18 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.degradation.general_order import progress_fraction
-from models.tracking.data import History
-from models.tracking.discrepancy import PAST, SIZES, at_end, drawn
+from models.tracking.criteria import DOMAIN, FEW, FORGET, GROWN, LOST, SIZES
+from models.tracking.discrepancy import PAST, at_end, drawn
 from models.tracking.filters.grid import Grid, GridState
-from models.tracking.filters.sigma_points import DIMENSION, DOMAIN, Normal, Way, definite, scaled, stepped, unscaled
+from models.tracking.filters.sigma_points import DIMENSION, Normal, Way, definite, scaled, stepped, unscaled
+from models.tracking.history import History
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
 from models.tracking.sampling import spread_normals, systematic
 
-#: The running mean of squared innovations forgets at this rate, and above the second number the filter is lost.
-FORGET, LOST = 0.3, 4.0
-#: The filters start anew when progress has grown by this factor.
-GROWN = 2.0
-#: The grid that starts the filter, the draws from it whose moments are taken, and the share of them below which a size
-#: is left out.
-STARTER, DRAWS, FEW = Grid(nodes=13, rows=13, levels=7), 1_000, 0.01
+#: The grid that starts the filter, and the draws from it whose moments are taken.
+_STARTER, _DRAWS = Grid(nodes=13, rows=13, levels=7), 1_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,14 +42,14 @@ class UkfState:
     """One filter for each of k sizes q: size [k], log_weight [k], mean [k, 7], covariance [k, 7, 7] in units of the
     prior, and scatter [k, 2]: its variance in the quantity's unit squared and how many observations it is worth.
 
-    `history` is everything measured, `reference` the progress at which the filters started, `surprise` the running mean
-    of squared innovations.
+    `history` is everything measured, `reference` the progress at which the filters started, `squared_innovation` the
+    running mean of squared innovations.
     """
 
     prior: Prior
     history: History
     reference: float
-    surprise: float
+    squared_innovation: float
     size: FloatArray
     log_weight: FloatArray
     mean: FloatArray
@@ -72,25 +68,25 @@ class UkfState:
     def to_arrays(self) -> dict[str, FloatArray]:
         """The state as named arrays; `from_arrays` gives it back exactly."""
         named = {name: getattr(self, name) for name in ("size", "log_weight", "mean", "covariance", "scatter")}
-        lone = {"prior": self.prior.to_array(), "place": np.array([self.reference, self.surprise])}
+        lone = {"prior": self.prior.to_array(), "place": np.array([self.reference, self.squared_innovation])}
         return self.history.to_arrays() | lone | named
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, FloatArray]) -> "UkfState":
         """The inverse of `to_arrays`."""
-        reference, surprise = arrays["place"].tolist()
+        reference, squared_innovation = arrays["place"].tolist()
         return cls(
             prior=Prior.from_array(arrays["prior"]),
             history=History.from_arrays(arrays),
             reference=reference,
-            surprise=surprise,
+            squared_innovation=squared_innovation,
             **{name: arrays[name] for name in ("size", "log_weight", "mean", "covariance", "scatter")},
         )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ukf:
-    """The filter, started from the first `together` measurements; nothing in its updates is left to chance."""
+    """The filter, started from the first `together` measurements; its updates use no random numbers."""
 
     together: int = 8
 
@@ -100,7 +96,7 @@ class Ukf:
         return "ukf"
 
     def start(self, prior: Prior) -> UkfState:
-        """The prior itself, as far as normals can say it."""
+        """The prior itself, approximated by normals."""
         return _started(prior, History.of((), prior))
 
     def update(self, state: UkfState, measurement: Measurement, rng: np.random.Generator | None = None) -> UkfState:  # noqa: ARG002
@@ -122,14 +118,14 @@ class Ukf:
         parts = [stepped(prior, state.normal(kind), way) for kind in range(state.size.size)]
         log_weight = state.log_weight + np.array([part.log_likelihood for part in parts])
         weight = _weights(log_weight)
-        surprise = float(weight @ [part.surprise for part in parts])
-        surprise = (1.0 - FORGET) * state.surprise + FORGET * surprise
-        if surprise > LOST:
+        squared_innovation = float(weight @ [part.squared_innovation for part in parts])
+        squared_innovation = (1.0 - FORGET) * state.squared_innovation + FORGET * squared_innovation
+        if squared_innovation > LOST:
             return _started(prior, history)
         return replace(
             state,
             history=history,
-            surprise=surprise,
+            squared_innovation=squared_innovation,
             log_weight=log_weight - log_weight.max(),
             mean=np.stack([part.mean for part in parts]),
             covariance=np.stack([part.covariance for part in parts]),
@@ -165,7 +161,7 @@ class Ukf:
 
 def _started(prior: Prior, history: History) -> UkfState:
     """The normals with the moments of the exact posterior, by size, from evenly spread draws."""
-    draws = STARTER.posterior(GridState(prior=prior, history=history), DRAWS, np.random.default_rng(0))
+    draws = _STARTER.posterior(GridState(prior=prior, history=history), _DRAWS, np.random.default_rng(0))
     reference = history.span
     size, course, step = _beside(draws)
     points = scaled(
@@ -192,12 +188,12 @@ def _started(prior: Prior, history: History) -> UkfState:
         prior=prior,
         history=history,
         reference=reference,
-        surprise=1.0,
+        squared_innovation=1.0,
         size=SIZES[kept],
         log_weight=np.log(shares[kept] / shares[kept].max()),
         mean=np.stack([mean for mean, _ in moments]),
         covariance=np.stack([covariance for _, covariance in moments]),
-        scatter=np.array([(each, worth) for each in variance]),
+        scatter=np.array([(s_squared, worth) for s_squared in variance]),
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from models.records.runs import Record
 from models.rig import campaign
 from models.rig.hysteresis import FrictionLag
-from models.rig.oil_warmth import warmed
+from models.rig.oil_viscosity import warmed
 from models.rig.recorder import Recorder
 from models.rig.sampled import DynamicTest, sampled_test
 from models.rig.simulated_runs import RunKind, SimulatedRun

@@ -73,7 +73,7 @@ def test_recent_duty_is_the_last_tenth_or_a_thousand_cycles() -> None:
     assert severity_map(ENERGY, blocks([10e3, 20e3], length=500.0)).rate == pytest.approx(1.5)
 
 
-def test_sliding_distance_assumes_a_duration_only_where_none_is_told() -> None:
+def test_sliding_distance_assumes_a_duration_only_where_none_is_stated() -> None:
     told = Block(end=1.0, cycles=1.0, speed=200.0, duration=0.5)
     assumed = Block(end=1.0, cycles=1.0, speed=200.0)
     assert told.work(SeverityBasis.SLIDING_DISTANCE) == pytest.approx(50.0)
@@ -87,7 +87,7 @@ def test_impossible_blocks_are_refused(wrong: dict[str, float]) -> None:
         Block(**{"end": 1000.0, "cycles": 1000.0} | wrong)
 
 
-def test_a_life_of_light_and_heavy_blocks_is_foretold_better_by_energy() -> None:
+def test_a_life_of_light_and_heavy_blocks_is_predicted_better_by_energy() -> None:
     """Heavy blocks wear four times as fast. By count of cycles the same law is fitted to a staircase."""
     scores = {"cycles": [], "energy": []}  # type: dict[str, list[float]]
     for seed in range(6):

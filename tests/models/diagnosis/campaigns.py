@@ -12,7 +12,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
 from models.friction.stribeck import StribeckParameters, torque
-from models.loops.lag import attractor_torque
+from models.loops.attractor import attractor_torque
 from models.records.runs import Plateaus, Record
 from models.rig.truth import SimulatedClutch, draw
 

@@ -8,7 +8,8 @@ from scipy.optimize import least_squares
 
 from models.arrays import FloatArray
 from models.friction.identification import StribeckFit, fit_curves
-from models.friction.pressure_laws import fit_asymptotic, fit_linear, fit_pressure_laws
+from models.friction.pressure_laws import fit_asymptotic, fit_linear, fit_pressure_laws, laws_of, over_pressure
+from models.friction.stribeck import PARAMETER_NAMES
 from models.records.runs import curves_by_pressure
 from models.rig.campaign import simulated_clutch
 from models.rig.stationary import NOISELESS, stationary_test
@@ -85,3 +86,24 @@ def test_too_few_pressures_have_no_law() -> None:
     untold = [replace(fit, undetermined=("stribeck_velocity",)) for fit in fits[:5]]
     assert fit_pressure_laws([*untold, *fits[5:]]) is None
     assert fit_pressure_laws([*untold[:4], *fits[4:]]) is not None
+
+
+def test_laws_through_medians_are_the_laws_that_made_them() -> None:
+    clutch = simulated_clutch(3)
+    columns = clutch.parameters(PROTOCOL_PRESSURES, 2_000.0).as_array().T
+    between = np.array([4.2e5, 6.9e5])
+    expected = clutch.parameters(between, 2_000.0).as_array()
+    assert laws_of(PROTOCOL_PRESSURES, columns).parameters(between).as_array() == pytest.approx(expected, rel=1e-3)
+    # the negative control: the four in the wrong order
+    assert laws_of(PROTOCOL_PRESSURES, columns[:, ::-1]).parameters(between).as_array() != pytest.approx(
+        expected, rel=0.1
+    )
+
+
+def test_a_parameter_over_pressure_at_several_states_is_its_law_at_each() -> None:
+    clutch = simulated_clutch(3)
+    states, pressures = [0.0, 2_000.0, 9_000.0], np.linspace(4e5, 7e5, 5)
+    for name in PARAMETER_NAMES:
+        values = np.stack([getattr(clutch.parameters(PROTOCOL_PRESSURES, state), name) for state in states], axis=1)
+        expected = np.stack([getattr(clutch.parameters(pressures, state), name) for state in states], axis=1)
+        assert over_pressure(name, PROTOCOL_PRESSURES, values, pressures) == pytest.approx(expected, rel=1e-3)

@@ -1,4 +1,4 @@
-"""Dynamic Stribeck tests as a rig would record them, for the tests of loops and lag; made apart from `models.loops.lag`.
+"""Dynamic Stribeck tests as a rig would record them, for the tests of loops and lag; made apart from `models.loops`.
 
 The torque comes from scipy's stiff integrator on the laws as they are written in the paper, over a run-in before the
 record starts; the rest (noise, jitter, lost samples, spikes) is what recorders do.
@@ -131,3 +131,13 @@ def record(
         keep = rng.random(p.size) >= lost
         time, p, speed, m = time[keep], p[keep], speed[keep], m[keep]
     return Record(time=time, pressure=p, speed=speed, torque=m)
+
+
+#: A fine clock over two periods of the swing, of which the last is taken.
+FINE = np.linspace(-10.0, 10.0, 20_001)
+PERIOD = slice(10_000, None)
+
+
+def dense_area(torque: np.ndarray) -> float:
+    """Eq. 8 by trapezoids over the last period of FINE."""
+    return float(np.trapezoid(torque[PERIOD], velocity(FINE)[PERIOD]))

@@ -14,7 +14,8 @@ from models.prognosis.first_passage import (
     PassageStatus,
     bands,
     ends_of_life,
-    first_passage,
+    first_below,
+    predict_first_passage,
     weighted_quantiles,
 )
 from models.tracking.discrepancy import FUTURE, PAST, Discrepancy
@@ -44,7 +45,7 @@ def numbers(passage: FirstPassage) -> list[float]:
 
 def test_a_certain_life_by_hand() -> None:
     """Δ = -1, ε = 1: 1/(1 + ζ/φ) = 1/2 at ζ = φ."""
-    passage = first_passage(sample([-1.0]), fraction=0.5, as_of=250.0)
+    passage = predict_first_passage(sample([-1.0]), fraction=0.5, as_of=250.0)
     assert list(passage.end_of_life) == list(QUANTILES)
     assert all(x == pytest.approx(1_000.0) for x in passage.end_of_life.values())
     assert all(x == pytest.approx(750.0) for x in passage.remaining.values())
@@ -55,7 +56,7 @@ def test_a_certain_life_by_hand() -> None:
 
 
 def test_remaining_life_is_never_negative() -> None:
-    passage = first_passage(sample([-1.0]), fraction=0.5, as_of=2_000.0)
+    passage = predict_first_passage(sample([-1.0]), fraction=0.5, as_of=2_000.0)
     assert set(passage.remaining.values()) == {0.0}
     assert passage.status is PassageStatus.REACHED
 
@@ -63,13 +64,13 @@ def test_remaining_life_is_never_negative() -> None:
 def test_half_of_the_probability_decides_what_is_reached() -> None:
     """Ends of life 1,000 (Δ = -1) and never (Δ = -0.4)."""
     for weight, status in ((0.5, "reached"), (0.49, "may_never_reach")):
-        passage = first_passage(sample([-1.0, -0.4], [weight, 1.0 - weight]), fraction=0.5, as_of=1_001.0)
+        passage = predict_first_passage(sample([-1.0, -0.4], [weight, 1.0 - weight]), fraction=0.5, as_of=1_001.0)
         assert passage.status == status
         assert passage.probability_of_reaching == pytest.approx(weight)
 
 
 def test_a_quantile_beyond_the_horizon_is_none() -> None:
-    passage = first_passage(sample([-1.0] * 60 + [-0.4] * 40), fraction=0.5, as_of=0.0)
+    passage = predict_first_passage(sample([-1.0] * 60 + [-0.4] * 40), fraction=0.5, as_of=0.0)
     assert passage.status == "may_never_reach"
     assert passage.probability_of_reaching == pytest.approx(0.6)
     assert passage.end_of_life[0.5] == pytest.approx(1_000.0)
@@ -78,10 +79,10 @@ def test_a_quantile_beyond_the_horizon_is_none() -> None:
 
 
 def test_beyond_the_horizon_counts_as_not_reached() -> None:
-    passage = first_passage(sample([-1.0], scale=2e6), fraction=0.5, as_of=0.0)
+    passage = predict_first_passage(sample([-1.0], scale=2e6), fraction=0.5, as_of=0.0)
     assert set(passage.end_of_life.values()) == {None}
     assert passage.probability_of_reaching == 0.0
-    assert first_passage(sample([-1.0], scale=2e6), fraction=0.5, as_of=0.0, horizon=3e6).status == "predicted"
+    assert predict_first_passage(sample([-1.0], scale=2e6), fraction=0.5, as_of=0.0, horizon=3e6).status == "predicted"
 
 
 def test_the_threshold_is_each_draws_own() -> None:
@@ -105,7 +106,7 @@ def test_the_threshold_is_each_draws_own() -> None:
     st.floats(1e-3, 1e9),
 )
 def test_nothing_that_json_cannot_carry(change: list[float], fraction: float, as_of: float, scale: float) -> None:
-    passage = first_passage(sample(change, scale=scale), fraction=fraction, as_of=as_of)
+    passage = predict_first_passage(sample(change, scale=scale), fraction=fraction, as_of=as_of)
     assert all(math.isfinite(x) for x in numbers(passage))
     ends = [math.inf if x is None else x for x in passage.end_of_life.values()]
     assert ends == sorted(ends)
@@ -138,7 +139,7 @@ def test_weights_matter_and_order_does_not() -> None:
 )
 def test_arguments_out_of_range(arguments: dict[str, float], message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        first_passage(sample([-1.0]), **arguments)
+        predict_first_passage(sample([-1.0]), **arguments)
 
 
 def beside(draws: Posterior, size: float, curvature: list[float], step: float = 0.0, at: float = 0.0) -> Posterior:
@@ -180,10 +181,10 @@ def test_a_bend_by_hand() -> None:
 def test_an_offset_is_part_of_the_criterion() -> None:
     """ξ + offset <= half of (ξ0 + offset(0)): 1/(1 + u) + 0.2 = 0.6 at u = 1.5; a step from 0 to 0.2 at 100: 7/3."""
     draws = sample([-1.0])
-    always = first_passage(draws, fraction=0.5, as_of=0.0, offset=lambda z: np.full(z.size, 0.2))
+    always = predict_first_passage(draws, fraction=0.5, as_of=0.0, offset=lambda z: np.full(z.size, 0.2))
     assert always.end_of_life[0.5] == pytest.approx(1_500.0, rel=1e-3)
     assert (always.initial, always.current[0]) == (pytest.approx(1.2), pytest.approx(1.2))
-    later = first_passage(draws, fraction=0.5, as_of=250.0, offset=lambda z: 0.2 * (z > 100.0))
+    later = predict_first_passage(draws, fraction=0.5, as_of=250.0, offset=lambda z: 0.2 * (z > 100.0))
     assert later.end_of_life[0.5] == pytest.approx(1_000.0 * (1.0 / 0.3 - 1.0), rel=1e-3)
     assert later.current[0] == pytest.approx(1.0)
 
@@ -210,6 +211,13 @@ def test_the_median_of_two_equal_draws_lies_between_them() -> None:
 
 def test_a_horizon_before_now_is_now() -> None:
     """Reached at 1,000, asked at 2,000 with a horizon of 500: it has been reached, for sure."""
-    passage = first_passage(sample([-1.0]), fraction=0.5, as_of=2_000.0, horizon=500.0)
+    passage = predict_first_passage(sample([-1.0]), fraction=0.5, as_of=2_000.0, horizon=500.0)
     assert passage.probability_of_reaching == 1.0
     assert passage.end_of_life[0.5] == pytest.approx(1_000.0)
+
+
+def test_first_below_is_straight_between_places_and_inf_where_never() -> None:
+    paths = np.array([[1.0, 0.4, 1.0], [0.6, 0.3, 0.9], [0.2, 0.1, 0.8]])
+    found = first_below(paths, np.array([0.0, 10.0, 30.0]), np.full(3, 0.5))
+    assert found[:2] == pytest.approx([15.0, 0.0])
+    assert np.isinf(found[2])

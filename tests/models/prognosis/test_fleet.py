@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from models.degradation.general_order import Degradation, value
+from models.prognosis.criteria import FEWEST_TESTS_TO_LEARN
 from models.prognosis.first_passage import ends_of_life
-from models.prognosis.fleet import FEWEST_TESTS, FleetPrior, learn, pooled
+from models.prognosis.fleet import FleetPrior, fit_population, learn, pooled, population, taught
 from models.prognosis.scoring import crps_of_sample
 from models.tracking import linear_model
 from models.tracking.filters.grid import Grid
@@ -68,10 +69,22 @@ def test_it_survives_json_and_counts_in_other_units() -> None:
     assert math.exp(shifted.log_scale_mean) == pytest.approx(0.5 * math.exp(found.prior_for(first).log_scale_mean))
 
 
+def test_a_population_says_whether_it_has_converged() -> None:
+    rng = np.random.default_rng(3)
+    samples = [taught(measured(life(rng, 5000.0), 15_000.0, 14, rng)) for _ in range(3)]
+    fit = fit_population(samples)
+    assert fit.converged
+    # further rounds leave it where it is, and a single one does not reach it
+    further = fit_population(samples, rounds=80).prior
+    assert fit.prior.mean == pytest.approx(further.mean, abs=0.01 * float(np.sqrt(np.diag(further.scale)).min()))
+    assert not fit_population(samples, rounds=1).converged
+    assert (population(samples).mean == fit.prior.mean).all()
+
+
 def test_too_few_tests_teach_nothing() -> None:
     rng = np.random.default_rng(4)
-    with pytest.raises(ValueError, match=f"{FEWEST_TESTS} tests or more"):
-        learn([measured(life(rng, 5000.0), 9000.0, FEWEST_TESTS - 1, rng)])
+    with pytest.raises(ValueError, match=f"{FEWEST_TESTS_TO_LEARN} tests or more"):
+        learn([measured(life(rng, 5000.0), 9000.0, FEWEST_TESTS_TO_LEARN - 1, rng)])
 
 
 def crps(posterior: Posterior, truth: float) -> float:
@@ -121,8 +134,8 @@ def test_the_mixture_is_that_of_importance_sampling() -> None:
     prior = fleet(6, 8)
     truth = life(rng, 5000.0)
     seen = [replace(m, variance=(0.003 * m.value) ** 2) for m in measured(truth, 3000.0, 3, rng)]
-    believed = replace(weak(seen[0], falling=True), spoiled_share=0.0, law_share=1.0)
-    learned = replace(prior.prior_for(seen[0]), spoiled_share=0.0, law_share=1.0)
+    believed = replace(weak(seen[0], falling=True), outlying_share=0.0, law_share=1.0)
+    learned = replace(prior.prior_for(seen[0]), outlying_share=0.0, law_share=1.0)
     under = [GRID.posterior(GRID.from_history(each, seen), 4000, rng) for each in (believed, learned)]
     mixed = prior.together(under[0], under[1], seen[0])
     reference = _brute(prior, seen, rng)

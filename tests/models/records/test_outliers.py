@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from models.records.outliers import OUTLIER_SHARE, beside, inliers, near
+from models.records.criteria import OUTLIER_SHARE
+from models.records.outliers import beside, inliers, near
 
 
 def noisy(count: int = 400) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

@@ -194,14 +194,14 @@ def test_a_single_dwell_that_settles_and_one_that_does_not():
 
 
 @pytest.mark.parametrize(("memory", "flagged"), [(0.8, True), (0.95, True), (0.5, False), (0.0, False)])
-def test_noise_that_remembers_for_too_long_is_flagged(memory, flagged):
+def test_noise_autocorrelated_for_too_long_is_flagged(memory, flagged):
     """At 10 Hz a dwell holds 50 samples: a memory of 0.8 leaves five independent ones."""
     rng = np.random.default_rng(18)
     made = make(*protocol(rng, SPEEDS[::2]), rng, rate=10.0, tau=0.1, sensors=Sensors(memory=memory))
     assert ("slow_noise" in codes(cut_plateaus(made.record))) is flagged
 
 
-def test_drift_is_told():
+def test_drift_is_reported():
     rng = np.random.default_rng(17)
     t = np.arange(0, 60, 0.01)
     torque = 20 + 0.05 * np.sin(t) + 0.003 * t + 0.02 * rng.standard_normal(t.size)

@@ -1,119 +1,47 @@
-"""Where pressure stands: loops whose pressure moves slowly between levels, against the same loops with steps."""
-
-import math
-from dataclasses import replace
+"""Levels of pressure among nominal and among scattered pressures."""
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from models.loops.loops import evaluate_loops
-from models.records.pressure_levels import pressure_stretches
-from models.records.runs import LEVEL_GAP, Record
-from models.rig.recorder import EXACT, Recorder
-from models.rig.sampled import DynamicTest
-from models.rig.stationary import Sensor
-from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
+from models.records.criteria import LEVEL_GAP
+from models.records.pressure_levels import level_width, levels_of
 
-CLUTCH = SimulatedClutch()
-NO_SCATTER = Sensor(gain_scatter=0.0)
+NOMINAL = np.repeat(np.arange(4.0, 7.01, 0.5) * 1e5, 40)
 
 
-def recorded(step: float, *, paused: bool, recorder: Recorder = EXACT) -> Record:
-    """A dynamic test with `step` s from level to level, in which the speed swings on or waits at its mean."""
-    test = DynamicTest(step=step, recorder=recorder)
-    time, pressure, speed = test.course()
-    if paused:
-        block = test.duration + step
-        turn = np.minimum((time / block).astype(int), PROTOCOL_PRESSURES.size - 1)
-        swung = turn * test.duration + np.clip(time - turn * block, 0, test.duration)
-        speed = test.offset + test.amplitude * np.sin(2 * math.pi * test.frequency * swung)
-    torque = CLUTCH.moving_torque(time, CLUTCH.geometry.sliding_velocity(speed), pressure, 0.0)
-    rng = np.random.default_rng(4)
-    record = replace(recorder, memory=0.0).record(time, pressure, speed, torque, rng, NO_SCATTER)
-    return Record(time=record.time, pressure=record.pressure, speed=record.speed, torque=record.torque)
+@pytest.mark.parametrize(("pressure", "width"), [(0.0, LEVEL_GAP), (4e5, LEVEL_GAP), (8e5, 0.2e5)])
+def test_a_level_is_as_wide_as_the_gap_or_its_share_of_the_pressure(pressure, width):
+    assert level_width(pressure) == pytest.approx(width)
 
 
-def areas(record: Record) -> np.ndarray:
-    found = evaluate_loops(record, CLUTCH.geometry, None)
-    assert [loop.pressure for loop in found] == PROTOCOL_PRESSURES.tolist()
-    return np.array([loop.area for loop in found])
+def test_nominal_pressures_are_their_own_levels():
+    np.testing.assert_array_equal(levels_of(NOMINAL), NOMINAL)
 
 
-@pytest.fixture(scope="module")
-def stepped() -> np.ndarray:
-    """The areas where pressure comes to its next level within two samples."""
-    return areas(recorded(0.02, paused=False))
+def test_scattered_pressures_find_their_level():
+    """0.02 bar of scatter about steps of 0.5 bar."""
+    measured = NOMINAL + np.random.default_rng(1).normal(0.0, 0.02e5, NOMINAL.size)
+    np.testing.assert_allclose(levels_of(measured), NOMINAL)
 
 
-@pytest.mark.parametrize("step", [0.5, 3.0, 10.0, 30.0])
-@pytest.mark.parametrize("paused", [False, True])
-def test_areas_do_not_depend_on_how_slowly_pressure_moves(step, paused, stepped):
-    found = areas(recorded(step, paused=paused))
-    assert np.abs(found / stepped - 1).max() < 0.035
+def test_levels_that_are_close_but_repeated_stay_apart():
+    """Nominal values of 5.00 and 5.05 bar in three rows each are two levels."""
+    pressure = np.repeat([5.00e5, 5.05e5], 3)
+    assert np.unique(levels_of(pressure)).tolist() == [5.00e5, 5.05e5]
 
 
-def test_a_recorder_with_noise(stepped):
-    record = recorded(3.0, paused=False, recorder=Recorder(torque_noise=0.01))
-    assert np.abs(areas(record) / stepped - 1).max() < 0.05
-    # the control: with all that lies within a level's gap, the areas would be off by a fifth and more
-    t, p = record.time, record.pressure
-    worst = 0.0
-    for stretch, area in zip(pressure_stretches(t, p), stepped, strict=True):
-        wide = np.flatnonzero(np.abs(p - stretch.pressure) < LEVEL_GAP)
-        all_of_it = replace_pressure(record, slice(wide[0], wide[-1] + 1), stretch.pressure)
-        worst = max(worst, abs(evaluate_loops(all_of_it, CLUTCH.geometry, None)[0].area / area - 1))
-    assert worst > 0.2
+def test_a_level_far_from_a_step_keeps_its_own_name():
+    assert levels_of(np.array([4.975e5, 4.976e5, 4.977e5])).tolist() == [497600.0] * 3
 
 
-def replace_pressure(record: Record, rows: slice, pressure: float) -> Record:
-    """Those rows, as if they had been at one pressure."""
-    count = record.time[rows].size
-    return Record(
-        time=record.time[rows],
-        pressure=np.full(count, pressure),
-        speed=record.speed[rows],
-        torque=record.torque[rows],
-    )
+def test_one_row_is_one_level():
+    assert levels_of(np.array([5.01e5])).tolist() == [5e5]
 
 
-def test_a_pressure_that_wanders_keeps_its_ends():
-    """A ripple of 0.03 bar all through, counts of 0.05 bar: nothing is cut off, nothing is split."""
-    time = np.arange(1500) / 100
-    rng = np.random.default_rng(5)
-    for pressure in (
-        5e5 + 3e3 * np.sin(2 * math.pi * 0.1 * time) + 500 * rng.standard_normal(1500),
-        np.round((5e5 + 2e3 * rng.standard_normal(1500)) / 5e3) * 5e3,
-    ):
-        (found,) = pressure_stretches(time, pressure)
-        assert found.start < 5
-        assert found.stop > 1495
-
-
-def test_a_ramp_is_no_level():
-    """But for what the record's end leaves of it, which is too little to be told from a level that drifts."""
-    time = np.arange(6000) / 100
-    longest = max((s.stop - s.start for s in pressure_stretches(time, np.linspace(4e5, 5e5, 6000))), default=0)
-    assert longest < 500
-    # the control: as long, and standing
-    (standing,) = pressure_stretches(time, np.full(6000, 4e5))
-    assert standing.stop - standing.start == 6000
-
-
-@pytest.mark.parametrize("step", [0.02e5, 0.03e5, 0.05e5, 0.1e5])
-@pytest.mark.parametrize("count", [5, 7])
-def test_levels_closer_than_a_gap_are_cut_without_harm(step: float, count: int) -> None:
-    """Some merge, some are taken for a ramp; none reaches beyond the record or is empty."""
-    pressure = np.repeat(0.4e5 + step * np.arange(count), 2001)
-    found = list(pressure_stretches(np.arange(pressure.size) / 60, pressure))
-    assert all(0 <= each.start < each.stop <= pressure.size for each in found)
-
-
-def test_stretches_of_pressure():
-    time = np.arange(4000) / 100
-    pressure = np.concatenate([np.full(1500, 4e5), np.linspace(4e5, 4.5e5, 200), np.full(2300, 4.5e5)])
-    pressure = pressure + 2e3 * np.random.default_rng(0).standard_normal(4000)
-    found = list(pressure_stretches(time, pressure))
-    assert [round(s.pressure / 1e5, 1) for s in found] == [4.0, 4.5]
-    assert abs(found[0].stop - 1500) < 60
-    assert abs(found[1].start - 1700) < 60
-    assert (found[0].start, found[1].stop) == (0, 4000)
+@given(st.permutations(range(28)))
+def test_the_order_of_rows_does_not_matter(order):
+    measured = np.repeat(np.arange(4.0, 7.01, 0.5) * 1e5, 4)
+    measured = measured + np.random.default_rng(2).normal(0.0, 0.02e5, measured.size)
+    np.testing.assert_array_equal(levels_of(measured[order]), levels_of(measured)[order])

@@ -1,12 +1,10 @@
-"""Plateaus check themselves; pressure levels are found in scattered pressures."""
+"""Plateaus check themselves, and a curve holds the rows of its pressure level."""
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from models.clutch import Geometry
-from models.records.runs import Plateaus, curves_by_pressure, pressure_levels
+from models.records.runs import Plateaus, curves_by_pressure
 
 NOMINAL = np.repeat(np.arange(4.0, 7.01, 0.5) * 1e5, 40)
 
@@ -15,37 +13,6 @@ def plateaus(pressure, /, **changes):
     n = len(pressure)
     columns = {"speed": np.linspace(2, 206, n), "torque": np.full(n, 20.0)}
     return Plateaus(**({"pressure": np.asarray(pressure)} | columns | changes))
-
-
-def test_nominal_pressures_are_their_own_levels():
-    np.testing.assert_array_equal(pressure_levels(NOMINAL), NOMINAL)
-
-
-def test_scattered_pressures_find_their_level():
-    """0.02 bar of scatter about steps of 0.5 bar."""
-    measured = NOMINAL + np.random.default_rng(1).normal(0.0, 0.02e5, NOMINAL.size)
-    np.testing.assert_allclose(pressure_levels(measured), NOMINAL)
-
-
-def test_levels_that_are_close_but_repeated_stay_apart():
-    """Nominal values of 5.00 and 5.05 bar in three rows each are two levels."""
-    pressure = np.repeat([5.00e5, 5.05e5], 3)
-    assert np.unique(pressure_levels(pressure)).tolist() == [5.00e5, 5.05e5]
-
-
-def test_a_level_far_from_a_step_keeps_its_own_name():
-    assert pressure_levels(np.array([4.975e5, 4.976e5, 4.977e5])).tolist() == [497600.0] * 3
-
-
-def test_one_row_is_one_level():
-    assert pressure_levels(np.array([5.01e5])).tolist() == [5e5]
-
-
-@given(st.permutations(range(28)))
-def test_the_order_of_rows_does_not_matter(order):
-    measured = np.repeat(np.arange(4.0, 7.01, 0.5) * 1e5, 4)
-    measured = measured + np.random.default_rng(2).normal(0.0, 0.02e5, measured.size)
-    np.testing.assert_array_equal(pressure_levels(measured[order]), pressure_levels(measured)[order])
 
 
 def test_curves_hold_their_rows_in_order():

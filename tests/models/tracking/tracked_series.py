@@ -44,5 +44,5 @@ def same(a: Any, b: Any) -> bool:
 
 CAMPAIGN = series(TYPICAL, np.linspace(0.0, 12_000.0, 13), 4e-4)
 PRIOR = weak(CAMPAIGN[0], falling=True)
-#: Eq. 6 for sure, and no run is ever spoiled.
-PLAIN = replace(PRIOR, law_share=1.0, spoiled_share=0.0)
+#: Eq. 6 for sure, and no run is ever outlying.
+PLAIN = replace(PRIOR, law_share=1.0, outlying_share=0.0)

@@ -24,9 +24,9 @@ from models.diagnosis.detection.raw_records.settling_transient import approach
 from models.diagnosis.detection.raw_records.shaft_orders import Line, best_order
 from models.diagnosis.detection.raw_records.whitened_torque import Swings, swings
 from models.diagnosis.report.report import Estimate
+from models.records.criteria import SETTLING
 from models.records.plateaus import PlateauCut, cut_plateaus
 from models.records.runs import Record
-from models.records.settling import SETTLING
 
 #: Log likelihood ratio [nats] from which a swing counts as evidence; noise makes it in a campaign of a thousand or fewer.
 SEEN = 4.5

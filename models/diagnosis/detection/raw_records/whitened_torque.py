@@ -22,8 +22,9 @@ from scipy.signal import lfilter
 
 from models.arrays import FloatArray
 from models.records.cleaning import clean
-from models.records.pressure_levels import pressure_stretches
-from models.records.runs import LEVEL_GAP, LEVEL_GAP_SHARE, Record
+from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE
+from models.records.pressure_stretches import pressure_stretches
+from models.records.runs import Record
 
 #: A speed that goes this share of its highest the other way reverses; torque has settled so long [s] after.
 REVERSES, TURNED = 0.03, 1.0

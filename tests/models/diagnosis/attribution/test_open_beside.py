@@ -16,7 +16,7 @@ from models.diagnosis.experiments.candidates import with_trial
 from models.diagnosis.extension import build_extension
 from models.diagnosis.pooled_fit.gauss_newton import Fitted, fit, priors_of
 from models.diagnosis.pooled_fit.starts import starting_laws
-from models.records.runs import UNLOADED
+from models.records.criteria import UNLOADED
 from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.fitted import Study, study
 

@@ -1,4 +1,4 @@
-"""The baseline: its derivatives against differences, its curve and loops against `friction.stribeck` and `loops.lag`."""
+"""The baseline: its derivatives against differences, its curve and loops against `stribeck` and `loops.attractor`."""
 
 from dataclasses import replace
 
@@ -29,7 +29,7 @@ from models.diagnosis.noise.estimate import first_noise
 from models.diagnosis.pooled_fit.gauss_newton import fit, priors_of
 from models.diagnosis.pooled_fit.starts import starting_laws
 from models.friction.stribeck import StribeckParameters, torque
-from models.loops.lag import attractor_torque
+from models.loops.attractor import attractor_torque
 from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.fitted import checked_jacobian
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.diagnosis.design.points import Points, joined, opened
-from models.records.runs import UNLOADED
+from models.records.criteria import UNLOADED
 
 _INTEGERS = {"run", "loop", "previous"}
 

@@ -1,4 +1,4 @@
-"""The simulated rig against what the reference says of the real one, and against itself: same seed, same bits."""
+"""The simulated clutch against its equations written out by hand, and against what the reference says of the real one."""
 
 import itertools
 import math
@@ -7,14 +7,17 @@ import numpy as np
 import pytest
 
 from models.clutch import Geometry
+from models.friction.stribeck import torque
 from models.records.runs import curves_by_pressure
-from models.rig.campaign import simulate, simulated_clutch
-from models.rig.simulated_runs import RunKind, SimulatedRun
-from models.rig.stationary import NOISELESS, Sensor, stationary_test
+from models.rig.stationary import NOISELESS, stationary_test
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch, draw
 
 RPM = 2 * math.pi / 60
+
+
 SPEEDS = np.arange(20, 1971, 50) * RPM
+
+
 BAR = 1e5
 
 
@@ -185,105 +188,12 @@ def test_parameters_refuse_what_no_clutch_has(nominal, pressure, cycles, rule):
         nominal.parameters(pressure, cycles)
 
 
-class TestStationaryTest:
-    def test_rows_stand_in_the_references_order(self, nominal):
-        plateaus = stationary_test(nominal, 0, np.random.default_rng(0))
-        assert plateaus.pressure.reshape(7, 40)[:, 0] / BAR == pytest.approx([4, 4.5, 5, 5.5, 6, 6.5, 7])
-        assert np.ptp(plateaus.pressure.reshape(7, 40), axis=1).max() == 0
-        assert plateaus.speed.reshape(7, 40)[3] / RPM == pytest.approx(np.arange(20, 1971, 50))
-        assert len(curves_by_pressure(plateaus, Geometry())) == 7
-
-    def test_noise_is_what_was_asked_for(self, nominal):
-        exact = stationary_test(nominal, 0, np.random.default_rng(0), NOISELESS).torque
-        sensor = Sensor(noise=0.01, floor=0.0, gain_scatter=0.05, torque_counts=0.0)
-        ratios = np.array(
-            [stationary_test(nominal, 0, np.random.default_rng(s), sensor).torque / exact for s in range(300)]
-        )
-        # 300 runs know a deviation to 4 % (one sigma), 84,000 plateaus to 0.25 %; four sigma each.
-        assert ratios.mean(axis=1).std() == pytest.approx(0.05, rel=0.16)
-        assert (ratios / ratios.mean(axis=1, keepdims=True)).std() == pytest.approx(0.01, rel=0.01)
-
-    def test_the_floor_is_all_that_is_left_without_noise(self, nominal):
-        exact = stationary_test(nominal, 0, np.random.default_rng(0), NOISELESS).torque
-        sensor = Sensor(noise=0.0, floor=0.02, gain_scatter=0.0)
-        left = np.concatenate(
-            [stationary_test(nominal, 0, np.random.default_rng(s), sensor).torque - exact for s in range(20)]
-        )
-        assert left.std() == pytest.approx(0.02, rel=0.04)  # 5600 values, four sigma
-
-    def test_torque_is_recorded_in_counts(self, nominal):
-        recorded = stationary_test(nominal, 0, np.random.default_rng(0), Sensor(torque_counts=100.0)).torque
-        assert np.array_equal(recorded, np.round(recorded, 2))
-
-    def test_oil_temperature_is_recorded_and_does_not_act(self, nominal):
-        for seed in range(20):
-            plateaus = stationary_test(nominal, 0, np.random.default_rng(seed), NOISELESS)
-            assert plateaus.oil_temperature.min() >= 273.15 + 80
-            assert plateaus.oil_temperature.max() <= 273.15 + 90
-            assert np.ptp(plateaus.oil_temperature) > 1
-            assert np.array_equal(
-                plateaus.torque, stationary_test(nominal, 0, np.random.default_rng(99), NOISELESS).torque
-            )
-
-    @pytest.mark.parametrize("setting", ["noise", "floor", "gain_scatter", "torque_counts", "temperature_counts"])
-    def test_a_sensor_refuses_what_is_no_deviation(self, setting):
-        with pytest.raises(ValueError, match=f"{setting} must be finite and not negative, got -1"):
-            Sensor(**{setting: -1.0})
+CLUTCH = SimulatedClutch()
 
 
-def bits(run):
-    columns = () if run.plateaus is None else (run.plateaus.torque.tobytes(), run.plateaus.oil_temperature.tobytes())
-    return run.run_id, run.kind, run.cycles, run.duty, columns
-
-
-class TestCampaign:
-    def test_runs_come_in_rig_order(self):
-        runs = list(itertools.islice(simulate(7), 8))
-        assert [(run.run_id, run.kind.value, run.cycles) for run in runs] == [
-            ("sim-7-run-in-00000", "run_in", 0),
-            ("sim-7-stationary-00000", "stationary_stribeck", 0),
-            ("sim-7-duty-00500", "duty_cycles", 500),
-            ("sim-7-stationary-00500", "stationary_stribeck", 500),
-            ("sim-7-duty-01000", "duty_cycles", 1000),
-            ("sim-7-stationary-01000", "stationary_stribeck", 1000),
-            ("sim-7-duty-02000", "duty_cycles", 2000),
-            ("sim-7-stationary-02000", "stationary_stribeck", 2000),
-        ]
-        assert [run.duty.cycles for run in runs if run.duty] == [200, 500, 500, 1000]
-        assert runs[0].duty.initial_speed == pytest.approx(1200 * RPM)
-        assert runs[2].duty.initial_speed == pytest.approx(2000 * RPM)
-        assert runs[2].duty.maximum_pressure == 8 * BAR
-
-    def test_ends_with_the_first_test_below_the_stop(self):
-        for seed in range(5):
-            clutch = simulated_clutch(seed)
-            tests = [run.cycles for run in simulate(seed) if run.kind is RunKind.STATIONARY_STRIBECK]
-            share = clutch.mean_cofs(np.array(tests, dtype=float)) / clutch.mean_cof(0)
-            assert (share[:-1] >= 0.45).all()
-            assert share[-1] < 0.45 or len(tests) == 40
-            assert clutch.end_of_life() < tests[-1]
-
-    def test_ends_after_the_most_tests(self):
-        tests = [run for run in simulate(7, most_tests=3) if run.plateaus is not None]
-        assert [run.cycles for run in tests] == [0, 500, 1000]
-
-    def test_the_same_seed_gives_the_same_bits_and_another_does_not(self):
-        first, again, other = ([bits(run) for run in itertools.islice(simulate(seed), 12)] for seed in (7, 7, 8))
-        assert first == again
-        assert all(a[4] != b[4] for a, b in zip(first, other, strict=True) if a[4])
-        assert len({run[4] for run in first if run[4]}) == 6  # no two tests share their noise
-
-    def test_a_given_clutch_is_the_one_that_is_measured(self, nominal):
-        run = next(run for run in simulate(3, clutch=nominal, sensor=NOISELESS) if run.plateaus is not None)
-        assert np.array_equal(run.plateaus.torque, np.concatenate(list(curves(nominal, 0).values())))
-
-    @pytest.mark.parametrize("wrong", [{"seed": -1}, {"stop_fraction": 1.0}, {"most_tests": 0}])
-    def test_refuses_nonsense_before_the_first_run(self, wrong):
-        with pytest.raises(ValueError, match=next(iter(wrong))):
-            simulate(**{"seed": 1, **wrong})
-
-    def test_a_simulated_run_says_so_and_carries_one_thing(self):
-        with pytest.raises(ValueError, match="must start with sim-"):
-            SimulatedRun(run_id="bench-7", kind=RunKind.RUN_IN, cycles=0)
-        with pytest.raises(ValueError, match="must carry plateaus"):
-            SimulatedRun(run_id="sim-7", kind=RunKind.STATIONARY_STRIBECK, cycles=0)
+def test_the_clutch_transfers_what_its_curve_says_and_less_below_its_lowest_pressure() -> None:
+    capacity = CLUTCH.capacity(2000.0)
+    at = float(torque(np.array(3.0), CLUTCH.parameters(6e5, 2000.0)))
+    lowest = float(torque(np.array(3.0), CLUTCH.parameters(4e5, 2000.0)))
+    assert capacity(6e5, 3.0) == pytest.approx(at)
+    assert capacity(1e5, 3.0) == pytest.approx(lowest / 4)

@@ -1,4 +1,4 @@
-"""What has been measured so far, as columns."""
+"""All measurements of a quantity so far, as columns."""
 
 import math
 from collections.abc import Sequence
@@ -10,9 +10,9 @@ from models.arrays import FloatArray
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
 
-#: Values are told apart to this share of the prior's deviations. Where a series is free of noise its likelihood grows
+#: Values are resolved to this share of the prior's deviations. Where a series is free of noise its likelihood grows
 #: without bound as the scatter vanishes, and differences of sums weighted by 1/s² would be rounding alone.
-RESOLUTION = 1e-6
+_RESOLUTION = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +49,7 @@ class History:
     def steps(self) -> FloatArray:
         """The progress at which each epoch after the first begins, as far as it was measured [e]."""
         later = np.unique(self.epoch)[1:]
-        return np.array([self.progress[self.epoch >= each].min() for each in later], dtype=np.float64)
+        return np.array([self.progress[self.epoch >= epoch].min() for epoch in later], dtype=np.float64)
 
     def to_arrays(self) -> dict[str, FloatArray]:
         """The columns by name."""
@@ -62,5 +62,5 @@ class History:
 
 
 def _row(measurement: Measurement, prior: Prior) -> tuple[float, float, float, int]:
-    resolution = RESOLUTION * math.hypot(prior.initial_sd, prior.change_sd)
+    resolution = _RESOLUTION * math.hypot(prior.initial_sd, prior.change_sd)
     return measurement.progress, measurement.value, measurement.variance + resolution**2, measurement.epoch

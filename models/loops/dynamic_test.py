@@ -2,8 +2,8 @@
 
 A record holds several pressures one after another, each with one period and a half or more of a swinging speed. The last
 whole periods of each give the loop area of eq. 8 (`loops.loop_area`) and, given the state's stationary curve, the
-attractor C and the film time τ_1 of the two laws of lag (`loops.lag`, `loops.lag_fit`). Which law describes the loop
-better is said where the likelihoods tell; neither is thereby true.
+attractor C and the film time τ_1 of the two laws of lag (`loops.attractor`, `loops.squeeze_film`, `loops.lag_fit`). Which
+law describes the loop better is stated where the likelihoods differ by enough; neither is thereby true.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, sections 2.3.4 and 3.2.
 """
@@ -18,23 +18,18 @@ import numpy as np
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.friction.stribeck import torque as stationary_torque
+from models.loops.criteria import FEWEST_SAMPLES, LEAST_CURVE, REVERSES, TELLING
 from models.loops.lag_fit import ATTRACTOR, SQUEEZE_FILM, LagFit, LagStatus, StationaryCurve, fit_lag
-from models.loops.loop_area import LEAST_SAMPLES, Area, Direction, Samples, area_of, clean_samples
+from models.loops.loop_area import Area, Direction, Samples, area_of, clean_samples
 from models.records.periods import Cycle, fit_cycle
-from models.records.pressure_levels import pressure_stretches
-from models.records.runs import LEVEL_GAP, LEVEL_GAP_SHARE, Record, pressure_levels
-
-#: A speed whose lowest is below minus this share of its swing reverses.
-REVERSES = 0.02
-#: Log likelihoods apart by this much tell one law from the other.
-TELLING = 5.0
-#: A stationary curve below this share of the measured torque is none to lag behind.
-_LEAST_SHARE = 0.01
+from models.records.pressure_levels import level_width, levels_of
+from models.records.pressure_stretches import pressure_stretches
+from models.records.runs import Record
 
 
 class LoopStatus(StrEnum):
     """DETERMINED, UNRESOLVED, AGAINST_THE_LAW are the attractor's; NO_CURVE: no stationary curve at this pressure;
-    REVERSES: the speed changes sign, which the laws leave to others; NO_PERIOD: nothing closed to be evaluated."""
+    REVERSES: the speed changes sign, which the laws do not describe; NO_PERIOD: no whole period."""
 
     DETERMINED = "determined"
     UNRESOLVED = "unresolved"
@@ -48,9 +43,10 @@ class LoopStatus(StrEnum):
 class Loop:
     """One pressure of a dynamic test. `pressure` [Pa] names the level, `mean_pressure` [Pa] was measured.
 
-    frequency [Hz], periods, area and area_sd [Nm m/s] are None, 0, None and None where nothing closed. attractor C
-    [Nm/s] and film_time τ_1 [s] with deviations and 90 % intervals (an end None: no bound) are None where the record
-    cannot tell; `better_law` is "attractor", "squeeze film" or None where neither stands out. `message` is a sentence.
+    frequency [Hz], periods, area and area_sd [Nm m/s] are None, 0, None and None where there is no whole period. attractor
+    C [Nm/s] and film_time τ_1 [s] with deviations and 90 % intervals (an end None: no bound) are None where the record does
+    not determine them; `better_law` is "attractor", "squeeze film" or None where neither is clearly better. `message` is a
+    sentence.
     """
 
     pressure: float
@@ -74,10 +70,10 @@ class Loop:
 def evaluate_loops(
     record: Record, geometry: Geometry, stationary: Mapping[float, StationaryCurve] | None
 ) -> tuple[Loop, ...]:
-    """A loop for each stretch of constant pressure, in the record's order; empty where the pressure never stands.
+    """A loop for each stretch of constant pressure, in the record's order; empty where the pressure is never constant.
 
-    `stationary` maps pressure levels [Pa] to the state's stationary curves, whose covariance becomes part of what is said
-    of the lag: the nearest within a level's width is taken; without one there is area and direction and no lag. Times that
+    `stationary` maps pressure levels [Pa] to the state's stationary curves, whose covariance contributes to the lag's
+    deviation: the nearest within a level's width is taken; without one there is area and direction and no lag. Times that
     fall are put in order.
     """
     order = np.argsort(record.time, kind="stable")
@@ -86,7 +82,7 @@ def evaluate_loops(
     loops = []
     for stretch in pressure_stretches(time, pressure):
         rows = slice(stretch.start, stretch.stop)
-        level = float(pressure_levels(np.array([stretch.pressure]))[0])
+        level = float(levels_of(np.array([stretch.pressure]))[0])
         mean = float(pressure[rows].mean())
         loops.append(_loop(level, mean, time[rows], velocity[rows], torque[rows], _nearest(stationary, mean)))
     return tuple(loops)
@@ -95,8 +91,8 @@ def evaluate_loops(
 def _nearest(stationary: Mapping[float, StationaryCurve] | None, pressure: float) -> StationaryCurve | None:
     if not stationary:
         return None
-    level = min(stationary, key=lambda known: abs(known - pressure))
-    return stationary[level] if abs(level - pressure) <= max(LEVEL_GAP, LEVEL_GAP_SHARE * pressure) else None
+    level = min(stationary, key=lambda candidate: abs(candidate - pressure))
+    return stationary[level] if abs(level - pressure) <= level_width(pressure) else None
 
 
 def _loop(
@@ -107,11 +103,11 @@ def _loop(
     torque: FloatArray,
     curve: StationaryCurve | None,
 ) -> Loop:
-    if np.median(velocity) < 0:  # the same swing from the other side: the model is odd, the area keeps
+    if np.median(velocity) < 0:  # the same swing in the other direction: the model is odd, the area unchanged
         velocity, torque = -velocity, -torque
     cycle = fit_cycle(time, velocity)
     samples = None if isinstance(cycle, str) else clean_samples(cycle, time, torque)
-    if isinstance(cycle, str) or samples is None or samples.phase.size < LEAST_SAMPLES:
+    if isinstance(cycle, str) or samples is None or samples.phase.size < FEWEST_SAMPLES:
         return Loop(
             pressure=level,
             mean_pressure=mean_pressure,
@@ -139,7 +135,7 @@ def _loop(
         attractor_interval=None if attractor is None else _inverted(attractor),
         film_time=None if film is None else film.lag,
         film_time_sd=None if film is None or film.lag is None else film.lag_sd,
-        film_time_interval=None if film is None or film.status is LagStatus.AGAINST else _positive(film),
+        film_time_interval=None if film is None or film.status is LagStatus.AGAINST_THE_LAW else _positive(film),
         better_law=None if attractor is None or film is None else _better(attractor, film),
         status=status,
         message=_message(status, area, attractor, film),
@@ -150,7 +146,7 @@ def _lags(
     cycle: Cycle, samples: Samples, curve: StationaryCurve | None
 ) -> tuple[LoopStatus, tuple[LagFit, LagFit] | None]:
     turn = cycle.value(np.linspace(0.0, 2 * np.pi, 361))
-    least = _LEAST_SHARE * float(np.abs(samples.torque).max())
+    least = LEAST_CURVE * float(np.abs(samples.torque).max())
     if curve is None or float(stationary_torque(np.maximum(turn, 0.0), curve.parameters).min()) < least:
         return LoopStatus.NO_CURVE, None
     if float(turn.min()) < -REVERSES * cycle.amplitude:
@@ -163,7 +159,7 @@ def _lags(
 def _inverted(fit: LagFit) -> tuple[float, float | None] | None:
     """The interval of C from that of 1/C; None where no C > 0 is in it."""
     low, high = fit.interval
-    if high <= 0 or fit.status is LagStatus.AGAINST:
+    if high <= 0 or fit.status is LagStatus.AGAINST_THE_LAW:
         return None
     return 1 / high, 1 / low if low > 0 else None
 
@@ -182,15 +178,15 @@ def _better(attractor: LagFit, film: LagFit) -> str | None:
 
 def _message(status: LoopStatus, area: Area, attractor: LagFit | None, film: LagFit | None) -> str:
     """A sentence or two for a person."""
-    said = {
+    sentence = {
         LoopStatus.DETERMINED: "The attractor is determined.",
         LoopStatus.UNRESOLVED: "The record shows no lag by the attractor law beyond its noise: C is bounded from below.",
         LoopStatus.AGAINST_THE_LAW: "Torque lags against what the attractor law can give on this stationary curve.",
-        LoopStatus.NO_CURVE: "No stationary curve of such torque is known at this pressure: the lag laws were not fitted.",
+        LoopStatus.NO_CURVE: "There is no stationary curve of such torque at this pressure: the lag laws were not fitted.",
         LoopStatus.REVERSES: "The speed changes sign: the lag laws, which hold while sliding, were not fitted.",
         LoopStatus.NO_PERIOD: "",
     }[status]
-    parts = [said]
+    parts = [sentence]
     if attractor is not None and film is not None:
         better = _better(attractor, film)
         if better is not None:

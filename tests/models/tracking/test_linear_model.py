@@ -1,4 +1,4 @@
-"""What the filters are made of: the closed form of ξ0 and Δ, the prior, measurements and draws."""
+"""The closed form of ξ0, Δ and the further terms, against the whole normal distribution of the data."""
 
 import math
 from dataclasses import replace
@@ -9,17 +9,23 @@ from scipy.stats import multivariate_normal
 
 from models.degradation.general_order import Degradation, value
 from models.tracking import linear_model, sampling
-from models.tracking.data import History
 from models.tracking.discrepancy import smooth
+from models.tracking.history import History
 from models.tracking.measurement import Measurement
-from models.tracking.prior import Prior, weak
+from models.tracking.prior import weak
 from tests import dense
 
 PROGRESS = np.linspace(0.0, 12_000.0, 13)
+
+
 VALUES = value(PROGRESS, Degradation(initial=0.134, change=-0.1, scale=5_000.0, exponent=0.7))
+
+
 CAMPAIGN = [
     Measurement(progress=float(z), value=float(y), variance=1e-8) for z, y in zip(PROGRESS, VALUES, strict=True)
 ]
+
+
 PRIOR = weak(CAMPAIGN[0], falling=True)
 
 
@@ -28,8 +34,10 @@ POINTS = linear_model.Points(
     log_exponent=np.array([-0.3, 0.4, -1.0]),
     log_scatter=np.array([-8.0, -6.5, -9.0]),
     size=np.array([0.0, 0.03, 0.1]),
-    spoiled=np.eye(13)[:, [4, 4, 12]] * [0.0, 1.0, 1.0],
+    outlying=np.eye(13)[:, [4, 4, 12]] * [0.0, 1.0, 1.0],
 )
+
+
 #: The last four runs come after an event.
 EPOCHS = [replace(each, epoch=int(index > 8)) for index, each in enumerate(CAMPAIGN)]
 
@@ -72,16 +80,16 @@ def test_the_table_and_the_points_are_one_sum() -> None:
     history = History.of(EPOCHS, PRIOR)
     table = linear_model.basis(history.progress[:, None], POINTS.log_scale, POINTS.log_exponent)
     levels = np.array([-8.0, -7.0])
-    kinds, spoiled = np.array([0.0, 0.03]), np.eye(13)[:, [0, 5]]
+    kinds, outlying = np.array([0.0, 0.03]), np.eye(13)[:, [0, 5]]
     tabled = linear_model.evidence(
-        linear_model.tabulated(history, PRIOR, table, np.stack([levels, levels]), kinds, spoiled), PRIOR
+        linear_model.tabulated(history, PRIOR, table, np.stack([levels, levels]), kinds, outlying), PRIOR
     )
     for kind, level in np.ndindex(2, 2):
         points = replace(
             POINTS,
             log_scatter=np.full(3, levels[level]),
             size=np.full(3, kinds[kind]),
-            spoiled=np.repeat(spoiled[:, kind : kind + 1], 3, axis=1),
+            outlying=np.repeat(outlying[:, kind : kind + 1], 3, axis=1),
         )
         pointed = linear_model.evidence(linear_model.pointwise(history, PRIOR, points)[0], PRIOR)
         np.testing.assert_allclose(tabled[kind, level], pointed, rtol=1e-9)
@@ -96,7 +104,7 @@ def test_drawn_terms_have_the_posterior_of_the_discrepancy() -> None:
         log_exponent=np.full(count, 0.4),
         log_scatter=np.full(count, -6.5),
         size=np.full(count, 0.03),
-        spoiled=np.repeat(POINTS.spoiled[:, 1:2], count, axis=1),
+        outlying=np.repeat(POINTS.outlying[:, 1:2], count, axis=1),
     )
     sums, terms = linear_model.pointwise(history, PRIOR, points)
     given = linear_model.conditional(sums, PRIOR)
@@ -113,56 +121,3 @@ def test_drawn_terms_have_the_posterior_of_the_discrepancy() -> None:
     sd = math.sqrt((0.03 * 0.134) ** 2 * dense.integrated(PROGRESS)[-1, -1] - gain @ cross)
     assert at_end.mean() == pytest.approx(gain @ (history.value - mean), abs=4.0 * sd / math.sqrt(count))
     assert at_end.std() == pytest.approx(sd, rel=0.03)
-
-
-def test_a_course_has_the_deviation_that_its_size_says() -> None:
-    """q · size at the end of what was measured (but for the corners of its stretches, 1/72 of it), (ζ/T)^1.5 of it
-    later on, up to ten times as far."""
-    variance = np.square(smooth(np.array([1.0, 4.0, 9.0, 500.0]) * 7e3, 7e3)).sum(axis=1)
-    np.testing.assert_allclose(np.sqrt(variance), [1.0, 8.0, 27.0, 10.0**1.5], rtol=0.015)
-    assert not smooth(np.array([0.0]), 7e3).any()
-
-
-def test_a_prior_survives_its_array_and_checks_itself() -> None:
-    assert Prior.from_array(PRIOR.to_array()) == PRIOR
-    with pytest.raises(ValueError, match="change_sd must be positive"):
-        replace(PRIOR, change_sd=0.0)
-    with pytest.raises(ValueError, match="initial_mean must be finite"):
-        replace(PRIOR, initial_mean=math.nan)
-    with pytest.raises(ValueError, match="spoiled_share must lie within"):
-        replace(PRIOR, spoiled_share=1.0)
-    with pytest.raises(ValueError, match="law_share must lie within"):
-        replace(PRIOR, law_share=0.0)
-
-
-@pytest.mark.parametrize("numbers", [(-1.0, 0.1, 0.0), (0.0, math.nan, 0.0), (0.0, 0.1, -1e-9), (math.inf, 0.1, 0.0)])
-def test_measurements_check_themselves(numbers: tuple[float, float, float]) -> None:
-    with pytest.raises(ValueError, match="must"):
-        Measurement(progress=numbers[0], value=numbers[1], variance=numbers[2])
-
-
-def test_systematic_draws_share_out_the_weights() -> None:
-    weight = np.array([0.5, 0.0, 0.3, 0.2])
-    for offset in (0.0, 0.5, 0.999):
-        assert np.bincount(sampling.systematic(weight, 10, offset), minlength=4).tolist() == [5, 0, 3, 2]
-
-
-def test_spread_points_are_more_even_than_chance() -> None:
-    """The share of 200 corners of the cube: these points err by less than half of what independent ones do."""
-    rng = np.random.default_rng(0)
-    edges = rng.random((200, 3))
-    points = sampling.spread_points(1_000, np.full(3, 0.5))
-    assert points.min() > 0.0
-    assert points.max() < 1.0
-
-    def error(sample: np.ndarray) -> float:
-        shares = (sample[None] < edges[:, None]).all(axis=2).mean(axis=1)
-        return float(np.sqrt(np.mean((shares - edges.prod(axis=1)) ** 2)))
-
-    assert error(points) < 0.5 * error(rng.random((1_000, 3)))
-
-
-def test_correlated_pairs_have_their_covariance() -> None:
-    normals = sampling.spread_normals(20_000, np.full(2, 0.5))
-    pair = sampling.correlated_pair(normals, np.full(20_000, 4.0), np.full(20_000, 1.0), np.full(20_000, -1.5))
-    np.testing.assert_allclose(np.cov(pair, rowvar=False), [[4.0, -1.5], [-1.5, 1.0]], atol=0.02)

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from models.arrays import FloatArray
-from models.records.periods import CORNERS, SPEED_HARMONICS, Cycle, fit_cycle
+from models.records import periods
+from models.records.criteria import CORNERS, SPEED_HARMONICS
+from models.records.periods import Cycle, fit_cycle
 
 RATE, AMPLITUDE = 100.0, 0.5
 
@@ -36,6 +38,7 @@ def test_ramps_are_followed_into_their_corners(
     time = np.arange(round(periods / frequency * RATE)) / RATE
     cycle = fitted(time, shape(first + frequency * time))
     assert cycle.cosine.size == CORNERS[-1]
+    assert cycle.converged
     assert cycle.frequency == pytest.approx(frequency, rel=1e-4)
     # 32 harmonics of a triangle leave 4/(π² 33) to its corner; four leave nine times as much
     off = cycle.value(cycle.phase(time)) - shape(first + frequency * time)
@@ -80,3 +83,11 @@ def test_holds_of_a_fiftieth_of_a_period_are_seen_once_the_corners_are(first: fl
     cycle = fitted(np.arange(value.size) / RATE, value)
     assert cycle.begin == pytest.approx(0.2, abs=0.05)
     assert cycle.stop == pytest.approx(15.2, abs=0.05)
+
+
+def test_a_fit_that_ran_out_of_steps_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    time = np.arange(2500) / RATE
+    swing = 1.0 + np.sin(2 * np.pi * 0.1 * time + 0.4)
+    assert fitted(time, swing).converged
+    monkeypatch.setattr(periods, "_STEPS", 1)
+    assert not fitted(time, swing + 0.1 * np.sin(4 * np.pi * 0.1 * time)).converged

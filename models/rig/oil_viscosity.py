@@ -1,12 +1,12 @@
-"""What the oil's temperature does to a simulated clutch's torque, for campaigns in which it is to be found.
+"""The effect of the oil's temperature on a simulated clutch's torque, for campaigns in which it is to be identified.
 
-By Hersey's similarity, friction hangs on speed times viscosity: warmer, thinner oil acts as a lower speed would.
+By Hersey's similarity, friction depends on speed times viscosity: warmer, thinner oil acts like a lower speed.
 
     M(v, p, T) = M_measured · S(v ν(T)/ν₀, p, ζ) / S(v, p, ζ),      ν(T)/ν₀ = exp(B/(T - C) - B/(T₀ - C))
 
-with Vogel's viscosity. The rig's own torque does not know of the temperature that it records: this adds it.
+with Vogel's viscosity. The rig's own torque does not depend on the temperature that it records: this adds the effect.
 
-Source: M. D. Hersey, J. Wash. Acad. Sci. 4 (1914) 542-552; H. Vogel, Phys. Z. 22 (1921) 645-646. The constants are made,
+Source: M. D. Hersey, J. Wash. Acad. Sci. 4 (1914) 542-552; H. Vogel, Phys. Z. 22 (1921) 645-646. The constants are chosen
 so that viscosity falls by some 22 % from 80 to 90 °C.
 """
 

@@ -1,0 +1,97 @@
+"""A squeezed film of oil, after eq. 7: friction lags because the film takes time to follow the speed.
+
+A film h that carries the load W has h_s ∝ (v/W)^n at rest with itself, so that away from it the film carries
+W (h_s/h)^{1/n}; eq. 7 adds -η_e l (2a/h)³ ḣ, and the sum must be W. In terms of the speed w whose stationary film is the
+present one, h = h_s(w), that is exactly a first-order lag, slower in thin films,
+
+    dw/dt = (v - w)/τ(w),    τ(w) = n η_e l (2a)³/(W h²) = τ_1 (w/1 m/s)^{-2n}
+
+Asperities carry what the film's thickness lets them; the film is sheared at v/h. With n = 1 - γ = 0.7 (γ = 0.3 of eq. 3;
+elastohydrodynamic films have 0.67 to 0.7) the two terms of eq. 3 are just these two, and
+
+    M = sign v [ M_s (1 + (M̄_c - 1) e^{-V_S/w}) + C_v |v|/w^n ]
+
+is S(v) where w = v. Accelerating, w < v: more contact *and* a thinner film, so torque is higher also where S rises
+(M̄_c <= 1). At one lining τ_1 ∝ η_e^{1-2n} W^{2n-1}: it grows with pressure^0.4, see `film_time_at`.
+
+The law needs sliding; sticking and presliding are not in it. Velocities that swing through zero are followed with |v| in
+the film and sign v in the torque.
+
+Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3.4, eqs. 7-8 and its references 5, 6 and 16.
+The step from eq. 7 to τ(w), and the split of eq. 3, are this project's.
+"""
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.friction.stribeck import GAMMA, StribeckParameters, torque
+from models.loops.relaxation import relax
+
+#: The exponent n of film thickness over speed [-].
+FILM_EXPONENT = 1 - GAMMA
+#: The pressure [Pa] at which film times are compared.
+FILM_PRESSURE = 5e5
+#: Speeds below this share of the highest [-] are lifted to it where a film's thickness is taken.
+_LEAST_SPEED = 1e-6
+_POWER = 2 * FILM_EXPONENT - 1  # z = w^-0.4 makes the film's equation convex
+_NEWTON_STEPS = 60
+
+
+def squeeze_film_torque(
+    time: FloatArray,
+    velocity: FloatArray,
+    parameters: StribeckParameters,
+    film_time: float | FloatArray,
+    start: float | None = None,
+) -> FloatArray:
+    """M [n] Nm by the squeezed film at time [n] s (ascending) and velocity [n] m/s; film_time τ_1 > 0 [s] at w = 1 m/s.
+
+    An array of film times [k, 1] gives [k, n]. `start` is w at time[0] [m/s], |v| if not given.
+    Raises ValueError on τ_1 <= 0 or times that fall.
+    """
+    film = film_speed(time, velocity, film_time, start)
+    return film_torque(velocity, film, parameters)
+
+
+def film_torque(velocity: FloatArray, film: FloatArray, parameters: StribeckParameters) -> FloatArray:
+    """M [n] Nm at velocity [n] m/s over the film that is stationary at `film` w [n] m/s > 0."""
+    dry = StribeckParameters(
+        static_torque=parameters.static_torque,
+        coulomb_ratio=parameters.coulomb_ratio,
+        stribeck_velocity=parameters.stribeck_velocity,
+        viscous_coefficient=0.0,
+    )
+    sheared = parameters.viscous_coefficient * np.abs(velocity) / film**FILM_EXPONENT
+    return np.asarray(np.copysign(1.0, velocity) * (torque(film, dry) + sheared), dtype=np.float64)
+
+
+def film_speed(
+    time: FloatArray, velocity: FloatArray, film_time: float | FloatArray, start: float | None = None
+) -> FloatArray:
+    """w [n] m/s, the speed whose stationary film is the present one, at time [n] s and velocity [n] m/s.
+
+    In z = w^-0.4 the film's equation is ż = (0.4/τ_1)(z^-2.5 - |v|), convex in z: Newton's iteration on whole courses
+    climbs to the solution from wherever it starts, and each step is one linear lag.
+    """
+    if not (np.asarray(film_time) > 0).all():
+        raise ValueError(f"film_time must be positive, got {film_time}")
+    speed = np.abs(velocity)
+    fastest = max(float(speed.max()), 0.0 if start is None else abs(start), 1e-12)
+    rate = _POWER / np.asarray(film_time, dtype=np.float64)
+    first = max(abs(float(speed[0]) if start is None else start), _LEAST_SPEED * fastest) ** -_POWER
+    least = fastest**-_POWER
+    course = np.maximum(speed, 0.2 * fastest) ** -_POWER * np.ones_like(rate)
+    for _ in range(_NEWTON_STEPS):
+        flow = course ** (-1 / _POWER)
+        fall = rate / _POWER * flow / course
+        after = np.maximum(relax(time, fall, course + rate * (flow - speed) / fall, first), least)
+        done = bool((np.abs(after - course) <= 1e-9 * after).all())
+        course = after
+        if done:
+            break
+    return np.asarray(course ** (-1 / _POWER), dtype=np.float64)
+
+
+def film_time_at(pressure: float, film_time: float) -> float:
+    """τ_1 [s] at pressure > 0 [Pa] of a lining that has `film_time` [s] at FILM_PRESSURE: ∝ pressure^(2n - 1)."""
+    return float(film_time * (pressure / FILM_PRESSURE) ** _POWER)

@@ -1,0 +1,41 @@
+"""The numbers that decide what a prognosis states and what a fleet teaches."""
+
+import numpy as np
+
+#: The levels of the quantiles that are stated. Fixed by the public contract.
+QUANTILES = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95)
+#: The quantiles of a band that a plot shows: a 90 % interval and its median.
+BAND = (0.05, 0.5, 0.95)
+#: Cycles beyond which an end of life is not distinguished from never. Fixed by the public contract.
+HORIZON = 1_000_000.0
+#: Nothing is predicted from fewer tests at different progress. Chosen; no table: eq. 6 has four coefficients.
+FEWEST_TESTS = 3
+
+# Mean COF from the parameters' tracks (`joint_draws`, `from_parameters`)
+
+#: Prior deviations of ξ0 and Δ, in sizes of the quantity. Chosen: as weak as the prior of a single track.
+INITIAL_SD, CHANGE_SD = 0.5, 1.0
+#: No correlation is worth this many tests beside the correlation that is observed from test to test. Chosen; no table.
+NONE_WORTH = 5.0
+#: Mean COF from the parameters and its direct track disagree where they are further apart than this many deviations. Chosen;
+#: no table.
+FAR_APART = 3.0
+
+# What a fleet teaches (`fleet`)
+
+#: A clutch with fewer tests than this says too little to teach anything. Chosen; no table.
+FEWEST_TESTS_TO_LEARN = 6
+#: The hyperprior: the deviations of (Δ/ξ0, log φ, log ε, log s/ξ0) among clutches of one kind. Chosen; no table.
+HYPER_SD = np.array([0.15, 0.6, 0.4, 0.5])
+#: How many clutches that is worth, and how many the centre of the weak prior is worth as the population's mean. Chosen; no
+#: table.
+HYPER_CLUTCHES, HYPER_CENTRE = 6.0, 0.03
+#: A fleet of n has the share TRUST n/(n + DOUBT) of the mixture: most of it stays weak, for the evidence soon speaks for a
+#: fleet that is right, and slowly against one that is wrong. Chosen: `make score PARTS=fleets` shows what it achieves.
+TRUST, DOUBT = 0.25, 3.0
+#: A filter runs under a normal that is wider than the population by this factor: a clutch at the edge of its fleet must not
+#: lie at the edge of what the filter covers. Chosen; no table.
+WIDER = 1.5
+#: A learned population has converged where its mean changes by less than this in a round, in its deviations. Chosen; no
+#: table: it decides no number.
+SETTLED = 1e-3

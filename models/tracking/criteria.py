@@ -1,0 +1,80 @@
+"""The numbers that decide what the filters believe before a clutch is measured, and when a test is off its track."""
+
+import numpy as np
+
+# The prior (`prior`)
+
+#: The share of runs that are outlying, and how far off they are: the deviation of a further normal, as a share of the size
+#: of the quantity. Chosen: a misread gain; `make score PARTS=outlying` has one run in ten off by 10 %.
+OUTLYING_SHARE, OUTLYING_SIZE = 0.05, 0.1
+#: The probability that a clutch follows eq. 6 alone, without a discrepancy. Chosen: by `make score PARTS=belief`, see
+#: "How much doubt" in docs/prognosis.md.
+LAW_SHARE = 0.95
+#: The deviation of the level's step at an event, as a share of the size of the quantity. Chosen: `make score PARTS=events`
+#: shows what it achieves, and no table compares it with others.
+STEP_SIZE = 0.05
+#: The weak prior's deviation of ξ0, in sizes of the quantity: the first run need not be at ζ = 0. Chosen; no table.
+INITIAL_SD = 0.5
+#: Mean and deviation of Δ in sizes of the quantity: where it is known to fall (7 % remains for a rise), and where it may go
+#: either way. Chosen; no table.
+FALLING_CHANGE, EITHER_CHANGE = (-0.6, 0.4), (0.0, 1.0)
+#: Median of φ [cycles] and deviation of its logarithm: two deviations cover 40 to 400,000. Chosen: with ε, lives of 10² to
+#: 10⁶ cycles.
+SCALE_MEDIAN, LOG_SCALE_SD = 4_000.0, 2.3
+#: Median of ε [-] and deviation of its logarithm: two deviations cover 0.2 to 3.2. Chosen: with φ, as above.
+EXPONENT_MEDIAN, LOG_EXPONENT_SD = 0.8, 0.7
+#: Median of the run-to-run scatter in sizes of the quantity and deviation of its logarithm: two deviations cover 0.06 % to
+#: 1.5 %. Chosen; no table.
+SCATTER_MEDIAN, LOG_SCATTER_SD = 0.003, 0.8
+
+# The discrepancy beside eq. 6 (`discrepancy`)
+
+#: The sizes q: the deviation of δ at the end of what was measured, as a share of the quantity. Chosen, as are the SHARES:
+#: smaller or larger ones with more weight do not improve the forecasts (docs/prognosis.md: lives that do not follow eq. 6).
+SIZES = np.array([0.0, 0.01, 0.03, 0.1])
+#: How the probability that there is a discrepancy is divided among the sizes that are not 0. Chosen: with SIZES.
+SHARES = np.array([0.4, 0.35, 0.25])
+#: Beyond this many times the progress measured so far δ is level: what is seen over a tenth of a course must not make every
+#: course pass every threshold in the end. Chosen; no table.
+LEVELLING = 10.0
+
+# A test off the track (`innovation`)
+
+#: Deviations beyond which a test is off the track. Derived: one test in 16,000 of a clutch that follows eq. 6.
+FAR = 4.0
+#: Tests that must have been before anything is off their track. Chosen; no table.
+FEWEST_BEFORE = 4
+
+# What the filters neglect (`outlying_runs`, `filters`)
+
+#: Deviations to either side that count as a prior's range. Derived: 6e-5 of a normal lies beyond.
+REACH = 4.0
+#: A node belongs to the mass where its log density is less than this below the highest. Derived: 4.2 deviations of a normal.
+DEPTH = 9.0
+#: A kind of history is dropped where its log mass is by so much below the best kind's: on the first coarse lattice, which is
+#: blurred, and once the lattice has closed in. Chosen; no table.
+NEGLIGIBLE, SLIGHT = 10.0, 6.0
+#: Sets of outlying runs are kept where their log probability is less than NEAR below the best, and MOST of them. Chosen; no
+#: table.
+NEAR, MOST = 4.5, 6
+#: Neighbours of a set are searched where it may come within LOOK of the best, of EXPANSIONS sets at most. Chosen; no table.
+LOOK, EXPANSIONS = 1.5, 24
+#: Once the lattices have closed in, sets that were overlooked are sought about so many leading kinds, and count where their
+#: log probability is less than WORTH below the best's. Chosen; no table.
+LEADING, WORTH = 3, 3.0
+#: The particle filter resamples below the first share of effective particles, and no single step may bring them below the
+#: second. Chosen; no table.
+HEALTHY, STARVED = 0.5, 0.25
+#: Steps of a move, at most, and the share of particles after which they end. Chosen; no table.
+MOVES, MOVED = 8, 0.9
+#: The unscented filters' running mean of squared innovations forgets at this rate; above LOST they start anew. Chosen; no
+#: table.
+FORGET, LOST = 0.3, 4.0
+#: They also start anew when progress has grown by this factor. Chosen; no table.
+GROWN = 2.0
+#: A size of the discrepancy with a smaller share of the probability gets no unscented filter. Chosen; no table.
+FEW = 0.01
+#: Deviations from the prior mean that an unscented filter's state may reach. Chosen; no table.
+DOMAIN = 6.0
+#: An innovation counts at most as one of this many deviations in an unscented filter. Chosen; no table.
+OUTLIER = 5.0
