@@ -22,9 +22,9 @@ from scipy.special import logsumexp
 
 from models.arrays import FloatArray
 from models.diagnosis.attribution.evidence import Hypothesis
+from models.diagnosis.design.axes import CLOCK
 from models.diagnosis.design.design import Design
 from models.diagnosis.detection.alarm import Lead
-from models.diagnosis.detection.contrasts import CLOCK
 from models.diagnosis.detection.raw_records.evidence import RawEvidence
 from models.diagnosis.detection.view import View
 from models.diagnosis.effects.uncatalogued import STRANGE

@@ -12,7 +12,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, MaintenanceEvent, StationaryRun
-from models.diagnosis.design.design import PLATEAU_DURATION
+from models.diagnosis.design.criteria import PLATEAU_DURATION
 from models.records.runs import UNLOADED, Plateaus, Record, pressure_levels
 
 #: The dynamic test of the reference (section 2.3.4): a swing of 1000 rpm about 1000 rpm, sampled at 200 a period.

@@ -8,7 +8,7 @@ import pytest
 
 from models.diagnosis.baseline.laws import EXPONENTIAL, FALL, LOG_BEND, POWERS, falling_weight
 from models.diagnosis.campaign import Campaign, DutyRun, StationaryRun
-from models.diagnosis.design.design import MOST_PLATEAUS
+from models.diagnosis.design.limits import MOST_PLATEAUS
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.catalogued.torque_zero_shift import DAYS, STRAIGHT
 from models.diagnosis.effects.viscosity import log_viscosity_ratio

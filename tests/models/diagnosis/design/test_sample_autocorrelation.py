@@ -8,7 +8,11 @@ from scipy.signal import lfilter
 
 from models.arrays import FloatArray
 from models.diagnosis.design.design import Design, build_design
-from models.diagnosis.design.sample_autocorrelation import Memory, bins_remember, memory_of
+from models.diagnosis.design.sample_autocorrelation import (
+    SampleAutocorrelation,
+    bin_autocorrelation,
+    sample_autocorrelation,
+)
 from models.diagnosis.noise.estimate import estimate_noise, first_noise
 from tests.models.diagnosis.campaigns import campaign
 
@@ -25,7 +29,7 @@ def remembering(share: float, step: float, size: int, seed: int = SEED) -> Float
 @pytest.mark.parametrize(("share", "step"), [(1.0, 0.7), (0.6, 0.95), (0.3, 0.5)])
 def test_means_of_samples_remember_as_foretold(share: float, step: float) -> None:
     bins = remembering(share, step, 4_000_000).reshape(-1, 20).mean(axis=1)
-    one, two = Memory(one=share * step, two=share * step**2, to_a_bin=20.0).of_bins()
+    one, two = SampleAutocorrelation(first=share * step, second=share * step**2, per_bin=20.0).of_bins()
     assert one == pytest.approx(float(np.corrcoef(bins[1:], bins[:-1])[0, 1]), abs=0.01)
     assert two == pytest.approx(float(np.corrcoef(bins[2:], bins[:-2])[0, 1]), abs=0.01)
     assert one > 0.01
@@ -39,16 +43,16 @@ def test_memory_is_found_beside_a_loop_and_over_gaps() -> None:
     for seed in range(10):
         torque = 40 + 5 * np.sin(phase) + 2 * np.cos(3 * phase) + 0.3 * remembering(0.8, 0.6, phase.size, seed)
         torque[~used] = 1e3
-        told = memory_of(torque, phase, used, 25.0)
+        told = sample_autocorrelation(torque, phase, used, 25.0)
         assert told is not None
-        found.append((told.one, told.two))
+        found.append((told.first, told.second))
     np.testing.assert_allclose(np.mean(found, axis=0), [0.48, 0.288], atol=0.02)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 4])
 def test_what_a_loop_is_is_not_taken_for_noise_that_remembers(seed: int) -> None:
     """Independent noise of 0.3 %: the loop turns sharply next to standstill, three times as far off its low harmonics."""
-    told = build_design(campaign(seed, noise=0.003)).bins_remember
+    told = build_design(campaign(seed, noise=0.003)).bin_autocorrelation
     assert told is not None
     assert max(told) < 0.05
 
@@ -58,7 +62,7 @@ def test_times_that_repeat_do_no_harm() -> None:
     floored = [
         replace(run, record=replace(run.record, time=np.floor(10 * run.record.time) / 10)) for run in given.dynamic
     ]
-    told = build_design(replace(given, dynamic=tuple(floored))).bins_remember
+    told = build_design(replace(given, dynamic=tuple(floored))).bin_autocorrelation
     assert told is not None
     assert max(told) < 0.05
 
@@ -66,11 +70,11 @@ def test_times_that_repeat_do_no_harm() -> None:
 def test_loops_sampled_otherwise_do_not_mix() -> None:
     """The same noise, remembered for 50 ms, in bins of 0.16 s sampled at 40 and at 1000 a second."""
 
-    def sampled(rate: float) -> Memory:
-        return Memory(one=np.exp(-20 / rate), two=np.exp(-40 / rate), to_a_bin=0.16 * rate)
+    def sampled(rate: float) -> SampleAutocorrelation:
+        return SampleAutocorrelation(first=np.exp(-20 / rate), second=np.exp(-40 / rate), per_bin=0.16 * rate)
 
     alone = [sampled(rate).of_bins()[0] for rate in (40.0, 1000.0)]
-    both = bins_remember([sampled(40.0), sampled(1000.0)])
+    both = bin_autocorrelation([sampled(40.0), sampled(1000.0)])
     assert both is not None
     assert both[0] == pytest.approx(np.mean(alone))
     assert alone[0] == pytest.approx(alone[1], abs=0.05)
@@ -79,13 +83,13 @@ def test_loops_sampled_otherwise_do_not_mix() -> None:
 def test_too_few_samples_tell_nothing() -> None:
     phase = np.linspace(0.0, 2 * np.pi, 3000)
     everything = np.ones(phase.size, dtype=np.bool_)
-    assert memory_of(np.sin(phase), phase, everything, 2.0) is None
-    assert memory_of(np.sin(phase[:100]), phase[:100], everything[:100], 25.0) is None
-    assert memory_of(np.zeros(phase.size), phase, everything, 25.0) is None
-    known = Memory(one=0.5, two=0.3, to_a_bin=10.0)
-    assert bins_remember([known, None]) is None
-    assert bins_remember([]) is None
-    assert bins_remember([known, known, None]) == pytest.approx(known.of_bins())
+    assert sample_autocorrelation(np.sin(phase), phase, everything, 2.0) is None
+    assert sample_autocorrelation(np.sin(phase[:100]), phase[:100], everything[:100], 25.0) is None
+    assert sample_autocorrelation(np.zeros(phase.size), phase, everything, 25.0) is None
+    known = SampleAutocorrelation(first=0.5, second=0.3, per_bin=10.0)
+    assert bin_autocorrelation([known, None]) is None
+    assert bin_autocorrelation([]) is None
+    assert bin_autocorrelation([known, known, None]) == pytest.approx(known.of_bins())
 
 
 @pytest.fixture(scope="module")
@@ -95,17 +99,17 @@ def design() -> Design:
 
 def swells(design: Design, memory: float, told: tuple[float, float] | None) -> list[float]:
     """Of noise of the bins that remembers from bin to bin, in ten draws."""
-    given, found = replace(design, bins_remember=told, repeats=()), []
+    given, found = replace(design, bin_autocorrelation=told, period_differences=()), []
     for seed in range(10):
         noise = remembering(1.0, memory, design.torque.size, seed)
         residual = 0.01 * design.torque * noise / np.sqrt(design.samples)
         loops = estimate_noise(given, residual, design.torque, first_noise(design))[0].loops
-        found.append(1 + 2 * loops.share * loops.step / (1 - loops.step))
+        found.append(1 + 2 * loops.share * loops.decay / (1 - loops.decay))
     return found
 
 
 def test_what_samples_tell_is_believed_unless_bins_contradict(design: Design) -> None:
-    assert design.bins_remember is not None  # the fixture's loops have samples enough
+    assert design.bin_autocorrelation is not None  # the fixture's loops have samples enough
     assert max(swells(design, 0.0, (0.0, 0.0))) < 1.3
     assert max(swells(design, 0.0, None)) > max(swells(design, 0.0, (0.0, 0.0)))
     assert min(swells(design, 0.6, (0.0, 0.0))) > 2.5  # truly 4: something slow that samples do not show

@@ -36,7 +36,7 @@ def test_noise_is_found_beside_something_smooth(design: Design, memory: float) -
     share = np.median(noise.deviation[steady] / design.torque[steady])
     assert not assumed
     assert abs(share - 0.01) < 0.0012  # some 600 rows, and the memory's part is told from few
-    next_row = noise.plateaus.share * noise.plateaus.step
+    next_row = noise.plateaus.share * noise.plateaus.decay
     assert abs(next_row - memory) < 0.15
 
 
@@ -49,7 +49,7 @@ def test_a_flat_likelihood_does_not_choose_persistent_noise(design: Design) -> N
         remembered = lfilter([np.sqrt(1 - 0.3**2)], [1, -0.3], white)
         residual = 0.01 * design.torque * remembered / np.sqrt(design.samples)
         found = estimate_noise(design, residual, design.torque, first_noise(design))[0].plateaus
-        swells.append(1 + 2 * found.share * found.step / (1 - found.step))
+        swells.append(1 + 2 * found.share * found.decay / (1 - found.decay))
     assert 1.4 < np.median(swells) < 2.4
     assert max(swells) < 4.0
 
@@ -57,7 +57,7 @@ def test_a_flat_likelihood_does_not_choose_persistent_noise(design: Design) -> N
 @pytest.mark.parametrize("share", [1.0, 1.0 - 1e-12, 1.0 - 1e-9, 1.0 - 1e-6, 0.998, 0.5, 1e-6])
 @pytest.mark.parametrize("step", [0.2, 0.9, 0.95])
 def test_an_arma_process_has_the_correlations_that_it_was_made_for(share: float, step: float) -> None:
-    theta, scale = arma(Correlation(share=share, step=step))
+    theta, scale = arma(Correlation(share=share, decay=step))
     assert abs(theta) < 1
     # x_i = ρ x_{i-1} + s (e_i + θ e_{i-1}): its variance, and its covariance with the neighbour
     variance = scale**2 * (1 + theta**2 + 2 * step * theta) / (1 - step**2)
@@ -66,7 +66,7 @@ def test_an_arma_process_has_the_correlations_that_it_was_made_for(share: float,
 
 
 def test_whitening_is_the_inverse_root_of_the_covariance(design: Design) -> None:
-    correlation = Correlation(share=0.7, step=0.6)
+    correlation = Correlation(share=0.7, decay=0.6)
     noise = Noise(
         deviation=np.full(design.torque.size, 2.0),
         plateaus=correlation,
