@@ -20,7 +20,7 @@ def viscosity(temperature: FloatArray, oil: Oil) -> FloatArray:
     """ν [n] m²/s at temperature [n] K > 0.
 
     >>> viscosity(np.array([353.15, 363.15]), Oil()).round(8).tolist()
-    [1.462e-05, 1.153e-05]
+    [1.49e-05, 1.163e-05]
     """
     at_40, at_100 = (np.log10(np.log10(point / _CST + 0.7)) for point in (oil.viscosity_40, oil.viscosity_100))
     slope = (at_40 - at_100) / (np.log10(_HIGH) - np.log10(_LOW))

@@ -14,6 +14,7 @@ from models.diagnosis.detection.raw_records.evidence import RawEvidence
 from models.diagnosis.detection.view import View, amplitude_deviations
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import sized
+from models.diagnosis.effects.estimate import Estimate
 from models.diagnosis.effects.uncatalogued.catalogue import UNCATALOGUED_BY_SLUG
 from models.diagnosis.experiments.test_plan import Rival, advise
 from models.diagnosis.extension import Extension, build_extension
@@ -21,7 +22,7 @@ from models.diagnosis.noise.covariance import Noise
 from models.diagnosis.pooled_fit.gauss_newton import Fit, Priors
 from models.diagnosis.report.maps import loop_traces, residual_maps
 from models.diagnosis.report.outlying_run import odd_run
-from models.diagnosis.report.report import Candidate, Estimate, Gain, Report, Verdict, Visible
+from models.diagnosis.report.report import Candidate, Gain, Report, Verdict, Visible
 from models.diagnosis.report.summary import Findings, summarise
 from models.diagnosis.validation.held_out import measure_gain
 from models.diagnosis.validation.smooth_correction import AXES as SMOOTH_AXES

@@ -23,7 +23,7 @@ from models.diagnosis.detection.raw_records.fixed_frequency import best_anywhere
 from models.diagnosis.detection.raw_records.settling_transient import approach
 from models.diagnosis.detection.raw_records.shaft_orders import Line, best_order
 from models.diagnosis.detection.raw_records.whitened_torque import Swings, swings
-from models.diagnosis.report.report import Estimate
+from models.diagnosis.effects.estimate import Estimate
 from models.records.plateaus import PlateauCut, cut_plateaus
 from models.records.runs import Record
 from models.records.settling import SETTLING
