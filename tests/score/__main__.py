@@ -30,7 +30,7 @@ def main() -> None:
         "belief": lambda: belief(lives(600), seed + 7),
         "calibration": lambda: on_prior.calibration(lives(1_000), seed),
         "exact": lambda: on_prior.beside_exact(lives(100), seed + 1),
-        "spoiled": lambda: on_prior.calibration(lives(1_000), seed + 2, spoiled=0.1),
+        "spoiled": lambda: on_prior.calibration(lives(1_000), seed + 2, outlying=0.1),
         "laws": lambda: off_prior.laws(lives(100), seed + 3),
         "never": lambda: off_prior.never(lives(1_000), seed + 4),
         "events": lambda: off_prior.after_event(lives(100), seed + 5),

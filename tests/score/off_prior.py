@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.prognosis import first_passage as foretold
-from models.prognosis.first_passage import ends_of_life
+from models.prognosis.first_passage import ends_of_life, first_passage
 from models.rig.truth import draw
 from models.tracking.discrepancy import FUTURE, PAST, SIZES, Discrepancy, log_size_weight
 from models.tracking.filters.grid import Grid
@@ -31,13 +30,13 @@ def laws(count: int, seed: int) -> str:
         name: [(course, 10_000.0)] * count for name, course in LAWS.items()
     }
     cases["the simulated rig: four parameters, an eq. 6 each"] = rig_lives(count, seed)
-    for name, each in cases.items():
-        told = np.array(
-            [followed(course, np.random.default_rng([seed, i]), end) for i, (course, end) in enumerate(each)],
+    for name, lives in cases.items():
+        outcomes = np.array(
+            [followed(course, np.random.default_rng([seed, i]), end) for i, (course, end) in enumerate(lives)],
             dtype=float,
         )
-        held, late = told[:, :, 0].mean(axis=0).tolist(), told[:, :, 1].mean(axis=0).tolist()
-        width = "/".join(f"{x:.2f}" for x in np.median(told[:, :, 2], axis=0))
+        held, late = outcomes[:, :, 0].mean(axis=0).tolist(), outcomes[:, :, 1].mean(axis=0).tolist()
+        width = "/".join(f"{x:.2f}" for x in np.median(outcomes[:, :, 2], axis=0))
         lines.append(f"| {name} | {percents(held)} % | {percents(late)} % | {width} |")
     return "\n".join(lines)
 
@@ -56,12 +55,12 @@ def rig_lives(count: int, seed: int) -> list[tuple[Callable[[float], float], flo
 
 def never(count: int, seed: int) -> str:
     """Lives from the prior, whether they ever reach half of their COF or not: is the stated probability right? Once for
-    lives of eq. 6 alone, and once for lives of all that is believed: some with a discrepancy, some runs spoiled."""
+    lives of eq. 6 alone, and once for lives of all that is believed: some with a discrepancy, some runs outlying."""
     found = {"eq. 6 alone": stated(count, seed, whole=False), "the whole prior": stated(count, seed + 100, whole=True)}
     shares = ", ".join(f"{100 * np.mean(came):.0f} % of those of {name}" for name, (_, came) in found.items())
     lines = [
         f"{count} lives each, seeds {seed} and {seed + 100}; half of the COF is reached within a million cycles by "
-        f"{shares}; nothing foretold was infinite\n",
+        f"{shares}; no forecast was infinite\n",
         "| stated probability | "
         + " | ".join(f"{name}: lives | mean stated, % | reached it, %" for name in found)
         + " |",
@@ -70,10 +69,10 @@ def never(count: int, seed: int) -> str:
     edges = np.array([0.0, 0.05, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0 + 1e-9])
     for low, high in itertools.pairwise(edges.tolist()):
         cells = [f"{low:.2f} to {min(high, 1.0):.2f}"]
-        for told, came in found.values():
-            here = (told >= low) & (told < high)
-            due = math.sqrt(float((told[here] * (1.0 - told[here])).mean()) / max(1, int(here.sum())))
-            mean, share = 100 * told[here].mean(), 100 * came[here].mean()
+        for probability, came in found.values():
+            here = (probability >= low) & (probability < high)
+            due = math.sqrt(float((probability[here] * (1.0 - probability[here])).mean()) / max(1, int(here.sum())))
+            mean, share = 100 * probability[here].mean(), 100 * came[here].mean()
             cells.append(f"{here.sum()} | {mean:.1f} ± {100 * due:.1f} | {share:.1f}")
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
@@ -81,8 +80,8 @@ def never(count: int, seed: int) -> str:
 
 def stated(count: int, seed: int, *, whole: bool) -> tuple[np.ndarray, np.ndarray]:
     """The probability stated for each of `count` lives [n], and whether it came [n]."""
-    rng, told, came, grid = np.random.default_rng(seed), [], [], Grid()
-    while len(told) < count:
+    rng, probability, came, grid = np.random.default_rng(seed), [], [], Grid()
+    while len(probability) < count:
         truth = Posterior(
             weight=np.ones(1),
             initial=rng.normal(PRIOR.initial_mean, PRIOR.initial_sd, 1),
@@ -102,18 +101,18 @@ def stated(count: int, seed: int, *, whole: bool) -> tuple[np.ndarray, np.ndarra
                 span=last, size=np.full(1, size), curvature=course, at=np.zeros(0), height=np.zeros((1, 0))
             )
             truth = replace(truth, discrepancy=beside)
-            spoiled = rng.random(runs) < PRIOR.spoiled_share
-            noise += spoiled * PRIOR.spoiled_size * PRIOR.size * rng.standard_normal(runs)
+            outlying = rng.random(runs) < PRIOR.spoiled_share
+            noise += outlying * PRIOR.spoiled_size * PRIOR.size * rng.standard_normal(runs)
         zeta = np.linspace(0.0, last, runs)
         values = truth.values(zeta)[:, 0] + noise
         seen = [
             Measurement(progress=z, value=y, variance=0.0) for z, y in zip(zeta.tolist(), values.tolist(), strict=True)
         ]
-        passage = foretold(grid.posterior(grid.from_history(PRIOR, seen), 1_000, rng), fraction=0.5, as_of=last)
+        passage = first_passage(grid.posterior(grid.from_history(PRIOR, seen), 1_000, rng), fraction=0.5, as_of=last)
         assert all(x is None or math.isfinite(x) for x in passage.end_of_life.values())
-        told.append(passage.probability_of_reaching)
+        probability.append(passage.probability_of_reaching)
         came.append(float(ends_of_life(truth, 0.5)[0]) <= CAP)
-    return np.array(told), np.array(came)
+    return np.array(probability), np.array(came)
 
 
 def after_event(count: int, seed: int) -> str:
@@ -138,16 +137,16 @@ def after_event(count: int, seed: int) -> str:
             for since in (1, 2, 5):
                 some = seen[: 11 + since]
                 posterior = grid.posterior(grid.from_history(weak(some[0], falling=True), some), 1_000, rng)
-                told = foretold(posterior, fraction=0.5, as_of=some[-1].progress).end_of_life
-                low, high = told[0.05] or math.inf, told[0.95] or math.inf
+                ends = first_passage(posterior, fraction=0.5, as_of=some[-1].progress).end_of_life
+                low, high = ends[0.05] or math.inf, ends[0.95] or math.inf
                 tallies.setdefault((known, since), []).append((low <= end <= high, min(high, CAP) - min(low, CAP)))
     lines = [
         f"{count} lives, seed {seed}\n",
         "| the event is | tests since | 90 % interval holds the truth, % | median width, cycles |",
         "|---|---|---|---|",
     ]
-    for (known, since), told in tallies.items():
-        held, width = np.array(told, dtype=float).T
+    for (known, since), outcomes in tallies.items():
+        held, width = np.array(outcomes, dtype=float).T
         lines.append(
             f"| {'known' if known else 'not known'} | {since} | {100 * held.mean():.0f} | {np.median(width):.0f} |"
         )

@@ -12,17 +12,17 @@ RUNS, DRAWS = 25, 1_000
 FILTERS = (Grid(), Particle(), Ukf())
 
 
-def calibration(count: int, seed: int, spoiled: float = 0.0) -> str:
+def calibration(count: int, seed: int, outlying: float = 0.0) -> str:
     """How often the 90 % interval holds the end of life, by stage, and how wide it is."""
     scores = Scores()
     for life, rng in lives(count, seed):
-        measurements = life.measured(0.8, RUNS, rng, spoiled)
+        measurements = life.measured(0.8, RUNS, rng, outlying)
         for tracker in FILTERS:
             for stage, state in at_stages(tracker, PRIOR, measurements, rng):
                 scores.add(tracker.name, stage, tracker.posterior(state, DRAWS, rng), life.end)  # type: ignore[arg-type]
     lines = [
         f"{count} lives, seed {seed}"
-        + (f", of the runs {100 * spoiled:.0f} % spoiled (gain off by 10 %)" if spoiled else "")
+        + (f", of the runs {100 * outlying:.0f} % outlying (gain off by 10 %)" if outlying else "")
         + "\n",
         "| filter | holds the truth at 20 | 40 | 60 | 80 % of life | CRPS, median at 20 | 40 | 60 | 80 % "
         "| PIT in tenths, % |",
@@ -35,12 +35,12 @@ def calibration(count: int, seed: int, spoiled: float = 0.0) -> str:
     return "\n".join(lines)
 
 
-def beside_exact(count: int, seed: int, spoiled: float = 0.0) -> str:
+def beside_exact(count: int, seed: int, outlying: float = 0.0) -> str:
     """CRPS and width relative to the exact posterior under the same prior, by importance sampling of the density written
     out in full."""
     scores, counts = Scores(), []
     for life, rng in lives(count, seed):
-        measurements = life.measured(0.8, RUNS, rng, spoiled)
+        measurements = life.measured(0.8, RUNS, rng, outlying)
         states = {tracker.name: dict(at_stages(tracker, PRIOR, measurements, rng)) for tracker in FILTERS}
         for stage in STAGES:
             seen = measurements[: round(stage * 30) + 1]

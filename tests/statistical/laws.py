@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from models.prognosis import first_passage
+from models.prognosis.first_passage import first_passage
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
@@ -37,12 +37,12 @@ def followed(
 ) -> list[tuple[bool, bool, float]]:
     """For each stage of a life: does the exact filter's interval hold the end, does it begin after it, how wide is it
     in lives?"""
-    grid, told = Grid(), []
+    grid, outcomes = Grid(), []
     tests = observed(course, rng, end)
     for stage in STAGES:
         seen = [each for each in tests if each.progress <= (stage + 0.01) * end]
         posterior = grid.posterior(grid.from_history(weak(seen[0], falling=True), seen), 1_000, rng)
         found = first_passage(posterior, fraction=0.5, as_of=seen[-1].progress).end_of_life
         low, high = found[0.05] or math.inf, found[0.95] or math.inf
-        told.append((low <= end <= high, low > end, (min(high, CAP) - min(low, CAP)) / end))
-    return told
+        outcomes.append((low <= end <= high, low > end, (min(high, CAP) - min(low, CAP)) / end))
+    return outcomes

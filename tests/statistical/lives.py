@@ -34,12 +34,12 @@ class Life:
     scatter: float
     end: float
 
-    def measured(self, share: float, runs: int, rng: np.random.Generator, spoiled: float = 0.0) -> list[Measurement]:
-        """Runs up to a share of life; of each, with the probability `spoiled`, the gain is off by 10 %."""
+    def measured(self, share: float, runs: int, rng: np.random.Generator, outlying: float = 0.0) -> list[Measurement]:
+        """Runs up to a share of life; of each, with the probability `outlying`, the gain is off by 10 %."""
         progress = np.linspace(0.0, share * self.end, runs)
         values = value(progress, self.truth) + self.scatter * rng.standard_normal(runs)
-        if spoiled > 0.0:
-            values *= np.where(rng.random(runs) < spoiled, 1.0 + 0.1 * rng.choice([-1.0, 1.0], runs), 1.0)
+        if outlying > 0.0:
+            values *= np.where(rng.random(runs) < outlying, 1.0 + 0.1 * rng.choice([-1.0, 1.0], runs), 1.0)
         return [
             Measurement(progress=float(z), value=float(y), variance=0.0) for z, y in zip(progress, values, strict=True)
         ]
@@ -185,7 +185,7 @@ def exact(
     """The exact posterior by importance sampling, late in life too; and how many draws it counts for.
 
     A particle cloud says where to look, nothing more: points come from Student's t with 4 degrees around random
-    particles (a tenth of the cloud's covariance), sizes and sets of spoiled runs as often as among the particles, one
+    particles (a tenth of the cloud's covariance), sizes and sets of outlying runs as often as among the particles, one
     time in ten any size. Every point is weighted by the density written out in full over that of its proposal.
     """
     prior, cloud = state.prior, state.cloud

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.prognosis import first_passage
+from models.prognosis.first_passage import first_passage
 from models.rig.truth import draw
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
@@ -22,10 +22,10 @@ pytestmark = pytest.mark.statistical
 LIVES = 30
 
 
-def shares(told: Any) -> tuple[list[float], list[float]]:
+def shares(outcomes: Any) -> tuple[list[float], list[float]]:
     """Share of lives whose interval holds the truth, and whose interval begins after it, by stage."""
-    found = np.array(told, dtype=float)
-    return found[:, :, 0].mean(axis=0).tolist(), found[:, :, 1].mean(axis=0).tolist()
+    lives = np.array(outcomes, dtype=float)
+    return lives[:, :, 0].mean(axis=0).tolist(), lives[:, :, 1].mean(axis=0).tolist()
 
 
 @pytest.mark.parametrize("name", [name for name in LAWS if name != "exponential to a floor"])
@@ -61,16 +61,16 @@ def test_a_filter_sure_of_eq_6_is_wrong_about_a_line() -> None:
 
 def test_the_rigs_own_lives_are_held_though_they_are_not_one_eq_6() -> None:
     """Mean COF of curves whose four parameters follow an eq. 6 each: 30 clutches leave a deviation of 5 points."""
-    told = []
+    outcomes = []
     for seed in range(LIVES):
         clutch = draw(np.random.default_rng([901, seed]))
         end = clutch.end_of_life()
         assert end is not None
         fresh = clutch.mean_cof(0.0)
-        told.append(
+        outcomes.append(
             followed(lambda x, c=clutch, e=end, f=fresh: c.mean_cof(x * e) / f, np.random.default_rng([902, seed]), end)  # type: ignore[misc]
         )
-    held, late = shares(told)
+    held, late = shares(outcomes)
     print(f"seeds 901 and 902: held {held}, begins after the truth {late}")
     assert min(held) > 0.8
     assert max(late) < 0.15

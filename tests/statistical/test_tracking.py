@@ -61,11 +61,11 @@ def test_grid_against_prior_draws_early_in_life(runs: int) -> None:
     assert tested >= 4
 
 
-@pytest.mark.parametrize("spoiled", [0.0, 0.1])
-def test_filters_against_importance_sampling_late_in_life(spoiled: float) -> None:
+@pytest.mark.parametrize("outlying", [0.0, 0.1])
+def test_filters_against_importance_sampling_late_in_life(outlying: float) -> None:
     """The density written out in full, at 60 runs; the proposal is no part of the answer."""
     for life, rng in typical(3, 200):
-        measurements = life.measured(0.9, 60, rng, spoiled)
+        measurements = life.measured(0.9, 60, rng, outlying)
         state = followed(Particle(), PRIOR, measurements, rng)
         reference, count = exact(state, measurements, 20_000, rng)
         assert count > 300
@@ -162,12 +162,12 @@ def test_weird_lives_are_survived(tracker: Any, count: int) -> None:
             assert np.abs(state.mean).max() <= 6.0
 
 
-def coverage(count: int, seed: int, belief: Prior, spoiled: float = 0.0) -> dict[float, float]:
+def coverage(count: int, seed: int, belief: Prior, outlying: float = 0.0) -> dict[float, float]:
     """How often the 90 % interval of the end of life holds the truth, at each stage of life."""
     grid = Grid()
     hits: dict[float, list[bool]] = {stage: [] for stage in STAGES}
     for life, rng in lives(count, seed):
-        measurements = life.measured(0.8, 25, rng, spoiled)
+        measurements = life.measured(0.8, 25, rng, outlying)
         for stage in STAGES:
             seen = measurements[: round(stage * 30) + 1]
             hits[stage].append(covered(grid.posterior(grid.from_history(belief, seen), 1_000, rng), life.end))
@@ -183,15 +183,15 @@ def test_nine_in_ten_ends_of_life_lie_in_the_interval() -> None:
     assert all(0.84 < share < 0.98 for share in found.values())
 
 
-def test_one_spoiled_run_in_ten_leaves_the_intervals_right() -> None:
+def test_one_outlying_run_in_ten_leaves_the_intervals_right() -> None:
     """80 lives leave a deviation of 3.4 points."""
-    found = coverage(80, 602, PRIOR, spoiled=0.1)
+    found = coverage(80, 602, PRIOR, outlying=0.1)
     print("coverage", found)
     assert all(0.82 < share < 0.99 for share in found.values())
 
 
 def test_a_filter_sure_of_too_little_scatter_is_found_out() -> None:
-    """The negative control: the scatter believed to be a fifth of what it is, and known for sure, with neither spoiled runs
+    """The negative control: the scatter believed to be a fifth of what it is, and known for sure, with neither outlying runs
     nor a discrepancy to account for the rest."""
     belief = replace(
         PRIOR,

@@ -176,9 +176,11 @@ def test_dynamic_tests_that_tell_nothing_are_counted() -> None:
         )
         for number, speed in enumerate((swinging, np.full(time.size, 100.0)))
     ]
-    told = [each for each in build_design(Campaign(dynamic=tuple(tests))).notes if each.startswith("Dynamic tests")]
-    assert len(told) == 1
-    assert told[0].startswith(
+    sentences = [
+        each for each in build_design(Campaign(dynamic=tuple(tests))).notes if each.startswith("Dynamic tests")
+    ]
+    assert len(sentences) == 1
+    assert sentences[0].startswith(
         "Dynamic tests that could not be evaluated and were left out: 1 of 2 (5 bar: The speed does not "
     )
     assert not [

@@ -1,4 +1,4 @@
-"""Periods held against each other: by hand, as a rotation of the samples, and what they tell of noise that is slow."""
+"""Periods held against each other: by hand, as a rotation of the samples, and what they show of slow noise."""
 
 from dataclasses import replace
 
@@ -43,7 +43,7 @@ def test_white_samples_give_white_differences_and_a_loop_gives_none() -> None:
 
 
 def designed(seed: int, memory: float, noise: float) -> Design:
-    """Four tests of five pressures, three periods each; noise remembers for `memory` s."""
+    """Four tests of five pressures, three periods each; noise is autocorrelated over `memory` s."""
     rng = np.random.default_rng(seed)
     time = np.arange(round(5 * 3 * PERIOD * RATE)) / RATE
     within = np.mod(time, 3 * PERIOD)
@@ -62,7 +62,7 @@ def designed(seed: int, memory: float, noise: float) -> Design:
     return build_design(Campaign(dynamic=tuple(runs)))
 
 
-def told(design: Design, expected: FloatArray) -> tuple[float, float]:
+def estimated(design: Design, expected: FloatArray) -> tuple[float, float]:
     """The correlation of neighbouring bins, and the strength [Nm²] of noise that is slow, for a mean over bins."""
     noise, _ = estimate_noise(design, design.torque - expected, expected, first_noise(design))
     share, decay = noise.loops.share, noise.loops.decay
@@ -71,9 +71,9 @@ def told(design: Design, expected: FloatArray) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_periods_tell_noise_that_is_slow(seed: int) -> None:
-    """It remembers for 0.3 s, ten bins: harmonics take most of that for part of the loop. Fewer than four samples fall into
-    a bin each period, so samples do not tell either."""
+def test_periods_show_slow_noise(seed: int) -> None:
+    """It is autocorrelated over 0.3 s, ten bins: harmonics absorb most of that. Fewer than four samples fall into
+    a bin each period, so samples do not show it either."""
     memory, expected = 0.3, designed(seed, 0.0, 0.0).torque
     design = designed(seed, memory, DEVIATION)
     assert design.bin_autocorrelation is None
@@ -82,18 +82,18 @@ def test_periods_tell_noise_that_is_slow(seed: int) -> None:
     periods = float(np.median(design.samples)) / (RATE * bin_time)
     # a mean over time T of a process that forgets in `memory` has the variance 2 memory/T
     strength = DEVIATION**2 * 2 * memory / (bin_time * periods)
-    neighbour, slow = told(design, expected)
+    neighbour, slow = estimated(design, expected)
     assert neighbour == pytest.approx(np.exp(-bin_time / memory), abs=0.03)
-    assert 0.4 * strength < slow < 1.2 * strength  # the slowest that is tried remembers by 0.9 a bin
+    assert 0.4 * strength < slow < 1.2 * strength  # the slowest that is tried has 0.9 a bin
     # the control: each loop alone
-    neighbour, slow = told(replace(design, period_differences=()), expected)
+    neighbour, slow = estimated(replace(design, period_differences=()), expected)
     assert neighbour < 0.85
     assert slow < 0.2 * strength
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_periods_tell_noise_that_forgets_at_once(seed: int) -> None:
+def test_periods_show_white_noise(seed: int) -> None:
     expected, design = designed(seed, 0.0, 0.0).torque, designed(seed, 0.0, DEVIATION)
-    neighbour, slow = told(design, expected)
+    neighbour, slow = estimated(design, expected)
     assert neighbour < 0.05
     assert slow == pytest.approx(DEVIATION**2 / float(np.median(design.samples)), rel=0.2)

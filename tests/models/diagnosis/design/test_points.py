@@ -47,7 +47,7 @@ def test_no_blocks_are_no_points() -> None:
 
 
 @pytest.mark.parametrize(
-    ("pressure", "engaged", "told"),
+    ("pressure", "engaged", "expected"),
     [
         ([4 * UNLOADED, 0.0, 2 * UNLOADED], [1.0, 0.0, 1.0], [4 * UNLOADED, 2 * UNLOADED, 2 * UNLOADED]),
         ([0.0, 0.5 * UNLOADED], [0.0, 0.0], [1.0, 1.0]),
@@ -55,11 +55,11 @@ def test_no_blocks_are_no_points() -> None:
     ],
 )
 def test_an_open_clutch_has_the_lowest_closed_pressure(
-    pressure: list[float], engaged: list[float], told: list[float]
+    pressure: list[float], engaged: list[float], expected: list[float]
 ) -> None:
     points = numbered(0, len(pressure))
     found = mark_open(
         Points(**{each.name: getattr(points, each.name) for each in fields(Points)} | {"pressure": np.array(pressure)})
     )
     assert found.engaged.tolist() == engaged
-    assert found.pressure.tolist() == told
+    assert found.pressure.tolist() == expected
