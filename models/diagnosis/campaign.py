@@ -1,8 +1,8 @@
 """A campaign as the diagnosis sees it: everything that one life of a clutch has sent, in SI units, ordered by cycles.
 
 Cycles count from the beginning of the life (new, or the last rebuild). Moments are seconds on one clock (since 1970) where
-the rig said when a run was started, else None. A stationary run is its steady plateaus in the order in which they were
-made; where a raw record was sent, the record is kept beside them as evidence of what happens within a dwell.
+the rig sent when a run was started, else None. A stationary run is its steady plateaus in the order in which they were
+made; where a raw record was sent, it is kept beside them as evidence of what happens within a dwell.
 """
 
 import math
@@ -14,7 +14,7 @@ from models.records.runs import Plateaus, Record
 
 
 class EventKind(StrEnum):
-    """What maintenance did."""
+    """The kind of maintenance."""
 
     OIL_CHANGE = "oil_change"
     REST = "rest"
@@ -69,7 +69,7 @@ class DynamicRun:
 class DutyRun:
     """A block of duty that ends at `cycles`: engagements, energy of each [J], initial speed [rad/s], pressure [Pa].
 
-    What the rig did not say is None; `record` is one engagement's trace if it was sent.
+    None stands for a quantity that the rig did not send; `record` is one engagement's trace if it was sent.
     """
 
     run_id: str
@@ -84,7 +84,7 @@ class DutyRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MaintenanceEvent:
-    """What was done to clutch or rig at `cycles`."""
+    """Maintenance of clutch or rig at `cycles`."""
 
     run_id: str
     cycles: float

@@ -15,7 +15,8 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
-from models.diagnosis.baseline.laws import ATTRACTOR, EXPONENTIAL, LOG_BEND, POWERS, Frame, Laws, scene_of
+from models.diagnosis.baseline.criteria import EXPONENTIAL
+from models.diagnosis.baseline.laws import ATTRACTOR, LOG_CURVATURE, POWERS, Frame, Laws, scene_of
 from models.diagnosis.campaign import Campaign, Oil, StationaryRun
 from models.diagnosis.design.design import build_design
 from models.diagnosis.design.facts import Facts, facts_of
@@ -198,7 +199,7 @@ def _laws(alternative: Mapping[str, Any]) -> Laws:
     size = ATTRACTOR + at.loop_pressures.size + POWERS
     # before it had a bend M̄_c's law was an exponential, and before that the open clutch had no drag
     if theta.size in (size - 1, size - 1 - POWERS):
-        theta = np.insert(theta, LOG_BEND, np.log(EXPONENTIAL))
+        theta = np.insert(theta, LOG_CURVATURE, np.log(EXPONENTIAL))
     return Laws(theta=np.append(theta, np.zeros(size - theta.size)), frame=at)
 
 

@@ -1,6 +1,6 @@
 """`/degradation`: eq. 6 of mean COF and of every Stribeck parameter, and mean COF computed back from the parameters.
 
-The numerics of the latter are in `models.prognosis.from_parameters`: a life's tests and tracks are handed to them by pressure.
+The numerics of the latter are in `models.prognosis.from_parameters`, to which a life hands its tests and tracks by pressure.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

@@ -66,10 +66,10 @@ def service() -> None:
             "the same, 95 % of them": statistics.quantiles(posts, n=20)[-1],
             "GET remaining-useful-life": milliseconds(lambda: http.get(f"{address}/remaining-useful-life"), 200),
             "GET livez, the floor of the transport": milliseconds(lambda: http.get("/livez"), 200),
-            "GET remaining-useful-life?pressure_bar=5, remembered": milliseconds(
+            "GET remaining-useful-life?pressure_bar=5, cached": milliseconds(
                 lambda: http.get(f"{address}/remaining-useful-life?pressure_bar=5"), 50
             ),
-            "GET degradation, remembered": milliseconds(lambda: http.get(f"{address}/degradation"), 20),
+            "GET degradation, cached": milliseconds(lambda: http.get(f"{address}/degradation"), 20),
             "GET stribeck": milliseconds(lambda: http.get(f"{address}/stribeck"), 10),
         }
     print("### The service, over a socket\n\n| what | ms |\n|---|---|")

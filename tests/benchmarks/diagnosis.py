@@ -16,7 +16,7 @@ from models.rig.oil_viscosity import warmed
 from models.rig.programme import QUICK, WHOLE, Programme
 from models.rig.simulated_runs import SimulatedRun
 from service.run_files.simulated import simulated_body
-from tests.blind.rig import told
+from tests.blind.rig import sent
 from tests.blind.rig.hide import hide
 from tests.blind.test_blind import FAMILIES
 from tests.support import serving
@@ -24,7 +24,7 @@ from tests.support import serving
 #: Seconds between two questions: a dashboard's, but far more often.
 _PAUSE = 0.01
 SEED = 10
-_ASKED = ("remaining-useful-life", "diagnoses", "model", "series", "")
+_PAGES = ("remaining-useful-life", "diagnoses", "model", "series", "")
 
 
 def post_life(http: httpx2.Client, clutch_id: str, states: int, programme: Programme) -> None:
@@ -46,10 +46,10 @@ def _body(run: SimulatedRun, clutch: campaign.SimulatedClutch) -> bytes:
     return json.dumps(body).encode()
 
 
-def asked(http: httpx2.Client, clutch_id: str, until: str | None, seconds: float) -> tuple[list[float], float]:
+def get_times(http: httpx2.Client, clutch_id: str, until: str | None, seconds: float) -> tuple[list[float], float]:
     """Times of GETs [ms] while the diagnosis `until` runs, or for so many seconds; and how long that was [s]."""
     taken, began = [], time.perf_counter()
-    for name in itertools.cycle(_ASKED):
+    for name in itertools.cycle(_PAGES):
         start = time.perf_counter()
         answer = http.get(f"/v1/clutches/{clutch_id}/{name}".rstrip("/"))
         taken.append(1e3 * (time.perf_counter() - start))
@@ -72,11 +72,11 @@ def _most(taken: list[float]) -> float:
     return statistics.quantiles(taken, n=100)[-1]
 
 
-def judged(slugs: tuple[str, ...], lam: float, count: int) -> list[float]:
+def verdict_seconds(slugs: tuple[str, ...], lam: float, count: int) -> list[float]:
     """Seconds of one core that verdicts on campaigns of ten states with loops take, reading them excluded."""
     taken = []
     for number in range(count):
-        given = told.campaign(hide((SEED, number), slugs, lam, states=10))
+        given = sent.campaign(hide((SEED, number), slugs, lam, states=10))
         start = time.process_time()
         diagnose(given, rng=np.random.default_rng(number))
         taken.append(time.process_time() - start)
@@ -96,7 +96,7 @@ def verdicts() -> list[str]:
     hidden["two effects, λ = 50 each"] = [(pair, 50.0, 2) for pair in (("oil_temperature", "inertia_torque"),)]
     hidden["one effect, λ = 1000"] = [((slug,), 1000.0, 1) for slug in FAMILIES.values()]
     for name, kinds in hidden.items():
-        taken = list(itertools.chain.from_iterable(judged(*kind) for kind in kinds))
+        taken = list(itertools.chain.from_iterable(verdict_seconds(*kind) for kind in kinds))
         table.append(f"| {name} | {len(taken)} | {statistics.median(taken):.1f} | {max(taken):.1f} |")
     return table
 
@@ -114,11 +114,11 @@ def main() -> None:
             clutch_id = name.replace(" ", "-")
             post_life(http, clutch_id, states, programme)
             http.get(f"/v1/clutches/{clutch_id}/degradation")
-            lines.append(row(f"{name}, idle", asked(http, clutch_id, None, 5.0)[0]))
-            sent = http.post(f"/v1/clutches/{clutch_id}/diagnoses", json={}, headers={"Prefer": "wait=0"})
-            taken, over = asked(http, clutch_id, sent.headers["Location"], 0.0)
+            lines.append(row(f"{name}, idle", get_times(http, clutch_id, None, 5.0)[0]))
+            posted = http.post(f"/v1/clutches/{clutch_id}/diagnoses", json={}, headers={"Prefer": "wait=0"})
+            taken, over = get_times(http, clutch_id, posted.headers["Location"], 0.0)
             lines.append(row(f"{name}, while it is diagnosed", taken))
-            report = http.get(sent.headers["Location"]).json()
+            report = http.get(posted.headers["Location"]).json()
             times.append(f"| {name} | {over:.1f} | {report['verdict']}: {', '.join(report['causes'])} |")
     print("\n".join(lines))
     print("\n| diagnosis, its process' start and remaining life included | s | verdict |\n|---|---|---|")

@@ -12,8 +12,8 @@ def held(pid: int) -> int:
     while waiting:
         process = Path(f"/proc/{waiting.pop()}")
         try:
-            told = (process / "smaps_rollup").read_text(encoding="ascii")
-            total += 1024 * sum(int(line.split()[1]) for line in told.splitlines() if line.startswith("Pss:"))
+            rollup = (process / "smaps_rollup").read_text(encoding="ascii")
+            total += 1024 * sum(int(line.split()[1]) for line in rollup.splitlines() if line.startswith("Pss:"))
             for thread in (process / "task").iterdir():
                 waiting += map(int, (thread / "children").read_text(encoding="ascii").split())
         except (FileNotFoundError, ProcessLookupError):

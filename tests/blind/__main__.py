@@ -27,12 +27,12 @@ BEGIN, END = "<!-- blind tests: begin -->", "<!-- blind tests: end -->"
 
 def run(work: Callable[[Job], Result], chosen: Sequence[Job], processes: int) -> list[Result]:
     """All of it, in as many processes, in its order; a word on the way to whoever waits."""
-    results, told = [], time.monotonic()
+    results, reported = [], time.monotonic()
     with multiprocessing.get_context("spawn").Pool(processes, initializer=os.nice, initargs=(10,)) as pool:
         for done, result in enumerate(pool.imap(work, chosen), start=1):
             results.append(result)
-            if time.monotonic() - told > 20:
-                told = time.monotonic()
+            if time.monotonic() - reported > 20:
+                reported = time.monotonic()
                 print(f"{done} of {len(chosen)} {work.__name__}", file=sys.stderr, flush=True)
     return results
 
@@ -67,14 +67,14 @@ def write(lines: Sequence[str]) -> None:
 
 def main() -> None:
     """Print the table."""
-    seed, asked = int(os.environ.get("SEED") or 1), os.environ.get("SIZE") or "small"
+    seed, chosen_size = int(os.environ.get("SEED") or 1), os.environ.get("SIZE") or "small"
     only = tuple((os.environ.get("ONLY") or "").split(","))
-    size = SIZES[asked] if asked in SIZES else float(asked)
+    size = SIZES[chosen_size] if chosen_size in SIZES else float(chosen_size)
     chosen = [trial for trial in trials(seed, size) if trial.row.startswith(only)]
     processes = int(os.environ.get("PROCESSES") or 2)
     outcomes = run(judge, chosen, processes)
     lived = run(lives.lived, lives.jobs(seed, size) if "lives".startswith(only) else [], processes)
-    lines = document(outcomes, lived, f"make blind SEED={seed} SIZE={asked}")
+    lines = document(outcomes, lived, f"make blind SEED={seed} SIZE={chosen_size}")
     print("\n".join(lines))
     if "--failures" in sys.argv:
         print("\n".join(table.failures(outcomes)))

@@ -23,9 +23,9 @@ from tests.blind.rig.hide import Hidden, hide
 from tests.blind.rig.loudness import UnreachableError
 from tests.blind.rig.makers import CATALOGUED
 from tests.blind.rig.plan import Life, Site
-from tests.blind.rig.told import runs
+from tests.blind.rig.sent import runs
 
-#: What moves a life, and artefacts that spoil what is measured of it; how loud; states; lives each in the whole table.
+#: What moves a life, and artefacts that distort what is measured of it; how loud; states; lives each in the whole table.
 COURSES = ("running_in", "oil_change", "accelerated_wear", "load_severity")
 ARTEFACTS = ("oil_temperature", "torque_zero_shift", "pressure_offset")
 LOUD, STATES, LIVES = 50.0, 8, 12
@@ -36,7 +36,7 @@ HORIZON = 1e6
 
 @dataclass(frozen=True)
 class Lived:
-    """A life: what was hidden, what was said, and CRPS of the end's logarithm before and after adoption.
+    """A life: what was hidden, what was diagnosed, and CRPS of the end's logarithm before and after adoption.
 
     Where nothing was there to adopt, both are the same; they are None where no such life could be made.
     """
@@ -70,8 +70,8 @@ def lived(job: tuple[str, tuple[int, ...]]) -> Lived:
         end = np.random.default_rng([*seed, k]).uniform(SOONEST, LATEST) * hidden.plan.life.span
         fraction = passed_at(hidden, end)
         if fraction is not None:
-            verdict, adopted, told = _asked(hidden, fraction)
-            before, after = (_crps(each, end) for each in told)
+            verdict, adopted, forecasts = _forecasts(hidden, fraction)
+            before, after = (_crps(forecast, end) for forecast in forecasts)
             return Lived(slug, hidden.seed, verdict, adopted, before, after)
     return Lived(slug, seed, "unreachable", False, None, None)
 
@@ -106,8 +106,8 @@ def mean_cof(hidden: Hidden, cycles: FloatArray) -> FloatArray:
     return np.asarray((torque / bar).mean(axis=1)[np.searchsorted(all_cycles, cycles)])
 
 
-def _asked(hidden: Hidden, fraction: float) -> tuple[str, bool, list[dict[str, Any]]]:
-    """The verdict, whether something was adopted, and what is said of the end of life before and after."""
+def _forecasts(hidden: Hidden, fraction: float) -> tuple[str, bool, list[dict[str, Any]]]:
+    """The verdict, whether something was adopted, and the forecast of the end of life before and after."""
     with tempfile.TemporaryDirectory() as folder:
         app = create_app(Settings(database=f"sqlite:///{Path(folder) / 'a.db'}"))
         with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as http:
@@ -116,19 +116,19 @@ def _asked(hidden: Hidden, fraction: float) -> tuple[str, bool, list[dict[str, A
             http.post("/v1/clutches", json=clutch).raise_for_status()
             for run in runs(hidden):
                 http.post(f"{base}/runs", json=run | {"origin": "simulated"}).raise_for_status()
-            asked = http.post(f"{base}/diagnoses", json={"adopt": False}, headers={"Prefer": "wait=120"})
-            report = asked.raise_for_status().json()
-            told = [http.get(f"{base}/remaining-useful-life").raise_for_status().json()]
+            answer = http.post(f"{base}/diagnoses", json={"adopt": False}, headers={"Prefer": "wait=120"})
+            report = answer.raise_for_status().json()
+            forecasts = [http.get(f"{base}/remaining-useful-life").raise_for_status().json()]
             if report["adoptable"]:
                 wanted = {"diagnosis_id": report["diagnosis_id"]}
                 http.put(f"{base}/model", json=wanted).raise_for_status()
-            told.append(http.get(f"{base}/remaining-useful-life").raise_for_status().json())
-    return str(report["verdict"]), bool(report["adoptable"]), told
+            forecasts.append(http.get(f"{base}/remaining-useful-life").raise_for_status().json())
+    return str(report["verdict"]), bool(report["adoptable"]), forecasts
 
 
-def _crps(told: dict[str, Any], end: float) -> float:
+def _crps(forecast: dict[str, Any], end: float) -> float:
     """CRPS of the logarithm of the end of life; one beyond the horizon is scored as if it were at the horizon."""
-    ends = {float(q): HORIZON if x is None else max(x, 1.0) for q, x in told["end_of_life_cycles"].items()}
+    ends = {float(q): HORIZON if x is None else max(x, 1.0) for q, x in forecast["end_of_life_cycles"].items()}
     return crps_of_quantiles(list(ends), [float(np.log(x)) for x in ends.values()], float(np.log(end)))
 
 

@@ -217,7 +217,7 @@ def calibration(outcomes: Sequence[Outcome]) -> list[tuple[str, int, int]]:
 
     Single effects of the catalogue only, at every loudness; what was left out of the catalogue is left out here.
     """
-    told = [
+    given = [
         (share, slug in one.truth)
         for one in outcomes
         if len(one.truth) == 1 and one.truth <= CATALOGUED.keys() and not one.trial.without
@@ -227,8 +227,8 @@ def calibration(outcomes: Sequence[Outcome]) -> list[tuple[str, int, int]]:
     return [
         (
             f"{low:.2f} to {min(high, 1.0):.2f}",
-            sum(true for p, true in told if low <= p < high),
-            sum(low <= p < high for p, _ in told),
+            sum(true for p, true in given if low <= p < high),
+            sum(low <= p < high for p, _ in given),
         )
         for low, high in edges
     ]

@@ -110,7 +110,7 @@ def of_gains() -> list[str]:
     """What the columns of `gains` mean."""
     return [
         "Held-out error is the RMSE in states and pressures that were left out. Most of it is the sensor's noise and the "
-        "gain that each run has of its own, which no model foretells; *beyond noise* both are taken off in squares, as the "
+        "gain that each run has of its own, which no model predicts; *beyond noise* both are taken off in squares, as the "
         "report estimates them, and the target of a half is about what is left. It is of the campaigns in which more "
         f"than {100 * LEAST_EXCESS:.0f} % of the error before was beyond noise."
     ]
@@ -147,7 +147,7 @@ def speed(outcomes: Sequence[Outcome]) -> list[str]:
 
 def failures(outcomes: Sequence[Outcome], most: int = 60) -> list[str]:
     """How to make again what went wrong: named and wrong, false alarms, crashes, the truth not in the set, missed."""
-    told = []
+    lines = []
     for one in outcomes:
         reason = ""
         if one.verdict == "crashed":
@@ -161,6 +161,6 @@ def failures(outcomes: Sequence[Outcome], most: int = 60) -> list[str]:
         elif one.made and one.truth and not one.detected and one.trial.lam >= 20:
             reason = "missed"
         if reason:
-            said = ", ".join(f"{slug} {share:.2f}" for slug, share in one.candidates[:3])
-            told.append(f"{reason:16} {one.trial}  -> {one.verdict} {sorted(one.causes)} [{said}]")
-    return sorted(told)[:most]
+            candidates = ", ".join(f"{slug} {share:.2f}" for slug, share in one.candidates[:3])
+            lines.append(f"{reason:16} {one.trial}  -> {one.verdict} {sorted(one.causes)} [{candidates}]")
+    return sorted(lines)[:most]

@@ -14,11 +14,11 @@ SECONDS = (5, 31)
 
 
 def test_the_true_course_is_that_of_what_is_measured() -> None:
-    """Mean torque over pressure at the states, reckoned from noise-free readings on the reference's own grid."""
+    """Mean torque over pressure at the states, computed from noise-free readings on the reference's own grid."""
     hidden = hide(SECONDS, ("running_in",), 50.0, loops=False, full=True)
     site = hidden.plan.sites[0]
-    told = read(hidden.plan, hidden.clutch, hidden.effects)[0]
-    seen = (told / site.bar).mean(axis=1)
+    torque = read(hidden.plan, hidden.clutch, hidden.effects)[0]
+    seen = (torque / site.bar).mean(axis=1)
     course = lives.mean_cof(hidden, hidden.plan.life.cycles)
     np.testing.assert_allclose(course / course[0], seen / seen[0], rtol=2e-3)
     bare = lives.mean_cof(replace(hidden, effects=()), hidden.plan.life.cycles)

@@ -1,4 +1,4 @@
-"""The rig that hides: independent of the catalogue, its lag, noise and loudness right by other ways of reckoning."""
+"""The rig that hides: independent of the catalogue, its lag, noise and loudness right by other ways of computing them."""
 
 import ast
 from dataclasses import replace
@@ -13,11 +13,11 @@ from scipy.stats import chi2
 from tests.blind.rig.hide import Hidden, hide
 from tests.blind.rig.loudness import UnreachableError, listen
 from tests.blind.rig.makers import ALL, CATALOGUED, OUTSIDE
-from tests.blind.rig.more import ASKED, TOGETHER, drag_of, with_test
+from tests.blind.rig.more import ADVISED, TOGETHER, drag_of, with_test
 from tests.blind.rig.plan import RADIUS, RPM
 from tests.blind.rig.refit import LEAST_GAIN, spreads, theta_at
 from tests.blind.rig.sensor import Whitening
-from tests.blind.rig.told import campaign, runs
+from tests.blind.rig.sent import campaign, runs
 from tests.blind.rig.world import Effect, follow, read
 
 FOLDER = Path(__file__).parent
@@ -79,15 +79,15 @@ def test_the_lag_is_that_of_a_stiff_integrator() -> None:
     site = next(site for site in hidden.plan.sites if site.kind == "loop")
     law = hidden.clutch.law(site.bar, site.cycles)
     curve, attractor = law.torque(site.v), hidden.clutch.attractor(site.bar, site.cycles)
-    told = follow(site, curve, attractor)[0]
+    lagged = follow(site, curve, attractor)[0]
     time = site.clock[0] - site.clock[0, 0]
     s = lambda t: float(np.interp(t, time, curve[0]))  # noqa: E731
     c = float(attractor[0, 0])
     found = solve_ivp(
         lambda t, m: c * (1 - m / s(t)), (0, time[-1]), [curve[0, 0]], t_eval=time, max_step=0.01, rtol=1e-8
     )
-    np.testing.assert_allclose(told, found.y[0], rtol=2e-4)
-    assert np.abs(told - curve[0]).max() > 0.01  # it does lag
+    np.testing.assert_allclose(lagged, found.y[0], rtol=2e-4)
+    assert np.abs(lagged - curve[0]).max() > 0.01  # it does lag
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -166,8 +166,8 @@ def test_a_refit_leaves_what_a_general_solver_leaves(slug: str, amplitude: float
 
     def missed(x: np.ndarray) -> np.ndarray:
         theta = np.concatenate([x, clutch.theta[count:]])
-        told = read(hidden.plan, replace(clutch, theta=theta))
-        difference = [one - other for one, other in zip(told, changed, strict=True)]
+        readings = read(hidden.plan, replace(clutch, theta=theta))
+        difference = [one - other for one, other in zip(readings, changed, strict=True)]
         return np.concatenate([whitened(difference), ((theta - clutch.theta) / spread)[:count]])
 
     nothing = 0.5 * float(np.square(missed(clutch.theta[:count])).sum())
@@ -181,8 +181,8 @@ def test_a_refit_leaves_what_a_general_solver_leaves(slug: str, amplitude: float
     assert loud == pytest.approx(min(found), rel=0.05)
     assert loud < 0.5 * nothing  # the baseline does take it up
     assert abs(ear.linear(effect, 0.02 * amplitude) / ear.loudness(effect, 0.02 * amplitude) - 1) < 0.1
-    bent = abs(ear.linear(effect, amplitude) / loud - 1)
-    assert (bent > 0.3) == (slug != "pressure_offset")  # where it matters, the linear prediction is far off
+    nonlinear = abs(ear.linear(effect, amplitude) / loud - 1)
+    assert (nonlinear > 0.3) == (slug != "pressure_offset")  # where it matters, the linear prediction is far off
 
 
 def test_what_cannot_be_loud_says_so() -> None:
@@ -195,8 +195,8 @@ def test_what_cannot_be_loud_says_so() -> None:
 
 def test_the_campaign_holds_what_the_runs_say() -> None:
     hidden = hide((5, 4), ("load_severity",), 20.0)
-    told, seen = runs(hidden), campaign(hidden)
-    first = next(run for run in told if run["kind"] == "stationary_stribeck")
+    sent, seen = runs(hidden), campaign(hidden)
+    first = next(run for run in sent if run["kind"] == "stationary_stribeck")
     np.testing.assert_allclose(seen.stationary[0].plateaus.pressure, 1e5 * np.array(first["channels"]["pressure_bar"]))
     np.testing.assert_allclose(
         seen.stationary[0].plateaus.speed * RADIUS, np.array(first["channels"]["speed_rpm"]) * RPM * RADIUS
@@ -204,7 +204,7 @@ def test_the_campaign_holds_what_the_runs_say() -> None:
     assert [run.cycles for run in seen.stationary] == sorted(run.cycles for run in seen.stationary)
     assert len(seen.duty) == len(seen.stationary) - 1
     assert all(block.energy is not None and block.energy > 1e3 for block in seen.duty)
-    assert {run["cycles"] for run in told if run["kind"] == "dynamic_stribeck"} == {run.cycles for run in seen.dynamic}
+    assert {run["cycles"] for run in sent if run["kind"] == "dynamic_stribeck"} == {run.cycles for run in seen.dynamic}
 
 
 @pytest.fixture(scope="module")
@@ -212,7 +212,7 @@ def shifted() -> Hidden:
     return hide((5, 6), ("torque_zero_shift",), 20.0, states=4)
 
 
-@pytest.mark.parametrize("key", sorted({*ASKED, *TOGETHER}))
+@pytest.mark.parametrize("key", sorted({*ADVISED, *TOGETHER}))
 def test_an_advised_test_is_made_with_the_same_secret(shifted: Hidden, key: str) -> None:
     before, after = campaign(shifted), campaign(with_test(shifted, key))
     old = {run.run_id for run in (*before.stationary, *before.dynamic)}
@@ -234,8 +234,8 @@ def test_an_open_clutch_has_its_own_drag_and_what_is_no_friction(slug: str) -> N
     assert not loops.bar.any()
     np.testing.assert_array_equal(sweep.clock[0], 5.0 * (np.arange(sweep.rpm.shape[1]) + 0.5))
     drag = drag_of(hidden.seed)
-    told = read(after.plan, after.clutch, after.effects, drag=drag)[-2:]
-    for site, torque, none in zip((sweep, loops), told, read(bare.plan, bare.clutch, drag=drag)[-2:], strict=True):
+    readings = read(after.plan, after.clutch, after.effects, drag=drag)[-2:]
+    for site, torque, none in zip((sweep, loops), readings, read(bare.plan, bare.clutch, drag=drag)[-2:], strict=True):
         np.testing.assert_array_equal(none, drag(site.v))
         left = torque - none
         assert np.abs(left).max() == 0 or effect.reading is not None

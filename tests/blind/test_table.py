@@ -1,4 +1,4 @@
-"""The table itself: one who knows the truth meets every target, one who is told the wrong truth does not."""
+"""The table itself: who knows the truth meets every target, who is given the wrong truth does not."""
 
 from dataclasses import replace
 
@@ -69,9 +69,9 @@ def test_what_cannot_be_made_is_an_outcome_that_counts_nowhere(monkeypatch: pyte
     made = [all_knowing(replace(trial, seed=(1, 3))), all_knowing(Trial("none", (1, 4)))]
     line = next(line for line in counts() if line.title == "λ = 1000: named and wrong")
     assert (line.of([unmade]), line.of([*made, unmade])) == ((0, 0), (0, 1))
-    told = blind.document([*made, unmade], [], "make blind")
-    assert any("1 of 3 trials could not be made" in row and "`running_in` at λ = 1000 (1)" in row for row in told)
-    assert told[4:] == blind.document(made, [], "make blind")[4:]
+    lines = blind.document([*made, unmade], [], "make blind")
+    assert any("1 of 3 trials could not be made" in row and "`running_in` at λ = 1000 (1)" in row for row in lines)
+    assert lines[4:] == blind.document(made, [], "make blind")[4:]
     assert table.unmade(made) == ["All 2 trials could be made."]
     assert table.failures([unmade]) == []
 

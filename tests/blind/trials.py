@@ -12,7 +12,7 @@ from models.diagnosis.report.report import Gain, Report
 from tests.blind.rig.hide import Hidden, hide
 from tests.blind.rig.loudness import UnreachableError
 from tests.blind.rig.more import with_test
-from tests.blind.rig.told import campaign
+from tests.blind.rig.sent import campaign
 
 Diagnose = Callable[..., Report]
 #: The verdict on a campaign that could not be made: no draw in which the effect was as loud as it should be.

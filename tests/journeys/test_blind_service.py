@@ -5,7 +5,7 @@ from typing import Any
 import httpx2
 
 from tests.blind.rig.hide import Hidden, hide
-from tests.blind.rig.told import runs
+from tests.blind.rig.sent import runs
 
 VERDICTS = {"model_adequate", "cause_named", "cause_ambiguous", "unexplained_structure", "insufficient_data"}
 BASE = "/v1/clutches/blind"

@@ -23,7 +23,7 @@ def screw_drives(http: httpx2.Client) -> None:
         answer = http.post(f"/v1/clutches/{name}/runs", json=run)
         answer.raise_for_status()
         fit = answer.json()["fits"][0]
-        m_s, m_c, v_s, c_v = (_told(fit, name, scale) for name, scale in _SCALES.items())
+        m_s, m_c, v_s, c_v = (_formatted(fit, name, scale) for name, scale in _SCALES.items())
         errors = f"{fit['rmse_nm'] * 1e3:.3f} | {fit['mse_percent']:.1f}"
         print(f"| {name} | {fit['points']} | {m_s} | {m_c} | {v_s} | {c_v} | {errors} | {fit['status']} |")
 
@@ -32,7 +32,7 @@ def screw_drives(http: httpx2.Client) -> None:
 _SCALES = {"static_torque_nm": 1e3, "coulomb_ratio": 1.0, "stribeck_velocity_m_s": 1.0, "viscous_coefficient": 1e3}
 
 
-def _told(fit: dict[str, Any], name: str, scale: float) -> str:
+def _formatted(fit: dict[str, Any], name: str, scale: float) -> str:
     if name in fit["undetermined"]:
         return "undetermined"
     return f"{fit['parameters'][name] * scale:.3g} ± {fit['standard_errors'][name] * scale:.2g}"

@@ -53,7 +53,7 @@ def _run(run_id: str, cycles: float, channels: dict[str, Sequence[float]]) -> St
     )
 
 
-def said_of(count: int) -> Report:
+def report_of(count: int) -> Report:
     """The report on a campaign of `count` sweeps."""
     return diagnose(traction_campaign(count), rng=np.random.default_rng(2013))
 
@@ -62,7 +62,7 @@ def main() -> None:
     """Verdict, axes and candidates by campaign, as Markdown, and the paragraph on the largest."""
     rows, last = [], ""
     for count in CAMPAIGNS:
-        report = said_of(count)
+        report = report_of(count)
         where = report.baseline.where if report.baseline is not None else ()
         rows.append(
             {

@@ -34,8 +34,8 @@ Row = dict[str, Any]
 def table(rows: Iterable[Row]) -> str:
     """A Markdown table, its head the rows' keys."""
     rows = list(rows)
-    told = [" | ".join(f"{v:.4g}" if isinstance(v, float) else str(v) for v in row.values()) for row in rows]
-    return "\n".join(f"| {line} |" for line in (" | ".join(rows[0]), " | ".join("---" for _ in rows[0]), *told))
+    lines = [" | ".join(f"{v:.4g}" if isinstance(v, float) else str(v) for v in row.values()) for row in rows]
+    return "\n".join(f"| {line} |" for line in (" | ".join(rows[0]), " | ".join("---" for _ in rows[0]), *lines))
 
 
 def loop_signs() -> list[Row]:

@@ -3,13 +3,13 @@
 Nothing of it is a clutch; eq. 6 and its filters are asked about what they were not made for:
 
 - **Lasers** (`laser_degradation`): the operating current of 15 lasers over 4,000 h, failed at +10 %; 12 never fail within
-  the test. What falls is 1 - increase, the threshold 0.9. Each laser is foretold with the weak prior, and with one
+  the test. What falls is 1 - increase, the threshold 0.9. Each laser is predicted with the weak prior, and with one
   learned from the other 14.
-- **Pins** (`sliding_wear`): the wear scar of 12 pins under 10, 50 and 100 g. Each pin is foretold from the others: by one
+- **Pins** (`sliding_wear`): the wear scar of 12 pins under 10, 50 and 100 g. Each pin is predicted from the others: by one
   law over load times cycles (the dissipated energy up to a factor), by one law a load over cycles, and, to be compared
   with, by one law over cycles whatever the load.
 - **Running-in** (`tribometer_running_in`): friction of one contact from the first second, in blocks of time; the last
-  block is foretold from the first ones.
+  block is predicted from the first ones.
 """
 
 import csv
@@ -80,16 +80,16 @@ def lasers() -> list[Row]:
             fleet = population(lessons[:index] + lessons[index + 1 :])
             for name, posterior in _believed(history, hours, fleet, rng).items():
                 found[name].append(_laser(posterior, history, rng))
-        for name, told in found.items():
-            value_held, end_held, chance = (list(column) for column in zip(*told, strict=True))
+        for name, outcomes in found.items():
+            value_held, end_held, chance = (list(column) for column in zip(*outcomes, strict=True))
             brier = float(np.mean([(p - f) ** 2 for p, f in zip(chance, failed, strict=True)]))
             rows.append(
                 {
                     "hours seen": int(hours),
                     "prior": name,
-                    "current at 4,000 h held": f"{sum(value_held)} of {len(told)}",
-                    "failure held, or not contradicted": f"{sum(end_held)} of {len(told)}",
-                    "failures by 4,000 h foretold": round(sum(chance), 1),
+                    "current at 4,000 h held": f"{sum(value_held)} of {len(outcomes)}",
+                    "failure held, or not contradicted": f"{sum(end_held)} of {len(outcomes)}",
+                    "failures by 4,000 h predicted": round(sum(chance), 1),
                     "came": sum(failed),
                     "Brier score": round(brier, 3),
                 }
@@ -180,7 +180,7 @@ def _scar_prior(scars: FloatArray) -> Prior:
 
 
 def running_in() -> list[Row]:
-    """By contact and share seen: the last block's friction, foretold and measured."""
+    """By contact and share seen: the last block's friction, predicted and measured."""
     rows = []
     for name in ("bod_10000s", "pod_7500s_a"):
         data = columns("tribometer_running_in", f"{name}.csv")

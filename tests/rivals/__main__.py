@@ -1,4 +1,4 @@
-"""`make rivals`: the same lives foretold by other packages, in one run: CRPS and time beside ours.
+"""`make rivals`: the same lives predicted by other packages, in one run: CRPS and time beside ours.
 
 SIZE scales the number of lives, SEED changes them; with --write the table takes its place in docs/prognosis.md.
 """
@@ -88,11 +88,11 @@ def sampled(tracker: Any, state: Any, rng: np.random.Generator) -> Sample:
 
 
 def compared(count: int, seed: int) -> tuple[Tally, int]:
-    """Lives like the reference's, foretold at 40, 60 and 80 % by every method."""
-    tally, told = Tally(), 0
+    """Lives like the reference's, predicted at 40, 60 and 80 % by every method."""
+    tally, done = Tally(), 0
     for life in [replace(life, scatter=SCATTER * life.truth.initial) for life, _ in typical(count, seed)]:
-        rng = np.random.default_rng([seed, told])
-        told += 1
+        rng = np.random.default_rng([seed, done])
+        done += 1
         measurements = life.measured(0.8, round(0.8 * INSPECTIONS) + 1, rng)
         prior, gap = weak(measurements[0], falling=True), measurements[1].progress
         ours: dict[str, tuple[Any, Any]] = {
@@ -115,14 +115,14 @@ def compared(count: int, seed: int) -> tuple[Tally, int]:
                 tally.scored(name, partial(sampled, tracker, state, rng), life.end)
             for name, rival in theirs.items():
                 tally.scored(name, partial(rival.sample, rng), life.end)
-                if told <= SIMULATED and isinstance(rival, Progpy):
+                if done <= SIMULATED and isinstance(rival, Progpy):
                     begun = time.process_time()
                     rival.simulated()
                     tally.whole[f"{name} and `MonteCarlo`, its own simulation"].append(time.process_time() - begun)
             seen = measurements[: index + 1]
             tally.scored("surpyval `predict_rul`", partial(unit.sample, seen, rng), life.end)
             tally.scored("scipy `curve_fit`, delta method", partial(fitted, seen, prior, rng), life.end)
-    return tally, told
+    return tally, done
 
 
 def main() -> None:
@@ -132,10 +132,10 @@ def main() -> None:
     parser.add_argument("--write", action="store_true")
     chosen = parser.parse_args()
     np.random.seed(chosen.seed)  # noqa: NPY002 # progpy draws from the global generator
-    tally, told = compared(max(4, round(40 * chosen.size)), chosen.seed)
+    tally, done = compared(max(4, round(40 * chosen.size)), chosen.seed)
     releases = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
     head = (
-        f"{told} lives like the reference's, {INSPECTIONS} inspections in a life, {100 * SCATTER:.0f} % scatter, at 40, 60 "
+        f"{done} lives like the reference's, {INSPECTIONS} inspections in a life, {100 * SCATTER:.0f} % scatter, at 40, 60 "
         f"and 80 % of life, seed {chosen.seed}; {releases}"
     )
     table = f"{head}\n\n{tally.table()}"

@@ -119,7 +119,7 @@ class Progpy:
         return ends_of(np.array([[float(each[name]) for name in NAMES] for each in drawn]))
 
     def simulated(self) -> np.ndarray:
-        """The ends of as many draws, in inspections from now on, the way progpy itself foretells: every one simulated
+        """The ends of as many draws, in inspections from now on, the way progpy itself predicts: every one simulated
         inspection by inspection."""
         self.model.parameters["process_noise"] = dict.fromkeys([*NAMES, "progress"], 0.0)
         found = MonteCarlo(self.model).predict(self.filter.x, n_samples=DRAWS, dt=1.0, horizon=float(AHEAD))

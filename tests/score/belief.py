@@ -36,7 +36,8 @@ def belief(count: int, seed: int) -> str:
         held = "/".join(f"{100 * np.mean([each.held for each in stage]):.1f}" for stage in eq_6[share])
         crps = np.mean([each.log_crps for stage in eq_6[share] for each in stage]) / sure
         rest = [
-            percents([float(np.mean([e.held for e in stage])) for stage in told[share]]) for told in others.values()
+            percents([float(np.mean([e.held for e in stage])) for stage in outcomes[share]])
+            for outcomes in others.values()
         ]
         lines.append(f"| {100 * share:.0f} % | {held} | {crps:.3f} | " + " | ".join(rest) + " |")
     return "\n".join(lines)

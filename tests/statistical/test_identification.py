@@ -150,7 +150,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(proportional: float, cons
 
 
 def test_intervals_with_known_deviations_hold_the_truth() -> None:
-    """Torque noise of 0.05 to 0.5 Nm that differs from point to point, and is told."""
+    """Torque noise of 0.05 to 0.5 Nm that differs from point to point, and is given."""
     truth, torque, _ = _simulated(0.0)
     rng = np.random.default_rng(SEED)
     sd = np.exp(rng.uniform(np.log(0.05), np.log(0.5), torque.shape))
@@ -172,6 +172,6 @@ def test_the_coverage_check_catches_half_a_covariance_and_a_wrong_model() -> Non
     fits = fit_curves([curve(VELOCITY, row) for row in noisy])
     halved = _coverage(fits, truth, shrink=np.sqrt(0.5))
     assert (halved < COVERAGE - WITHIN).all()
-    bent = noisy + truth[:, 3:] * (VELOCITY**0.5 - VELOCITY**0.3)
-    wrong = _coverage(fit_curves([curve(VELOCITY, row) for row in bent]), truth)
+    wrong_form = noisy + truth[:, 3:] * (VELOCITY**0.5 - VELOCITY**0.3)
+    wrong = _coverage(fit_curves([curve(VELOCITY, row) for row in wrong_form]), truth)
     assert (wrong[:4] < COVERAGE - WITHIN).all()

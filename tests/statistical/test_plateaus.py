@@ -66,7 +66,8 @@ def test_deviations_cover_under_white_and_coloured_noise(rate: float, memory: fl
 
 @pytest.mark.parametrize(("rate", "memory"), [(10.0, 0.8), (10.0, 0.9), (100.0, 0.97)])
 def test_deviations_nearly_cover_under_noise_that_outlasts_the_dwells(rate: float, memory: float) -> None:
-    """Nine, nineteen and 66 samples of 50 and 500 are remembered: 45 to 80 % were held without `models.records.slow_noise`.
+    """Noise is autocorrelated over nine, nineteen and 66 samples of 50 and 500: without `models.records.slow_noise` 45 to
+    80 % were held.
 
     All dwells of a record share one estimate of its memory, so that eight records scatter by more than their dwells'
     number says: ten points are allowed.
@@ -125,8 +126,8 @@ def test_the_fits_are_those_of_the_exact_plateaus() -> None:
         record = spike(jitter(lose(made.record, 0.01, rng), rng), rng)
         exact = Plateaus(pressure=made.pressure, speed=made.speed, torque=made.torque)
         truth = mean_torques(fit_curves(curves_by_pressure(exact, GEOMETRY)), velocities)
-        told = mean_torques(fit_curves(curves_by_pressure(cut_plateaus(record).plateaus, GEOMETRY)), velocities)
-        misses.append((told[:, 0] - truth[:, 0]) / told[:, 1])
+        estimate = mean_torques(fit_curves(curves_by_pressure(cut_plateaus(record).plateaus, GEOMETRY)), velocities)
+        misses.append((estimate[:, 0] - truth[:, 0]) / estimate[:, 1])
     root_mean_square = float(np.sqrt((np.concatenate(misses) ** 2).mean()))
     print(f"root mean square of the misses {root_mean_square:.3f}")
     assert 0.7 < root_mean_square < 1.3, "1 ± 0.085, three of them, and a margin for transients"

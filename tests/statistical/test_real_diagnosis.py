@@ -13,7 +13,7 @@ pytestmark = [
 
 @pytest.mark.parametrize("count", [6, 20, 60])
 def test_traction_sweeps_get_no_name(count):
-    report = diagnosis.said_of(count)
+    report = diagnosis.report_of(count)
     print(count, report.verdict, report.causes, report.summary)
     assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
     assert report.causes == ()

@@ -15,7 +15,7 @@ from models.diagnosis.baseline.laws import Laws
 from models.diagnosis.design.design import Design
 from models.diagnosis.detection.raw_records.evidence import RawEvidence
 from models.diagnosis.detection.view import View, columns_at_rows
-from models.diagnosis.effects.uncatalogued import STRANGERS
+from models.diagnosis.effects.uncatalogued.catalogue import UNCATALOGUED
 from models.diagnosis.noise.covariance import Noise
 from models.diagnosis.pooled_fit.gauss_newton import Fit, Fitted, Priors, fit
 from models.diagnosis.pooled_fit.projection import Projected, gram_of, project
@@ -220,7 +220,7 @@ class _Search:
 
     def strangers(self, best: float) -> list[Hypothesis]:
         """What is not in the catalogue and comes near the best [nats], refitted."""
-        effects = [each.effect for each in STRANGERS]
+        effects = [each.effect for each in UNCATALOGUED]
         columns = columns_of(effects, [effect.grid(self.design.facts) for effect in effects])
         fitted = self.null.fit
         projected = beside(self.design, self.noise, self.priors, fitted, columns)
@@ -232,7 +232,7 @@ class _Search:
             added = Fitted(effect=each.effects[0], amplitude=float(amplitudes[0]), shape=each.shapes[0])
             linear = (each.evidence, drop)
             found.append(self.refitted(fitted.laws, (added,), each.shape_evidence, linear, STEPS))
-        return [each.less(float(np.log(len(STRANGERS))), 0.0) for each in found]
+        return [each.less(float(np.log(len(UNCATALOGUED))), 0.0) for each in found]
 
     def from_the_best_pair(
         self, found: list[Hypothesis], pairs: list[Hypothesis], screened: list[Screened]

@@ -13,7 +13,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 
-#: A curve below this share of its loop's largest value is no friction to be followed, and is lifted to it.
+#: A curve below this share of its loop's largest value is lifted to it: C/S must stay finite.
 _LEAST_SHARE = 1e-3
 
 
@@ -29,7 +29,7 @@ class Lag:
     by_log_attractor: FloatArray
 
     def follow(self, change: FloatArray) -> FloatArray:
-        """R[(M/S) δS]: a change of the stationary curve [l, k, m] Nm as it shows in the loops' torque."""
+        """R[(M/S) δS]: the change of the loops' torque [l, k, m] Nm by a change of the stationary curve [l, k, m] Nm."""
         return _relaxed(self.keep, self.mean_keep, self.ratio[:, :, None] * change)
 
 
@@ -66,8 +66,8 @@ def _relaxed(keep: FloatArray, mean_keep: FloatArray, target: FloatArray) -> Flo
 
 
 def _periodic(keep: FloatArray, gain: FloatArray) -> FloatArray:
-    """The periodic y [l, k, m] of y_i = keep_i y_{i-1} + gain_i, keep [l, k], gain [k, l, m] (taken for y): once around
-    from nothing, then what was missing."""
+    """The periodic y [l, k, m] of y_i = keep_i y_{i-1} + gain_i, keep [l, k], gain [k, l, m] (overwritten): once around from
+    y = 0, then the share of its end that was missing at its start is added."""
     steps = keep.T[:, :, None]
     for i in range(1, gain.shape[0]):
         gain[i] += steps[i] * gain[i - 1]

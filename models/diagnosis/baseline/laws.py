@@ -7,13 +7,13 @@ highest pressure,
     w         = (P⁺ - p)/(P⁺ - P⁻)                               for M_s, V_S, C_v: straight lines in pressure
     w         = (g(p) - g(P⁺))/(1 - g(P⁺)),  g = (1 + b (p - P⁻)/p_0)^{-1/b}  for M̄_c: fast or slowly to its asymptote
     log C          = κ(p) + d_1 x + d_2 x (1 + ξ)/(x + ξ) + d_3 x (p - p̄)/(P⁺ - P⁻),       x = ζ/ζ_last,  ξ = 0.15
-    open clutch    = Σ_k o_k (v/v_0)^k,  k = 1 ... 4                           whatever oil it drags along, and no friction
+    open clutch    = Σ_k o_k (v/v_0)^k,  k = 1 ... 4                           the drag of its oil, and no friction
 
-(φ, ε) stand in θ as (log h, log ε) with h the half-life, D(h) = 1/2: φ = h/(2^{1/ε} - 1). Data tell h far better than φ.
-u⁻, u⁺ are the fresh values at the two ends of the pressures; intercept and slope (asymptote and excess) drift each by its
+(φ, ε) stand in θ as (log h, log ε) with h the half-life, D(h) = 1/2: φ = h/(2^{1/ε} - 1). Data determine h far better than
+φ. u⁻, u⁺ are the fresh values at the two ends of the pressures; intercept and slope (asymptote and excess) drift each by its
 own share: whether eq. 6 multiplies a law as a whole (s⁻ = s⁺) or not is left to the data. Fig. 9 shows that M̄_c falls to an
-asymptote and not how: b → 0 is c_∞ + a e^{-p/p_0}, b = 1 with p_0 = P⁻ is c_∞ + a/p; below P⁻ its
-tangent. κ is free at every pressure of the loops and straight between them.
+asymptote and not how: b, the curvature of its fall, leaves that open. b → 0 is c_∞ + a e^{-p/p_0}, b = 1 with p_0 = P⁻ is
+c_∞ + a/p; below P⁻ the law goes on by its tangent. κ is free at every pressure of the loops and linear between them.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, eqs. 2, 3, 6, figs. 9 and 10; the bilinear form and the
 course of C are this project's.
@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
+from models.diagnosis.baseline.criteria import CURVATURE_BOUNDS, EARLY
 from models.diagnosis.design.facts import Facts
 from models.diagnosis.design.points import IntArray, Points
 from models.friction.stribeck import GAMMA
@@ -33,27 +34,22 @@ BLOCK = 6
 #: θ: four blocks of (low end, high end, share low, share high, log h, log ε); log p_0, log b;
 #: d_1, d_2, d_3; then κ at each pressure of the loops; then o_1 ... o_4 of the open clutch.
 LOG_DECAY = 4 * BLOCK
-LOG_BEND = LOG_DECAY + 1
-FALL = slice(LOG_DECAY, LOG_BEND + 1)
-DRIFT = LOG_BEND + 1
+LOG_CURVATURE = LOG_DECAY + 1
+FALL = slice(LOG_DECAY, LOG_CURVATURE + 1)
+DRIFT = LOG_CURVATURE + 1
 ATTRACTOR = DRIFT + 3
-#: Drag that rises and falls again is followed to a percent by so many powers; with two, what is left would pass for a zero.
+#: Powers of speed of the open clutch's drag. Chosen: four follow a drag that rises and falls again to a percent; with two
+#: the remainder passed for a shifted zero.
 POWERS = 4
 KAPPA, OPEN_DRAG = slice(ATTRACTOR, -POWERS), slice(-POWERS, None)
 RATIO = 1  # the place of M̄_c among the four
-#: b where nothing tells it: between an exponential and a hyperbola.
-USUAL_BEND = 0.25
-#: b of what is as good as an exponential, and the bounds of b.
-EXPONENTIAL = 1e-3
-BENDS = (EXPONENTIAL, 5.0)
-#: Half of what log C drifts by early is done after this share of the life measured, as eq. 6 has it.
-EARLY = 0.15
+#: V_S [m/s] is kept above this, lest eq. 3 divides by it.
 _LEAST_VELOCITY = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """What the laws are relative to: the lowest and highest pressure [Pa], the last state [cycles], the pressures of the
+    """The reference of the laws: the lowest and highest pressure [Pa], the last state [cycles], the pressures of the
     loops [l] Pa, ascending, and a velocity [m/s] in the middle of what was measured."""
 
     lowest: float
@@ -64,19 +60,19 @@ class Frame:
 
     @property
     def span(self) -> float:
-        """Of the pressures [Pa], or the pressure itself where there is one only."""
+        """The range of the pressures [Pa], or the pressure itself where there is only one."""
         return self.highest - self.lowest if self.highest > self.lowest else self.highest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Laws:
-    """theta [ATTRACTOR + loop pressures + POWERS] and the frame that it is in."""
+    """theta [ATTRACTOR + loop pressures + POWERS] and the frame that it refers to."""
 
     theta: FloatArray
     frame: Frame
 
     def parameters(self, pressure: FloatArray, cycles: FloatArray) -> FloatArray:
-        """M_s, M̄_c, V_S, C_v [n, 4] at pressure [n] Pa and cycles [n]. V_S is kept above nothing, the rest is as fitted."""
+        """M_s, M̄_c, V_S, C_v [n, 4] at pressure [n] Pa and cycles [n]. V_S is kept above 0, the others are as fitted."""
         begins, repeats = _stretches(pressure, cycles)
         return np.repeat(self._values(pressure[begins], cycles[begins], None)[0], repeats, axis=0)
 
@@ -85,7 +81,7 @@ class Laws:
         begins, repeats = _stretches(pressure, cycles)
         slopes = np.empty((begins.size, 4, BLOCK))
         values, by_fall = self._values(pressure[begins], cycles[begins], slopes)
-        values, slopes, by_fall = (np.repeat(each, repeats, axis=0) for each in (values, slopes, by_fall))
+        values, slopes, by_fall = (np.repeat(rows, repeats, axis=0) for rows in (values, slopes, by_fall))
         return values, slopes, by_fall
 
     def _values(
@@ -95,7 +91,7 @@ class Laws:
         values = np.empty((pressure.size, 4))
         by_fall = np.zeros((pressure.size, 2))
         high = (pressure - self.frame.lowest) / self.frame.span
-        # rows of one test stand together: eq. 6 is worked out once for each
+        # rows of one test follow each other: eq. 6 is computed once for each
         begins, repeats = _stretches(cycles)
         states = cycles[begins]
         fall, fall_slopes = falling_weight(high, self.frame.span, self.theta[FALL])
@@ -103,7 +99,7 @@ class Laws:
             first, second, share_1, share_2, log_half, log_exponent = self.theta[k * BLOCK : (k + 1) * BLOCK].tolist()
             weight_1, weight_2 = (fall, 1.0 - fall) if k == RATIO else (1.0 - high, high)
             done, by_half, by_exponent = (
-                np.repeat(each, repeats) for each in _progress(states, log_half, log_exponent)
+                np.repeat(share, repeats) for share in _progress(states, log_half, log_exponent)
             )
             lost = first * share_1 * weight_1 + second * share_2 * weight_2
             values[:, k] = first * weight_1 + second * weight_2 + lost * done
@@ -116,10 +112,10 @@ class Laws:
                 slopes[:, k, 3] = second * weight_2 * done
                 slopes[:, k, 4] = lost * by_half
                 slopes[:, k, 5] = lost * by_exponent
-        stuck = values[:, 2] < _LEAST_VELOCITY
-        values[stuck, 2] = _LEAST_VELOCITY
+        too_low = values[:, 2] < _LEAST_VELOCITY
+        values[too_low, 2] = _LEAST_VELOCITY
         if slopes is not None:
-            slopes[stuck, 2] = 0.0
+            slopes[too_low, 2] = 0.0
         return values, by_fall
 
     def by_pressure(self, pressure: FloatArray, cycles: FloatArray) -> FloatArray:
@@ -140,25 +136,25 @@ class Laws:
 
 
 def _stretches(*keys: FloatArray) -> tuple[IntArray, IntArray]:
-    """Where rows [n] begin that are the same in all keys as those that follow them, and how many follow: a loop is one."""
-    changes = np.any([np.diff(each, prepend=np.nan) != 0.0 for each in keys], axis=0)
+    """First rows of stretches of equal keys, and how many rows each stretch has: a loop is one stretch."""
+    changes = np.any([np.diff(key, prepend=np.nan) != 0.0 for key in keys], axis=0)
     begins = np.flatnonzero(changes)
     return begins, np.diff(begins, append=changes.size)
 
 
 def falling_weight(high: FloatArray, span: float, fall: FloatArray) -> tuple[FloatArray, FloatArray]:
     """w [n] of M̄_c's law at (p - P⁻)/(P⁺ - P⁻) = `high` [n], and its derivatives [n, 2] by `fall`: log p_0, p_0 in Pa, and
-    log b, b within BENDS. Below P⁻ the law goes on by its tangent: a hyperbola has its pole there."""
+    log b, b within CURVATURE_BOUNDS. Below P⁻ the law goes on by its tangent: a hyperbola has its pole there."""
     ratio = float(np.clip(span / np.exp(fall[0]), 1e-3, 60.0))
-    bend = float(np.exp(np.clip(fall[1], *np.log(BENDS))))
+    curvature = float(np.exp(np.clip(fall[1], *np.log(CURVATURE_BOUNDS))))
     at = np.append(high, 1.0)
-    stretched = 1.0 + bend * ratio * np.maximum(at, 0.0)
+    stretched = 1.0 + curvature * ratio * np.maximum(at, 0.0)
     logs = np.log(stretched)
-    weight = np.exp(-logs / bend) - ratio * np.minimum(at, 0.0)
+    weight = np.exp(-logs / curvature) - ratio * np.minimum(at, 0.0)
     along = ratio * at / stretched
-    by_bend = (logs / bend - along) * np.exp(-logs / bend) * (at > 0.0)
-    by_decay = along * np.where(at > 0.0, np.exp(-logs / bend), 1.0)
-    slopes = np.stack([by_decay, by_bend], axis=-1)
+    by_curvature = (logs / curvature - along) * np.exp(-logs / curvature) * (at > 0.0)
+    by_decay = along * np.where(at > 0.0, np.exp(-logs / curvature), 1.0)
+    slopes = np.stack([by_decay, by_curvature], axis=-1)
     whole = 1.0 - weight[-1]
     by_fall = (slopes[:-1] - slopes[-1]) / whole + ((weight[:-1] - weight[-1]) / whole**2)[:, None] * slopes[-1]
     return (weight[:-1] - weight[-1]) / whole, by_fall
@@ -187,9 +183,8 @@ def curve(velocity: FloatArray, parameters: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """Points and what the baseline says there, all [P]: curve S [Nm]; parameters [P, 4] and gradient [P, 4] = ∂S by them;
-    decay e = exp(-V_S/v); by_velocity ∂S/∂v [Nm s/m]. With the clutch open there is no friction: all but parameters
-    and e is 0."""
+    """The baseline at points [P]: curve S [Nm]; the parameters [P, 4] and the gradient [P, 4] of S by them; decay
+    e = exp(-V_S/v); by_velocity ∂S/∂v [Nm s/m]. With the clutch open there is no friction: all but parameters and e is 0."""
 
     points: Points
     facts: Facts
@@ -209,16 +204,16 @@ class Scene:
     @property
     def viscous(self) -> FloatArray:
         """The viscous part C_v v^γ [P] Nm."""
-        carried = self.points.engaged * self.parameters[:, 3] * self.points.velocity**GAMMA
-        return np.asarray(carried, dtype=np.float64)
+        torque = self.points.engaged * self.parameters[:, 3] * self.points.velocity**GAMMA
+        return np.asarray(torque, dtype=np.float64)
 
     @property
     def open_powers(self) -> FloatArray:
-        """(v/v_0)^k [P, POWERS] with the clutch open, 0 elsewhere: what its drag is made of."""
+        """(v/v_0)^k [P, POWERS] with the clutch open, 0 elsewhere: the terms of its drag."""
         powers = np.zeros((self.points.engaged.size, POWERS))
-        where = np.flatnonzero(self.points.engaged < 1.0)
-        relative = self.points.velocity[where] / self.laws.frame.reference_velocity
-        powers[where] = (1.0 - self.points.engaged[where])[:, None] * relative[:, None] ** np.arange(1, POWERS + 1)
+        is_open = np.flatnonzero(self.points.engaged < 1.0)
+        relative = self.points.velocity[is_open] / self.laws.frame.reference_velocity
+        powers[is_open] = (1.0 - self.points.engaged[is_open])[:, None] * relative[:, None] ** np.arange(1, POWERS + 1)
         return powers
 
     def curve_at(
@@ -230,10 +225,10 @@ class Scene:
     ) -> FloatArray:
         """S [P] Nm with other cycles, velocity [m/s] > 0 or pressure [Pa] at the points."""
         p = self.points.pressure if pressure is None else pressure
-        at = self.parameters
+        parameters = self.parameters
         if cycles is not None or pressure is not None:
-            at = self.laws.parameters(p, self.points.cycles if cycles is None else cycles)
-        return self.points.engaged * curve(self.points.velocity if velocity is None else velocity, at)
+            parameters = self.laws.parameters(p, self.points.cycles if cycles is None else cycles)
+        return self.points.engaged * curve(self.points.velocity if velocity is None else velocity, parameters)
 
 
 def gradient_of(velocity: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -245,7 +240,7 @@ def gradient_of(velocity: FloatArray, parameters: FloatArray) -> tuple[FloatArra
 
 
 def scene_of(laws: Laws, points: Points, facts: Facts) -> Scene:
-    """What the laws say at the points."""
+    """The laws evaluated at the points."""
     values = laws.parameters(points.pressure, points.cycles)
     gradient, decay = gradient_of(points.velocity, values)
     gradient *= points.engaged[:, None]

@@ -54,7 +54,7 @@ class Prediction:
         """∂torque/∂θ [N, θ.size]."""
         laws, rows = self.scene.laws, design.rows
         by_parameters = self.change_at_rows(design, self.scene.gradient, before_lag=True)
-        # a loop has one pressure and one state: how the parameters go with θ is the same at its rows as at its points
+        # a loop has one pressure and one state: the parameters depend on θ at its rows as they do at its points
         _, slopes, by_fall = laws.with_gradient(rows.pressure, rows.cycles)
         columns = np.zeros((rows.run.size, laws.theta.size))
         columns[:, :LOG_DECAY] = (by_parameters[:, :, None] * slopes).reshape(-1, 4 * BLOCK)
@@ -82,7 +82,7 @@ def frame_of(design: Design) -> Frame:
 
 
 def predict(design: Design, laws: Laws) -> Prediction:
-    """What the laws say of every row."""
+    """The torque at every row by the laws."""
     scene = scene_of(laws, design.points, design.facts)
     at_points, lag = scene.curve, None
     if design.loops:

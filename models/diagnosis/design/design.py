@@ -15,15 +15,14 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, StationaryRun
+from models.diagnosis.design.criteria import PLATEAU_DURATION
 from models.diagnosis.design.facts import Facts, facts_of
+from models.diagnosis.design.limits import MOST_PLATEAUS
 from models.diagnosis.design.loop_bins import BINS, PHASES, BinnedLoop, binned_loops
-from models.diagnosis.design.points import IntArray, Points, joined, opened
-from models.diagnosis.design.sample_autocorrelation import bins_remember
-from models.diagnosis.design.thinning import MOST_PLATEAUS, thinned
+from models.diagnosis.design.points import IntArray, Points, concatenate, mark_open
+from models.diagnosis.design.sample_autocorrelation import bin_autocorrelation
+from models.diagnosis.design.thinning import thinned
 from models.records.pressure_levels import levels_of
-
-#: Time on one plateau [s] where nothing else is known (the reference's section 2.3.3).
-PLATEAU_DURATION = 5.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,14 +36,25 @@ class RunInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Design:
-    """Points [P] (plateaus first, then PHASES points a loop), rows [N] (plateaus first, then the loops' bins), measured
-    torque [N] Nm (folded), `samples` [N] averaged in each row, `torque_sd` [N] Nm as sent (NaN where not), `level` [N] Pa
-    the pressure level (0 where the clutch is open), `curve` [N] an index that run and level share, `bins` [N - plateaus]
-    which bin of the flat (loop, bin) order each loop row is, `past` [N - plateaus] how far past that bin's middle (in bins)
-    its samples lie, `repeats` rows [n] of a loop and what a further period of it differs by there [n] Nm, as if each were
-    one sample, `chains` [b, n] rows that follow each other in a run or loop, those of one length together,
-    `bins_remember` the correlations of neighbouring bins, and of those next but one, that the loops' samples tell (None:
-    they do not), `notes` what was left out."""
+    """What the baseline and the effects are fitted to.
+
+    points [P]              plateaus first, then PHASES points a loop
+    rows [N]                plateaus first, then the loops' bins
+    torque [N] Nm           measured, folded
+    samples [N]             how many were averaged in each row
+    torque_sd [N] Nm        as sent, NaN where not
+    level [N] Pa            pressure level, 0 where the clutch is open
+    curve [N]               an index that the rows of one run at one level share
+    bins [N - plateaus]     which bin of the flat (loop, bin) order each loop row is
+    bin_offset [N - plateaus]  how far past that bin's middle (in bins) its samples lie
+    period_differences      rows [n] of a loop, and what a further period of it differs by there [n] Nm, as if each were one
+                            sample (`design.period_differences`)
+    chains [b, n]           rows that follow each other in a run or loop, those of one length together
+    plateaus, loops         how many
+    bin_autocorrelation     of neighbouring bins, and of those next but one, estimated from the loops' samples; None where
+                            these are too few
+    notes                   what was left out
+    """
 
     points: Points
     rows: Points
@@ -54,12 +64,12 @@ class Design:
     level: FloatArray
     curve: IntArray
     bins: IntArray
-    past: FloatArray
-    repeats: tuple[tuple[IntArray, FloatArray], ...]
+    bin_offset: FloatArray
+    period_differences: tuple[tuple[IntArray, FloatArray], ...]
     chains: tuple[IntArray, ...]
     plateaus: int
     loops: int
-    bins_remember: tuple[float, float] | None
+    bin_autocorrelation: tuple[float, float] | None
     runs: tuple[RunInfo, ...]
     facts: Facts
     notes: tuple[str, ...]
@@ -86,13 +96,13 @@ class Design:
         out = np.empty((self.torque.size, *at_points.shape[1:]))
         out[: self.plateaus] = at_points[: self.plateaus]
         first, second = (at_points[self.plateaus + k :: PHASES // BINS][self.bins] for k in range(PHASES // BINS))
-        later = (0.5 + 2.0 * self.past).reshape(-1, *(1,) * (at_points.ndim - 1))
+        later = (0.5 + 2.0 * self.bin_offset).reshape(-1, *(1,) * (at_points.ndim - 1))
         out[self.plateaus :] = first + later * (second - first)
         return out
 
 
 def build_design(campaign: Campaign) -> Design:
-    """All rows of a campaign. Never raises on a campaign that checked itself; may have no rows."""
+    """All rows of a campaign. Never raises on a campaign that is valid by itself; it may have no rows."""
     notes: list[str] = []
     kept = thinned(campaign, notes)
     runs: list[RunInfo] = []
@@ -110,18 +120,18 @@ def build_design(campaign: Campaign) -> Design:
             offset += torque.size
     loops: list[BinnedLoop] = []
     of_run: list[int] = []
-    mute: list[str] = []
+    reasons: list[str] = []  # why a dynamic test gave no loop at all
     for dynamic in kept.dynamic:
-        found, said = binned_loops(dynamic.record, kept.geometry)
-        notes.extend(f"{dynamic.run_id}: {sentence}" for sentence in said)
-        mute += said[:1] if not found else []
-        if found:
-            loops.extend(found)
-            of_run.extend([len(runs)] * len(found))
+        test_loops, sentences = binned_loops(dynamic.record, kept.geometry)
+        notes.extend(f"{dynamic.run_id}: {sentence}" for sentence in sentences)
+        reasons += sentences[:1] if not test_loops else []
+        if test_loops:
+            loops.extend(test_loops)
+            of_run.extend([len(runs)] * len(test_loops))
             runs.append(RunInfo(run_id=dynamic.run_id, cycles=dynamic.cycles, dynamic=True))
-    if mute:
-        told = f"{len(mute)} of {len(kept.dynamic)} ({mute[0].rstrip('.')})"
-        notes.append(f"Dynamic tests that could not be evaluated and tell nothing: {told}.")
+    if reasons:
+        count = f"{len(reasons)} of {len(kept.dynamic)} ({reasons[0].rstrip('.')})"
+        notes.append(f"Dynamic tests that could not be evaluated and were left out: {count}.")
     moments = {run.run_id: run.moment for run in kept.dynamic}
     for number, (loop, index) in enumerate(zip(loops, of_run, strict=True)):
         blocks.append(_loop_points(loop, index, number, runs[index].cycles, moments[runs[index].run_id]))
@@ -139,10 +149,10 @@ def _assembled(
     campaign: Campaign,
     notes: tuple[str, ...],
 ) -> Design:
-    points = opened(joined(blocks))
-    filled, past = (
+    points = mark_open(concatenate(blocks))
+    filled, offsets = (
         np.concatenate([getattr(loop, name) for loop in loops]) if loops else np.zeros(0)
-        for name in ("samples", "past")
+        for name in ("samples", "bin_offset")
     )
     bins = np.flatnonzero(filled > 0)
     per_bin = PHASES // BINS
@@ -164,24 +174,26 @@ def _assembled(
         level=level,
         curve=np.asarray(curve, dtype=np.intp).reshape(-1),
         bins=np.asarray(bins, dtype=np.intp),
-        past=past[bins],
-        repeats=tuple(_repeats(loops, bins, plateaus)),
+        bin_offset=offsets[bins],
+        period_differences=tuple(_period_differences(loops, bins, plateaus)),
         chains=_chains(rows),
         plateaus=plateaus,
         loops=len(loops),
-        bins_remember=bins_remember([loop.memory for loop in loops]),
+        bin_autocorrelation=bin_autocorrelation([loop.autocorrelation for loop in loops]),
         runs=tuple(runs),
         facts=facts_of(campaign),
         notes=notes,
     )
 
 
-def _repeats(loops: list[BinnedLoop], bins: IntArray, plateaus: int) -> Iterator[tuple[IntArray, FloatArray]]:
+def _period_differences(
+    loops: list[BinnedLoop], bins: IntArray, plateaus: int
+) -> Iterator[tuple[IntArray, FloatArray]]:
     for number, loop in enumerate(loops):
         first, last = np.searchsorted(bins, [number * BINS, (number + 1) * BINS])
-        for differs in loop.repeats[:, bins[first:last] - number * BINS]:
-            known = np.isfinite(differs)
-            yield np.asarray(plateaus + first + np.flatnonzero(known), dtype=np.intp), differs[known]
+        for differences in loop.period_differences[:, bins[first:last] - number * BINS]:
+            measured = np.isfinite(differences)
+            yield np.asarray(plateaus + first + np.flatnonzero(measured), dtype=np.intp), differences[measured]
 
 
 def _chains(rows: Points) -> tuple[IntArray, ...]:
@@ -190,12 +202,12 @@ def _chains(rows: Points) -> tuple[IntArray, ...]:
     edges = np.concatenate([[0], np.flatnonzero(np.diff(owner)) + 1, [owner.size]])
     starts, lengths = edges[:-1], np.diff(edges)
     steady = np.append(rows.steady, False)[starts]
-    found = []
-    for mine in (steady, ~steady):
-        for length in np.unique(lengths[mine & (lengths > 0)]):
-            first = starts[mine & (lengths == length)]
-            found.append(np.asarray(first[:, None] + np.arange(length), dtype=np.intp))
-    return tuple(found)
+    chains = []
+    for kind in (steady, ~steady):
+        for length in np.unique(lengths[kind & (lengths > 0)]):
+            first = starts[kind & (lengths == length)]
+            chains.append(np.asarray(first[:, None] + np.arange(length), dtype=np.intp))
+    return tuple(chains)
 
 
 def _plateaus(
@@ -212,8 +224,8 @@ def _plateaus(
     velocity = campaign.geometry.sliding_velocity(table.speed[usable])
     sign = np.copysign(1.0, velocity)
     count = usable.size
-    known = PLATEAU_DURATION * (np.arange(table.torque.size) + 0.5) if run.time is None else np.array(run.time)
-    clock = np.asarray(known[usable], dtype=np.float64)
+    times = PLATEAU_DURATION * (np.arange(table.torque.size) + 0.5) if run.time is None else np.array(run.time)
+    clock = np.asarray(times[usable], dtype=np.float64)
     nan: FloatArray = np.full(count, np.nan, dtype=np.float64)
     moment = nan if run.moment is None else np.asarray(run.moment + clock, dtype=np.float64)
     consecutive = np.concatenate([[-1], np.where(np.diff(usable) == 1, offset + np.arange(count - 1), -1)])

@@ -1,4 +1,4 @@
-"""A campaign made small enough to be fitted at once: states left out evenly, the first and the last kept."""
+"""A campaign made small enough to be fitted at once: states are left out evenly, the first and the last are kept."""
 
 from dataclasses import replace
 
@@ -6,34 +6,29 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign
+from models.diagnosis.design.limits import MOST_LOOP_STATES, MOST_PLATEAUS, MOST_ROWS
 from models.diagnosis.design.loop_bins import BINS
 
-#: A run keeps at most this many plateaus (evenly taken), a campaign about this many rows (states evenly taken).
-MOST_PLATEAUS, MOST_ROWS = 2000, 40_000
-#: Loops of so many states (evenly taken, the first and the last among them) say what more would say.
-MOST_LOOP_STATES = 12
+#: Pressures that a dynamic test is taken to have when its rows are counted beforehand.
+_LOOPS_PER_TEST = 8
 
 
 def thinned(campaign: Campaign, notes: list[str]) -> Campaign:
-    """The campaign with states left out evenly where it is too large; what was left out is noted."""
+    """The campaign with states left out evenly where it is too large; `notes` gets a sentence on what was left out."""
     campaign = _with_fewer_loops(campaign, notes)
     states = np.unique([*(run.cycles for run in campaign.stationary), *(run.cycles for run in campaign.dynamic)])
     size = sum(min(run.plateaus.torque.size, MOST_PLATEAUS) for run in campaign.stationary)
-    size += sum(8 * BINS for _ in campaign.dynamic)
+    size += sum(_LOOPS_PER_TEST * BINS for _ in campaign.dynamic)
     if size <= MOST_ROWS or states.size < 3:
         return campaign
-    keep = _evenly(states, max(2, int(states.size * MOST_ROWS / size)))
+    kept = _evenly(states, max(2, int(states.size * MOST_ROWS / size)))
     notes.append(
-        f"{states.size - len(keep)} of {states.size} states were left out, evenly: the campaign is very large."
+        f"{states.size - len(kept)} of {states.size} states were left out, evenly: the campaign is very large."
     )
-    return Campaign(
-        geometry=campaign.geometry,
-        oil=campaign.oil,
-        cof_fraction=campaign.cof_fraction,
-        stationary=tuple(run for run in campaign.stationary if run.cycles in keep),
-        dynamic=tuple(run for run in campaign.dynamic if run.cycles in keep),
-        duty=campaign.duty,
-        maintenance=campaign.maintenance,
+    return replace(
+        campaign,
+        stationary=tuple(run for run in campaign.stationary if run.cycles in kept),
+        dynamic=tuple(run for run in campaign.dynamic if run.cycles in kept),
     )
 
 
@@ -41,9 +36,9 @@ def _with_fewer_loops(campaign: Campaign, notes: list[str]) -> Campaign:
     states = np.unique([run.cycles for run in campaign.dynamic])
     if states.size <= MOST_LOOP_STATES:
         return campaign
-    keep = _evenly(states, MOST_LOOP_STATES)
-    notes.append(f"Dynamic tests of {len(keep)} of {states.size} states were taken, evenly: there are very many.")
-    return replace(campaign, dynamic=tuple(run for run in campaign.dynamic if run.cycles in keep))
+    kept = _evenly(states, MOST_LOOP_STATES)
+    notes.append(f"Dynamic tests of {len(kept)} of {states.size} states were taken, evenly: there are very many.")
+    return replace(campaign, dynamic=tuple(run for run in campaign.dynamic if run.cycles in kept))
 
 
 def _evenly(states: FloatArray, count: int) -> set[float]:

@@ -16,13 +16,11 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline.prediction import Prediction
+from models.diagnosis.design.axes import CLOCK, CYCLES, PHASE, PRESSURE, SPEED, TEMPERATURE, TORQUE
 from models.diagnosis.design.design import Design
 
 #: Takes the axis and a column [N] relative to the torque.
 Add: TypeAlias = Callable[[str, FloatArray], None]
-SPEED, PRESSURE, CYCLES = "speed_rpm", "pressure_bar", "cycles"
-TEMPERATURE, CLOCK, PHASE = "oil_temperature_c", "test_clock_s", "loop_phase"
-TORQUE = "torque_nm"
 
 #: A sensor that is not straight may be so in many waves over its range; speed may have ripples (an encoder's, a mount's).
 TORQUE_WAVES, SPEED_WAVES = 20, range(4, 17)

@@ -22,12 +22,12 @@ from scipy.special import logsumexp
 
 from models.arrays import FloatArray
 from models.diagnosis.attribution.evidence import Hypothesis
+from models.diagnosis.design.axes import CLOCK
 from models.diagnosis.design.design import Design
 from models.diagnosis.detection.alarm import Lead
-from models.diagnosis.detection.contrasts import CLOCK
 from models.diagnosis.detection.raw_records.evidence import RawEvidence
 from models.diagnosis.detection.view import View
-from models.diagnosis.effects.uncatalogued import STRANGE
+from models.diagnosis.effects.uncatalogued.catalogue import UNCATALOGUED_BY_SLUG
 from models.diagnosis.noise.covariance import Noise, by_curve, gains_of, whitened
 from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.diagnosis.report.report import Misfit, Where
@@ -86,7 +86,7 @@ def axes_of(
         strength = max(-float(np.log(max(line.p_value, 1e-300))), slow.strength)
         found[CLOCK] = Where(axis=CLOCK, strength=strength, p_value=min(line.p_value, slow.p_value))
     if stranger is not None:
-        axis = STRANGE[stranger.slugs[0]].axis
+        axis = UNCATALOGUED_BY_SLUG[stranger.slugs[0]].axis
         known, p_value = found.get(axis), float(np.exp(-np.clip(stranger.evidence, 0.0, 700.0)))
         if known is None or stranger.evidence > known.strength:
             p_value = p_value if known is None else min(p_value, known.p_value)

@@ -15,7 +15,8 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
-from models.diagnosis.design.facts import USUAL_PRESSURE, USUAL_TORQUE, Facts
+from models.diagnosis.design.criteria import USUAL_PRESSURE, USUAL_TORQUE
+from models.diagnosis.design.facts import Facts
 
 #: Values of an effect's shape parameters, in the order of `Effect.shapes`.
 Shape: TypeAlias = tuple[float, ...]

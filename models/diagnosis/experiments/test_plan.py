@@ -16,8 +16,9 @@ from scipy.special import ndtr, softmax
 from models.arrays import FloatArray
 from models.diagnosis.attribution.decide import CLOSE, LEAST_NAMED, RIVAL, TOLERANCE
 from models.diagnosis.campaign import Campaign
+from models.diagnosis.design.criteria import REFERENCE_TEMPERATURE
 from models.diagnosis.design.design import Design, build_design
-from models.diagnosis.design.facts import REFERENCE_TEMPERATURE, facts_of
+from models.diagnosis.design.facts import facts_of
 from models.diagnosis.effects.catalogued import oil_temperature
 from models.diagnosis.experiments.candidates import TRIALS, runs_of, with_trial
 from models.diagnosis.experiments.information import Foretold

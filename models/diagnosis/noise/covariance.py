@@ -37,9 +37,9 @@ def whitened(columns: FloatArray, design: Design, noise: Noise) -> FloatArray:
     for rows in design.chains:
         first, last = int(rows[0, 0]), int(rows[-1, -1])
         correlation = noise.plateaus if first < design.plateaus else noise.loops
-        if correlation.step == 0.0 or correlation.share == 0.0:
+        if correlation.decay == 0.0 or correlation.share == 0.0:
             continue
-        if last - first + 1 == rows.size:  # one stretch: in its place
+        if last - first + 1 == rows.size:  # consecutive rows are filtered in place
             _filter(out[first : last + 1].reshape(*rows.shape, -1), correlation)
         else:
             blocks = out[rows]
@@ -52,8 +52,8 @@ def _filter(blocks: FloatArray, correlation: Correlation) -> None:
     """Whiten blocks [b, n, m] along n, in place."""
     theta, scale = arma(correlation)
     first = blocks[:, :1]
-    start = -correlation.step / scale * first - theta * first  # as if the first innovation were all of x_0
-    numerator = [1.0 / scale, -correlation.step / scale]
+    start = -correlation.decay / scale * first - theta * first  # as if the first innovation were all of x_0
+    numerator = [1.0 / scale, -correlation.decay / scale]
     blocks[:, 1:] = lfilter(numerator, [1.0, theta], blocks[:, 1:], axis=1, zi=start)[0]
 
 
@@ -76,7 +76,7 @@ class Gains:
 
 
 def gains_of(design: Design, torque: FloatArray, noise: Noise) -> Gains:
-    """For the predicted torque [N] Nm."""
+    """The gains' directions for the predicted torque [N] Nm."""
     white = whitened(torque[:, None], design, noise)[:, 0]
     count = int(design.curve.max()) + 1
     run_of_curve = np.zeros(count, dtype=np.intp)
@@ -99,14 +99,15 @@ def by_curve(columns: FloatArray, gains: Gains) -> FloatArray:
 
 
 def without_gains(columns: FloatArray, gains: Gains, run_gain: float, curve_gain: float) -> FloatArray:
-    """Whitened columns [N, m] with the gains' variance whitened as well (exact, curve by curve and then run by run)."""
+    """Whitened columns [N, m] with the scatter of the gains [-] whitened as well: exact, curve by curve and then run by
+    run."""
     along = by_curve(columns, gains)
-    off = _shrink(curve_gain**2 * gains.squares)  # what is taken off along each m_c, as a share
-    left = (1 - off)[:, None]
+    removed = _shrink(curve_gain**2 * gains.squares)  # the share that is taken off along each m_c
+    left = (1 - removed)[:, None]
     norm = gains.by_run(left[:, 0] ** 2 * gains.squares)
     factor = _shrink(run_gain**2 * norm) / np.maximum(norm, 1e-300)
     of_run = factor[:, None] * gains.by_run(left**2 * along)
-    taken = (off / np.maximum(gains.squares, 1e-300))[:, None] * along + left * of_run[gains.run_of_curve]
+    taken = (removed / np.maximum(gains.squares, 1e-300))[:, None] * along + left * of_run[gains.run_of_curve]
     return np.asarray(columns - gains.torque[:, None] * taken[gains.curve], dtype=np.float64)
 
 

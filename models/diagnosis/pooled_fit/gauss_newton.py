@@ -11,18 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
+from models.diagnosis.baseline.criteria import CURVATURE_BOUNDS, USUAL_CURVATURE
 from models.diagnosis.baseline.laws import (
     ATTRACTOR,
-    BENDS,
     BLOCK,
     DRIFT,
     FALL,
     KAPPA,
-    LOG_BEND,
+    LOG_CURVATURE,
     LOG_DECAY,
     OPEN_DRAG,
     POWERS,
-    USUAL_BEND,
     Frame,
     Laws,
 )
@@ -87,7 +86,7 @@ def priors_of(design: Design, start: FloatArray, frame: Frame) -> Priors:
         block = k * BLOCK
         sds[block : block + BLOCK] = [spread, spread, 1.5, 1.5, 1.5, 0.7]
         means[block + 2 : block + BLOCK] = [0.0, 0.0, np.log(0.5 * design.facts.life), np.log(0.8)]
-    sds[FALL], means[FALL] = (0.7, 1.2), (np.log(0.6 * frame.span), np.log(USUAL_BEND))
+    sds[FALL], means[FALL] = (0.7, 1.2), (np.log(0.6 * frame.span), np.log(USUAL_CURVATURE))
     sds[DRIFT:ATTRACTOR], means[DRIFT:ATTRACTOR] = (0.6, 0.4, 0.3), 0.0
     # friction may follow at once: one wide doubt, and a step of 1 from pressure to pressure
     sds[KAPPA], means[KAPPA] = 1.0, 0.0
@@ -274,7 +273,7 @@ def _moved(state: Fit, priors: Priors, step: FloatArray) -> tuple[Laws, tuple[Fi
         move[block + 2 : block + BLOCK] = np.clip(move[block + 2 : block + BLOCK], -_LARGEST_STEP, _LARGEST_STEP)
     move[LOG_DECAY:-POWERS] = np.clip(move[LOG_DECAY:-POWERS], -_LARGEST_STEP, _LARGEST_STEP)
     theta = state.laws.theta + move
-    theta[LOG_BEND] = np.clip(theta[LOG_BEND], *np.log(BENDS))
+    theta[LOG_CURVATURE] = np.clip(theta[LOG_CURVATURE], *np.log(CURVATURE_BOUNDS))
     for k in range(4):
         theta[k * BLOCK + 4 : k * BLOCK + 6] = np.clip(theta[k * BLOCK + 4 : k * BLOCK + 6], -3.0, 25.0)
     at, effects = count, []

@@ -6,16 +6,16 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.degradation.general_order import progress_fraction
+from models.diagnosis.baseline.criteria import USUAL_CURVATURE
 from models.diagnosis.baseline.laws import (
     ATTRACTOR,
     BLOCK,
     FALL,
     KAPPA,
-    LOG_BEND,
+    LOG_CURVATURE,
     LOG_DECAY,
     POWERS,
     RATIO,
-    USUAL_BEND,
     Frame,
     Laws,
     falling_weight,
@@ -39,12 +39,12 @@ def starting_laws(design: Design, frame: Frame) -> Laws:
     theta = np.zeros(ATTRACTOR + frame.loop_pressures.size + POWERS)
     theta[KAPPA] = np.log(12 * design.usual_torque)
     high = (pressure - frame.lowest) / frame.span
-    theta[FALL] = np.log(0.6 * frame.span), np.log(USUAL_BEND)
+    theta[FALL] = np.log(0.6 * frame.span), np.log(USUAL_CURVATURE)
     for k in range(4):
         best = np.inf
         for scale, decay in product(_SCALES, _DECAYS if k == RATIO and design.levels.size > 2 else (0.6,)):
             phi = scale * design.facts.life
-            fall = falling_weight(high, frame.span, np.array([np.log(decay * frame.span), theta[LOG_BEND]]))[0]
+            fall = falling_weight(high, frame.span, np.array([np.log(decay * frame.span), theta[LOG_CURVATURE]]))[0]
             first, second = (fall, 1 - fall) if k == RATIO else (1 - high, high)
             found, miss = _along(
                 first, second, progress_fraction(cycles, phi, _EXPONENT), values[:, k], deviations[:, k]

@@ -14,14 +14,15 @@ from models.diagnosis.detection.raw_records.evidence import RawEvidence
 from models.diagnosis.detection.view import View, amplitude_deviations
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import sized
-from models.diagnosis.effects.uncatalogued import STRANGE
+from models.diagnosis.effects.estimate import Estimate
+from models.diagnosis.effects.uncatalogued.catalogue import UNCATALOGUED_BY_SLUG
 from models.diagnosis.experiments.test_plan import Rival, advise
 from models.diagnosis.extension import Extension, build_extension
 from models.diagnosis.noise.covariance import Noise
 from models.diagnosis.pooled_fit.gauss_newton import Fit, Priors
 from models.diagnosis.report.maps import loop_traces, residual_maps
 from models.diagnosis.report.outlying_run import odd_run
-from models.diagnosis.report.report import Candidate, Estimate, Gain, Report, Verdict, Visible
+from models.diagnosis.report.report import Candidate, Gain, Report, Verdict, Visible
 from models.diagnosis.report.summary import Findings, summarise
 from models.diagnosis.validation.held_out import measure_gain
 from models.diagnosis.validation.smooth_correction import AXES as SMOOTH_AXES
@@ -118,7 +119,7 @@ def _looks(judgement: Judgement, hypotheses: Sequence[Hypothesis], stranger: Hyp
     if stranger is None or judgement.verdict not in OPEN:
         return ""
     least = max((each.evidence - CLOSE for each in hypotheses if finite(each)), default=0.0)
-    return STRANGE[stranger.slugs[0]].looks if stranger.evidence >= max(least, OVER_NOTHING) else ""
+    return UNCATALOGUED_BY_SLUG[stranger.slugs[0]].description if stranger.evidence >= max(least, OVER_NOTHING) else ""
 
 
 def _race(judgement: Judgement, hypotheses: Sequence[Hypothesis]) -> tuple[list[Rival], list[Rival]]:

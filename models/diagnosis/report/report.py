@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from models.arrays import FloatArray
+from models.diagnosis.effects.estimate import Estimate
 from models.diagnosis.extension import Extension
 
 
@@ -16,16 +17,6 @@ class Verdict(StrEnum):
     CAUSE_AMBIGUOUS = "cause_ambiguous"
     UNEXPLAINED_STRUCTURE = "unexplained_structure"
     INSUFFICIENT_DATA = "insufficient_data"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Estimate:
-    """The amplitude of an effect in engineering units."""
-
-    name: str
-    value: float
-    sd: float
-    unit: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

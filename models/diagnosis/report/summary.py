@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 from models.diagnosis.attribution.decide import LEAST_NAMED
 from models.diagnosis.effects.catalogue import BY_SLUG
+from models.diagnosis.effects.estimate import Estimate
 from models.diagnosis.experiments.test_plan import WORTH
-from models.diagnosis.report.report import Advice, Candidate, Estimate, Gain, Misfit, Verdict, Visible, Where
+from models.diagnosis.report.report import Advice, Candidate, Gain, Misfit, Verdict, Visible, Where
 
 #: Rivals that are spoken of and between which probabilities, effects whose visible amplitude is told.
 _SPOKEN, _RIVAL, _OPEN, _TOLD = 3, 0.001, 0.1, 3

@@ -14,9 +14,9 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.baseline.prediction import Prediction
+from models.diagnosis.design.axes import CLOCK, CYCLES, PHASE, PRESSURE, SPEED, TEMPERATURE
 from models.diagnosis.design.design import Design
 from models.diagnosis.design.points import Points
-from models.diagnosis.detection.contrasts import CLOCK, CYCLES, PHASE, PRESSURE, SPEED, TEMPERATURE
 from models.diagnosis.effects.effect import Effect, Family, Kind, Shape
 from models.diagnosis.noise.covariance import Noise
 from models.diagnosis.pooled_fit.gauss_newton import Fit, Fitted, Priors, fit

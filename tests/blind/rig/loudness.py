@@ -1,10 +1,10 @@
 """How loud an effect is: λ [nats], what an oracle sees of it after the baseline has been refitted to what it changes.
 
 The refit is in `refit`; of what is fast no baseline takes anything up. Who looks does not know how much the gains scatter:
-they are reckoned to scatter by 0.2 % at least. Samples slower than the slowest plateau say nothing of sliding friction and
+they are taken to scatter by 0.2 % at least. Samples slower than the slowest plateau show nothing of sliding friction and
 are not counted, except of what swings from sample to sample.
 
-Of such a swing nobody knows the phase, and it does not keep it for longer than a dwell: with λ_k of a stretch of 5 s whose
+The phase of such a swing is unknown, and it is not kept for longer than a dwell: with λ_k of a stretch of 5 s whose
 phase were known, λ = Σ_k E ln I₀(√(2 λ_k) R) - λ_k, R² noncentral χ² of two degrees about 2 λ_k. Many weak ones are worth
 little.
 """

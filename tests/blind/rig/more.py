@@ -13,7 +13,7 @@ from tests.blind.rig.world import Drag, read
 
 #: What each advice asks for: states to come, energy of their duty, pause [s] before every second, oil [°C], pressures,
 #: order, loops [Hz], how many tests.
-ASKED: dict[str, dict[str, float]] = {
+ADVISED: dict[str, dict[str, float]] = {
     "loops_0.3hz": {"frequency": 0.3},
     "light_loops": {"frequency": 0.3, "pressure": 0.25},
     "light_loops_60c": {"frequency": 0.3, "pressure": 0.25, "oil": 60.0},
@@ -50,12 +50,12 @@ def with_test(hidden: Hidden, key: str) -> Hidden:
         for part in TOGETHER[key]:
             hidden = with_test(hidden, part)
         return hidden
-    asked = ASKED[key]
+    advised = ADVISED[key]
     rng = np.random.default_rng([*hidden.seed, 99, len(hidden.plan.sites)])
-    life = _lived_on(hidden.plan.life, asked)
+    life = _lived_on(hidden.plan.life, advised)
     new = np.arange(hidden.plan.life.cycles.size, life.cycles.size)
     old = tuple(replace(site, life=life) for site in hidden.plan.sites)
-    site = _loops(rng, hidden, life, asked) if "frequency" in asked else _sweeps(rng, old[0], new, asked)
+    site = _loops(rng, hidden, life, advised) if "frequency" in advised else _sweeps(rng, old[0], new, advised)
     added = replace(hidden.plan, life=life, sites=(site,))
     truth = read(added, hidden.clutch, hidden.effects, drag=drag_of(hidden.seed))
     readings = measure(rng, added, hidden.sensor, truth)
@@ -75,14 +75,14 @@ def drag_of(seed: Sequence[int]) -> Drag:
     return drag
 
 
-def _lived_on(life: Life, asked: dict[str, float]) -> Life:
+def _lived_on(life: Life, advised: dict[str, float]) -> Life:
     """A state a test: further on in life, or again where it is."""
-    states = int(asked.get("states", asked.get("times", 1)))
-    step = float(np.median(np.diff(life.cycles)[life.cycles.size // 2 - 1 :])) if "states" in asked else 0.0
+    states = int(advised.get("states", advised.get("times", 1)))
+    step = float(np.median(np.diff(life.cycles)[life.cycles.size // 2 - 1 :])) if "states" in advised else 0.0
     cycles = life.cycles[-1] + step * (1 + np.arange(states))
-    pause = np.where(np.arange(states) % 2 == 0, asked.get("rest", 600.0), 600.0)
+    pause = np.where(np.arange(states) % 2 == 0, advised.get("rest", 600.0), 600.0)
     moment = life.moment[-1] + 3600 + np.cumsum(20 * step + pause + 2500 * np.ones(states))
-    energy = np.full(states, asked.get("energy", 1.0) * life.usual_energy)
+    energy = np.full(states, advised.get("energy", 1.0) * life.usual_energy)
     return replace(
         life,
         cycles=np.append(life.cycles, cycles),
@@ -92,30 +92,30 @@ def _lived_on(life: Life, asked: dict[str, float]) -> Life:
     )
 
 
-def _sweeps(rng: np.random.Generator, last: Site, new: np.ndarray, asked: dict[str, float]) -> Site:
+def _sweeps(rng: np.random.Generator, last: Site, new: np.ndarray, advised: dict[str, float]) -> Site:
     """The stationary test in its own order, or with speeds falling, at each new state."""
     rows = np.arange(last.bar.shape[1])
-    if asked.get("pressure") == 0.0:  # the speeds at one pressure, five times over
+    if advised.get("pressure") == 0.0:  # the speeds at one pressure, five times over
         rows = np.tile(rows[np.abs(last.bar[-1] - last.bar[-1, 0]) < 0.2], 5)
-    if "falling" in asked and last.kind == "stationary":
+    if "falling" in advised and last.kind == "stationary":
         rows = np.lexsort((-last.rpm[-1], np.round(2 * last.bar[-1]) / 2))
-    bar = asked.get("pressure", 1.0) * np.repeat(last.bar[-1:, rows], new.size, axis=0)
+    bar = advised.get("pressure", 1.0) * np.repeat(last.bar[-1:, rows], new.size, axis=0)
     rpm = np.repeat(last.rpm[-1:, rows], new.size, axis=0)
     effort = bar[0] * rpm[0] / 6000
     clock = last.clock[-1] if rows.size == last.bar.shape[1] else last.step * (np.arange(rows.size) + 0.5)
-    oil = np.stack([oil_course(rng, clock, effort) for _ in new]) + asked.get("oil", 85.0) - 85.0
+    oil = np.stack([oil_course(rng, clock, effort) for _ in new]) + advised.get("oil", 85.0) - 85.0
     return replace(last, state=new, bar=bar, rpm=rpm, clock=np.repeat(clock[None], new.size, axis=0), oil=oil)
 
 
-def _loops(rng: np.random.Generator, hidden: Hidden, life: Life, asked: dict[str, float]) -> Site:
+def _loops(rng: np.random.Generator, hidden: Hidden, life: Life, advised: dict[str, float]) -> Site:
     """Ten periods at every pressure, or at three light ones, two hundred samples a period."""
-    frequency, pressures = asked["frequency"], hidden.plan.pressures
-    if "pressure" in asked:
-        pressures = asked["pressure"] * pressures[0] * np.array([1.0, 1.5, 2.0] if asked["pressure"] else [1.0])
+    frequency, pressures = advised["frequency"], hidden.plan.pressures
+    if "pressure" in advised:
+        pressures = advised["pressure"] * pressures[0] * np.array([1.0, 1.5, 2.0] if advised["pressure"] else [1.0])
     time = np.arange(2001) / (200 * frequency)
     rpm = np.broadcast_to(1000 - 1000 * np.cos(2 * np.pi * frequency * time), (pressures.size, time.size))
     clock = np.arange(pressures.size)[:, None] * (time[-1] + 3.0) + time
-    oil = np.full(clock.shape, asked.get("oil", 85.0) + rng.uniform(-2, 2))
+    oil = np.full(clock.shape, advised.get("oil", 85.0) + rng.uniform(-2, 2))
     state = np.full(pressures.size, life.cycles.size - 1)
     bar = pressures[:, None] + np.zeros_like(time)
     return Site("loop", state, bar, rpm, clock, oil, life, float(time[1]), None, frequency)

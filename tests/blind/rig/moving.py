@@ -95,8 +95,8 @@ def shaft_ripple(rng: np.random.Generator, _: Plan) -> Effect:
             return np.zeros_like(torque)
         turn = np.cumsum(site.rpm * RPM, axis=1) * site.step + phase
         turn = turn + np.cumsum(np.random.default_rng(5).standard_normal(turn.shape[1])) * slip
-        swell = 1 + 0.3 * np.tanh(site.rpm / 600)
-        return a * torque * swell * (np.sin(turn) + second * np.sin(2 * turn + 1))
+        growth = 1 + 0.3 * np.tanh(site.rpm / 600)
+        return a * torque * growth * (np.sin(turn) + second * np.sin(2 * turn + 1))
 
     return Effect("shaft_ripple", 0.003, 0.5, reading=reading, fast=True)
 

@@ -4,8 +4,8 @@
 
 f are the noise-free readings, W whitens (gains included), Δ is the change. The refit is not linearised: Gauss-Newton with
 Levenberg's damping, the sensitivities taken anew only where the linear prediction does not hold. The prior about the truth
-θ₀ is mild (`spreads`); without it a refit would run along what the readings hardly tell to laws that no clutch has, a share
-of -7 lost with a time scale of ten lives. Its price counts: who looks would have to pay it, too. There may be several
+θ₀ is mild (`spreads`); without it a refit would run, where the readings hardly determine it, to laws that no clutch has, a
+share of -7 lost with a time scale of ten lives. Its price counts: who looks would have to pay it, too. There may be several
 minima: the lowest is taken of those found downhill from a few places.
 """
 
@@ -24,7 +24,7 @@ LEAST_GAIN, SLOWEST = 2e-3, 20.0
 #: A linear prediction holds, and a refit has ended, where λ is right to this share; at most so many steps.
 HOLDS, STEPS = 0.02, 40
 #: Where λ is this share off the linear prediction, minima beside the nearest one are looked for.
-BENT = 0.1
+NONLINEAR = 0.1
 #: How far the logarithms of a time scale (over the span) and of an order may go at all, those of attractors half as far.
 FARTHEST = 8.0
 #: A curve above this [Nm] at all of these speeds [m/s] is friction.
@@ -40,11 +40,11 @@ def spreads(clutch: Clutch) -> FloatArray:
 
 @dataclass(frozen=True)
 class Refitted:
-    """Where a refit ended: what is left [nats], the coordinates, what is told there, sensitivities not far from there."""
+    """Where a refit ended: what is left [nats], the coordinates, the prediction there, sensitivities not far from there."""
 
     left: float
     at: FloatArray
-    told: FloatArray
+    prediction: FloatArray
     jacobian: FloatArray
 
 
@@ -74,39 +74,39 @@ class Refit:
         wanted = self._rows(y)
         truth = Refitted(0.0, coordinates(self.clutch), np.zeros_like(wanted), self.jacobian)
         now, damping, growth = begin or truth, 0.0, 2.0
-        bowl = _Bowl(now.jacobian, wanted - now.told)
+        bowl = _Bowl(now.jacobian, wanted - now.prediction)
         now = replace(now, left=bowl.cost)
         for _ in range(STEPS):
             if now.left <= enough or (damping > 0 and bowl.least > (1 - HOLDS) * now.left):
                 break
-            step, foretold = bowl.step(damping)
-            told = self.told(now.at + step)
-            left = np.inf if told is None else 0.5 * float(np.square(wanted - told).sum())
-            if told is None or left >= now.left:
+            step, expected = bowl.step(damping)
+            prediction = self.prediction(now.at + step)
+            left = np.inf if prediction is None else 0.5 * float(np.square(wanted - prediction).sum())
+            if prediction is None or left >= now.left:
                 damping, growth = max(growth * damping, 1e-4), 2 * growth
                 continue
-            ratio = min((now.left - left) / max(now.left - foretold, 1e-300), 1.0)
-            now = Refitted(left, now.at + step, told, now.jacobian)
+            ratio = min((now.left - left) / max(now.left - expected, 1e-300), 1.0)
+            now = Refitted(left, now.at + step, prediction, now.jacobian)
             if abs(left - bowl.least) < HOLDS * left:
                 break
             damping, growth = damping * max(0.1, 1 - (2 * ratio - 1) ** 3), 2.0
-            now = replace(now, jacobian=self._sensitivities(now.at, told))
-            bowl = _Bowl(now.jacobian, wanted - told)
+            now = replace(now, jacobian=self._sensitivities(now.at, prediction))
+            bowl = _Bowl(now.jacobian, wanted - prediction)
         return now
 
-    def lower(self, y: FloatArray, found: "Refitted") -> "Refitted":
-        """The lowest of `found` and what refits find from the truth and from a clutch whose static friction falls a lot
-        sooner; only where the baseline is bent so far that there may be others."""
-        if abs(found.left / max(self.linear(y), 1e-300) - 1) < BENT:
-            return found
+    def lower(self, y: FloatArray, nearest: "Refitted") -> "Refitted":
+        """The lowest of `nearest` and what refits find from the truth and from a clutch whose static friction falls a lot
+        sooner; only where the baseline is so nonlinear there that there may be others."""
+        if abs(nearest.left / max(self.linear(y), 1e-300) - 1) < NONLINEAR:
+            return nearest
         sooner = coordinates(_sooner(self.clutch))
-        told = self.told(sooner)
-        ends = [found, self.to(y)]
-        if told is not None:
-            ends.append(self.to(y, Refitted(0.0, sooner, told, self._sensitivities(sooner, told))))
-        return min(ends, key=lambda one: one.left)
+        prediction = self.prediction(sooner)
+        ends = [nearest, self.to(y)]
+        if prediction is not None:
+            ends.append(self.to(y, Refitted(0.0, sooner, prediction, self._sensitivities(sooner, prediction))))
+        return min(ends, key=lambda end: end.left)
 
-    def told(self, at: FloatArray) -> FloatArray | None:
+    def prediction(self, at: FloatArray) -> FloatArray | None:
         """The readings, whitened, and the prior's rows at coordinates, less those at the truth; None at impossible ones."""
         theta = theta_at(at, self.clutch.span)
         if theta is None:
@@ -129,13 +129,13 @@ class Refit:
     def _rows(self, y: FloatArray) -> FloatArray:
         return np.concatenate([y, np.zeros(self.clutch.theta.size)])
 
-    def _sensitivities(self, at: FloatArray, told: FloatArray) -> FloatArray:
+    def _sensitivities(self, at: FloatArray, prediction: FloatArray) -> FloatArray:
         """By forward differences; a coordinate that cannot go forward stays where it is."""
         columns = []
         for i, value in enumerate(at):
             h = 1e-4 * max(abs(value), 0.1)
-            there = self.told(_nudged(at, i, h))
-            columns.append(np.zeros_like(told) if there is None else (there - told) / h)
+            ahead = self.prediction(_nudged(at, i, h))
+            columns.append(np.zeros_like(prediction) if ahead is None else (ahead - prediction) / h)
         return np.stack(columns, axis=1)
 
 
@@ -167,7 +167,7 @@ def refit_of(plan: Plan, clutch: Clutch, sensor: Sensor) -> Refit:
     at, columns = coordinates(clutch), []
     for i, value in enumerate(at):
         h = 1e-4 * max(abs(value), 0.1)
-        up, down = refit.told(_nudged(at, i, h)), refit.told(_nudged(at, i, -h))
+        up, down = refit.prediction(_nudged(at, i, h)), refit.prediction(_nudged(at, i, -h))
         assert up is not None
         assert down is not None
         columns.append((up - down) / (2 * h))
@@ -208,7 +208,7 @@ def _nudged(at: FloatArray, index: int, by: float) -> FloatArray:
 
 
 def _lean(site: Site) -> Site:
-    """The same with columns that say one thing said once; what is reckoned from them is broadcast."""
+    """The same with constant columns stored once; what is computed from them is broadcast."""
     bar = site.bar[:, :1] if np.ptp(site.bar, axis=1).max() == 0 else site.bar
     rpm = site.rpm[:1] if np.ptp(site.rpm, axis=0).max() == 0 else site.rpm
     return replace(site, bar=bar, rpm=rpm)

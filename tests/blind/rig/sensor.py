@@ -1,6 +1,6 @@
 """Noise of the blind rig, and the same noise taken out again (whitened) to say what an oracle could see.
 
-σ² = (s M)² + f² a sample, remembering from sample to sample with ρ; every run has a gain of its own (deviation g), on
+σ² = (s M)² + f² a sample, autocorrelated from sample to sample by ρ; every run has a gain of its own (deviation g), on
 some rigs every pressure of a run once more (c); the recorder rounds. A plateau that was averaged on the rig is one sample.
 """
 
@@ -70,7 +70,7 @@ def curves(plan: Plan, site: Site, shape: tuple[int, ...]) -> np.ndarray:
 
 def measure(rng: np.random.Generator, plan: Plan, sensor: Sensor, truth: list[FloatArray]) -> list[FloatArray]:
     """What the recorder writes [Nm]."""
-    told = []
+    readings = []
     for site, torque in zip(plan.sites, truth, strict=True):
         rho = sensor.rho(site)
         white = rng.standard_normal(torque.shape)
@@ -81,8 +81,8 @@ def measure(rng: np.random.Generator, plan: Plan, sensor: Sensor, truth: list[Fl
         if sensor.curve > 0:
             each = rng.standard_normal(states * plan.pressures.size)
             gain = gain * (1 + sensor.curve * each[curves(plan, site, torque.shape)])
-        told.append(np.round((torque * gain + noise) / sensor.count) * sensor.count)
-    return told
+        readings.append(np.round((torque * gain + noise) / sensor.count) * sensor.count)
+    return readings
 
 
 class Whitening:
@@ -138,7 +138,7 @@ def _taken(square: FloatArray) -> FloatArray:
 
 
 def uncorrelated(x: FloatArray, rho: float) -> FloatArray:
-    """Series [series, n] that remember with ρ, freed of their memory."""
+    """Autocorrelated series [series, n], whitened by their ρ."""
     y = x.copy()
     y[:, 1:] = (x[:, 1:] - rho * x[:, :-1]) / np.sqrt(1 - rho**2)
     return y

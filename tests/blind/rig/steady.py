@@ -116,7 +116,7 @@ def pressure_offset(rng: np.random.Generator, plan: Plan) -> Effect:
 
 
 def unsettled_dwell(rng: np.random.Generator, _: Plan) -> Effect:
-    """Torque creeps to a new level with two time constants, so that a plateau remembers the one before it."""
+    """Torque creeps to a new level with two time constants, so that a plateau still carries a share of the one before it."""
     fast, slow, share = rng.uniform(0.8, 2.0), rng.uniform(2.5, 5.0), rng.uniform(0.3, 0.7)
 
     def left(torque: FloatArray, step: float, a: float) -> FloatArray:

@@ -38,15 +38,15 @@ def follow(site: Site, curve: FloatArray, attractor: FloatArray) -> FloatArray:
     keep = np.exp(-x)
     ramp = -np.expm1(-x) / x  # mean of e^{-(x - u)} over the step
     gain = curve[:, 1:] * (1 - ramp) + curve[:, :-1] * (ramp - keep)
-    told = np.empty_like(curve)
-    told[:, 0] = curve[:, 0]
+    torque = np.empty_like(curve)
+    torque[:, 0] = curve[:, 0]
     piece = max(1, int(200 / max(float(x.max()), 1e-9)))
     for a in range(0, x.shape[1], piece):
         power = np.cumprod(keep[:, a : a + piece], axis=1)
-        told[:, a + 1 : a + 1 + piece] = power * (
-            told[:, a : a + 1] + np.cumsum(gain[:, a : a + piece] / power, axis=1)
+        torque[:, a + 1 : a + 1 + piece] = power * (
+            torque[:, a : a + 1] + np.cumsum(gain[:, a : a + piece] / power, axis=1)
         )
-    return told
+    return torque
 
 
 def _rubbed(site: Site, clutch: Clutch, effects: Sequence[tuple[Effect, float]]) -> FloatArray:

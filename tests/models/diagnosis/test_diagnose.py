@@ -13,8 +13,9 @@ from models.diagnosis.campaign import EventKind as Event
 from models.diagnosis.detection.alarm import Lead
 from models.diagnosis.detection.raw_records.evidence import RawEvidence
 from models.diagnosis.diagnose import confirmed, diagnose, with_lines
+from models.diagnosis.effects.estimate import Estimate
 from models.diagnosis.pooled_fit.gauss_newton import Fit
-from models.diagnosis.report.report import Estimate, Report, Verdict
+from models.diagnosis.report.report import Report, Verdict
 from models.friction.stribeck import StribeckParameters, torque
 from models.records.runs import Plateaus
 from tests.models.diagnosis.campaigns import Planted, Where, campaign

@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.diagnosis.baseline.laws import EXPONENTIAL, FALL, LOG_BEND, POWERS, falling_weight
+from models.diagnosis.baseline.criteria import EXPONENTIAL
+from models.diagnosis.baseline.laws import FALL, LOG_CURVATURE, POWERS, falling_weight
 from models.diagnosis.campaign import Campaign, DutyRun, StationaryRun
-from models.diagnosis.design.design import MOST_PLATEAUS
+from models.diagnosis.design.limits import MOST_PLATEAUS
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.catalogued.torque_zero_shift import DAYS, STRAIGHT
 from models.diagnosis.effects.viscosity import log_viscosity_ratio
@@ -193,16 +194,16 @@ def test_what_was_stored_before_the_ratio_s_fall_had_a_bend_is_an_exponential_st
     built = extension_of(warm, TEMPERATURE, WEAR)
     stored = json.loads(json.dumps(built.to_dict()))
     for each in stored["content"]["alternatives"]:
-        theta = np.delete(np.array(each["theta"]), LOG_BEND)
+        theta = np.delete(np.array(each["theta"]), LOG_CURVATURE)
         each["theta"] = (theta if drag else theta[:-POWERS]).tolist()
     told = _laws(Extension.from_dict(stored).content["alternatives"][0])
     expected = _laws(built.content["alternatives"][0])
     assert told.theta.size == expected.theta.size
-    assert told.theta[LOG_BEND] == pytest.approx(np.log(EXPONENTIAL))
-    kept = np.arange(told.theta.size) != LOG_BEND
+    assert told.theta[LOG_CURVATURE] == pytest.approx(np.log(EXPONENTIAL))
+    kept = np.arange(told.theta.size) != LOG_CURVATURE
     assert np.array_equal(told.theta[kept][:-POWERS], expected.theta[kept][:-POWERS])
     assert np.array_equal(told.theta[-POWERS:], expected.theta[-POWERS:] if drag else np.zeros(POWERS))
-    high, decay = np.linspace(0.0, 1.0, 5), np.exp(told.theta[LOG_BEND - 1])
+    high, decay = np.linspace(0.0, 1.0, 5), np.exp(told.theta[LOG_CURVATURE - 1])
     fallen = np.exp(-high * told.frame.span / decay)
     weight = falling_weight(high, told.frame.span, told.theta[FALL])[0]
     assert np.allclose(weight, (fallen - fallen[-1]) / (1 - fallen[-1]), atol=5e-3)

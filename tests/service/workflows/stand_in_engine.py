@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from models.diagnosis.campaign import Campaign, StationaryRun
+from models.diagnosis.effects.estimate import Estimate
 from models.diagnosis.extension import Extension
 from models.diagnosis.report.report import (
     Advice,
     Candidate,
-    Estimate,
     Gain,
     LoopTrace,
     Maps,

@@ -1,4 +1,8 @@
-"""Torque that swings k times a turn: samples demodulated along the shaft's angle, in stretches short and long."""
+"""Order tracking: torque that swings k times a revolution, demodulated along the shaft's angle in stretches.
+
+The phase may be kept over one or several stretches, and the size may go with the load or with the speed; evidence is
+averaged over both and over the orders by their prior probabilities.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,169 +12,177 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from models.arrays import FloatArray
-from models.diagnosis.detection.raw_records.incoherent import SHARES, amplitude, level, likelihoods, sizes
-from models.diagnosis.detection.raw_records.whitened_torque import Swings
-
-IntArray = NDArray[np.intp]
-
-#: Orders looked for and how likely each is beforehand.
-ORDERS = dict(
-    zip(
-        (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0),
-        (0.05, 0.25, 0.03, 0.20, 0.08, 0.07, 0.03, 0.05, 0.04, 0.02, 0.03),
-        strict=True,
-    )
+from models.diagnosis.design.points import IntArray
+from models.diagnosis.detection.raw_records.criteria import (
+    ABOVE_ORDER,
+    AMPLITUDE_WEIGHTS,
+    BELOW_ORDER,
+    COHERENT_STRETCHES,
+    FEWEST_STRETCHES,
+    LEAST_VISIBLE,
+    LINE_SPEED,
+    LINE_WIDTH,
+    ORDERS,
+    PAIRED_ORDERS,
+    PAIRED_PROBABILITY,
+    STRETCH,
 )
-#: The first and second together.
-BOTH, BOTH_SHARE = (1.0, 2.0), 0.15
-#: Orders beside one that is looked for, in which it does not show.
-LEFT, RIGHT = (-0.3, -0.2), (0.2, 0.3)
-#: Length of a stretch [s], and how many of them keep their phase.
-STRETCH, KEPT = 1.25, (1, 2, 4, 12)
-#: A law of the size: with the load (the torque's root, between all alike and like the torque), or with the speed.
-LAWS = ("load", "speed")
-#: Fewer stretches show no order.
-FEWEST = 4
+from models.diagnosis.detection.raw_records.incoherent import (
+    amplitude,
+    log_likelihood_ratios,
+    noise_level,
+    trial_amplitudes,
+)
+from models.diagnosis.detection.raw_records.line import Line
+from models.diagnosis.detection.raw_records.whitened_torque import WhitenedRecord
+
+#: Laws of the size: with the load (the torque's root, between independent of it and proportional), or with the speed.
+_LAWS = ("load", "speed")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Line:
-    """What swings best: evidence [nats], its order or frequency [Hz], its amplitude [Nm]; `share` of the highest speed
-    below which it does; `clear` is how far log L stands over none."""
-
-    evidence: float = 0.0
-    at: float = 0.0
-    amplitude: float = 0.0
-    share: float = 1.0
-    clear: float = 0.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Turns:
+class DemodulatedOrder:
     """D and N [b] of an order in the stretches of all records."""
 
     sums: NDArray[np.complex128]
     weight: FloatArray
 
 
-def best_order(records: Sequence[Swings], line: Line | None = None) -> Line:
-    """The evidence of ripple and its best order; samples in which a line would lie on it are left out."""
-    stretches = [_bounds(each) for each in records]
-    groups = _groups(records)
-    sizes_of = _sizes_of(records, stretches)
-    wanted = sorted({round(k + by, 1) for k in ORDERS for by in (*LEFT, 0.0, *RIGHT)})
-    turns = demodulated(records, stretches, wanted, line)
-    found: dict[float, FloatArray] = {}
+def best_order(records: Sequence[WhitenedRecord], line: Line | None = None) -> Line:
+    """The evidence of ripple and its best order; samples in which `line` would lie on the order are left out."""
+    stretches = [_stretch_starts(record) for record in records]
+    groups = _coherent_groups(records)
+    sizes = _relative_sizes(records, stretches)
+    orders = sorted({round(k + offset, 1) for k in ORDERS for offset in (*BELOW_ORDER, 0.0, *ABOVE_ORDER)})
+    demodulated = _demodulated(records, stretches, orders, line)
+    by_order: dict[float, FloatArray] = {}
     best, highest = Line(), -np.inf
-    for order in ORDERS:
-        logs = np.zeros((len(LAWS), len(KEPT)))
-        for i, law in enumerate(LAWS):
-            for j, kept in enumerate(KEPT):
-                value, size, clear = _order(turns, order, sizes_of[law], groups[kept])
-                logs[i, j] = value
-                if value + np.log(ORDERS[order]) > highest and clear > 0:
-                    highest = value + float(np.log(ORDERS[order]))
-                    best = Line(at=order, amplitude=size, clear=clear)
-        found[order] = logs
-    parts = [np.log(share / found[k].size) + found[k].ravel() for k, share in ORDERS.items()]
-    both = found[BOTH[0]] + found[BOTH[1]]
-    parts.append(np.log(BOTH_SHARE / both.size) + both.ravel())
-    return Line(
-        evidence=float(logsumexp(np.concatenate(parts))), at=best.at, amplitude=best.amplitude, clear=best.clear
-    )
+    for order, probability in ORDERS.items():
+        logs = np.zeros((len(_LAWS), len(COHERENT_STRETCHES)))
+        for i, law in enumerate(_LAWS):
+            for j, kept in enumerate(COHERENT_STRETCHES):
+                evidence, size, peak = _order_evidence(demodulated, order, sizes[law], groups[kept])
+                logs[i, j] = evidence
+                if evidence + np.log(probability) > highest and peak > 0:
+                    highest = evidence + float(np.log(probability))
+                    best = Line(position=order, amplitude=size, peak=peak)
+        by_order[order] = logs
+    parts = [np.log(probability / by_order[k].size) + by_order[k].ravel() for k, probability in ORDERS.items()]
+    both = by_order[PAIRED_ORDERS[0]] + by_order[PAIRED_ORDERS[1]]
+    parts.append(np.log(PAIRED_PROBABILITY / both.size) + both.ravel())
+    evidence = float(logsumexp(np.concatenate(parts)))
+    return Line(evidence=evidence, position=best.position, amplitude=best.amplitude, peak=best.peak)
 
 
-def _bounds(swings: Swings) -> IntArray:
-    """First samples of the stretches."""
-    firsts = []
-    for first, stop in zip(swings.starts[:-1], swings.starts[1:], strict=True):
-        count = max(1, round((stop - first) * swings.step / STRETCH))
-        firsts.append(np.linspace(first, stop, count + 1)[:-1].astype(np.intp))
-    return np.concatenate(firsts)
+def _stretch_count(record: WhitenedRecord, first: int, stop: int) -> int:
+    return max(1, round((stop - first) * record.step / STRETCH))
 
 
-def _groups(records: Sequence[Swings]) -> dict[int, IntArray]:
-    """Of each number of stretches that keep their phase: the first stretches of the groups, which stay within a piece."""
-    found: dict[int, list[int]] = {kept: [] for kept in KEPT}
-    at = 0
-    for swings in records:
-        for first, stop in zip(swings.starts[:-1], swings.starts[1:], strict=True):
-            count = max(1, round((stop - first) * swings.step / STRETCH))
-            for kept in KEPT:
+def _stretch_starts(record: WhitenedRecord) -> IntArray:
+    """First samples of the stretches of a record."""
+    starts = []
+    for first, stop in zip(record.starts[:-1], record.starts[1:], strict=True):
+        count = _stretch_count(record, first, stop)
+        starts.append(np.linspace(first, stop, count + 1)[:-1].astype(np.intp))
+    return np.concatenate(starts)
+
+
+def _coherent_groups(records: Sequence[WhitenedRecord]) -> dict[int, IntArray]:
+    """For each number of stretches over which the phase is kept: the first stretches of the groups, which stay within a
+    piece."""
+    groups: dict[int, list[int]] = {kept: [] for kept in COHERENT_STRETCHES}
+    before = 0
+    for record in records:
+        for first, stop in zip(record.starts[:-1], record.starts[1:], strict=True):
+            count = _stretch_count(record, first, stop)
+            for kept in COHERENT_STRETCHES:
                 parts = max(1, round(count / kept))
-                found[kept] += (at + np.linspace(0, count, parts + 1)[:-1].astype(np.intp)).tolist()
-            at += count
-    return {kept: np.array(firsts, dtype=np.intp) for kept, firsts in found.items()}
+                groups[kept] += (before + np.linspace(0, count, parts + 1)[:-1].astype(np.intp)).tolist()
+            before += count
+    return {kept: np.array(firsts, dtype=np.intp) for kept, firsts in groups.items()}
 
 
-def _sizes_of(records: Sequence[Swings], stretches: list[IntArray]) -> dict[str, FloatArray]:
-    """Each law's size [b] in the stretches, 1 on average."""
+def _relative_sizes(records: Sequence[WhitenedRecord], stretches: list[IntArray]) -> dict[str, FloatArray]:
+    """Each law's relative size [b] in the stretches, 1 on average."""
 
-    def means(values: list[FloatArray]) -> FloatArray:
-        each = [
-            np.add.reduceat(np.abs(value), firsts) / np.diff(np.append(firsts, value.size))
-            for value, firsts in zip(values, stretches, strict=True)
+    def means(channels: list[FloatArray]) -> FloatArray:
+        by_record = [
+            np.add.reduceat(np.abs(channel), firsts) / np.diff(np.append(firsts, channel.size))
+            for channel, firsts in zip(channels, stretches, strict=True)
         ]
-        found = np.concatenate(each)
-        return found / max(float(np.sqrt(np.mean(found**2))), 1e-300)
+        values = np.concatenate(by_record)
+        return values / max(float(np.sqrt(np.mean(values**2))), 1e-300)
 
-    return {"load": np.sqrt(means([each.torque for each in records])), "speed": means([each.speed for each in records])}
-
-
-def demodulated(
-    records: Sequence[Swings], stretches: list[IntArray], orders: list[float], line: Line | None
-) -> dict[float, Turns]:
-    """D and N of every order."""
-    highest = max(float(np.abs(each.speed).max()) for each in records)
-    parts: dict[float, list[tuple[FloatArray, FloatArray]]] = {order: [] for order in orders}
-    for swings, firsts in zip(records, stretches, strict=True):
-        hertz = swings.speed / (2 * np.pi)
-        steps = np.diff(swings.time, prepend=swings.time[0])
-        angle = 2 * np.pi * np.cumsum(hertz * steps)
-        hertz = np.abs(hertz)
-        tenth = {1: np.exp(-0.1j * angle)}
-        for k in range(2, 11):
-            tenth[k] = tenth[k - 1] * tenth[1]
-        turn, now = np.ones(angle.size, dtype=np.complex128), 0
-        counts = np.diff(np.append(firsts, angle.size))
-        for order in orders:
-            while now < round(10 * order):
-                by = min(10, round(10 * order) - now)
-                turn, now = turn * tenth[by], now + by
-            frequency = order * hertz
-            seen = (frequency > swings.slowest) & (frequency < swings.fastest)
-            if line is not None:
-                near = np.minimum(np.abs(frequency - line.at), np.abs(frequency - 2 * line.at)) < 1.0
-                seen &= ~(near & (hertz * 2 * np.pi <= 1.2 * line.share * highest))
-            weight = swings.weight * seen
-            total = np.add.reduceat(turn * (swings.matched * seen), firsts)
-            power = np.add.reduceat(weight * swings.response(frequency), firsts)
-            lasting = np.add.reduceat(seen.astype(float), firsts) > 0.25 * counts
-            parts[order].append((total * lasting, power * lasting))
     return {
-        order: Turns(sums=np.concatenate([a for a, _ in each]), weight=np.concatenate([b for _, b in each]))
-        for order, each in parts.items()
+        "load": np.sqrt(means([record.torque for record in records])),
+        "speed": means([record.speed for record in records]),
     }
 
 
-def _powers(turns: Turns, size: FloatArray, firsts: IntArray) -> tuple[FloatArray, FloatArray]:
-    """u and N of the groups that hold anything."""
-    total = np.add.reduceat(turns.sums * size, firsts)
-    weight = np.add.reduceat(turns.weight * size**2, firsts)
-    some = weight > 0
-    return np.abs(total[some]) ** 2 / weight[some], weight[some]
+def _demodulated(
+    records: Sequence[WhitenedRecord], stretches: list[IntArray], orders: list[float], line: Line | None
+) -> dict[float, DemodulatedOrder]:
+    """D and N of every order (multiples of a tenth, ascending)."""
+    highest = max(float(np.abs(record.speed).max()) for record in records)
+    parts: dict[float, list[tuple[FloatArray, FloatArray]]] = {order: [] for order in orders}
+    for record, firsts in zip(records, stretches, strict=True):
+        hertz = record.speed / (2 * np.pi)
+        steps = np.diff(record.time, prepend=record.time[0])
+        angle = 2 * np.pi * np.cumsum(hertz * steps)
+        hertz = np.abs(hertz)
+        # e^{-ikφ} of each order from that of the one before, by powers of e^{-iφ/10}
+        tenths = {1: np.exp(-0.1j * angle)}
+        for k in range(2, 11):
+            tenths[k] = tenths[k - 1] * tenths[1]
+        carrier, carrier_tenths = np.ones(angle.size, dtype=np.complex128), 0
+        counts = np.diff(np.append(firsts, angle.size))
+        for order in orders:
+            while carrier_tenths < round(10 * order):
+                step = min(10, round(10 * order) - carrier_tenths)
+                carrier, carrier_tenths = carrier * tenths[step], carrier_tenths + step
+            frequency = order * hertz
+            visible = (frequency > record.lowest) & (frequency < record.highest)
+            if line is not None:
+                distance = np.minimum(np.abs(frequency - line.position), np.abs(frequency - 2 * line.position))
+                slow = hertz * 2 * np.pi <= LINE_SPEED * line.speed_share * highest
+                visible &= ~((distance < LINE_WIDTH) & slow)
+            weight = record.weight * visible
+            total = np.add.reduceat(carrier * (record.matched * visible), firsts)
+            power = np.add.reduceat(weight * record.response(frequency), firsts)
+            enough = np.add.reduceat(visible.astype(float), firsts) > LEAST_VISIBLE * counts
+            parts[order].append((total * enough, power * enough))
+    return {
+        order: DemodulatedOrder(
+            sums=np.concatenate([total for total, _ in of_records]),
+            weight=np.concatenate([power for _, power in of_records]),
+        )
+        for order, of_records in parts.items()
+    }
 
 
-def _order(turns: dict[float, Turns], order: float, size: FloatArray, firsts: IntArray) -> tuple[float, float, float]:
-    """Evidence of an order, amplitude, and log L over none at it."""
-    power, weight = _powers(turns[order], size, firsts)
-    if power.size < FEWEST:
+def _powers(order: DemodulatedOrder, size: FloatArray, firsts: IntArray) -> tuple[FloatArray, FloatArray]:
+    """u and N of the groups in which the order is visible."""
+    total = np.add.reduceat(order.sums * size, firsts)
+    weight = np.add.reduceat(order.weight * size**2, firsts)
+    visible = weight > 0
+    return np.abs(total[visible]) ** 2 / weight[visible], weight[visible]
+
+
+def _order_evidence(
+    demodulated: dict[float, DemodulatedOrder], order: float, size: FloatArray, firsts: IntArray
+) -> tuple[float, float, float]:
+    """Evidence of an order, its amplitude, and the largest log likelihood ratio."""
+    power, weight = _powers(demodulated[order], size, firsts)
+    if power.size < FEWEST_STRETCHES:
         return 0.0, 0.0, 0.0
     sides = []
-    for side in (LEFT, RIGHT):
-        around = [_powers(turns[round(order + by, 1)], size, firsts)[0] for by in side]
-        sides.append((float(sum(each.sum() for each in around)), float(sum(each.size for each in around))))
-    usual = level(*sides)
-    tried = sizes(weight / usual)
-    logs = likelihoods(power / usual, weight / usual, tried)
-    return float(logsumexp(logs, b=SHARES)), amplitude(power / usual, weight / usual), float(logs.max())
+    for offsets in (BELOW_ORDER, ABOVE_ORDER):
+        beside = [_powers(demodulated[round(order + offset, 1)], size, firsts)[0] for offset in offsets]
+        sides.append((float(sum(values.sum() for values in beside)), float(sum(values.size for values in beside))))
+    noise = noise_level(*sides)
+    logs = log_likelihood_ratios(power / noise, weight / noise, trial_amplitudes(weight / noise))
+    return (
+        float(logsumexp(logs, b=AMPLITUDE_WEIGHTS)),
+        amplitude(power / noise, weight / noise),
+        float(logs.max()),
+    )

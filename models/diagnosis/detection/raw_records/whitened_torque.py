@@ -1,8 +1,8 @@
-"""Raw torque made ready for a search of what swings in it: free of what is slow, and its noise whitened.
+"""Raw torque made ready for a search of swings: freed of everything slow, and its noise whitened.
 
     torque = smooth spline + x,    A(L) x / σ ~ white noise of deviation 1
 
-A is an autoregression learnt from the record's own spectrum (above what the spline takes up), σ the local deviation of
+A is an autoregression estimated from the record's own spectrum (above what the spline absorbs), σ the local deviation of
 A(L) x. A swing s(t) of unknown size and phase is then looked for by its matched filter,
 
     D = Σ s* A(1/L) [A(L) x / σ²],    N = Σ |A(ω) s|² / σ²,    |D|²/N ~ exponential of mean 1 where there is none.
@@ -10,8 +10,7 @@ A(L) x. A swing s(t) of unknown size and phase is then looked for by its matched
 The spline's knots are so close that no friction curve passed at the record's pace leaves anything above its cut-off.
 """
 
-import itertools
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,48 +20,37 @@ from scipy.ndimage import uniform_filter1d
 from scipy.signal import lfilter
 
 from models.arrays import FloatArray
+from models.diagnosis.detection.raw_records.criteria import (
+    AUTOREGRESSION_ORDER,
+    BLURRED,
+    CONSTANT_SPEED,
+    COUNT_SAMPLES,
+    FEWEST_BETWEEN_KNOTS,
+    HIGHEST_SHARE,
+    KNOT_SHARE,
+    KNOT_SPACING,
+    LARGEST_SQUARE,
+    LEAST_VARIANCE_SHARE,
+    LOCAL_TIME,
+    LOWEST_CYCLES,
+    RATE,
+    SEGMENT,
+)
+from models.diagnosis.detection.raw_records.pieces import Piece, pieces_of
 from models.records.cleaning import clean
-from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE
-from models.records.pressure_stretches import pressure_stretches
 from models.records.runs import Record
 
-#: A speed that goes this share of its highest the other way reverses; torque has settled so long [s] after.
-REVERSES, TURNED = 0.03, 1.0
-#: Samples that may be missing in a row.
-GAP = 5
-#: Records are averaged down to about this rate [Hz].
-RATE = 250.0
-#: The spline's knots lie so far apart at most [s], and this share of a swing of the speed.
-KNOTS, KNOTS_SHARE = 0.25, 1 / 40
-#: Samples between knots at least; with fewer nothing is left to be looked at.
-FEWEST_BETWEEN = 5
-#: What the spline does not touch, in cycles between knots; and the highest frequency as a share of the rate.
-ABOVE, BELOW = 1.25, 0.45
-#: A piece is this long at least: seconds, samples.
-SHORTEST, FEWEST = 1.0, 48
-#: Order of the autoregression; samples of a spectrum that it is learnt from.
-MEMORY, SEGMENT = 6, 256
-#: Points at which its gain is kept.
-GAINS = 512
-#: Time [s] over which the local deviation is taken.
-LOCAL = 2.0
-#: Squares count for this many of the usual at most where the local deviation is taken.
-LARGEST_SQUARE = 12.0
-#: No part of a record is taken for quieter than this share of the usual: a coarse recorder may write one value for long.
-QUIETEST = 0.25
-#: Noise of less than this share of the recorder's count does not blur its steps, which then look like swings.
-BLURRED, COUNTED = 0.45, 5000
-#: A speed that swings by less than this share of its highest stands.
-STANDS = 0.05
+#: Points at which the autoregression's gain is tabulated.
+_GAINS = 512
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Swings:
+class WhitenedRecord:
     """The samples of a record's pieces, one after the other: time [n] s, speed [n] rad/s, torque [n] Nm (the spline's).
 
     matched [n] is A(1/L) [A(L) x/σ²], weight [n] 1/σ²; `starts` are the pieces' first samples and n. `step` [s] is the
-    usual interval, `slowest` and `fastest` [Hz] bound what can be seen, `gain` is |A|² evenly
-    from 0 to half the rate.
+    sample interval, `lowest` and `highest` [Hz] bound the frequencies that can be seen, `gain` is |A|² evenly from 0 to half
+    the rate.
     """
 
     time: FloatArray
@@ -72,146 +60,95 @@ class Swings:
     weight: FloatArray
     starts: tuple[int, ...]
     step: float
-    slowest: float
+    lowest: float
     gain: FloatArray
 
     @property
-    def fastest(self) -> float:
-        return BELOW / self.step
+    def highest(self) -> float:
+        return HIGHEST_SHARE / self.step
 
     def response(self, frequency: FloatArray) -> FloatArray:
-        """|A|² at frequencies [Hz] up to half the rate; what is beyond is given the last value."""
+        """|A|² at frequencies [Hz] up to half the rate; beyond, the last value."""
         place = frequency * (2 * (self.gain.size - 1) * self.step)
         return np.asarray(self.gain[np.minimum(place, self.gain.size - 1).astype(np.intp)])
 
 
-def swings(record: Record, spans: FloatArray | None = None) -> Swings | None:
-    """Of a record, within spans [k, 2] s where they are given, else where its pressure stands; None where it holds too
-    little, or samples too far apart."""
+def whitened_record(record: Record, spans: FloatArray | None = None) -> WhitenedRecord | None:
+    """Of a record, within spans [k, 2] s where they are given, else where its pressure is constant; None where it holds too
+    few samples, or samples too far apart."""
     try:
         cleaned, period, _ = clean(record)
     except ValueError:
         return None
     count = max(1, int(1.0 / (RATE * period)))
     step = count * period
-    pieces = [
-        _averaged(cleaned, first, stop, count)
-        for begin, end in _whole(cleaned, spans, period)
-        for first, stop in _one_way(cleaned.speed, begin, end, round(TURNED / period))
-        if (stop - first) * period >= SHORTEST and stop - first >= FEWEST * count
-    ]
+    pieces = pieces_of(cleaned, spans, period, count)
     if not pieces:
         return None
-    spacing = min(KNOTS, *(KNOTS_SHARE * _pace(speed, step) for _, speed, _ in pieces))
+    spacing = min(KNOT_SPACING, *(KNOT_SHARE * _speed_period(piece.speed, step) for piece in pieces))
     between = round(spacing / step)
-    if between < FEWEST_BETWEEN or not ABOVE / (between * step) < BELOW / step:
+    if between < FEWEST_BETWEEN_KNOTS or not LOWEST_CYCLES / (between * step) < HIGHEST_SHARE / step:
         return None
-    within = cleaned.torque[: cleaned.torque.size // count * count].reshape(-1, count).var(axis=1).mean()
-    return _whitened(pieces, step, between, (BLURRED * _count(cleaned.torque)) ** 2 - float(within))
+    averaged_out = cleaned.torque[: cleaned.torque.size // count * count].reshape(-1, count).var(axis=1).mean()
+    return _whitened(pieces, step, between, (BLURRED * _recorder_count(cleaned.torque)) ** 2 - float(averaged_out))
 
 
-def _count(torque: FloatArray) -> float:
-    """The least step [Nm] of what was written down."""
-    moved = np.abs(np.diff(torque[:COUNTED]))
-    moved = moved[moved > 1e-9 * float(np.abs(torque).max())]
-    return float(moved.min()) if moved.size else 0.0
+def _recorder_count(torque: FloatArray) -> float:
+    """The least step [Nm] between recorded values."""
+    steps = np.abs(np.diff(torque[:COUNT_SAMPLES]))
+    steps = steps[steps > 1e-9 * float(np.abs(torque).max())]
+    return float(steps.min()) if steps.size else 0.0
 
 
-def _whole(record: Record, spans: FloatArray | None, period: float) -> Iterator[tuple[int, int]]:
-    """Rows [first, stop) without gaps."""
-    gaps = (np.flatnonzero(np.diff(record.time) > GAP * period) + 1).tolist()
-    for first, stop in itertools.pairwise([0, *gaps, record.time.size]):
-        if spans is None:
-            yield from _at_one_pressure(record, first, stop)
-    if spans is None:
-        return
-    for first, stop in (np.searchsorted(record.time, span) for span in spans):
-        inside = [gap for gap in gaps if first < gap < stop]
-        yield from itertools.pairwise([int(first), *inside, int(stop)])
-
-
-def _at_one_pressure(record: Record, first: int, stop: int) -> Iterator[tuple[int, int]]:
-    """Rows of [first, stop), which have no gaps, in which pressure stands."""
-    if stop - first < FEWEST:
-        return
-    pressure = record.pressure[first:stop]
-    usual = float(np.median(pressure))
-    low, high = np.quantile(pressure, (0.005, 0.995))
-    if high - low <= max(LEVEL_GAP, LEVEL_GAP_SHARE * abs(usual)):
-        yield first, stop
-        return
-    for each in pressure_stretches(record.time[first:stop], pressure):
-        yield first + each.start, first + each.stop
-
-
-def _one_way(speed: FloatArray, first: int, stop: int, turned: int) -> Iterator[tuple[int, int]]:
-    """Rows of [first, stop) between reversals of the speed, `turned` after each: where the clutch turns over torque jumps,
-    at the same angle of the shaft each time, and that is no swing."""
-    own = speed[first:stop]
-    if min(own.max(initial=0.0), -own.min(initial=0.0)) <= REVERSES * np.abs(own).max(initial=0.0):
-        yield first, stop
-        return
-    turns = np.flatnonzero(np.diff(np.signbit(own))) + 1
-    yield first, first + int(turns[0])
-    for begin, end in itertools.pairwise([*turns.tolist(), own.size]):
-        yield first + begin + turned, first + end
-
-
-def _averaged(record: Record, first: int, stop: int, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Time, speed and torque of the rows [first, stop), means of `count` each."""
-    stop = first + (stop - first) // count * count
-    time, speed, torque = (each[first:stop] for each in (record.time, record.speed, record.torque))
-    if count == 1:
-        return time, speed, torque
-    time, speed, torque = (each.reshape(-1, count).mean(axis=1) for each in (time, speed, torque))
-    return time, speed, torque
-
-
-def _pace(speed: FloatArray, step: float) -> float:
-    """The period [s] of the swing of a speed; infinite where it stands."""
+def _speed_period(speed: FloatArray, step: float) -> float:
+    """The period [s] of the strongest oscillation of a speed; infinite where it is constant."""
     window = np.hanning(speed.size)
     power = np.abs(np.fft.rfft((speed - speed.mean()) * window))
-    if 2 * power.max() <= STANDS * np.abs(speed).max() * window.sum():  # an encoder's noise is no swing
+    if 2 * power.max() <= CONSTANT_SPEED * np.abs(speed).max() * window.sum():  # an encoder's noise is no oscillation
         return np.inf
     return float(speed.size * step / max(1, int(power.argmax())))
 
 
-def _whitened(
-    pieces: list[tuple[FloatArray, FloatArray, FloatArray]], step: float, between: int, least_square: float
-) -> Swings | None:
-    smooth = [_spline(torque, between) for _, _, torque in pieces]
-    rest = [torque - slow for (_, _, torque), slow in zip(pieces, smooth, strict=True)]
-    size = max(float(np.abs(torque).max()) for _, _, torque in pieces)
-    scale = [float(each.std()) for each in rest]
-    if not (min(scale) > 1e-9 * size and float(np.median(scale)) ** 2 > least_square):
+def _whitened(pieces: Sequence[Piece], step: float, between: int, least_variance: float) -> WhitenedRecord | None:
+    """None where noise is too small beside the recorder's steps (its median variance at most `least_variance` [Nm²])."""
+    smooth = [_spline(piece.torque, between) for piece in pieces]
+    fast = [piece.torque - slow for piece, slow in zip(pieces, smooth, strict=True)]
+    largest = max(float(np.abs(piece.torque).max()) for piece in pieces)
+    deviations = [float(series.std()) for series in fast]
+    if not (min(deviations) > 1e-9 * largest and float(np.median(deviations)) ** 2 > least_variance):
         return None
-    past = _autoregression([each / one for each, one in zip(rest, scale, strict=True)], 1.0 / between)
-    fresh = [lfilter(past, 1.0, each) for each in rest]
-    least = QUIETEST * float(np.median([np.square(each[past.size :]).mean() for each in fresh]))
+    scaled = [series / deviation for series, deviation in zip(fast, deviations, strict=True)]
+    polynomial = _autoregression(scaled, 1.0 / between)
+    innovations = [lfilter(polynomial, 1.0, series) for series in fast]
+    usual = float(np.median([np.square(series[polynomial.size :]).mean() for series in innovations]))
+    least = LEAST_VARIANCE_SHARE * usual
     if not least > 0:
         return None
-    weights = [_weight(each, past.size, round(LOCAL / step), least) for each in fresh]
-    matched = [lfilter(past, 1.0, (e * w)[::-1])[::-1] for e, w in zip(fresh, weights, strict=True)]
-    return Swings(
-        time=np.concatenate([time for time, _, _ in pieces]),
-        speed=np.concatenate([speed for _, speed, _ in pieces]),
+    weights = [_weight(series, polynomial.size, round(LOCAL_TIME / step), least) for series in innovations]
+    matched = [
+        lfilter(polynomial, 1.0, (series * weight)[::-1])[::-1]
+        for series, weight in zip(innovations, weights, strict=True)
+    ]
+    return WhitenedRecord(
+        time=np.concatenate([piece.time for piece in pieces]),
+        speed=np.concatenate([piece.speed for piece in pieces]),
         torque=np.concatenate(smooth),
         matched=np.concatenate(matched),
         weight=np.concatenate(weights),
-        starts=tuple(np.cumsum([0, *(each.size for each in rest)]).tolist()),
+        starts=tuple(np.cumsum([0, *(series.size for series in fast)]).tolist()),
         step=step,
-        slowest=ABOVE / (between * step),
-        gain=np.asarray(np.abs(np.fft.rfft(past, 2 * GAINS)) ** 2, dtype=np.float64),
+        lowest=LOWEST_CYCLES / (between * step),
+        gain=np.asarray(np.abs(np.fft.rfft(polynomial, 2 * _GAINS)) ** 2, dtype=np.float64),
     )
 
 
-def _weight(fresh: FloatArray, memory: int, local: int, least: float) -> FloatArray:
-    """1/σ² [n] of innovations [n], 0 where they still lack their past."""
-    squares = fresh**2
-    squares[:memory] = squares[memory:].mean()
+def _weight(innovations: FloatArray, order: int, local: int, least: float) -> FloatArray:
+    """1/σ² [n] of innovations [n], 0 for the first `order`, which lack their past."""
+    squares = innovations**2
+    squares[:order] = squares[order:].mean()
     squares = np.minimum(squares, LARGEST_SQUARE * squares.mean())
-    weight = 1.0 / np.maximum(uniform_filter1d(squares, min(local, fresh.size), mode="reflect"), least)
-    weight[:memory] = 0.0
+    weight = 1.0 / np.maximum(uniform_filter1d(squares, min(local, innovations.size), mode="reflect"), least)
+    weight[:order] = 0.0
     return np.asarray(weight, dtype=np.float64)
 
 
@@ -223,14 +160,14 @@ def _spline(torque: FloatArray, between: int) -> FloatArray:
     return np.asarray(make_lsq_spline(place, torque, knots, 3)(place), dtype=np.float64)
 
 
-def _autoregression(rest: list[FloatArray], lowest: float) -> FloatArray:
+def _autoregression(series: Sequence[FloatArray], lowest: float) -> FloatArray:
     """A [p + 1] (Yule-Walker) for series whose spectrum below `lowest` [cycles a sample] goes on flat as it is above."""
-    size = min(SEGMENT, min(each.size for each in rest))
+    size = min(SEGMENT, min(part.size for part in series))
     window = np.hanning(size)
-    parts = [each[first : first + size] for each in rest for first in range(0, each.size - size + 1, size // 2)]
-    power = np.mean(np.abs(np.fft.rfft(np.array(parts) * window, axis=1)) ** 2, axis=0)
+    segments = [part[first : first + size] for part in series for first in range(0, part.size - size + 1, size // 2)]
+    power = np.mean(np.abs(np.fft.rfft(np.array(segments) * window, axis=1)) ** 2, axis=0)
     edge = max(1, int(np.ceil(lowest * size)))
     power[:edge] = power[edge : max(edge + 2, round(1.6 * edge))].mean()
-    covariance = np.fft.irfft(power)[: MEMORY + 1]
+    covariance = np.fft.irfft(power)[: AUTOREGRESSION_ORDER + 1]
     covariance[0] *= 1 + 1e-9
     return np.concatenate([[1.0], -solve_toeplitz(covariance[:-1], covariance[1:])])

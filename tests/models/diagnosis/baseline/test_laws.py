@@ -7,17 +7,15 @@ import pytest
 from scipy.optimize import brentq
 
 from models.degradation.general_order import progress_fraction
+from models.diagnosis.baseline.criteria import CURVATURE_BOUNDS, EXPONENTIAL, USUAL_CURVATURE
 from models.diagnosis.baseline.laws import (
     ATTRACTOR,
-    BENDS,
     BLOCK,
-    EXPONENTIAL,
     FALL,
     KAPPA,
-    LOG_BEND,
+    LOG_CURVATURE,
     POWERS,
     RATIO,
-    USUAL_BEND,
     Frame,
     Laws,
     curve,
@@ -101,23 +99,23 @@ def test_what_c_drifts_early_in_life_is_followed(exponent: float, half: float) -
     assert missed(np.stack([x, x * x], axis=1)) > 0.045
 
 
-@pytest.mark.parametrize("bend", [EXPONENTIAL, 0.25, 1.0])
-def test_the_coulomb_ratio_falls_as_an_exponential_as_a_hyperbola_or_between(bend: float) -> None:
+@pytest.mark.parametrize("curvature", [EXPONENTIAL, 0.25, 1.0])
+def test_the_coulomb_ratio_falls_as_an_exponential_as_a_hyperbola_or_between(curvature: float) -> None:
     """The limits against their own formulas, P⁻ for p_0, and a straight line below P⁻; derivatives against differences."""
     lowest, span = 4e5, 3e5
     high = np.array([-1.0, -0.6, 0.0, 0.3, 1.0])
-    fall = np.array([np.log(lowest), np.log(bend)])
+    fall = np.array([np.log(lowest), np.log(curvature)])
     weight, slopes = falling_weight(high, span, fall)
     pressure = lowest + span * high[2:]
     known = {EXPONENTIAL: np.exp(-(pressure - lowest) / lowest), 1.0: lowest / pressure}
-    if bend in known:
-        expected = (known[bend] - known[bend][-1]) / (1 - known[bend][-1])
+    if curvature in known:
+        expected = (known[curvature] - known[curvature][-1]) / (1 - known[curvature][-1])
         np.testing.assert_allclose(weight[2:], expected, atol=2e-3)
     assert weight[[2, 4]] == pytest.approx([1.0, 0.0])
     near = falling_weight(np.array([-1e-6, 1e-6]), span, fall)[0]
     assert (weight[0] - 1.0) / 1.0 == pytest.approx((weight[1] - 1.0) / 0.6)
     assert (near[0] - near[1]) / 2e-6 == pytest.approx(weight[0] - 1.0, rel=1e-4)
-    if bend > EXPONENTIAL:  # that is its bound
+    if curvature > EXPONENTIAL:  # that is its bound
         for k, step in enumerate(np.eye(2) * 1e-6):
             numeric = (falling_weight(high, span, fall + step)[0] - falling_weight(high, span, fall - step)[0]) / 2e-6
             np.testing.assert_allclose(slopes[:, k], numeric, atol=1e-6)
@@ -127,26 +125,26 @@ def test_the_coulomb_ratio_falls_as_an_exponential_as_a_hyperbola_or_between(ben
 def test_far_below_two_pressures_the_ratio_stays_one(levels: tuple[float, float]) -> None:
     """A quarter of the lowest, as advised tests have it: two pressures say nothing of how the ratio falls."""
     frame = Frame(lowest=levels[0], highest=levels[1], last=1e4, loop_pressures=np.zeros(0), reference_velocity=6.0)
-    fall = np.array([np.log(0.6 * frame.span), np.log(USUAL_BEND)])
+    fall = np.array([np.log(0.6 * frame.span), np.log(USUAL_CURVATURE)])
     high = np.array([(0.25 * levels[0] - levels[0]) / frame.span])
     weight = float(falling_weight(high, frame.span, fall)[0][0])
     assert 1.0 < weight < 1.0 - 3.0 * float(high[0])
 
 
-def test_a_bend_stays_within_its_bounds_wherever_a_fit_starts() -> None:
+def test_the_curvature_stays_within_its_bounds_wherever_a_fit_starts() -> None:
     design = build_design(campaign(3, noise=0.0, gain=0.0, loops=False, cycles=(0.0, 3000.0, 9000.0)))
     start = starting_laws(design, frame_of(design))
     priors = priors_of(design, start.theta, start.frame)
     theta = start.theta.copy()
     theta[FALL] = np.log(0.05 * start.frame.span), np.log(4.9)
-    bent = replace(design, torque=predict(design, Laws(theta=theta, frame=start.frame)).torque)
+    curved = replace(design, torque=predict(design, Laws(theta=theta, frame=start.frame)).torque)
     noise = first_noise(design)
     noise = replace(noise, deviation=0.02 * noise.deviation)
     for begun in (0.25, 20.0):
         theta = start.theta.copy()
-        theta[LOG_BEND] = np.log(begun)
-        found = fit(bent, noise, Laws(theta=theta, frame=start.frame), priors)
-        assert BENDS[0] <= np.exp(found.laws.theta[LOG_BEND]) <= BENDS[1] * (1 + 1e-9)
+        theta[LOG_CURVATURE] = np.log(begun)
+        found = fit(curved, noise, Laws(theta=theta, frame=start.frame), priors)
+        assert CURVATURE_BOUNDS[0] <= np.exp(found.laws.theta[LOG_CURVATURE]) <= CURVATURE_BOUNDS[1] * (1 + 1e-9)
 
 
 def test_a_ratio_that_falls_as_a_hyperbola_is_followed_and_an_exponential_is_not_enough() -> None:
@@ -155,11 +153,11 @@ def test_a_ratio_that_falls_as_a_hyperbola_is_followed_and_an_exponential_is_not
     theta = start.theta.copy()
     theta[RATIO * BLOCK : RATIO * BLOCK + 2] = 0.9, 0.6
     theta[FALL] = np.log(start.frame.lowest / 2), np.log(1.5)
-    bent = replace(design, torque=predict(design, Laws(theta=theta, frame=start.frame)).torque)
+    curved = replace(design, torque=predict(design, Laws(theta=theta, frame=start.frame)).torque)
     noise, priors = first_noise(design), priors_of(design, start.theta, start.frame)
-    held = replace(priors, free=priors.free & (np.arange(theta.size) != LOG_BEND))
+    held = replace(priors, free=priors.free & (np.arange(theta.size) != LOG_CURVATURE))
     stiff = start.theta.copy()
-    stiff[LOG_BEND] = np.log(EXPONENTIAL)
-    free = fit(bent, noise, start, priors)
-    exponential = fit(bent, noise, Laws(theta=stiff, frame=start.frame), held)
+    stiff[LOG_CURVATURE] = np.log(EXPONENTIAL)
+    free = fit(curved, noise, start, priors)
+    exponential = fit(curved, noise, Laws(theta=stiff, frame=start.frame), held)
     assert np.abs(free.residual).max() < 0.2 * np.abs(exponential.residual).max()

@@ -145,7 +145,7 @@ def test_samples_beside_a_bins_middle_are_no_delay(rate: float, samples: int) ->
     assert most < 0.005
     assert delay < 1e-5
     # the control: as if they lay in the middle
-    most, delay = off(replace(design, past=0 * design.past))
+    most, delay = off(replace(design, bin_offset=0 * design.bin_offset))
     assert most > 0.04
     assert delay > 1e-3
 
@@ -176,10 +176,12 @@ def test_dynamic_tests_that_tell_nothing_are_counted() -> None:
         )
         for number, speed in enumerate((swinging, np.full(time.size, 100.0)))
     ]
-    told = [each for each in build_design(Campaign(dynamic=tuple(tests))).notes if each.startswith("Dynamic tests")]
-    assert len(told) == 1
-    assert told[0].startswith(
-        "Dynamic tests that could not be evaluated and tell nothing: 1 of 2 (5 bar: The speed does not "
+    sentences = [
+        each for each in build_design(Campaign(dynamic=tuple(tests))).notes if each.startswith("Dynamic tests")
+    ]
+    assert len(sentences) == 1
+    assert sentences[0].startswith(
+        "Dynamic tests that could not be evaluated and were left out: 1 of 2 (5 bar: The speed does not "
     )
     assert not [
         each for each in build_design(Campaign(dynamic=tuple(tests[:1]))).notes if each.startswith("Dynamic tests")

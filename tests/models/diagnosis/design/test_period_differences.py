@@ -1,4 +1,4 @@
-"""Periods held against each other: by hand, as a rotation of the samples, and what they tell of noise that is slow."""
+"""Periods held against each other: by hand, as a rotation of the samples, and what they show of slow noise."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from models.arrays import FloatArray
 from models.diagnosis.campaign import Campaign, DynamicRun
 from models.diagnosis.design.design import Design, build_design
 from models.diagnosis.design.loop_bins import BINS
-from models.diagnosis.design.period_differences import repeats_of
+from models.diagnosis.design.period_differences import period_differences
 from models.diagnosis.noise.estimate import estimate_noise, first_noise
 from models.records.runs import Record
 
@@ -23,11 +23,11 @@ def test_three_periods_by_hand() -> None:
     torque = np.array([1.0, 3.0, 5.0, 6.0, 8.0, 70.0, 8.0, 9.0])
     bins = np.array([0, 0, 1, 0, 0, 0, 1, 2])
     turns = np.array([0.1, 0.2, 0.5, 1.1, 1.2, 2.1, 2.4, 2.9])
-    found = repeats_of(torque, bins, turns, 3)
+    found = period_differences(torque, bins, turns, 3)
     nan = np.nan
     expected = [[(7 - 2) / np.sqrt(1 / 2 + 1 / 2), nan, nan], [nan, (8 - 5) / np.sqrt(1 / 1 + 1 / 1), nan]]
     np.testing.assert_allclose(found, expected, rtol=1e-12)
-    assert repeats_of(torque[:3], bins[:3], turns[:3], 3).shape == (0, 3)
+    assert period_differences(torque[:3], bins[:3], turns[:3], 3).shape == (0, 3)
 
 
 def test_white_samples_give_white_differences_and_a_loop_gives_none() -> None:
@@ -35,7 +35,7 @@ def test_white_samples_give_white_differences_and_a_loop_gives_none() -> None:
     rng = np.random.default_rng(3)
     turns = np.arange(0.0, 4.3, 0.061)
     bins = np.floor(5 * np.mod(turns, 1)).astype(np.intp)
-    rows = np.stack([repeats_of(unit, bins, turns, 5).ravel() for unit in np.eye(turns.size)], axis=1)
+    rows = np.stack([period_differences(unit, bins, turns, 5).ravel() for unit in np.eye(turns.size)], axis=1)
     rows = rows[np.isfinite(rows).all(axis=1)]
     assert rows.shape[0] > 12
     np.testing.assert_allclose(rows @ rows.T, np.eye(rows.shape[0]), atol=1e-12)
@@ -43,7 +43,7 @@ def test_white_samples_give_white_differences_and_a_loop_gives_none() -> None:
 
 
 def designed(seed: int, memory: float, noise: float) -> Design:
-    """Four tests of five pressures, three periods each; noise remembers for `memory` s."""
+    """Four tests of five pressures, three periods each; noise is autocorrelated over `memory` s."""
     rng = np.random.default_rng(seed)
     time = np.arange(round(5 * 3 * PERIOD * RATE)) / RATE
     within = np.mod(time, 3 * PERIOD)
@@ -62,38 +62,38 @@ def designed(seed: int, memory: float, noise: float) -> Design:
     return build_design(Campaign(dynamic=tuple(runs)))
 
 
-def told(design: Design, expected: FloatArray) -> tuple[float, float]:
+def estimated(design: Design, expected: FloatArray) -> tuple[float, float]:
     """The correlation of neighbouring bins, and the strength [Nm²] of noise that is slow, for a mean over bins."""
     noise, _ = estimate_noise(design, design.torque - expected, expected, first_noise(design))
-    share, step = noise.loops.share, noise.loops.step
+    share, decay = noise.loops.share, noise.loops.decay
     variance = float(np.median(noise.deviation**2))
-    return share * step, variance * (1 + 2 * share * step / (1 - step))
+    return share * decay, variance * (1 + 2 * share * decay / (1 - decay))
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_periods_tell_noise_that_is_slow(seed: int) -> None:
-    """It remembers for 0.3 s, ten bins: harmonics take most of that for part of the loop. Fewer than four samples fall into
-    a bin each period, so samples do not tell either."""
+def test_periods_show_slow_noise(seed: int) -> None:
+    """It is autocorrelated over 0.3 s, ten bins: harmonics absorb most of that. Fewer than four samples fall into
+    a bin each period, so samples do not show it either."""
     memory, expected = 0.3, designed(seed, 0.0, 0.0).torque
     design = designed(seed, memory, DEVIATION)
-    assert design.bins_remember is None
-    assert len(design.repeats) == 2 * design.loops
+    assert design.bin_autocorrelation is None
+    assert len(design.period_differences) == 2 * design.loops
     bin_time = PERIOD / BINS
     periods = float(np.median(design.samples)) / (RATE * bin_time)
     # a mean over time T of a process that forgets in `memory` has the variance 2 memory/T
     strength = DEVIATION**2 * 2 * memory / (bin_time * periods)
-    neighbour, slow = told(design, expected)
+    neighbour, slow = estimated(design, expected)
     assert neighbour == pytest.approx(np.exp(-bin_time / memory), abs=0.03)
-    assert 0.4 * strength < slow < 1.2 * strength  # the slowest that is tried remembers by 0.9 a bin
+    assert 0.4 * strength < slow < 1.2 * strength  # the slowest that is tried has 0.9 a bin
     # the control: each loop alone
-    neighbour, slow = told(replace(design, repeats=()), expected)
+    neighbour, slow = estimated(replace(design, period_differences=()), expected)
     assert neighbour < 0.85
     assert slow < 0.2 * strength
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_periods_tell_noise_that_forgets_at_once(seed: int) -> None:
+def test_periods_show_white_noise(seed: int) -> None:
     expected, design = designed(seed, 0.0, 0.0).torque, designed(seed, 0.0, DEVIATION)
-    neighbour, slow = told(design, expected)
+    neighbour, slow = estimated(design, expected)
     assert neighbour < 0.05
     assert slow == pytest.approx(DEVIATION**2 / float(np.median(design.samples)), rel=0.2)

@@ -5,7 +5,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from models.diagnosis.design.points import Points, joined, opened
+from models.diagnosis.design.points import Points, concatenate, mark_open
 from models.records.criteria import UNLOADED
 
 _INTEGERS = {"run", "loop", "previous"}
@@ -33,7 +33,7 @@ def test_some_are_taken_and_lose_the_ones_before_them() -> None:
 
 def test_blocks_stand_one_after_the_other() -> None:
     one, other = numbered(0, 2), numbered(7, 3)
-    both = joined([one, other])
+    both = concatenate([one, other])
     for each in fields(Points):
         column = getattr(both, each.name)
         assert column.tolist() == [*getattr(one, each.name), *getattr(other, each.name)]
@@ -42,12 +42,12 @@ def test_blocks_stand_one_after_the_other() -> None:
 
 
 def test_no_blocks_are_no_points() -> None:
-    none = joined([])
+    none = concatenate([])
     assert {getattr(none, each.name).size for each in fields(Points)} == {0}
 
 
 @pytest.mark.parametrize(
-    ("pressure", "engaged", "told"),
+    ("pressure", "engaged", "expected"),
     [
         ([4 * UNLOADED, 0.0, 2 * UNLOADED], [1.0, 0.0, 1.0], [4 * UNLOADED, 2 * UNLOADED, 2 * UNLOADED]),
         ([0.0, 0.5 * UNLOADED], [0.0, 0.0], [1.0, 1.0]),
@@ -55,11 +55,11 @@ def test_no_blocks_are_no_points() -> None:
     ],
 )
 def test_an_open_clutch_has_the_lowest_closed_pressure(
-    pressure: list[float], engaged: list[float], told: list[float]
+    pressure: list[float], engaged: list[float], expected: list[float]
 ) -> None:
     points = numbered(0, len(pressure))
-    found = opened(
+    found = mark_open(
         Points(**{each.name: getattr(points, each.name) for each in fields(Points)} | {"pressure": np.array(pressure)})
     )
     assert found.engaged.tolist() == engaged
-    assert found.pressure.tolist() == told
+    assert found.pressure.tolist() == expected

@@ -1,4 +1,4 @@
-"""What samples remember, and what that makes of bins: against noise that was made so."""
+"""Autocorrelation of samples, and of bins as it follows from that: against noise that was made so."""
 
 from dataclasses import replace
 
@@ -8,14 +8,18 @@ from scipy.signal import lfilter
 
 from models.arrays import FloatArray
 from models.diagnosis.design.design import Design, build_design
-from models.diagnosis.design.sample_autocorrelation import Memory, bins_remember, memory_of
+from models.diagnosis.design.sample_autocorrelation import (
+    SampleAutocorrelation,
+    bin_autocorrelation,
+    sample_autocorrelation,
+)
 from models.diagnosis.noise.estimate import estimate_noise, first_noise
 from tests.models.diagnosis.campaigns import campaign
 
 SEED = 20
 
 
-def remembering(share: float, step: float, size: int, seed: int = SEED) -> FloatArray:
+def autocorrelated(share: float, step: float, size: int, seed: int = SEED) -> FloatArray:
     """Noise of unit variance, partly white."""
     slow, white = np.random.default_rng(seed).standard_normal((2, size))
     slow = lfilter([np.sqrt(1 - step**2)], [1.0, -step], slow)
@@ -23,34 +27,34 @@ def remembering(share: float, step: float, size: int, seed: int = SEED) -> Float
 
 
 @pytest.mark.parametrize(("share", "step"), [(1.0, 0.7), (0.6, 0.95), (0.3, 0.5)])
-def test_means_of_samples_remember_as_foretold(share: float, step: float) -> None:
-    bins = remembering(share, step, 4_000_000).reshape(-1, 20).mean(axis=1)
-    one, two = Memory(one=share * step, two=share * step**2, to_a_bin=20.0).of_bins()
+def test_means_of_samples_are_autocorrelated_as_predicted(share: float, step: float) -> None:
+    bins = autocorrelated(share, step, 4_000_000).reshape(-1, 20).mean(axis=1)
+    one, two = SampleAutocorrelation(first=share * step, second=share * step**2, per_bin=20.0).of_bins()
     assert one == pytest.approx(float(np.corrcoef(bins[1:], bins[:-1])[0, 1]), abs=0.01)
     assert two == pytest.approx(float(np.corrcoef(bins[2:], bins[:-2])[0, 1]), abs=0.01)
     assert one > 0.01
 
 
-def test_memory_is_found_beside_a_loop_and_over_gaps() -> None:
+def test_autocorrelation_is_found_beside_a_loop_and_over_gaps() -> None:
     phase = np.linspace(0.0, 4 * np.pi, 3000)
     used = np.ones(phase.size, dtype=np.bool_)
     used[np.random.default_rng(1).random(phase.size) < 0.1] = False
     found = []
     for seed in range(10):
-        torque = 40 + 5 * np.sin(phase) + 2 * np.cos(3 * phase) + 0.3 * remembering(0.8, 0.6, phase.size, seed)
+        torque = 40 + 5 * np.sin(phase) + 2 * np.cos(3 * phase) + 0.3 * autocorrelated(0.8, 0.6, phase.size, seed)
         torque[~used] = 1e3
-        told = memory_of(torque, phase, used, 25.0)
-        assert told is not None
-        found.append((told.one, told.two))
+        estimate = sample_autocorrelation(torque, phase, used, 25.0)
+        assert estimate is not None
+        found.append((estimate.first, estimate.second))
     np.testing.assert_allclose(np.mean(found, axis=0), [0.48, 0.288], atol=0.02)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 4])
-def test_what_a_loop_is_is_not_taken_for_noise_that_remembers(seed: int) -> None:
+def test_a_loops_course_is_not_taken_for_autocorrelated_noise(seed: int) -> None:
     """Independent noise of 0.3 %: the loop turns sharply next to standstill, three times as far off its low harmonics."""
-    told = build_design(campaign(seed, noise=0.003)).bins_remember
-    assert told is not None
-    assert max(told) < 0.05
+    estimate = build_design(campaign(seed, noise=0.003)).bin_autocorrelation
+    assert estimate is not None
+    assert max(estimate) < 0.05
 
 
 def test_times_that_repeat_do_no_harm() -> None:
@@ -58,34 +62,34 @@ def test_times_that_repeat_do_no_harm() -> None:
     floored = [
         replace(run, record=replace(run.record, time=np.floor(10 * run.record.time) / 10)) for run in given.dynamic
     ]
-    told = build_design(replace(given, dynamic=tuple(floored))).bins_remember
-    assert told is not None
-    assert max(told) < 0.05
+    estimate = build_design(replace(given, dynamic=tuple(floored))).bin_autocorrelation
+    assert estimate is not None
+    assert max(estimate) < 0.05
 
 
 def test_loops_sampled_otherwise_do_not_mix() -> None:
-    """The same noise, remembered for 50 ms, in bins of 0.16 s sampled at 40 and at 1000 a second."""
+    """The same noise, autocorrelated over 50 ms, in bins of 0.16 s sampled at 40 and at 1000 a second."""
 
-    def sampled(rate: float) -> Memory:
-        return Memory(one=np.exp(-20 / rate), two=np.exp(-40 / rate), to_a_bin=0.16 * rate)
+    def sampled(rate: float) -> SampleAutocorrelation:
+        return SampleAutocorrelation(first=np.exp(-20 / rate), second=np.exp(-40 / rate), per_bin=0.16 * rate)
 
     alone = [sampled(rate).of_bins()[0] for rate in (40.0, 1000.0)]
-    both = bins_remember([sampled(40.0), sampled(1000.0)])
+    both = bin_autocorrelation([sampled(40.0), sampled(1000.0)])
     assert both is not None
     assert both[0] == pytest.approx(np.mean(alone))
     assert alone[0] == pytest.approx(alone[1], abs=0.05)
 
 
-def test_too_few_samples_tell_nothing() -> None:
+def test_too_few_samples_give_no_estimate() -> None:
     phase = np.linspace(0.0, 2 * np.pi, 3000)
     everything = np.ones(phase.size, dtype=np.bool_)
-    assert memory_of(np.sin(phase), phase, everything, 2.0) is None
-    assert memory_of(np.sin(phase[:100]), phase[:100], everything[:100], 25.0) is None
-    assert memory_of(np.zeros(phase.size), phase, everything, 25.0) is None
-    known = Memory(one=0.5, two=0.3, to_a_bin=10.0)
-    assert bins_remember([known, None]) is None
-    assert bins_remember([]) is None
-    assert bins_remember([known, known, None]) == pytest.approx(known.of_bins())
+    assert sample_autocorrelation(np.sin(phase), phase, everything, 2.0) is None
+    assert sample_autocorrelation(np.sin(phase[:100]), phase[:100], everything[:100], 25.0) is None
+    assert sample_autocorrelation(np.zeros(phase.size), phase, everything, 25.0) is None
+    known = SampleAutocorrelation(first=0.5, second=0.3, per_bin=10.0)
+    assert bin_autocorrelation([known, None]) is None
+    assert bin_autocorrelation([]) is None
+    assert bin_autocorrelation([known, known, None]) == pytest.approx(known.of_bins())
 
 
 @pytest.fixture(scope="module")
@@ -93,19 +97,19 @@ def design() -> Design:
     return build_design(campaign(1))
 
 
-def swells(design: Design, memory: float, told: tuple[float, float] | None) -> list[float]:
-    """Of noise of the bins that remembers from bin to bin, in ten draws."""
-    given, found = replace(design, bins_remember=told, repeats=()), []
+def inflations(design: Design, memory: float, from_samples: tuple[float, float] | None) -> list[float]:
+    """Variance inflation of noise that is autocorrelated from bin to bin, in ten draws."""
+    given, found = replace(design, bin_autocorrelation=from_samples, period_differences=()), []
     for seed in range(10):
-        noise = remembering(1.0, memory, design.torque.size, seed)
+        noise = autocorrelated(1.0, memory, design.torque.size, seed)
         residual = 0.01 * design.torque * noise / np.sqrt(design.samples)
         loops = estimate_noise(given, residual, design.torque, first_noise(design))[0].loops
-        found.append(1 + 2 * loops.share * loops.step / (1 - loops.step))
+        found.append(1 + 2 * loops.share * loops.decay / (1 - loops.decay))
     return found
 
 
-def test_what_samples_tell_is_believed_unless_bins_contradict(design: Design) -> None:
-    assert design.bins_remember is not None  # the fixture's loops have samples enough
-    assert max(swells(design, 0.0, (0.0, 0.0))) < 1.3
-    assert max(swells(design, 0.0, None)) > max(swells(design, 0.0, (0.0, 0.0)))
-    assert min(swells(design, 0.6, (0.0, 0.0))) > 2.5  # truly 4: something slow that samples do not show
+def test_what_samples_show_is_used_unless_bins_contradict(design: Design) -> None:
+    assert design.bin_autocorrelation is not None  # the fixture's loops have samples enough
+    assert max(inflations(design, 0.0, (0.0, 0.0))) < 1.3
+    assert max(inflations(design, 0.0, None)) > max(inflations(design, 0.0, (0.0, 0.0)))
+    assert min(inflations(design, 0.6, (0.0, 0.0))) > 2.5  # truly 4: something slow that samples do not show

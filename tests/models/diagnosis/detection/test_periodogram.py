@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from models.arrays import FloatArray
+from models.diagnosis.design import axes
 from models.diagnosis.design.autocorrelation import Correlation
 from models.diagnosis.design.design import Design, build_design
 from models.diagnosis.detection import contrasts
@@ -123,6 +124,6 @@ def test_a_sensor_that_is_wavy_over_its_range_is_structure_on_its_reading(monkey
     for most in (20, 4):
         monkeypatch.setattr(contrasts, "TORQUE_WAVES", most)
         view = view_of(given.design, known.noise, known.priors, known.fit, [])
-        found[most] = max((each.strength for each in axes_of(view, {}) if each.axis == contrasts.TORQUE), default=0.0)
+        found[most] = max((each.strength for each in axes_of(view, {}) if each.axis == axes.TORQUE), default=0.0)
     assert found[20] > 20.0
     assert found[4] < 0.2 * found[20], found  # the control: few waves hardly show it

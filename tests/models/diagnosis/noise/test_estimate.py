@@ -1,4 +1,4 @@
-"""Noise from within the data: right where it is white or remembers, and blind to what is smooth."""
+"""Noise from within the data: right where it is white or autocorrelated, and blind to what is smooth."""
 
 from dataclasses import replace
 
@@ -28,36 +28,36 @@ def design() -> Design:
 def test_noise_is_found_beside_something_smooth(design: Design, memory: float) -> None:
     rng = np.random.default_rng(SEED)
     white = rng.standard_normal(design.torque.size)
-    remembered = lfilter([np.sqrt(1 - memory**2)], [1.0, -memory], white)
+    autocorrelated = lfilter([np.sqrt(1 - memory**2)], [1.0, -memory], white)
     smooth = 0.03 * design.torque * np.sin(design.rows.velocity / 3)
-    residual = smooth + 0.01 * design.torque * remembered / np.sqrt(design.samples)
+    residual = smooth + 0.01 * design.torque * autocorrelated / np.sqrt(design.samples)
     noise, assumed = estimate_noise(design, residual, design.torque, first_noise(design))
     steady = slice(0, design.plateaus)
     share = np.median(noise.deviation[steady] / design.torque[steady])
     assert not assumed
-    assert abs(share - 0.01) < 0.0012  # some 600 rows, and the memory's part is told from few
-    next_row = noise.plateaus.share * noise.plateaus.step
+    assert abs(share - 0.01) < 0.0012  # some 600 rows, and the correlation is estimated from few
+    next_row = noise.plateaus.share * noise.plateaus.decay
     assert abs(next_row - memory) < 0.15
 
 
 def test_a_flat_likelihood_does_not_choose_persistent_noise(design: Design) -> None:
-    """Neighbours that remember by 0.3 in 20 draws: slow noise, of which curves freed of all that is smooth say little, must
+    """Neighbours correlated by 0.3 in 20 draws: slow noise, of which curves freed of all that is smooth show little, must
     not be taken for much stronger than it is (1.86 times that of independent neighbours) in any of them."""
-    swells = []
+    inflations = []
     for seed in range(20):
         white = np.random.default_rng([SEED, seed]).standard_normal(design.torque.size)
-        remembered = lfilter([np.sqrt(1 - 0.3**2)], [1, -0.3], white)
-        residual = 0.01 * design.torque * remembered / np.sqrt(design.samples)
+        autocorrelated = lfilter([np.sqrt(1 - 0.3**2)], [1, -0.3], white)
+        residual = 0.01 * design.torque * autocorrelated / np.sqrt(design.samples)
         found = estimate_noise(design, residual, design.torque, first_noise(design))[0].plateaus
-        swells.append(1 + 2 * found.share * found.step / (1 - found.step))
-    assert 1.4 < np.median(swells) < 2.4
-    assert max(swells) < 4.0
+        inflations.append(1 + 2 * found.share * found.decay / (1 - found.decay))
+    assert 1.4 < np.median(inflations) < 2.4
+    assert max(inflations) < 4.0
 
 
 @pytest.mark.parametrize("share", [1.0, 1.0 - 1e-12, 1.0 - 1e-9, 1.0 - 1e-6, 0.998, 0.5, 1e-6])
 @pytest.mark.parametrize("step", [0.2, 0.9, 0.95])
 def test_an_arma_process_has_the_correlations_that_it_was_made_for(share: float, step: float) -> None:
-    theta, scale = arma(Correlation(share=share, step=step))
+    theta, scale = arma(Correlation(share=share, decay=step))
     assert abs(theta) < 1
     # x_i = ρ x_{i-1} + s (e_i + θ e_{i-1}): its variance, and its covariance with the neighbour
     variance = scale**2 * (1 + theta**2 + 2 * step * theta) / (1 - step**2)
@@ -66,7 +66,7 @@ def test_an_arma_process_has_the_correlations_that_it_was_made_for(share: float,
 
 
 def test_whitening_is_the_inverse_root_of_the_covariance(design: Design) -> None:
-    correlation = Correlation(share=0.7, step=0.6)
+    correlation = Correlation(share=0.7, decay=0.6)
     noise = Noise(
         deviation=np.full(design.torque.size, 2.0),
         plateaus=correlation,
@@ -120,7 +120,7 @@ def test_gains_that_scatter_from_pressure_to_pressure_are_no_structure(
 @pytest.mark.parametrize("order", ["rising speed", "random"])
 @pytest.mark.parametrize("place", ["first", "middle", "last"])
 def test_a_spike_weighs_nothing_wherever_it_stands_on_its_curve(order: str, place: str) -> None:
-    """It is 40 deviations; everything around it is off by a fifth of a spike, as where it has bent the fit."""
+    """It is 40 deviations; everything around it is off by a fifth of a spike, as where it has distorted the fit."""
     given = campaign(1, loops=False)
     if order == "random":
         shuffle = np.random.default_rng(SEED).permutation(given.stationary[0].plateaus.torque.size)

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
-from models.diagnosis.report.report import Advice, Candidate, Estimate, Gain, Misfit, Verdict, Visible, Where
+from models.diagnosis.effects.estimate import Estimate
+from models.diagnosis.report.report import Advice, Candidate, Gain, Misfit, Verdict, Visible, Where
 from models.diagnosis.report.summary import Findings, summarise
 
 MISFIT = Misfit(

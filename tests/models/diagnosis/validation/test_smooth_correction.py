@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.diagnosis.detection.contrasts import CYCLES, PHASE, PRESSURE, SPEED
+from models.diagnosis.design.axes import CYCLES, PHASE, PRESSURE, SPEED
 from models.diagnosis.validation.held_out import measure_gain
 from models.diagnosis.validation.smooth_correction import SLUG, smooth_fit
 from tests.models.diagnosis.campaigns import campaign

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.diagnosis.campaign import Campaign
-from models.diagnosis.detection.raw_records import whitened_torque
+from models.diagnosis.detection.raw_records import pieces
 from models.diagnosis.detection.raw_records.evidence import raw_evidence
 from models.records.runs import Record
 from tests.models.diagnosis.raw_campaigns import (
@@ -29,7 +29,7 @@ def found(of: Campaign) -> dict[str, tuple[float, float]]:
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.8, 0.95])
-def test_noise_that_remembers_is_no_evidence(memory: float) -> None:
+def test_autocorrelated_noise_is_no_evidence(memory: float) -> None:
     print("seeds 0 to 3")
     rngs = [np.random.default_rng(seed) for seed in range(4)]
     assert [found(campaign([stepped(rng, memory=memory)], [swinging(rng, memory)])) for rng in rngs] == [{}] * 4
@@ -62,7 +62,7 @@ def test_a_line_at_every_speed_is_neither() -> None:
     assert found(campaign([with_line(stepped(rng), 0.05, 30.0) for _ in range(2)], [])).keys() == {"fixed_line"}
 
 
-def test_both_at_once_are_told_apart() -> None:
+def test_both_at_once_are_distinguished() -> None:
     rng = np.random.default_rng(5)
     records = [with_line(with_ripple(stepped(rng), 0.05, 2.0), 0.2, 17.0, below=2.0) for _ in range(2)]
     assert found(campaign(records, [])).keys() == {"shaft_ripple", "stick_slip"}
@@ -116,7 +116,7 @@ def test_torque_that_turns_with_the_clutch_is_no_ripple(
     rng = np.random.default_rng(1)
     given = campaign([], [reversing(rng, frequency=frequency, rate=rate) for _ in range(4)])
     assert found(given) == {}
-    monkeypatch.setattr(whitened_torque, "REVERSES", 2.0)
+    monkeypatch.setattr(pieces, "REVERSES", 2.0)
     assert "shaft_ripple" in found(given)
 
 

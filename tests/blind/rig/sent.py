@@ -1,4 +1,4 @@
-"""What the rig tells of a hidden campaign: the contract's runs as JSON, and the same as the diagnosis takes it."""
+"""What the rig sends of a hidden campaign: the contract's runs as JSON, and the same as the diagnosis takes it."""
 
 from datetime import UTC, datetime
 from typing import Any
@@ -18,14 +18,14 @@ KELVIN = 273.15
 
 def runs(hidden: Hidden) -> list[dict[str, Any]]:
     """The runs as they would be posted, ordered by cycles."""
-    told = [*_duty(hidden), *_events(hidden)]
+    sent = [*_duty(hidden), *_events(hidden)]
     dice = np.random.default_rng([*hidden.seed, 77])
     for number, (site, torque) in enumerate(zip(hidden.plan.sites, hidden.measured, strict=True)):
         for k in range(hidden.plan.life.cycles.size):
             rows = np.flatnonzero(site.state == k)
             if rows.size:
-                told.append(_test(hidden, site, torque, rows, k, number, dice))
-    return sorted(told, key=lambda run: (run["cycles"], run["kind"] != "duty_cycles", run["kind"] != "maintenance"))
+                sent.append(_test(hidden, site, torque, rows, k, number, dice))
+    return sorted(sent, key=lambda run: (run["cycles"], run["kind"] != "duty_cycles", run["kind"] != "maintenance"))
 
 
 def _test(
@@ -69,16 +69,16 @@ def _duty(hidden: Hidden) -> list[dict[str, Any]]:
 
 def _events(hidden: Hidden) -> list[dict[str, Any]]:
     life = hidden.plan.life
-    told: list[dict[str, Any]] = []
+    sent: list[dict[str, Any]] = []
     for i, (kind, at) in enumerate(life.events):
         k = int(np.searchsorted(life.cycles, at))
         moment = _started(hidden, float(life.moment[k] - life.pause[k]))
-        told.append({"run_id": f"event-{i}", "kind": "maintenance", "cycles": at, "event": kind, "note": ""} | moment)
+        sent.append({"run_id": f"event-{i}", "kind": "maintenance", "cycles": at, "event": kind, "note": ""} | moment)
     for k in np.flatnonzero(life.pause > LONG_PAUSE):
         moment = _started(hidden, float(life.moment[k] - life.pause[k]))
         rest = {"run_id": f"rest-{k}", "kind": "maintenance", "cycles": float(life.cycles[k]), "event": "rest"}
-        told.append(rest | {"note": f"{life.pause[k] / 3600:.0f} h"} | moment)
-    return told
+        sent.append(rest | {"note": f"{life.pause[k] / 3600:.0f} h"} | moment)
+    return sent
 
 
 def _started(hidden: Hidden, moment: float) -> dict[str, str]:
@@ -91,11 +91,11 @@ def _listed(values: FloatArray, digits: int) -> list[float]:
 
 def campaign(hidden: Hidden) -> Campaign:
     """The same runs in SI units, raw stationary records cut into plateaus as the service cuts them."""
-    told = runs(hidden)
-    stationary = [_stationary(run) for run in told if run["kind"] == "stationary_stribeck"]
+    sent = runs(hidden)
+    stationary = [_stationary(run) for run in sent if run["kind"] == "stationary_stribeck"]
     dynamic = [
         DynamicRun(run_id=run["run_id"], cycles=run["cycles"], record=_record(run), moment=_moment(run))
-        for run in told
+        for run in sent
         if run["kind"] == "dynamic_stribeck"
     ]
     duty = [
@@ -108,12 +108,12 @@ def campaign(hidden: Hidden) -> Campaign:
             maximum_pressure=run["duty"]["maximum_pressure_bar"] * 1e5,
             moment=_moment(run),
         )
-        for run in told
+        for run in sent
         if run["kind"] == "duty_cycles"
     ]
     maintenance = [
         MaintenanceEvent(run_id=run["run_id"], cycles=run["cycles"], event=EventKind(run["event"]), moment=_moment(run))
-        for run in told
+        for run in sent
         if run["kind"] == "maintenance"
     ]
     return Campaign(
@@ -127,16 +127,16 @@ def _moment(run: dict[str, Any]) -> float | None:
 
 def _columns(run: dict[str, Any]) -> dict[str, FloatArray]:
     channels = {name: np.array(values) for name, values in run["channels"].items()}
-    found = {
+    columns = {
         "pressure": channels["pressure_bar"] * 1e5,
         "speed": channels["speed_rpm"] * RPM,
         "torque": channels["torque_nm"],
     }
     if "oil_temperature_c" in channels:
-        found["oil_temperature"] = channels["oil_temperature_c"] + KELVIN
+        columns["oil_temperature"] = channels["oil_temperature_c"] + KELVIN
     if "torque_sd_nm" in channels:
-        found["torque_sd"] = channels["torque_sd_nm"]
-    return found
+        columns["torque_sd"] = channels["torque_sd_nm"]
+    return columns
 
 
 def _record(run: dict[str, Any]) -> Record:

@@ -11,7 +11,8 @@ from models.diagnosis.campaign import Campaign
 from models.diagnosis.design.design import build_design
 from models.diagnosis.diagnose import diagnose
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.uncatalogued import STRANGE, STRANGERS, way
+from models.diagnosis.effects.uncatalogued.catalogue import UNCATALOGUED, UNCATALOGUED_BY_SLUG
+from models.diagnosis.effects.uncatalogued.fault import UncataloguedFault
 from models.diagnosis.pooled_fit.starts import starting_laws
 from models.diagnosis.report.report import Verdict
 from models.friction.stribeck import torque
@@ -37,13 +38,13 @@ def other_encoder(at: Where) -> np.ndarray:
         (other_encoder, "speed_scale_step"),
     ],
 )
-def test_what_no_catalogue_holds_is_unexplained_and_told_by_its_looks(planted: Planted, slug: str) -> None:
+def test_what_no_catalogue_holds_is_unexplained_and_described_in_the_summary(planted: Planted, slug: str) -> None:
     report = diagnose(campaign(3, planted, noise=0.004, gain=0.001), rng=np.random.default_rng(1))
     assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
     assert report.baseline is not None
-    assert report.baseline.where[0].axis == STRANGE[slug].axis
-    assert STRANGE[slug].looks in report.summary
-    assert not {each.effect for each in report.candidates} & STRANGE.keys()
+    assert report.baseline.where[0].axis == UNCATALOGUED_BY_SLUG[slug].axis
+    assert UNCATALOGUED_BY_SLUG[slug].description in report.summary
+    assert not {each.effect for each in report.candidates} & UNCATALOGUED_BY_SLUG.keys()
 
 
 def test_a_zero_that_settles_is_still_a_zero() -> None:
@@ -52,22 +53,22 @@ def test_a_zero_that_settles_is_still_a_zero() -> None:
 
     report = diagnose(campaign(3, settling_zero, noise=0.004, gain=0.001), rng=np.random.default_rng(1))
     assert (report.verdict, report.causes) == (Verdict.CAUSE_NAMED, ("torque_zero_shift",))
-    assert not [each.looks for each in STRANGERS if each.looks in report.summary]
+    assert not [each.description for each in UNCATALOGUED if each.description in report.summary]
 
 
-def test_strangers_have_names_of_their_own() -> None:
-    assert len(STRANGE) == len(STRANGERS)
-    assert not STRANGE.keys() & BY_SLUG.keys()
+def test_faults_have_slugs_of_their_own() -> None:
+    assert len(UNCATALOGUED_BY_SLUG) == len(UNCATALOGUED)
+    assert not UNCATALOGUED_BY_SLUG.keys() & BY_SLUG.keys()
 
 
-def bent_pressure(at: Where) -> np.ndarray:
+def curved_pressure(at: Where) -> np.ndarray:
     """M_s is no straight line in pressure."""
     x = (at.pressure - 4e5) / 3e5
     return np.asarray(-0.24 * x * (x - 1) * torque(at.velocity, at.parameters), dtype=np.float64)
 
 
-def test_no_hysteresis_is_told_of_where_nothing_was_ever_lowered() -> None:
-    report = diagnose(campaign(3, bent_pressure, noise=0.004, gain=0.001, loops=False), rng=np.random.default_rng(1))
+def test_no_hysteresis_is_reported_where_nothing_was_ever_lowered() -> None:
+    report = diagnose(campaign(3, curved_pressure, noise=0.004, gain=0.001, loops=False), rng=np.random.default_rng(1))
     assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
     assert report.baseline is not None
     assert report.baseline.where[0].axis == "pressure_bar"
@@ -83,7 +84,7 @@ def shuffled(given: Campaign) -> Campaign:
     return replace(given, stationary=tuple(runs))
 
 
-def test_a_gauges_hysteresis_is_told_of_where_pressure_goes_both_ways() -> None:
+def test_a_gauges_hysteresis_is_reported_where_pressure_goes_both_ways() -> None:
     """Every test in random order; the gauge is 1.5 % behind."""
     given = shuffled(campaign(3, noise=0.004, gain=0.001, loops=False))
     runs = []
@@ -93,7 +94,7 @@ def test_a_gauges_hysteresis_is_told_of_where_pressure_goes_both_ways() -> None:
         runs.append(replace(run, plateaus=replace(run.plateaus, torque=run.plateaus.torque * behind)))
     report = diagnose(replace(given, stationary=tuple(runs)), rng=np.random.default_rng(1))
     assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
-    assert STRANGE["gauge_hysteresis"].looks in report.summary
+    assert UNCATALOGUED_BY_SLUG["gauge_hysteresis"].description in report.summary
 
 
 @pytest.fixture(scope="module")
@@ -102,27 +103,12 @@ def scene() -> Scene:
     return predict(design, starting_laws(design, frame_of(design))).scene
 
 
-@pytest.mark.parametrize("stranger", STRANGERS, ids=[each.effect.slug for each in STRANGERS])
-def test_every_change_is_proportional_to_its_size(stranger, scene: Scene) -> None:
-    tried = stranger.effect.grid(scene.facts)
+@pytest.mark.parametrize("fault", UNCATALOGUED, ids=[each.effect.slug for each in UNCATALOGUED])
+def test_every_change_is_proportional_to_its_size(fault: UncataloguedFault, scene: Scene) -> None:
+    tried = fault.effect.grid(scene.facts)
     assert tried
     for each in tried:
-        one, three = (stranger.effect.change(scene, size, each.shape) for size in (0.01, 0.03))
+        one, three = (fault.effect.change(scene, size, each.shape) for size in (0.01, 0.03))
         np.testing.assert_allclose(three, 3 * one)
         assert np.isfinite(one).all()
-    assert any(np.abs(stranger.effect.change(scene, 0.01, each.shape)).max() > 0 for each in tried)
-
-
-@pytest.mark.parametrize(
-    ("values", "breaks", "told"),
-    [
-        ([1.0, 1.0, 2.0, 2.0, 2.001, 1.0, 1.0], [0], [0, 0, 1, 1, 1, -1, -1]),
-        ([1.0, 2.0, 1.0, 1.0, 2.0], [0, 2], [0, 1, 0, 0, 1]),
-        ([3.0], [0], [0]),
-    ],
-)
-def test_the_way_is_that_of_the_last_change(values: list[float], breaks: list[int], told: list[int]) -> None:
-    """A run begins at each of the breaks."""
-    previous = np.arange(-1, len(values) - 1)
-    previous[breaks] = -1
-    assert way(np.array(values), previous).tolist() == told
+    assert any(np.abs(fault.effect.change(scene, 0.01, each.shape)).max() > 0 for each in tried)

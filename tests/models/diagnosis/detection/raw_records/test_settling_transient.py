@@ -1,10 +1,10 @@
-"""Dwells that still approach their level are told from friction's own lag, from drift and from noise that remembers."""
+"""Dwells that still settle are distinguished from friction's own lag, from drift and from autocorrelated noise."""
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from models.diagnosis.detection.raw_records.settling_transient import approach
+from models.diagnosis.detection.raw_records.settling_transient import settling_evidence
 from models.records.plateaus import cut_plateaus
 from models.records.runs import Record
 
@@ -29,21 +29,21 @@ def record(*, share: float = 0.0, late: float = 2.0, lag: float = 0.15, drift: f
     return Record(time=time, pressure=np.full(speed.size, 5e5), speed=speed, torque=torque + 0.1 * noise)
 
 
-def told(**wanted: float) -> tuple[float, float]:
+def evidence_of(**wanted: float) -> tuple[float, float]:
     made = record(**wanted)
-    return approach([(made, cut_plateaus(made))])
+    return settling_evidence([(made, cut_plateaus(made))])
 
 
-def test_an_approach_is_seen_and_its_time_is_found() -> None:
-    evidence, time = told(share=0.3)
+def test_a_transient_is_seen_and_its_time_is_estimated() -> None:
+    evidence, time = evidence_of(share=0.3)
     assert evidence > 15.0
     assert 1.0 < time < 4.0
 
 
 @pytest.mark.parametrize("wanted", [{}, {"lag": 0.08}, {"lag": 0.3}, {"drift": 0.02}], ids=str)
-def test_lag_drift_and_noise_are_no_approach(wanted: dict[str, float]) -> None:
-    assert max(told(**wanted, seed=seed)[0] for seed in range(4)) < 3.0
+def test_lag_drift_and_noise_are_no_transient(wanted: dict[str, float]) -> None:
+    assert max(evidence_of(**wanted, seed=seed)[0] for seed in range(4)) < 3.0
 
 
 def test_one_dwell_says_nothing() -> None:
-    assert approach([])[0] == pytest.approx(0.0, abs=1e-9)
+    assert settling_evidence([])[0] == pytest.approx(0.0, abs=1e-9)

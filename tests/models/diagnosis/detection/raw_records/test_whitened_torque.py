@@ -8,12 +8,12 @@ import pytest
 from scipy.special import i0e
 
 from models.diagnosis.detection.raw_records.incoherent import amplitude, rice
-from models.diagnosis.detection.raw_records.whitened_torque import Swings, swings
+from models.diagnosis.detection.raw_records.whitened_torque import WhitenedRecord, whitened_record
 from models.records.runs import Record
 from tests.models.diagnosis.raw_campaigns import loops, reversing, stepped, with_ripple
 
 
-def demodulated(of: Swings, hertz: float) -> tuple[np.ndarray, np.ndarray]:
+def demodulated(of: WhitenedRecord, hertz: float) -> tuple[np.ndarray, np.ndarray]:
     """u and N of a line in windows of two seconds, by plain sums."""
     power, weight = [], []
     for first in range(0, of.time.size - 200, 200):
@@ -28,7 +28,7 @@ def test_power_of_noise_is_exponential_of_mean_one(memory: float) -> None:
     rng = np.random.default_rng(11)
     power = []
     for _ in range(6):
-        record = swings(loops(rng, memory=memory))
+        record = whitened_record(loops(rng, memory=memory))
         assert record is not None
         power += [demodulated(record, hertz)[0] for hertz in (8.0, 17.0, 31.0)]
     u = np.concatenate(power)
@@ -45,7 +45,7 @@ def test_a_line_comes_out_with_its_amplitude() -> None:
         speed=record.speed,
         torque=record.torque + 0.1 * np.sin(2 * np.pi * 17.0 * record.time),
     )
-    here = swings(loud)
+    here = whitened_record(loud)
     assert here is not None
     assert amplitude(*demodulated(here, 17.0)) == pytest.approx(0.1, rel=0.1)
     assert amplitude(*demodulated(here, 31.0)) < 0.03
@@ -63,15 +63,15 @@ def test_records_that_are_too_slow_or_still_have_none() -> None:
         time=record.time[::20], pressure=record.pressure[::20], speed=record.speed[::20], torque=record.torque[::20]
     )
     still = Record(time=record.time, pressure=record.pressure, speed=record.speed, torque=0 * record.torque)
-    assert swings(slow) is None
-    assert swings(still) is None
-    assert swings(with_ripple(record, 0.1, 1.0)) is not None
+    assert whitened_record(slow) is None
+    assert whitened_record(still) is None
+    assert whitened_record(with_ripple(record, 0.1, 1.0)) is not None
 
 
 def test_what_reverses_is_cut_where_it_does_and_settles_before_it_counts() -> None:
     """Three pressures of two swings of 20 s: four ways of 10 s each, all but the first without their first second
     at least."""
-    found = swings(reversing(np.random.default_rng(14), frequency=0.05))
+    found = whitened_record(reversing(np.random.default_rng(14), frequency=0.05))
     assert found is not None
     pieces = [slice(*ends) for ends in itertools.pairwise(found.starts)]
     assert len(pieces) == 3 * 4
@@ -92,6 +92,6 @@ def test_an_encoders_noise_is_no_swing_of_the_speed(encoder: float) -> None:
         torque=record.torque + 0.1 * np.sin(2 * np.pi * 9.0 * record.time),
     )
     spans = np.stack([np.arange(0.0, 200.0, 5.0) + 1.0, np.arange(5.0, 205.0, 5.0)], axis=1)
-    here = swings(record, spans)
+    here = whitened_record(record, spans)
     assert here is not None
     assert amplitude(*demodulated(here, 9.0)) == pytest.approx(0.1, rel=0.15)

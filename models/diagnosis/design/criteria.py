@@ -1,0 +1,69 @@
+"""Numbers that decide what becomes a row, what counts as a rest and what is taken for noise of samples.
+
+Each has its meaning, its unit and its origin; "chosen; no table" means that no command prints the alternatives.
+"""
+
+# ---- physical defaults, where a campaign does not say
+
+#: Oil temperature [K] to which everything refers where none was measured.
+#: Derived: the middle of the 80 to 90 °C of Ompusunggu et al. 2013, section 2.3.
+REFERENCE_TEMPERATURE = 273.15 + 85.0
+#: Torque [Nm] and pressure [Pa] of the clutch in whose size the effects' priors are given.
+#: Derived: the clutch of Ompusunggu et al. 2013.
+USUAL_TORQUE = 25.0
+USUAL_PRESSURE = 5e5
+#: Time on one plateau [s] where none was sent. Derived: Ompusunggu et al. 2013, section 2.3.3.
+PLATEAU_DURATION = 5.0
+
+# ---- rests, read off the times of the runs
+
+#: A gap between runs is a rest where it is longer than this [s] ... Chosen; no table.
+LEAST_PAUSE = 8 * 3600.0
+#: ... and than this many median gaps [-]. Chosen; no table.
+PAUSE_RATIO = 4.0
+#: Timed runs needed before rests are looked for. Chosen; no table.
+FEWEST_TIMED = 4
+#: An engagement's duration is this quantile [-] of the blocks' gap per engagement: in slower blocks the rig rested as well.
+#: Chosen; no table.
+PACE_QUANTILE = 0.2
+#: Blocks needed to estimate that duration. Chosen; no table.
+FEWEST_BLOCKS = 3
+#: An engagement takes at most this long [s]. Chosen; no table.
+LONGEST_ENGAGEMENT = 120.0
+
+# ---- loops in phase bins
+
+#: Rows slower than this share [-] of the loop's highest speed are left out: there the clutch sticks, or is next to it.
+#: Chosen; no table.
+LEAST_SPEED = 0.004
+#: The same where the speed has corners: bins cannot resolve how fast the cusp of S at rest is passed there.
+#: Chosen; no table.
+LEAST_SPEED_WITH_CORNERS = 0.012
+#: A speed that falls below minus this share [-] of its highest reverses. Chosen; no table.
+REVERSES = 0.03
+#: A loop is in its periodic state after this share of a period [-] and at least this time [s], less where no whole period
+#: would follow. Derived: friction lags by S/C, about 0.1 s, of which nothing is left after 1 s. The share: chosen; no table.
+SETTLING_SHARE = 0.06
+SETTLING_TIME = 1.0
+#: Filled bins that a loop must have. Chosen; no table.
+FEWEST_BINS = 24
+#: The speed cycle of one pressure is used for the next one too where its residual there is no more than this many times
+#: larger [-]. Chosen; no table.
+SAME_CYCLE_RESIDUAL = 1.3
+#: A bin counts in a period where it holds at least this share [-] of the samples of its fullest period: where the record
+#: begins or ends, samples lie elsewhere in the bin. Chosen; no table.
+FULL_BIN = 2 / 3
+
+# ---- autocorrelation of a loop's samples
+
+#: Harmonics of a loop that are taken for signal, the rest for noise. Chosen; no table.
+SIGNAL_HARMONICS = 8
+#: Samples slower than this share [-] of the loop's highest speed are left out: a loop turns sharply there, which is not
+#: noise. #: Chosen; no table.
+LEAST_NOISE_SPEED = 0.08
+#: Samples per bin needed; with fewer the bins themselves say as much. Chosen; no table.
+FEWEST_PER_BIN = 4.0
+#: Loops whose samples per bin differ by less than about this factor [-] are averaged together. Chosen; no table.
+ALIKE_SAMPLING = 1.2
+#: A correlation of neighbours below this [-] is taken for none. Chosen; no table.
+LEAST_CORRELATION = 0.02
