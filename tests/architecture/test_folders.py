@@ -13,10 +13,15 @@ MOST_LINES = 300
 #: One file an effect: these two grow with what is known of clutches.
 CATALOGUES = ("models/diagnosis/effects/catalogued", "models/diagnosis/effects/uncatalogued")
 
-#: An introduction says what goes in, what comes out, and which file of the folder to open first.
-GOES_IN = re.compile(r"\bIn:|\bgo(?:es)? in\b", flags=re.IGNORECASE)
-COMES_OUT = re.compile(r"\bOut:|\bcomes? out\b", flags=re.IGNORECASE)
-OPEN_FIRST = re.compile(r"\bOpen\s+`?([\w./]+?)(?:\.py)?`?[\s,].*?\bfirst\b", flags=re.DOTALL)
+#: An introduction says what goes in, what comes out, and which file of the folder to open first, as in "In: arrays. Out:
+#: bytes. Open `codec.py` first." or "Arrays go in, bytes come out: `codec` first, then the others."
+GOES_IN = re.compile(r"\bin:|\bgo(?:es)?\s+in\b|\bin\s+go(?:es)?\b|\bin,.*\bout\b", flags=re.IGNORECASE | re.DOTALL)
+COMES_OUT = re.compile(r"\bout:|\bcomes?\s+out\b|\bout\s+comes?\b|\bin,.*\bout\b", flags=re.IGNORECASE | re.DOTALL)
+OPEN_FIRST = re.compile(
+    r"\bOpen\s+`?([\w/]+)"
+    r"|`([\w/]+)(?:\.py)?`(?:\s+\([^)]*\))?\s+first\b"
+    r"|\breading order:\s+`([\w/]+)",
+)
 SENTENCE = re.compile(r"[.!?](?:\s|$)")
 
 
@@ -39,7 +44,7 @@ def test_a_folder_holds_few_modules() -> None:
 def lacks(introduction: str, files: set[str]) -> list[str]:
     """What the docstring of a folder with those files lacks, in words; empty where it lacks nothing."""
     opened = OPEN_FIRST.search(introduction)
-    first = "" if opened is None else opened[1].strip("/").split("/")[0]
+    first = "" if opened is None else next(filter(None, opened.groups())).split("/")[0]
     lacking = [
         (len(SENTENCE.findall(introduction)) >= 2, "two sentences"),
         (GOES_IN.search(introduction) is not None, '"In: ..."'),
@@ -72,6 +77,8 @@ def test_what_an_introduction_lacks_is_noticed() -> None:
     whole = "Bytes and arrays.\n\nIn: arrays. Out: bytes. Open `codec.py` first, then the others."
     assert lacks(whole, files) == []
     assert lacks("Arrays go in; bytes come out. Open codec.py first: it is short.", files) == []
+    assert lacks("Bytes: `codec` first.\n\nIn go arrays (any); out come bytes.", files) == []
+    assert lacks("Arrays in, bytes out. In reading order: `codec` (bytes), `engine`.", files) == []
     assert lacks("Bytes and arrays.\n\nIn: arrays. Out: bytes. Open `other.py` first.", files) == [
         "the file 'other' that it names"
     ]
