@@ -140,9 +140,8 @@ def test_a_legend_fits_beside_itself_or_breaks_into_rows(frame: Module) -> None:
 
 
 def test_a_legend_of_columns_keeps_them_aligned(frame: Module) -> None:
-    entries = settled(frame, *(trace([0, 1], [0, 1], name="n" * size) for size in (20, 3, 20, 3, 20, 3)))["legend"][
-        "entries"
-    ]
+    data = [trace([0, 1], [0, 1], name="n" * size) for size in (20, 3, 3, 20, 20, 3)]
+    entries = settled(frame, *data)["legend"]["entries"]
     columns = {entry["x"] for entry in entries}
     assert 1 < len(columns) < len(entries)
     assert len({entry["y"] for entry in entries}) == -(-len(entries) // len(columns))
