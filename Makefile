@@ -1,6 +1,6 @@
 # make demo    a simulated clutch's life, posted run by run, with its prognosis      (ARGS=--exit to end by itself)
 # make test    all tests
-# make check   formatting, lint, types, layers
+# make check   formatting, lint, types, layers; of the dashboard's JavaScript and styles too, for which it needs npm
 # make lowest  tests that meet every dependency, on the oldest releases that pyproject.toml allows
 # make score   how good the prognosis is, on simulated lives: the tables of docs/prognosis.md  (SEED= SIZE= PARTS= ARGS=--write)
 # make rivals  the same beside other packages, in an environment of their own                (SEED= SIZE=)
@@ -12,6 +12,8 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 ARGS ?=
+# what checks JavaScript: of `make check` alone, everything else needs Python only
+JAVASCRIPT := tests/javascript/node_modules
 
 # versions age a week before they are locked; no index is named
 LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --exclude-newer "7 days" \
@@ -27,11 +29,13 @@ test: $(VENV)/.tests
 	$(BIN)/python -m tests.browser
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal $(ARGS)
 
-check: $(VENV)/.tests
+check: $(VENV)/.tests $(JAVASCRIPT)/.package-lock.json
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(JAVASCRIPT)/.bin/prettier --config tests/javascript/prettier.json --check "service/dashboard/static/**/*.{js,css,ts}" tests/javascript
+	$(JAVASCRIPT)/.bin/tsc --project tests/javascript
 
 # what the oldest releases deprecate among themselves is theirs; our own tests stay strict in `test`. Every dependency is met:
 # storage, files, numerics, the service over a socket.
@@ -93,10 +97,15 @@ $(VENV)/.tests: $(VENV)/.runs tests/requirements.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r tests/requirements.txt
 	@touch $@
 
+$(JAVASCRIPT)/.package-lock.json: tests/javascript/package.json tests/javascript/package-lock.json
+	@command -v npm >/dev/null || { echo "make check needs npm (with Node.js 20 or later) for the dashboard's JavaScript; 'npm' is not there. make test and make demo do without it." >&2; exit 1; }
+	cd tests/javascript && npm ci --ignore-scripts --loglevel=error
+	@touch $@
+
 lock:
 	uv pip compile $(LOCK) pyproject.toml -o docker/requirements.txt
 	uv pip compile $(LOCK) pyproject.toml --group test -o tests/requirements.txt
 	uv pip compile $(LOCK) --resolution lowest-direct pyproject.toml --group test -o tests/requirements-lowest.txt
 
 clean:
-	rm -rf $(VENV) $(VENV)-lowest $(VENV)-rivals .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(JAVASCRIPT) $(VENV) $(VENV)-lowest $(VENV)-rivals .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

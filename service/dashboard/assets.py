@@ -1,8 +1,9 @@
 """What the pages load: read once, named by the hash of its content, compressed, kept by the browser for good.
 
-No build step: the files are served as they stand in `static/`, all under one folder that is named by the hash of all of
-them, so that modules find each other by relative imports and a new version is a new address. The plotting library's
-JavaScript is the one in the installed wheel of plotly, which is found and never imported.
+No build step: the tree `static/` is served as it stands, below one folder that is named by the hash of all its files, so
+that modules find each other by relative imports and a new version is a new address. A file's name is its path in the tree,
+as `shared/api.js`. What is not read here at start-up has no name: a request looks names up in a dictionary and never touches
+the disk. The plotting library's JavaScript is the one in the installed wheel of plotly, which is located and never imported.
 """
 
 import gzip
@@ -24,7 +25,7 @@ _TYPES = {
 
 @dataclass(frozen=True, kw_only=True)
 class Asset:
-    """A file and how it goes out."""
+    """A file and how it goes out; `name` is its path in the tree, with slashes."""
 
     name: str
     media_type: str
@@ -37,19 +38,19 @@ class Asset:
 
     @cached_property
     def compressed(self) -> bytes:
-        """Gzipped, worked out when it is first asked for."""
+        """Gzipped, computed when it is first requested."""
         return gzip.compress(self.body, 9, mtime=0)
 
 
 def plotting_library() -> Path:
     """Where the wheel of plotly keeps its JavaScript; raises FileNotFoundError where it is not installed."""
-    spec = find_spec("plotly")  # of a top-level package: looks it up, does not run it
-    places = [] if spec is None else spec.submodule_search_locations or []
-    for place in places:
-        path = Path(place) / "package_data" / "plotly.min.js"
+    spec = find_spec("plotly")  # of a top-level package: locates it, does not run it
+    folders = [] if spec is None else spec.submodule_search_locations or []
+    for folder in folders:
+        path = Path(folder) / "package_data" / "plotly.min.js"
         if path.is_file():
             return path
-    raise FileNotFoundError("plotly.min.js is not there: the package plotly is not installed whole")
+    raise FileNotFoundError("plotly.min.js is missing: the package plotly is not installed completely")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,16 +68,18 @@ class Assets:
 
 
 def load(folder: Path = STATIC) -> Assets:
-    """Read every file of the folder, and the plotting library."""
-    found = [_read(path) for path in sorted(folder.iterdir()) if path.suffix in _TYPES]
-    found.append(_read(plotting_library()))
-    return Assets(by_name={asset.name: asset for asset in found}, digest=_digest(found))
+    """Read every file of the tree, and the plotting library."""
+    paths = sorted(path for path in folder.rglob("*") if path.suffix in _TYPES and path.is_file())
+    assets = [_read(path, path.relative_to(folder).as_posix()) for path in paths]
+    library = plotting_library()
+    assets.append(_read(library, library.name))
+    return Assets(by_name={asset.name: asset for asset in assets}, digest=_digest(assets))
 
 
-def _read(path: Path) -> Asset:
-    return Asset(name=path.name, media_type=_TYPES[path.suffix], body=path.read_bytes())
+def _read(path: Path, name: str) -> Asset:
+    return Asset(name=name, media_type=_TYPES[path.suffix], body=path.read_bytes())
 
 
 def _digest(assets: Iterable[Asset]) -> str:
-    told = "".join(f"{asset.name} {asset.digest}\n" for asset in assets)
-    return hashlib.sha256(told.encode()).hexdigest()[:16]
+    listing = "".join(f"{asset.name} {asset.digest}\n" for asset in assets)
+    return hashlib.sha256(listing.encode()).hexdigest()[:16]

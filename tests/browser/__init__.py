@@ -13,11 +13,13 @@ _NAMES = ("chromium", "chromium-browser", "google-chrome-stable", "google-chrome
 
 def find() -> str | None:
     """The browser to drive: $CHROMIUM, one on the path, or Playwright's own."""
+    return system() or _of_playwright()
+
+
+def system() -> str | None:
+    """$CHROMIUM or one on the path; where there is none, Playwright launches its own."""
     named = os.environ.get("CHROMIUM")
-    if named:
-        return named
-    on_path = next((path for name in _NAMES if (path := shutil.which(name))), None)
-    return on_path or _of_playwright()
+    return named or next((path for name in _NAMES if (path := shutil.which(name))), None)
 
 
 def _of_playwright() -> str | None:

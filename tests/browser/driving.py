@@ -10,7 +10,7 @@ from typing import Any
 
 from playwright.sync_api import Browser, BrowserType, Page, sync_playwright
 
-from tests.browser import find
+from tests.browser import system
 from tests.support import free_port, wait_until_ready
 
 #: Software rendering, so that 3D charts are drawn on a machine without a graphics card.
@@ -34,7 +34,7 @@ document.addEventListener("securitypolicyviolation", (event) => {
 
 def launched(kind: BrowserType, *, more: tuple[str, ...] = ()) -> Browser:
     """A headless browser of that kind."""
-    return kind.launch(executable_path=find(), args=[*ARGUMENTS, *more])
+    return kind.launch(executable_path=system(), args=[*ARGUMENTS, *more])
 
 
 @contextmanager

@@ -22,7 +22,7 @@ expect.set_options(timeout=20_000)
 
 CHARTS = {
     "fan": "Mean COF against its threshold",
-    "foretold": "Remaining cycles, as foretold",
+    "predicted": "Remaining cycles, as predicted",
     "cof": "Mean COF by pressure",
     "stribeck": "Stribeck curves by state",
     "surface": "Stribeck curves in 3D",
@@ -200,14 +200,14 @@ def test_a_run_posted_while_the_page_is_open_appears(browser: Browser, tmp_path:
         post(http, "live", stationary(0))
         page.locator("#chart-fan[data-drawn]").wait_for()
         expect(page.locator("#runs .runs details")).to_have_count(1)
-        assert page.locator("#chart-foretold").get_by_text("From the third stationary test on").is_visible()
+        assert page.locator("#chart-predicted").get_by_text("From the third stationary test on").is_visible()
         page.locator("#chart-loop-curves").scroll_into_view_if_needed()
         assert page.locator("#chart-loop-curves").get_by_text("No dynamic Stribeck test yet").is_visible()
         for cycles in (1000, 2000):
             post(http, "live", stationary(cycles))
         expect(page.locator("#runs .runs details")).to_have_count(3)
-        page.locator("#chart-foretold").scroll_into_view_if_needed()
-        page.locator("#chart-foretold[data-drawn]").wait_for()
+        page.locator("#chart-predicted").scroll_into_view_if_needed()
+        page.locator("#chart-predicted[data-drawn]").wait_for()
         assert page.evaluate("window.same")
         watched.close()
 
@@ -216,7 +216,7 @@ def test_a_file_is_dropped_and_its_receipt_appears(browser: Browser, tmp_path: P
     with serving(tmp_path / "clutchlife.db", loaded=True) as server:
         watched = Watched(browser, server.url)
         page = watched.open("/")
-        page.get_by_role("heading", name="No clutch is known yet").wait_for()
+        page.get_by_role("heading", name="No clutch is registered yet").wait_for()
         drop(page, "run-0.json", json.dumps(stationary(0)))
         dialog = page.get_by_role("dialog", name="Send a run")
         assert "Stationary Stribeck test at 0 cycles" in dialog.inner_text()

@@ -72,7 +72,7 @@ def adopt(page: Page, *, agree: bool) -> None:
     page.get_by_role("button", name="Adopt the extended model").click()
     dialog = page.get_by_role("dialog", name="Adopt")
     said = dialog.inner_text()
-    for part in ("Torque zero shift", "computed anew", "The runs themselves are not touched", "Now", "Then"):
+    for part in ("Torque zero shift", "recomputed", "The runs themselves are not touched", "Now", "Then"):
         assert part in said, part
     if agree:
         dialog.get_by_role("button", name="Adopt it").click()

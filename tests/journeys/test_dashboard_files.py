@@ -72,8 +72,16 @@ def test_only_files_of_the_service_may_run(http: httpx2.Client) -> None:
 
 
 def test_what_is_no_asset_is_not_there(http: httpx2.Client) -> None:
-    folder = assets_of(http, "/")[0].rsplit("/", 1)[0]
-    for name in ("nothing.js", "fleet.html", "%2e%2e%2froutes.py", "..%2f..%2froutes.py"):
+    folder = "/".join(assets_of(http, "/")[0].split("/")[:3])
+    assert http.get(f"{folder}/shared/api.js").status_code == 200
+    for name in (
+        "nothing.js",
+        "api.js",
+        "fleet.html",
+        "shared/../fleet.html",
+        "%2e%2e%2fpages.py",
+        "..%2f..%2fpages.py",
+    ):
         answer = http.get(f"{folder}/{name}")
         assert answer.status_code == 404, name
         assert answer.headers["content-type"] == "application/problem+json"

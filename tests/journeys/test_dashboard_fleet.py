@@ -46,7 +46,7 @@ def test_an_empty_service_says_what_to_do_and_fills_by_itself(browser: Browser, 
     watched = Watched(browser, server.url)
     watched.context.grant_permissions(["clipboard-read", "clipboard-write"])
     page = watched.open("/")
-    page.get_by_role("heading", name="No clutch is known yet").wait_for()
+    page.get_by_role("heading", name="No clutch is registered yet").wait_for()
     commands = "\n".join(page.locator("pre").all_inner_texts())
     for part in ("clutchlife simulate", f"clutchlife push campaign --clutch sim-7 --url {server.url}", "curl "):
         assert part in commands
@@ -76,7 +76,7 @@ def test_the_worst_comes_first_with_all_that_is_asked_of_a_row(watched: Watched)
         assert ageing.locator(drawing).count() == 1, drawing
     assert "ago" in ageing.locator("time").inner_text() or "now" in ageing.locator("time").inner_text()
     assert "Maintenance at 4,000 cycles" in ageing.inner_text()
-    assert "not asked" in ageing.inner_text()
+    assert "not run" in ageing.inner_text()
     assert not any("plotly" in url for url in watched.asked)
     # what comes from outside is text, never markup
     assert "<i>carbon</i> on steel" in first.inner_text()
@@ -102,7 +102,7 @@ def test_searching_and_filtering(watched: Watched) -> None:
     page.get_by_role("button", name="1 failure").click()
     expect(page.locator("table.fleet tbody tr:visible")).to_have_count(1)
     page.get_by_label("Find").fill("nobody")
-    page.get_by_text("No clutch fits").wait_for()
+    page.get_by_text("No clutch matches").wait_for()
     page.get_by_label("Find").fill("")
     page.get_by_role("button", name="4 clutches").click()
     expect(page.locator("table.fleet tbody tr:visible")).to_have_count(4)

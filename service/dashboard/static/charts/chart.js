@@ -1,0 +1,244 @@
+// @ts-check
+// The charts: answers of the API go in, figures with a title, a table, a PNG and a CSV come out. Open this file first (one
+// chart; until the plotting library is loaded, and where it does not load, its drawing is a light one), then life.js: like
+// fan.js, loops.js, parameters.js and stribeck.js it says what its charts show; the other files say how a chart is drawn.
+
+import { h, save, saveText, scrolling, symbol, table } from "../shared/dom.js";
+import { settled } from "./frame.js";
+import { base, config } from "./layout.js";
+import { colours } from "./palette.js";
+import { has3d, painted, plotly } from "./plotting.js";
+import { sketch } from "./sketch.js";
+
+/** @import { Content } from "../shared/dom.js" */
+/** @import { Cell, Column, Scheme, SettledFigure, Size, Spec, WholeFigure } from "./types.js" */
+
+/**
+ * @typedef {object} Options
+ * @property {string} id
+ * @property {string} title
+ * @property {() => string} name the start of saved files' names
+ * @property {[string, string] | null} [letter] a symbol with its index, after the title
+ * @property {boolean} [spatial] whether it is drawn in 3D, which needs WebGL
+ * @property {boolean} [wide]
+ * @property {number} [height] px
+ */
+
+const MOST_ROWS = 400;
+const NO_WEBGL = "This browser does not draw in 3D (WebGL is off). The table holds the numbers.";
+const NO_LIBRARY = "The plotting library did not load. The table holds the numbers.";
+
+/** @type {WeakMap<Element, Chart>} */
+const charts = new WeakMap();
+const visibility = new IntersectionObserver(
+  (entries) => {
+    for (const { target, isIntersecting } of entries) charts.get(target)?.near(isIntersecting);
+  },
+  { rootMargin: "400px" },
+);
+
+export class Chart {
+  /** @param {Options} options */
+  constructor({ id, title, name, letter = null, spatial = false, wide = false, height = 360 }) {
+    this.id = id;
+    this.title = title;
+    this.name = name;
+    this.spatial = spatial;
+    this.height = height;
+    /** @type {Spec | null} */
+    this.spec = null;
+    this.stale = false;
+    this.visible = false;
+    this.turn = 0;
+    this.note = h("p", { class: "note" });
+    this.controls = h("div", { class: "controls" });
+    const style = { "min-height": `${height}px` };
+    this.plot = h("div", { class: "plot", role: "img", "aria-label": title, style });
+    this.table = scrolling(`${title}: table`);
+    this.details = h("details", { ontoggle: () => this.fill() }, h("summary", {}, "Table"), this.table);
+    this.tools = h(
+      "div",
+      { class: "tools" },
+      this.button("PNG", "save as PNG", () => this.savePng()),
+      this.button("CSV", "save data as CSV", () => this.saveCsv()),
+    );
+    const heading = h("h3", {}, title, letter && [" ", symbol(...letter)]);
+    this.element = h(
+      "figure",
+      { class: `chart panel${wide ? " wide" : ""}`, id: `chart-${id}` },
+      h("figcaption", {}, heading, this.tools, this.note),
+      this.controls,
+      this.plot,
+      this.details,
+    );
+    charts.set(this.element, this);
+    visibility.observe(this.element);
+    document.addEventListener("themechange", () => this.redraw());
+  }
+
+  /**
+   * @param {string} text
+   * @param {string} action
+   * @param {() => unknown} onclick
+   */
+  button(text, action, onclick) {
+    return h("button", { type: "button", class: "small", onclick, "aria-label": `${this.title}: ${action}` }, text);
+  }
+
+  /** @param {Spec} spec what to show from now on */
+  show(spec) {
+    this.spec = spec;
+    this.note.textContent = spec.note ?? "";
+    const nothing = spec.empty ?? (this.spatial && !has3d() ? NO_WEBGL : null);
+    this.element.classList.toggle("empty", nothing !== null);
+    if (nothing !== null) {
+      this.clear();
+      this.plot.replaceChildren(h("p", { class: "nothing" }, nothing));
+    } else if (this.plot.querySelector(".nothing")) this.plot.replaceChildren();
+    this.plot.setAttribute("aria-label", `${this.title}. ${spec.note ?? ""} The numbers are in the table below.`);
+    this.tools.hidden = this.details.hidden = !spec.rows?.length;
+    if (this.details.open) this.fill();
+    this.redraw();
+  }
+
+  /** @param {boolean} visible whether the chart is on the screen or close to it */
+  near(visible) {
+    this.visible = visible;
+    if (visible && this.stale) this.draw();
+  }
+
+  redraw() {
+    this.stale = this.spec !== null && !this.element.classList.contains("empty");
+    if (this.visible && this.stale) this.draw();
+  }
+
+  async draw() {
+    this.stale = false;
+    this.turn += 1;
+    const { turn } = this;
+    if (!this.element.dataset.drawn) this.sketch();
+    let library;
+    try {
+      library = await plotly();
+    } catch {
+      this.stale = true; // tried again when the chart is next looked at
+      if (!this.plot.hasChildNodes()) this.plot.append(h("p", { class: "nothing" }, NO_LIBRARY));
+      return;
+    }
+    const figure = this.figure();
+    if (turn !== this.turn || figure === null) return;
+    await library.react(this.plot, figure.data, figure.layout, config(this.spatial));
+    this.plot.querySelector(".sketch, .nothing")?.remove();
+    this.element.dataset.drawn = "yes";
+    performance.mark(`drawn ${this.id}`);
+  }
+
+  /**
+   * Data and layout in the colours of now, or of a scheme; null where there is nothing to draw.
+   * @param {Scheme} [scheme]
+   * @param {Partial<Size> & { compact?: boolean }} [size]
+   * @returns {SettledFigure | (WholeFigure & { ticks?: undefined }) | null}
+   */
+  figure(scheme = null, { width = this.plot.clientWidth, height = this.height, compact = width < 480 } = {}) {
+    if (!this.spec?.figure || this.element.classList.contains("empty")) return null;
+    const c = colours(scheme);
+    const { data, layout } = this.spec.figure(c);
+    const whole = { data, layout: base(c, layout, { height, compact }) };
+    return settled(whole, { width, height }) ?? whole;
+  }
+
+  /** What can be drawn without the library is drawn at once. */
+  sketch() {
+    const figure = this.figure();
+    if (!figure?.ticks) return;
+    this.plot.querySelector(".sketch, .nothing")?.remove();
+    this.plot.append(sketch(figure, { width: this.plot.clientWidth, height: this.height }));
+    this.element.dataset.sketched = "yes";
+    painted().then(() => performance.mark(`sketched ${this.id}`));
+  }
+
+  clear() {
+    this.turn += 1;
+    if (this.element.dataset.drawn) globalThis.Plotly?.purge(this.plot);
+    delete this.element.dataset.drawn;
+    delete this.element.dataset.sketched;
+  }
+
+  fill() {
+    if (!this.details.open || !this.spec?.rows) return;
+    const { columns, rows } = this.spec;
+    const names = columns.map(({ name }) => name);
+    const cells = rows.slice(0, MOST_ROWS).map((row) => row.map((value, index) => cellText(value, columns[index])));
+    const cut = `The first ${cells.length} of ${rows.length} rows; the CSV holds all.`;
+    this.table.replaceChildren(
+      table(this.title, names, cells),
+      rows.length > cells.length ? h("p", { class: "quiet" }, cut) : "",
+    );
+  }
+
+  /**
+   * The light drawing as an image's address, in any size and scheme; null where there is none.
+   * @param {Size & { scheme?: Scheme }} options
+   */
+  light({ width, height, scheme = null }) {
+    const figure = this.figure(scheme, { width, height, compact: false });
+    if (!figure?.ticks) return null;
+    const text = new XMLSerializer().serializeToString(sketch(figure, { width, height }));
+    return `data:image/svg+xml,${encodeURIComponent(text)}`;
+  }
+
+  async savePng() {
+    const library = await plotly();
+    const [width, height] = [1000, 600];
+    if (this.spatial && !this.element.dataset.drawn) await this.draw();
+    const figure = this.figure(null, { width, height, compact: false });
+    if (figure === null) return;
+    // a chart in 3D is saved as it has been turned
+    const shown = this.spatial ? this.plot : { data: figure.data, layout: { ...figure.layout, width } };
+    const image = await library.toImage(shown, { format: "png", width, height, scale: 2 });
+    save(`${this.name()}-${this.id}.png`, image);
+  }
+
+  saveCsv() {
+    if (!this.spec?.rows) return;
+    const { columns, rows } = this.spec;
+    const lines = [columns.map(({ name }) => name), ...rows].map((row) => row.map(quoted).join(","));
+    saveText(`${this.name()}-${this.id}.csv`, `${lines.join("\r\n")}\r\n`, "text/csv");
+  }
+}
+
+/**
+ * @param {Cell} value
+ * @param {Column} column
+ */
+function cellText(value, { text }) {
+  if (value === null || value === undefined) return "–";
+  return text && typeof value === "number" ? text(value) : String(value);
+}
+
+/**
+ * A field after RFC 4180; a name that a spreadsheet would run as a formula is kept from it.
+ * @param {Cell} value
+ */
+function quoted(value) {
+  if (value === null || value === undefined) return "";
+  const text = typeof value === "string" && /^[=+\-@\t\r]/.test(value) ? `'${value}` : String(value);
+  return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+}
+
+/**
+ * A labelled choice for a chart's controls.
+ * @param {string} label
+ * @param {[string | number, string][]} options values and their texts
+ * @param {string | number | undefined} value
+ * @param {(value: string) => unknown} changed
+ */
+export function choice(label, options, value, changed) {
+  /** @type {Content} */
+  const children = options.map(([key, text]) =>
+    h("option", { value: key, selected: String(key) === String(value) }, text),
+  );
+  const select = h("select", {}, children);
+  select.addEventListener("change", () => changed(select.value));
+  return h("label", {}, `${label} `, select);
+}

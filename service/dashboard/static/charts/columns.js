@@ -1,0 +1,54 @@
+// @ts-check
+// The columns that the charts' tables share, and the rows of a quantity that is measured and follows eq. 6.
+
+import { fixed, significant } from "../shared/format.js";
+
+/** @import { Measured, Trajectory } from "../shared/types.js" */
+/** @import { Cell, Column } from "./types.js" */
+
+/** Half of a 90 % interval in standard deviations. */
+export const HALF_OF_90 = 1.645;
+
+/** @type {Column} */
+export const KIND = { name: "kind" };
+
+/**
+ * A column with that many decimals.
+ * @param {string} name
+ * @param {number} [decimals]
+ * @returns {Column}
+ */
+export const column = (name, decimals = 0) => ({ name, text: (value) => fixed(value, decimals) });
+
+/**
+ * A column with that many significant digits.
+ * @param {string} name
+ * @param {number} digits
+ * @returns {Column}
+ */
+export const digitsColumn = (name, digits) => ({ name, text: (value) => significant(value, digits) });
+
+export const CYCLES = column("cycles");
+export const PRESSURE = column("pressure, bar", 1);
+
+/**
+ * Measured values and eq. 6 as rows: kind, what `before` holds, cycles, value and its 90 % interval.
+ * @param {{ measured: Measured, trajectory: Trajectory }} item
+ * @param {{ measured: string, law: string, before?: Cell[] }} kinds
+ * @returns {Cell[][]}
+ */
+export function measuredAndLaw({ measured, trajectory }, { measured: kind, law, before = [] }) {
+  const points = measured.cycles.map((at, index) => {
+    const [value, half] = [measured.value[index], HALF_OF_90 * measured.sd[index]];
+    return [kind, ...before, at, value, value - half, value + half];
+  });
+  const { median, lower, upper } = trajectory;
+  const line = trajectory.cycles.map((at, index) => [law, ...before, at, median[index], lower[index], upper[index]]);
+  return [...points, ...line];
+}
+
+/**
+ * Values in ascending order, each once.
+ * @param {number[]} values
+ */
+export const distinct = (values) => [...new Set(values)].sort((a, b) => a - b);

@@ -1,0 +1,202 @@
+// @ts-check
+// Mean COF, its law with the 90 % band, the threshold and when it is reached; behind it the earlier predictions.
+
+import { cycles, fixed, interval, withSd } from "../shared/format.js";
+import { column, CYCLES, KIND, measuredAndLaw } from "./columns.js";
+import { eventMarks } from "./layout.js";
+import { faint } from "./palette.js";
+import { band, errorBars, titled } from "./traces.js";
+
+/** @import { DegradationItem, Measured, Receipt, RemainingLife, SeriesItem, Trajectory } from "../shared/types.js" */
+/** @import { Annotation, Cell, Colours, PlainTrace, Shape, Spec } from "./types.js" */
+
+/** @typedef {{ at: number, cof: number | null, remaining: SeriesItem }} Prediction made at `at` cycles, when mean COF was `cof` */
+
+const COLUMNS = [KIND, CYCLES, column("mean COF", 4), column("lower, 5 %", 4), column("upper, 95 %", 4)];
+
+/**
+ * @param {{ life: RemainingLife, pooled: DegradationItem | undefined, predictions: Prediction[], events: Receipt[] }} answers
+ * @returns {Spec}
+ */
+export function fan({ life, pooled, predictions, events }) {
+  if (!pooled) return { empty: "Mean COF is known from the first stationary test on." };
+  const { measured, trajectory } = pooled;
+  const threshold = life.criterion.threshold_mean_cof;
+  const last = lastCycle(life, measured.cycles);
+  return {
+    note: noteOf(life),
+    columns: COLUMNS,
+    rows: [...measuredAndLaw(pooled, { measured: "measured", law: "law" }), ...endRows(life)],
+    figure: (c) => {
+      const marks = eventMarks(events, c);
+      const limit = threshold === null ? { shapes: [], annotations: [] } : thresholdMarks(threshold, c);
+      return {
+        data: [
+          ...past(predictions, threshold, c),
+          ...law(trajectory, life, c),
+          ...endOfLife(life, threshold, c),
+          points(measured, c),
+        ],
+        layout: {
+          xaxis: { ...titled("duty cycles"), range: [-0.01 * last, last] },
+          yaxis: titled("mean COF"),
+          shapes: [...marks.shapes, ...limit.shapes],
+          annotations: [...marks.annotations, ...limit.annotations],
+        },
+      };
+    },
+  };
+}
+
+/** @param {RemainingLife} life */
+function noteOf(life) {
+  const { current, criterion, end_of_life_cycles: end } = life;
+  if (life.status === "insufficient_data") {
+    return "Too few tests for a prediction: three at different cycles are needed.";
+  }
+  const median = end["0.5"];
+  const when =
+    median === null
+      ? "perhaps never"
+      : `at about ${cycles(median, end["0.05"], end["0.95"])} cycles (90 %: ${interval(end)})`;
+  const reaches = median !== null && life.status === "reached" ? "reached" : "reaches";
+  const limit = `${fixed(criterion.threshold_mean_cof, 4)}, ${fixed(100 * criterion.fraction)} % of new`;
+  return `Mean COF ${withSd(current.mean_cof, current.mean_cof_sd)}; it ${reaches} ${limit}, ${when}.`;
+}
+
+/**
+ * How far the abscissa goes: past the predicted end, but not so far that the measurements vanish.
+ * @param {RemainingLife} life
+ * @param {number[]} measured cycles of the tests
+ */
+function lastCycle(life, measured) {
+  const past = Math.max(1, life.as_of_cycles ?? 0, ...measured);
+  const end = life.end_of_life_cycles;
+  const ahead = end["0.95"] ?? 1.5 * (end["0.5"] ?? past);
+  return Math.max(1.08 * past, Math.min(1.06 * ahead, 4 * past));
+}
+
+/**
+ * @param {RemainingLife} life
+ * @returns {Cell[][]}
+ */
+function endRows({ criterion: { threshold_mean_cof: threshold }, end_of_life_cycles: end }) {
+  if (threshold === null) return [];
+  const name = (/** @type {string} */ quantile) => `end of life, ${100 * Number(quantile)} %`;
+  return Object.entries(end).map(([quantile, at]) => [name(quantile), at, threshold, null, null]);
+}
+
+/**
+ * The threshold as a dashed line with its value.
+ * @param {number} y
+ * @param {Colours} c
+ * @returns {{ shapes: Shape[], annotations: Annotation[] }}
+ */
+function thresholdMarks(y, c) {
+  const line = { color: c.failure, width: 1.6, dash: "dash" };
+  const font = { color: c.failure, size: 12 };
+  const text = `threshold ${fixed(y, 4)}`;
+  return {
+    shapes: [{ type: "line", x0: 0, x1: 1, xref: "paper", y0: y, y1: y, line }],
+    annotations: [{ x: 0, xref: "paper", xanchor: "left", y, yanchor: "bottom", text, showarrow: false, font }],
+  };
+}
+
+/**
+ * @param {Measured} measured
+ * @param {Colours} c
+ * @returns {PlainTrace}
+ */
+const points = (measured, c) => ({
+  name: "measured",
+  mode: "markers",
+  x: measured.cycles,
+  y: measured.value,
+  marker: { color: c.ink, size: 7 },
+  error_y: errorBars(measured.sd, c.ink, { thickness: 1.2, width: 3 }),
+  hovertemplate: "%{x:,.0f} cycles<br>mean COF %{y:.4f}<extra></extra>",
+});
+
+/**
+ * Each earlier prediction as a line from mean COF when it was made to the predicted end of life.
+ * @param {Prediction[]} predictions
+ * @param {number | null} threshold
+ * @param {Colours} c
+ * @returns {PlainTrace[]}
+ */
+function past(predictions, threshold, c) {
+  const lines = predictions.slice(0, -1).flatMap(({ at, cof, remaining: { value } }) => {
+    return value !== null && value > 0 && cof !== null ? [{ at, cof, end: at + value }] : [];
+  });
+  if (threshold === null || lines.length === 0) return [];
+  const x = lines.flatMap(({ at, end }) => [at, end, null]);
+  const y = lines.flatMap(({ cof }) => [cof, threshold, null]);
+  const line = { color: faint(c.quiet, 0.45), width: 1 };
+  return [{ name: "earlier predictions", mode: "lines", x, y, line, hoverinfo: "skip" }];
+}
+
+/**
+ * Eq. 6 with its band, led on to the threshold where the prediction reaches it past the law's last point.
+ * @param {Trajectory} trajectory
+ * @param {RemainingLife} life
+ * @param {Colours} c
+ * @returns {PlainTrace[]}
+ */
+function law(trajectory, life, c) {
+  const end = life.end_of_life_cycles;
+  const threshold = life.criterion.threshold_mean_cof;
+  const last = trajectory.cycles.at(-1) ?? 0;
+  const median = end["0.5"];
+  const beyond = life.status === "predicted" && median !== null && median > last;
+  /** @type {(values: number[], at: number | null) => { x: number[], y: number[] }} */
+  const joined = (values, at) =>
+    beyond && threshold !== null && at !== null && at > last
+      ? { x: [...trajectory.cycles, at], y: [...values, threshold] }
+      : { x: trajectory.cycles, y: values };
+  return [
+    ...band("90 % of its law", joined(trajectory.lower, end["0.05"]), joined(trajectory.upper, end["0.95"]), c),
+    {
+      name: "law (eq. 6)",
+      mode: "lines",
+      ...joined(trajectory.median, median),
+      line: { color: c.accent, width: 2.2 },
+      hovertemplate: "%{x:,.0f} cycles<br>law %{y:.4f}<extra></extra>",
+    },
+  ];
+}
+
+/**
+ * The predicted end of life on the threshold: its 90 % and 50 % intervals and its median.
+ * @param {RemainingLife} life
+ * @param {number | null} threshold
+ * @param {Colours} c
+ * @returns {PlainTrace[]}
+ */
+function endOfLife(life, threshold, c) {
+  const q = life.end_of_life_cycles;
+  const median = q["0.5"];
+  if (threshold === null || median === null) return [];
+  /** @type {(from: string, to: string, width: number, name: string) => PlainTrace} */
+  const bar = (from, to, width, name) => ({
+    name,
+    showlegend: name !== "",
+    mode: "lines",
+    x: [q[from], q[to] ?? 10 * median],
+    y: [threshold, threshold],
+    line: { color: c.worn, width },
+    hoverinfo: "skip",
+  });
+  return [
+    bar("0.05", "0.95", 5, "end of life, 90 % and 50 %"),
+    bar("0.25", "0.75", 11, ""),
+    {
+      name: "median",
+      showlegend: false,
+      mode: "markers",
+      x: [median],
+      y: [threshold],
+      marker: { color: c.panel, size: 9, line: { color: c.worn, width: 3 } },
+      hovertemplate: "end of life<br>%{x:,.0f} cycles<extra></extra>",
+    },
+  ];
+}

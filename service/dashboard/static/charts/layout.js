@@ -1,0 +1,195 @@
+// @ts-check
+// How every chart looks: axes, margins, type, what the plotting library may do.
+
+/** @import { Receipt } from "../shared/types.js" */
+/** @import { Annotation, Axis, Colours, Layout, Scene, Shape, WholeLayout } from "./types.js" */
+
+const FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", sans-serif';
+const COARSE = matchMedia("(pointer: coarse)");
+
+/** As many decimals as the step between two ticks has, the same at every tick. */
+const DIGITS = [
+  [1, null, 0],
+  [0.1, 0.99, 1],
+  [0.01, 0.099, 2],
+  [0.001, 0.0099, 3],
+  [0.0001, 0.00099, 4],
+  [null, 0.000099, 6],
+].map(([from, to, decimals]) => ({ dtickrange: [from, to], value: `,.${decimals}f` }));
+
+/**
+ * A chart's own layout on top of what all charts share.
+ * @param {Colours} c
+ * @param {Layout} layout
+ * @param {{ height: number, compact: boolean }} options
+ * @returns {WholeLayout}
+ */
+export function base(c, layout, { height, compact }) {
+  const common = commonOf(c, height, compact);
+  if (layout.scene) {
+    const margin = { l: 0, r: 0, t: 0, b: 0 };
+    return {
+      ...common,
+      ...layout,
+      legend: common.legend,
+      margin,
+      dragmode: "turntable",
+      scene: scene(c, layout.scene, compact),
+    };
+  }
+  const axis = axisOf(c, compact);
+  const named = Object.keys(layout).filter((key) => /^[xy]axis/.test(key));
+  const axes = [...new Set(["xaxis", "yaxis", ...named])].map((name) => [
+    name,
+    merged(axis, /** @type {Axis | undefined} */ (layout[name])),
+  ]);
+  return {
+    ...common,
+    ...layout,
+    ...Object.fromEntries(axes),
+    legend: { ...common.legend, ...layout.legend },
+    margin: { ...common.margin, ...layout.margin },
+  };
+}
+
+/**
+ * @param {Colours} c
+ * @param {boolean} compact
+ * @returns {Axis}
+ */
+function axisOf(c, compact) {
+  return {
+    gridcolor: c.line,
+    linecolor: c.edge,
+    zeroline: false,
+    ticks: "outside",
+    tickcolor: c.edge,
+    ticklen: 4,
+    automargin: true,
+    title: { standoff: 8, font: { size: compact ? 11 : 12.5 } },
+    exponentformat: "none",
+    tickformatstops: DIGITS,
+  };
+}
+
+/**
+ * @param {Colours} c
+ * @param {number} height
+ * @param {boolean} compact
+ */
+function commonOf(c, height, compact) {
+  return {
+    height,
+    autosize: true,
+    paper_bgcolor: c.panel,
+    plot_bgcolor: c.panel,
+    font: { family: FONT, size: compact ? 11 : 12.5, color: c.ink },
+    margin: { l: 56, r: 16, t: 12, b: 48 },
+    hoverlabel: { bgcolor: c.panel, bordercolor: c.edge, font: { color: c.ink, family: FONT, size: 12.5 } },
+    hovermode: "closest",
+    separators: ".,",
+    dragmode: COARSE.matches ? false : "zoom",
+    legend: {
+      orientation: "h",
+      y: -62 / Math.max(80, height - 110),
+      yanchor: "top",
+      x: 0,
+      traceorder: "normal",
+      font: { size: compact ? 11 : 12 },
+      bgcolor: "rgba(0,0,0,0)",
+    },
+  };
+}
+
+/**
+ * @param {Colours} c
+ * @param {Scene} own
+ * @param {boolean} compact
+ */
+function scene(c, own, compact) {
+  const axis = {
+    gridcolor: c.line,
+    color: c.ink,
+    backgroundcolor: c.panel,
+    showbackground: false,
+    zeroline: false,
+    exponentformat: "none",
+    tickformatstops: DIGITS,
+    tickfont: { size: compact ? 9 : 11 },
+    title: { font: { size: compact ? 11 : 12.5 } },
+  };
+  return {
+    aspectmode: "manual",
+    aspectratio: { x: 1.35, y: 1.1, z: 0.8 },
+    camera: {
+      eye: compact ? { x: 1.9, y: -2.1, z: 0.95 } : { x: 1.5, y: -1.6, z: 0.75 },
+      center: { x: 0, y: 0, z: -0.12 },
+    },
+    ...own,
+    xaxis: merged(axis, own.xaxis),
+    yaxis: merged(axis, own.yaxis),
+    zaxis: merged(axis, own.zaxis),
+  };
+}
+
+/**
+ * @param {Axis} ours
+ * @param {Axis} [own]
+ * @returns {Axis}
+ */
+const merged = (ours, own = {}) => ({ ...ours, ...own, title: { ...ours.title, ...own.title } });
+
+/**
+ * What the plotting library may do: no logo, no tool bar, and nothing that leaves this host.
+ * @param {boolean} spatial
+ */
+export const config = (spatial) => ({
+  responsive: true,
+  displaylogo: false,
+  displayModeBar: false,
+  showTips: false,
+  scrollZoom: false,
+  staticPlot: spatial && COARSE.matches,
+  doubleClick: "reset",
+  plotlyServerURL: "",
+  topojsonURL: "",
+});
+
+/**
+ * What was done; the plotting library reads texts as markup, so nothing in a note may look like it.
+ * @param {string} event
+ * @param {string | null} note
+ */
+const nameOf = (event, note) =>
+  event === "other" && note ? note.replaceAll("<", "‹").replaceAll(">", "›").slice(0, 40) : event.replaceAll("_", " ");
+
+/**
+ * Maintenance events as vertical lines with their name at the top.
+ * @param {Receipt[]} events
+ * @param {Colours} c
+ * @returns {{ shapes: Shape[], annotations: Annotation[] }}
+ */
+export function eventMarks(events, c) {
+  return {
+    shapes: events.map(({ cycles }) => ({
+      type: "line",
+      x0: cycles,
+      x1: cycles,
+      y0: 0,
+      y1: 1,
+      yref: "paper",
+      line: { color: c.maintenance, width: 1.5, dash: "dot" },
+    })),
+    annotations: events.map(({ cycles, event, note }) => ({
+      x: cycles,
+      y: 1,
+      yref: "paper",
+      yanchor: "top",
+      xanchor: "left",
+      text: nameOf(event ?? "", note),
+      showarrow: false,
+      font: { size: 11, color: c.maintenance },
+      textangle: 90,
+    })),
+  };
+}

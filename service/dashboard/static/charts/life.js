@@ -1,0 +1,102 @@
+// @ts-check
+// Remaining cycles as they were predicted at each test, and mean COF at every pressure.
+
+import { fixed } from "../shared/format.js";
+import { column, CYCLES, distinct, PRESSURE } from "./columns.js";
+import { eventMarks } from "./layout.js";
+import { band, linesByPressure, titled } from "./traces.js";
+
+/** @import { Receipt, RemainingLife, StribeckItem } from "../shared/types.js" */
+/** @import { Prediction } from "./fan.js" */
+/** @import { Colours, PlainTrace, Spec } from "./types.js" */
+
+/**
+ * Remaining cycles as they were predicted at each test, against what is predicted now.
+ * @param {{ life: RemainingLife, predictions: Prediction[], events: Receipt[] }} answers
+ * @returns {Spec}
+ */
+export function remainingCycles({ life, predictions, events }) {
+  const made = predictions.flatMap(({ at, remaining: { value, lower, upper } }) => {
+    return value === null ? [] : [{ at, value, lower, upper }];
+  });
+  if (made.length === 0) return { empty: "From the third stationary test on the remaining cycles are predicted." };
+  const end = life.end_of_life_cycles["0.5"];
+  const top = 1.12 * Math.max(1, ...made.map(({ value, upper }) => Math.min(upper ?? Infinity, 2.2 * value + 1)));
+  const comparison =
+    end === null ? "" : "A perfect prediction would have followed the dashed line down to today's end of life.";
+  return {
+    note: `The median and its 90 % interval, as predicted then. ${comparison}`,
+    columns: [CYCLES, column("remaining cycles"), column("lower, 5 %"), column("upper, 95 %")],
+    rows: predictions.map(({ at, remaining: r }) => [at, r.value, r.lower, r.upper]),
+    figure: (c) => ({
+      data: predictionTraces(made, end, top, c),
+      layout: {
+        xaxis: titled("duty cycles at the prediction"),
+        yaxis: { ...titled("remaining cycles"), range: [0, top] },
+        ...eventMarks(events, c),
+      },
+    }),
+  };
+}
+
+/**
+ * @param {{ at: number, value: number, lower: number | null, upper: number | null }[]} made
+ * @param {number | null} end
+ * @param {number} top
+ * @param {Colours} c
+ * @returns {PlainTrace[]}
+ */
+function predictionTraces(made, end, top, c) {
+  const x = made.map(({ at }) => at);
+  const lower = made.map((prediction) => prediction.lower ?? 0);
+  const upper = made.map((prediction) => Math.min(prediction.upper ?? Infinity, 4 * top));
+  /** @type {PlainTrace[]} */
+  const today = [];
+  if (end !== null) {
+    const line = { color: c.worn, width: 1.6, dash: "dash" };
+    today.push({ name: "today's median", mode: "lines", x: [0, end], y: [end, 0], line, hoverinfo: "skip" });
+  }
+  return [
+    ...band("90 % interval", { x, y: lower }, { x, y: upper }, c),
+    ...today,
+    {
+      name: "predicted median",
+      mode: "lines+markers",
+      x,
+      y: made.map(({ value }) => value),
+      line: { color: c.accent, width: 2 },
+      marker: { size: 6 },
+      hovertemplate: "predicted at %{x:,.0f} cycles<br>%{y:,.0f} cycles remain<extra></extra>",
+    },
+  ];
+}
+
+/**
+ * Mean COF of every pressure over cycles.
+ * @param {{ tests: StribeckItem[], events: Receipt[] }} answers
+ * @returns {Spec}
+ */
+export function meanCof({ tests, events }) {
+  const values = tests.flatMap(({ cycles, fits }) => {
+    return fits.flatMap(({ pressure_bar: pressure, mean_cof: value, mean_cof_sd: sd }) =>
+      value === null ? [] : [{ cycles, pressure, value, sd }],
+    );
+  });
+  if (values.length === 0) return { empty: "Mean COF is known from the first stationary test on." };
+  const pressures = distinct(values.map(({ pressure }) => pressure));
+  const count = pressures.length === 1 ? "one pressure" : `${fixed(pressures.length)} pressures`;
+  return {
+    note: `Mean over the speeds of the first test, at ${count}, with 90 % error bars.`,
+    columns: [CYCLES, PRESSURE, column("mean COF", 4), column("standard deviation", 5)],
+    rows: values.map(({ cycles, pressure, value, sd }) => [cycles, pressure, value, sd]),
+    figure: (c) => ({
+      data: linesByPressure(
+        pressures,
+        (level) => values.filter(({ pressure }) => pressure === level),
+        { size: 5, bars: 2, text: "mean COF %{y:.4f}" },
+        c,
+      ),
+      layout: { xaxis: titled("duty cycles"), yaxis: titled("mean COF"), ...eventMarks(events, c) },
+    }),
+  };
+}

@@ -1,0 +1,178 @@
+// @ts-check
+// The four Stribeck parameters over cycles: eq. 6 with its band at one pressure (fig. 10), and over all of them (fig. 11).
+
+import { significant, withSd } from "../shared/format.js";
+import { CYCLES, digitsColumn, KIND, measuredAndLaw, PRESSURE } from "./columns.js";
+import { eventMarks } from "./layout.js";
+import { scaleOf } from "./palette.js";
+import { band, errorBars, titled } from "./traces.js";
+
+/** @import { DegradationItem, Receipt, Trajectory } from "../shared/types.js" */
+/** @import { Range, Spec } from "./types.js" */
+
+/** @typedef {"static_torque_nm" | "coulomb_ratio" | "stribeck_velocity_m_s" | "viscous_coefficient"} ParameterName */
+
+/** @type {Record<ParameterName, { title: string, symbol: [string, string], unit: string }>} */
+export const PARAMETERS = {
+  static_torque_nm: { title: "Static torque", symbol: ["M", "s"], unit: "Nm" },
+  coulomb_ratio: { title: "Coulomb ratio", symbol: ["M̄", "c"], unit: "" },
+  stribeck_velocity_m_s: { title: "Stribeck velocity", symbol: ["V", "S"], unit: "m/s" },
+  viscous_coefficient: { title: "Viscous coefficient", symbol: ["C", "v"], unit: "Nm/(m/s)^0.3" },
+};
+
+export const PARAMETER_NAMES = /** @type {ParameterName[]} */ (Object.keys(PARAMETERS));
+
+/**
+ * A parameter's axis, in the plotting library's own small markup.
+ * @param {ParameterName} name
+ */
+function axisOf(name) {
+  const { symbol, unit } = PARAMETERS[name];
+  return `${symbol[0]}<sub>${symbol[1]}</sub>${unit && `, ${unit.replace(/\^([\d.]+)/, "<sup>$1</sup>")}`}`;
+}
+
+const COLUMNS = [
+  KIND,
+  PRESSURE,
+  CYCLES,
+  digitsColumn("value", 4),
+  digitsColumn("lower, 5 %", 4),
+  digitsColumn("upper, 95 %", 4),
+];
+
+/** @param {DegradationItem} item */
+const rowsOf = (item) => measuredAndLaw(item, { measured: "identified", law: "law", before: [item.pressure_bar] });
+
+/**
+ * A range that the measurements set, not an error bar that leaves the paper.
+ * @param {DegradationItem} item
+ * @returns {Range}
+ */
+function rangeOf({ measured, trajectory }) {
+  const all = [...measured.value, ...trajectory.median].sort((a, b) => a - b);
+  const [low, high] = [all[Math.floor(0.01 * all.length)], all[Math.ceil(0.99 * all.length) - 1]];
+  const room = 0.35 * (high - low) || 0.1 * Math.abs(high) || 1;
+  return [Math.min(low - room, low >= 0 && low < room ? 0 : low - room), high + room];
+}
+
+/**
+ * One parameter at one pressure.
+ * @param {{ items: DegradationItem[], name: ParameterName, pressure: number | undefined, events: Receipt[] }} answers
+ * @returns {Spec}
+ */
+export function parameter({ items, name, pressure, events }) {
+  const item = items.find(({ quantity, pressure_bar: level }) => quantity === name && level === pressure);
+  if (!item) return { empty: "The tests at this pressure do not determine it." };
+  const { measured, trajectory, coefficients: k } = item;
+  const { unit } = PARAMETERS[name];
+  const inUnit = unit && ` ${unit.replace("^0.3", "⁰·³")}`;
+  const [initial, change] = [k.initial, k.change].map(({ value, sd }) => `${withSd(value, sd)}${inUnit}`);
+  const scale = significant(k.scale_cycles.value, 2);
+  const x = trajectory.cycles;
+  return {
+    note: `Eq. 6: ${initial} when new, a change of ${change} in the end, on a scale of ${scale} cycles.`,
+    columns: COLUMNS,
+    rows: rowsOf(item),
+    figure: (c) => ({
+      data: [
+        ...band("90 % band", { x, y: trajectory.lower }, { x, y: trajectory.upper }, c),
+        {
+          name: "eq. 6",
+          mode: "lines",
+          x,
+          y: trajectory.median,
+          line: { color: c.accent, width: 2 },
+          hovertemplate: "%{x:,.0f} cycles<br>eq. 6: %{y:.4g}<extra></extra>",
+        },
+        {
+          name: "identified",
+          mode: "markers",
+          x: measured.cycles,
+          y: measured.value,
+          marker: { color: c.ink, size: 6 },
+          error_y: errorBars(measured.sd, c.ink, { thickness: 1.1, width: 3 }),
+          hovertemplate: "%{x:,.0f} cycles<br>%{y:.4g}<extra></extra>",
+        },
+      ],
+      layout: {
+        xaxis: titled("duty cycles"),
+        yaxis: { ...titled(axisOf(name)), range: rangeOf(item) },
+        ...eventMarks(events, c),
+      },
+    }),
+  };
+}
+
+/**
+ * One parameter over cycles and pressure: the law as a surface, what was identified as points.
+ * @param {{ items: DegradationItem[], name: ParameterName }} answers
+ * @returns {Spec}
+ */
+export function landscape({ items, name }) {
+  const own = items
+    .flatMap((item) =>
+      item.quantity === name && item.pressure_bar !== null ? [{ item, pressure: item.pressure_bar }] : [],
+    )
+    .sort((a, b) => a.pressure - b.pressure);
+  if (own.length < 2) return { empty: "A surface needs two pressures or more." };
+  const ranges = own.map(({ item }) => rangeOf(item));
+  const [low, high] = [Math.min(...ranges.map(([from]) => from)), Math.max(...ranges.map(([, to]) => to))];
+  const points = own
+    .flatMap(({ item: { measured }, pressure }) =>
+      measured.cycles.map((at, index) => ({ at, pressure, value: measured.value[index] })),
+    )
+    .filter(({ value }) => value >= low && value <= high);
+  // every pressure's law on the same cycles, those of the longest
+  const laws = own.map(({ item }) => item.trajectory);
+  const end = (/** @type {Trajectory} */ law) => law.cycles.at(-1) ?? 0;
+  const longest = laws.reduce((a, b) => (end(b) > end(a) ? b : a)).cycles;
+  return {
+    note: `${PARAMETERS[name].title} at every pressure: points identified, surface eq. 6. Drag to turn.`,
+    columns: COLUMNS,
+    rows: own.flatMap(({ item }) => rowsOf(item)),
+    figure: (c) => ({
+      data: [
+        {
+          type: "surface",
+          x: longest,
+          y: own.map(({ pressure }) => pressure),
+          z: laws.map((law) => longest.map((at) => medianAt(law, at))),
+          colorscale: scaleOf(c),
+          opacity: 0.86,
+          showscale: false,
+          hovertemplate: "%{x:,.0f} cycles, %{y} bar<br>eq. 6: %{z:.4g}<extra></extra>",
+        },
+        {
+          type: "scatter3d",
+          mode: "markers",
+          x: points.map(({ at }) => at),
+          y: points.map(({ pressure }) => pressure),
+          z: points.map(({ value }) => value),
+          marker: { size: 2.6, color: c.ink },
+          hovertemplate: "%{x:,.0f} cycles, %{y} bar<br>%{z:.4g}<extra></extra>",
+        },
+      ],
+      layout: {
+        showlegend: false,
+        scene: {
+          xaxis: titled("duty cycles"),
+          yaxis: titled("pressure, bar"),
+          zaxis: { ...titled(axisOf(name)), range: [low, high] },
+        },
+      },
+    }),
+  };
+}
+
+/**
+ * The law's median between its points; null past its end.
+ * @param {Trajectory} law
+ * @param {number} at cycles
+ */
+function medianAt({ cycles, median }, at) {
+  const index = cycles.findIndex((cycle) => cycle >= at);
+  if (index < 0) return null;
+  if (index === 0) return median[0];
+  const share = (at - cycles[index - 1]) / (cycles[index] - cycles[index - 1]);
+  return median[index - 1] + share * (median[index] - median[index - 1]);
+}

@@ -1,0 +1,51 @@
+// @ts-check
+// The plotting library, loaded once, where a chart is drawn and after what can be drawn without it: running its megabytes
+// keeps the page busy for a second.
+
+/** @import { Plotting } from "./types.js" */
+
+/** @type {Promise<Plotting> | null} */
+let loading = null;
+
+/** Plotly, when its script has run; it is a file of this service. */
+export function plotly() {
+  loading ??= painted().then(script);
+  return loading;
+}
+
+/**
+ * When the browser has shown what there is so far.
+ * @returns {Promise<void>}
+ */
+export const painted = () =>
+  new Promise((resolve) => {
+    requestAnimationFrame(() => setTimeout(resolve));
+  });
+
+/** @returns {Promise<Plotting>} */
+const script = () =>
+  new Promise((resolve, reject) => {
+    const element = document.createElement("script");
+    const fail = () => {
+      loading = null;
+      element.remove();
+      reject(new Error("the plotting library did not load"));
+    };
+    element.src = new URL("../plotly.min.js", import.meta.url).href;
+    element.onload = () => (globalThis.Plotly ? resolve(globalThis.Plotly) : fail());
+    element.onerror = fail;
+    document.head.append(element);
+  });
+
+/** @type {boolean | null} */
+let webgl = null;
+
+/** Whether this browser can draw in 3D. */
+export function has3d() {
+  if (webgl === null) {
+    const context = document.createElement("canvas").getContext("webgl");
+    webgl = context !== null;
+    context?.getExtension("WEBGL_lose_context")?.loseContext();
+  }
+  return webgl;
+}

@@ -1,0 +1,78 @@
+// @ts-check
+// The traces that several charts draw: bands between two edges, and points or lines with error bars.
+
+import { fixed } from "../shared/format.js";
+import { HALF_OF_90 } from "./columns.js";
+import { faint, rampOf } from "./palette.js";
+
+/** @import { Colours, ErrorBars, PlainTrace } from "./types.js" */
+
+/** @typedef {(number | null)[]} Values */
+
+/**
+ * The title of an axis.
+ * @param {string} text
+ */
+export const titled = (text) => ({ title: { text } });
+
+/**
+ * A band between two edges, each with its own abscissae.
+ * @param {string} name
+ * @param {{ x: Values, y: Values }} lower
+ * @param {{ x: Values, y: Values }} upper
+ * @param {Colours} c
+ * @returns {PlainTrace[]}
+ */
+export function band(name, lower, upper, c) {
+  /** @type {Omit<PlainTrace, "x" | "y">} */
+  const edge = { mode: "lines", line: { width: 0 }, hoverinfo: "skip", showlegend: false };
+  const fillcolor = faint(c.accent, 0.2);
+  return [
+    { ...edge, ...lower },
+    { ...edge, ...upper, fill: "tonexty", fillcolor, name, showlegend: true },
+  ];
+}
+
+/**
+ * Bars that span the 90 % interval.
+ * @param {(number | null)[]} sds standard deviations; null draws none
+ * @param {string} color
+ * @param {{ thickness: number, width: number }} look
+ * @returns {ErrorBars}
+ */
+export const errorBars = (sds, color, look) => ({
+  type: "data",
+  array: sds.map((sd) => HALF_OF_90 * (sd ?? 0)),
+  color,
+  ...look,
+});
+
+/**
+ * A line with points and error bars for each pressure, over cycles.
+ * @param {number[]} pressures
+ * @param {(pressure: number) => { cycles: number, value: number, sd: number | null }[]} valuesAt
+ * @param {{ size: number, bars: number, text: string }} look `text` says a value under the pointer
+ * @param {Colours} c
+ * @returns {PlainTrace[]}
+ */
+export function linesByPressure(pressures, valuesAt, { size, bars, text }, c) {
+  return pressures.map((pressure, index) => {
+    const values = valuesAt(pressure);
+    const color = rampOf(c, index, pressures.length);
+    const name = `${fixed(pressure, 1)} bar`;
+    return {
+      name,
+      mode: "lines+markers",
+      x: values.map((value) => value.cycles),
+      y: values.map(({ value }) => value),
+      line: { color, width: 1.4 },
+      marker: { color, size },
+      error_y: errorBars(
+        values.map(({ sd }) => sd),
+        color,
+        { thickness: 1, width: bars },
+      ),
+      hovertemplate: `%{x:,.0f} cycles, ${name}<br>${text}<extra></extra>`,
+    };
+  });
+}

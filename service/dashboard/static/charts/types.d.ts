@@ -1,0 +1,207 @@
+// What charts are made of, as far as these pages use it: what a chart shows, the plotting library's data and layout, and the
+// little of the library itself that is called. For the checks alone; browsers never load this file.
+
+export type Cell = string | number | null | undefined;
+
+/** A column of a chart's table; `text` writes a number for a reader, the CSV has it raw. */
+export interface Column {
+  name: string;
+  text?: (value: number) => string;
+}
+
+/** What a chart shows: a drawing with its table, or what is missing and how to get it. */
+export type Spec =
+  | { empty: string; note?: undefined; columns?: undefined; rows?: undefined; figure?: undefined }
+  | { empty?: undefined; note: string; columns: Column[]; rows: Cell[][]; figure: (colours: Colours) => Figure };
+
+/** Colours as CSS; `ramp` gives one between fresh (0) and worn (1). */
+export type Colours = Record<ColourName, string> & { ramp: (share: number) => string };
+export type ColourName =
+  | "ink"
+  | "quiet"
+  | "line"
+  | "edge"
+  | "panel"
+  | "accent"
+  | "failure"
+  | "out"
+  | "check"
+  | "normal"
+  | "maintenance"
+  | "fresh"
+  | "midlife"
+  | "worn";
+export type Scheme = "light" | "dark" | null;
+
+export interface Figure {
+  data: Trace[];
+  layout: Layout;
+}
+
+export interface Line {
+  color?: string;
+  width?: number;
+  dash?: string;
+}
+
+export interface Marker {
+  color?: string;
+  size: number;
+  line?: { color: string; width: number };
+}
+
+export interface ErrorBars {
+  type: "data";
+  array: number[];
+  color: string;
+  thickness: number;
+  width: number;
+}
+
+/** Lines, points or a band over one pair of axes: what can be drawn without the library. */
+export interface PlainTrace {
+  type?: "scatter";
+  mode: string;
+  x: (number | null)[];
+  y: (number | null)[];
+  name?: string;
+  line?: Line;
+  marker?: Marker;
+  error_y?: ErrorBars;
+  fill?: "tonexty";
+  fillcolor?: string;
+  showlegend?: boolean;
+  legendgroup?: string;
+  hoverinfo?: "skip";
+  hovertemplate?: string;
+  xaxis?: string;
+  yaxis?: string;
+}
+
+export interface OtherTrace {
+  type: "surface" | "scatter3d" | "heatmap";
+  [name: string]: unknown;
+}
+
+export type Trace = PlainTrace | OtherTrace;
+export type Range = [number, number];
+
+export interface Axis {
+  title?: { text?: string; standoff?: number; font?: { size: number } };
+  range?: Range;
+  rangemode?: "tozero";
+  gridcolor?: string;
+  linecolor?: string;
+  [name: string]: unknown;
+}
+
+/** A line; `paper` counts from 0 to 1 over the whole chart. */
+export interface Shape {
+  type: "line";
+  x0: number;
+  x1: number;
+  y0: number;
+  y1: number;
+  xref?: "paper";
+  yref?: "paper";
+  line: Required<Line>;
+}
+
+export interface Annotation {
+  x: number;
+  y: number;
+  xref?: "paper";
+  yref?: "paper";
+  xanchor?: string;
+  yanchor?: string;
+  text: string;
+  textangle?: number;
+  showarrow: false;
+  font?: { size: number; color: string };
+}
+
+export interface Margin {
+  l: number;
+  r: number;
+  t: number;
+  b: number;
+}
+
+export interface Scene {
+  xaxis: Axis;
+  yaxis: Axis;
+  zaxis: Axis;
+}
+
+/** A chart's own layout. */
+export interface Layout {
+  xaxis?: Axis;
+  yaxis?: Axis;
+  scene?: Scene;
+  shapes?: Shape[];
+  annotations?: Annotation[];
+  margin?: Partial<Margin>;
+  legend?: object;
+  [name: string]: unknown;
+}
+
+export interface Font {
+  family: string;
+  size: number;
+  color: string;
+}
+
+/** A layout with all that the house adds. */
+export interface WholeLayout extends Layout {
+  font: Font;
+  margin: Margin;
+  legend: { font: { size: number }; [name: string]: unknown };
+  paper_bgcolor: string;
+}
+
+export interface FlatLayout extends WholeLayout {
+  xaxis: Axis;
+  yaxis: Axis;
+}
+
+export interface WholeFigure {
+  data: Trace[];
+  layout: WholeLayout;
+}
+
+export interface Tick {
+  at: number;
+  text: string;
+}
+
+export interface LegendEntry {
+  trace: PlainTrace;
+  width: number;
+  x: number;
+  y: number;
+}
+
+/** A figure whose axes, ticks and legend have their places before anything is drawn. */
+export interface SettledFigure {
+  data: PlainTrace[];
+  layout: FlatLayout & { xaxis: { range: Range }; yaxis: { range: Range } };
+  ticks: { x: Tick[]; y: Tick[] };
+  legend: { entries: LegendEntry[]; top: number };
+}
+
+export interface Size {
+  width: number;
+  height: number;
+}
+
+/** What is called of the plotting library. */
+export interface Plotting {
+  react(place: HTMLElement, data: Trace[], layout: Layout, config: object): Promise<unknown>;
+  purge(place: HTMLElement): void;
+  toImage(figure: HTMLElement | Figure, options: Size & { format: "png"; scale: number }): Promise<string>;
+}
+
+declare global {
+  /** Set by plotly.min.js. */
+  var Plotly: Plotting | undefined;
+}

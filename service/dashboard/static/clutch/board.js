@@ -1,0 +1,277 @@
+// @ts-check
+// The clutch page's charts and the choices above them.
+
+import { Chart, choice } from "../charts/chart.js";
+import { fan } from "../charts/fan.js";
+import { meanCof, remainingCycles } from "../charts/life.js";
+import { loopAreas, loopCurves, loopPressures } from "../charts/loops.js";
+import { landscape, parameter, PARAMETER_NAMES, PARAMETERS } from "../charts/parameters.js";
+import { flat, pressuresOf, spread, surface } from "../charts/stribeck.js";
+import { clutchPath, read } from "../shared/api.js";
+import { fixed } from "../shared/format.js";
+
+/** @import { Prediction } from "../charts/fan.js" */
+/** @import { ParameterName } from "../charts/parameters.js" */
+/** @import { Channels, ClutchOut, DegradationItem, LoopItem, Receipt, RemainingLife, RunOut, StribeckItem } from "../shared/types.js" */
+
+/**
+ * @typedef {object} Answers what the page has read of the clutch
+ * @property {ClutchOut} clutch
+ * @property {RemainingLife | null} life
+ * @property {DegradationItem[]} items
+ * @property {Prediction[]} predictions
+ * @property {StribeckItem[]} tests
+ * @property {LoopItem[]} loops
+ * @property {Receipt[]} runs
+ * @property {Receipt[]} events
+ */
+
+/**
+ * @typedef {object} Choices
+ * @property {number} [pressure]
+ * @property {string} [run]
+ * @property {"pressure" | "cycles"} over
+ * @property {ParameterName} parameter
+ * @property {"state" | "pressure"} loopsOver
+ * @property {number} [loopPressure]
+ * @property {string} [loopRun]
+ */
+
+/** The pressure that is shown first is the one closest to this, bar. */
+const USUAL_PRESSURE = 5;
+/** Most tests whose records the surface over cycles draws. */
+const MOST_ON_SURFACE = 9;
+
+/**
+ * The charts, each in its section.
+ * @param {() => string} name
+ * @param {(section: string) => HTMLElement} place
+ */
+function makeCharts(name, place) {
+  /** @type {(section: string, options: Omit<import("../charts/chart.js").Options, "name">) => Chart} */
+  const add = (section, options) => {
+    const chart = new Chart({ name, ...options });
+    place(section).append(chart.element);
+    return chart;
+  };
+  const fan = add("life", { id: "fan", title: "Mean COF against its threshold", wide: true, height: 420 });
+  const remaining = add("life", { id: "predicted", title: "Remaining cycles, as predicted" });
+  const cof = add("life", { id: "cof", title: "Mean COF by pressure" });
+  const curves = add("stribeck", { id: "stribeck", title: "Stribeck curves by state", height: 440 });
+  const surface = add("stribeck", { id: "surface", title: "Stribeck curves in 3D", spatial: true, height: 440 });
+  const parameters = PARAMETER_NAMES.map((key) => {
+    const { title, symbol: letter } = PARAMETERS[key];
+    return { key, chart: add("parameters", { id: key.replaceAll("_", "-"), title, letter, height: 300 }) };
+  });
+  const overAll = { id: "landscape", title: "A parameter over cycles and pressure", spatial: true, wide: true };
+  const landscape = add("parameters", { ...overAll, height: 440 });
+  const loops = add("loops", { id: "loop-curves", title: "Loops: torque over speed", height: 400 });
+  const areas = add("loops", { id: "loop-areas", title: "Loop area over cycles", height: 400 });
+  return { fan, remaining, cof, curves, surface, parameters, landscape, loops, areas };
+}
+
+export class Board {
+  /**
+   * @param {string} clutchId
+   * @param {() => string} name the start of saved files' names
+   * @param {(section: string) => HTMLElement} place where a section's charts go
+   */
+  constructor(clutchId, name, place) {
+    this.clutchId = clutchId;
+    this.charts = makeCharts(name, place);
+    /** @type {Answers | null} */
+    this.answers = null;
+    /** @type {Record<string, Channels>} */
+    this.channels = {};
+    /** @type {Choices} */
+    this.chosen = { over: "pressure", loopsOver: "state", parameter: "static_torque_nm" };
+  }
+
+  /**
+   * The charts of the remaining life, which come first.
+   * @param {Answers & { life: RemainingLife }} answers
+   */
+  life({ life, items, predictions, tests, events }) {
+    const pooled = items.find((item) => item.quantity === "mean_cof" && item.pressure_bar === null);
+    this.charts.remaining.show(remainingCycles({ life, predictions, events }));
+    if (tests.length > 0) this.charts.cof.show(meanCof({ tests, events }));
+    this.charts.fan.show(fan({ life, pooled, predictions, events }));
+  }
+
+  /** @param {Answers} answers for all other charts */
+  async rest(answers) {
+    this.answers = answers;
+    this.charts.cof.show(meanCof(answers));
+    this.parameters(answers);
+    this.charts.areas.show(loopAreas(answers));
+    await this.readChannels(answers);
+    this.stribeck(answers);
+    this.loopCurves(answers);
+  }
+
+  /**
+   * The raw channels of the tests that are drawn; a run never changes, so each is read once.
+   * @param {Answers} answers
+   */
+  async readChannels({ tests, loops }) {
+    const dynamic = [...new Set(loops.map((loop) => loop.run_id))];
+    const stationary = tests.map((test) => test.run_id);
+    const drawn = [...spread(stationary, MOST_ON_SURFACE), ...spread(stationary), ...spread(dynamic)];
+    const picked = [this.chosen.run, this.chosen.loopRun].filter(
+      (id) => stationary.includes(id ?? "") || dynamic.includes(id ?? ""),
+    );
+    const ids = new Set([...drawn, ...picked]);
+    await Promise.all([...ids].map((id) => this.readRun(id)));
+  }
+
+  /** @param {string | undefined} id */
+  async readRun(id) {
+    if (id === undefined || this.channels[id]) return;
+    /** @type {{ body: RunOut }} */
+    const { body } = await read(`${clutchPath(this.clutchId)}/runs/${encodeURIComponent(id)}`);
+    this.channels[id] = body.channels;
+  }
+
+  /**
+   * Draw again, with the answers that are there.
+   * @param {(answers: Answers) => void} draw
+   */
+  again(draw) {
+    if (this.answers) draw(this.answers);
+  }
+
+  /**
+   * The chosen pressure, or the one closest to the usual; undefined before the first test.
+   * @param {Answers} answers
+   */
+  pressure({ tests }) {
+    const levels = pressuresOf(tests);
+    const { pressure } = this.chosen;
+    if (pressure !== undefined && levels.includes(pressure)) return pressure;
+    /** @param {number} level */
+    const distance = (level) => Math.abs(level - USUAL_PRESSURE);
+    return levels.length === 0 ? undefined : levels.reduce((a, b) => (distance(b) < distance(a) ? b : a));
+  }
+
+  /** @param {Answers} answers */
+  pressureChoice(answers) {
+    return choice("Pressure", levelOptions(pressuresOf(answers.tests)), this.pressure(answers), (value) => {
+      this.chosen.pressure = Number(value);
+      this.again((latest) => {
+        this.stribeck(latest);
+        this.parameters(latest);
+      });
+    });
+  }
+
+  /** @param {Answers} answers */
+  stribeck(answers) {
+    const { tests, clutch } = answers;
+    const { over } = this.chosen;
+    const { curves, surface: spatial } = this.charts;
+    const shared = { tests, clutch, channels: this.channels, pressure: this.pressure(answers) };
+    const run = tests.some((test) => test.run_id === this.chosen.run) ? this.chosen.run : tests[0]?.run_id;
+    setControls(curves, tests.length > 0 ? [this.pressureChoice(answers)] : []);
+    curves.show(flat(shared));
+    const axis = choice(
+      "Torque over speed and",
+      [
+        ["pressure", "pressure"],
+        ["cycles", "cycles"],
+      ],
+      over,
+      (value) => {
+        this.chosen.over = value === "cycles" ? "cycles" : "pressure";
+        this.again((latest) => this.stribeck(latest));
+      },
+    );
+    const state = choice("State", stateOptions(tests), run, async (value) => {
+      this.chosen.run = value;
+      await this.readRun(value);
+      this.again((latest) => this.stribeck(latest));
+    });
+    setControls(spatial, tests.length > 0 ? [axis, over === "pressure" ? state : this.pressureChoice(answers)] : []);
+    spatial.show(surface({ ...shared, over, run }));
+  }
+
+  /** @param {Answers} answers */
+  parameters(answers) {
+    const { items, events, tests } = answers;
+    const pressure = this.pressure(answers);
+    for (const { key, chart } of this.charts.parameters) {
+      setControls(chart, tests.length > 0 ? [this.pressureChoice(answers)] : []);
+      chart.show(parameter({ items, events, name: key, pressure }));
+    }
+    const { parameter: name } = this.chosen;
+    const which = choice(
+      "Parameter",
+      PARAMETER_NAMES.map((key) => [key, PARAMETERS[key].title]),
+      name,
+      (value) => {
+        this.chosen.parameter = PARAMETER_NAMES.find((key) => key === value) ?? name;
+        this.again((latest) => this.parameters(latest));
+      },
+    );
+    setControls(this.charts.landscape, [which]);
+    this.charts.landscape.show(landscape({ items, name }));
+  }
+
+  /** @param {Answers} answers */
+  loopCurves({ loops }) {
+    const { loopsOver: over, loopPressure, loopRun } = this.chosen;
+    const levels = loopPressures(loops);
+    const runs = [...new Map(loops.map((loop) => [loop.run_id, loop])).values()];
+    const middle = levels[Math.floor(levels.length / 2)];
+    const pressure = loopPressure !== undefined && levels.includes(loopPressure) ? loopPressure : middle;
+    const run = runs.some((loop) => loop.run_id === loopRun) ? loopRun : runs[0]?.run_id;
+    const redraw = () => this.again((latest) => this.loopCurves(latest));
+    const axis = choice(
+      "Colour by",
+      [
+        ["state", "state"],
+        ["pressure", "pressure"],
+      ],
+      over,
+      (value) => {
+        this.chosen.loopsOver = value === "pressure" ? "pressure" : "state";
+        redraw();
+      },
+    );
+    const level = choice("Pressure", levelOptions(levels), pressure, (value) => {
+      this.chosen.loopPressure = Number(value);
+      redraw();
+    });
+    const state = choice("State", stateOptions(runs), run, async (value) => {
+      this.chosen.loopRun = value;
+      await this.readRun(value);
+      redraw();
+    });
+    setControls(this.charts.loops, loops.length > 0 ? [axis, over === "state" ? level : state] : []);
+    this.charts.loops.show(loopCurves({ loops, channels: this.channels, over, pressure, run }));
+  }
+}
+
+/**
+ * @param {number[]} levels
+ * @returns {[number, string][]}
+ */
+const levelOptions = (levels) => levels.map((level) => [level, `${fixed(level, 1)} bar`]);
+
+/**
+ * @param {{ run_id: string, cycles: number }[]} tests
+ * @returns {[string, string][]}
+ */
+const stateOptions = (tests) => tests.map((test) => [test.run_id, `${fixed(test.cycles)} cycles`]);
+
+/**
+ * Replace a chart's controls, keeping the focus on the one that was used.
+ * @param {Chart} chart
+ * @param {HTMLElement[]} controls
+ */
+function setControls(chart, controls) {
+  const focused = [...chart.controls.querySelectorAll("select")].findIndex(
+    (select) => select === document.activeElement,
+  );
+  chart.controls.replaceChildren(...controls);
+  if (focused >= 0) chart.controls.querySelectorAll("select")[focused]?.focus();
+}

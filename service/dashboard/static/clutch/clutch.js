@@ -1,0 +1,159 @@
+// @ts-check
+// The page of one clutch: its answers of the API are read when they change, and shown in sections that are drawn when seen.
+// Open this file first, then head.js (its state in one look), board.js (its charts and their choices), runs.js (its runs)
+// and report.js (the printed page).
+
+import { Diagnosis } from "../diagnosis/diagnosis.js";
+import { sender } from "../sending/sending.js";
+import { clutchPath, Problem, read, readAll } from "../shared/api.js";
+import { byId, h, within } from "../shared/dom.js";
+import { withKey } from "../shared/key.js";
+import { Live } from "../shared/live.js";
+import { liveBar } from "../shared/live_bar.js";
+import { openVerdict, stateOf } from "../shared/state.js";
+import { firstRun } from "../shared/welcome.js";
+import { Board } from "./board.js";
+import { head } from "./head.js";
+import { makeReport } from "./report.js";
+import { showRuns } from "./runs.js";
+
+/** @import { ClutchOut, DegradationItem, LoopItem, Receipt, RemainingLife, SeriesItem, StribeckItem } from "../shared/types.js" */
+/** @import { Answers } from "./board.js" */
+
+const ID = decodeURIComponent(location.pathname.split("/").at(-1) ?? "");
+const PATH = clutchPath(ID);
+const INTERVAL = 2000; // ms
+const SECTIONS = ["life", "diagnosis", "stribeck", "parameters", "loops", "runs"];
+const fileName = () => ID.replaceAll(/[^\w.-]+/g, "_");
+
+/**
+ * What is shown now.
+ * @type {Answers | null}
+ */
+let shown = null;
+let due = true;
+/**
+ * The page's parts, once there is something to put into them.
+ * @type {{ board: Board, diagnosis: Diagnosis } | null}
+ */
+let parts = null;
+document.title = `${ID} · Clutchlife`;
+
+async function poll() {
+  /** @type {{ body: ClutchOut, changed: boolean }} */
+  let answer;
+  try {
+    answer = await read(PATH);
+  } catch (problem) {
+    if (!(problem instanceof Problem && problem.status === 404)) throw problem;
+    showUnregistered();
+    return;
+  }
+  due ||= answer.changed; // until all of it is read: an error midway is made good at the next poll
+  if (due) {
+    await refresh(answer.body);
+    due = false;
+  } else if (parts !== null) {
+    await parts.diagnosis.poll();
+    drawHead();
+  }
+}
+
+/** @param {ClutchOut} clutch */
+async function refresh(clutch) {
+  /** @type {Answers} */
+  const nothing = { clutch, life: null, items: [], predictions: [], tests: [], loops: [], runs: [], events: [] };
+  if (clutch.runs === 0) {
+    shown = nothing;
+    drawHead();
+    if (!document.getElementById("first")) byId("head").after(h("div", { id: "first" }, firstRun(ID)));
+    return;
+  }
+  if (shown === null) {
+    shown = nothing;
+    drawHead();
+  }
+  const first = await readLife(); // what the first chart needs comes first
+  const { board, diagnosis } = begin();
+  shown = { ...shown, clutch, ...first };
+  drawHead();
+  diagnosis.setModel(first.life.model);
+  board.life({ ...shown, ...first });
+  await diagnosis.poll();
+  drawHead();
+  const rest = await readRest();
+  shown = { clutch, ...first, ...rest };
+  showRuns(within("runs", ".body"), rest.runs, ID);
+  if (rest.events.length > 0) board.life({ ...shown, ...first });
+  await board.rest(shown);
+  makeReport(byId("report"), shown, board, diagnosis.latest);
+}
+
+/** Remaining life, degradation and the earlier predictions. */
+async function readLife() {
+  /** @type {[{ body: RemainingLife }, { items: DegradationItem[] }, { items: SeriesItem[] }, { items: SeriesItem[] }]} */
+  const [life, degradation, remaining, cof] = await Promise.all([
+    read(`${PATH}/remaining-useful-life`),
+    readAll(`${PATH}/degradation`),
+    readAll(`${PATH}/series?quantity=remaining_cycles`),
+    readAll(`${PATH}/series?quantity=mean_cof`),
+  ]);
+  const pooled = cof.items.filter((row) => row.pressure_bar === null && row.run_id === null);
+  const cofAt = new Map(pooled.map((row) => [row.cycles, row.value]));
+  const predictions = remaining.items.map((row) => {
+    return { at: row.cycles, cof: cofAt.get(row.cycles) ?? null, remaining: row };
+  });
+  return { life: life.body, items: degradation.items, predictions };
+}
+
+/** Tests, loops, runs and events. */
+async function readRest() {
+  /** @type {[{ items: StribeckItem[] }, { items: LoopItem[] }, { items: Receipt[] }]} */
+  const [tests, loops, runs] = await Promise.all([
+    readAll(`${PATH}/stribeck?limit=1000`),
+    readAll(`${PATH}/loops`),
+    readAll(`${PATH}/runs?limit=1000`),
+  ]);
+  const events = runs.items.filter((run) => run.kind === "maintenance");
+  return { tests: tests.items, loops: loops.items, runs: runs.items, events };
+}
+
+/** The page's parts, made when there is first something to put into them. */
+function begin() {
+  if (parts !== null) return parts;
+  document.getElementById("first")?.remove();
+  for (const section of SECTIONS) byId(section).hidden = false;
+  byId("sections").hidden = false;
+  const board = new Board(ID, fileName, (section) => within(section, ".charts"));
+  const diagnosis = new Diagnosis(within("diagnosis", ".body"), ID, fileName, () => live.now());
+  parts = { board, diagnosis };
+  return parts;
+}
+
+/** The head, drawn again where something in it is another than before. */
+function drawHead() {
+  if (shown === null) return;
+  const { clutch, life } = shown;
+  const state = stateOf(clutch.summary, openVerdict(parts?.diagnosis.latest));
+  const text = JSON.stringify([clutch, life, state]);
+  const place = byId("head");
+  if (place.dataset.shown === text) return;
+  place.dataset.shown = text;
+  place.replaceChildren(...head(clutch, life, state));
+}
+
+function showUnregistered() {
+  const text = `No clutch is registered as “${ID}”. It appears here as soon as it is. `;
+  const link = h("a", { href: "/" }, "All clutches");
+  const notice = h("div", { class: "notice bad" }, h("h1", {}, "No such clutch"), h("p", {}, text, link));
+  byId("head").replaceChildren(notice);
+  delete byId("head").dataset.shown;
+}
+
+byId("print").addEventListener("click", () => {
+  if (shown && parts) makeReport(byId("report"), shown, parts.board, parts.diagnosis.latest);
+  print();
+});
+const live = new Live(withKey(poll), liveBar(byId("live")), INTERVAL);
+sender(byId("send"), { clutches: () => [ID], sent: () => live.now() });
+live.start();

@@ -1,0 +1,88 @@
+// @ts-check
+// The state of a clutch in one look: title, verdict, tiles.
+
+import { h } from "../shared/dom.js";
+import { cycles, fixed, interval, percent, probability, withSd, words } from "../shared/format.js";
+import { healthBar } from "../shared/sparkline.js";
+import { stateIcon, STATES } from "../shared/state.js";
+
+/** @import { Content } from "../shared/dom.js" */
+/** @import { State } from "../shared/state.js" */
+/** @import { ClutchOut, RemainingLife } from "../shared/types.js" */
+
+/**
+ * @param {ClutchOut} clutch
+ * @param {RemainingLife | null} life null before the first run
+ * @param {State} state
+ * @returns {HTMLElement[]}
+ */
+export function head(clutch, life, state) {
+  const simulated = clutch.origin === "simulated" && h("span", { class: "tag" }, "simulated");
+  const title = h(
+    "div",
+    { class: "title" },
+    h("h1", {}, clutch.clutch_id, simulated),
+    h(
+      "p",
+      { class: `verdict state state-${state.name}` },
+      stateIcon(state.name),
+      h("b", {}, STATES[state.name].word),
+      h("span", { class: "quiet" }, state.why),
+    ),
+    h("p", { class: "quiet" }, description(clutch)),
+  );
+  return life === null ? [title] : [title, h("dl", { class: "tiles" }, tiles(clutch, life, state))];
+}
+
+/** @param {ClutchOut} clutch */
+function description({ friction_material: material, reaction_plate: plate, fluid, geometry, end_of_life: end }) {
+  const { inner_diameter_mm: inner, outer_diameter_mm: outer, friction_faces: faces } = geometry;
+  const disc = `${fixed(inner)}/${fixed(outer)} mm, ${faces} ${faces === 1 ? "face" : "faces"}`;
+  const limit = `end of life at ${percent(end.cof_fraction)} of the new mean COF`;
+  return `${words(material)} on ${plate}, ${fluid}; ${disc}; ${limit}`;
+}
+
+/**
+ * @param {ClutchOut} clutch
+ * @param {RemainingLife} life
+ * @param {State} state
+ */
+function tiles(clutch, life, state) {
+  const { current, model, status } = life;
+  const { health } = current;
+  const [cof, deviation] = withSd(current.mean_cof, current.mean_cof_sd).split(" ± ");
+  const spread = deviation ? `± ${deviation}; ` : "";
+  const quantiles = status === "predicted" ? `90 %: ${interval(life.remaining_cycles)}` : words(status);
+  const used = `${life.runs_used} ${life.runs_used === 1 ? "test" : "tests"} used, ${clutch.runs} runs`;
+  const effects = model.effects.length > 0 ? model.effects.map(words).join(", ") : "without extension";
+  return [
+    tile("Health", percent(health), health === null ? null : healthBar(health, state.name)),
+    tile("Remaining cycles", remaining(life), small(quantiles)),
+    tile("Mean COF", cof, small(`${spread}${percent(current.fraction_of_initial, 1)} of new`)),
+    tile("Duty cycles so far", fixed(life.as_of_cycles), small(used)),
+    tile(
+      "Reaches end of life",
+      probability(life.probability_of_reaching),
+      small(`within ${fixed(life.horizon_cycles)} cycles`),
+    ),
+    tile("Model", words(model.name), small(effects)),
+  ];
+}
+
+/** @param {string} text */
+const small = (text) => h("small", {}, text);
+
+/**
+ * @param {string} name
+ * @param {string} value
+ * @param {Content} more
+ */
+const tile = (name, value, more) =>
+  h("div", { class: "tile" }, h("dt", {}, name), h("dd", {}, h("span", { class: "big" }, value), more));
+
+/** @param {RemainingLife} life */
+function remaining({ status, remaining_cycles: q }) {
+  if (status === "insufficient_data") return "–";
+  if (status === "reached") return "0";
+  return q["0.5"] === null ? "may never end" : cycles(q["0.5"], q["0.05"], q["0.95"]);
+}

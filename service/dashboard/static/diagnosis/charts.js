@@ -1,0 +1,244 @@
+// @ts-check
+// The residuals between data and model, before and after the extension; and the loops under both.
+
+import { Chart } from "../charts/chart.js";
+import { column } from "../charts/columns.js";
+import { titled } from "../charts/traces.js";
+import { fixed, significant } from "../shared/format.js";
+
+/** @import { Annotation, Axis, Colours, PlainTrace, Spec, Trace } from "../charts/types.js" */
+/** @import { DiagnosisOut, LoopTraceOut, MapsOut, Table } from "../shared/types.js" */
+
+/** @typedef {"before" | "after"} Side */
+
+/**
+ * @typedef {object} ResidualsMap
+ * @property {string} id
+ * @property {string} title
+ * @property {"speed_pressure" | "pressure_cycles"} key
+ * @property {boolean} columnwise whether the table comes with a row an x; all are drawn with a row a y
+ * @property {"speed_rpm" | "cycles"} x
+ * @property {"pressure_bar"} y
+ * @property {string} xName
+ * @property {string} yName
+ */
+
+const NARROW = matchMedia("(max-width: 600px)");
+
+/** @type {ResidualsMap[]} */
+const MAPS = [
+  {
+    id: "map-speed",
+    title: "Residuals over speed and pressure",
+    key: "speed_pressure",
+    columnwise: false,
+    x: "speed_rpm",
+    y: "pressure_bar",
+    xName: "speed, rpm",
+    yName: "pressure, bar",
+  },
+  {
+    id: "map-cycles",
+    title: "Residuals over cycles and pressure",
+    key: "pressure_cycles",
+    columnwise: true,
+    x: "cycles",
+    y: "pressure_bar",
+    xName: "duty cycles",
+    yName: "pressure, bar",
+  },
+];
+
+/**
+ * The diagnosis' charts, each with what it shows of a report (null: nothing).
+ * @param {() => string} name the start of saved files' names
+ * @returns {{ chart: Chart, spec: (report: DiagnosisOut) => Spec | null }[]}
+ */
+export function charts(name) {
+  const loops = new Chart({ id: "diagnosis-loops", title: "Loops under both models", name, wide: true, height: 380 });
+  return [
+    ...MAPS.map((map) => ({
+      chart: new Chart({ id: map.id, title: map.title, name, height: 330 }),
+      spec: (/** @type {DiagnosisOut} */ report) => mapSpec(report.maps, map),
+    })),
+    { chart: loops, spec: (report) => loopSpec(report.loops ?? []) },
+  ];
+}
+
+/**
+ * @param {MapsOut | null | undefined} maps
+ * @param {ResidualsMap} map
+ * @returns {Spec | null}
+ */
+function mapSpec(maps, map) {
+  const { key, columnwise, x, y, xName, yName } = map;
+  if (!maps?.before?.[key] || !maps.axes?.[x] || !maps.axes?.[y]) return null;
+  const [xs, ys] = [maps.axes[x], maps.axes[y]];
+  const sides = /** @type {Side[]} */ (["before", "after"])
+    .filter((side) => maps[side]?.[key])
+    .map((side) => ({ side, z: columnwise ? turned(maps[side][key], ys) : maps[side][key] }));
+  return {
+    note: "Mean residual in units of sigma: pure noise stays pale. The scale is the same before and after.",
+    columns: [{ name: "model" }, column(xName), column(yName, 2), column("residual, sigma", 2)],
+    rows: sides.flatMap(({ side, z }) => z.flatMap((row, j) => row.map((value, i) => [side, xs[i], ys[j], value]))),
+    figure: (c) => ({
+      data: heatmaps(sides, { xs, ys, xName, yName }, c),
+      layout: mapLayout(
+        sides.map(({ side }) => side),
+        { xName, yName },
+      ),
+    }),
+  };
+}
+
+/**
+ * @param {{ side: Side, z: Table }[]} sides
+ * @param {{ xs: number[], ys: number[], xName: string, yName: string }} axes
+ * @param {Colours} c
+ * @returns {Trace[]}
+ */
+function heatmaps(sides, { xs, ys, xName, yName }, c) {
+  const magnitudes = sides.flatMap(({ z }) => z.flat().flatMap((value) => (value === null ? [] : [Math.abs(value)])));
+  const most = Math.max(1, ...magnitudes);
+  return sides.map(({ side, z }, index) => ({
+    type: "heatmap",
+    x: xs.map((value) => fixed(value)),
+    y: ys.map((value) => significant(value, 3)),
+    z,
+    zmin: -most,
+    zmax: most,
+    xaxis: index ? "x2" : "x",
+    yaxis: "y",
+    xgap: 1,
+    ygap: 1,
+    colorscale: [
+      [0, c.fresh],
+      [0.5, c.panel],
+      [1, c.worn],
+    ],
+    showscale: index === sides.length - 1,
+    colorbar: { ...titled("σ"), thickness: 12, outlinewidth: 0 },
+    hovertemplate: `${side}<br>${xName} %{x}<br>${yName} %{y}<br>%{z:.2f} σ<extra></extra>`,
+  }));
+}
+
+/**
+ * One or two maps beside each other, each under its name.
+ * @param {Side[]} sides
+ * @param {{ xName: string, yName: string }} names
+ */
+function mapLayout(sides, { xName, yName }) {
+  const two = sides.length > 1;
+  /** @type {(domain: [number, number]) => Axis} */
+  const abscissa = (domain) => ({
+    ...titled(xName),
+    domain,
+    type: "category",
+    nticks: NARROW.matches ? 3 : 5,
+    tickangle: 0,
+    showgrid: false,
+  });
+  const middles = two ? [0.24, 0.76] : [0.5];
+  /** @type {Annotation[]} */
+  const annotations = sides.map((side, index) => {
+    const place = {
+      x: middles[index],
+      xref: /** @type {const} */ ("paper"),
+      y: 1,
+      yref: /** @type {const} */ ("paper"),
+    };
+    return { text: `<b>${side}</b>`, ...place, yanchor: "bottom", showarrow: false };
+  });
+  return {
+    grid: { rows: 1, columns: sides.length },
+    hovermode: "closest",
+    xaxis: abscissa(two ? [0, 0.48] : [0, 1]),
+    ...(two ? { xaxis2: abscissa([0.52, 1]) } : {}),
+    yaxis: { ...titled(yName), type: "category", showgrid: false },
+    margin: { t: 30 },
+    annotations,
+  };
+}
+
+/**
+ * Rows and columns exchanged.
+ * @param {Table} z
+ * @param {number[]} ys
+ * @returns {Table}
+ */
+const turned = (z, ys) => ys.map((_, j) => z.map((row) => row[j] ?? null));
+
+/** @typedef {"measured" | "baseline" | "extended"} Kind */
+/** @typedef {"measured_nm" | "baseline_nm" | "extended_nm"} TorqueKey */
+
+/** @type {[Kind, TorqueKey][]} */
+const KINDS = [
+  ["measured", "measured_nm"],
+  ["baseline", "baseline_nm"],
+  ["extended", "extended_nm"],
+];
+
+/**
+ * @param {LoopTraceOut[]} loops
+ * @returns {Spec | null}
+ */
+function loopSpec(loops) {
+  if (loops.length === 0) return null;
+  const kinds = KINDS.filter(([, key]) => loops.every((loop) => loop[key]));
+  const shown = loops.slice(0, NARROW.matches ? 1 : 3);
+  const axes = shown.flatMap((_, place) => [
+    [`xaxis${suffix(place)}`, titled("speed, rpm")],
+    [`yaxis${suffix(place)}`, titled(place ? "" : "torque, Nm")],
+  ]);
+  return {
+    note: shown.map(loopName).join(" · "),
+    columns: [{ name: "loop" }, { name: "model" }, column("speed, rpm", 1), column("torque, Nm", 2)],
+    rows: loops.flatMap((loop) =>
+      kinds.flatMap(([kind, key]) =>
+        loop.speed_rpm.map((speed, index) => [loopName(loop), kind, speed, loop[key][index]]),
+      ),
+    ),
+    figure: (c) => ({
+      data: shown.flatMap((loop, place) => kinds.map(([kind, key]) => loopTrace(loop, { place, kind, key }, c))),
+      layout: {
+        grid: { rows: 1, columns: shown.length, pattern: "independent", xgap: 0.12 },
+        ...Object.fromEntries(axes),
+      },
+    }),
+  };
+}
+
+/**
+ * What the plotting library adds to an axis' name: nothing to the first one's.
+ * @param {number} place
+ */
+const suffix = (place) => (place ? String(place + 1) : "");
+
+/** @param {LoopTraceOut} loop */
+function loopName({ cycles, pressure_bar: pressure, frequency_hz: frequency }) {
+  const rate = frequency ? `, ${significant(frequency, 2)} Hz` : "";
+  return `${fixed(cycles)} cycles, ${fixed(pressure, 1)} bar${rate}`;
+}
+
+/**
+ * @param {LoopTraceOut} loop
+ * @param {{ place: number, kind: Kind, key: TorqueKey }} options
+ * @param {Colours} c
+ * @returns {PlainTrace}
+ */
+function loopTrace(loop, { place, kind, key }, c) {
+  const baseline = kind === "baseline";
+  return {
+    name: kind,
+    showlegend: place === 0,
+    legendgroup: kind,
+    x: loop.speed_rpm,
+    y: loop[key],
+    xaxis: `x${suffix(place)}`,
+    yaxis: `y${suffix(place)}`,
+    mode: kind === "measured" ? "markers" : "lines",
+    marker: { size: 3, color: c.quiet },
+    line: { width: 2, color: baseline ? c.worn : c.accent, dash: baseline ? "dash" : "solid" },
+    hovertemplate: `${kind}<br>%{x:.0f} rpm, %{y:.2f} Nm<extra></extra>`,
+  };
+}

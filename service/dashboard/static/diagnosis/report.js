@@ -1,0 +1,212 @@
+// @ts-check
+// A finished report in words and tables.
+
+import { h, scrolling, svg, table } from "../shared/dom.js";
+import { cycles, fixed, moment, percent, probability, quantity, significant, withSd, words } from "../shared/format.js";
+import { VERDICTS } from "../shared/state.js";
+import { lifeBars } from "./lifebars.js";
+
+/** @import { Content } from "../shared/dom.js" */
+/** @import { CandidateOut, DiagnosisOut, GainOut, MisfitOut } from "../shared/types.js" */
+
+/** @type {Record<string, (causes: string) => string>} */
+const SENTENCES = {
+  model_adequate: () => "Nothing is left beyond noise and run-to-run scatter: the model is adequate.",
+  cause_named: (causes) =>
+    `The data disagree with the model, and ${causes} ${causes.includes(" and ") ? "account" : "accounts"} for it.`,
+  cause_ambiguous: (causes) => `The data disagree with the model; ${causes} cannot be distinguished with these runs.`,
+  unexplained_structure: () => "The data disagree with the model, and no cause in the catalogue accounts for it.",
+  insufficient_data: () => "There is too little data for a verdict.",
+};
+
+/** @type {Record<string, string>} */
+const NOTICES = { model_adequate: "good", cause_named: "bad", cause_ambiguous: "bad", unexplained_structure: "bad" };
+
+const MOST_ROWS = 8;
+
+/**
+ * The report's elements.
+ * @param {DiagnosisOut} diagnosis
+ */
+export function report(diagnosis) {
+  if (diagnosis.status === "failed") {
+    const reason = diagnosis.problem ?? "";
+    return [h("p", { class: "notice bad" }, h("b", {}, "The diagnosis failed. "), reason)];
+  }
+  const verdict = diagnosis.verdict ?? "";
+  const date = `${moment(diagnosis.created_at)}, of the runs up to ${cycles(diagnosis.as_of_cycles, 0, 20)} cycles.`;
+  return [
+    h(
+      "div",
+      { class: `notice ${NOTICES[verdict] ?? ""}` },
+      h("p", { class: "verdict" }, h("b", {}, `${VERDICTS[verdict] ?? words(verdict)}. `), sentence(diagnosis)),
+      diagnosis.summary ? h("p", {}, diagnosis.summary) : null,
+      h("p", { class: "quiet" }, date, outdated(diagnosis)),
+    ),
+    h(
+      "div",
+      { class: "columns" },
+      candidates(diagnosis),
+      fitness(diagnosis),
+      gain(diagnosis),
+      where(diagnosis),
+      advice(diagnosis),
+      notes(diagnosis),
+      visible(diagnosis),
+    ),
+  ];
+}
+
+/** @param {DiagnosisOut} diagnosis */
+function outdated({ earlier_life: earlier, stale }) {
+  if (earlier) return h("b", {}, " The clutch has been rebuilt since: this is of its earlier life.");
+  return stale ? h("b", {}, " Runs have been added since: run it again.") : null;
+}
+
+/**
+ * The verdict as a sentence.
+ * @param {{ verdict: string | null, causes?: string[] }} diagnosis
+ */
+export function sentence({ verdict, causes = [] }) {
+  const names = causes.map((cause) => words(cause).toLowerCase());
+  const last = names.at(-1) ?? "the named cause";
+  const joined = names.length > 1 ? `${names.slice(0, -1).join(", ")} and ${last}` : last;
+  return SENTENCES[verdict ?? ""]?.(joined) ?? "";
+}
+
+/**
+ * @param {string} title
+ * @param {Content[]} content
+ */
+const part = (title, ...content) => h("div", { class: "part" }, h("h3", {}, title), ...content);
+
+/** @param {DiagnosisOut} diagnosis */
+function candidates({ candidates: all = [], causes = [] }) {
+  if (all.length === 0) return null;
+  const rows = all.slice(0, MOST_ROWS).map((candidate) => {
+    const { effect, title } = candidate;
+    return [
+      h("span", { class: causes.includes(effect) ? "named" : null, title: effect }, title || words(effect)),
+      h("span", { class: "chance" }, chance(candidate.probability), probability(candidate.probability)),
+      fixed(candidate.log_evidence_gain, 1),
+      estimated(candidate),
+    ];
+  });
+  const columns = ["Cause", "Probability", "Evidence gain, nats", "Estimate"];
+  return h(
+    "div",
+    { class: "part wide" },
+    h("h3", {}, "Candidates"),
+    scrolling("Candidates", table("Candidate causes", columns, rows)),
+  );
+}
+
+/** @param {CandidateOut} candidate */
+function estimated({ estimate }) {
+  if (!estimate) return "–";
+  const name = estimate.name ? `${words(estimate.name)} ` : "";
+  return `${name}${withSd(estimate.value, estimate.sd)} ${estimate.unit.replace(/^[-1]$/, "")}`;
+}
+
+/** @param {number | null} value */
+function chance(value) {
+  const size = { width: 60, height: 8 };
+  const width = (60 * (value ?? 0)).toFixed(1);
+  return svg(
+    "svg",
+    { viewBox: "0 0 60 8", ...size, "aria-hidden": "true" },
+    svg("rect", { class: "axis", ...size, rx: 3 }),
+    svg("rect", { class: "fill", width, height: 8, rx: 3 }),
+  );
+}
+
+/** @param {DiagnosisOut} diagnosis */
+function fitness({ baseline, extended }) {
+  if (!baseline) return null;
+  /** @type {(name: string, misfit: MisfitOut) => string[]} */
+  const line = (name, misfit) => [
+    name,
+    significant(misfit.rmse_nm, 3),
+    significant(misfit.noise_nm, 3),
+    percent(misfit.unexplained_share, 1),
+  ];
+  const rows = [line("Baseline", baseline), ...(extended ? [line("Extended", extended)] : [])];
+  return part("Fit to all runs", table("Fit", ["Model", "RMSE, Nm", "Noise, Nm", "Unexplained"], rows));
+}
+
+/** @param {DiagnosisOut} diagnosis */
+function gain({ gain: gained }) {
+  if (!gained) return null;
+  const bars = gained.remaining_useful_life ? lifeBars(gained.remaining_useful_life) : null;
+  const error = errorGain(gained);
+  if (error === null && bars === null) return null;
+  return part("Gain on runs held out", error, bars && h("h4", {}, "Remaining cycles"), bars);
+}
+
+/** @param {GainOut} gained */
+function errorGain(gained) {
+  if (gained.rmse_before_nm === null || gained.rmse_before_nm === undefined) return null;
+  const count = gained.held_out_runs?.length ?? 0;
+  const [before, after] = [gained.rmse_before_nm, gained.rmse_after_nm].map((rmse) => significant(rmse, 3));
+  const scores = [
+    scoreText("on the held-out runs", gained.log_score_gain),
+    scoreText("in predicting the last states from the first", gained.prediction_log_score_gain),
+  ];
+  return h(
+    "p",
+    { title: scores.filter(Boolean).join("; ") || null },
+    h("b", {}, `${fixed(gained.reduction_percent)} % less error`),
+    ` on ${count} held-out ${count === 1 ? "run" : "runs"}: ${before} → ${after} Nm RMS.`,
+  );
+}
+
+/**
+ * @param {string} place
+ * @param {number | null | undefined} nats
+ */
+const scoreText = (place, nats) =>
+  nats === null || nats === undefined ? "" : `log score ${nats >= 0 ? "+" : ""}${fixed(nats, 1)} nats ${place}`;
+
+/** @param {DiagnosisOut} diagnosis */
+function where({ baseline }) {
+  const axes = baseline?.where ?? [];
+  if (axes.length === 0) return null;
+  const rows = axes.slice(0, MOST_ROWS).map(({ axis, strength, p_value: p }) => {
+    return [quantity(axis), significant(strength, 3), p !== null && p < 0.001 ? "< 0.001" : significant(p, 2)];
+  });
+  return part("Where the baseline falls short", table("Where", ["Along", "Strength, nats", "p"], rows));
+}
+
+/** @param {DiagnosisOut} diagnosis */
+function advice({ advice: tests = [] }) {
+  if (tests.length === 0) return null;
+  const items = tests.map(({ test, separates }) => {
+    const names = (separates ?? []).map((name) => words(name).toLowerCase()).join(" from ");
+    return h("li", {}, h("b", {}, test), names && h("span", { class: "quiet" }, ` distinguishes ${names}`));
+  });
+  return part("The test that would decide", h("ul", {}, items));
+}
+
+/** @param {DiagnosisOut} diagnosis */
+function notes({ notes: all = [] }) {
+  const items = all.map((note) => h("li", {}, note));
+  return items.length > 0 ? part("Notes", h("ul", {}, items)) : null;
+}
+
+const VISIBLE =
+  "The smallest amplitude that would have been detected, for each effect in the middle one of its shapes, computed before " +
+  "any residual was looked at.";
+
+/** @param {DiagnosisOut} diagnosis */
+function visible({ visible: all = [] }) {
+  if (all.length === 0) return null;
+  const rows = all.map(({ effect, amplitude, unit }) => [words(effect), significant(amplitude, 3), unit ?? ""]);
+  const label = "Smallest visible amplitudes";
+  return h(
+    "details",
+    { class: "part" },
+    h("summary", {}, "What these runs would show"),
+    h("p", { class: "quiet" }, VISIBLE),
+    scrolling(label, table(label, ["Effect", "Amplitude", "Unit"], rows)),
+  );
+}

@@ -1,0 +1,121 @@
+// @ts-check
+// One clutch in the fleet's table.
+
+import { h } from "../shared/dom.js";
+import { age, cycles, fixed, interval, kindName, percent, words } from "../shared/format.js";
+import { healthBar, intervalBar, sparkline } from "../shared/sparkline.js";
+import { stateIcon, STATES, VERDICTS } from "../shared/state.js";
+
+/** @import { Content } from "../shared/dom.js" */
+/** @import { State, StateName } from "../shared/state.js" */
+/** @import { ClutchOut, ClutchSummary } from "../shared/types.js" */
+
+export const COLUMNS = [
+  "State",
+  "Clutch",
+  "Health",
+  "Remaining cycles, 90 % interval",
+  "Mean COF over cycles",
+  "Last run",
+  "Diagnosis",
+];
+
+/**
+ * The row; `scale` is the cycles at the right end of every interval's bar.
+ * @param {ClutchOut} clutch
+ * @param {State} state
+ * @param {number} scale
+ */
+export function row(clutch, state, scale) {
+  const { summary } = clutch;
+  const address = `/clutches/${encodeURIComponent(clutch.clutch_id)}`;
+  const label = h("span", {}, STATES[state.name].word, small(state.why));
+  return h(
+    "tr",
+    { role: "row", "data-clutch": clutch.clutch_id },
+    cell("State", h("span", { class: "state" }, stateIcon(state.name), label)),
+    h(
+      "th",
+      { role: "rowheader", scope: "row", "data-label": "Clutch" },
+      h("a", { href: address }, clutch.clutch_id),
+      clutch.origin === "simulated" && h("span", { class: "tag" }, "simulated"),
+      small(`${clutch.friction_material} on ${clutch.reaction_plate}`),
+    ),
+    cell("Health", ...health(summary, state.name)),
+    cell("Remaining", ...remaining(summary, scale)),
+    cell("Mean COF", ...meanCof(clutch)),
+    cell("Last run", ...lastRun(clutch)),
+    cell("Diagnosis", ...diagnosis(clutch, address)),
+  );
+}
+
+/**
+ * @param {string} name
+ * @param {Content[]} content
+ */
+const cell = (name, ...content) => h("td", { role: "cell", "data-label": name }, ...content);
+
+/** @param {string} text */
+const number = (text) => h("span", { class: "number" }, text);
+/** @param {string} text */
+const small = (text) => h("small", {}, text);
+
+/**
+ * @param {ClutchSummary | null} summary
+ * @param {StateName} state
+ */
+function health(summary, state) {
+  const value = summary?.current.health ?? null;
+  return value === null ? ["–"] : [number(percent(value)), healthBar(value, state)];
+}
+
+/**
+ * @param {ClutchSummary | null} summary
+ * @param {number} scale
+ */
+function remaining(summary, scale) {
+  if (summary === null || summary.status === "insufficient_data") return ["–", small("after three tests")];
+  if (summary.status === "reached") return [number("0"), small("reached")];
+  const q = summary.remaining_cycles;
+  const median = q["0.5"] === null ? "may never end" : cycles(q["0.5"], q["0.05"], q["0.95"]);
+  return [number(median), intervalBar(q, scale), small(interval(q))];
+}
+
+/** @param {ClutchOut} clutch */
+function meanCof({ summary, recent, end_of_life: end }) {
+  const cof = summary?.current.mean_cof ?? null;
+  const share = summary?.current.fraction_of_initial ?? null;
+  if (cof === null) return ["–"];
+  const threshold = share ? (end.cof_fraction * cof) / share : null;
+  return [
+    sparkline(recent?.mean_cof ?? [], threshold),
+    h("span", { class: "beside" }, number(fixed(cof, 4)), small(`${percent(share)} of new`)),
+  ];
+}
+
+/** @param {ClutchOut} clutch */
+function lastRun({ recent }) {
+  if (recent === null) return ["none"];
+  const { at, kind, cycles: count } = recent.last_run;
+  const when = Date.parse(at);
+  const title = new Date(when).toLocaleString("en-GB");
+  return [
+    h("time", { datetime: at, title, "data-age": String(when) }, age(when)),
+    small(`${kindName(kind)} at ${cycles(count, 0, 20)} cycles`),
+  ];
+}
+
+/**
+ * @param {ClutchOut} clutch
+ * @param {string} address
+ */
+function diagnosis({ diagnosis: latest }, address) {
+  if (latest === null) return [h("span", { class: "quiet" }, "not run")];
+  const verdict = latest.verdict ?? "";
+  const causes = latest.causes.map(words).join(", ");
+  const remarks = [causes, latest.adopted && "adopted", latest.earlier_life && "before the rebuild"];
+  return [
+    h("a", { href: `${address}#diagnosis` }, VERDICTS[verdict] ?? words(verdict)),
+    small(remarks.filter(Boolean).join(" · ")),
+  ];
+}

@@ -1,0 +1,152 @@
+// @ts-check
+// Shared by both pages: answers of the API go in; values, elements, texts and states come out. Nothing here imports another
+// chapter. Open this file first (the reader's key, entity tags, errors as values), then dom.js and format.js; the shapes of
+// the API's answers are in types.d.ts.
+
+/** @import { ListPage, ProblemError } from "./types.js" */
+
+const KEY = "clutchlife-key";
+
+export const key = {
+  get: () => {
+    try {
+      return sessionStorage.getItem(KEY);
+    } catch {
+      return null;
+    }
+  },
+  /** @param {string} text */
+  set: (text) => {
+    try {
+      sessionStorage.setItem(KEY, text);
+    } catch {
+      /* the key holds for this request only */
+    }
+  },
+};
+
+/** An answer that is no success; `status` 0 means that there was no answer at all. */
+export class Problem extends Error {
+  /**
+   * @param {number} status
+   * @param {{ title?: string, detail?: string, errors?: ProblemError[], total_errors?: number }} [body] of RFC 9457
+   * @param {number | null} [retryAfter] seconds
+   */
+  constructor(status, { title = "", detail = "", errors = [], total_errors: total = 0 } = {}, retryAfter = null) {
+    super(detail || title || `status ${status}`);
+    this.status = status;
+    this.title = title;
+    this.detail = detail;
+    this.errors = errors;
+    this.total = total;
+    this.retryAfter = retryAfter;
+  }
+
+  get needsKey() {
+    return this.status === 401;
+  }
+}
+
+/**
+ * @param {string} path
+ * @param {RequestInit} [options]
+ */
+async function request(path, options = {}) {
+  const headers = new Headers(options.headers);
+  const secret = key.get();
+  if (secret) headers.set("Authorization", `Bearer ${secret}`);
+  let answer;
+  try {
+    answer = await fetch(path, { cache: "no-store", ...options, headers });
+  } catch (error) {
+    if (error instanceof DOMException && error.name === "AbortError") throw error;
+    throw new Problem(0, { title: "The service does not answer" });
+  }
+  if (answer.ok || answer.status === 304) return answer;
+  const body = await answer.json().catch(() => ({ title: answer.statusText }));
+  throw new Problem(answer.status, body, Number(answer.headers.get("Retry-After")) || null);
+}
+
+/**
+ * What was last read of an address, and its tag: an unchanged answer costs a few hundred bytes.
+ * @type {Map<string, { tag: string | null, body: any }>}
+ */
+const answers = new Map();
+
+/**
+ * The answer's body, and whether it is another than last time.
+ * @template Body
+ * @param {string} path
+ * @returns {Promise<{ body: Body, changed: boolean }>}
+ */
+export async function read(path) {
+  const before = answers.get(path);
+  const answer = await request(path, before?.tag ? { headers: { "If-None-Match": before.tag } } : {});
+  if (answer.status === 304 && before) {
+    await answer.arrayBuffer(); // an answer that is not read to its end keeps its connection busy
+    return { body: before.body, changed: false };
+  }
+  const body = await answer.json();
+  answers.set(path, { tag: answer.headers.get("ETag"), body });
+  return { body, changed: true };
+}
+
+/**
+ * All items of a list, page by page.
+ * @template Item
+ * @param {string} path
+ * @returns {Promise<{ items: Item[], changed: boolean }>}
+ */
+export async function readAll(path) {
+  /** @type {Item[]} */
+  const items = [];
+  let changed = false;
+  /** @type {string | null} */
+  let cursor = null;
+  do {
+    const address =
+      cursor === null ? path : `${path}${path.includes("?") ? "&" : "?"}cursor=${encodeURIComponent(cursor)}`;
+    /** @type {{ body: ListPage<Item>, changed: boolean }} */
+    const page = await read(address);
+    items.push(...page.body.items);
+    changed ||= page.changed;
+    cursor = page.body.next ?? null;
+  } while (cursor !== null);
+  return { items, changed };
+}
+
+/**
+ * Send something; the answer's body and status.
+ * @template Body
+ * @param {string} method
+ * @param {string} path
+ * @param {BodyInit} body
+ * @param {Record<string, string>} [headers]
+ * @returns {Promise<{ status: number, location: string | null, body: Body }>}
+ */
+export async function send(method, path, body, headers = {}) {
+  const answer = await request(path, { method, body, headers });
+  const text = await answer.text();
+  return { status: answer.status, location: answer.headers.get("Location"), body: text ? JSON.parse(text) : null };
+}
+
+/**
+ * The same with a value as JSON.
+ * @template Body
+ * @param {string} method
+ * @param {string} path
+ * @param {object} value
+ * @param {Record<string, string>} [headers]
+ * @returns {Promise<{ status: number, location: string | null, body: Body }>}
+ */
+export const sendJson = (method, path, value, headers = {}) =>
+  send(method, path, JSON.stringify(value), { "Content-Type": "application/json", ...headers });
+
+/**
+ * An answer as text, for a file that the reader saves.
+ * @param {string} path
+ */
+export const readText = async (path) => (await request(path)).text();
+
+/** @param {string} id */
+export const clutchPath = (id) => `/v1/clutches/${encodeURIComponent(id)}`;

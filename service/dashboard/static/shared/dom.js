@@ -1,0 +1,166 @@
+// @ts-check
+// Elements without a framework. Text is always text: nothing that comes from outside is ever parsed as HTML.
+
+/**
+ * @typedef {Node | string | null | undefined | false} Child left out where it is null, undefined or false
+ * @typedef {Child | readonly (Child | readonly Child[])[]} Content
+ * @typedef {string | number | boolean | null | undefined | ((event: any) => unknown) | Record<string, string>} Value
+ * @typedef {Record<string, Value>} Attributes `on…` are listeners, `style` its properties; null and false are left out
+ */
+
+const SVG = "http://www.w3.org/2000/svg";
+
+/**
+ * An element with attributes and children (nodes or text).
+ * @template {keyof HTMLElementTagNameMap} Name
+ * @param {Name} name
+ * @param {Attributes} [attributes]
+ * @param {Content[]} children
+ * @returns {HTMLElementTagNameMap[Name]}
+ */
+export function h(name, attributes = {}, ...children) {
+  return filled(document.createElement(name), attributes, children);
+}
+
+/**
+ * The same for SVG.
+ * @template {keyof SVGElementTagNameMap} Name
+ * @param {Name} name
+ * @param {Attributes} [attributes]
+ * @param {Content[]} children
+ * @returns {SVGElementTagNameMap[Name]}
+ */
+export function svg(name, attributes = {}, ...children) {
+  return filled(document.createElementNS(SVG, name), attributes, children);
+}
+
+/**
+ * @template {HTMLElement | SVGElement} Filled
+ * @param {Filled} element
+ * @param {Attributes} attributes
+ * @param {Content[]} children
+ */
+function filled(element, attributes, children) {
+  for (const [key, value] of Object.entries(attributes)) {
+    if (value === null || value === undefined || value === false) continue;
+    if (typeof value === "function") element.addEventListener(key.slice(2), value);
+    else if (typeof value === "object") {
+      for (const [property, set] of Object.entries(value)) element.style.setProperty(property, set);
+    } else element.setAttribute(key, value === true ? "" : String(value));
+  }
+  const flat = /** @type {Child[]} */ (children.flat(2));
+  element.append(...flat.filter((child) => child !== null && child !== undefined && child !== false));
+  return element;
+}
+
+/**
+ * An element that the page always has.
+ * @param {string} id
+ */
+export function byId(id) {
+  const element = document.getElementById(id);
+  if (element === null) throw new Error(`the page has no element #${id}`);
+  return element;
+}
+
+/**
+ * The place of a section's content.
+ * @param {string} id
+ * @param {string} selector
+ */
+export function within(id, selector) {
+  const element = byId(id).querySelector(selector);
+  if (!(element instanceof HTMLElement)) throw new Error(`the page has no element #${id} ${selector}`);
+  return element;
+}
+
+/**
+ * A letter with its index.
+ * @param {string} letter
+ * @param {string} index
+ */
+export const symbol = (letter, index) => h("span", {}, letter, h("sub", {}, index));
+
+/**
+ * A table with a caption and a header; `columns` are names, rows are cells of text or nodes.
+ * @param {string} caption
+ * @param {Content[]} columns
+ * @param {Content[][]} rows
+ * @param {{ shown?: boolean }} [options] whether the caption is shown
+ */
+export function table(caption, columns, rows, { shown = false } = {}) {
+  const header = columns.map((name) => h("th", { scope: "col" }, name));
+  return h(
+    "table",
+    {},
+    h("caption", { class: shown ? null : "hidden" }, caption),
+    h("thead", {}, h("tr", {}, header)),
+    h(
+      "tbody",
+      {},
+      rows.map((row) =>
+        h(
+          "tr",
+          {},
+          row.map((cell) => h("td", {}, cell ?? "–")),
+        ),
+      ),
+    ),
+  );
+}
+
+/**
+ * A table that scrolls in its own place, by keyboard too.
+ * @param {string} label
+ * @param {Content[]} content
+ */
+export const scrolling = (label, ...content) =>
+  h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": label }, ...content);
+
+/**
+ * Give an address's content to the user as a file.
+ * @param {string} name
+ * @param {string} address
+ */
+export function save(name, address) {
+  const link = h("a", { href: address, download: name, hidden: true });
+  document.body.append(link);
+  link.click();
+  link.remove();
+}
+
+/**
+ * Give a text to the user as a file.
+ * @param {string} name
+ * @param {string} text
+ * @param {string} type
+ */
+export function saveText(name, text, type) {
+  const address = URL.createObjectURL(new Blob([text], { type }));
+  save(name, address);
+  setTimeout(() => URL.revokeObjectURL(address), 10_000);
+}
+
+/**
+ * A command beside a button that copies it and says so.
+ * @param {string} text
+ */
+export function copyable(text) {
+  const status = h("span", { class: "copied", role: "status" });
+  const code = h("code", {}, text);
+  const copy = async () => {
+    try {
+      await navigator.clipboard.writeText(text);
+      status.textContent = "copied";
+    } catch {
+      getSelection()?.selectAllChildren(code);
+      status.textContent = "selected: press Ctrl+C";
+    }
+    setTimeout(() => {
+      status.textContent = "";
+    }, 3000);
+  };
+  const label = `Copy: ${text.split("\n")[0].slice(0, 60)}`;
+  const button = h("button", { type: "button", onclick: copy, "aria-label": label }, "Copy");
+  return h("div", { class: "command" }, h("pre", { tabindex: "0" }, code), button, status);
+}

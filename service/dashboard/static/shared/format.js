@@ -1,0 +1,188 @@
+// @ts-check
+// Numbers as a person reads them: grouped, with their unit, and with no more digits than their uncertainty allows.
+// A dash stands wherever a value is null, undefined or not finite.
+
+/** @import { Quantiles } from "./types.js" */
+
+/** @typedef {number | null | undefined} Maybe a number, or none */
+
+const MINUS = "−";
+const NONE = "–";
+
+/** @type {Record<string, string>} */
+const UNITS = { c: "°C", bar: "bar", rpm: "rpm", nm: "Nm", s: "s", hz: "Hz" };
+
+/**
+ * A name that ends in its unit, as `oil_temperature_c`: Oil temperature, °C.
+ * @param {string} name
+ */
+export function quantity(name) {
+  const [, stem, unit] = /^(.*)_([a-z]+)$/.exec(name) ?? ["", name, ""];
+  return UNITS[unit] ? `${words(stem)}, ${UNITS[unit]}` : words(name);
+}
+
+/**
+ * @param {Maybe} value
+ * @returns {value is number}
+ */
+const isNumber = (value) => value !== null && value !== undefined && Number.isFinite(value);
+
+/**
+ * A number with that many decimals, thousands grouped.
+ * @param {Maybe} value
+ * @param {number} [decimals]
+ */
+export function fixed(value, decimals = 0) {
+  if (!isNumber(value)) return NONE;
+  const digits = { minimumFractionDigits: decimals, maximumFractionDigits: decimals };
+  const text = Math.abs(value).toLocaleString("en-GB", digits);
+  return (value < 0 && /[1-9]/.test(text) ? MINUS : "") + text;
+}
+
+/**
+ * A number with that many significant digits.
+ * @param {Maybe} value
+ * @param {number} [digits]
+ */
+export function significant(value, digits = 3) {
+  if (!isNumber(value)) return NONE;
+  if (value === 0) return "0";
+  const size = Math.floor(Math.log10(Math.abs(value)));
+  if (size >= 6 || size < -4) return value.toExponential(digits - 1).replaceAll("-", MINUS);
+  const unit = 10 ** (size - digits + 1);
+  return fixed(unit > 1 ? Math.round(value / unit) * unit : value, Math.max(0, digits - 1 - size));
+}
+
+/**
+ * A value and its deviation: the deviation to one digit (two where it starts with 1), the value to the same place.
+ * @param {Maybe} value
+ * @param {Maybe} sd
+ */
+export function withSd(value, sd) {
+  if (!isNumber(value)) return NONE;
+  if (!sd || !Number.isFinite(sd)) return significant(value, 4);
+  const size = Math.floor(Math.log10(sd));
+  const decimals = Math.min(8, Math.max(0, -size + (sd / 10 ** size < 2 ? 1 : 0)));
+  return `${fixed(value, decimals)} ± ${fixed(sd, decimals)}`;
+}
+
+/**
+ * Cycles, rounded to a twentieth of the interval that they lie in, but to no fewer than two digits.
+ * @param {Maybe} value
+ * @param {number | null} [low]
+ * @param {number | null} [high]
+ */
+export function cycles(value, low = null, high = null) {
+  if (!isNumber(value)) return NONE;
+  const width = low !== null && high !== null ? high - low : Math.abs(value) / 50;
+  const coarsest = 10 ** (Math.floor(Math.log10(Math.max(10, Math.abs(value)))) - 1);
+  const unit = width > 20 ? Math.min(coarsest, 10 ** Math.floor(Math.log10(width / 10))) : 1;
+  return fixed(Math.round(value / unit) * unit);
+}
+
+/**
+ * The 90 % interval of quantiles by name.
+ * @param {Quantiles} quantiles
+ */
+export function interval(quantiles) {
+  const [low, high] = [quantiles["0.05"], quantiles["0.95"]];
+  if (low === null && high === null) return NONE;
+  if (high === null) return `over ${cycles(low)}`;
+  return `${cycles(low, low, high)} to ${cycles(high, low, high)}`;
+}
+
+/**
+ * A share of one as a percentage.
+ * @param {Maybe} share
+ * @param {number} [decimals]
+ */
+export const percent = (share, decimals = 0) => (isNumber(share) ? `${fixed(100 * share, decimals)} %` : NONE);
+
+/**
+ * A probability: never rounded to certainty.
+ * @param {Maybe} value
+ */
+export function probability(value) {
+  if (!isNumber(value)) return NONE;
+  if (value > 0 && value < 0.005) return "< 1 %";
+  if (value < 1 && value > 0.995) return "> 99 %";
+  return percent(value);
+}
+
+/** @type {[number, string, string][]} */
+const STEPS = [
+  [60, "s", "s"],
+  [60, "min", "min"],
+  [24, "h", "h"],
+  [365, "day", "days"],
+  [Infinity, "year", "years"],
+];
+
+/**
+ * How long ago a moment was, in one unit.
+ * @param {number} moment ms since 1970
+ * @param {number} [now] the same
+ */
+export function age(moment, now = Date.now()) {
+  let left = Math.max(0, (now - moment) / 1000);
+  if (left < 5) return "just now";
+  for (const [size, unit, units] of STEPS) {
+    if (left < size) {
+      const count = Math.floor(left);
+      return `${count} ${count === 1 ? unit : units} ago`;
+    }
+    left /= size;
+  }
+  return NONE;
+}
+
+/**
+ * A moment on the reader's clock.
+ * @param {string | null | undefined} text ISO 8601
+ */
+export function moment(text) {
+  if (!text) return NONE;
+  return new Date(text).toLocaleString("en-GB", {
+    day: "numeric",
+    month: "short",
+    year: "numeric",
+    hour: "2-digit",
+    minute: "2-digit",
+  });
+}
+
+/** @param {Date} when */
+export const clock = (when) => when.toLocaleTimeString("en-GB");
+
+/** @type {Record<string, string>} */
+const KINDS = {
+  stationary_stribeck: "Stationary Stribeck test",
+  dynamic_stribeck: "Dynamic Stribeck test",
+  duty_cycles: "Duty cycles",
+  run_in: "Run-in",
+  maintenance: "Maintenance",
+};
+
+/**
+ * What kind of run it is, in words.
+ * @param {string} kind
+ */
+export const kindName = (kind) => KINDS[kind] ?? words(kind);
+
+/**
+ * snake_case as words.
+ * @param {unknown} name
+ */
+export function words(name) {
+  const text = String(name).replaceAll("_", " ");
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}
+
+/**
+ * `60000 ms` as `1 min`.
+ * @param {number} milliseconds
+ */
+export const seconds = (milliseconds) =>
+  milliseconds < 60_000
+    ? `${Math.max(1, Math.round(milliseconds / 1000))} s`
+    : `${Math.round(milliseconds / 60_000)} min`;

@@ -1,0 +1,56 @@
+// @ts-check
+// Asks for a key where the service wants one; it is kept for this tab only.
+
+import { key, Problem } from "./api.js";
+import { h } from "./dom.js";
+
+/**
+ * Resolves when a key has been given.
+ * @param {Problem} problem
+ * @returns {Promise<void>}
+ */
+function askForKey(problem) {
+  const input = h("input", { id: "key", type: "password", autocomplete: "off", required: true, spellcheck: "false" });
+  const dialog = h(
+    "dialog",
+    { "aria-labelledby": "key-title" },
+    h(
+      "form",
+      { method: "dialog" },
+      h("h2", { id: "key-title" }, "This service asks for a key"),
+      h("p", {}, problem.detail || "Its operator creates one, with the scope read to look and ingest to send:"),
+      h("pre", {}, h("code", {}, "clutchlife key create --scope read")),
+      h("label", { for: "key" }, "Key"),
+      input,
+      h("p", { class: "quiet" }, "It is kept in this tab until you close it, and sent to this service only."),
+      h("div", { class: "buttons" }, h("button", { class: "main" }, "Use this key")),
+    ),
+  );
+  dialog.addEventListener("cancel", (event) => event.preventDefault());
+  document.body.append(dialog);
+  dialog.showModal();
+  return new Promise((resolve) => {
+    dialog.addEventListener("close", () => {
+      key.set(input.value.trim());
+      dialog.remove();
+      resolve();
+    });
+  });
+}
+
+/**
+ * `poll`, asking for a key and polling again where one is needed.
+ * @param {() => Promise<void>} poll
+ */
+export function withKey(poll) {
+  return async () => {
+    for (;;) {
+      try {
+        return await poll();
+      } catch (error) {
+        if (!(error instanceof Problem && error.needsKey)) throw error;
+        await askForKey(error);
+      }
+    }
+  };
+}

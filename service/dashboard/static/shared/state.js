@@ -1,0 +1,100 @@
+// @ts-check
+// The state of a clutch, after NAMUR NE 107: one of five states, each with its own word, shape and colour.
+
+import { svg } from "./dom.js";
+
+/** @import { ClutchSummary } from "./types.js" */
+
+/**
+ * @typedef {"failure" | "out_of_specification" | "maintenance" | "check" | "normal"} StateName
+ * @typedef {{ name: StateName, why: string }} State its name and the sentence why
+ * @typedef {{ status?: string, verdict: string | null, adopted: boolean, earlier_life: boolean }} Verdict of a diagnosis
+ */
+
+/** Below this health (1 new, 0 end of life) a replacement should be planned. */
+const LOW_HEALTH = 0.2;
+
+/** @type {Record<StateName, { order: number, word: string }>} */
+export const STATES = {
+  failure: { order: 0, word: "Failure" },
+  out_of_specification: { order: 1, word: "Out of specification" },
+  maintenance: { order: 2, word: "Maintenance required" },
+  check: { order: 3, word: "Function check" },
+  normal: { order: 4, word: "Normal" },
+};
+
+/** @type {Record<string, string>} */
+export const VERDICTS = {
+  model_adequate: "Model adequate",
+  cause_named: "Cause named",
+  cause_ambiguous: "Cause ambiguous",
+  unexplained_structure: "Unexplained structure",
+  insufficient_data: "Too little data",
+};
+
+/**
+ * The verdict of a finished diagnosis that waits for someone to act on it, or null; a rebuild ends it.
+ * @param {Verdict | null | undefined} latest
+ */
+export function openVerdict(latest) {
+  return latest && (latest.status ?? "finished") === "finished" && !latest.adopted && !latest.earlier_life
+    ? latest.verdict
+    : null;
+}
+
+/** @type {Set<string | null>} */
+const DISAGREES = new Set(["cause_named", "cause_ambiguous", "unexplained_structure"]);
+
+/**
+ * The state of a clutch; `verdict` is that of a diagnosis that nobody has acted on, or null.
+ * @param {ClutchSummary | null} summary
+ * @param {string | null} [verdict]
+ * @returns {State}
+ */
+export function stateOf(summary, verdict = null) {
+  if (summary === null || summary.status === "insufficient_data")
+    return { name: "check", why: "fewer than three tests: no prognosis yet" };
+  if (summary.status === "reached") return { name: "failure", why: "end of life reached" };
+  if (DISAGREES.has(verdict))
+    return { name: "out_of_specification", why: "data and model disagree: see the diagnosis" };
+  const health = summary.current.health;
+  if (health !== null && health < LOW_HEALTH) return { name: "maintenance", why: "near the end of its life" };
+  if (summary.status === "may_never_reach") return { name: "normal", why: "may never reach end of life" };
+  return { name: "normal", why: "ageing as modelled" };
+}
+
+/** @type {Record<StateName, ["circle" | "path" | "rect", Record<string, string | number>][]>} */
+const SHAPES = {
+  failure: [
+    ["circle", { cx: 10, cy: 10, r: 9 }],
+    ["path", { d: "M6.5 6.5l7 7m0-7l-7 7", class: "mark" }],
+  ],
+  out_of_specification: [
+    ["path", { d: "M10 1.2l9 16.3H1z" }],
+    ["path", { d: "M10 7v5.2m0 2v1.4", class: "mark" }],
+  ],
+  maintenance: [
+    ["path", { d: "M10 .8L19.2 10 10 19.2.8 10z" }],
+    ["path", { d: "M10 5.5V11m0 2.2v1.5", class: "mark" }],
+  ],
+  check: [
+    ["rect", { x: 1.5, y: 1.5, width: 17, height: 17, rx: 3 }],
+    ["path", { d: "M7 7.8a3 3 0 1 1 4.4 2.6c-1 .5-1.4 1-1.4 2m0 2v.4", class: "mark" }],
+  ],
+  normal: [
+    ["circle", { cx: 10, cy: 10, r: 9 }],
+    ["path", { d: "M5.8 10.3l2.9 2.9 5.5-6", class: "mark" }],
+  ],
+};
+
+/**
+ * The state's shape; its word is beside it, so screen readers skip the shape.
+ * @param {StateName} name
+ */
+export function stateIcon(name) {
+  return svg(
+    "svg",
+    { class: `icon state-${name}`, viewBox: "0 0 20 20", width: 20, height: 20, "aria-hidden": "true" },
+    SHAPES[name].map(([shape, attributes]) => svg(shape, attributes)),
+  );
+}

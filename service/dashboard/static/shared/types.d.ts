@@ -1,0 +1,343 @@
+// The API's answers, as the pages read them: an interface here bears the name of its class in service/schemas and holds no
+// other fields than that class (tests/service/dashboard/test_types.py). For the checks alone; browsers never load this file.
+
+export type Quantiles = Record<string, number | null>;
+
+/** A list's page; `next` is the cursor of the page after it. */
+export interface ListPage<Item> {
+  items: Item[];
+  next: string | null;
+}
+
+// --- service/schemas/problem.py
+
+export interface ProblemError {
+  pointer: string;
+  row: number | null;
+  value: string;
+  message: string;
+}
+
+// --- service/schemas/clutch.py
+
+export interface GeometryIn {
+  inner_diameter_mm: number;
+  outer_diameter_mm: number;
+  friction_faces: number;
+  mean_radius_mm: number | null;
+}
+
+export interface EndOfLifeIn {
+  cof_fraction: number;
+}
+
+export interface ClutchSummary {
+  status: string;
+  current: Current;
+  remaining_cycles: Quantiles;
+}
+
+export interface LastRun {
+  kind: string;
+  cycles: number;
+  at: string;
+}
+
+export interface Recent {
+  last_run: LastRun;
+  mean_cof: number[];
+}
+
+export interface LatestDiagnosis {
+  verdict: string | null;
+  causes: string[];
+  adopted: boolean;
+  earlier_life: boolean;
+}
+
+export interface ClutchOut {
+  clutch_id: string;
+  geometry: GeometryIn;
+  end_of_life: EndOfLifeIn;
+  friction_material: string;
+  reaction_plate: string;
+  fluid: string;
+  origin: string;
+  runs: number;
+  summary: ClutchSummary | null;
+  recent: Recent | null;
+  diagnosis: LatestDiagnosis | null;
+}
+
+// --- service/schemas/life.py
+
+export interface Criterion {
+  fraction: number;
+  threshold_mean_cof: number | null;
+}
+
+export interface Current {
+  mean_cof: number | null;
+  mean_cof_sd: number | null;
+  fraction_of_initial: number | null;
+  health: number | null;
+}
+
+export interface ModelName {
+  name: string;
+  effects: string[];
+}
+
+export interface RemainingLife {
+  as_of_cycles: number | null;
+  runs_used: number;
+  status: string;
+  criterion: Criterion;
+  current: Current;
+  remaining_cycles: Quantiles;
+  end_of_life_cycles: Quantiles;
+  probability_of_reaching: number | null;
+  horizon_cycles: number;
+  model: ModelName;
+}
+
+export interface Estimate {
+  value: number;
+  sd: number;
+}
+
+export interface Coefficients {
+  initial: Estimate;
+  change: Estimate;
+  scale_cycles: Estimate;
+}
+
+export interface Measured {
+  cycles: number[];
+  value: number[];
+  sd: number[];
+}
+
+export interface Trajectory {
+  cycles: number[];
+  median: number[];
+  lower: number[];
+  upper: number[];
+}
+
+export interface DegradationItem {
+  quantity: string;
+  pressure_bar: number | null;
+  coefficients: Coefficients;
+  measured: Measured;
+  trajectory: Trajectory;
+}
+
+export interface StribeckItem {
+  run_id: string;
+  cycles: number;
+  fits: Fit[];
+}
+
+export interface LoopItem extends Loop {
+  run_id: string;
+  cycles: number;
+}
+
+export interface SeriesItem {
+  cycles: number;
+  run_id: string | null;
+  pressure_bar: number | null;
+  value: number | null;
+  lower: number | null;
+  upper: number | null;
+}
+
+// --- service/schemas/run.py
+
+export interface Warned {
+  code: string;
+  message: string;
+}
+
+export interface Parameters {
+  static_torque_nm: number;
+  coulomb_ratio: number;
+  stribeck_velocity_m_s: number;
+  viscous_coefficient: number;
+}
+
+export interface Fit {
+  pressure_bar: number;
+  parameters: Parameters;
+  standard_errors: Parameters;
+  mse_percent: number | null;
+  rmse_nm: number;
+  acceptable: boolean;
+  mean_cof: number | null;
+  mean_cof_sd: number | null;
+  status: string;
+  undetermined: string[];
+}
+
+export interface Loop {
+  pressure_bar: number;
+  loop_area_nm_m_s: number | null;
+  loop_area_sd_nm_m_s: number | null;
+  attractor_nm_s: number | null;
+  attractor_sd_nm_s: number | null;
+  frequency_hz: number | null;
+  periods: number;
+  status: string;
+  message: string;
+}
+
+export interface Duty {
+  cycles: number;
+  energy_per_cycle_kj: number | null;
+}
+
+export interface Receipt {
+  clutch_id: string;
+  run_id: string;
+  kind: string;
+  cycles: number;
+  started_at: string | null;
+  origin: string;
+  received_at: string;
+  content_sha256: string;
+  duplicate: boolean;
+  warnings: Warned[];
+  fits: Fit[];
+  loops: Loop[];
+  duty: Duty | null;
+  event: string | null;
+  note: string | null;
+  code_version: string;
+}
+
+export interface RunOut extends Receipt {
+  channels: Channels;
+}
+
+/** The channels that Stribeck tests always have. */
+export interface StationaryChannels {
+  pressure_bar: number[];
+  speed_rpm: number[];
+  torque_nm: number[];
+}
+
+export type Channels = StationaryChannels;
+
+// --- service/schemas/diagnosis.py; null is what is not known, or not yet
+
+export interface Amplitude {
+  name: string;
+  value: number | null;
+  sd: number | null;
+  unit: string;
+}
+
+export interface CandidateOut {
+  effect: string;
+  title: string;
+  probability: number | null;
+  log_evidence_gain: number | null;
+  estimate: Amplitude;
+}
+
+export interface WhereOut {
+  axis: string;
+  strength: number | null;
+  p_value: number | null;
+}
+
+export interface MisfitOut {
+  rmse_nm: number | null;
+  noise_nm: number | null;
+  unexplained_share: number | null;
+  where: WhereOut[];
+}
+
+/** Answers as `/remaining-useful-life` gives them. */
+export interface BeforeAndAfter {
+  before: Partial<RemainingLife>;
+  after: Partial<RemainingLife>;
+}
+
+export interface GainOut {
+  held_out_runs: string[];
+  rmse_before_nm: number | null;
+  rmse_after_nm: number | null;
+  reduction_percent: number | null;
+  log_score_gain: number | null;
+  prediction_log_score_gain?: number | null;
+  remaining_useful_life: BeforeAndAfter;
+}
+
+export interface AdviceOut {
+  test: string;
+  separates: string[];
+}
+
+export interface VisibleOut {
+  effect: string;
+  amplitude: number | null;
+  unit: string;
+}
+
+export interface Axes {
+  pressure_bar: number[];
+  speed_rpm: number[];
+  cycles: number[];
+}
+
+export type Table = (number | null)[][];
+
+export interface ResidualMap {
+  speed_pressure: Table;
+  pressure_cycles: Table;
+}
+
+export interface MapsOut {
+  axes: Axes;
+  before: ResidualMap;
+  after: ResidualMap;
+}
+
+export interface LoopTraceOut {
+  pressure_bar: number;
+  cycles: number;
+  frequency_hz: number | null;
+  speed_rpm: (number | null)[];
+  measured_nm: (number | null)[];
+  baseline_nm: (number | null)[];
+  extended_nm: (number | null)[];
+}
+
+export interface DiagnosisListed {
+  diagnosis_id: string;
+  status: "running" | "finished" | "failed";
+  created_at: string;
+  as_of_cycles: number | null;
+  stale: boolean;
+  earlier_life: boolean;
+  adoptable: boolean;
+  adopted: boolean;
+  problem: string | null;
+  verdict: string | null;
+  causes: string[];
+  summary: string;
+  candidates: CandidateOut[];
+  baseline: MisfitOut;
+  extended: MisfitOut;
+  gain: GainOut;
+  advice: AdviceOut[];
+  visible: VisibleOut[];
+  notes: string[];
+}
+
+export interface DiagnosisOut extends DiagnosisListed {
+  maps: MapsOut | null;
+  loops: LoopTraceOut[];
+}

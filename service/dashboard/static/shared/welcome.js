@@ -1,0 +1,52 @@
+// @ts-check
+// What a first visitor sees: what to do next, and the command for it.
+
+import { copyable, h } from "./dom.js";
+
+const here = () => location.origin;
+
+/** @param {string} id */
+const registration = (id) =>
+  `curl ${here()}/v1/clutches -H 'Content-Type: application/json' -d '{"clutch_id": "${id}"}'`;
+
+/** No clutch is registered yet. */
+export function welcome() {
+  return h(
+    "section",
+    { class: "welcome", "aria-labelledby": "welcome-title" },
+    h("h2", { id: "welcome-title" }, "No clutch is registered yet"),
+    h("p", {}, "The service runs and waits for a rig. This page fills by itself as soon as the first run arrives."),
+    h("h3", {}, "Try it with a simulated clutch"),
+    copyable(`clutchlife simulate --seed 7 --out campaign\nclutchlife push campaign --clutch sim-7 --url ${here()}`),
+    h("h3", {}, "Connect a rig"),
+    h("p", {}, "Register the clutch; what you leave out takes the reference clutch's values:"),
+    copyable(registration("bench3-017")),
+    h(
+      "p",
+      {},
+      "Then send run files (JSON, CSV, TDMS, MDF4 or Parquet) as they are written, or drop them on this page:",
+    ),
+    copyable(`clutchlife push run-0001.csv --clutch bench3-017 --url ${here()}`),
+    h("p", {}, h("a", { href: "/docs" }, "The API"), " describes everything that can be sent, with examples."),
+  );
+}
+
+/**
+ * A clutch without a run.
+ * @param {string} id
+ */
+export function firstRun(id) {
+  return h(
+    "section",
+    { class: "welcome", "aria-labelledby": "first-title" },
+    h("h2", { id: "first-title" }, "No run has arrived for this clutch yet"),
+    h("p", {}, "Drop a run's file on this page, or send it from where the rig writes it:"),
+    copyable(`clutchlife push run-0001.json --clutch ${id} --url ${here()}`),
+    h(
+      "p",
+      {},
+      "The first stationary Stribeck test is the reference that ageing is measured against; ",
+      "from the third on the remaining cycles are predicted.",
+    ),
+  );
+}

@@ -1,0 +1,95 @@
+"""Remaining life before and after, on one scale."""
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from tests.browser.modules import Module
+
+pytestmark = pytest.mark.browser
+
+BEFORE = {"0.05": 1000, "0.25": 1500, "0.5": 2000, "0.75": 2500, "0.95": 3000}
+AFTER = {"0.05": 3000, "0.25": 3500, "0.5": 4000, "0.75": 4500, "0.95": 5000}
+#: Width of a bar's drawing, and where its right end is in cycles for AFTER: 5 % past the larger 95 % quantile.
+WIDTH, SCALE = 120, 1.05 * 5000
+
+
+@pytest.fixture(scope="module")
+def bars(loaded: Callable[[str], Module]) -> Module:
+    return loaded("diagnosis/lifebars.js")
+
+
+def show(bars: Module, before: Any, after: Any, *names: Any) -> dict[str, str]:
+    result: dict[str, str] = bars("lifeBars", {"before": before, "after": after}, *names)
+    return result
+
+
+def medians(html: str) -> list[float]:
+    """Where the medians are, px."""
+    return [float(x) for x in re.findall(r'class="median" x="([^"]+)"', html)]
+
+
+def boxes(html: str, name: str) -> list[tuple[float, float]]:
+    """Both ends of the bars of a kind, px."""
+    found = re.findall(rf'class="{name}"[^>]*? x="([^"]+)" width="([^"]+)"', html)
+    return [(float(x), float(x) + float(width)) for x, width in found]
+
+
+def test_both_are_shown_with_their_median_and_interval(bars: Module) -> None:
+    text = show(bars, BEFORE, AFTER)["text"]
+    assert text == "Before2,000 (90 %: 1,000 to 3,000)After4,000 (90 %: 3,000 to 5,000)"
+
+
+def test_they_bear_the_names_that_are_given(bars: Module) -> None:
+    text = show(bars, BEFORE, AFTER, ["Now", "Then"])["text"]
+    assert text.startswith("Now2,000")
+    assert "Then4,000" in text
+
+
+def test_they_share_one_scale(bars: Module) -> None:
+    html = show(bars, BEFORE, AFTER)["html"]
+    assert medians(html) == pytest.approx([WIDTH * 2000 / SCALE, WIDTH * 4000 / SCALE], abs=0.06)
+    wide, half = boxes(html, "wide"), boxes(html, "half")
+    assert wide[0] == pytest.approx((WIDTH * 1000 / SCALE, WIDTH * 3000 / SCALE), abs=0.11)
+    assert wide[1] == pytest.approx((WIDTH * 3000 / SCALE, WIDTH * 5000 / SCALE), abs=0.11)
+    assert half[1] == pytest.approx((WIDTH * 3500 / SCALE, WIDTH * 4500 / SCALE), abs=0.11)
+    assert 'class="beyond"' not in html
+
+
+def test_whole_answers_are_taken_too(bars: Module) -> None:
+    whole = show(bars, {"remaining_cycles": BEFORE, "status": "predicted"}, {"remaining_cycles": AFTER})
+    assert whole == show(bars, BEFORE, AFTER)
+
+
+def test_an_end_that_is_not_in_sight_is_marked(bars: Module) -> None:
+    result = show(bars, BEFORE, AFTER | {"0.75": None, "0.95": None})
+    assert "(90 %: over 3,000)" in result["text"]
+    assert result["html"].count('class="beyond"') == 1
+    # the scale then goes 1.6 times as far as the median
+    assert medians(result["html"])[1] == pytest.approx(WIDTH * 4000 / (1.05 * 1.6 * 4000), abs=0.06)
+    never = show(bars, BEFORE, dict.fromkeys(AFTER))
+    assert "After– (90 %: –)" in never["text"]
+    assert len(medians(never["html"])) == 1
+
+
+def test_quartiles_that_are_missing_are_taken_from_the_interval(bars: Module) -> None:
+    ends = {name: AFTER[name] for name in ("0.05", "0.5", "0.95")}
+    html = show(bars, BEFORE, ends)["html"]
+    assert boxes(html, "half")[1] == boxes(html, "wide")[1]
+    alone = show(bars, BEFORE, {"0.5": 4000})
+    assert "After4,000 (90 %: –)" in alone["text"]
+
+
+def test_a_life_that_has_ended_has_bars_of_some_width(bars: Module) -> None:
+    ended = dict.fromkeys(AFTER, 0)
+    result = show(bars, ended, ended)
+    assert result["text"] == "Before0 (90 %: 0 to 0)After0 (90 %: 0 to 0)"
+    assert all(end - start == pytest.approx(1.5) for start, end in boxes(result["html"], "wide"))
+
+
+@pytest.mark.parametrize("nothing", [None, {}, {"remaining_cycles": {}}, {"status": "insufficient_data"}])
+def test_without_quantiles_on_both_sides_there_is_nothing_to_compare(bars: Module, nothing: Any) -> None:
+    assert show(bars, nothing, AFTER) is None
+    assert show(bars, BEFORE, nothing) is None
