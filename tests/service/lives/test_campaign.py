@@ -13,7 +13,7 @@ from models.records.runs import Record
 from service.lives import campaign as campaign_module
 from service.lives.campaign import Stored, read_campaign, thinned
 from storage.engine.database import open_database
-from tests.service.run_files.test_files_and_records import dynamic_record, raw_record
+from tests.service.run_files.test_upload import dynamic_record, raw_record
 from tests.support import PRESSURES_BAR, SPEEDS_RPM, stationary
 
 RUNS = "/v1/clutches/c1/runs"
