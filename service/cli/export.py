@@ -63,10 +63,10 @@ def _pages(service: Service, path: str, **params: Any) -> Iterator[dict[str, Any
 
 
 def _results(service: Service, clutch: str, folder: Path) -> None:
-    from service.schemas.life import Method  # start-up time
+    from service.schemas.life import MethodName  # start-up time
 
     base = f"/v1/clutches/{clutch}"
-    for method in get_args(Method):
+    for method in get_args(MethodName):
         _write(
             folder / f"remaining-useful-life-{method}.json", service.get(f"{base}/remaining-useful-life", method=method)
         )

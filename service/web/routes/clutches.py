@@ -7,6 +7,7 @@ from fastapi.responses import Response
 
 from service.run_files.json_run import invalid
 from service.schemas.clutch import ClutchIn, ClutchOut, ClutchPage
+from service.schemas.parameters import ClutchId
 from service.web.bodies import described_body, json_body
 from service.web.context import Context, Cursor, Ingester, Limit, Reader
 from service.web.pages import JSON_TYPE, answer, encode, from_cursor, page, tagged
@@ -62,6 +63,6 @@ def list_clutches(request: Request, context: Reader, limit: Limit = 100, cursor:
 
 
 @router.get("/{clutch_id}", response_model=ClutchOut, responses=READING)
-def read_clutch(request: Request, context: Reader, clutch_id: str) -> Response:
+def read_clutch(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
     """One clutch."""
     return answer(request, registration.look_up(context.database, clutch_id))

@@ -12,6 +12,7 @@ from fastapi.responses import Response
 from service.run_files.json_run import invalid
 from service.schemas.base import Schema
 from service.schemas.diagnosis import DiagnosisIn, DiagnosisOut, DiagnosisPage, ModelIn, ModelOut
+from service.schemas.parameters import ClutchId, DiagnosisId
 from service.web.bodies import described_body, json_body
 from service.web.context import Context, Cursor, Ingester, Limit, Reader
 from service.web.pages import JSON_TYPE, answer, encode, from_cursor, page
@@ -37,7 +38,7 @@ Prefer = Annotated[
     responses=SENDING | {202: {"model": DiagnosisOut, "description": "It still runs: look again at `Location`"}},
     openapi_extra=described_body(DiagnosisIn, {"adopt": False}),
 )
-async def post_diagnosis(request: Request, context: Ingester, clutch_id: str, prefer: Prefer = None) -> Response:
+async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchId, prefer: Prefer = None) -> Response:
     """Have all runs of the clutch's present life diagnosed. A question while the same runs are being diagnosed joins in."""
     asked = _read(DiagnosisIn, await json_body(request))
     job = await run_in_threadpool(context.worker.ask, clutch_id, adopt=asked.adopt)
@@ -54,7 +55,7 @@ async def post_diagnosis(request: Request, context: Ingester, clutch_id: str, pr
 
 @router.get("/diagnoses", response_model=DiagnosisPage, responses=READING)
 def list_diagnoses(
-    request: Request, context: Reader, clutch_id: str, limit: Limit = 100, cursor: Cursor = None
+    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = 100, cursor: Cursor = None
 ) -> Response:
     """Diagnoses without their maps and loops, newest first."""
     items, after = run_diagnosis.page(context.database, clutch_id, limit=limit, after=from_cursor(cursor))
@@ -62,13 +63,13 @@ def list_diagnoses(
 
 
 @router.get("/diagnoses/{diagnosis_id}", response_model=DiagnosisOut, responses=READING)
-def read_diagnosis(request: Request, context: Reader, clutch_id: str, diagnosis_id: str) -> Response:
+def read_diagnosis(request: Request, context: Reader, clutch_id: ClutchId, diagnosis_id: DiagnosisId) -> Response:
     """One diagnosis with its maps and loops."""
     return answer(request, run_diagnosis.one(context.database, clutch_id, diagnosis_id))
 
 
 @router.get("/model", response_model=ModelOut, responses=READING)
-def read_model(request: Request, context: Reader, clutch_id: str) -> Response:
+def read_model(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
     """The model that tracking and remaining life use, and all that were adopted."""
     return answer(request, adopt_model.model(context.database, clutch_id))
 
@@ -79,7 +80,7 @@ def read_model(request: Request, context: Reader, clutch_id: str) -> Response:
     responses=SENDING,
     openapi_extra=described_body(ModelIn, {"diagnosis_id": None}),
 )
-async def put_model(request: Request, context: Ingester, clutch_id: str) -> Response:
+async def put_model(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
     """Adopt what a diagnosis found, or return to the baseline; all is tracked anew before this is answered."""
     asked = _read(ModelIn, await json_body(request))
     said = await run_in_threadpool(_adopt, context, clutch_id, asked.diagnosis_id)

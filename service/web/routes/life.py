@@ -7,19 +7,11 @@ from fastapi.responses import Response
 
 from service.queries import answers, scores
 from service.queries.surfaces import flat as flat_surfaces
+from service.schemas.curves import EngagementOut, LoopItem, LoopPage, SeriesItem, SeriesPage, StribeckPage
+from service.schemas.degradation import Degradation, Surfaces
 from service.schemas.fleet import Scores
-from service.schemas.life import (
-    Degradation,
-    EngagementOut,
-    LoopItem,
-    LoopPage,
-    Method,
-    RemainingLife,
-    SeriesItem,
-    SeriesPage,
-    StribeckPage,
-    Surfaces,
-)
+from service.schemas.life import Method, RemainingLife
+from service.schemas.parameters import ClutchId, Quantity
 from service.web.context import AtCycles, Cursor, Limit, PressureBar, Reader, Whole
 from service.web.lasting import lasting_answer, lasting_table
 from service.web.pages import answer, from_cursor, page, sliced, table
@@ -34,7 +26,7 @@ twins = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["spreadsheets"])
 def remaining_useful_life(
     request: Request,
     context: Reader,
-    clutch_id: str,
+    clutch_id: ClutchId,
     method: Method = "particle",
     pressure_bar: PressureBar = None,
     at_cycles: AtCycles = None,
@@ -53,7 +45,7 @@ def remaining_useful_life(
 
 @router.get("/degradation", response_model=Degradation, responses=READING)
 def degradation(
-    request: Request, context: Reader, clutch_id: str, limit: Whole = 1_000_000, cursor: Cursor = None
+    request: Request, context: Reader, clutch_id: ClutchId, limit: Whole = 1_000_000, cursor: Cursor = None
 ) -> Response:
     """Eq. 6 for every Stribeck parameter and for mean COF: coefficients, measurements, trajectory with its 90 % band."""
     after = from_cursor(cursor)
@@ -66,7 +58,9 @@ def degradation(
 
 
 @router.get("/stribeck", response_model=StribeckPage, responses=READING)
-def stribeck(request: Request, context: Reader, clutch_id: str, limit: Limit = 100, cursor: Cursor = None) -> Response:
+def stribeck(
+    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = 100, cursor: Cursor = None
+) -> Response:
     """The Stribeck curves of the stationary tests by cycles, and the pressure laws through them (fig. 9)."""
     after = from_cursor(cursor)
 
@@ -77,13 +71,13 @@ def stribeck(request: Request, context: Reader, clutch_id: str, limit: Limit = 1
 
 
 @router.get("/engagement", response_model=EngagementOut, responses=READING)
-def engagement(request: Request, context: Reader, clutch_id: str, at_cycles: AtCycles = None) -> Response:
+def engagement(request: Request, context: Reader, clutch_id: ClutchId, at_cycles: AtCycles = None) -> Response:
     """A simulated engagement of the tracked clutch: the pressure profile of fig. 3 against the motor's 20 Nm."""
     return answer(request, answers.engaged(context.database, context.remembered, clutch_id, at_cycles=at_cycles))
 
 
 @router.get("/surfaces", response_model=Surfaces, responses=READING)
-def surfaces(request: Request, context: Reader, clutch_id: str) -> Response:
+def surfaces(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
     """The tracked Stribeck parameters over pressure and cycles (figs. 10, 11), and torque over speed besides."""
     return lasting_answer(
         request, context, clutch_id, lambda: answers.surface(context.database, context.remembered, clutch_id)
@@ -94,7 +88,7 @@ def surfaces(request: Request, context: Reader, clutch_id: str) -> Response:
 def clutch_scores(
     request: Request,
     context: Reader,
-    clutch_id: str,
+    clutch_id: ClutchId,
     method: Method = "particle",
     limit: Whole = 1_000_000,
     cursor: Cursor = None,
@@ -106,7 +100,7 @@ def clutch_scores(
 
 @router.get("/loops", response_model=LoopPage, responses=READING)
 def loops(
-    request: Request, context: Reader, clutch_id: str, limit: Whole = 1_000_000, cursor: Cursor = None
+    request: Request, context: Reader, clutch_id: ClutchId, limit: Whole = 1_000_000, cursor: Cursor = None
 ) -> Response:
     """Friction loops of the dynamic tests by cycles and pressure."""
     after = from_cursor(cursor)
@@ -119,8 +113,8 @@ def loops(
 def series(
     request: Request,
     context: Reader,
-    clutch_id: str,
-    quantity: str | None = None,
+    clutch_id: ClutchId,
+    quantity: Quantity = None,
     limit: Whole = 1_000_000,
     cursor: Cursor = None,
 ) -> Response:
@@ -139,7 +133,7 @@ def _series(database: Database, clutch_id: str, quantity: str | None) -> list[di
 def remaining_useful_life_csv(
     request: Request,
     context: Reader,
-    clutch_id: str,
+    clutch_id: ClutchId,
     method: Method = "particle",
     pressure_bar: PressureBar = None,
     at_cycles: AtCycles = None,
@@ -163,7 +157,7 @@ def remaining_useful_life_csv(
 
 
 @twins.get("/degradation.csv", response_class=Response, responses=READING)
-def degradation_csv(request: Request, context: Reader, clutch_id: str) -> Response:
+def degradation_csv(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
     """Eq. 6's coefficients, a row a quantity and pressure."""
     items = answers.degradation(context.database, context.remembered, clutch_id)["items"]
     names = ("initial", "change", "scale_cycles", "exponent")
@@ -179,7 +173,7 @@ def degradation_csv(request: Request, context: Reader, clutch_id: str) -> Respon
 
 @twins.get("/stribeck.csv", response_class=Response, responses=READING)
 def stribeck_csv(
-    request: Request, context: Reader, clutch_id: str, limit: Limit = 1000, cursor: Cursor = None
+    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = 1000, cursor: Cursor = None
 ) -> Response:
     """The fits, a row a test and pressure."""
     items, _ = answers.stribeck_page(
@@ -198,14 +192,14 @@ def _fit_row(item: dict[str, Any], fit: dict[str, Any]) -> dict[str, Any]:
 
 
 @twins.get("/surfaces.csv", response_class=Response, responses=READING)
-def surfaces_csv(request: Request, context: Reader, clutch_id: str) -> Response:
+def surfaces_csv(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
     """The surfaces, a row a count of cycles, a pressure and a speed."""
     rows = flat_surfaces(answers.surface(context.database, context.remembered, clutch_id))
     return table(request, tuple(rows[0]), rows)
 
 
 @twins.get("/scores.csv", response_class=Response, responses=READING)
-def clutch_scores_csv(request: Request, context: Reader, clutch_id: str, method: Method = "particle") -> Response:
+def clutch_scores_csv(request: Request, context: Reader, clutch_id: ClutchId, method: Method = "particle") -> Response:
     """The scored predictions, a row each."""
     items = scores.of_clutch(context.database, context.remembered, clutch_id, method=method)["items"]
     rows = [row for item in items for row in scores.flat(item)]
@@ -213,13 +207,13 @@ def clutch_scores_csv(request: Request, context: Reader, clutch_id: str, method:
 
 
 @twins.get("/loops.csv", response_class=Response, responses=READING)
-def loops_csv(request: Request, context: Reader, clutch_id: str) -> Response:
+def loops_csv(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
     """Friction loops, a row each."""
     return table(request, tuple(LoopItem.model_fields), answers.loop_page(context.database, clutch_id))
 
 
 @twins.get("/series.csv", response_class=Response, responses=READING)
-def series_csv(request: Request, context: Reader, clutch_id: str, quantity: str | None = None) -> Response:
+def series_csv(request: Request, context: Reader, clutch_id: ClutchId, quantity: Quantity = None) -> Response:
     """The flat rows as CSV."""
     columns = tuple(SeriesItem.model_fields)
     return lasting_table(request, context, clutch_id, columns, lambda: _series(context.database, clutch_id, quantity))
