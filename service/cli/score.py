@@ -11,9 +11,9 @@ def score(
     method: Annotated[str, typer.Option(help="particle, ukf or grid")] = "particle", database: Database = DATABASE
 ) -> None:
     """Score the prediction at every test of every life that has ended."""
-    from service.lives.tracks import METHODS  # start-up time: the three of them
-    from service.queries import scores
-    from service.queries.views import Remembered
+    from service.lives.tracks import METHODS  # start-up time
+    from service.queries import scores  # start-up time
+    from service.queries.views import Remembered  # start-up time
 
     if method not in METHODS:
         fail(f"method must be one of {', '.join(METHODS)}, got {method!r}", EX_USAGE)

@@ -23,9 +23,9 @@ def serve(
     """Run the service."""
     if log_level not in uvicorn.config.LOG_LEVELS:
         fail(f"log-level must be one of {', '.join(uvicorn.config.LOG_LEVELS)}, got {log_level!r}", EX_USAGE)
-    from service.web.auth import is_loopback  # start-up time: the three of them
-    from storage import keys
-    from storage.engine.database import open_database
+    from service.web.auth import is_loopback  # start-up time
+    from storage import keys  # start-up time
+    from storage.engine.database import open_database  # start-up time
 
     with errors_in_a_line():
         settings = Settings.from_environment(database)

@@ -34,8 +34,8 @@ def simulate(
 
     Run-in and duty blocks are JSON whatever the format. Tests in another format are listed in runs.json, which push reads.
     """
-    from models.rig import campaign  # start-up time: both of them
-    from service.run_files import record_writer, simulated
+    from models.rig import campaign  # start-up time
+    from service.run_files import record_writer, simulated  # start-up time
 
     with errors_in_a_line():
         record_format = record_writer.RecordFormat(form)
@@ -64,8 +64,8 @@ def simulate(
 
 def _programme(raw_rate: float | None, dynamic: bool, ageing: str) -> "Programme":
     """The programme of fig. 2 with these options."""
-    from models.rig.programme import Ageing, Programme  # start-up time: both of them
-    from models.rig.sampled import DynamicTest, RawTest
+    from models.rig.programme import Ageing, Programme  # start-up time
+    from models.rig.sampled import DynamicTest, RawTest  # start-up time
 
     return Programme(
         dynamic=DynamicTest() if dynamic else None,

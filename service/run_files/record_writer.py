@@ -72,8 +72,7 @@ def _write_csv(path: Path, channels: Mapping[str, FloatArray], head: Mapping[str
 
 
 def _write_tdms(path: Path, channels: Mapping[str, FloatArray], head: Mapping[str, Any]) -> None:
-    # start-up time and an optional package: loaded only where a TDMS file is written
-    from nptdms import ChannelObject, RootObject, TdmsWriter  # type: ignore[import-untyped]
+    from nptdms import ChannelObject, RootObject, TdmsWriter  # type: ignore[import-untyped]  # start-up time, optional package
 
     objects = [RootObject(properties=dict(head))]
     for name, column in channels.items():
@@ -86,8 +85,8 @@ def _write_mdf4(path: Path, channels: Mapping[str, FloatArray], head: Mapping[st
     """With time as the master channel; plateaus, which have no time, by their number."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # asammdf's own imports warn
-        from asammdf import MDF, Signal  # start-up time, and an optional package
-        from asammdf.blocks import v4_constants as v4c  # the same
+        from asammdf import MDF, Signal  # start-up time, optional package
+        from asammdf.blocks import v4_constants as v4c  # start-up time, optional package
 
         rows = next(iter(channels.values())).size
         master = channels.get("time_s", np.arange(rows, dtype=np.float64))

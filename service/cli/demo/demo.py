@@ -56,9 +56,9 @@ def demo(
 
 def _life(service: Service, seed: int) -> float:
     """Post the life and have it diagnosed; the duty cycles at its end."""
-    from models.rig import campaign  # start-up time: the three of them
-    from service.cli.demo import life
-    from service.run_files import simulated
+    from models.rig import campaign  # start-up time
+    from service.cli.demo import life  # start-up time
+    from service.run_files import simulated  # start-up time
 
     clutch_id, truth = f"sim-{seed}", campaign.simulated_clutch(seed)
     end = truth.end_of_life()
@@ -90,8 +90,8 @@ def _life(service: Service, seed: int) -> float:
 
 def _loops(service: Service, seed: int, last: float) -> None:
     """Dynamic tests at some states of the same life, for the dashboard: they come late, as from a rig's archive."""
-    from service.cli.demo import life  # start-up time: both of them
-    from service.run_files import simulated
+    from service.cli.demo import life  # start-up time
+    from service.run_files import simulated  # start-up time
 
     out.print("\nDynamic tests of the same life follow, for the friction loops on the dashboard.")
     for run in life.loops(seed, last):
