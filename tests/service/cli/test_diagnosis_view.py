@@ -26,12 +26,14 @@ def printed(report: dict[str, Any], *, colours: bool = False) -> str:
 @pytest.fixture
 def report() -> dict[str, Any]:
     diagnosed = diagnose(EMPTY, rng=None)  # type: ignore[arg-type]  # none is drawn without tests
-    said = public(diagnosed, origin=500.0, before=LIFE, after=LIFE | {"status": "reached"}, notes=("left out",))
-    return said | STATE
+    public_report = public(
+        diagnosed, origin=500.0, before=LIFE, after=LIFE | {"status": "reached"}, notes=("left out",)
+    )
+    return public_report | STATE
 
 
 def test_all_that_matters_is_there(report: dict[str, Any]) -> None:
-    said = printed(report)
+    shown_text = printed(report)
     for words in (
         "The model is adequate",
         "A stand-in looked at 0 tests.",
@@ -45,7 +47,7 @@ def test_all_that_matters_is_there(report: dict[str, Any]) -> None:
         "Note: left out",
         "oil_temperature_c",
     ):
-        assert words in said, words
+        assert words in shown_text, words
     assert report["maps"]["axes"]["cycles"] == [500.0, 1500.0, 2500.0]
 
 

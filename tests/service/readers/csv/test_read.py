@@ -149,8 +149,8 @@ WRONG = [
 @pytest.mark.parametrize(("content", "message"), WRONG, ids=[message for _, message in WRONG])
 def test_wrong_files_are_refused_with_their_place(tmp_path: Path, content: str | bytes, message: str) -> None:
     error = refused(tmp_path, content)
-    said = " ".join([error.detail, *(each.message for each in error.errors)])
-    assert re.search(message, said), said
+    messages = " ".join([error.detail, *(item.message for item in error.errors)])
+    assert re.search(message, messages), messages
     assert len(error.errors) <= 50
     assert len(error.detail) < 2500
 
@@ -216,7 +216,9 @@ def test_no_bytes_raise_anything_else(tmp_path_factory: pytest.TempPathFactory, 
 
 def untidy(columns: dict[str, FloatArray]) -> dict[str, tuple[str, str | None]]:
     """The same columns as no reader of plain numbers takes them, each with the map that it needs."""
-    rows = [[repr(value) for value in row] for row in zip(*(each.tolist() for each in columns.values()), strict=True)]
+    rows = [
+        [repr(value) for value in row] for row in zip(*(column.tolist() for column in columns.values()), strict=True)
+    ]
     head, needed = ",".join(columns), ",".join(f"{name}:{name}" for name in columns)
     german = [";".join(row).replace(".", ",") for row in rows]
     return {
