@@ -1,10 +1,12 @@
-"""What can go wrong for a caller: one base, mapped to HTTP once (`service.web.problems`). Knows no web framework."""
+"""The errors that a caller may get: one base, mapped to HTTP once (`service.web.problems`). Knows no web framework."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-#: No answer lists more single errors than this; the total is always told.
+#: Errors that one answer lists; chosen: a screenful. The total is always stated.
 MOST_ERRORS = 50
+#: Characters of a wrong value that a message quotes; chosen: a line of a terminal.
+MOST_QUOTED = 80
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,11 +21,11 @@ class FieldError:
 
 
 class ServiceError(Exception):
-    """Base of everything a caller may be told. `slug` names the kind of problem, `status` is its HTTP status."""
+    """Base of all errors that a caller may get. `slug` names the kind of problem, `status` is its HTTP status."""
 
     status = 500
     slug = "internal-error"
-    title = "Something went wrong here"
+    title = "An error inside the service"
 
     def __init__(self, detail: str, *, errors: Sequence[FieldError] = (), total: int | None = None) -> None:
         super().__init__(detail)
@@ -41,7 +43,7 @@ class InvalidError(ServiceError):
 
 
 class NotFoundError(ServiceError):
-    """Nothing is known under that name."""
+    """No object has that name."""
 
     status = 404
     slug = "not-found"
@@ -49,11 +51,11 @@ class NotFoundError(ServiceError):
 
 
 class ConflictError(ServiceError):
-    """Other content is already known under that name."""
+    """That name is taken by other content."""
 
     status = 409
     slug = "conflict"
-    title = "Other content is known under this name"
+    title = "This name is taken by other content"
 
 
 class NothingToAdoptError(ConflictError):
@@ -64,7 +66,7 @@ class NothingToAdoptError(ConflictError):
 
 
 class TooLargeError(ServiceError):
-    """The request is larger than the service takes."""
+    """The request is larger than the service accepts."""
 
     status = 413
     slug = "too-large"
@@ -72,15 +74,15 @@ class TooLargeError(ServiceError):
 
 
 class UnsupportedMediaTypeError(ServiceError):
-    """The body is not of a type that this address takes."""
+    """The body is not of a type that this address accepts."""
 
     status = 415
     slug = "unsupported-media-type"
-    title = "The body has a type that is not taken here"
+    title = "The body has a type that is not accepted here"
 
 
 class BusyError(ServiceError):
-    """So much is waiting already that this is not taken now; the same again may be, a little later."""
+    """Too many requests of this kind are waiting; the same request may succeed a little later."""
 
     status = 503
     slug = "busy"
@@ -88,7 +90,7 @@ class BusyError(ServiceError):
 
 
 class UnauthorizedError(ServiceError):
-    """A key is needed and none that is known was sent."""
+    """A key is needed and no valid one was sent."""
 
     status = 401
     slug = "unauthorized"
@@ -96,7 +98,7 @@ class UnauthorizedError(ServiceError):
 
 
 class ForbiddenError(ServiceError):
-    """The caller is known, or is where it may not be, and may not do this."""
+    """The caller's key, or its address where no keys are configured, does not allow this."""
 
     status = 403
     slug = "forbidden"

@@ -1,4 +1,4 @@
-"""A diagnosis for a person at a terminal: verdict, paragraph, candidates, residual maps, gain, advice."""
+"""A diagnosis in a terminal: verdict, paragraph, candidates, residual maps, gain, advice."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,14 +15,18 @@ _VERDICTS = {
     "model_adequate": ("The model is adequate", "green"),
     "cause_named": ("The cause is named", "yellow"),
     "cause_ambiguous": ("One of these causes", "yellow"),
-    "unexplained_structure": ("Something that is not in the catalogue", "red"),
+    "unexplained_structure": ("Structure that no effect of the catalogue explains", "red"),
     "insufficient_data": ("Too little data", "cyan"),
 }
-#: What is less likely, and what comes after so many, is left to `--json`.
+#: Candidates that are less probable, or come after this many, are shown by `--json` only. Chosen: a screenful.
 _LEAST_PROBABILITY, _MOST_CANDIDATES = 0.005, 6
-#: A map is no wider than so many cells of two characters: finer axes are averaged.
+#: A gain in log evidence [nats] from which the evidence has this name. Derived: 2 ln B of 6 and 2 in R. E. Kass, A. E.
+#: Raftery, Bayes Factors, JASA 90, 1995, section 3.2.
+_EVIDENCE = ((3.0, "strong"), (1.0, "moderate"), (0.0, "weak"))
+#: Cells of two characters across a map; finer axes are averaged. Chosen: two maps fit 80 characters.
 _MOST_CELLS = 15
-#: Shares of the largest residual from which a cell is marked, and its mark and colour for below and above.
+#: A cell is marked from this share of the largest residual on: share, mark, colours for residuals above and below zero.
+#: Chosen: quarters.
 _MARKS = ((0.75, "##", 160, 27), (0.5, "++", 203, 69), (0.25, "+ ", 217, 153))
 
 
@@ -32,35 +36,45 @@ def shown(report: Mapping[str, Any]) -> Iterator[RenderableType]:
     causes = f": {', '.join(report['causes'])}" if report["causes"] else ""
     yield Panel(Text(report["summary"]), title=Text(f"{words}{causes}", style=f"bold {colour}"), border_style=colour)
     if report["candidates"]:
-        likely = [each for each in report["candidates"] if (each["probability"] or 0.0) >= _LEAST_PROBABILITY]
+        likely = [item for item in report["candidates"] if (item["probability"] or 0.0) >= _LEAST_PROBABILITY]
         yield _candidates((likely or report["candidates"])[:_MOST_CANDIDATES])
     if report["maps"] is not None:
         yield _maps(report["maps"])
     if report["baseline"]["where"]:
-        places = [f"{each['axis']} (p = {_number(each['p_value'], 2)})" for each in report["baseline"]["where"]]
-        yield Text(f"Structure that the baseline leaves lives on: {', '.join(places)}")
+        axes = [f"{item['axis']} (p = {_number(item['p_value'], 2)})" for item in report["baseline"]["where"]]
+        yield Text(f"The baseline's residuals have structure over: {', '.join(axes)}")
     yield from _gain(report)
-    for each in report["advice"]:
-        yield Text(f"To tell {' from '.join(each['separates'])}: {each['test']} ({_number(each['nats'], 2)} nats)")
+    for advice in report["advice"]:
+        expected = _evidence(advice["nats"])
+        yield Text(
+            f"To distinguish {' from '.join(advice['separates'])}: {advice['test']} (expected evidence: {expected})"
+        )
     for note in report["notes"]:
         yield Text(f"Note: {note}", style="dim")
 
 
-def _candidates(found: Sequence[Mapping[str, Any]]) -> Table:
+def _candidates(candidates: Sequence[Mapping[str, Any]]) -> Table:
     table = Table(box=None, pad_edge=False, header_style="bold")
     for name, side in (("candidate", "left"), ("probability", "right"), ("evidence", "right"), ("estimate", "left")):
         table.add_column(name, justify="right" if side == "right" else "left")
-    for each in found:
-        estimate = each["estimate"]
+    for candidate in candidates:
+        estimate = candidate["estimate"]
         amount = f"{_number(estimate['value'])} ± {_number(estimate['sd'], 2)} {estimate['unit']} {estimate['name']}"
-        evidence = f"{_number(each['log_evidence_gain'])} nats"
-        table.add_row(Text(each["effect"]), _number(each["probability"]), evidence, Text(amount))
+        evidence = _evidence(candidate["log_evidence_gain"])
+        table.add_row(Text(candidate["effect"]), _number(candidate["probability"]), evidence, Text(amount))
     return table
 
 
-def _maps(found: Mapping[str, Any]) -> Group:
-    axes, drawn = found["axes"], []
-    tables = {when: _tables(found[when]) for when in ("before", "after")}
+def _evidence(gain: float | None) -> str:
+    """A gain in log evidence [nats] in a word; the number is in `--json`."""
+    if gain is None:
+        return "-"
+    return next((word for least, word in _EVIDENCE if gain >= least), "none")
+
+
+def _maps(maps: Mapping[str, Any]) -> Group:
+    axes, drawn = maps["axes"], []
+    tables = {when: _tables(maps[when]) for when in ("before", "after")}
     largest = [
         max((abs(value) for line in tables["before"][place] for value in line if value is not None), default=0.0)
         for place in (0, 1)
@@ -122,8 +136,8 @@ def _below(mark: str) -> str:
 
 
 def _mean(values: Sequence[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return sum(known) / len(known) if known else None
+    measured = [value for value in values if value is not None]
+    return sum(measured) / len(measured) if measured else None
 
 
 def _gain(report: Mapping[str, Any]) -> Iterator[RenderableType]:
@@ -133,7 +147,7 @@ def _gain(report: Mapping[str, Any]) -> Iterator[RenderableType]:
         yield Text(
             f"Held out ({len(gain['held_out_runs'])} runs): error {_number(gain['rmse_before_nm'])} Nm before, "
             f"{_number(gain['rmse_after_nm'])} Nm after, {_number(gain['reduction_percent'])}{spread} % less; "
-            f"log score {_number(gain['log_score_gain'])} nats better"
+            f"log score gain {_number(gain['log_score_gain'])} nats"
         )
     life = gain["remaining_useful_life"]
     for when, title in (("before", "baseline"), ("after", "extended")):
@@ -143,10 +157,12 @@ def _gain(report: Mapping[str, Any]) -> Iterator[RenderableType]:
         yield Text("The extended model is adopted: tracking and remaining life use it from now on.", style="bold")
 
 
-def _remaining(said: Mapping[str, Any]) -> str:
-    if said["status"] in ("reached", "insufficient_data"):
-        return {"reached": "its end is reached", "insufficient_data": "too few tests to tell"}[said["status"]]
-    low, middle, high = (said["remaining_cycles"][quantile] for quantile in ("0.05", "0.5", "0.95"))
+def _remaining(life: Mapping[str, Any]) -> str:
+    if life["status"] == "reached":
+        return "the end of life is reached"
+    if life["status"] == "insufficient_data":
+        return "too few tests for a prediction"
+    low, middle, high = (life["remaining_cycles"][quantile] for quantile in ("0.05", "0.5", "0.95"))
     return f"{_cycles(middle)} cycles (90 %: {_cycles(low)} to {_cycles(high)})"
 
 

@@ -1,4 +1,4 @@
-"""`clutchlife fleet`: what clutches of a kind have taught; works on the database, while the service runs."""
+"""`clutchlife fleet`: the priors learned from clutches of a kind; works on the database, while the service runs."""
 
 from datetime import UTC, datetime
 from typing import Annotated, Any
@@ -7,7 +7,7 @@ import typer
 
 from service.cli.options import DATABASE, Database, existing, out
 
-app = typer.Typer(help="The priors that earlier clutches taught.")
+app = typer.Typer(help="The priors learned from earlier clutches.")
 
 
 @app.callback(invoke_without_command=True)
@@ -15,36 +15,36 @@ def show(context: typer.Context, database: Database = DATABASE) -> None:
     """The newest version of every kind's prior."""
     if context.invoked_subcommand is not None:
         return
-    from service.queries.fleet_priors import newest  # loaded by the commands that need it
+    from service.queries.fleet_priors import newest  # start-up time
 
     with existing(database) as opened:
         priors = newest(opened)
     for item in priors:
         out.print(_line(item), markup=False, soft_wrap=True)
     if not priors:
-        out.print("no fleet has taught a prior yet: run `clutchlife fleet refresh`", markup=False)
+        out.print("no prior has been learned from a fleet yet: run `clutchlife fleet refresh`", markup=False)
 
 
 @app.command()
 def refresh(
     database: Database = DATABASE,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Say only what has changed")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Print changes only")] = False,
 ) -> None:
-    """Learn every kind's prior anew, and bring the predictions up to date with it."""
-    from service.queries.fleet_priors import newest  # loaded by the commands that need it
-    from service.workflows.learn_fleet import refresh as refreshed  # as above
+    """Learn every kind's prior anew, and update the predictions of clutches whose prior has changed."""
+    from service.queries.fleet_priors import newest  # start-up time
+    from service.workflows.learn_fleet import refresh as learn_priors  # start-up time
 
     with existing(database) as opened:
-        done = refreshed(opened, now=datetime.now(UTC).isoformat(timespec="seconds"))
+        done = learn_priors(opened, now=datetime.now(UTC).isoformat(timespec="seconds"))
         priors = newest(opened)
     for item in priors:
         new = item["kind"] in done.kinds
         if new or not quiet:
             out.print(_line(item) + (" (new)" if new else ""), markup=False, soft_wrap=True)
     for clutch_id in done.changed:
-        out.print(f"{clutch_id}: tracked anew", markup=False)
+        out.print(f"{clutch_id}: predictions updated", markup=False)
     if not priors and not quiet:
-        out.print("no three clutches of a kind have six tests each: all priors stay weak", markup=False)
+        out.print("no kind has three clutches with six tests each: all priors stay weak", markup=False)
 
 
 def _line(item: dict[str, Any]) -> str:

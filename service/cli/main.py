@@ -1,8 +1,8 @@
-"""The command `clutchlife`."""
+"""The command `clutchlife`: every command, in the order in which `--help` lists them."""
 
 import typer
 
-from service.cli import diagnose, export, fleet, keys, maintain, score, serve, simulate
+from service.cli import backup, diagnose, export, fleet, key, model, replay, score, serve, simulate
 from service.cli.demo import demo
 from service.cli.sending import push
 
@@ -18,12 +18,12 @@ app.command()(demo.demo)
 app.command()(simulate.simulate)
 app.command()(push.push)
 app.command()(diagnose.diagnose)
-app.command()(diagnose.model)
+app.command()(model.model)
 app.command()(export.export)
 app.command()(score.score)
-app.command()(maintain.replay)
-app.command()(maintain.backup)
-app.add_typer(keys.app, name="key")
+app.command()(replay.replay)
+app.command()(backup.backup)
+app.add_typer(key.app, name="key")
 app.add_typer(fleet.app, name="fleet")
 
 

@@ -1,4 +1,4 @@
-"""`clutchlife score`: how right the predictions were of every clutch that has reached its threshold."""
+"""`clutchlife score`: how accurate the predictions were, for every clutch that has reached its threshold."""
 
 from typing import Annotated, Any
 
@@ -10,28 +10,30 @@ from service.cli.options import DATABASE, EX_USAGE, Database, existing, fail, ou
 def score(
     method: Annotated[str, typer.Option(help="particle, ukf or grid")] = "particle", database: Database = DATABASE
 ) -> None:
-    """Back-cast every life that came to its end: what would have been said at each test, and how right it was."""
-    from service.lives.tracks import METHODS
-    from service.queries import scores  # loaded by the one command that needs it
-    from service.queries.cache import AnswerCache
-    from service.web.limits import MOST_CACHED_BYTES
+    """Score the prediction at every test of every life that has ended."""
+    from service.lives.tracks import METHODS  # start-up time
+    from service.queries import scores  # start-up time
+    from service.queries.cache import AnswerCache  # start-up time
+    from service.web.limits import MOST_CACHED_BYTES  # start-up time
 
     if method not in METHODS:
         fail(f"method must be one of {', '.join(METHODS)}, got {method!r}", EX_USAGE)
     with existing(database) as opened:
-        said = scores.of_fleet(opened, AnswerCache(MOST_CACHED_BYTES), method=method)
-    for life in said["lives"]:
+        fleet = scores.of_fleet(opened, AnswerCache(MOST_CACHED_BYTES), method=method)
+    for life in fleet["lives"]:
         out.print(f"{life['clutch_id']}: ended at {life['end_of_life_cycles']:.0f} cycles", markup=False)
-    if not said["lives"]:
+    if not fleet["lives"]:
         out.print("no clutch has reached its threshold yet: there is nothing to score", markup=False)
         return
     out.print("share of life  predictions  CRPS/life  interval/life  coverage  alpha-lambda", markup=False)
-    for row in [*said["stages"], said["overall"]]:
+    for row in [*fleet["stages"], fleet["overall"]]:
         out.print(_line(row), markup=False)
 
 
 def _line(row: dict[str, Any]) -> str:
     stage = f"{row['share_of_life']:.1f}" if "share_of_life" in row else "all"
     shares = (row[name] for name in ("crps_share", "interval_share", "coverage", "alpha_lambda"))
-    told = ["-" if value is None else f"{value:.3f}" for value in shares]
-    return f"{stage:>13}  {row['predictions']:>11}  {told[0]:>9}  {told[1]:>13}  {told[2]:>8}  {told[3]:>12}"
+    columns = ["-" if value is None else f"{value:.3f}" for value in shares]
+    return (
+        f"{stage:>13}  {row['predictions']:>11}  {columns[0]:>9}  {columns[1]:>13}  {columns[2]:>8}  {columns[3]:>12}"
+    )

@@ -8,7 +8,7 @@ import typer
 import uvicorn
 from threadpoolctl import threadpool_limits
 
-from service.cli.options import DATABASE, EX_USAGE, Database, err, fail, told
+from service.cli.options import DATABASE, EX_USAGE, Database, err, errors_in_a_line, fail
 from service.settings import Settings
 
 LOOPBACK = "127.0.0.1"
@@ -23,11 +23,11 @@ def serve(
     """Run the service."""
     if log_level not in uvicorn.config.LOG_LEVELS:
         fail(f"log-level must be one of {', '.join(uvicorn.config.LOG_LEVELS)}, got {log_level!r}", EX_USAGE)
-    from service.web.auth import is_loopback  # what only this command needs is loaded by it alone
-    from storage import keys
-    from storage.engine.database import open_database
+    from service.web.auth import is_loopback  # start-up time
+    from storage import keys  # start-up time
+    from storage.engine.database import open_database  # start-up time
 
-    with told():
+    with errors_in_a_line():
         settings = Settings.from_environment(database)
         with closing(open_database(settings.database)) as opened, opened.reading() as connection:
             has_keys = keys.any_active(connection)
@@ -38,12 +38,12 @@ def serve(
             soft_wrap=True,
         )
         host = LOOPBACK
-    from service.app import create_app
+    from service.app import create_app  # start-up time
 
-    # the arrays are small: BLAS threads that wait for each other cost more than they bring
+    # the arrays are small: BLAS threads that wait for each other cost more than they gain
     threadpool_limits(limits=1, user_api="blas")
     app = create_app(settings)
-    # what is loaded stays: the collector's walks through all of it would hold up answers by a tenth of a second each
+    # loaded modules stay: the collector's walk through all of them would delay an answer by a tenth of a second
     gc.collect()
     gc.freeze()
     uvicorn.run(

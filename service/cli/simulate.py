@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from service.cli.options import Seed, err, out, told
+from service.cli.options import Seed, err, errors_in_a_line, out
 from service.run_files import manifest
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from models.rig.simulated_runs import SimulatedRun
     from service.run_files.record_writer import RecordFormat
 
-#: Where the campaign ends, as a share of the mean COF when new.
+#: The campaign ends at this share of the mean COF when new. Chosen: a little below the end of life at 0.5.
 _STOP = 0.45
 
 
@@ -22,50 +22,50 @@ def simulate(
     out_folder: Annotated[Path, typer.Option("--out", help="The folder to write to")],
     seed: Seed = 7,
     form: Annotated[
-        Literal["json", "csv", "tdms", "mdf4"], typer.Option("--format", help="Of the tests' files")
+        Literal["json", "csv", "tdms", "mdf4"], typer.Option("--format", help="Format of the tests' files")
     ] = "json",
-    raw: Annotated[bool, typer.Option("--raw", help="Stationary tests as sampled records")] = False,
-    raw_rate: Annotated[float, typer.Option(min=10, max=2000, help="Of raw records [Hz]")] = 100.0,
-    dynamic: Annotated[bool, typer.Option(help="With dynamic tests")] = True,
+    raw: Annotated[bool, typer.Option("--raw", help="Write stationary tests as sampled records")] = False,
+    raw_rate: Annotated[float, typer.Option(min=10, max=2000, help="Sampling rate of raw records [Hz]")] = 100.0,
+    dynamic: Annotated[bool, typer.Option(help="Simulate dynamic tests too")] = True,
     ageing: Annotated[Literal["cycles", "energy"], typer.Option(help="What ages the clutch")] = "cycles",
     tests: Annotated[int, typer.Option(min=1, help="End after so many stationary tests, if not before")] = 40,
 ) -> None:
     """Simulate a clutch's life on the rig and write it, a file a run; `clutchlife push` sends it.
 
-    Run-in and duty blocks are JSON whatever the format. Tests in another one are listed in runs.json, which push reads.
+    Run-in and duty blocks are JSON whatever the format. Tests in another format are listed in runs.json, which push reads.
     """
-    from models.rig import campaign  # what only this command needs is loaded by it alone
-    from service.run_files import record_writer, simulated
+    from models.rig import campaign  # start-up time
+    from service.run_files import record_writer, simulated  # start-up time
 
-    with told():
+    with errors_in_a_line():
         record_format = record_writer.RecordFormat(form)
         record_writer.require_writer(record_format)
         programme = _programme(raw_rate if raw else None, dynamic, ageing)
         out_folder.mkdir(parents=True, exist_ok=True)
         clutch, clutch_id = campaign.simulated_clutch(seed), f"sim-{seed}"
         manifest.write(out_folder / manifest.CLUTCH_FILE, simulated.simulated_clutch_body(clutch_id))
-        course: list[tuple[float, float]] = []
+        wear_and_cycles: list[tuple[float, float]] = []
         listed: list[dict[str, Any]] = []
         with _progress() as progress:
             task = progress.add_task("run-in", total=clutch.end_of_life(_STOP))
             runs = campaign.simulate(seed, clutch=clutch, programme=programme, stop_fraction=_STOP, most_tests=tests)
             for run in runs:
-                said = f"{run.kind.value.replace('_', ' ')}, {run.cycles} cycles"
-                progress.update(task, description=said, completed=run.wear)
+                description = f"{run.kind.value.replace('_', ' ')}, {run.cycles} cycles"
+                progress.update(task, description=description, completed=run.wear)
                 listed += _write(out_folder, run, record_format)
-                course.append((run.wear, run.cycles))
+                wear_and_cycles.append((run.wear, run.cycles))
         if listed:
             manifest.write(out_folder / manifest.MANIFEST, listed)
-        end = campaign.end_of_life(course, clutch)
+        end = campaign.end_of_life(wear_and_cycles, clutch)
         truth = "has not halved in this campaign" if end is None else f"has halved after {end:.0f} cycles"
-        out.print(f"{len(course)} simulated runs of the simulated clutch {clutch_id} in {out_folder}", soft_wrap=True)
+        out.print(f"{len(wear_and_cycles)} simulated runs of {clutch_id} in {out_folder}", soft_wrap=True)
         out.print(f"the truth: its mean COF {truth}")
 
 
 def _programme(raw_rate: float | None, dynamic: bool, ageing: str) -> "Programme":
-    """All of fig. 2, but for what is left out."""
-    from models.rig.programme import Ageing, Programme
-    from models.rig.sampled import DynamicTest, RawTest
+    """The programme of fig. 2 with these options."""
+    from models.rig.programme import Ageing, Programme  # start-up time
+    from models.rig.sampled import DynamicTest, RawTest  # start-up time
 
     return Programme(
         dynamic=DynamicTest() if dynamic else None,
@@ -76,8 +76,8 @@ def _programme(raw_rate: float | None, dynamic: bool, ageing: str) -> "Programme
 
 
 def _write(folder: Path, run: "SimulatedRun", record_format: "RecordFormat") -> list[dict[str, Any]]:
-    """One run into one file; what the manifest has to say of it, if it is no JSON."""
-    from service.run_files import record_writer, simulated
+    """One run into one file; its entry for the manifest, where it is not JSON."""
+    from service.run_files import record_writer, simulated  # start-up time
 
     if record_format is record_writer.RecordFormat.JSON or run.duty is not None:
         manifest.write(folder / f"{run.run_id}.json", simulated.simulated_body(run))

@@ -1,4 +1,4 @@
-"""Columns of numbers as they were sent -> checked 64-bit columns, or errors that name channel, row and value."""
+"""Columns as they were sent -> checked float64 columns, or errors that name channel, row and value."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -7,18 +7,15 @@ from typing import Any
 import numpy as np
 
 from models.arrays import FloatArray
-from service.errors import MOST_ERRORS, FieldError, InvalidError
+from service.errors import MOST_ERRORS, MOST_QUOTED, FieldError, InvalidError
 from service.readers.units import CHANNELS, SAMPLED_LEAST
 
-_SHOWN = 80
-
-
-#: Row of a column, from 0 -> line of the file that it stands on, from 1.
+#: Row of a column, from 0 -> its line in the file, from 1.
 LineOf = Callable[[int], int]
 
 
 class _Errors:
-    """Collects errors; keeps the first MOST_ERRORS and counts the rest. Rows of a file are named with their line."""
+    """Collects errors; keeps the first MOST_ERRORS and counts the rest. Rows of a file are given with their line."""
 
     def __init__(self, line_of: LineOf | None = None) -> None:
         self.kept: list[FieldError] = []
@@ -34,7 +31,7 @@ class _Errors:
         if len(self.kept) >= MOST_ERRORS:
             self.total += 1
             return
-        shown = repr(value)[:_SHOWN] if isinstance(value, str | list | dict) else str(value)[:_SHOWN]
+        shown = repr(value)[:MOST_QUOTED] if isinstance(value, str | list | dict) else str(value)[:MOST_QUOTED]
         place = f"{name}[{index}]" + (f" (line {self._line_of(index)})" if self._line_of else "")
         self.add(
             FieldError(
@@ -66,9 +63,9 @@ def check_columns(columns: Mapping[str, Sequence[Any]]) -> dict[str, FloatArray]
 
 
 def check_arrays(columns: Mapping[str, FloatArray], *, line_of: LineOf | None = None) -> None:
-    """Columns [n] by public channel name, in the channels' units, held to the rules of `check_columns`.
+    """Columns [n] by public channel name, in the channels' units, checked by the rules of `check_columns`.
 
-    Raises InvalidError as that does; with `line_of` the messages name the line of the file too.
+    Raises InvalidError as `check_columns` does; with `line_of` the messages name the line of the file too.
     """
     errors = _Errors(line_of)
     _check_lengths(columns, errors)

@@ -1,4 +1,4 @@
-"""Which of a file's columns is which channel: by public name, by synonym, or as an explicit map says; and its unit."""
+"""A file's column titles -> channels and their units: by public name, by synonym, or by an explicit map."""
 
 import re
 import unicodedata
@@ -6,11 +6,12 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from service.errors import FieldError, InvalidError
+from service.errors import MOST_QUOTED, FieldError, InvalidError
+from service.readers.limits import LONGEST_MAP
 from service.readers.unit_table import Conversion, conversion, is_unit, spellings
 from service.readers.units import CHANNELS
 
-#: Single letters mean what they mean in mechanics: capitals count (M is a torque, n a speed, p a pressure, t a time).
+#: Single letters have their meaning in mechanics: capitals count (M is a torque, n a speed, p a pressure, t a time).
 _LETTERS = {"M": "torque_nm", "n": "speed_rpm", "p": "pressure_bar", "t": "time_s"}
 
 _WORDS = {
@@ -28,7 +29,7 @@ _WORDS = {
     "temperature_oil temperatur_öl theta_oil theta_öl sump_temperature sumpftemperatur oil_sump_temperature",
 }
 
-_SHOWN = 80
+#: Columns that one message names.
 _MOST_NAMED = 10
 
 
@@ -36,7 +37,7 @@ _MOST_NAMED = 10
 class Header:
     """One column of a file: its name without a unit, and the unit that the file states (None: it states none).
 
-    `group` is what tells equal names apart in files that have groups; `group/name` may be used in a map.
+    `group` distinguishes equal names in files that have groups; a map may use `group/name`.
     """
 
     name: str
@@ -45,12 +46,12 @@ class Header:
 
     def shown(self) -> str:
         """The name for a message."""
-        return f"{self.group}/{self.name}"[:_SHOWN] if self.group else self.name[:_SHOWN]
+        return f"{self.group}/{self.name}"[:MOST_QUOTED] if self.group else self.name[:MOST_QUOTED]
 
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """A column that is taken: the file's `index`-th as `channel`, with its way into the channel's unit."""
+    """A column that is taken: the file's `index`-th as `channel`, with its conversion to the channel's unit."""
 
     channel: str
     index: int
@@ -82,12 +83,12 @@ def header_of(text: str) -> Header:
     title = text.strip()
     if known_channel(title):
         return Header(title)
-    if found := _BRACKETED.fullmatch(title):
-        return Header(found["name"].strip(), bare_unit(found["unit"]))
+    if match := _BRACKETED.fullmatch(title):
+        return Header(match["name"].strip(), bare_unit(match["unit"]))
     for pattern in (_PER, _IN):
-        found = pattern.fullmatch(title)
-        if found and (known_channel(found["name"]) or is_unit(found["unit"])):
-            return Header(found["name"].strip(), bare_unit(found["unit"]))
+        match = pattern.fullmatch(title)
+        if match and (known_channel(match["name"]) or is_unit(match["unit"])):
+            return Header(match["name"].strip(), bare_unit(match["unit"]))
     for mark in re.finditer(r"[\s_]+", title):
         name, unit = title[: mark.start()], title[mark.end() :]
         if known_channel(name) and is_unit(unit):
@@ -102,12 +103,12 @@ def bare_unit(text: str) -> str | None:
 
 
 def with_unit(header: Header, unit: str | None) -> Header:
-    """A header with the unit that the file states beside the name; raises InvalidError where the name says another."""
+    """A header with the unit that the file states beside the name; raises InvalidError where the name states another."""
     stated = bare_unit(unit or "")
     if stated and header.unit and stated != header.unit:
         channel = known_channel(header.name)
         if channel is None or conversion(channel, stated) != conversion(channel, header.unit):
-            both = f"{header.unit[:_SHOWN]!r} and {stated[:_SHOWN]!r}"
+            both = f"{header.unit[:MOST_QUOTED]!r} and {stated[:MOST_QUOTED]!r}"
             message = f"column {header.shown()!r} must be in one unit, got {both}"
             raise InvalidError(
                 message, errors=[FieldError(pointer="", code="mixed_units", message=message, value=both)]
@@ -118,103 +119,105 @@ def with_unit(header: Header, unit: str | None) -> Header:
 def parse_map(mapping: str | None) -> dict[str, str]:
     """`torque_nm:Mz,pressure_bar:p1` -> {channel: column's name}. Names may hold commas and colons themselves.
 
-    Raises InvalidError where the text is no such list, a channel is not known or is named twice.
+    Raises InvalidError where the text is no such list, or a channel in it is unknown or named twice.
     """
     if mapping is None or not mapping.strip():
         return {}
-    if len(mapping) > 4096:
-        raise _wrong_map(mapping, "must not be longer than 4096 characters")
-    asked: dict[str, str] = {}
+    if len(mapping) > LONGEST_MAP:
+        raise _wrong_map(mapping, f"must not be longer than {LONGEST_MAP} characters")
+    names: dict[str, str] = {}
     for part in re.split(rf",(?=\s*(?:{'|'.join(CHANNELS)})\s*:)", mapping):
         channel, colon, name = part.partition(":")
         channel, name = channel.strip(), name.strip()
         if not colon or not name:
             raise _wrong_map(part, "must be a list such as torque_nm:Mz,pressure_bar:p1")
         if channel not in CHANNELS:
-            raise _wrong_map(channel, f"must name channels out of {', '.join(CHANNELS)}")
-        if channel in asked:
+            raise _wrong_map(channel, f"must name channels from {', '.join(CHANNELS)}")
+        if channel in names:
             raise _wrong_map(channel, "must name each channel once")
-        asked[channel] = name
-    return asked
+        names[channel] = name
+    return names
 
 
 def _wrong_map(value: str, rule: str) -> InvalidError:
-    message = f"map {rule}, got {value[:_SHOWN]!r}"
+    message = f"map {rule}, got {value[:MOST_QUOTED]!r}"
     return InvalidError(
-        message, errors=[FieldError(pointer="/map", code="invalid_map", message=message, value=value[:_SHOWN])]
+        message, errors=[FieldError(pointer="/map", code="invalid_map", message=message, value=value[:MOST_QUOTED])]
     )
 
 
 def choose(headers: Sequence[Header], mapping: str | None) -> list[Taken]:
     """Which columns are taken, in the order of the file.
 
-    Without a map every column must be known; a map says what some are, and what is neither named in it nor known is left
-    out. Raises InvalidError where a column is unknown, two are the same channel, or a unit is unknown or not stated.
+    Without a map every column must be a known channel. With a map, columns that are neither in it nor known are left out.
+    Raises InvalidError where a column is unknown, two are the same channel, or a unit is unknown or not stated.
     """
-    asked = parse_map(mapping)
-    by_map = {_find(headers, channel, name): channel for channel, name in asked.items()}
-    if len(by_map) < len(asked):
+    mapped_names = parse_map(mapping)
+    by_map = {_find(headers, channel, name): channel for channel, name in mapped_names.items()}
+    if len(by_map) < len(mapped_names):
         raise _wrong_map(str(mapping), "must not name one column for two channels")
-    names: dict[str, int] = {}
+    indices: dict[str, int] = {}
     unknown = []
     for index, header in enumerate(headers):
         channel = by_map.get(index) or known_channel(header.name)
         if channel is None:
             unknown.append(header)
-        elif index in by_map or channel not in asked:
-            if channel in names:
-                raise _twice(channel, headers[names[channel]], header)
-            names[channel] = index
-    if unknown and not asked:
+        elif index in by_map or channel not in mapped_names:
+            if channel in indices:
+                raise _twice(channel, headers[indices[channel]], header)
+            indices[channel] = index
+    if unknown and not mapped_names:
         raise _unknown(headers, unknown)
-    if not names:
-        raise InvalidError(f"the file holds no channel that is known: it has {_list(headers)}")
+    if not indices:
+        raise InvalidError(f"the file holds no known channel: it has {_list(headers)}")
     taken = [
-        Taken(name, index, _conversion(name, headers[index], mapped=index in by_map)) for name, index in names.items()
+        Taken(name, index, _conversion(name, headers[index], mapped=index in by_map)) for name, index in indices.items()
     ]
-    return sorted(taken, key=lambda each: each.index)
+    return sorted(taken, key=lambda column: column.index)
 
 
 def _find(headers: Sequence[Header], channel: str, name: str) -> int:
-    """The column that a map names: by its exact name, else by its name without regard to case, blanks and unit."""
+    """The index of the column that a map names: by its exact name, else whatever its case, blanks and unit."""
     wanted = header_of(name).name
     exact = [index for index, header in enumerate(headers) if name in (header.name, f"{header.group}/{header.name}")]
     alike = [index for index, header in enumerate(headers) if _key(wanted) == _key(header.name)]
-    for found in (exact, alike):
-        if len(found) == 1:
-            return found[0]
-        if found:
-            raise _twice(channel, *(headers[index] for index in found))
-    message = f"map says that {channel} is {name[:_SHOWN]!r}, which the file does not have: it has {_list(headers)}"
+    for matches in (exact, alike):
+        if len(matches) == 1:
+            return matches[0]
+        if matches:
+            raise _twice(channel, *(headers[index] for index in matches))
+    message = (
+        f"map names for {channel} the column {name[:MOST_QUOTED]!r}, which is not there; there are {_list(headers)}"
+    )
     raise InvalidError(
-        message, errors=[FieldError(pointer="/map", code="no_such_column", message=message, value=name[:_SHOWN])]
+        message, errors=[FieldError(pointer="/map", code="no_such_column", message=message, value=name[:MOST_QUOTED])]
     )
 
 
 def _twice(channel: str, *headers: Header) -> InvalidError:
     shown = " and ".join(header.shown() for header in headers[:_MOST_NAMED])
-    message = f"{channel} must be one column, got {shown}; map={channel}:NAME says which"
+    message = f"{channel} must be one column, got {shown}; map={channel}:NAME chooses one"
     return InvalidError(
         message, errors=[FieldError(pointer=f"/channels/{channel}", code="ambiguous", message=message, value=shown)]
     )
 
 
 def _unknown(headers: Sequence[Header], unknown: Sequence[Header]) -> InvalidError:
-    """Every column that is not known, and equal names said first: they cannot be told apart by a map either."""
+    """The error that lists every unknown column, and equal names: a map cannot distinguish those either."""
     repeated = [name for name, times in Counter(header.shown() for header in headers).items() if times > 1]
     more = f"; {', '.join(repeated[:_MOST_NAMED])} is there more than once" if repeated else ""
     errors = [
         FieldError(
             pointer=f"/channels/{header.shown().replace('~', '~0').replace('/', '~1')}",
             code="unknown_channel",
-            message=f"{header.shown()!r} is not a channel that is known",
+            message=f"{header.shown()!r} is not a known channel",
             value=header.shown(),
         )
         for header in unknown
     ]
     detail = (
         f"{_list(unknown)}: not known as a channel; the channels are {', '.join(CHANNELS)}{more}; "
-        "map=CHANNEL:NAME,... says what is what, and leaves out what it does not name"
+        "map=CHANNEL:NAME,... names the columns to take; unknown columns that it does not name are left out"
     )
     return InvalidError(detail, errors=errors)
 
@@ -225,30 +228,30 @@ def _list(headers: Sequence[Header]) -> str:
 
 
 def _conversion(channel: str, header: Header, *, mapped: bool) -> Conversion:
-    """The way into the channel's unit. A public name states its unit itself: another one beside it is a contradiction.
+    """The conversion to the channel's unit. A public name states its unit: another unit beside it is a contradiction.
 
-    A map states it too, for a column that has none of its own.
+    A column without a unit that a map names is taken to be in the channel's unit.
     """
     own, public = CHANNELS[channel].unit, _key(header.name) == channel
     if header.unit is None:
         if public or mapped:
             return Conversion()
-        rule = (
-            f"must state its unit ({spellings(channel)}), in brackets or in a units row; or map={channel}:{header.name}"
-        )
+        rule = f"must be stated ({spellings(channel)}), in brackets or in a unit row; or map={channel}:{header.name}"
         raise _wrong_unit(channel, header, "missing_unit", rule, "none")
-    found = conversion(channel, header.unit)
-    if found is None:
-        rule = f"must be in a unit that is known ({spellings(channel)})"
-        raise _wrong_unit(channel, header, "unknown_unit", rule, repr(header.unit[:_SHOWN]))
-    if public and not mapped and not found.is_identity():
+    converted = conversion(channel, header.unit)
+    if converted is None:
+        rule = f"must be a known one ({spellings(channel)})"
+        raise _wrong_unit(channel, header, "unknown_unit", rule, repr(header.unit[:MOST_QUOTED]))
+    if public and not mapped and not converted.is_identity():
         rule = f"is in {own} by its name"
-        raise _wrong_unit(channel, header, "mixed_units", rule, repr(header.unit[:_SHOWN]))
-    return found
+        raise _wrong_unit(channel, header, "mixed_units", rule, repr(header.unit[:MOST_QUOTED]))
+    return converted
 
 
 def _wrong_unit(channel: str, header: Header, code: str, rule: str, got: str) -> InvalidError:
-    said = channel if _key(header.name) == channel else f"{channel} (column {header.shown()!r})"
-    message = f"{said}: the unit {rule}, got {got}"
-    error = FieldError(pointer=f"/channels/{channel}", code=code, message=message, value=(header.unit or "")[:_SHOWN])
+    column = channel if _key(header.name) == channel else f"{channel} (column {header.shown()!r})"
+    message = f"{column}: the unit {rule}, got {got}"
+    error = FieldError(
+        pointer=f"/channels/{channel}", code=code, message=message, value=(header.unit or "")[:MOST_QUOTED]
+    )
     return InvalidError(message, errors=[error])

@@ -1,4 +1,4 @@
-"""Which format a file has, by its first bytes and its suffix; and its bytes, unpacked where it is packed with gzip."""
+"""The format of a file, by its first bytes and its suffix; and its bytes, unpacked where it is packed with gzip."""
 
 import gzip
 import zlib
@@ -8,7 +8,7 @@ from enum import StrEnum
 from pathlib import Path, PurePath
 from typing import BinaryIO, Protocol
 
-from service.errors import InvalidError, TooLargeError
+from service.errors import MOST_QUOTED, InvalidError, TooLargeError
 from service.readers.limits import Limits
 
 
@@ -22,7 +22,7 @@ class Format(StrEnum):
 
 
 class ByteSource(Protocol):
-    """What a reader reads: a file, or a file being unpacked."""
+    """A file, or a gzip file being unpacked."""
 
     def read(self, size: int, /) -> bytes:
         """At most `size` bytes; none at the end."""
@@ -49,19 +49,19 @@ _FOREIGN = {
     b"MATLAB 5": "a MATLAB file",
     b"SQLite f": "a database",
     b"\x7fELF": "a program",
-    b"\x28\xb5\x2f\xfd": "a Zstandard archive (gzip is taken)",
-    b"BZh": "a bzip2 archive (gzip is taken)",
-    b"\xfd7zXZ": "an xz archive (gzip is taken)",
+    b"\x28\xb5\x2f\xfd": "a Zstandard archive (gzip is accepted)",
+    b"BZh": "a bzip2 archive (gzip is accepted)",
+    b"\xfd7zXZ": "an xz archive (gzip is accepted)",
     _GZIP: "packed with gzip twice",
-    b"{": "JSON: post that to the runs themselves",
+    b"{": "JSON: post it to the address of the runs",
 }
+#: Bytes that are read to detect the format; every magic number is shorter.
 _HEAD = 4096
-_SHOWN = 80
 
 
 @contextmanager
 def opened(path: Path, limits: Limits) -> Iterator[ByteSource]:
-    """The file's bytes, unpacked where they are packed. Reading past the limits raises TooLargeError."""
+    """The file's bytes, unpacked if it is a gzip file. Reading past the limits raises TooLargeError."""
     with path.open("rb") as file:
         packed = file.read(2) == _GZIP
         file.seek(0)
@@ -100,19 +100,19 @@ class _Unpacked:
 
 
 def sniff(path: Path, filename: str, limits: Limits) -> Format:
-    """The format of a file, by content first. Raises InvalidError where it is none of those that are read."""
+    """The format of a file, by content first. Raises InvalidError where it is another one."""
     with opened(path, limits) as source:
         head = source.read(_HEAD)
-    shown = repr(filename[-_SHOWN:])
+    shown = repr(filename[-MOST_QUOTED:])
     if not head:
         raise InvalidError(f"{shown} must not be empty")
     for magic, kind in _MAGIC.items():
         if head.startswith(magic):
             return kind
-    for magic, what in _FOREIGN.items():
+    for magic, foreign in _FOREIGN.items():
         if head.startswith(magic):
-            raise InvalidError(f"{shown} must be CSV, TDMS, MDF4 or Parquet, got {what}")
-    named = _SUFFIXES.get(PurePath(filename.lower().removesuffix(".gz")).suffix)
-    if named:
-        raise InvalidError(f"{shown} is named as {named} but does not begin as one")
+            raise InvalidError(f"{shown} must be CSV, TDMS, MDF4 or Parquet, got {foreign}")
+    by_suffix = _SUFFIXES.get(PurePath(filename.lower().removesuffix(".gz")).suffix)
+    if by_suffix:
+        raise InvalidError(f"{shown} is named as {by_suffix} but does not begin as one")
     return Format.CSV

@@ -1,21 +1,30 @@
-"""What reading one file may cost."""
+"""What reading one file may cost. A file past a limit is refused with TooLargeError or InvalidError; values are chosen."""
 
 from dataclasses import dataclass
+
+#: Bytes of one line of CSV. Chosen; 1,000 columns of 60 characters fit.
+LONGEST_LINE_BYTES = 1 << 16
+#: Characters of a map of channels. Chosen; no table.
+LONGEST_MAP = 4096
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """Bounds on one file: bytes (unpacked), unpacking, values that are taken, columns, and its reader's seconds and memory.
+    """Bounds on one file and on the process that reads it."""
 
-    `most_ratio` holds past the first `free_bytes` unpacked: a short text of few digits packs well.
-    """
-
+    #: Bytes, unpacked. Chosen; by docs/benchmarks.md five channels at 10 kHz for 1,400 s are half of it as CSV.
     most_bytes: int = 1 << 30
+    #: Unpacked over packed bytes, and the unpacked bytes that are free of that rule: a short text of few digits packs well.
+    #: Chosen; no table.
     most_ratio: int = 100
     free_bytes: int = 8 << 20
+    #: Values that are taken, rows times channels. Chosen; 160 MB of memory as float64.
     most_values: int = 20_000_000
+    #: Columns, whether they are taken or not. Chosen; no table.
     most_columns: int = 1000
+    #: Seconds of reading. Chosen; by docs/benchmarks.md 1.4 million rows take 2.5 s at most, fits and storage included.
     seconds: int = 30
+    #: Address space of the process that reads a TDMS, MDF4 or Parquet file, bytes: 1.5 GiB. Chosen; no table.
     memory_bytes: int = 3 << 29
 
 

@@ -1,6 +1,6 @@
 """ASAM MDF4 -> columns, by asammdf: channels of all groups in physical values, the groups' master channel as the time.
 
-Runs in the reading process of `isolation`. Source: ASAM MDF 4.2, Measurement Data Format.
+Runs in the reading process of `sandbox`. Source: ASAM MDF 4.2, Measurement Data Format.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,9 @@ _TRUNCATED = "truncated"
 
 
 @dataclass(frozen=True, slots=True)
-class _Found:
+class _Source:
+    """A channel of the file: its header, where it is, and how many rows its group states."""
+
     header: Header
     group: int
     index: int
@@ -29,19 +31,18 @@ class _Found:
 
 
 def read(path: Path, mapping: str | None, limits: Limits) -> dict[str, FloatArray]:
-    """The channels [n] that the map and the names tell, in their own units; `time_s` from the master channel."""
+    """The channels [n] that the map and the names choose, in their own units; `time_s` from the master channel."""
     _require_version_4(path)
     with MDF(path) as file:
-        asked = parse_map(mapping)
-        found = _channels(file, masters="time_s" in asked)
-        if len(found) > limits.most_columns:
-            raise InvalidError(f"a file must not have more than {limits.most_columns} channels, got {len(found)}")
-        headers = [each.header for each in found]
+        sources = _sources(file, masters="time_s" in parse_map(mapping))
+        if len(sources) > limits.most_columns:
+            raise InvalidError(f"a file must not have more than {limits.most_columns} channels, got {len(sources)}")
+        headers = [source.header for source in sources]
         taken = choose(headers, mapping)
-        require_one_length({place(headers, each): found[each.index].rows for each in taken}, limits)
-        columns = {each.channel: _column(file, each, found[each.index]) for each in taken}
+        require_one_length({place(headers, column): sources[column.index].rows for column in taken}, limits)
+        columns = {column.channel: _values(file, column, sources[column.index]) for column in taken}
         if "time_s" not in columns:
-            columns |= _master(file, [found[each.index] for each in taken])
+            columns |= _master_time(file, [sources[column.index] for column in taken])
         return columns
 
 
@@ -52,41 +53,41 @@ def _require_version_4(path: Path) -> None:
         raise InvalidError(f"an MDF file must be of version 4, got {version!r}")
 
 
-def _channels(file: Any, *, masters: bool) -> list[_Found]:
-    """All channels with values; the master channels among them only where a map asks for one by name."""
+def _sources(file: Any, *, masters: bool) -> list[_Source]:
+    """All channels with values; `masters`: master channels too, for a map that names the time."""
     groups = [index for index, group in enumerate(file.groups) if group.channel_group.cycles_nr]
-    found = []
+    sources = []
     for group in groups:
         name = (file.groups[group].channel_group.acq_name or f"group {group}") if len(groups) > 1 else ""
         for index, channel in enumerate(file.groups[group].channels):
             if masters or index != file.masters_db.get(group):
                 header = recorded_header(channel.name, file.get_channel_unit(group=group, index=index), name)
-                found.append(_Found(header, group, index, int(file.groups[group].channel_group.cycles_nr)))
-    return found
+                sources.append(_Source(header, group, index, int(file.groups[group].channel_group.cycles_nr)))
+    return sources
 
 
-def _column(file: Any, each: Taken, found: _Found) -> FloatArray:
-    samples = file.get(group=found.group, index=found.index).samples
-    if len(samples) != found.rows:
-        message = f"{each.channel} must have the {found.rows} rows that its group states, got {len(samples)}"
+def _values(file: Any, column: Taken, source: _Source) -> FloatArray:
+    samples = file.get(group=source.group, index=source.index).samples
+    if len(samples) != source.rows:
+        message = f"{column.channel} must have the {source.rows} rows that its group states, got {len(samples)}"
         raise InvalidError(message, errors=[FieldError(pointer="", code=_TRUNCATED, message=message)])
-    column = numbers(each.channel, samples).copy()
-    each.conversion.apply(column)
-    return column
+    values = numbers(column.channel, samples).copy()
+    column.conversion.apply(values)
+    return values
 
 
-def _master(file: Any, found: list[_Found]) -> dict[str, FloatArray]:
-    """`time_s` of the groups that were taken, which must have one time; nothing where they have none.
+def _master_time(file: Any, sources: list[_Source]) -> dict[str, FloatArray]:
+    """`time_s` of the groups that were taken, which must agree; empty where no master channel is a time.
 
-    A master that is an angle, a distance or an index is no time.
+    A master channel may also be an angle, a distance or an index.
     """
-    groups = sorted({each.group for each in found})
+    groups = sorted({source.group for source in sources})
     timed = [group for group in groups if group in file.masters_db and _is_time(file, group)]
     times = [np.array(file.get_master(group), dtype=np.float64) for group in timed]
     if not times:
         return {}
     if len(times) < len(groups) or any(not np.array_equal(times[0], time) for time in times[1:]):
-        raise InvalidError("all channels that are taken must be sampled by one clock, got groups whose times differ")
+        raise InvalidError("all channels that are taken must be sampled by one clock, got groups with different times")
     return {"time_s": times[0]}
 
 

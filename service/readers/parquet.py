@@ -1,6 +1,6 @@
 """Apache Parquet -> columns, by pyarrow: units from the names, or from the fields' metadata under `unit`.
 
-Runs in the reading process of `isolation`. Source: apache/parquet-format.
+Runs in the reading process of `sandbox`. Source: apache/parquet-format.
 """
 
 from pathlib import Path
@@ -18,29 +18,31 @@ from service.readers.recorder_columns import numbers, recorded_header, require_o
 
 
 def read(path: Path, mapping: str | None, limits: Limits) -> dict[str, FloatArray]:
-    """The columns [n] that the map and the names tell, in their own units. A null is NaN, and refused as that."""
+    """The columns [n] that the map and the names choose, in their own units. A null is NaN, which is refused."""
     with parquet.ParquetFile(path, memory_map=True) as file:
         fields = list(file.schema_arrow)
         if len(fields) > limits.most_columns:
             raise InvalidError(f"a file must not have more than {limits.most_columns} columns, got {len(fields)}")
         taken = choose([_header(field) for field in fields], mapping)
         rows = file.metadata.num_rows
-        require_one_length({each.channel: rows for each in taken}, limits)
-        for each in taken:
-            _require_numbers(each.channel, fields[each.index].type)
-        columns = {each.channel: np.empty(rows) for each in taken}
+        require_one_length({column.channel: rows for column in taken}, limits)
+        for column in taken:
+            _require_numbers(column.channel, fields[column.index].type)
+        columns = {column.channel: np.empty(rows) for column in taken}
         _fill(file, fields, taken, columns)
-    for each in taken:
-        if kinds.is_timestamp(fields[each.index].type):
-            columns[each.channel] -= columns[each.channel][:1]
+    for column in taken:
+        if kinds.is_timestamp(fields[column.index].type):
+            columns[column.channel] -= columns[column.channel][:1]
         else:
-            each.conversion.apply(columns[each.channel])
+            column.conversion.apply(columns[column.channel])
     return columns
 
 
 def _header(field: Any) -> Header:
-    said = field.metadata or {}
-    unit = next((said[key].decode("utf-8", "replace") for key in (b"unit", b"units", b"Unit") if key in said), None)
+    metadata = field.metadata or {}
+    unit = next(
+        (metadata[key].decode("utf-8", "replace") for key in (b"unit", b"units", b"Unit") if key in metadata), None
+    )
     return recorded_header(field.name, "s" if kinds.is_timestamp(field.type) else unit)
 
 
@@ -54,15 +56,15 @@ def _require_numbers(channel: str, kind: Any) -> None:
 
 
 def _fill(file: Any, fields: list[Any], taken: list[Taken], columns: dict[str, FloatArray]) -> None:
-    at = 0
+    start = 0
     first = None
     for batch in file.iter_batches(
-        batch_size=65536, columns=[fields[each.index].name for each in taken], use_threads=False
+        batch_size=65536, columns=[fields[column.index].name for column in taken], use_threads=False
     ):
-        for each in taken:
-            values = batch.column(fields[each.index].name).to_numpy(zero_copy_only=False)
+        for column in taken:
+            values = batch.column(fields[column.index].name).to_numpy(zero_copy_only=False)
             if values.dtype.kind == "M":
                 first = values[0] if first is None else first
                 values = (values - first) / np.timedelta64(1, "s")
-            columns[each.channel][at : at + batch.num_rows] = numbers(each.channel, values)
-        at += batch.num_rows
+            columns[column.channel][start : start + batch.num_rows] = numbers(column.channel, values)
+        start += batch.num_rows

@@ -1,4 +1,4 @@
-"""A run's record as a file, of whatever format -> checked columns by public channel name."""
+"""A run's record as a file of any format -> checked columns by public channel name: detect, read, check."""
 
 from pathlib import Path
 
@@ -15,8 +15,8 @@ def read_file(
 ) -> dict[str, FloatArray]:
     """The channels [n] of a CSV, TDMS, MDF4 or Parquet file by public name, in the channels' units.
 
-    `filename` is what the sender called it, `mapping` is `torque_nm:Mz,...`. Raises InvalidError and TooLargeError, and
-    nothing else, whatever the file holds.
+    `filename` is the sender's name for it, `mapping` names columns (`torque_nm:Mz,...`). Raises InvalidError or
+    TooLargeError, and nothing else, whatever the file holds.
     """
     kind = sniff(path, filename, limits)
     if kind is not Format.CSV:

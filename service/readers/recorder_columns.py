@@ -1,4 +1,4 @@
-"""What the readers of TDMS, MDF4 and Parquet share: names, lengths and number types as recorders write them."""
+"""Shared by `tdms`, `mdf4` and `parquet`: names, lengths and number types as recorders write them."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,15 +13,15 @@ from service.readers.limits import Limits
 
 
 def recorded_header(name: str, unit: str | None, group: str = "") -> Header:
-    """The header of a recorded channel, whose unit may stand in its name, beside it, or both."""
-    found = header_of(name)
-    return with_unit(Header(found.name, found.unit, group), unit)
+    """The header of a recorded channel, whose unit may be in its name, in its properties, or both."""
+    header = header_of(name)
+    return with_unit(Header(header.name, header.unit, group), unit)
 
 
 def require_one_length(lengths: Mapping[str, int], limits: Limits) -> None:
-    """Channels that are recorded at several rates are refused, and so are too many values.
+    """Raises InvalidError on channels of several rates, TooLargeError on too many values.
 
-    `lengths`: rows by a name that says channel and place. Raises InvalidError, TooLargeError.
+    `lengths`: rows by channel and its place in the file.
     """
     if len(set(lengths.values())) > 1:
         shown = ", ".join(f"{name} has {rows}" for name, rows in lengths.items())
@@ -34,7 +34,7 @@ def require_one_length(lengths: Mapping[str, int], limits: Limits) -> None:
 def numbers(channel: str, values: NDArray[Any]) -> FloatArray:
     """Recorded values [n] as float64 [n]; points in time become seconds since the first.
 
-    Raises InvalidError where they are neither.
+    Raises InvalidError on any other type.
     """
     if values.ndim == 1 and values.dtype.kind in "iuf":
         return np.asarray(values, dtype=np.float64)
@@ -47,6 +47,6 @@ def numbers(channel: str, values: NDArray[Any]) -> FloatArray:
     )
 
 
-def place(headers: Sequence[Header], each: Taken) -> str:
-    """A taken channel and where it comes from, for a message."""
-    return f"{each.channel} ({headers[each.index].shown()!r})"
+def place(headers: Sequence[Header], column: Taken) -> str:
+    """A taken channel and its name in the file, for a message."""
+    return f"{column.channel} ({headers[column.index].shown()!r})"

@@ -1,14 +1,15 @@
-"""Foreign binary files are read in a process of their own, with limits on its memory, time and output.
+"""TDMS, MDF4 and Parquet files are read in a process of their own, with limits on its memory, time and output.
 
-The libraries that read TDMS, MDF4 and Parquet are large, and a broken or malicious file may make them loop, eat memory or
-crash: then a process ends that nobody else lives in. It hands back one file: a line of JSON that says what follows, then the
-columns as raw little-endian float64. Nothing that came from the file is ever unpickled or evaluated.
+The libraries that read them are large, and a broken or malicious file may make them loop, exhaust memory or crash: that
+ends the reading process only. It returns one file: a line of JSON (the columns' lengths, or an error), then the columns as
+raw little-endian float64. Nothing that came from the file is ever unpickled or evaluated.
 """
 
 import importlib
 import json
 import math
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -27,18 +28,22 @@ from service.readers.detect import Format, is_packed, opened
 from service.readers.limits import Limits
 from service.readers.units import CHANNELS
 
-#: Where each format is read, which package that needs, and the extra of ours that installs it.
+#: The module that reads each format, the package it needs, and the extra of ours that installs that package.
 READERS = {
     Format.TDMS: ("service.readers.tdms", "nptdms", "tdms"),
     Format.MDF4: ("service.readers.mdf4", "asammdf", "mdf"),
     Format.PARQUET: ("service.readers.parquet", "pyarrow", "parquet"),
 }
 
+#: Bytes of the line of JSON that the reading process answers with.
 _LONGEST_ANSWER = 1 << 16
 _BLOCK = 1 << 20
-_SHOWN = 200
+#: Characters of a foreign library's message that ours quotes, and of a whole message.
+_MOST_QUOTED, _LONGEST_DETAIL = 200, 4000
+#: Added to the limit on reading, for the interpreter to start and import the library.
 _STARTING_SECONDS = 10
-_PASSED_ON = (
+#: Environment variables that the reading process gets; no others, so no keys.
+_ENVIRONMENT = (
     "PATH",
     "PYTHONPATH",
     "LANG",
@@ -76,9 +81,9 @@ def _require(kind: Format) -> None:
 
 
 def _run(kind: Format, path: Path, mapping: str | None, limits: Limits) -> dict[str, FloatArray]:
-    asked = {"kind": kind, "path": str(path.resolve()), "mapping": mapping, "limits": asdict(limits)}
-    environment = {name: os.environ[name] for name in _PASSED_ON if name in os.environ}
-    # Threads of their own would only reserve memory: the limit is on what is reserved.
+    request = {"kind": kind, "path": str(path.resolve()), "mapping": mapping, "limits": asdict(limits)}
+    environment = {name: os.environ[name] for name in _ENVIRONMENT if name in os.environ}
+    # Further threads would only reserve memory: the limit is on reserved memory.
     environment |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "NUMEXPR_MAX_THREADS": "1"}
     environment |= {"ARROW_DEFAULT_MEMORY_POOL": "system", "MALLOC_ARENA_MAX": "2", "PYTHONIOENCODING": "utf-8"}
     with tempfile.TemporaryFile(prefix="clutchlife-") as result:
@@ -86,7 +91,7 @@ def _run(kind: Format, path: Path, mapping: str | None, limits: Limits) -> dict[
         try:
             ended = subprocess.run(  # noqa: S603 (our own interpreter and module)
                 arguments,
-                input=json.dumps(asked).encode(),
+                input=json.dumps(request).encode(),
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 pass_fds=[result.fileno()],
@@ -121,12 +126,12 @@ def _ending(code: int) -> str:
 
 
 def _answer(result: BinaryIO, kind: Format, limits: Limits) -> dict[str, FloatArray]:
-    """What the reading process wrote, believed no further than it can be checked."""
+    """The columns that the reading process wrote; its answer is checked before it is used."""
     try:
-        said = json.loads(result.readline(_LONGEST_ANSWER))
-        if "error" in said:
-            raise _error(said["error"])
-        lengths = {str(name): int(length) for name, length in said["channels"].items()}
+        answer = json.loads(result.readline(_LONGEST_ANSWER))
+        if "error" in answer:
+            raise _error(answer["error"])
+        lengths = {str(name): int(length) for name, length in answer["channels"].items()}
     except (ValueError, KeyError, TypeError, AttributeError):
         raise _unreadable(kind, "its reader gave no answer") from None
     if not lengths.keys() <= CHANNELS.keys() or not 0 <= sum(lengths.values()) <= limits.most_values:
@@ -138,60 +143,59 @@ def _answer(result: BinaryIO, kind: Format, limits: Limits) -> dict[str, FloatAr
     return columns
 
 
-def _error(said: Mapping[str, Any]) -> ServiceError:
-    sort = TooLargeError if said["too_large"] else InvalidError
-    return sort(str(said["detail"]), errors=[FieldError(**each) for each in said["errors"]], total=int(said["total"]))
+def _error(answer: Mapping[str, Any]) -> ServiceError:
+    error_type = TooLargeError if answer["too_large"] else InvalidError
+    errors = [FieldError(**error) for error in answer["errors"]]
+    return error_type(str(answer["detail"]), errors=errors, total=int(answer["total"]))
 
 
 # --- what follows runs in the reading process ---
 
 
 def main() -> None:
-    """Read the file that standard input names and write the answer to the file that the first argument numbers."""
-    asked = json.load(sys.stdin)
-    kind, limits = Format(asked["kind"]), Limits(**asked["limits"])
+    """Read the file that standard input names; write the answer to the open file whose number is the first argument."""
+    request = json.load(sys.stdin)
+    kind, limits = Format(request["kind"]), Limits(**request["limits"])
     with os.fdopen(int(sys.argv[1]), "wb") as result:
         _limit(limits)
         try:
             reader = importlib.import_module(READERS[kind][0])
-            columns: dict[str, FloatArray] = reader.read(Path(asked["path"]), asked["mapping"], limits)
+            columns: dict[str, FloatArray] = reader.read(Path(request["path"]), request["mapping"], limits)
             _write(result, {"channels": {name: column.size for name, column in columns.items()}})
             for column in columns.values():
                 result.write(np.ascontiguousarray(column, dtype="<f8").data)
         except ServiceError as error:
             _write_error(result, error)
         except MemoryError:
-            _write_error(result, TooLargeError(f"the {kind} file needs more memory than is allowed for reading one"))
+            _write_error(result, TooLargeError(f"the {kind} file needs more memory than reading a file may take"))
         except Exception as error:  # noqa: BLE001 (whatever a foreign library raises on a foreign file)
-            _write_error(result, _unreadable(kind, f"{type(error).__name__}: {str(error)[:_SHOWN]}"))
+            _write_error(result, _unreadable(kind, f"{type(error).__name__}: {str(error)[:_MOST_QUOTED]}"))
 
 
 def _limit(limits: Limits) -> None:
-    import resource
-
     for which, most, over in (
         (resource.RLIMIT_AS, limits.memory_bytes, 0),
-        (resource.RLIMIT_CPU, math.ceil(limits.seconds), 1),  # SIGXCPU first, which says why; then SIGKILL
+        (resource.RLIMIT_CPU, math.ceil(limits.seconds), 1),  # first SIGXCPU, which names the cause, then SIGKILL
         (resource.RLIMIT_FSIZE, 8 * limits.most_values + _LONGEST_ANSWER, 0),
         (resource.RLIMIT_CORE, 0, 0),
     ):
         resource.setrlimit(which, (most, most + over))
 
 
-def _write(result: BinaryIO, said: Mapping[str, Any]) -> None:
-    result.write(json.dumps(said).encode() + b"\n")
+def _write(result: BinaryIO, answer: Mapping[str, Any]) -> None:
+    result.write(json.dumps(answer).encode() + b"\n")
 
 
 def _write_error(result: BinaryIO, error: ServiceError) -> None:
     result.seek(0)
     result.truncate()
-    said = {
+    answer = {
         "too_large": isinstance(error, TooLargeError),
-        "detail": error.detail[:4000],
-        "errors": [asdict(each) for each in error.errors],
+        "detail": error.detail[:_LONGEST_DETAIL],
+        "errors": [asdict(field_error) for field_error in error.errors],
         "total": error.total,
     }
-    _write(result, {"error": said})
+    _write(result, {"error": answer})
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """NI TDMS -> columns, by npTDMS: channels of all groups, scaled, units from `unit_string`, time from the waveform.
 
-Runs in the reading process of `isolation`. Source: NI, TDMS File Format Internal Structure.
+Runs in the reading process of `sandbox`. Source: NI, TDMS File Format Internal Structure.
 """
 
 from pathlib import Path
@@ -19,9 +19,9 @@ _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit")
 
 
 def read(path: Path, mapping: str | None, limits: Limits) -> dict[str, FloatArray]:
-    """The channels [n] that the map and the names tell, in their own units.
+    """The channels [n] that the map and the names choose, in their own units.
 
-    A waveform's time, wf_start_offset + k · wf_increment, becomes `time_s` where no channel is the time.
+    A waveform's time, wf_start_offset + k · wf_increment, becomes `time_s` where the file has no time channel.
     """
     with TdmsFile.open(path) as file:
         if file.file_status.incomplete_final_segment:
@@ -36,13 +36,13 @@ def read(path: Path, mapping: str | None, limits: Limits) -> dict[str, FloatArra
             for channel in channels
         ]
         taken = choose(headers, mapping)
-        require_one_length({place(headers, each): len(channels[each.index]) for each in taken}, limits)
+        require_one_length({place(headers, column): len(channels[column.index]) for column in taken}, limits)
         columns = {}
-        for each in taken:
-            column = numbers(each.channel, channels[each.index][:])
-            if channels[each.index].dtype.kind != "M":
-                each.conversion.apply(column)
-            columns[each.channel] = column
+        for column in taken:
+            values = numbers(column.channel, channels[column.index][:])
+            if channels[column.index].dtype.kind != "M":
+                column.conversion.apply(values)
+            columns[column.channel] = values
         if "time_s" not in columns:
             columns |= _waveform_time(channels, taken)
         return columns
@@ -56,18 +56,18 @@ def _unit(channel: Any) -> str | None:
 
 
 def _waveform_time(channels: list[Any], taken: list[Taken]) -> dict[str, FloatArray]:
-    """`time_s` of waveforms that share one clock; nothing where there are none. Raises InvalidError on several clocks."""
+    """`time_s` of waveforms that share one clock; empty where there are none. Raises InvalidError on several clocks."""
     clocks = {
         (
-            float(channels[each.index].properties.get("wf_start_offset", 0.0)),
-            float(channels[each.index].properties.get("wf_increment", 0.0)),
+            float(channels[column.index].properties.get("wf_start_offset", 0.0)),
+            float(channels[column.index].properties.get("wf_increment", 0.0)),
         )
-        for each in taken
+        for column in taken
     }
     if len(clocks) > 1:
         shown = ", ".join(f"{step:g} s" for step in sorted({step for _, step in clocks}))
         raise InvalidError(
-            f"all channels must be sampled by one clock, got offsets or steps (wf_increment) that differ: {shown}"
+            f"all channels must be sampled by one clock, got different offsets or steps (wf_increment): {shown}"
         )
     offset, step = clocks.pop()
     return {"time_s": offset + step * np.arange(len(channels[taken[0].index]), dtype=np.float64)} if step > 0 else {}

@@ -1,4 +1,4 @@
-"""The units that files may state, as a fixed table to the channels' own units (`units.CHANNELS`); all others are refused."""
+"""The units that a file may state and their conversion to the channels' own units (`units.CHANNELS`); others are refused."""
 
 import unicodedata
 from dataclasses import dataclass
@@ -66,7 +66,7 @@ _TEMPERATURE = (
     | _spelled(Conversion(5 / 9, -160 / 9), "°F", "degF", "DegF", "deg F", "F", "Fahrenheit", "fahrenheit")
 )
 
-#: By the channel's unit: what may be stated, with capitals as they are (mPa is not MPa).
+#: By the channel's unit: the spellings that may be stated; capitals count (mPa is not MPa).
 UNITS = {"s": _TIME, "bar": _PRESSURE, "rpm": _SPEED, "Nm": _TORQUE, "°C": _TEMPERATURE}
 
 _AS_WRITTEN = str.maketrans(
@@ -88,10 +88,10 @@ _AS_WRITTEN = str.maketrans(
 
 
 def conversion(channel: str, unit: str) -> Conversion | None:
-    """How values of a channel come from a stated unit to the channel's own; None where the unit is not in the table."""
-    known = UNITS[CHANNELS[channel].unit]
+    """From a stated unit to the channel's own; None where the unit is not in the table."""
+    table = UNITS[CHANNELS[channel].unit]
     written = unicodedata.normalize("NFC", unit).translate(_AS_WRITTEN).strip()
-    return known.get(written) or known.get(written.replace(" ", ""))
+    return table.get(written) or table.get(written.replace(" ", ""))
 
 
 def is_unit(text: str) -> bool:
@@ -100,12 +100,12 @@ def is_unit(text: str) -> bool:
 
 
 def spellings(channel: str) -> str:
-    """A few of the units that a channel may be in, for a message."""
-    shown = {
+    """Examples of the units that a channel may be in, for a message."""
+    examples = {
         "s": "s, ms, min",
         "bar": "bar, mbar, MPa, kPa, Pa, psi",
         "rpm": "rpm, 1/min, rad/s",
         "Nm": "Nm, N·m, kNm",
         "°C": "°C, degC, K, °F",
     }
-    return shown[CHANNELS[channel].unit]
+    return examples[CHANNELS[channel].unit]

@@ -30,6 +30,8 @@ class Channel:
         return converted
 
 
+#: Ranges are chosen to refuse wrong units and faulty sensors, not unusual clutches. Derived: absolute zero, and no negative
+#: pressure, speed or deviation.
 CHANNELS = {
     channel.name: channel
     for channel in (
@@ -42,5 +44,6 @@ CHANNELS = {
     )
 }
 
-#: A sampled record swings through zero with its sensors' noise; a gauge cannot read below a vacuum.
+#: The least value in a sampled record, which passes zero with its sensors' noise. Pressure: derived, a gauge cannot read
+#: below a vacuum (-1 bar), and a tenth for its zero.
 SAMPLED_LEAST = {"pressure_bar": -1.1, "speed_rpm": -1e6}

@@ -1,11 +1,11 @@
-"""Runs as files: JSON files that hold what is posted, records that a manifest lists, and `clutch.json` for the clutch.
+"""A folder of runs: JSON files that are posted as they are, record files listed in a manifest, `clutch.json` for the clutch.
 
-The manifest, `runs.json`, says of each record file (CSV, TDMS, MDF4, Parquet) what its channels do not:
+The manifest, `runs.json`, holds for each record file (CSV, TDMS, MDF4, Parquet) what its channels do not:
 
     [{"file": "a.csv", "kind": "stationary_stribeck", "cycles": 0, "run_id": "a", "origin": "measured",
       "started_at": "2026-11-02T08:00:00+01:00", "map": "torque_nm:Mz"}, ...]
 
-of which `file`, `kind` and `cycles` are needed.
+where `file`, `kind` and `cycles` are needed.
 """
 
 import json
@@ -17,18 +17,18 @@ from typing import Any
 
 CLUTCH_FILE = "clutch.json"
 MANIFEST = "runs.json"
-#: What claims more cycles than this is no run.
-MOST_CYCLES = 1e15
+#: Cycles from which a file is not taken for a run. Chosen: far beyond what the service accepts (`schemas.limits`).
+_MOST_CYCLES = 1e15
 _NEEDED, _OPTIONAL = ("file", "kind", "cycles"), ("run_id", "origin", "started_at", "map")
 _RECORDS = (".csv", ".txt", ".tdms", ".mf4", ".mdf", ".parquet")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FoundRun:
-    """A run's file; `asked` is what its manifest says beside a record, None for JSON and for what none lists."""
+class RunFile:
+    """A run's file and the parameters that the manifest has for it; None for JSON and for a record that is not listed."""
 
     path: Path
-    asked: Mapping[str, str] | None = None
+    parameters: Mapping[str, str] | None = None
 
 
 def write(path: Path, body: Mapping[str, Any] | Sequence[Mapping[str, Any]]) -> None:
@@ -38,28 +38,36 @@ def write(path: Path, body: Mapping[str, Any] | Sequence[Mapping[str, Any]]) -> 
     partial.replace(path)
 
 
-def find(paths: Iterable[Path]) -> list[FoundRun]:
-    """The files named, and of folders the runs in them, each folder's by cycles where they are told.
+def find(paths: Iterable[Path]) -> list[RunFile]:
+    """The files at `paths`, and the runs in the folders among them, those of a folder sorted by cycles.
 
-    Raises FileNotFoundError for a path that is not there, ValueError for a manifest that is none.
+    Raises FileNotFoundError for a path that does not exist, ValueError for a manifest that is wrong.
     """
-    found: list[FoundRun] = []
+    runs: list[RunFile] = []
     for path in paths:
         if path.is_dir():
-            listed = _listed(path)
-            runs = [(float(asked["cycles"]), FoundRun(path=file, asked=asked)) for file, asked in listed.items()]
-            bodies = [each for each in path.glob("*.json") if each.name not in (CLUTCH_FILE, MANIFEST)]
-            runs += [(_cycles(each), FoundRun(path=each)) for each in bodies]
-            found += [run for _, run in sorted(runs, key=lambda each: (each[0], each[1].path.name))]
+            runs += _in_folder(path)
         elif path.exists():
-            found.append(FoundRun(path=path, asked=_listed(path.parent).get(path) if path.suffix != ".json" else None))
+            listed = {} if path.suffix == ".json" else _listed(path.parent)
+            runs.append(RunFile(path=path, parameters=listed.get(path)))
         else:
             raise FileNotFoundError(f"{path} is not there")
-    return found
+    return runs
+
+
+def _in_folder(folder: Path) -> list[RunFile]:
+    """The runs of a folder by cycles, then by name."""
+    runs = [
+        (float(parameters["cycles"]), RunFile(path=path, parameters=parameters))
+        for path, parameters in _listed(folder).items()
+    ]
+    bodies = [path for path in folder.glob("*.json") if path.name not in (CLUTCH_FILE, MANIFEST)]
+    runs += [(_cycles(path), RunFile(path=path)) for path in bodies]
+    return [run for _, run in sorted(runs, key=lambda pair: (pair[0], pair[1].path.name))]
 
 
 def unlisted(paths: Iterable[Path]) -> list[Path]:
-    """The record files in the folders among `paths` that no manifest lists, so that nothing is known of them."""
+    """The record files in the folders among `paths` that no manifest lists: their kind and cycles are unknown."""
     return [
         file
         for path in paths
@@ -75,7 +83,7 @@ def _is_record(path: Path) -> bool:
 
 
 def _listed(folder: Path) -> dict[Path, dict[str, str]]:
-    """What the folder's manifest says by file, as the service is asked; nothing where there is none."""
+    """The folder's manifest: the parameters of the request by file; empty where there is no manifest."""
     manifest = folder / MANIFEST
     if not manifest.is_file():
         return {}
@@ -94,7 +102,7 @@ def _entry(manifest: Path, index: int, entry: object) -> tuple[Path, dict[str, s
         rule = f"must hold {', '.join(_NEEDED)} and at most {', '.join(_OPTIONAL)}"
         raise ValueError(f"{at} {rule}, got {str(entry)[:80]}")
     cycles = entry["cycles"]
-    if isinstance(cycles, bool) or not isinstance(cycles, int | float) or not 0 <= cycles < MOST_CYCLES:
+    if isinstance(cycles, bool) or not isinstance(cycles, int | float) or not 0 <= cycles < _MOST_CYCLES:
         raise ValueError(f"{at}: cycles must be a number that is not negative, got {cycles!r}")
     for name in entry.keys() - {"cycles"}:
         if not isinstance(entry[name], str) or not entry[name]:
@@ -102,15 +110,15 @@ def _entry(manifest: Path, index: int, entry: object) -> tuple[Path, dict[str, s
     file = manifest.parent / entry["file"]
     if not file.is_file():
         raise FileNotFoundError(f"{at}: {file} is not there")
-    said = {name: entry[name] for name in ("kind", *_OPTIONAL) if name in entry}
-    return file, said | {"cycles": repr(float(cycles)), "filename": file.name}
+    parameters = {name: entry[name] for name in ("kind", *_OPTIONAL) if name in entry}
+    return file, parameters | {"cycles": repr(float(cycles)), "filename": file.name}
 
 
 def _cycles(path: Path) -> float:
-    """The cycles that a run file tells, for ordering alone; what is no run comes last and is refused by the service."""
+    """The cycles in a JSON run, for sorting only; a file that is no run comes last, and the service refuses it."""
     try:
         body = json.loads(path.read_bytes())
     except (ValueError, RecursionError):
         return math.inf
     cycles = body.get("cycles") if isinstance(body, dict) else None
-    return float(cycles) if isinstance(cycles, int | float) and abs(cycles) < MOST_CYCLES else math.inf
+    return float(cycles) if isinstance(cycles, int | float) and abs(cycles) < _MOST_CYCLES else math.inf

@@ -1,6 +1,6 @@
-"""A run's channels -> a record file: CSV, NI TDMS or ASAM MDF4, as `reading` takes them back bit for bit.
+"""A run's channels -> a record file: CSV, NI TDMS or ASAM MDF4, which `readers` reads back bit for bit.
 
-Names and units are the public ones. TDMS and MDF4 need the extras' packages, which are loaded when they are used.
+Names and units are the public ones. TDMS and MDF4 need the packages of the extras.
 """
 
 import warnings
@@ -22,7 +22,7 @@ _GROUP = "rig"
 
 
 class RecordFormat(StrEnum):
-    """The formats that are written; the value is what the command line calls it, and JSON holds the whole run."""
+    """The formats that are written, by their names on the command line; JSON holds the whole run."""
 
     JSON = "json"
     CSV = "csv"
@@ -31,7 +31,7 @@ class RecordFormat(StrEnum):
 
     @property
     def suffix(self) -> str:
-        """Of its files."""
+        """The suffix of its files."""
         return ".mf4" if self is RecordFormat.MDF4 else f".{self.value}"
 
 
@@ -39,7 +39,7 @@ _NEEDING = {RecordFormat.TDMS: Format.TDMS, RecordFormat.MDF4: Format.MDF4}
 
 
 def require_writer(kind: RecordFormat) -> None:
-    """Raises ValueError where the package that writes a format is not installed; names the extra that has it."""
+    """Raises ValueError where the package that writes a format is not installed; names the extra that installs it."""
     if kind not in _NEEDING:
         return
     _, package, extra = READERS[_NEEDING[kind]]
@@ -50,7 +50,7 @@ def require_writer(kind: RecordFormat) -> None:
 def write_record(path: Path, kind: RecordFormat, channels: Mapping[str, FloatArray], head: Mapping[str, Any]) -> None:
     """Channels [n] by public name into one file, whole or not at all; `head` goes in as comment or properties.
 
-    Raises ValueError where the format is none of records, or its package is not installed.
+    Raises ValueError where the format is JSON, or its package is not installed.
     """
     if kind is RecordFormat.JSON:
         raise ValueError("a record file must be CSV, TDMS or MDF4, got JSON")
@@ -61,7 +61,7 @@ def write_record(path: Path, kind: RecordFormat, channels: Mapping[str, FloatArr
 
 
 def _write_csv(path: Path, channels: Mapping[str, FloatArray], head: Mapping[str, Any]) -> None:
-    """The shortest decimals that are the same doubles, a comment line before the header."""
+    """The shortest decimals that give the same doubles; a comment line before the header."""
     columns = list(channels.values())
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.write("# " + ", ".join(f"{name} {value}" for name, value in head.items()) + "\n")
@@ -72,7 +72,7 @@ def _write_csv(path: Path, channels: Mapping[str, FloatArray], head: Mapping[str
 
 
 def _write_tdms(path: Path, channels: Mapping[str, FloatArray], head: Mapping[str, Any]) -> None:
-    from nptdms import ChannelObject, RootObject, TdmsWriter  # type: ignore[import-untyped]
+    from nptdms import ChannelObject, RootObject, TdmsWriter  # type: ignore[import-untyped]  # start-up time, optional package
 
     objects = [RootObject(properties=dict(head))]
     for name, column in channels.items():
@@ -82,17 +82,17 @@ def _write_tdms(path: Path, channels: Mapping[str, FloatArray], head: Mapping[st
 
 
 def _write_mdf4(path: Path, channels: Mapping[str, FloatArray], head: Mapping[str, Any]) -> None:
-    """With time as the master channel; plateaus, which have none, by their number."""
+    """With time as the master channel; plateaus, which have no time, by their number."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the package warns of others as it is loaded
-        from asammdf import MDF, Signal
-        from asammdf.blocks import v4_constants as v4c
+        warnings.simplefilter("ignore")  # asammdf's own imports warn
+        from asammdf import MDF, Signal  # start-up time, optional package
+        from asammdf.blocks import v4_constants as v4c  # start-up time, optional package
 
         rows = next(iter(channels.values())).size
         master = channels.get("time_s", np.arange(rows, dtype=np.float64))
-        said = ("time", v4c.SYNC_TYPE_TIME) if "time_s" in channels else ("number", v4c.SYNC_TYPE_INDEX)
+        master_metadata = ("time", v4c.SYNC_TYPE_TIME) if "time_s" in channels else ("number", v4c.SYNC_TYPE_INDEX)
         signals = [
-            Signal(column, master, name=name, unit=CHANNELS[name].unit, master_metadata=said)
+            Signal(column, master, name=name, unit=CHANNELS[name].unit, master_metadata=master_metadata)
             for name, column in channels.items()
             if name != "time_s"
         ]

@@ -1,4 +1,4 @@
-"""Simulated runs as they are posted: in the channels' public units, and labelled as simulated."""
+"""Simulated runs -> what is posted: channels in their public units, labelled as simulated."""
 
 from typing import Any
 
@@ -9,31 +9,31 @@ from models.records.runs import Plateaus, Record
 from models.rig.simulated_runs import DutyBlock, SimulatedRun
 from service.readers.units import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
 
-#: A rig's files are no wider than so many digits.
+#: Significant digits of a value. Chosen: more than a rig's recorder writes.
 _DIGITS = 9
 _POWERS = np.array([float(f"1e{exponent}") for exponent in range(23)])
 
 
 def simulated_clutch_body(clutch_id: str) -> dict[str, Any]:
-    """The record of a simulated clutch: the reference's geometry and oil, and that it is simulated."""
+    """The record of a simulated clutch: the reference's geometry and oil, origin simulated."""
     return {"clutch_id": clutch_id, "origin": "simulated"}
 
 
 def simulated_head(run: SimulatedRun) -> dict[str, Any]:
-    """What is said of a simulated run beside its channels: its name, kind and cycles, and that it is simulated."""
+    """The fields of a simulated run beside its channels: name, kind, cycles, origin."""
     return {"run_id": run.run_id, "kind": run.kind.value, "cycles": run.cycles, "origin": "simulated"}
 
 
 def simulated_channels(run: SimulatedRun) -> dict[str, FloatArray]:
-    """The channels [n] of a simulated run by public name, in their units, to nine digits; none where it has none."""
-    held = run.record if run.record is not None else run.plateaus
-    if held is None:
+    """The channels [n] of a simulated run by public name, in their units, to nine digits; empty where it has none."""
+    data = run.record if run.record is not None else run.plateaus
+    if data is None:
         return {}
-    return {name: _from_si(name, column) for name, column in _columns(held).items() if column is not None}
+    return {name: _from_si(name, column) for name, column in _columns(data).items() if column is not None}
 
 
 def simulated_body(run: SimulatedRun) -> dict[str, Any]:
-    """A simulated run as it is posted."""
+    """The JSON body of a simulated run."""
     body = simulated_head(run)
     channels = simulated_channels(run)
     if channels:
@@ -43,20 +43,20 @@ def simulated_body(run: SimulatedRun) -> dict[str, Any]:
     return body
 
 
-def _columns(held: Plateaus | Record) -> dict[str, FloatArray | None]:
+def _columns(data: Plateaus | Record) -> dict[str, FloatArray | None]:
     columns = {
-        "pressure_bar": held.pressure,
-        "speed_rpm": held.speed,
-        "torque_nm": held.torque,
-        "oil_temperature_c": held.oil_temperature,
+        "pressure_bar": data.pressure,
+        "speed_rpm": data.speed,
+        "torque_nm": data.torque,
+        "oil_temperature_c": data.oil_temperature,
     }
-    if isinstance(held, Record):
-        return {"time_s": held.time} | columns
-    return columns | {"torque_sd_nm": held.torque_sd}
+    if isinstance(data, Record):
+        return {"time_s": data.time} | columns
+    return columns | {"torque_sd_nm": data.torque_sd}
 
 
 def _from_si(name: str, column: FloatArray) -> FloatArray:
-    """In the channel's unit, to nine digits: each the double nearest to its decimal."""
+    """In the channel's unit, to nine digits: every value is the double nearest to its decimal."""
     channel = CHANNELS[name]
     values = (column - channel.offset) / channel.factor
     size = np.floor(np.log10(np.maximum(np.abs(values), 1e-9))).astype(np.int64)

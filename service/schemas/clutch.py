@@ -1,4 +1,4 @@
-"""The clutch record: geometry, oil, end of life. Everything but the name has the reference's clutch as default."""
+"""The clutch record: geometry, oil, end of life. Everything but the name defaults to the reference's clutch."""
 
 from typing import Annotated, Literal, Self
 
@@ -6,30 +6,54 @@ from pydantic import Field, StringConstraints, model_validator
 
 from models.clutch import Geometry
 from models.degradation.severity import Severity, SeverityBasis
-from service.schemas.base import Answer, Identifier, NotNegativeNumber, Origin, PositiveNumber, Schema
-from service.schemas.life import Current, ModelName
+from service.schemas.base import (
+    Answer,
+    ClutchName,
+    Identifier,
+    Next,
+    NotNegativeNumber,
+    Origin,
+    PositiveNumber,
+    Revision,
+    RunCycles,
+    RunName,
+    Schema,
+)
+from service.schemas.life import Current, ModelName, Quantiles
+from service.schemas.limits import (
+    LEAST_LENGTH_MM,
+    LEAST_PRESSURE_FACTOR,
+    LEAST_WIDTH_MM,
+    LONGEST_NAME,
+    MOST_FRICTION_FACES,
+    MOST_LENGTH_MM,
+    MOST_PRESSURE_FACTOR,
+    MOST_SEVERITY_EXPONENT,
+)
 
-Name = Annotated[str, StringConstraints(min_length=1, max_length=200)]
-
-
-#: A ring narrower than this is a slip of the pen.
-_LEAST_WIDTH_MM = 0.1
+Name = Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_NAME)]
+Length = Annotated[PositiveNumber, Field(ge=LEAST_LENGTH_MM, le=MOST_LENGTH_MM)]
+PressureFactor = Annotated[PositiveNumber, Field(ge=LEAST_PRESSURE_FACTOR, le=MOST_PRESSURE_FACTOR)]
 
 
 class GeometryIn(Schema):
-    """The friction disc, lengths in mm."""
+    """The friction disc."""
 
-    inner_diameter_mm: Annotated[PositiveNumber, Field(ge=0.1, le=1e5)] = 99.0
-    outer_diameter_mm: Annotated[PositiveNumber, Field(ge=0.1, le=1e5)] = 133.0
-    friction_faces: Annotated[int, Field(ge=1, le=1000, strict=True)] = 2
-    mean_radius_mm: Annotated[PositiveNumber, Field(ge=0.1, le=1e5)] | None = None
-    pressure_factor: Annotated[PositiveNumber, Field(ge=1e-6, le=1e6)] = 1.0
+    inner_diameter_mm: Length = Field(default=99.0, description="Inner diameter of the lining, mm")
+    outer_diameter_mm: Length = Field(default=133.0, description="Outer diameter of the lining, mm")
+    friction_faces: Annotated[int, Field(ge=1, le=MOST_FRICTION_FACES, strict=True)] = Field(
+        default=2, description="Number of friction faces"
+    )
+    mean_radius_mm: Length | None = Field(
+        default=None, description="Mean radius, mm; left out, a quarter of both diameters' sum"
+    )
+    pressure_factor: PressureFactor = Field(default=1.0, description="Lining pressure over line pressure")
 
     @model_validator(mode="after")
     def _has_width(self) -> Self:
-        if self.outer_diameter_mm < self.inner_diameter_mm + _LEAST_WIDTH_MM:
+        if self.outer_diameter_mm < self.inner_diameter_mm + LEAST_WIDTH_MM:
             raise ValueError(
-                f"outer_diameter_mm must exceed inner_diameter_mm {self.inner_diameter_mm} by {_LEAST_WIDTH_MM} or more, "
+                f"outer_diameter_mm must exceed inner_diameter_mm {self.inner_diameter_mm} by {LEAST_WIDTH_MM} or more, "
                 f"got {self.outer_diameter_mm}"
             )
         return self
@@ -46,10 +70,10 @@ class GeometryIn(Schema):
 
 
 class OilIn(Schema):
-    """Kinematic viscosity at two temperatures, cSt."""
+    """The oil's kinematic viscosity."""
 
-    kinematic_viscosity_40c_cst: PositiveNumber = 56.0
-    kinematic_viscosity_100c_cst: PositiveNumber = 9.3
+    kinematic_viscosity_40c_cst: PositiveNumber = Field(default=56.0, description="Kinematic viscosity at 40 °C, cSt")
+    kinematic_viscosity_100c_cst: PositiveNumber = Field(default=9.3, description="Kinematic viscosity at 100 °C, cSt")
 
     @model_validator(mode="after")
     def _thins_when_warm(self) -> Self:
@@ -62,16 +86,22 @@ class OilIn(Schema):
 
 
 class EndOfLifeIn(Schema):
-    """End of life: mean COF has fallen to this fraction of what it was when new."""
+    """The end-of-life criterion."""
 
-    cof_fraction: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False, strict=True)] = 0.5
+    cof_fraction: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False, strict=True)] = Field(
+        default=0.5, description="The life ends when mean COF has fallen to this fraction of its initial value"
+    )
 
 
 class SeverityIn(Schema):
-    """What eq. 6 counts: duty cycles, or their sliding distance or dissipated energy to the power of `exponent`."""
+    """How much a duty cycle ages the clutch: the argument of eq. 6."""
 
-    basis: Literal["cycles", "sliding_distance", "dissipated_energy"] = "cycles"
-    exponent: Annotated[NotNegativeNumber, Field(le=10)] = 1.0
+    basis: Literal["cycles", "sliding_distance", "dissipated_energy"] = Field(
+        default="cycles", description="What eq. 6 counts: duty cycles, or their sliding distance or dissipated energy"
+    )
+    exponent: Annotated[NotNegativeNumber, Field(le=MOST_SEVERITY_EXPONENT)] = Field(
+        default=1.0, description="Exponent of a duty cycle's distance or energy"
+    )
 
     def to_model(self) -> Severity:
         """As the models take it."""
@@ -81,75 +111,75 @@ class SeverityIn(Schema):
 class ClutchIn(Schema):
     """A clutch as it is registered."""
 
-    clutch_id: Identifier
-    geometry: GeometryIn = GeometryIn()
-    oil: OilIn = OilIn()
-    end_of_life: EndOfLifeIn = EndOfLifeIn()
-    friction_material: Name = "paper"
-    reaction_plate: Name = "steel"
-    fluid: Name = "ATF"
-    severity: SeverityIn = SeverityIn()
+    clutch_id: Identifier = Field(description="The clutch's name; safe in an address, 128 characters at most")
+    geometry: GeometryIn = Field(default=GeometryIn(), description="The friction disc")
+    oil: OilIn = Field(default=OilIn(), description="The oil")
+    end_of_life: EndOfLifeIn = Field(default=EndOfLifeIn(), description="The end-of-life criterion")
+    friction_material: Name = Field(default="paper", description="The friction material")
+    reaction_plate: Name = Field(default="steel", description="The reaction plate's material")
+    fluid: Name = Field(default="ATF", description="The fluid")
+    severity: SeverityIn = Field(default=SeverityIn(), description="How much a duty cycle ages the clutch")
     origin: Origin = "measured"
 
 
 class ClutchSummary(Answer):
-    """Current health and remaining life, as lists show them; null before anything is known."""
+    """Current health and remaining life, as lists show them; null while unknown."""
 
-    status: str
-    as_of_cycles: float | None
-    current: Current
-    remaining_cycles: dict[str, float | None]
-    model: ModelName
+    status: str = Field(description="The status of `/remaining-useful-life`")
+    as_of_cycles: float | None = Field(description="Duty cycles since new of the latest run")
+    current: Current = Field(description="The clutch's present state")
+    remaining_cycles: Quantiles = Field(description="Quantiles of the remaining duty cycles, by probability")
+    model: ModelName = Field(description="The model that the clutch is tracked under")
 
 
 class LastRun(Answer):
-    """The run that was made last; `at` is when, UTC, ISO 8601."""
+    """The run that was made last."""
 
-    run_id: str
-    kind: str
-    cycles: float
-    at: str
+    run_id: RunName
+    kind: str = Field(description="The kind of run")
+    cycles: RunCycles
+    at: str = Field(description="When it was made, else received; UTC, ISO 8601")
 
 
 class Recent(Answer):
-    """The latest past: the last run, and mean COF of the present life as a short line of at most 32 values."""
+    """The latest past of a clutch."""
 
-    last_run: LastRun
-    mean_cof: list[float]
+    last_run: LastRun = Field(description="The run that was made last")
+    mean_cof: list[float] = Field(description="Mean COF of the present life, thinned to at most 32 values")
 
 
 class LatestDiagnosis(Answer):
-    """The newest finished diagnosis; `adopted` where its model is in force, `earlier_life` where a rebuild came since."""
+    """The newest finished diagnosis."""
 
-    diagnosis_id: str
-    verdict: str | None
-    causes: list[str]
-    adopted: bool
-    earlier_life: bool
+    diagnosis_id: str = Field(description="The diagnosis' name")
+    verdict: str | None = Field(description="Its verdict")
+    causes: list[str] = Field(description="The causes it names, by their slugs")
+    adopted: bool = Field(description="Whether its model is in force")
+    earlier_life: bool = Field(description="Whether a rebuild has ended the life that it diagnosed")
 
 
 class ClutchOut(Answer):
     """A registered clutch."""
 
-    clutch_id: str
-    geometry: GeometryIn
-    oil: OilIn
-    end_of_life: EndOfLifeIn
-    friction_material: str
-    reaction_plate: str
-    fluid: str
-    severity: SeverityIn
+    clutch_id: ClutchName
+    geometry: GeometryIn = Field(description="The friction disc")
+    oil: OilIn = Field(description="The oil")
+    end_of_life: EndOfLifeIn = Field(description="The end-of-life criterion")
+    friction_material: str = Field(description="The friction material")
+    reaction_plate: str = Field(description="The reaction plate's material")
+    fluid: str = Field(description="The fluid")
+    severity: SeverityIn = Field(description="How much a duty cycle ages the clutch")
     origin: Origin
-    created_at: str
-    revision: int
-    runs: int
-    summary: ClutchSummary | None
-    recent: Recent | None
-    diagnosis: LatestDiagnosis | None
+    created_at: str = Field(description="When it was registered; UTC, ISO 8601")
+    revision: Revision
+    runs: int = Field(description="Number of stored runs")
+    summary: ClutchSummary | None = Field(description="Health and remaining life; null before the first run")
+    recent: Recent | None = Field(description="The latest past; null before the first run")
+    diagnosis: LatestDiagnosis | None = Field(description="The newest finished diagnosis; null without one")
 
 
 class ClutchPage(Answer):
-    """Clutches, worst first."""
+    """Clutches, the fewest remaining cycles first."""
 
-    items: list[ClutchOut]
-    next: str | None
+    items: list[ClutchOut] = Field(description="The clutches of this page")
+    next: Next

@@ -1,208 +1,219 @@
-"""Diagnoses and adopted models as they go out; what is not known, or not yet, is null or empty."""
+"""Diagnoses and adopted models; fields that are not known, or not yet, are null or empty."""
 
 from typing import Annotated, Literal
 
 from pydantic import Field, StringConstraints
 
-from service.schemas.base import Answer, Schema
+from service.schemas.base import Answer, ClutchName, Next, Revision, Schema
 from service.schemas.life import ModelName
+from service.schemas.limits import LONGEST_DIAGNOSIS_ID
 
 Number = float | None
 Numbers = list[float | None]
 Table = list[list[float | None]]
+DiagnosisName = Annotated[str, Field(description="The diagnosis' name")]
 
 
 class DiagnosisIn(Schema):
-    """What is asked: whether an extended model is to be adopted where one is found."""
+    """A request for a diagnosis."""
 
-    adopt: Annotated[bool, Field(strict=True)] = False
+    adopt: Annotated[bool, Field(strict=True)] = Field(
+        default=False, description="Whether to adopt the extended model, if there is one"
+    )
 
 
 class ModelIn(Schema):
-    """The diagnosis whose extended model is adopted; null returns to the baseline."""
+    """A request to adopt a model."""
 
-    diagnosis_id: Annotated[str, StringConstraints(min_length=1, max_length=64)] | None
+    diagnosis_id: Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_DIAGNOSIS_ID)] | None = Field(
+        description="The diagnosis whose extended model is adopted; null returns to the baseline"
+    )
 
 
 class Amplitude(Answer):
     """An effect's amplitude in engineering units."""
 
-    name: str
-    value: Number
-    sd: Number
-    unit: str
+    name: str = Field(description="What the amplitude is")
+    value: Number = Field(description="Estimate")
+    sd: Number = Field(description="Its standard deviation")
+    unit: str = Field(description="Its unit")
 
 
 class CandidateOut(Answer):
-    """An effect that competed, its probability and its gain in log evidence over the baseline [nats]; evidence and estimate
-    are of the fit together with the effects `beside` it."""
+    """An effect that competed with the others and with the baseline."""
 
-    effect: str
-    title: str
-    probability: Number
-    log_evidence_gain: Number
-    estimate: Amplitude
-    beside: list[str] = Field(default_factory=list)
+    effect: str = Field(description="The effect's slug")
+    title: str = Field(description="The effect in a few words")
+    probability: Number = Field(description="Probability that the effect is at work")
+    log_evidence_gain: Number = Field(description="Gain in log evidence over the baseline, nats")
+    estimate: Amplitude = Field(description="Its amplitude")
+    beside: list[str] = Field(
+        default_factory=list,
+        description="Effects fitted together with it; evidence and estimate are of that fit",
+    )
 
 
 class WhereOut(Answer):
-    """An axis on which structure lives, its strength in nats."""
+    """An axis over which residuals have structure."""
 
-    axis: str
-    strength: Number
-    p_value: Number
+    axis: str = Field(description="A channel, or `test_clock_s`, `cycles` or `loop_phase`")
+    strength: Number = Field(description="Log evidence for structure over this axis, nats")
+    p_value: Number = Field(description="Probability of as much structure by chance")
 
 
 class MisfitOut(Answer):
-    """How well a model fits; `unexplained_share` of the variance is beyond noise."""
+    """The error of a model."""
 
-    rmse_nm: Number
-    noise_nm: Number
-    unexplained_share: Number
-    where: list[WhereOut]
+    rmse_nm: Number = Field(description="Root mean square of the residuals, Nm")
+    noise_nm: Number = Field(description="What noise and run-to-run scatter alone would give, Nm")
+    unexplained_share: Number = Field(description="Share of the residuals' variance beyond noise")
+    where: list[WhereOut] = Field(description="The axes over which residuals have structure, strongest first")
 
 
 class BeforeAndAfter(Answer):
-    """Remaining useful life, as `/remaining-useful-life` says it, under the baseline and under the extension."""
+    """Remaining useful life under both models, in the form of `/remaining-useful-life`."""
 
-    before: dict[str, object]
-    after: dict[str, object]
+    before: dict[str, object] = Field(description="Under the baseline")
+    after: dict[str, object] = Field(description="Under the extended model")
 
 
 class GainOut(Answer):
-    """What the extension gains on runs held out; `excess` is the error beyond noise.
+    """What the extended model gains on held-out runs."""
 
-    Log scores are in nats, the last one in foretelling the last states from the first.
-    """
-
-    held_out_runs: list[str]
-    rmse_before_nm: Number
-    rmse_after_nm: Number
-    reduction_percent: Number
-    reduction_percent_sd: Number
-    excess_before_nm: Number
-    excess_after_nm: Number
-    mse_percent_before: Number
-    mse_percent_after: Number
-    log_score_gain: Number
-    foretelling_log_score_gain: Number
-    remaining_useful_life: BeforeAndAfter
+    held_out_runs: list[str] = Field(description="The runs that were held out")
+    rmse_before_nm: Number = Field(description="The baseline's error, RMS, Nm")
+    rmse_after_nm: Number = Field(description="The extended model's error, RMS, Nm")
+    reduction_percent: Number = Field(description="Reduction of the error, %")
+    reduction_percent_sd: Number = Field(description="Its standard deviation, paired by points")
+    excess_before_nm: Number = Field(description="The baseline's error beyond noise, Nm")
+    excess_after_nm: Number = Field(description="The extended model's error beyond noise, Nm")
+    mse_percent_before: Number = Field(description="The baseline's percentage MSE (eq. 5), %")
+    mse_percent_after: Number = Field(description="The extended model's percentage MSE (eq. 5), %")
+    log_score_gain: Number = Field(description="Gain in log score, nats")
+    foretelling_log_score_gain: Number = Field(
+        description="Gain in log score when the last states are predicted from the first ones, nats"
+    )
+    remaining_useful_life: BeforeAndAfter = Field(description="Remaining useful life under both models")
 
 
 class AdviceOut(Answer):
-    """A test that would decide between two effects, or an effect and the baseline; `nats` is what it is to bring."""
+    """A test that would distinguish two effects, or an effect from the baseline."""
 
-    key: str
-    test: str
-    separates: list[str]
-    nats: Number
+    key: str = Field(description="The test in a word for programs")
+    test: str = Field(description="The test in a sentence")
+    separates: list[str] = Field(description="The two effects that it distinguishes; `baseline` stands for none")
+    nats: Number = Field(description="Expected gain in log evidence, nats")
 
 
 class VisibleOut(Answer):
-    """The smallest amplitude of an effect that these data would have shown with 90 % power in its middle shape."""
+    """The smallest amplitude of an effect that would be detected in these data with 90 % power, in its middle shape."""
 
-    effect: str
-    amplitude: Number
-    unit: str
+    effect: str = Field(description="The effect's slug")
+    amplitude: Number = Field(description="The amplitude")
+    unit: str = Field(description="Its unit")
 
 
 class Axes(Answer):
     """The axes of the residual maps."""
 
-    pressure_bar: list[float]
-    speed_rpm: list[float]
-    cycles: list[float]
+    pressure_bar: list[float] = Field(description="Line pressure, bar")
+    speed_rpm: list[float] = Field(description="Sliding speed, rpm")
+    cycles: list[float] = Field(description="Duty cycles since new")
 
 
 class ResidualMap(Answer):
-    """Mean residuals in deviations: a row a pressure and a column a speed; a row a count of cycles, a column a pressure."""
+    """Mean residuals, in standard deviations."""
 
-    speed_pressure: Table
-    pressure_cycles: Table
+    speed_pressure: Table = Field(description="A row a pressure, a column a speed")
+    pressure_cycles: Table = Field(description="A row a count of cycles, a column a pressure")
 
 
 class MapsOut(Answer):
-    """Residuals under the baseline and under the extension."""
+    """Residual maps of both models."""
 
-    axes: Axes
-    before: ResidualMap
-    after: ResidualMap
+    axes: Axes = Field(description="Their axes")
+    before: ResidualMap = Field(description="Under the baseline")
+    after: ResidualMap = Field(description="Under the extended model")
 
 
 class LoopTraceOut(Answer):
-    """A friction loop over one period: measured, and what the two models give."""
+    """A friction loop over one period: measured, and of both models."""
 
-    pressure_bar: float
-    cycles: float
-    frequency_hz: Number
-    speed_rpm: Numbers
-    measured_nm: Numbers
-    baseline_nm: Numbers
-    extended_nm: Numbers
+    pressure_bar: float = Field(description="Line pressure, bar")
+    cycles: float = Field(description="Duty cycles since new")
+    frequency_hz: Number = Field(description="Frequency of the speed, Hz")
+    speed_rpm: Numbers = Field(description="Sliding speed, rpm")
+    measured_nm: Numbers = Field(description="Measured torque, Nm")
+    baseline_nm: Numbers = Field(description="Torque under the baseline, Nm")
+    extended_nm: Numbers = Field(description="Torque under the extended model, Nm")
 
 
 class DiagnosisListed(Answer):
     """A diagnosis without its maps and loops. While it runs, and where it failed, it has no verdict."""
 
-    diagnosis_id: str
-    clutch_id: str
-    status: Literal["running", "finished", "failed"]
-    created_at: str
-    finished_at: str | None
-    revision: int
-    as_of_cycles: Number
-    stale: bool
-    earlier_life: bool
-    adoptable: bool
-    adopted: bool
-    problem: str | None
-    code_version: str
+    diagnosis_id: DiagnosisName
+    clutch_id: ClutchName
+    status: Literal["running", "finished", "failed"] = Field(
+        description="Whether it still runs, has finished, or failed"
+    )
+    created_at: str = Field(description="When it was requested; UTC, ISO 8601")
+    finished_at: str | None = Field(description="When it ended; UTC, ISO 8601")
+    revision: Revision
+    as_of_cycles: Number = Field(description="Duty cycles since new of the latest run in it")
+    stale: bool = Field(description="Whether runs were posted since")
+    earlier_life: bool = Field(description="Whether a rebuild has ended the life that it diagnosed")
+    adoptable: bool = Field(description="Whether it has an extended model to adopt")
+    adopted: bool = Field(description="Whether its model is in force")
+    problem: str | None = Field(description="Why it failed")
+    code_version: str = Field(description="The release that made it")
     verdict: (
         Literal["model_adequate", "cause_named", "cause_ambiguous", "unexplained_structure", "insufficient_data"] | None
+    ) = Field(description="The result in a word")
+    causes: list[str] = Field(
+        description="The named causes, or those that these data cannot distinguish, by their slugs"
     )
-    causes: list[str]
-    summary: str
-    candidates: list[CandidateOut]
-    baseline: MisfitOut
-    extended: MisfitOut
-    gain: GainOut
-    advice: list[AdviceOut]
-    visible: list[VisibleOut]
-    notes: list[str]
-    statistics: dict[str, Number]
+    summary: str = Field(description="The result in a paragraph")
+    candidates: list[CandidateOut] = Field(description="The effects that competed, most probable first")
+    baseline: MisfitOut = Field(description="The baseline's error")
+    extended: MisfitOut = Field(description="The extended model's error")
+    gain: GainOut = Field(description="What the extended model gains on held-out runs")
+    advice: list[AdviceOut] = Field(description="Tests that would distinguish what these data do not")
+    visible: list[VisibleOut] = Field(description="The smallest amplitude of each effect that would be detected")
+    notes: list[str] = Field(description="Assumptions and omissions")
+    statistics: dict[str, Number] = Field(description="Numbers of the computation, by name")
 
 
 class DiagnosisOut(DiagnosisListed):
     """A diagnosis with its residual maps and loops."""
 
-    maps: MapsOut | None
-    loops: list[LoopTraceOut]
+    maps: MapsOut | None = Field(description="Residual maps; null without a verdict")
+    loops: list[LoopTraceOut] = Field(description="Measured friction loops beside both models'")
 
 
 class DiagnosisPage(Answer):
     """Diagnoses, newest first."""
 
-    items: list[DiagnosisListed]
-    next: str | None
+    items: list[DiagnosisListed] = Field(description="The diagnoses of this page")
+    next: Next
 
 
 class ModelVersion(Answer):
-    """A model that was adopted; `diagnosis_id` null is the baseline."""
+    """A model that was adopted."""
 
-    version: int
-    diagnosis_id: str | None
-    adopted_at: str
-    model: ModelName
+    version: int = Field(description="Its number, from 1")
+    diagnosis_id: str | None = Field(description="The diagnosis that it comes from; null is the baseline")
+    adopted_at: str = Field(description="When it was adopted; UTC, ISO 8601")
+    model: ModelName = Field(description="The model")
 
 
 class ModelOut(Answer):
-    """The model that tracking and remaining life use now, and all that were adopted, newest first.
+    """The model that tracking and remaining life use now, and all that were adopted.
 
     A rebuild ends the life that was diagnosed: from then on the baseline is in force, whatever version is the last.
     """
 
-    clutch_id: str
-    model: ModelName
-    version: int
-    diagnosis_id: str | None
-    versions: list[ModelVersion]
+    clutch_id: ClutchName
+    model: ModelName = Field(description="The model in force")
+    version: int = Field(description="Its number; 0 where none was adopted")
+    diagnosis_id: str | None = Field(description="The diagnosis that it comes from; null is the baseline")
+    versions: list[ModelVersion] = Field(description="All adopted models, newest first")

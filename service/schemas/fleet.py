@@ -1,129 +1,133 @@
-"""The fleet's priors and scores as they go out."""
+"""The fleet's priors, and the scores of predictions."""
 
-from service.schemas.base import Answer, Origin
-from service.schemas.life import Method, ModelName, PriorName, Quantiles, SeverityName
+from pydantic import Field
+
+from service.schemas.base import Answer, ClutchName, Next, Origin, Revision
+from service.schemas.life import Method, Model, Prior, Quantiles, SeverityUsed
 
 
 class Kind(Answer):
-    """What clutches have in common that teach each other."""
+    """What clutches have in common that share a prior."""
 
-    friction_material: str
-    reaction_plate: str
-    fluid: str
+    friction_material: str = Field(description="The friction material")
+    reaction_plate: str = Field(description="The reaction plate's material")
+    fluid: str = Field(description="The fluid")
     origin: Origin
-    severity: SeverityName
+    severity: SeverityUsed
 
 
 class Share(Answer):
-    """Δ as a share of ξ0 among the clutches of a fleet."""
+    """Δ over ξ0 among the clutches of a fleet."""
 
-    median: float
-    sd: float
+    median: float = Field(description="Median")
+    sd: float = Field(description="Standard deviation")
 
 
 class Factor(Answer):
-    """A positive coefficient among the clutches of a fleet; `log_sd` is the deviation of its logarithm."""
+    """A positive coefficient among the clutches of a fleet."""
 
-    median: float
-    log_sd: float
+    median: float = Field(description="Median")
+    log_sd: float = Field(description="Standard deviation of its logarithm")
 
 
 class Population(Answer):
-    """Eq. 6's coefficients among the clutches of a fleet: change and scatter as shares of ξ0, scale in cycles."""
+    """The coefficients of eq. 6 among the clutches of a fleet."""
 
-    change: Share
-    scale_cycles: Factor
-    exponent: Factor
-    scatter: Factor
+    change: Share = Field(description="Change Δ as a share of ξ0")
+    scale_cycles: Factor = Field(description="Scale φ, duty cycles")
+    exponent: Factor = Field(description="Exponent ε")
+    scatter: Factor = Field(description="Scatter from run to run as a share of ξ0")
 
 
 class FleetPriorOut(Answer):
-    """What clutches of one kind have taught; a clutch among `members` is tracked under what the others taught."""
+    """The prior learned from clutches of one kind; each of its members is tracked under what the others have in common."""
 
-    kind: Kind
-    version: int
-    created_at: str
-    clutches: int
-    members: list[str]
-    population: Population
+    kind: Kind = Field(description="The kind of clutch")
+    version: int = Field(description="Increases whenever the prior changes")
+    created_at: str = Field(description="When this version was learned; UTC, ISO 8601")
+    clutches: int = Field(description="Number of clutches that it was learned from")
+    members: list[str] = Field(description="Their names")
+    population: Population = Field(description="The coefficients among them")
 
 
 class FleetPriorPage(Answer):
-    """The newest version of every kind."""
+    """The newest version of every kind's prior."""
 
-    items: list[FleetPriorOut]
-    next: str | None
+    items: list[FleetPriorOut] = Field(description="The priors of this page")
+    next: Next
 
 
 class ScoreSummary(Answer):
-    """Means over predictions, shares of the whole life; coverage is of the 5 to 95 % interval, nominally 0.9."""
+    """Means over predictions; null without any."""
 
-    predictions: int
-    crps_share: float | None
-    interval_share: float | None
-    coverage: float | None
-    alpha_lambda: float | None
+    predictions: int = Field(description="Number of predictions")
+    crps_share: float | None = Field(description="Continuous ranked probability score, as a share of the whole life")
+    interval_share: float | None = Field(description="Width of the 5 to 95 % interval, as a share of the whole life")
+    coverage: float | None = Field(description="Share of 5 to 95 % intervals that hold the truth; nominally 0.9")
+    alpha_lambda: float | None = Field(description="Share of medians within 20 % of the true remaining life")
 
 
 class ScoredPrediction(Answer):
-    """What was said at one test, and how right it was; `alpha_lambda`: the median within 20 % of what remained."""
+    """The prediction at one test, and its scores."""
 
-    cycles: float
-    runs_used: int
-    share_of_life: float
-    true_remaining_cycles: float
-    remaining_cycles: Quantiles
-    crps_cycles: float
-    crps_share: float
-    interval_share: float
-    covered: bool
-    pit: float
-    alpha_lambda: bool
+    cycles: float = Field(description="Duty cycles since new at the test")
+    runs_used: int = Field(description="Number of stationary tests that the prediction uses")
+    share_of_life: float = Field(description="Share of the whole life at the test")
+    true_remaining_cycles: float = Field(description="Duty cycles that did remain")
+    remaining_cycles: Quantiles = Field(description="Quantiles of the remaining duty cycles as predicted")
+    crps_cycles: float = Field(description="Continuous ranked probability score, duty cycles")
+    crps_share: float = Field(description="The same as a share of the whole life")
+    interval_share: float = Field(description="Width of the 5 to 95 % interval, as a share of the whole life")
+    covered: bool = Field(description="Whether the 5 to 95 % interval holds the truth")
+    pit: float = Field(description="Predicted probability of a life as short as the true one or shorter")
+    alpha_lambda: bool = Field(description="Whether the median is within 20 % of the true remaining life")
 
 
 class ScoredLife(Answer):
-    """A life that came to its end; the prognostic horizon is the remaining life from which on all was within 10 % of it."""
+    """A life that has ended."""
 
-    origin_cycles: float
-    end_of_life_cycles: float
-    prognostic_horizon_cycles: float | None
-    summary: ScoreSummary
-    pit_histogram: list[float]
-    predictions: list[ScoredPrediction]
-    model: ModelName
-    prior: PriorName
-    severity: SeverityName
+    origin_cycles: float = Field(description="Duty cycles since new at its start")
+    end_of_life_cycles: float = Field(description="Duty cycles since new at its end")
+    prognostic_horizon_cycles: float | None = Field(
+        description="Remaining life from which on all medians were within 10 % of the whole life; null where none was"
+    )
+    summary: ScoreSummary = Field(description="Means over its predictions")
+    pit_histogram: list[float] = Field(description="Shares of predictions in ten equal bins of `pit`")
+    predictions: list[ScoredPrediction] = Field(description="Its predictions, by cycles")
+    model: Model
+    prior: Prior
+    severity: SeverityUsed
 
 
 class Scores(Answer):
-    """The lives of a clutch that came to their end."""
+    """The lives of a clutch that have ended."""
 
-    clutch_id: str
+    clutch_id: ClutchName
     method: Method
-    revision: int
-    items: list[ScoredLife]
-    next: str | None
+    revision: Revision
+    items: list[ScoredLife] = Field(description="The lives of this page")
+    next: Next
 
 
 class EndedLife(Answer):
     """A life that was scored."""
 
-    clutch_id: str
-    origin_cycles: float
-    end_of_life_cycles: float
+    clutch_id: ClutchName
+    origin_cycles: float = Field(description="Duty cycles since new at its start")
+    end_of_life_cycles: float = Field(description="Duty cycles since new at its end")
 
 
 class StageSummary(ScoreSummary):
-    """Predictions at about this share of life."""
+    """Means over predictions at one stage of life."""
 
-    share_of_life: float
+    share_of_life: float = Field(description="The middle of the stage, as a share of the whole life")
 
 
 class FleetScores(Answer):
-    """All lives that came to their end, together and by stage of life; ten equal bins of PIT."""
+    """All lives that have ended, together and by stage of life."""
 
     method: Method
-    lives: list[EndedLife]
-    overall: ScoreSummary
-    stages: list[StageSummary]
-    pit_histogram: list[float]
+    lives: list[EndedLife] = Field(description="The lives that were scored")
+    overall: ScoreSummary = Field(description="Means over all predictions")
+    stages: list[StageSummary] = Field(description="Means by stage of life")
+    pit_histogram: list[float] = Field(description="Shares of predictions in ten equal bins of `pit`")

@@ -1,80 +1,111 @@
-"""Runs as they come in, and the receipts that go out."""
+"""Runs as they are posted, and the receipts that answer them."""
 
 from typing import Annotated, Literal
 
 from pydantic import AwareDatetime, Field, StringConstraints, TypeAdapter
 
-from service.schemas.base import Answer, Column, Cycles, Identifier, NotNegativeNumber, Origin, PositiveNumber, Schema
+from service.schemas.base import (
+    Answer,
+    ClutchName,
+    Column,
+    Cycles,
+    Identifier,
+    Next,
+    NotNegativeNumber,
+    Origin,
+    PositiveNumber,
+    RunCycles,
+    RunName,
+    Schema,
+)
+from service.schemas.limits import LONGEST_NOTE, MOST_CYCLES
+
+Pressure = Annotated[Column, Field(description="Line pressure, bar")]
+Speed = Annotated[Column, Field(description="Sliding speed, rpm")]
+Torque = Annotated[Column, Field(description="Friction torque, Nm")]
+OilTemperature = Annotated[Column | None, Field(description="Oil temperature, °C")]
 
 
 class StationaryChannels(Schema):
-    """One value a plateau; with `time_s`, the raw record."""
+    """The channels of a stationary test: one value a plateau, or with `time_s` the raw record."""
 
-    pressure_bar: Column
-    speed_rpm: Column
-    torque_nm: Column
-    torque_sd_nm: Column | None = None
-    oil_temperature_c: Column | None = None
-    time_s: Column | None = None
+    pressure_bar: Pressure
+    speed_rpm: Speed
+    torque_nm: Torque
+    torque_sd_nm: Column | None = Field(
+        default=None, description="Standard deviation of each plateau's mean torque, Nm"
+    )
+    oil_temperature_c: OilTemperature = None
+    time_s: Column | None = Field(default=None, description="Time of each sample, s; left out, rows are plateaus")
 
 
 class DynamicChannels(Schema):
-    """The sampled record of a dynamic test."""
+    """The sampled record of a dynamic test or of an engagement."""
 
-    time_s: Column
-    pressure_bar: Column
-    speed_rpm: Column
-    torque_nm: Column
-    oil_temperature_c: Column | None = None
+    time_s: Column = Field(description="Time of each sample, s")
+    pressure_bar: Pressure
+    speed_rpm: Speed
+    torque_nm: Torque
+    oil_temperature_c: OilTemperature = None
 
 
 class Duty(Schema):
     """The block of engagements that ends at the run's `cycles`."""
 
-    cycles: Annotated[PositiveNumber, Field(le=1e12)]
-    energy_per_cycle_kj: NotNegativeNumber | None = None
-    initial_speed_rpm: NotNegativeNumber | None = None
-    engagement_duration_s: NotNegativeNumber | None = None
-    maximum_pressure_bar: NotNegativeNumber | None = None
+    cycles: Annotated[PositiveNumber, Field(le=MOST_CYCLES)] = Field(description="Duty cycles in the block")
+    energy_per_cycle_kj: NotNegativeNumber | None = Field(
+        default=None, description="Energy dissipated in a duty cycle, kJ"
+    )
+    initial_speed_rpm: NotNegativeNumber | None = Field(
+        default=None, description="Sliding speed at the start of an engagement, rpm"
+    )
+    engagement_duration_s: NotNegativeNumber | None = Field(
+        default=None, description="Time from contact to standstill, s"
+    )
+    maximum_pressure_bar: NotNegativeNumber | None = Field(
+        default=None, description="Highest line pressure of an engagement, bar"
+    )
 
 
 class RunBase(Schema):
-    """What every run says: its name (derived from its content when left out) and the cycles since new when it is made."""
+    """Fields of every run."""
 
-    run_id: Identifier | None = None
-    cycles: Cycles
-    started_at: Annotated[AwareDatetime, Field(strict=True)] | None = None
+    run_id: Identifier | None = Field(default=None, description="The run's name; left out, it derives from the content")
+    cycles: Cycles = Field(description="Duty cycles since new when the run is made")
+    started_at: Annotated[AwareDatetime, Field(strict=True)] | None = Field(
+        default=None, description="When it was started: ISO 8601 with a time zone"
+    )
     origin: Origin = "measured"
 
 
 class StationaryRunIn(RunBase):
     """A stationary Stribeck test."""
 
-    kind: Literal["stationary_stribeck"]
-    channels: StationaryChannels
+    kind: Literal["stationary_stribeck"] = Field(description="The kind of run")
+    channels: StationaryChannels = Field(description="The channels, of equal length")
 
 
 class DynamicRunIn(RunBase):
     """A dynamic Stribeck test."""
 
-    kind: Literal["dynamic_stribeck"]
-    channels: DynamicChannels
+    kind: Literal["dynamic_stribeck"] = Field(description="The kind of run")
+    channels: DynamicChannels = Field(description="The channels, of equal length")
 
 
 class DutyRunIn(RunBase):
     """A block of duty cycles, or the run-in; optionally the record of one engagement."""
 
-    kind: Literal["duty_cycles", "run_in"]
-    duty: Duty
-    channels: DynamicChannels | None = None
+    kind: Literal["duty_cycles", "run_in"] = Field(description="The kind of run")
+    duty: Duty = Field(description="The block of engagements")
+    channels: DynamicChannels | None = Field(default=None, description="The record of one engagement")
 
 
 class MaintenanceRunIn(RunBase):
-    """Something was done to the clutch or the rig."""
+    """Maintenance of the clutch or the rig."""
 
-    kind: Literal["maintenance"]
-    event: Literal["oil_change", "rest", "sensor_zero", "rebuild", "other"]
-    note: Annotated[str, StringConstraints(max_length=4000)] = ""
+    kind: Literal["maintenance"] = Field(description="The kind of run")
+    event: Literal["oil_change", "rest", "sensor_zero", "rebuild", "other"] = Field(description="What was done")
+    note: Annotated[str, StringConstraints(max_length=LONGEST_NOTE)] = Field(default="", description="A remark")
 
 
 RunIn = Annotated[StationaryRunIn | DynamicRunIn | DutyRunIn | MaintenanceRunIn, Field(discriminator="kind")]
@@ -83,86 +114,96 @@ RUN_IN: TypeAdapter[StationaryRunIn | DynamicRunIn | DutyRunIn | MaintenanceRunI
 
 
 class Warned(Answer):
-    """Something that was noticed and did not stop the run."""
+    """A warning; it does not stop the run."""
 
-    code: str
-    message: str
+    code: str = Field(description="The warning in a word for programs")
+    message: str = Field(description="The warning in a sentence")
 
 
 class Parameters(Answer):
     """The four Stribeck parameters of eq. 3."""
 
-    static_torque_nm: float
-    coulomb_ratio: float
-    stribeck_velocity_m_s: float
-    viscous_coefficient: float
+    static_torque_nm: float = Field(description="Static torque M_s, Nm")
+    coulomb_ratio: float = Field(description="Coulomb torque over static torque, M̄_c")
+    stribeck_velocity_m_s: float = Field(description="Stribeck velocity V_S, m/s")
+    viscous_coefficient: float = Field(description="Viscous coefficient C_v, Nm/(m/s)^0.3")
 
 
 class Fit(Answer):
-    """The fitted curve of one pressure (eq. 4, 5); `mean_cof` is null where the data cannot say it."""
+    """The fitted Stribeck curve of one pressure (eq. 4, 5)."""
 
-    pressure_bar: float
-    parameters: Parameters
-    standard_errors: Parameters
-    mse_percent: float | None
-    rmse_nm: float
-    noise_nm: float
-    acceptable: bool
-    mean_cof: float | None
-    mean_cof_sd: float | None
-    points: int
-    status: Literal["determined", "at_bound", "undetermined"]
-    undetermined: list[str]
-    message: str
+    pressure_bar: float = Field(description="Line pressure, bar")
+    parameters: Parameters = Field(description="The fitted parameters")
+    standard_errors: Parameters = Field(description="Their standard errors")
+    mse_percent: float | None = Field(description="Eq. 5, %; null where the torque does not vary")
+    rmse_nm: float = Field(description="Root mean square of the residuals, Nm")
+    noise_nm: float = Field(description="Standard deviation of one point, Nm")
+    acceptable: bool = Field(description="Whether `mse_percent` is below 5")
+    mean_cof: float | None = Field(description="Mean COF of the curve; null where the data do not determine it")
+    mean_cof_sd: float | None = Field(description="Its standard deviation")
+    points: int = Field(description="Number of points")
+    status: Literal["determined", "at_bound", "undetermined"] = Field(
+        description="Whether the data determine all parameters, put one at zero, or leave some undetermined"
+    )
+    undetermined: list[str] = Field(description="The parameters that the data do not determine")
+    message: str = Field(description="The fit in a sentence")
 
 
 class Loop(Answer):
-    """A friction loop at one pressure (eq. 8): positive where torque is higher in acceleration; null: it cannot be told."""
+    """A friction loop at one pressure; null where the record does not determine a value."""
 
-    pressure_bar: float
-    loop_area_nm_m_s: float | None
-    loop_area_sd_nm_m_s: float | None
-    attractor_nm_s: float | None
-    attractor_sd_nm_s: float | None
-    film_time_s: float | None
-    film_time_sd_s: float | None
-    frequency_hz: float | None
-    periods: int
-    direction: str
-    better_law: str | None
-    status: str
-    message: str
+    pressure_bar: float = Field(description="Line pressure, bar")
+    loop_area_nm_m_s: float | None = Field(
+        description="Area (eq. 8), Nm·m/s; positive where torque is higher in acceleration"
+    )
+    loop_area_sd_nm_m_s: float | None = Field(description="Its standard deviation")
+    attractor_nm_s: float | None = Field(description="The attractor's rate C of the GMS model, Nm/s")
+    attractor_sd_nm_s: float | None = Field(description="Its standard deviation")
+    film_time_s: float | None = Field(description="Time constant of the squeeze film, s")
+    film_time_sd_s: float | None = Field(description="Its standard deviation")
+    frequency_hz: float | None = Field(description="Frequency of the speed, Hz")
+    periods: int = Field(description="Number of whole periods")
+    direction: str = Field(
+        description="`higher_accelerating`, `higher_decelerating`, or `none`: the area is within noise"
+    )
+    better_law: str | None = Field(
+        description="The law that fits clearly better, `attractor` or `squeeze film`; null: neither"
+    )
+    status: str = Field(
+        description="`determined`, `unresolved`, `against_the_law`, `no_curve`, `reverses` (speed changes sign), `no_period`"
+    )
+    message: str = Field(description="The loop in a sentence")
 
 
 class Receipt(Answer):
-    """What the service made of a run."""
+    """The evaluation of a stored run."""
 
-    clutch_id: str
-    run_id: str
-    kind: str
-    cycles: float
-    started_at: str | None
+    clutch_id: ClutchName
+    run_id: RunName
+    kind: str = Field(description="The kind of run")
+    cycles: RunCycles
+    started_at: str | None = Field(description="When it was started, ISO 8601")
     origin: Origin
-    received_at: str
-    content_sha256: str
-    duplicate: bool
-    warnings: list[Warned]
-    fits: list[Fit]
-    loops: list[Loop]
-    duty: Duty | None
-    event: str | None
-    note: str | None
-    code_version: str
+    received_at: str = Field(description="When it was stored; UTC, ISO 8601")
+    content_sha256: str = Field(description="Hash of everything but the name")
+    duplicate: bool = Field(description="Whether the run was stored before this request")
+    warnings: list[Warned] = Field(description="Warnings")
+    fits: list[Fit] = Field(description="The fitted curves of a stationary test, by pressure")
+    loops: list[Loop] = Field(description="The friction loops of a dynamic test, by pressure")
+    duty: Duty | None = Field(description="The block of engagements; null for other kinds")
+    event: str | None = Field(description="The maintenance event; null for other kinds")
+    note: str | None = Field(description="The maintenance note; null for other kinds")
+    code_version: str = Field(description="The release that evaluated the run")
 
 
 class RunOut(Receipt):
     """A receipt with the run's channels as they were sent."""
 
-    channels: dict[str, list[float]]
+    channels: dict[str, list[float]] = Field(description="The channels by name, bit for bit as they were sent")
 
 
 class RunPage(Answer):
     """Receipts by cycles."""
 
-    items: list[Receipt]
-    next: str | None
+    items: list[Receipt] = Field(description="The receipts of this page")
+    next: Next

@@ -14,19 +14,19 @@ from tests.support import Server, serving
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[Server]:
     """A running service with an empty database."""
-    with serving(tmp_path / "clutchlife.db", loaded=True) as found:
-        yield found
+    with serving(tmp_path / "clutchlife.db", loaded=True) as running:
+        yield running
 
 
 @pytest.fixture
 def http(server: Server) -> Iterator[httpx2.Client]:
     """A client for it."""
-    with httpx2.Client(base_url=server.url, timeout=60) as found:
-        yield found
+    with httpx2.Client(base_url=server.url, timeout=60) as client:
+        yield client
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     """A headless Chromium for the pages of a module."""
-    with chromium() as found:
-        yield found
+    with chromium() as launched:
+        yield launched

@@ -17,8 +17,8 @@ def diagnosed(http: httpx2.Client, hidden: Hidden) -> dict[str, Any]:
     for run in runs(hidden):
         answer = http.post(f"{BASE}/runs", json=run | {"origin": "simulated"})
         assert answer.status_code == 201, answer.text
-    asked = {"json": {"adopt": False}, "headers": {"Prefer": "wait=400"}}  # a busy machine takes its time
-    answer = http.post(f"{BASE}/diagnoses", **asked, timeout=420)
+    request = {"json": {"adopt": False}, "headers": {"Prefer": "wait=400"}}  # a busy machine takes its time
+    answer = http.post(f"{BASE}/diagnoses", **request, timeout=420)
     assert answer.status_code == 201, answer.text
     report: dict[str, Any] = answer.json()
     assert report["status"] == "finished"

@@ -24,8 +24,8 @@ def clutchlife(*arguments: str | Path, code: int = 0, **environment: str) -> str
 def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A simulated campaign as files."""
     folder = tmp_path_factory.mktemp("campaign")
-    said = clutchlife("simulate", "--seed", "7", "--no-dynamic", "--out", folder)
-    assert "simulated" in said
+    output = clutchlife("simulate", "--seed", "7", "--no-dynamic", "--out", folder)
+    assert "simulated" in output
     return folder
 
 
@@ -50,10 +50,10 @@ def test_a_campaign_is_pushed_exported_and_pushed_again(campaign: Path, server: 
     exported = json.loads((tmp_path / "export" / "results" / "remaining-useful-life-particle.json").read_bytes())
     assert exported == first
     with serving(tmp_path / "second.db") as second:
-        said = clutchlife(
+        output = clutchlife(
             "push", tmp_path / "export", "--clutch", "sim-7", "--url", second.url, "--spool", tmp_path / "spool"
         )
-        assert f"{runs} stored" in said
+        assert f"{runs} stored" in output
         assert ONCE.get(second.url + address).json() == first
 
 
@@ -94,7 +94,7 @@ def test_a_recorders_file_is_pushed_as_it_is(server: Server, tmp_path: Path) -> 
     ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "c1"})
     push: tuple[str | Path, ...] = ("push", tmp_path / "test.csv", "--clutch", "c1", "--url", server.url)
     push = (*push, "--spool", tmp_path / "spool")
-    assert "say --kind and --cycles" in clutchlife(*push, code=64)
+    assert "give --kind and --cycles" in clutchlife(*push, code=64)
     push = (*push, "--kind", "stationary_stribeck", "--cycles", "0", "--map", "torque_nm:Mz")
     assert "1 stored, 0 known already" in clutchlife(*push)
     assert "0 stored, 1 known already" in clutchlife(*push)
@@ -118,7 +118,7 @@ def test_replay_gives_the_same_again_and_backup_a_copy(campaign: Path, tmp_path:
     assert "no clutch is known" in clutchlife("replay", "nobody", "--database", url, code=1)
 
 
-def test_wrong_arguments_are_told_in_a_line(tmp_path: Path) -> None:
+def test_wrong_arguments_are_reported_in_a_line(tmp_path: Path) -> None:
     """No traceback, and no new database where the address was mistyped."""
     absent = f"sqlite:///{tmp_path / 'mistyped.db'}"
     (tmp_path / "file").write_text("not a folder")
@@ -143,7 +143,7 @@ def test_wrong_arguments_are_told_in_a_line(tmp_path: Path) -> None:
 
 
 def results(url: str) -> list[object]:
-    """Everything that is said of the clutch, but for the revision."""
+    """All answers about the clutch, but for the revision."""
     base = f"{url}/v1/clutches/sim-7"
     names = (
         "remaining-useful-life?method=ukf",
@@ -182,10 +182,10 @@ def test_the_demo_shows_a_life_and_leaves_its_dashboard_open_with_friction_loops
     called = [sys.executable, "-u", "-m", "service.cli.main", "demo", "--no-browser"]
     with subprocess.Popen(called, stdout=subprocess.PIPE, text=True, start_new_session=True) as demo:
         assert demo.stdout is not None
-        said = ""
+        output = ""
         try:
             for line in demo.stdout:
-                said += line
+                output += line
                 if "all clutches: http" in line:
                     break
             url = line.rpartition("all clutches: ")[2].strip()
@@ -193,7 +193,7 @@ def test_the_demo_shows_a_life_and_leaves_its_dashboard_open_with_friction_loops
         finally:
             os.killpg(demo.pid, signal.SIGINT)
             rest = demo.communicate(timeout=60)[0]
-    life, _, diagnosis = said.partition("What does the simulation get wrong?")
+    life, _, diagnosis = output.partition("What does the simulation get wrong?")
     rows = [line.split() for line in life.splitlines() if line[:7].strip().isdigit()]
     assert len(rows) > 8
     assert "simulated clutch" in life

@@ -92,20 +92,27 @@ def test_all_kinds_of_runs_are_taken(http: httpx2.Client) -> None:
 @pytest.mark.parametrize("method", ["particle", "ukf", "grid"])
 def test_remaining_life_has_the_contracts_shape(http: httpx2.Client, method: str) -> None:
     post_life(http)
-    said = http.get(f"{BASE}/remaining-useful-life", params={"method": method}).json()
-    assert (said["method"], said["as_of_cycles"], said["runs_used"], said["status"]) == (method, 7000, 8, "predicted")
-    assert said["criterion"]["quantity"] == "mean_cof"
-    assert said["criterion"]["fraction"] == 0.5
-    assert said["criterion"]["pressure_bar"] is None
-    assert said["criterion"]["threshold_mean_cof"] == pytest.approx(0.5 * said["criterion"]["initial_mean_cof"])
-    assert list(said["remaining_cycles"]) == list(said["end_of_life_cycles"]) == QUANTILES
-    values = list(said["remaining_cycles"].values())
+    prediction = http.get(f"{BASE}/remaining-useful-life", params={"method": method}).json()
+    assert (prediction["method"], prediction["as_of_cycles"], prediction["runs_used"], prediction["status"]) == (
+        method,
+        7000,
+        8,
+        "predicted",
+    )
+    assert prediction["criterion"]["quantity"] == "mean_cof"
+    assert prediction["criterion"]["fraction"] == 0.5
+    assert prediction["criterion"]["pressure_bar"] is None
+    assert prediction["criterion"]["threshold_mean_cof"] == pytest.approx(
+        0.5 * prediction["criterion"]["initial_mean_cof"]
+    )
+    assert list(prediction["remaining_cycles"]) == list(prediction["end_of_life_cycles"]) == QUANTILES
+    values = list(prediction["remaining_cycles"].values())
     assert values == sorted(values)
-    assert said["end_of_life_cycles"]["0.5"] == pytest.approx(7000 + said["remaining_cycles"]["0.5"])
-    assert 0 < said["current"]["health"] < 1
-    assert said["current"]["health"] == pytest.approx((said["current"]["fraction_of_initial"] - 0.5) / 0.5)
-    assert said["horizon_cycles"] == 1_000_000
-    assert said["model"] == {"name": "baseline", "effects": []}
+    assert prediction["end_of_life_cycles"]["0.5"] == pytest.approx(7000 + prediction["remaining_cycles"]["0.5"])
+    assert 0 < prediction["current"]["health"] < 1
+    assert prediction["current"]["health"] == pytest.approx((prediction["current"]["fraction_of_initial"] - 0.5) / 0.5)
+    assert prediction["horizon_cycles"] == 1_000_000
+    assert prediction["model"] == {"name": "baseline", "effects": []}
     at_five_bar = http.get(f"{BASE}/remaining-useful-life", params={"method": method, "pressure_bar": 5}).json()
     assert at_five_bar["criterion"]["pressure_bar"] == 5
     assert at_five_bar["status"] in ("predicted", "may_never_reach")
@@ -113,27 +120,27 @@ def test_remaining_life_has_the_contracts_shape(http: httpx2.Client, method: str
     assert unknown.status_code == 404
 
 
-def test_at_cycles_says_what_would_have_been_said_then(http: httpx2.Client) -> None:
+def test_at_cycles_gives_the_prediction_of_that_time(http: httpx2.Client) -> None:
     post_life(http, last=3)
     then = http.get(f"{BASE}/remaining-useful-life").json()
     for cycles in (4000, 5000):
         http.post(f"{BASE}/runs", json=stationary(cycles))
     for at in (3000, 3999.5):
-        asked = http.get(f"{BASE}/remaining-useful-life", params={"at_cycles": at}).json()
-        assert asked | {"revision": 0} == then | {"revision": 0}
+        earlier = http.get(f"{BASE}/remaining-useful-life", params={"at_cycles": at}).json()
+        assert earlier | {"revision": 0} == then | {"revision": 0}
     early = http.get(f"{BASE}/remaining-useful-life", params={"at_cycles": 0}).json()
     assert (early["status"], early["runs_used"]) == ("insufficient_data", 1)
     assert set(early["remaining_cycles"].values()) == {None}
 
 
-def test_a_clutch_of_which_nothing_is_known(http: httpx2.Client) -> None:
+def test_a_clutch_without_runs(http: httpx2.Client) -> None:
     http.post("/v1/clutches", json=CLUTCH)
-    said = http.get(f"{BASE}/remaining-useful-life").json()
-    assert (said["status"], said["as_of_cycles"], said["runs_used"]) == ("insufficient_data", None, 0)
-    assert list(said["remaining_cycles"]) == QUANTILES
+    prediction = http.get(f"{BASE}/remaining-useful-life").json()
+    assert (prediction["status"], prediction["as_of_cycles"], prediction["runs_used"]) == ("insufficient_data", None, 0)
+    assert list(prediction["remaining_cycles"]) == QUANTILES
 
 
-def test_the_other_answers_and_their_csv_twins(http: httpx2.Client) -> None:
+def test_the_other_answers_and_their_csv_exports(http: httpx2.Client) -> None:
     post_life(http, last=4)
     degradation = http.get(f"{BASE}/degradation").json()["items"]
     assert {item["quantity"] for item in degradation} == PARAMETERS | {"mean_cof"}
@@ -150,16 +157,16 @@ def test_the_other_answers_and_their_csv_twins(http: httpx2.Client) -> None:
     assert stribeck[0]["pressure_laws"]["static_torque_nm"]["slope_per_bar"] > 0
     assert http.get(f"{BASE}/loops").json() == {"items": [], "next": None}
     for name, whole in (("degradation", degradation), ("series", http.get(f"{BASE}/series").json()["items"])):
-        seen: list[dict[str, Any]] = []
+        collected: list[dict[str, Any]] = []
         params: dict[str, Any] = {"limit": 7}
         while True:
             page = http.get(f"{BASE}/{name}", params=params).json()
-            seen += page["items"]
+            collected += page["items"]
             assert len(page["items"]) <= 7
             if page["next"] is None:
                 break
             params["cursor"] = page["next"]
-        assert seen == whole
+        assert collected == whole
     assert {row["quantity"] for row in http.get(f"{BASE}/series").json()["items"]} > PARAMETERS | {"remaining_cycles"}
     for name, rows in (("degradation", 36), ("stribeck", 35), ("loops", 0), ("runs", 5), ("remaining-useful-life", 7)):
         answer = http.get(f"{BASE}/{name}.csv")
@@ -181,14 +188,14 @@ def test_lists_page_and_are_worst_first(http: httpx2.Client) -> None:
     assert [item["clutch_id"] for item in page["items"]] == ["worn", "bench3-017", "fresh"]
     assert page["items"][1]["summary"]["remaining_cycles"]["0.5"] > 0
     assert page["next"] is None
-    seen, cursor = [], {}
+    collected, cursor = [], {}
     while True:
         page = http.get(f"{BASE}/runs", params={"limit": 2} | cursor).json()
-        seen += [item["run_id"] for item in page["items"]]
+        collected += [item["run_id"] for item in page["items"]]
         if page["next"] is None:
             break
         cursor = {"cursor": page["next"]}
-    assert seen == [f"stationary-{1000 * index}" for index in range(5)]
+    assert collected == [f"stationary-{1000 * index}" for index in range(5)]
 
 
 def test_etags_change_when_and_only_when_the_content_does(http: httpx2.Client) -> None:

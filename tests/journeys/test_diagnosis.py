@@ -16,8 +16,8 @@ BASE = "/v1/clutches/c1"
 
 def post_tests(http: httpx2.Client, *cycles: float) -> None:
     http.post("/v1/clutches", json={"clutch_id": "c1"})
-    for each in cycles:
-        assert http.post(f"{BASE}/runs", json=stationary(each, run_id=f"r{each:g}")).status_code == 201
+    for count in cycles:
+        assert http.post(f"{BASE}/runs", json=stationary(count, run_id=f"r{count:g}")).status_code == 201
 
 
 def test_a_kill_during_a_diagnosis_leaves_a_sane_state(tmp_path: Path) -> None:
@@ -25,22 +25,22 @@ def test_a_kill_during_a_diagnosis_leaves_a_sane_state(tmp_path: Path) -> None:
     server.start()
     with httpx2.Client(base_url=server.url, timeout=60) as http:
         post_tests(http, 0, 1000, 2000, 3000)
-        asked = http.post(f"{BASE}/diagnoses", json={"adopt": True}, headers={"Prefer": "wait=0"})
-        assert (asked.status_code, asked.json()["status"]) == (202, "running")
-        place = asked.headers["Location"]
+        answer = http.post(f"{BASE}/diagnoses", json={"adopt": True}, headers={"Prefer": "wait=0"})
+        assert (answer.status_code, answer.json()["status"]) == (202, "running")
+        place = answer.headers["Location"]
         time.sleep(0.5)
         server.kill()
     assert _children_end(server.database)
     server.start()
     try:
         with httpx2.Client(base_url=server.url, timeout=300) as http:
-            found = http.get(place).json()
-            assert (found["status"], "ask again" in found["problem"]) == ("failed", True)
+            failed = http.get(place).json()
+            assert (failed["status"], "ask again" in failed["problem"]) == ("failed", True)
             assert http.get(f"{BASE}/model").json()["model"]["name"] == "baseline"
             post_tests(http, 4000)
             again = http.post(f"{BASE}/diagnoses", json={}, headers={"Prefer": "wait=240"})
             assert (again.status_code, again.json()["status"]) == (201, "finished"), again.json()["problem"]
-            assert [each["status"] for each in http.get(f"{BASE}/diagnoses").json()["items"]] == ["finished", "failed"]
+            assert [item["status"] for item in http.get(f"{BASE}/diagnoses").json()["items"]] == ["finished", "failed"]
     finally:
         assert server.stop() in (0, -15)
 
@@ -50,7 +50,7 @@ def _children_end(database: Path) -> bool:
     deadline = time.monotonic() + 30
     while time.monotonic() < deadline:
         commands = [path.read_bytes() for path in Path("/proc").glob("[0-9]*/cmdline") if _readable(path)]
-        if not any(b"diagnosis_process" in each and str(database).encode() in each for each in commands):
+        if not any(b"service.jobs.diagnosis" in command and str(database).encode() in command for command in commands):
             return True
         time.sleep(0.1)
     return False
@@ -84,14 +84,14 @@ def commanded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     with serving(folder / "clutchlife.db", loaded=True) as server:
         with httpx2.Client(base_url=server.url, timeout=60) as http:
             post_tests(http, 0, 1000, 2000, 3000)
-        said = clutchlife("diagnose", "c1", "--url", server.url)
+        output = clutchlife("diagnose", "c1", "--url", server.url)
         (folder / "report.json").write_text(clutchlife("diagnose", "c1", "--json", "--url", server.url))
         (folder / "model.txt").write_text(clutchlife("model", "c1", "--baseline", "--url", server.url))
         clutchlife("export", "c1", "--out", str(folder / "export"), "--url", server.url)
         assert "no clutch is known" in clutchlife("diagnose", "nobody", "--url", server.url, code=65)
         assert "not both" in clutchlife("model", "c1", "--baseline", "--adopt", "x", "--url", server.url, code=64)
         assert "no diagnosis" in clutchlife("model", "c1", "--adopt", "x", "--url", server.url, code=65)
-    return folder, said
+    return folder, output
 
 
 def clutchlife(*arguments: str, code: int = 0) -> str:
@@ -102,11 +102,11 @@ def clutchlife(*arguments: str, code: int = 0) -> str:
     return done.stdout if code == 0 else done.stderr
 
 
-def test_the_command_tells_a_person_what_json_tells_a_script(commanded: tuple[Path, str]) -> None:
-    folder, said = commanded
+def test_the_command_prints_for_a_person_what_json_holds_for_a_script(commanded: tuple[Path, str]) -> None:
+    folder, output = commanded
     report = json.loads((folder / "report.json").read_text())
     assert report["status"] == "finished"
-    assert " ".join(report["summary"].split())[:40] in " ".join(said.replace("│", " ").split())
+    assert " ".join(report["summary"].split())[:40] in " ".join(output.replace("│", " ").split())
     assert "baseline" in (folder / "model.txt").read_text()
 
 

@@ -1,4 +1,4 @@
-"""What the documents show is run: the API's examples against a service, the commands they name against the command line."""
+"""The documents against the project: examples run, and commands, paths, addresses and settings that they name exist."""
 
 import os
 import re
@@ -44,6 +44,30 @@ def test_commands_that_are_named_are_there(path: Path) -> None:
     assert targets <= rules
     for link in re.findall(r"\]\(([^)#:]+)\)", text):
         assert (path.parent / link).exists(), link
+
+
+PATH = re.compile(r"(?<![\w/.])((?:models|service|storage|tests|docker|docs)/[\w./-]*\w)")
+MODULE = re.compile(r"\bpython -m ((?:models|service|tests)[\w.]*)")
+
+
+@pytest.mark.parametrize("path", [*DOCUMENTS, ROOT / "CHANGELOG.md"], ids=lambda path: path.name)
+def test_paths_exist(path: Path) -> None:
+    """Every file, folder and module that a document names, from the top of the repository."""
+    text = path.read_text(encoding="utf-8")
+    assert [name for name in PATH.findall(text) if not (ROOT / name).exists()] == []
+    modules = [name.replace(".", "/") for name in MODULE.findall(text)]
+    assert [name for name in modules if not ((ROOT / name).is_dir() or (ROOT / f"{name}.py").is_file())] == []
+
+
+def test_settings_are_documented() -> None:
+    """Every environment variable that the service or the command line reads."""
+    sources = [ROOT / "service" / "settings.py", ROOT / "service" / "cli" / "options.py"]
+    variables = {
+        name for source in sources for name in re.findall(r'"(CLUTCHLIFE_\w+)"', source.read_text(encoding="utf-8"))
+    }
+    assert variables
+    operations = (ROOT / "docs" / "operations.md").read_text(encoding="utf-8")
+    assert [name for name in sorted(variables) if name not in operations] == []
 
 
 def test_every_address_is_documented(server: Server) -> None:

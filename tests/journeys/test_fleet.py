@@ -29,25 +29,27 @@ def post(http: httpx2.Client, name: str, scale: float, last: int) -> None:
 
 def test_a_fleet_is_refreshed_and_scored_beside_the_service(server: Server, http: httpx2.Client) -> None:
     database = ("--database", f"sqlite:///{server.database}")
-    assert "no fleet" in clutchlife("fleet", *database)
+    assert "no prior has been learned" in clutchlife("fleet", *database)
     assert "nothing to score" in clutchlife("score", *database)
     for number, scale in enumerate((4000.0, 5000.0, 6000.0)):
         post(http, f"old-{number}", scale, 18_000)
     post(http, "young", 5000.0, 4000)
     before = http.get("/v1/clutches/young/remaining-useful-life")
-    assert "version 1, 3 clutches" in clutchlife("fleet", "refresh", *database)
+    refreshed = clutchlife("fleet", "refresh", *database)
+    assert "version 1, 3 clutches" in refreshed
+    assert "young: predictions updated" in refreshed
     after = http.get("/v1/clutches/young/remaining-useful-life", headers={"If-None-Match": before.headers["etag"]})
     assert after.status_code == 200
     assert after.json()["prior"] == {"name": "fleet", "version": 1, "clutches": 3}
     assert after.json()["revision"] == before.json()["revision"] + 1
     assert "version 1, 3 clutches" in clutchlife("fleet", *database)
-    assert "tracked anew" not in clutchlife("fleet", "refresh", *database)
-    told = clutchlife("score", *database)
-    said = http.get("/v1/fleet/scores").json()
-    assert len(said["lives"]) >= 2
-    for life in said["lives"]:
-        assert f"{life['clutch_id']}: ended at {life['end_of_life_cycles']:.0f} cycles" in told
-    assert f"{said['overall']['coverage']:.3f}" in told.splitlines()[-1]
+    assert "predictions updated" not in clutchlife("fleet", "refresh", *database)
+    output = clutchlife("score", *database)
+    scores = http.get("/v1/fleet/scores").json()
+    assert len(scores["lives"]) >= 2
+    for life in scores["lives"]:
+        assert f"{life['clutch_id']}: ended at {life['end_of_life_cycles']:.0f} cycles" in output
+    assert f"{scores['overall']['coverage']:.3f}" in output.splitlines()[-1]
     # what a posted run gets under the fleet's prior is what a replay makes of it
     clutchlife("replay", "young", *database)
     again = http.get("/v1/clutches/young/remaining-useful-life").json()

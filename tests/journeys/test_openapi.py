@@ -13,7 +13,7 @@ from service.settings import Settings
 from tests.support import ONCE, Server, serving, stationary
 
 SCHEMA = schemathesis.openapi.from_dict(create_app(Settings()).openapi())
-OPERATIONS = [found.ok() for found in SCHEMA.get_all_operations()]
+OPERATIONS = [operation.ok() for operation in SCHEMA.get_all_operations()]
 #: What JSON schema cannot say (equal lengths, a curve in the data, a clutch that is there) is refused all the same.
 EXCLUDED = [checks.positive_data_acceptance]
 
@@ -36,7 +36,7 @@ CASES = [(operation, GenerationMode.POSITIVE) for operation in OPERATIONS] + [
 ]
 
 
-@pytest.mark.parametrize(("operation", "mode"), CASES, ids=lambda each: getattr(each, "label", None) or each.value)
+@pytest.mark.parametrize(("operation", "mode"), CASES, ids=lambda part: getattr(part, "label", None) or part.value)
 def test_every_answer_keeps_to_the_description(api: Server, operation: APIOperation, mode: GenerationMode) -> None:
     """All of schemathesis' checks: documented statuses, types, schemas, wrong data refused, nothing unexpected."""
 

@@ -15,8 +15,8 @@ BASE = "/v1/clutches/c1"
 
 
 def without_revision(http: httpx2.Client, **params: str | float) -> dict[str, object]:
-    said: dict[str, object] = http.get(f"{BASE}/remaining-useful-life", params=params).json()
-    return said | {"revision": 0}
+    prediction: dict[str, object] = http.get(f"{BASE}/remaining-useful-life", params=params).json()
+    return prediction | {"revision": 0}
 
 
 def test_the_order_of_arrival_does_not_matter(tmp_path: Path) -> None:
@@ -57,8 +57,8 @@ def test_at_equal_cycles_the_earlier_start_comes_first(http: httpx2.Client) -> N
         http.post("/v1/clutches", json={"clutch_id": name})
         for body in (*bodies, stationary(1000, run_id="c"), stationary(2000, run_id="d")):
             assert http.post(f"/v1/clutches/{name}/runs", json=body).status_code == 201
-    said = [http.get(f"/v1/clutches/{name}/runs").json()["items"] for name in ("c1", "c2")]
-    by_name = [{item["run_id"]: item["fits"] for item in items} for items in said]
+    pages = [http.get(f"/v1/clutches/{name}/runs").json()["items"] for name in ("c1", "c2")]
+    by_name = [{item["run_id"]: item["fits"] for item in items} for items in pages]
     assert by_name[0] == by_name[1]
 
 
@@ -73,27 +73,27 @@ def test_what_was_done_before_a_rebuild_at_its_cycles_is_taken(http: httpx2.Clie
     assert [http.post(f"{BASE}/runs", json=body).status_code for body in bodies] == [201] * 4
 
 
-def test_a_first_test_that_says_nothing_sets_no_reference(http: httpx2.Client) -> None:
+def test_a_first_test_without_a_mean_cof_sets_no_reference(http: httpx2.Client) -> None:
     mad = stationary(0, pressures=(5.0,), speeds=(0.0, 1.0, 2.0, 3.0, 4.0, 1e6))
     mad["channels"]["torque_nm"] = [-20.0] * 6
-    said = {}
+    predictions = {}
     for name in ("with", "without"):
         http.post("/v1/clutches", json={"clutch_id": name})
         if name == "with":
             warnings = http.post(f"/v1/clutches/{name}/runs", json=mad).json()["warnings"]
-            assert "no_mean_cof" in {each["code"] for each in warnings}
+            assert "no_mean_cof" in {warning["code"] for warning in warnings}
         for cycles in (10, 1000, 2000, 3000):
             assert http.post(f"/v1/clutches/{name}/runs", json=stationary(cycles)).status_code == 201
-        said[name] = http.get(f"/v1/clutches/{name}/remaining-useful-life?method=grid").json()
+        predictions[name] = http.get(f"/v1/clutches/{name}/remaining-useful-life?method=grid").json()
     for part, key in (("current", "mean_cof"), ("criterion", "initial_mean_cof")):
-        assert said["with"][part][key] == pytest.approx(said["without"][part][key], rel=1e-2)
+        assert predictions["with"][part][key] == pytest.approx(predictions["without"][part][key], rel=1e-2)
 
 
 def test_a_test_at_other_pressures_says_that_no_track_uses_it(http: httpx2.Client) -> None:
     http.post("/v1/clutches", json={"clutch_id": "c1"})
     http.post(f"{BASE}/runs", json=stationary(0, pressures=(4.0, 5.0)))
     answer = http.post(f"{BASE}/runs", json=stationary(1000, pressures=(6.0, 7.0))).json()
-    assert [each["code"] for each in answer["warnings"]] == ["other_pressures"]
+    assert [warning["code"] for warning in answer["warnings"]] == ["other_pressures"]
     assert http.get(f"{BASE}/remaining-useful-life").json()["runs_used"] == 1
 
 
@@ -169,8 +169,8 @@ def test_a_kill_loses_nothing_that_was_acknowledged(tmp_path: Path, delay: float
             stored = [item["run_id"] for item in http.get(f"{BASE}/runs", params={"limit": 1000}).json()["items"]]
             assert set(acknowledged) <= set(stored)
             assert len(stored) <= len(acknowledged) + 1
-            said = without_revision(http)
-            assert said["runs_used"] == len(stored)
+            prediction = without_revision(http)
+            assert prediction["runs_used"] == len(stored)
             body = stationary(100 * len(stored), run_id="after")
             assert http.post(f"{BASE}/runs", json=body).status_code == 201
     finally:
@@ -189,10 +189,10 @@ def test_many_writers_at_once(server: Server) -> None:
                     failures.append(answer.text)
 
     rigs = [threading.Thread(target=rig, args=(f"rig-{index}",)) for index in range(6)]
-    for each in rigs:
-        each.start()
-    for each in rigs:
-        each.join()
+    for thread in rigs:
+        thread.start()
+    for thread in rigs:
+        thread.join()
     assert failures == []
     with httpx2.Client(base_url=server.url) as http:
         assert [item["runs"] for item in http.get("/v1/clutches").json()["items"]] == [4] * 6

@@ -15,23 +15,23 @@ pytestmark = pytest.mark.browser
 def browser() -> Iterator[Browser]:
     """A headless Chromium."""
     with sync_playwright() as playwright:
-        found = playwright.chromium.launch(
+        chromium = playwright.chromium.launch(
             executable_path=find(),
             args=["--no-sandbox", "--disable-background-networking", "--disable-component-update", "--disable-sync"],
         )
-        yield found
-        found.close()
+        yield chromium
+        chromium.close()
 
 
 def test_the_api_describes_itself_without_the_internet(server: Server, browser: Browser) -> None:
     page = browser.new_page()
-    asked: list[str] = []
-    said: list[str] = []
-    page.on("request", lambda request: asked.append(request.url))
-    page.on("console", lambda message: said.append(f"{message.type}: {message.text}"))
-    page.on("pageerror", lambda error: said.append(str(error)))
+    requested: list[str] = []
+    logged: list[str] = []
+    page.on("request", lambda request: requested.append(request.url))
+    page.on("console", lambda message: logged.append(f"{message.type}: {message.text}"))
+    page.on("pageerror", lambda error: logged.append(str(error)))
     page.goto(f"{server.url}/docs")
     page.get_by_text("/v1/clutches/{clutch_id}/remaining-useful-life", exact=True).wait_for()
     assert page.get_by_role("heading", name="Clutchlife").is_visible()
-    assert [url for url in asked if not url.startswith((server.url, "data:"))] == []
-    assert [line for line in said if line.startswith(("error", "Refused"))] == []
+    assert [url for url in requested if not url.startswith((server.url, "data:"))] == []
+    assert [line for line in logged if line.startswith(("error", "Refused"))] == []

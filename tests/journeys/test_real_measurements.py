@@ -31,8 +31,8 @@ def test_traction_sweeps_get_no_confident_number(http: httpx2.Client) -> None:
     for run in runs[::4]:
         assert http.post("/v1/clutches/traction/runs", json=run).status_code == 201
     for method in ("particle", "ukf", "grid"):
-        said = http.get("/v1/clutches/traction/remaining-useful-life", params={"method": method}).json()
-        assert said["status"] == "may_never_reach"
-        assert said["remaining_cycles"]["0.5"] is None
-        assert said["probability_of_reaching"] < 0.5
-        assert said["current"]["mean_cof"] == pytest.approx(0.05, rel=0.2)
+        prediction = http.get("/v1/clutches/traction/remaining-useful-life", params={"method": method}).json()
+        assert prediction["status"] == "may_never_reach"
+        assert prediction["remaining_cycles"]["0.5"] is None
+        assert prediction["probability_of_reaching"] < 0.5
+        assert prediction["current"]["mean_cof"] == pytest.approx(0.05, rel=0.2)

@@ -30,6 +30,6 @@ def test_a_record_that_no_manifest_lists_is_named(server: Server, tmp_path: Path
     clutchlife("simulate", "--seed", "7", "--out", folder, "--format", "csv", "--tests", "1", "--no-dynamic")
     (folder / "lonely.csv").write_text("torque_nm\n1\n", encoding="utf-8")
     push = ("push", folder, "--clutch", "sim-7", "--url", server.url, "--spool", tmp_path / "spool")
-    said = clutchlife(*push)
-    assert "lonely.csv is not listed in runs.json and not sent" in said
-    assert "2 stored" in said
+    output = clutchlife(*push)
+    assert "lonely.csv is not listed in runs.json and not sent" in output
+    assert "2 stored" in output

@@ -24,7 +24,7 @@ from service.cli.sending.client import Service, ServiceAwayError, connect
 _PORT = 8000
 _START_SECONDS = 60.0
 HIDDEN_EFFECT = "oil_temperature"
-HIDDEN = "the oil's temperature, whose viscosity acts as another speed would"
+HIDDEN = "the oil's temperature, whose viscosity acts like a change of speed"
 _HEADER = f"{'cycles':>7} {'mean COF':>16} {'of new':>7} {'remaining':>10} {'90 % interval':>17} {'truth':>7}"
 
 
@@ -35,7 +35,7 @@ def demo(
         bool, typer.Option(help="Open the dashboard in a browser at the end, where there is one")
     ] = True,
 ) -> None:
-    """Simulate a clutch's life, send it to a service run by run, and watch its remaining life being foretold."""
+    """Simulate a clutch's life, send it to a service run by run, and watch the prediction of its remaining life."""
     with tempfile.TemporaryDirectory(prefix="clutchlife-demo-") as folder, _service(Path(folder)) as (url, process):
         out.print(f"Clutchlife at {url}, its database in {folder}", markup=False, soft_wrap=True)
         with connect(url) as http:
@@ -56,15 +56,15 @@ def demo(
 
 def _life(service: Service, seed: int) -> float:
     """Post the life and have it diagnosed; the duty cycles at its end."""
-    from models.rig import campaign  # what only this command needs is loaded by it alone
-    from service.cli.demo import life
-    from service.run_files import simulated
+    from models.rig import campaign  # start-up time
+    from service.cli.demo import life  # start-up time
+    from service.run_files import simulated  # start-up time
 
     clutch_id, truth = f"sim-{seed}", campaign.simulated_clutch(seed)
     end = truth.end_of_life()
     service.post("/v1/clutches", json.dumps(simulated.simulated_clutch_body(clutch_id)).encode())
     out.print(f"\nA simulated clutch, {clutch_id}: 7 pressures x 40 speeds a test, 1 % noise.")
-    out.print(f"Hidden in its torque: {HIDDEN}, which the service is not told of.", markup=False)
+    out.print(f"Hidden in its torque: {HIDDEN}. The service does not know it.", markup=False)
     out.print("Duty cycles that remain until its mean COF has halved:\n")
     out.print(_HEADER, style="bold")
     inside: list[bool] = []
@@ -76,22 +76,22 @@ def _life(service: Service, seed: int) -> float:
             service.post(f"/v1/clutches/{clutch_id}/runs", body)
             progress.update(task, completed=run.cycles)
             if run.plateaus is not None:
-                said = service.get(f"/v1/clutches/{clutch_id}/remaining-useful-life")
-                progress.console.print(_row(said, end), markup=False)
-                inside += _inside(said, end)
-    truth_said = "it never halves" if end is None else f"it halved at {end:.0f} cycles"
+                prediction = service.get(f"/v1/clutches/{clutch_id}/remaining-useful-life")
+                progress.console.print(_row(prediction, end), markup=False)
+                inside += _inside(prediction, end)
+    halved = "it never halves" if end is None else f"it halved at {end:.0f} cycles"
     out.print(
-        f"The truth: {truth_said}.\nIt lay inside the 90 % interval {sum(inside)} times out of {len(inside)}.\n"
-        "'-' means that too few tests are known yet, or that it may never come."
+        f"The truth: {halved}.\nIt lay inside the 90 % interval {sum(inside)} times out of {len(inside)}.\n"
+        "'-' means that there are too few tests yet, or that the end may never come."
     )
     _diagnosed(service, clutch_id, end)
     return run.cycles
 
 
 def _loops(service: Service, seed: int, last: float) -> None:
-    """Dynamic tests at some states of the same life, for the dashboard: they come late, as a rig's own archive would."""
-    from service.cli.demo import life
-    from service.run_files import simulated
+    """Dynamic tests at some states of the same life, for the dashboard: they come late, as from a rig's archive."""
+    from service.cli.demo import life  # start-up time
+    from service.run_files import simulated  # start-up time
 
     out.print("\nDynamic tests of the same life follow, for the friction loops on the dashboard.")
     for run in life.loops(seed, last):
@@ -99,7 +99,7 @@ def _loops(service: Service, seed: int, last: float) -> None:
 
 
 def _diagnosed(service: Service, clutch_id: str, end: float | None) -> None:
-    """The diagnosis of the life that was posted, and what it would have changed halfway."""
+    """The diagnosis of the posted life, and the prediction at half of it before and after."""
     out.print("\nWhat does the simulation get wrong?\n", style="bold")
     halfway = {} if end is None else {"at_cycles": round(end / 2)}
     before = service.get(f"/v1/clutches/{clutch_id}/remaining-useful-life", **halfway)
@@ -111,29 +111,31 @@ def _diagnosed(service: Service, clutch_id: str, end: float | None) -> None:
     for part in shown(report):
         out.print(part)
     after = service.get(f"/v1/clutches/{clutch_id}/remaining-useful-life", **halfway)
-    found = HIDDEN_EFFECT in report["causes"]
-    out.print(f"\nHidden was {HIDDEN_EFFECT}: {'found' if found else 'not named'}.", style="bold", markup=False)
+    named = HIDDEN_EFFECT in report["causes"]
+    out.print(f"\nHidden was {HIDDEN_EFFECT}: {'found' if named else 'not named'}.", style="bold", markup=False)
     if end is not None:
         out.print(f"Halfway, under either model:\n{'':8} {_HEADER}")
-        for name, said in (("before", before), ("after", after)):
-            out.print(f"{name:8} {_row(said, end)}", markup=False)
+        for name, prediction in (("before", before), ("after", after)):
+            out.print(f"{name:8} {_row(prediction, end)}", markup=False)
 
 
-def _row(said: dict[str, Any], end: float | None) -> str:
-    current, remaining = said["current"], said["remaining_cycles"]
+def _row(prediction: dict[str, Any], end: float | None) -> str:
+    current, remaining = prediction["current"], prediction["remaining_cycles"]
     cof = f"{current['mean_cof']:.4f} ± {current['mean_cof_sd']:.4f}"
     interval = f"{_count(remaining['0.05'])} … {_count(remaining['0.95'])}"
-    left = "-" if end is None else f"{max(0.0, end - said['as_of_cycles']):.0f}"
+    left = "-" if end is None else f"{max(0.0, end - prediction['as_of_cycles']):.0f}"
     share = f"{100 * current['fraction_of_initial']:.1f} %"
-    if said["status"] == "reached":
+    if prediction["status"] == "reached":
         interval = "reached"
-    return f"{said['as_of_cycles']:>7} {cof:>16} {share:>7} {_count(remaining['0.5']):>10} {interval:>17} {left:>7}"
+    return (
+        f"{prediction['as_of_cycles']:>7} {cof:>16} {share:>7} {_count(remaining['0.5']):>10} {interval:>17} {left:>7}"
+    )
 
 
-def _inside(said: dict[str, Any], end: float | None) -> list[bool]:
+def _inside(prediction: dict[str, Any], end: float | None) -> list[bool]:
     """Whether the truth lay inside the interval, where one was given and the end of life was ahead."""
-    low, high = (said["end_of_life_cycles"][quantile] for quantile in ("0.05", "0.95"))
-    if low is None or end is None or said["as_of_cycles"] > end:
+    low, high = (prediction["end_of_life_cycles"][quantile] for quantile in ("0.05", "0.95"))
+    if low is None or end is None or prediction["as_of_cycles"] > end:
         return []
     return [low <= end and (high is None or end <= high)]
 

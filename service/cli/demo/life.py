@@ -1,8 +1,8 @@
-"""The life that `clutchlife demo` simulates: the rig's campaign, with an effect in its torque that its sensors do not name.
+"""The life that `clutchlife demo` simulates: the rig's campaign, with an effect of the oil's temperature in its torque.
 
 Dynamic tests are made at few states and pressures, at a quarter of the usual rate, with the plateaus' noise of 1 %: the
-friction loops are seen over the life, and the demo stays short, for to tell the lag of a loop takes the service longest.
-Friction lags speed as the service's own model has it, so that one effect alone is hidden.
+dashboard shows friction loops over the life, and the demo stays short, because the lag of a loop takes the service longest.
+Friction lags speed as in the service's own model, so that only one effect is hidden.
 """
 
 from collections.abc import Iterator
@@ -19,9 +19,10 @@ from models.rig.sampled import DynamicTest, sampled_test
 from models.rig.simulated_runs import RunKind, SimulatedRun
 from models.rig.stationary import Sensor
 
-#: The demo ends a little after the end of life.
+#: The demo ends at this share of the mean COF when new. Chosen: a little after the end of life at 0.5.
 _STOP = 0.49
-#: Duty cycles at which a dynamic test is made, pressures [Pa] at which it is recorded, what it is, the lag of its torque.
+#: Duty cycles at which a dynamic test is made; the pressures [Pa] that are recorded, and how near [Pa] a sample must be; the
+#: test; the lag of its torque.
 _LOOPS_AT = (0, 3000, 11_000)
 _RECORDED, _NEAR = (4.0e5, 5.5e5, 7.0e5), 0.03e5
 _TEST = DynamicTest(rate=25.0, recorder=Recorder(torque_noise=0.25, memory=0.02))
@@ -33,7 +34,7 @@ _STREAM = 0xD7
 def runs(seed: int) -> Iterator[SimulatedRun]:
     """All runs but the dynamic tests, in rig order; torque as the oil's temperature makes it.
 
-    Made as they are asked for. The same seed >= 0 gives the same bits. Raises ValueError on a negative seed.
+    Runs are made one by one. The same seed >= 0 gives the same bits. Raises ValueError on a negative seed.
     """
     truth = campaign.simulated_clutch(seed)
     for run in campaign.simulate(seed, clutch=truth, stop_fraction=_STOP):
@@ -58,7 +59,7 @@ def loops(seed: int, last: float) -> Iterator[SimulatedRun]:
 
 
 def _recorded(record: Record) -> Record:
-    """What is left of a record where the recorder ran at some pressures only."""
+    """The part of a record at the recorded pressures."""
     kept = np.any([np.abs(record.pressure - level) < _NEAR for level in _RECORDED], axis=0)
     return Record(
         time=record.time[kept],

@@ -1,4 +1,4 @@
-"""The other side of the wire: a client that waits for a service that is away, and tells what it refused."""
+"""A client of the service: it waits while the service is away or busy, and raises what the service refuses."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -9,18 +9,20 @@ from typing import Any
 import httpx2
 
 JSON = {"Content-Type": "application/json"}
-#: What passes by itself: a gateway without its service, a busy service, a slow one.
-_PASSING = (502, 503, 504)
+#: Statuses that pass by themselves: a gateway without its service, a busy service, a slow one.
+_TRANSIENT = (502, 503, 504)
+#: Characters of an answer that is no problem report, quoted as its detail.
+_MOST_QUOTED = 500
 #: Seconds between tries: doubled from the first to the last.
 FIRST_WAIT, LAST_WAIT = 0.25, 15.0
 
 
 class ServiceAwayError(Exception):
-    """The service did not answer, or was busy, for as long as was to be waited."""
+    """The service did not answer, or was busy, for longer than the patience."""
 
 
 class RefusedError(Exception):
-    """The service answered that it will not take this; the same again would be refused again."""
+    """The service refused the request; repeating it would be refused again."""
 
     def __init__(self, status: int, problem: dict[str, Any]) -> None:
         super().__init__(f"{status}: {problem.get('detail') or problem.get('title') or 'refused'}")
@@ -37,20 +39,20 @@ class Service:
     on_wait: Callable[[str, float], None] = lambda _reason, _seconds: None
 
     def post(self, path: str, body: bytes, *, prefer: str | None = None) -> dict[str, Any]:
-        """The answer to a JSON body; ServiceAwayError, or RefusedError where it will not be taken."""
+        """The answer to a JSON body; raises ServiceAwayError or RefusedError."""
         headers = JSON if prefer is None else JSON | {"Prefer": prefer}
         return self._answer("POST", path, content=body, headers=headers)
 
     def put(self, path: str, body: bytes) -> dict[str, Any]:
-        """The same, for what takes the place of what was there."""
+        """The answer to a JSON body that replaces what is at `path`; raises as `post` does."""
         return self._answer("PUT", path, content=body, headers=JSON)
 
-    def post_file(self, path: str, file: Path, asked: Mapping[str, str]) -> dict[str, Any]:
-        """The answer to a run's file."""
-        return self._answer("POST", path, params=dict(asked), file=file)
+    def post_file(self, path: str, file: Path, parameters: Mapping[str, str]) -> dict[str, Any]:
+        """The answer to a run's file; raises as `post` does."""
+        return self._answer("POST", path, params=dict(parameters), file=file)
 
     def get(self, path: str, **params: Any) -> dict[str, Any]:
-        """The answer to a question; ServiceAwayError, or RefusedError where there is none."""
+        """The answer to a GET; raises as `post` does."""
         return self._answer("GET", path, params=params)
 
     def _answer(self, method: str, path: str, *, file: Path | None = None, **request: Any) -> dict[str, Any]:
@@ -68,11 +70,11 @@ class Service:
                 reason = f"no answer ({type(error).__name__})"
             else:
                 if response.status_code < 400:
-                    found: dict[str, Any] = response.json()
-                    return found
-                if response.status_code not in _PASSING:
+                    answer: dict[str, Any] = response.json()
+                    return answer
+                if response.status_code not in _TRANSIENT:
                     raise RefusedError(response.status_code, _problem(response))
-                reason = f"it says {response.status_code}"
+                reason = f"status {response.status_code}"
                 wait = max(wait, float(response.headers.get("Retry-After", 0)))
             if time.monotonic() + wait > deadline:
                 raise ServiceAwayError(f"{self.http.base_url}: {reason}")
@@ -83,10 +85,10 @@ class Service:
 
 def _problem(response: httpx2.Response) -> dict[str, Any]:
     try:
-        found = response.json()
+        problem = response.json()
     except ValueError:
-        return {"detail": response.text[:500]}
-    return found if isinstance(found, dict) else {"detail": str(found)[:500]}
+        return {"detail": response.text[:_MOST_QUOTED]}
+    return problem if isinstance(problem, dict) else {"detail": str(problem)[:_MOST_QUOTED]}
 
 
 def connect(url: str, *, key: str | None = None, timeout: float = 60.0) -> httpx2.Client:

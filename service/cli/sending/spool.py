@@ -1,8 +1,8 @@
-"""What is still to be sent, kept on disk until the service has it for good.
+"""Runs that are still to be sent, kept on disk until the service has stored them.
 
-A run is copied into the spool before it is sent and taken out when the service has answered that it is stored (or that
-it has it already), so a crash or a power cut on the sender's side loses nothing. What the service refuses is put aside
-under `refused/` with its answer.
+A run is copied into the spool before it is sent and removed when the service has answered that it is stored (now or
+earlier), so a crash or a power cut on the sender's side loses nothing. A run that the service refuses is moved to
+`refused/`, with the answer beside it.
 """
 
 import hashlib
@@ -14,6 +14,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
+
+#: Beside a record file: the parameters of its request, as JSON.
+_PARAMETERS = ".asked"
 
 
 def default_folder() -> Path:
@@ -40,30 +43,29 @@ class Spool:
         """Keep a JSON body; the same body is kept once. Entries keep the order in which they came."""
         return self._keep(hashlib.sha256(body).hexdigest()[:24], ".json", io.BytesIO(body))
 
-    def add_file(self, path: Path, asked: Mapping[str, str]) -> Path:
-        """Keep a run's file and what is to be said beside it."""
+    def add_file(self, path: Path, parameters: Mapping[str, str]) -> Path:
+        """Keep a run's file and the parameters of its request."""
         with path.open("rb") as file:
             digest = hashlib.file_digest(file, "sha256")
-            digest.update(json.dumps(dict(asked), sort_keys=True).encode())
+            digest.update(json.dumps(dict(parameters), sort_keys=True).encode())
             file.seek(0)
             kept = self._keep(digest.hexdigest()[:24], ".run", file)
-        said = kept.with_suffix(".asked")
-        if not said.exists():
-            said.write_text(json.dumps(dict(asked)), encoding="utf-8")
+        beside = kept.with_suffix(_PARAMETERS)
+        if not beside.exists():
+            beside.write_text(json.dumps(dict(parameters)), encoding="utf-8")
         return kept
 
-    def asked(self, path: Path) -> dict[str, str] | None:
-        """What is to be said beside a file; None for a JSON body."""
-        said = path.with_suffix(".asked")
+    def parameters(self, path: Path) -> dict[str, str] | None:
+        """The parameters of a file's request; None for a JSON body."""
         if path.suffix == ".json":
             return None
-        found: dict[str, str] = json.loads(said.read_text(encoding="utf-8"))
-        return found
+        parameters: dict[str, str] = json.loads(path.with_suffix(_PARAMETERS).read_text(encoding="utf-8"))
+        return parameters
 
     def _keep(self, digest: str, suffix: str, source: BinaryIO) -> Path:
-        known = next(self.folder.glob(f"*-{digest}{suffix}"), None)
-        if known is not None:
-            return known
+        present = next(self.folder.glob(f"*-{digest}{suffix}"), None)
+        if present is not None:
+            return present
         last = max((int(path.name.partition("-")[0]) for path in self._entries()), default=0)
         path = self.folder / f"{last + 1:08d}-{digest}{suffix}"
         partial = path.with_suffix(".part")
@@ -82,17 +84,17 @@ class Spool:
         return [path for path in self.folder.glob("[0-9]*-*") if path.suffix in (".json", ".run")]
 
     def done(self, path: Path) -> None:
-        """The service has it."""
+        """Remove an entry that the service has stored."""
         path.unlink(missing_ok=True)
-        path.with_suffix(".asked").unlink(missing_ok=True)
+        path.with_suffix(_PARAMETERS).unlink(missing_ok=True)
 
     def refused(self, path: Path, problem: dict[str, Any]) -> Path:
-        """The service will not have it: aside, with its answer beside it."""
+        """Move an entry that the service refuses to `refused/`, with the answer beside it."""
         aside = self.folder / "refused"
         aside.mkdir(exist_ok=True)
         answer = aside / f"{path.stem}.problem"
         answer.write_text(json.dumps(problem, indent=1, ensure_ascii=False), encoding="utf-8")
-        said = path.with_suffix(".asked")
-        if said.exists():
-            said.replace(aside / said.name)
+        beside = path.with_suffix(_PARAMETERS)
+        if beside.exists():
+            beside.replace(aside / beside.name)
         return path.replace(aside / path.name)

@@ -1,6 +1,6 @@
-"""Blocks of CSV made plain: comments and blank lines left out, and of what is left the cells of a few columns picked out.
+"""Blocks of CSV made plain: comments and blank lines left out, then the cells of the columns taken picked out.
 
-Whole blocks at a time, whatever stands in the columns that are not taken. A separator counts where an even number of
+Whole blocks at a time, whatever the columns that are not taken hold. A separator counts where an even number of
 quotes stands before it; a quote may only begin a cell, end one, or be doubled in one (RFC 4180).
 """
 
@@ -9,19 +9,19 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from service.readers.csv.head import is_comment, text_of
+from service.readers.csv.lines import is_comment, text_of
 
-#: What separates the cells that were picked.
+#: The separator between picked cells.
 INNER = b";"
 
 _NEWLINE, _QUOTE = b'\n"'
-#: What a comment or a blank line begins with, behind blanks and quotes.
+#: Letters that a comment or a blank line may begin with, behind blanks and quotes.
 _DOUBTFUL = np.zeros(256, dtype=np.bool_)
 _DOUBTFUL[list(b'#%/; \t\n"')] = True
 
 
 def without_comments(block: bytes, separator: str) -> tuple[bytes, list[int]]:
-    """A block of whole lines without its comments and blank lines, and before which of the lines left each one stood."""
+    """A block of whole lines without comments and blank lines; for each line left out, how many kept lines precede it."""
     letters = np.frombuffer(block, np.uint8)
     stops = np.flatnonzero(letters == _NEWLINE) + 1
     starts = np.concatenate([[0], stops[:-1]])
@@ -73,7 +73,7 @@ def picked(block: bytes, separator: bytes, width: int, taken: Sequence[int]) -> 
 
 
 def _well_placed(quotes: NDArray[np.intp], letters: NDArray[np.uint8], separator: int) -> bool:
-    """Whether quotes, which open and close by turns, stand at the ends of cells or, doubled, next to each other."""
+    """Whether quotes, which open and close in turn, are at the ends of cells or, doubled, next to each other."""
     before, after = (
         letters[quotes[0::2] - 1],
         letters[quotes[1::2] + 1],

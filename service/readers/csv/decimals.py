@@ -18,7 +18,7 @@ from models.arrays import FloatArray
 Words = NDArray[np.uint64]
 Indices = NDArray[np.intp]
 
-#: What counts as a number: no hexadecimals, no underscores, no words but those that `check_arrays` refuses with their row.
+#: A number: no hexadecimals, no underscores, no words but nan and inf, which `check_arrays` refuses with their row.
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?|[+-]?(nan|inf|infinity)", re.IGNORECASE | re.ASCII)
 
 _NEWLINE, _POINT, _PLUS, _MINUS, _SMALL_E, _LARGE_E = b"\n.+-eE"
@@ -30,8 +30,8 @@ _WORD = 8
 def parse_rows(text: bytes, separator: int, columns: int) -> FloatArray | None:
     """Lines of `columns` numbers each, every line ended by a newline -> [rows, columns].
 
-    `separator` is the byte between numbers; the decimal sign is a point. None where anything in the text is not so: the
-    caller then looks for the place line by line.
+    `separator` is the byte between numbers; the decimal sign is a point. None where the text holds anything
+    else: the caller then looks for the place line by line.
     """
     if sys.byteorder != "little" or not text:
         return None

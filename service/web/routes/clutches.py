@@ -9,6 +9,7 @@ from service.queries import clutch_list
 from service.queries.cache import to_json
 from service.run_files.json_run import invalid
 from service.schemas.clutch import ClutchIn, ClutchOut, ClutchPage
+from service.schemas.parameters import ClutchId
 from service.web.auth import Ingester, Reader
 from service.web.context import Context, Cursor, Limit, now
 from service.web.limits import USUAL_ITEMS
@@ -66,6 +67,6 @@ def list_clutches(request: Request, context: Reader, limit: Limit = USUAL_ITEMS,
 
 
 @router.get("/{clutch_id}", response_model=ClutchOut, responses=READING)
-def read_clutch(request: Request, context: Reader, clutch_id: str) -> Response:
+def read_clutch(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
     """One clutch."""
     return answer(request, clutch_list.look_up(context.database, clutch_id))

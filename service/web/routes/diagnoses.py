@@ -14,6 +14,7 @@ from service.queries.cache import to_json
 from service.run_files.json_run import invalid
 from service.schemas.base import Schema
 from service.schemas.diagnosis import DiagnosisIn, DiagnosisOut, DiagnosisPage, ModelIn, ModelOut
+from service.schemas.parameters import ClutchId, DiagnosisId
 from service.web.auth import Ingester, Reader
 from service.web.context import Context, Cursor, Limit, now
 from service.web.limits import LONGEST_WAIT_SECONDS, USUAL_ITEMS, WAIT_SECONDS
@@ -39,7 +40,7 @@ Prefer = Annotated[
     responses=SENDING | {202: {"model": DiagnosisOut, "description": "It still runs: look again at `Location`"}},
     openapi_extra=described_body(DiagnosisIn, {"adopt": False}),
 )
-async def post_diagnosis(request: Request, context: Ingester, clutch_id: str, prefer: Prefer = None) -> Response:
+async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchId, prefer: Prefer = None) -> Response:
     """Have all runs of the clutch's present life diagnosed. A question while the same runs are being diagnosed joins in."""
     question = _read(DiagnosisIn, await json_body(request))
     job = await run_in_threadpool(context.diagnoses.ask, clutch_id, adopt=question.adopt)
@@ -64,13 +65,13 @@ def list_diagnoses(
 
 
 @router.get("/diagnoses/{diagnosis_id}", response_model=DiagnosisOut, responses=READING)
-def read_diagnosis(request: Request, context: Reader, clutch_id: str, diagnosis_id: str) -> Response:
+def read_diagnosis(request: Request, context: Reader, clutch_id: ClutchId, diagnosis_id: DiagnosisId) -> Response:
     """One diagnosis with its maps and loops."""
     return answer(request, diagnoses.one(context.database, clutch_id, diagnosis_id))
 
 
 @router.get("/model", response_model=ModelOut, responses=READING)
-def read_model(request: Request, context: Reader, clutch_id: str) -> Response:
+def read_model(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
     """The model that tracking and remaining life use, and all that were adopted."""
     return answer(request, model.model(context.database, clutch_id))
 
@@ -81,7 +82,7 @@ def read_model(request: Request, context: Reader, clutch_id: str) -> Response:
     responses=SENDING,
     openapi_extra=described_body(ModelIn, {"diagnosis_id": None}),
 )
-async def put_model(request: Request, context: Ingester, clutch_id: str) -> Response:
+async def put_model(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
     """Adopt what a diagnosis found, or return to the baseline; all is tracked anew before this is answered."""
     wanted = _read(ModelIn, await json_body(request))
     answered = await run_in_threadpool(_adopt, context, clutch_id, wanted.diagnosis_id)

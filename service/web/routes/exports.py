@@ -7,7 +7,9 @@ from fastapi import APIRouter, Request
 from fastapi.responses import Response
 
 from service.queries import degradation, fleet_priors, remaining_life, runs, scores, series, stribeck, surfaces
-from service.schemas.life import LoopItem, Method, SeriesItem
+from service.schemas.curves import LoopItem, SeriesItem
+from service.schemas.life import Method
+from service.schemas.parameters import ClutchId, Quantity
 from service.web.auth import Reader
 from service.web.context import AtCycles, Cursor, Limit, PressureBar
 from service.web.limits import MOST_ITEMS
@@ -24,7 +26,7 @@ def _items(payload: Mapping[str, Any]) -> Any:
 
 @router.get("/runs.csv", response_class=Response, responses=READING)
 def list_runs_csv(
-    request: Request, context: Reader, clutch_id: str, limit: Limit = MOST_ITEMS, cursor: Cursor = None
+    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = MOST_ITEMS, cursor: Cursor = None
 ) -> Response:
     """Receipts by cycles as CSV; warnings and fits are counted."""
     after = from_cursor(cursor)
@@ -49,7 +51,7 @@ def list_runs_csv(
 def remaining_useful_life_csv(
     request: Request,
     context: Reader,
-    clutch_id: str,
+    clutch_id: ClutchId,
     method: Method = "particle",
     pressure_bar: PressureBar = None,
     at_cycles: AtCycles = None,
@@ -68,7 +70,7 @@ def remaining_useful_life_csv(
 
 
 @router.get("/degradation.csv", response_class=Response, responses=READING)
-def degradation_csv(request: Request, context: Reader, clutch_id: str) -> Response:
+def degradation_csv(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
     """Eq. 6's coefficients, a row a quantity and pressure."""
 
     def make() -> object:
@@ -79,7 +81,7 @@ def degradation_csv(request: Request, context: Reader, clutch_id: str) -> Respon
 
 @router.get("/stribeck.csv", response_class=Response, responses=READING)
 def stribeck_csv(
-    request: Request, context: Reader, clutch_id: str, limit: Limit = MOST_ITEMS, cursor: Cursor = None
+    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = MOST_ITEMS, cursor: Cursor = None
 ) -> Response:
     """The fits, a row a test and pressure."""
     after = from_cursor(cursor)
@@ -94,7 +96,7 @@ def stribeck_csv(
 
 
 @router.get("/surfaces.csv", response_class=Response, responses=READING)
-def surfaces_csv(request: Request, context: Reader, clutch_id: str) -> Response:
+def surfaces_csv(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
     """The surfaces, a row a count of cycles, a pressure and a speed."""
 
     def make() -> object:
@@ -104,7 +106,7 @@ def surfaces_csv(request: Request, context: Reader, clutch_id: str) -> Response:
 
 
 @router.get("/scores.csv", response_class=Response, responses=READING)
-def clutch_scores_csv(request: Request, context: Reader, clutch_id: str, method: Method = "particle") -> Response:
+def clutch_scores_csv(request: Request, context: Reader, clutch_id: ClutchId, method: Method = "particle") -> Response:
     """The scored predictions, a row each."""
 
     def make() -> object:
@@ -117,7 +119,7 @@ def clutch_scores_csv(request: Request, context: Reader, clutch_id: str, method:
 
 
 @router.get("/loops.csv", response_class=Response, responses=READING)
-def loops_csv(request: Request, context: Reader, clutch_id: str) -> Response:
+def loops_csv(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
     """Friction loops, a row each."""
 
     def make() -> object:
@@ -127,7 +129,7 @@ def loops_csv(request: Request, context: Reader, clutch_id: str) -> Response:
 
 
 @router.get("/series.csv", response_class=Response, responses=READING)
-def series_csv(request: Request, context: Reader, clutch_id: str, quantity: str | None = None) -> Response:
+def series_csv(request: Request, context: Reader, clutch_id: ClutchId, quantity: Quantity = None) -> Response:
     """The flat rows as CSV."""
 
     def make() -> object:

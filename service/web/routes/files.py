@@ -3,18 +3,26 @@
 import tempfile
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
-from pydantic import AwareDatetime
 from starlette.datastructures import UploadFile
 
 from service.errors import InvalidError
 from service.queries.cache import to_json
 from service.run_files.upload import read_file_run
-from service.schemas.base import IDENTIFIER_PATTERN, Origin
+from service.schemas.base import Origin
+from service.schemas.parameters import (
+    ClutchId,
+    FileCycles,
+    FileKind,
+    FileMap,
+    FileName,
+    FileRunId,
+    FileStartedAt,
+)
 from service.schemas.run import Receipt
 from service.web.auth import Ingester
 from service.web.context import Context, now
@@ -31,7 +39,6 @@ _BODY = {
         "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
     }
 }
-Kind = Literal["stationary_stribeck", "dynamic_stribeck"]
 
 
 @router.post(
@@ -44,13 +51,13 @@ Kind = Literal["stationary_stribeck", "dynamic_stribeck"]
 async def post_run_file(
     request: Request,
     context: Ingester,
-    clutch_id: str,
-    kind: Kind,
-    cycles: Annotated[float, Query(ge=0, le=1e12, allow_inf_nan=False)],
-    map: Annotated[str | None, Query(max_length=4000, description="Channels by name: torque_nm:Mz,speed_rpm:n")] = None,  # noqa: A002
-    filename: Annotated[str, Query(max_length=255)] = "upload",
-    run_id: Annotated[str | None, Query(pattern=IDENTIFIER_PATTERN)] = None,
-    started_at: AwareDatetime | None = None,
+    clutch_id: ClutchId,
+    kind: FileKind,
+    cycles: FileCycles,
+    map: FileMap = None,  # noqa: A002
+    filename: FileName = "upload",
+    run_id: FileRunId = None,
+    started_at: FileStartedAt = None,
     origin: Origin = "measured",
 ) -> Response:
     """Post a run as CSV, NI TDMS, ASAM MDF4 or Parquet, plain or gzipped."""

@@ -10,17 +10,11 @@ from service.queries.degradation import degradation as degradation_of
 from service.queries.engagement import engaged
 from service.queries.remaining_life import remaining_life
 from service.queries.surfaces import surface
+from service.schemas.curves import EngagementOut, LoopPage, SeriesPage, StribeckPage
+from service.schemas.degradation import Degradation, Surfaces
 from service.schemas.fleet import Scores
-from service.schemas.life import (
-    Degradation,
-    EngagementOut,
-    LoopPage,
-    Method,
-    RemainingLife,
-    SeriesPage,
-    StribeckPage,
-    Surfaces,
-)
+from service.schemas.life import Method, RemainingLife
+from service.schemas.parameters import ClutchId, Quantity
 from service.web.auth import Reader
 from service.web.context import AtCycles, Cursor, Limit, PressureBar, Whole
 from service.web.limits import ALL_ITEMS, USUAL_ITEMS
@@ -34,7 +28,7 @@ router = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["remaining life"])
 def remaining_useful_life(
     request: Request,
     context: Reader,
-    clutch_id: str,
+    clutch_id: ClutchId,
     method: Method = "particle",
     pressure_bar: PressureBar = None,
     at_cycles: AtCycles = None,
@@ -51,7 +45,7 @@ def remaining_useful_life(
 
 @router.get("/degradation", response_model=Degradation, responses=READING)
 def degradation(
-    request: Request, context: Reader, clutch_id: str, limit: Whole = ALL_ITEMS, cursor: Cursor = None
+    request: Request, context: Reader, clutch_id: ClutchId, limit: Whole = ALL_ITEMS, cursor: Cursor = None
 ) -> Response:
     """Eq. 6 for every Stribeck parameter and for mean COF: coefficients, measurements, trajectory with its 90 % band."""
     return clutch_list_answer(
@@ -61,7 +55,7 @@ def degradation(
 
 @router.get("/stribeck", response_model=StribeckPage, responses=READING)
 def stribeck(
-    request: Request, context: Reader, clutch_id: str, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
+    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
 ) -> Response:
     """The Stribeck curves of the stationary tests by cycles, and the pressure laws through them (fig. 9)."""
     after = from_cursor(cursor)
@@ -73,7 +67,7 @@ def stribeck(
 
 
 @router.get("/engagement", response_model=EngagementOut, responses=READING)
-def engagement(request: Request, context: Reader, clutch_id: str, at_cycles: AtCycles = None) -> Response:
+def engagement(request: Request, context: Reader, clutch_id: ClutchId, at_cycles: AtCycles = None) -> Response:
     """A simulated engagement of the tracked clutch: the pressure profile of fig. 3 against the motor's 20 Nm."""
     return clutch_answer(
         request,
@@ -86,7 +80,7 @@ def engagement(request: Request, context: Reader, clutch_id: str, at_cycles: AtC
 
 
 @router.get("/surfaces", response_model=Surfaces, responses=READING)
-def surfaces(request: Request, context: Reader, clutch_id: str) -> Response:
+def surfaces(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
     """The tracked Stribeck parameters over pressure and cycles (figs. 10, 11), and torque over speed besides."""
     return clutch_answer(request, context, clutch_id, "surfaces", lambda: surface(context.database, clutch_id))
 
@@ -95,7 +89,7 @@ def surfaces(request: Request, context: Reader, clutch_id: str) -> Response:
 def clutch_scores(
     request: Request,
     context: Reader,
-    clutch_id: str,
+    clutch_id: ClutchId,
     method: Method = "particle",
     limit: Whole = ALL_ITEMS,
     cursor: Cursor = None,
@@ -110,7 +104,7 @@ def clutch_scores(
 
 @router.get("/loops", response_model=LoopPage, responses=READING)
 def loops(
-    request: Request, context: Reader, clutch_id: str, limit: Whole = ALL_ITEMS, cursor: Cursor = None
+    request: Request, context: Reader, clutch_id: ClutchId, limit: Whole = ALL_ITEMS, cursor: Cursor = None
 ) -> Response:
     """Friction loops of the dynamic tests by cycles and pressure."""
 
@@ -124,8 +118,8 @@ def loops(
 def series(
     request: Request,
     context: Reader,
-    clutch_id: str,
-    quantity: str | None = None,
+    clutch_id: ClutchId,
+    quantity: Quantity = None,
     limit: Whole = ALL_ITEMS,
     cursor: Cursor = None,
 ) -> Response:

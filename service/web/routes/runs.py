@@ -9,6 +9,7 @@ from fastapi.responses import Response
 from service.queries import runs
 from service.queries.cache import to_json
 from service.run_files.json_run import read_run
+from service.schemas.parameters import ClutchId, RunId
 from service.schemas.run import RUN_IN, Receipt, RunOut, RunPage
 from service.web.auth import Ingester, Reader
 from service.web.context import Context, Cursor, Limit, now
@@ -40,7 +41,7 @@ EXAMPLE = {
     responses=SENDING | {200: {"model": Receipt, "description": "The same run again: the same receipt"}},
     openapi_extra=described_body(RUN_IN.json_schema(), EXAMPLE),
 )
-async def post_run(request: Request, context: Ingester, clutch_id: str) -> Response:
+async def post_run(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
     """Post a run, in any order of cycles. The receipt says what was made of it; by then it is stored for good."""
     body = await json_body(request)
     receipt, new = await run_in_threadpool(_ingest, context, clutch_id, body)
@@ -54,7 +55,7 @@ def _ingest(context: Context, clutch_id: str, body: bytes) -> tuple[dict[str, An
 
 @router.get("", response_model=RunPage, responses=READING)
 def list_runs(
-    request: Request, context: Reader, clutch_id: str, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
+    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
 ) -> Response:
     """Receipts by cycles."""
     after = from_cursor(cursor)
@@ -66,6 +67,6 @@ def list_runs(
 
 
 @router.get("/{run_id}", response_model=RunOut, responses=READING)
-def read_run_with_channels(request: Request, context: Reader, clutch_id: str, run_id: str) -> Response:
+def read_run_with_channels(request: Request, context: Reader, clutch_id: ClutchId, run_id: RunId) -> Response:
     """One receipt with the run's channels as they were sent."""
     return answer(request, runs.one_run(context.database, clutch_id, run_id))

@@ -25,13 +25,15 @@ def printed(report: dict[str, Any], *, colours: bool = False) -> str:
 
 @pytest.fixture
 def report() -> dict[str, Any]:
-    found = diagnose(EMPTY, rng=None)  # type: ignore[arg-type]  # none is drawn without tests
-    said = public(found, origin=500.0, before=LIFE, after=LIFE | {"status": "reached"}, notes=("left out",))
-    return said | STATE
+    diagnosed = diagnose(EMPTY, rng=None)  # type: ignore[arg-type]  # none is drawn without tests
+    public_report = public(
+        diagnosed, origin=500.0, before=LIFE, after=LIFE | {"status": "reached"}, notes=("left out",)
+    )
+    return public_report | STATE
 
 
 def test_all_that_matters_is_there(report: dict[str, Any]) -> None:
-    said = printed(report)
+    shown_text = printed(report)
     for words in (
         "The model is adequate",
         "A stand-in looked at 0 tests.",
@@ -39,13 +41,13 @@ def test_all_that_matters_is_there(report: dict[str, Any]) -> None:
         "1.5 ± - Nm zero shift",
         "0.3 Nm before, 0.25 Nm after, 16.7 ± 2 % less",
         "Remaining life, baseline: 12,346 cycles (90 %: 4,000 to beyond the horizon)",
-        "Remaining life, extended: its end is reached",
+        "Remaining life, extended: the end of life is reached",
         "The extended model is adopted",
-        "read the unloaded zero",
+        "read the unloaded zero (expected evidence: strong)",
         "Note: left out",
         "oil_temperature_c",
     ):
-        assert words in said, words
+        assert words in shown_text, words
     assert report["maps"]["axes"]["cycles"] == [500.0, 1500.0, 2500.0]
 
 

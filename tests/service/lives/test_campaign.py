@@ -14,7 +14,7 @@ from service.jobs.diagnosis import read_life
 from service.lives import campaign as campaign_module
 from service.lives.campaign import DiagnosedLife, thinned
 from storage.engine.database import open_database
-from tests.service.run_files.test_files_and_records import dynamic_record, raw_record
+from tests.service.run_files.test_upload import dynamic_record, raw_record
 from tests.support import PRESSURES_BAR, SPEEDS_RPM, stationary
 
 RUNS = "/v1/clutches/c1/runs"

@@ -11,7 +11,7 @@ from service.lives.model_correction import corrected_cofs
 from service.workflows.replay import replay_clutch
 from storage.engine.database import open_database
 from tests.service.lives.test_campaign import campaign, post
-from tests.service.run_files.test_files_and_records import dynamic_record
+from tests.service.run_files.test_upload import dynamic_record
 from tests.support import stationary
 
 CLUTCH = "/v1/clutches/c1"

@@ -57,8 +57,8 @@ def write_tdms(
         objects = [RootObject()]
         for place, columns_there in ((group, columns), ("More", more or {})):
             for name, values in columns_there.items():
-                said = dict(properties or {}) | ({"unit_string": units[name]} if name in units else {})
-                objects.append(ChannelObject(place, name, values, properties=said))
+                channel_properties = dict(properties or {}) | ({"unit_string": units[name]} if name in units else {})
+                objects.append(ChannelObject(place, name, values, properties=channel_properties))
         writer.write_segment(objects)
     return path
 
@@ -92,9 +92,9 @@ def write_mdf(
     units = {} if units is None else units
     groups = {"a": {name: values for name, values in columns.items() if name != "time_s"}, "b": more or {}}
     arrays = {f"{group}|{name}": values for group, held in groups.items() for name, values in held.items()}
-    said = [units.get(name.partition("|")[2], "") for name in arrays]
+    unit_names = [units.get(name.partition("|")[2], "") for name in arrays]
     held = path.with_suffix(".npz")
-    np.savez(held, names=list(arrays), units=said, time=columns["time_s"], allow_pickle=False, **arrays)
+    np.savez(held, names=list(arrays), units=unit_names, time=columns["time_s"], allow_pickle=False, **arrays)
     arguments = [sys.executable, "-W", "ignore", "-c", _WRITE_MDF, str(held), str(path), version, str(compression)]
     subprocess.run(arguments, check=True, capture_output=True)
     return path

@@ -1,6 +1,5 @@
-"""`clutchlife replay` and `clutchlife backup`: on the database itself."""
+"""`clutchlife replay`: all results computed anew, on the database itself."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -14,7 +13,7 @@ def replay(
     database: Database = DATABASE,
 ) -> None:
     """Recompute all results from the raw runs, with the code that is installed now."""
-    from service.workflows.replay import clutch_ids, replay_clutch  # loaded by the one command that needs it
+    from service.workflows.replay import clutch_ids, replay_clutch  # start-up time: only this command needs it
 
     with existing(database) as opened, Progress(console=err, transient=True) as progress:
         wanted = clutch_ids_given or clutch_ids(opened)
@@ -23,10 +22,3 @@ def replay(
             runs = replay_clutch(opened, clutch_id)
             out.print(f"{clutch_id}: {runs} runs", markup=False)
             progress.advance(task)
-
-
-def backup(path: Path, database: Database = DATABASE) -> None:
-    """A consistent copy of the database at PATH, while the service runs."""
-    with existing(database) as opened:
-        opened.backup(path)
-    out.print(str(path), markup=False)

@@ -1,52 +1,9 @@
-"""Names and units: the fixed table, the synonyms, and what is refused."""
+"""Column titles, synonyms and maps -> channels, and titles that are refused."""
 
-import numpy as np
 import pytest
 
 from service.errors import InvalidError
 from service.readers.column_names import Header, choose, header_of, known_channel, parse_map
-from service.readers.unit_table import conversion
-
-
-@pytest.mark.parametrize(
-    ("channel", "unit", "value", "expected"),
-    [
-        ("speed_rpm", "rad/s", 2 * np.pi, 60.0),
-        ("speed_rpm", "1/min", 60.0, 60.0),
-        ("speed_rpm", "min⁻¹", 60.0, 60.0),
-        ("torque_nm", "kNm", 0.02, 20.0),
-        ("torque_nm", "N·m", 20.0, 20.0),
-        ("torque_nm", "N m", 20.0, 20.0),
-        ("torque_nm", "mNm", 20.0, 0.02),
-        ("torque_nm", "lbf·ft", 1.0, 1.3558179483314004),
-        ("pressure_bar", "mbar", 5000.0, 5.0),
-        ("pressure_bar", "MPa", 0.5, 5.0),
-        ("pressure_bar", "kPa", 500.0, 5.0),
-        ("pressure_bar", "Pa", 5e5, 5.0),
-        ("pressure_bar", "psi", 14.503773773020923, 1.0),
-        ("oil_temperature_c", "degC", 85.0, 85.0),
-        ("oil_temperature_c", "K", 358.15, 85.0),
-        ("oil_temperature_c", "°F", 185.0, 85.0),
-        ("oil_temperature_c", "℃", 85.0, 85.0),
-        ("time_s", "ms", 1500.0, 1.5),
-        ("time_s", "min", 2.0, 120.0),
-    ],
-)
-def test_units_are_converted(channel: str, unit: str, value: float, expected: float) -> None:
-    found = conversion(channel, unit)
-    assert found is not None
-    values = np.array([value])
-    found.apply(values)
-    np.testing.assert_allclose(values, expected, rtol=1e-15, atol=1e-13)
-
-
-@pytest.mark.parametrize(
-    ("channel", "unit"),
-    [("pressure_bar", "mPa"), ("pressure_bar", "Nm"), ("torque_nm", "MNm"), ("speed_rpm", "s"), ("speed_rpm", "Hz"),
-     ("oil_temperature_c", "Pa"), ("time_s", ""), ("torque_nm", "V")],
-)  # fmt: skip
-def test_units_of_something_else_are_not_known(channel: str, unit: str) -> None:
-    assert conversion(channel, unit) is None
 
 
 @pytest.mark.parametrize(
@@ -86,13 +43,13 @@ def test_a_map_may_name_what_holds_commas_and_colons() -> None:
 
 def test_a_map_wins_over_names_and_states_the_unit() -> None:
     headers = [Header("torque_nm"), Header("Mz"), Header("other")]
-    assert [(each.channel, each.index) for each in choose(headers, "torque_nm:Mz")] == [("torque_nm", 1)]
+    assert [(column.channel, column.index) for column in choose(headers, "torque_nm:Mz")] == [("torque_nm", 1)]
 
 
-def test_equal_names_are_told_apart_by_their_group() -> None:
+def test_equal_names_are_distinguished_by_their_group() -> None:
     headers = [Header("M", "Nm", "fast"), Header("M", "Nm", "slow")]
     with pytest.raises(InvalidError, match="torque_nm must be one column, got fast/M and slow/M"):
         choose(headers, None)
     with pytest.raises(InvalidError, match="torque_nm must be one column"):
         choose(headers, "torque_nm:M")
-    assert [each.index for each in choose(headers, "torque_nm:slow/M")] == [1]
+    assert [column.index for column in choose(headers, "torque_nm:slow/M")] == [1]

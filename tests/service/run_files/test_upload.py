@@ -59,9 +59,9 @@ def test_a_raw_record_gives_the_fits_of_its_plateaus(client: TestClient) -> None
     client.post("/v1/clutches", json={"clutch_id": "exact"})
     exact = client.post("/v1/clutches/exact/runs", json=plateaus())
     assert [fit["pressure_bar"] for fit in raw.json()["fits"]] == [4.0, 5.0, 6.0]
-    for found, true in zip(raw.json()["fits"], exact.json()["fits"], strict=True):
-        assert found["points"] == 8
-        assert abs(found["mean_cof"] - true["mean_cof"]) < 4 * found["mean_cof_sd"]
+    for fitted, true in zip(raw.json()["fits"], exact.json()["fits"], strict=True):
+        assert fitted["points"] == 8
+        assert abs(fitted["mean_cof"] - true["mean_cof"]) < 4 * fitted["mean_cof_sd"]
     sent = client.get(f"{RUNS}/{raw.json()['run_id']}").json()["channels"]
     assert sent == raw_record()
 
@@ -91,7 +91,7 @@ def test_a_dynamic_test_gets_its_loop(client: TestClient) -> None:
 
 
 def test_a_stationary_test_that_comes_later_gives_the_loops_their_curve(client: TestClient) -> None:
-    """Whatever the order of arrival, a dynamic test's lag is told against its state's stationary curve."""
+    """Whatever the order of arrival, a dynamic test's lag is estimated against its state's stationary curve."""
     dynamic = {"kind": "dynamic_stribeck", "cycles": 0, "run_id": "d", "channels": dynamic_record()}
     client.post(RUNS, json=dynamic)
     assert client.get(f"{RUNS}/d").json()["loops"][0]["status"] == "no_curve"

@@ -1,6 +1,5 @@
 """TDMS, MDF4 and Parquet: the same columns as were written; wrong files end in errors, in a process of their own."""
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime, timedelta
@@ -11,8 +10,6 @@ import pytest
 
 from models.arrays import FloatArray
 from service.errors import InvalidError, ServiceError, TooLargeError
-from service.readers import sandbox
-from service.readers.detect import Format
 from service.readers.limits import LIMITS
 from service.readers.read_file import read_file
 from tests.service.readers.sample_files import UNITS, record, write_mdf, write_parquet, write_tdms
@@ -167,51 +164,3 @@ def test_a_renamed_picture_is_refused(tmp_path: Path) -> None:
     path.write_bytes(b"RIFF" + bytes(100))
     with pytest.raises(InvalidError, match="named as TDMS but does not begin as one"):
         read(path)
-
-
-def test_memory_is_limited(tmp_path: Path) -> None:
-    path = write_tdms(tmp_path / "a.tdms", record(2_000_000), units=UNITS)
-    with pytest.raises(TooLargeError, match="memory"):
-        read_file(path, filename="a.tdms", limits=replace(LIMITS, memory_bytes=130 << 20))
-
-
-@pytest.mark.parametrize(
-    ("body", "message"),
-    [
-        ("import os; os.abort()", "SIGABRT"),
-        ("while True: pass", "longer than 1 s"),
-        ("import sys; sys.exit(3)", "status 3"),
-        ("raise RecursionError('deep')", "RecursionError: deep"),
-        ("import time; time.sleep(60)", "longer than 1 s"),
-        ("return {'secret': __import__('numpy').zeros(3)}", "gave no answer"),
-        ("return {'torque_nm': __import__('numpy').zeros(9000000)}", "OSError|SIGXFSZ"),
-    ],
-)
-def test_a_reader_that_misbehaves_ends_alone(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str, message: str
-) -> None:
-    (tmp_path / "nptdms.py").write_text("class TdmsFile: pass\n", encoding="utf-8")
-    (tmp_path / "sitecustomize.py").write_text(
-        f"import sys, types\nfake = types.ModuleType('service.readers.tdms')\n"
-        f"def read(path, mapping, limits):\n    {body}\n"
-        "fake.read = read\nsys.modules['service.readers.tdms'] = fake\n",
-        encoding="utf-8",
-    )
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    monkeypatch.setattr(sandbox, "_STARTING_SECONDS", 2)
-    path = tmp_path / "a.tdms"
-    path.write_bytes(b"TDSm")
-    with pytest.raises(InvalidError, match=message):
-        read_file(path, filename="a.tdms", limits=replace(LIMITS, seconds=1, most_values=1_000_000))
-
-
-def test_a_missing_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sandbox.READERS, Format.TDMS, ("service.readers.tdms", "no_such_package", "tdms"))
-    path = tmp_path / "a.tdms"
-    path.write_bytes(b"TDSm")
-    with pytest.raises(InvalidError, match=r"install clutchlife\[tdms\]"):
-        read(path)
-
-
-def test_reading_loads_no_foreign_package_here() -> None:
-    assert "asammdf" not in sys.modules

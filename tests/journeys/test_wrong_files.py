@@ -43,17 +43,17 @@ class Watched:
         self.before = self.state()
 
     def state(self) -> list[Any]:
-        """All that is told of the clutch: revision and ETag among it."""
-        said = [self.http.get(f"{CLUTCH}{path}") for path in ("", "/runs", "/remaining-useful-life", "/loops")]
-        return [(answer.status_code, answer.headers["etag"], answer.json()) for answer in said]
+        """All answers about the clutch, with their ETags."""
+        answers = [self.http.get(f"{CLUTCH}{path}") for path in ("", "/runs", "/remaining-useful-life", "/loops")]
+        return [(answer.status_code, answer.headers["etag"], answer.json()) for answer in answers]
 
     def post(self, content: bytes, *, name: str = "run.csv", **query: str) -> tuple[httpx2.Response, int]:
         """The answer, and by how much the memory of the service and its readers had grown at most meanwhile."""
-        asked = {"kind": "dynamic_stribeck", "cycles": "0", "filename": name} | query
+        parameters = {"kind": "dynamic_stribeck", "cycles": "0", "filename": name} | query
         answers: list[httpx2.Response] = []
         grown = added(
             self._pid,
-            lambda: answers.append(self.http.post(f"{CLUTCH}/runs/file", params=asked, content=content)),
+            lambda: answers.append(self.http.post(f"{CLUTCH}/runs/file", params=parameters, content=content)),
         )
         return answers[0], grown
 
@@ -101,8 +101,8 @@ def test_a_file_cut_off_anywhere(
     for place in sorted(places):
         service.refuse(whole[:place], name=name)
     service.http.post("/v1/clutches", json={"clutch_id": "control"})
-    asked = {"kind": "dynamic_stribeck", "cycles": "0", "filename": name, "run_id": name}
-    assert service.http.post("/v1/clutches/control/runs/file", params=asked, content=whole).status_code == 201
+    parameters = {"kind": "dynamic_stribeck", "cycles": "0", "filename": name, "run_id": name}
+    assert service.http.post("/v1/clutches/control/runs/file", params=parameters, content=whole).status_code == 201
 
 
 @pytest.mark.statistical
@@ -206,8 +206,8 @@ def test_the_wrong_suffix(service: Watched, tmp_path: Path) -> None:
     assert "named as MDF4" in service.refuse(text(record(100)), name="run.mf4")["detail"]
     service.http.post("/v1/clutches", json={"clutch_id": "control"})
     whole = write_tdms(tmp_path / "a.tdms", record(400), units=UNITS).read_bytes()
-    asked = {"kind": "dynamic_stribeck", "cycles": "0", "filename": "run.csv", "run_id": "suffix"}
-    assert service.http.post("/v1/clutches/control/runs/file", params=asked, content=whole).status_code == 201
+    parameters = {"kind": "dynamic_stribeck", "cycles": "0", "filename": "run.csv", "run_id": "suffix"}
+    assert service.http.post("/v1/clutches/control/runs/file", params=parameters, content=whole).status_code == 201
 
 
 def test_a_file_larger_than_is_taken(service: Watched) -> None:
@@ -228,8 +228,10 @@ def test_many_at_once(service: Watched) -> None:
 
     def send() -> None:
         with httpx2.Client(base_url=service.http.base_url, timeout=120) as client:
-            asked = {"kind": "dynamic_stribeck", "cycles": "0", "filename": "a.tdms"}
-            answers.append(client.post(f"{CLUTCH}/runs/file", params=asked, content=b"TDSm" + bytes(40)).status_code)
+            parameters = {"kind": "dynamic_stribeck", "cycles": "0", "filename": "a.tdms"}
+            answers.append(
+                client.post(f"{CLUTCH}/runs/file", params=parameters, content=b"TDSm" + bytes(40)).status_code
+            )
 
     senders = [threading.Thread(target=send) for _ in range(8)]
     for sender in senders:

@@ -1,0 +1,29 @@
+"""Parameters of addresses and questions, each with its bounds and description."""
+
+from typing import Annotated, Literal
+
+from pydantic import AwareDatetime, Field
+
+from service.schemas.limits import IDENTIFIER_PATTERN, LONGEST_FILENAME, LONGEST_MAP, MOST_CYCLES
+
+ClutchId = Annotated[str, Field(description="The clutch's name")]
+RunId = Annotated[str, Field(description="The run's name")]
+DiagnosisId = Annotated[str, Field(description="The diagnosis' name")]
+Quantity = Annotated[str | None, Field(description="Rows of this quantity only")]
+
+# --- of a posted file: what a JSON run has in fields ---
+
+FileKind = Annotated[Literal["stationary_stribeck", "dynamic_stribeck"], Field(description="The kind of run")]
+FileCycles = Annotated[
+    float, Field(ge=0, le=MOST_CYCLES, allow_inf_nan=False, description="Duty cycles since new when the run is made")
+]
+FileMap = Annotated[
+    str | None, Field(max_length=LONGEST_MAP, description="Columns of channels: torque_nm:Mz,speed_rpm:n")
+]
+FileName = Annotated[str, Field(max_length=LONGEST_FILENAME, description="The sender's name for the file")]
+FileRunId = Annotated[
+    str | None, Field(pattern=IDENTIFIER_PATTERN, description="The run's name; left out, it derives from the content")
+]
+FileStartedAt = Annotated[
+    AwareDatetime | None, Field(description="When the run was started: ISO 8601 with a time zone")
+]

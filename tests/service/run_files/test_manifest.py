@@ -1,0 +1,55 @@
+"""The manifest of a folder: what `push` sends, in which order, with which parameters; wrong manifests are refused."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from models.rig.simulated_runs import RunKind
+from service.run_files import manifest
+
+
+class TestManifest:
+    def entry(self, **more: object) -> dict[str, object]:
+        return {"file": "a.csv", "kind": RunKind.STATIONARY_STRIBECK.value, "cycles": 500} | more
+
+    def write(self, folder: Path, content: object) -> None:
+        (folder / "a.csv").write_text("torque_nm\n1\n", encoding="utf-8")
+        (folder / manifest.MANIFEST).write_text(json.dumps(content), encoding="utf-8")
+
+    def test_says_beside_a_record_what_its_channels_do_not(self, tmp_path: Path) -> None:
+        self.write(tmp_path, [self.entry(run_id="r1", map="torque_nm:Mz")])
+        (tmp_path / "b.json").write_text('{"cycles": 100}', encoding="utf-8")
+        (tmp_path / "c.TDMS").write_bytes(b"TDSm")
+        runs = manifest.find([tmp_path])
+        parameters = {"kind": "stationary_stribeck", "cycles": "500.0", "run_id": "r1", "map": "torque_nm:Mz"}
+        assert [(run.path.name, run.parameters) for run in runs] == [
+            ("b.json", None),
+            ("a.csv", parameters | {"filename": "a.csv"}),
+        ]
+        assert manifest.find([tmp_path / "a.csv"]) == [runs[1]]
+        assert manifest.find([tmp_path / "c.TDMS"])[0].parameters is None
+        assert [path.name for path in manifest.unlisted([tmp_path])] == ["c.TDMS"]
+
+    @pytest.mark.parametrize(
+        ("content", "rule"),
+        [
+            ({"file": "a.csv"}, "must hold a list"),
+            (["a.csv"], "must hold file, kind, cycles"),
+            ([{"file": "a.csv", "kind": "x"}], "must hold file, kind, cycles"),
+            ([{"file": "a.csv", "kind": "x", "cycles": 0, "speed": 1}], "at most run_id"),
+            ([{"file": "a.csv", "kind": "x", "cycles": -1}], "cycles must be a number that is not negative, got -1"),
+            ([{"file": "a.csv", "kind": "x", "cycles": True}], "cycles must be a number"),
+            ([{"file": "a.csv", "kind": "x", "cycles": float("nan")}], "cycles must be a number"),
+            ([{"file": "a.csv", "kind": 7, "cycles": 0}], "kind must be a text, got 7"),
+        ],
+    )
+    def test_refuses_what_is_none(self, tmp_path: Path, content: object, rule: str) -> None:
+        self.write(tmp_path, content)
+        with pytest.raises(ValueError, match=rule):
+            manifest.find([tmp_path])
+
+    def test_refuses_a_file_that_is_not_there(self, tmp_path: Path) -> None:
+        self.write(tmp_path, [self.entry(file="other.csv")])
+        with pytest.raises(FileNotFoundError, match=r"runs\.json\[0\]: .*other\.csv is not there"):
+            manifest.find([tmp_path])
