@@ -13,8 +13,8 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
+from models.diagnosis.design.axes import CLOCK, CYCLES, PRESSURE, SPEED
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.detection.contrasts import CLOCK, CYCLES, PRESSURE, SPEED
 from models.diagnosis.effects.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried
 
 #: The usual size of all of them, as a share of the torque or of the speed (of the usual pressure's ∂S/∂p p for a gauge's).
@@ -65,7 +65,7 @@ def _stranger(
         grid=grid,
         change=change,
         before_lag=False,
-        bends=(),
+        discrepancies=(),
     )
     return Stranger(effect=effect, axis=axis, looks=looks)
 

@@ -23,7 +23,8 @@ from models.diagnosis.detection.raw_records.fixed_frequency import best_anywhere
 from models.diagnosis.detection.raw_records.settling_transient import approach
 from models.diagnosis.detection.raw_records.shaft_orders import Line, best_order
 from models.diagnosis.detection.raw_records.whitened_torque import Swings, swings
-from models.diagnosis.report.report import Estimate
+from models.diagnosis.effects.catalogued import shaft_ripple, stick_slip, unsettled_dwell
+from models.diagnosis.effects.estimate import Estimate
 from models.records.plateaus import PlateauCut, cut_plateaus
 from models.records.runs import Record
 from models.records.settling import SETTLING
@@ -36,6 +37,9 @@ FASTER, SAME = 2.0, 1.0
 SETTLED_SHARE = 0.8
 #: Records analysed, evenly over life: so many, or as many more as hold so many samples in all.
 FEW_RECORDS, MANY_SAMPLES = 8, 300_000
+
+#: A line of one frequency at all speeds: structure that is no effect of the catalogue.
+FIXED_LINE = "fixed_line"
 
 Run = TypeVar("Run", StationaryRun, DynamicRun)
 
@@ -92,11 +96,11 @@ def _lines(records: list[Swings]) -> list[RawEvidence]:
     found = []
     if order.evidence > SEEN and order.amplitude > 0:
         note = f"torque swings {order.at:g} times a revolution at every speed"
-        found.append(_seen("shaft_ripple", order, "ripple amplitude", note))
+        found.append(_seen(shaft_ripple.EFFECT.slug, order, "ripple amplitude", note))
     if line.evidence > SEEN and line.amplitude > 0:
         where = f"below {100 * line.share:.0f} % of the highest speed and not above" if slow else "at all speeds alike"
         note = f"torque swings at {line.at:.3g} Hz {where}"
-        found.append(_seen("stick_slip" if slow else "fixed_line", line, "line amplitude", note))
+        found.append(_seen(stick_slip.EFFECT.slug if slow else FIXED_LINE, line, "line amplitude", note))
     return found
 
 
@@ -141,4 +145,6 @@ def _unsettled(dwells: list[tuple[Record, PlateauCut]]) -> list[RawEvidence]:
     usual = float(np.median(known)) if alone > 0 else likely
     spread = float(1.4826 * np.median(np.abs(known - usual))) / np.sqrt(known.size) if alone > 0 else 0.5 * likely
     estimate = Estimate(name="settling time constant", value=usual, sd=spread, unit="s")
-    return [RawEvidence(effect="unsettled_dwell", log_evidence=max(alone, together), estimate=estimate, note=note)]
+    return [
+        RawEvidence(effect=unsettled_dwell.EFFECT.slug, log_evidence=max(alone, together), estimate=estimate, note=note)
+    ]

@@ -36,7 +36,7 @@ def _shifted(curves: FloatArray, steps: FloatArray) -> FloatArray:
 EFFECT = Effect(
     slug="channel_delay",
     title="The torque channel is delayed",
-    physics="A filter or the recorder delays torque against speed: accelerating, torque belongs to a lower speed.",
+    physics="A filter or the recorder delays torque against speed: while accelerating, torque belongs to a lower speed.",
     formula="S(v(t - δ)) - S(v(t)), to first order -δ dS/dt",
     source="anti-aliasing filters and multiplexed recorders; no friction is in it",
     family=Family.DYNAMIC,
@@ -51,5 +51,6 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=True,
-    bends=(),
+    discrepancies=(),
+    opposite_physics="Torque is ahead of the speed: a filter or the recorder delays the speed channel.",
 )

@@ -6,7 +6,7 @@ from scipy.linalg import solve_banded
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Shape, ShapeParameter, Tried
 
 #: The heat flux to which the amplitude refers [W/m²]: the reference's 20 Nm at 1970 rpm and some, on two faces.
 REFERENCE_FLUX = 0.32e6
@@ -67,8 +67,8 @@ def _around(heat: FloatArray, scene: Scene, settling: float) -> FloatArray:
 EFFECT = Effect(
     slug="interface_heating",
     title="Frictional heat at the interface lowers the torque",
-    physics="The interface is hotter than the oil by the power that it turns into heat; the boundary film and the oil "
-    "there lose strength.",
+    physics="Frictional power heats the interface above the oil's temperature; the boundary film and the oil there lose "
+    "strength.",
     formula="-S (1 - e^{-a w}), w the heat flux |S| ω/A over 0.32 W/mm², saturating by s and lagging by τ; S or its "
     "viscous part",
     source="Marklund and Larsson, Tribology Int. 41 (2008) 824: friction of wet clutches by interface temperature",
@@ -88,5 +88,5 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=True,
-    bends=(Bend.SPEED, Bend.MOTION),
+    discrepancies=(Discrepancy.SPEED, Discrepancy.MOTION),
 )

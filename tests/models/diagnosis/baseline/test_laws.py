@@ -26,7 +26,9 @@ from models.diagnosis.baseline.laws import (
 from models.diagnosis.baseline.prediction import frame_of, predict
 from models.diagnosis.design.design import build_design
 from models.diagnosis.noise.estimate import first_noise
-from models.diagnosis.pooled_fit.gauss_newton import fit, priors_of
+from models.diagnosis.pooled_fit.gauss_newton import fit
+from models.diagnosis.pooled_fit.priors import priors_of
+from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.starts import starting_laws
 from models.friction.stribeck import StribeckParameters, torque
 from models.loops.lag import attractor_torque
@@ -74,7 +76,9 @@ def test_loops_are_the_attractor_law_in_its_periodic_state(attractor: float) -> 
 def test_a_bare_truth_is_fitted_to_a_thousandth() -> None:
     design = build_design(campaign(3, noise=0.0, gain=0.0))
     start = starting_laws(design, frame_of(design))
-    found = fit(design, first_noise(design), start, priors_of(design, start.theta, start.frame))
+    found = fit(
+        FitProblem(design=design, noise=first_noise(design), priors=priors_of(design, start.theta, start.frame)), start
+    )
     assert np.sqrt(np.mean(found.residual**2)) < 1e-3 * np.median(design.torque)
 
 
@@ -145,7 +149,7 @@ def test_a_bend_stays_within_its_bounds_wherever_a_fit_starts() -> None:
     for begun in (0.25, 20.0):
         theta = start.theta.copy()
         theta[LOG_BEND] = np.log(begun)
-        found = fit(bent, noise, Laws(theta=theta, frame=start.frame), priors)
+        found = fit(FitProblem(design=bent, noise=noise, priors=priors), Laws(theta=theta, frame=start.frame))
         assert BENDS[0] <= np.exp(found.laws.theta[LOG_BEND]) <= BENDS[1] * (1 + 1e-9)
 
 
@@ -160,6 +164,6 @@ def test_a_ratio_that_falls_as_a_hyperbola_is_followed_and_an_exponential_is_not
     held = replace(priors, free=priors.free & (np.arange(theta.size) != LOG_BEND))
     stiff = start.theta.copy()
     stiff[LOG_BEND] = np.log(EXPONENTIAL)
-    free = fit(bent, noise, start, priors)
-    exponential = fit(bent, noise, Laws(theta=stiff, frame=start.frame), held)
+    free = fit(FitProblem(design=bent, noise=noise, priors=priors), start)
+    exponential = fit(FitProblem(design=bent, noise=noise, priors=held), Laws(theta=stiff, frame=start.frame))
     assert np.abs(free.residual).max() < 0.2 * np.abs(exponential.residual).max()

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.diagnosis.attribution.verdict import Verdict
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.baseline.prediction import frame_of, predict
 from models.diagnosis.campaign import Campaign
@@ -13,7 +14,6 @@ from models.diagnosis.diagnose import diagnose
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.uncatalogued import STRANGE, STRANGERS, way
 from models.diagnosis.pooled_fit.starts import starting_laws
-from models.diagnosis.report.report import Verdict
 from models.friction.stribeck import torque
 from tests.models.diagnosis.campaigns import Planted, Where, campaign
 
