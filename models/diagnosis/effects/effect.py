@@ -101,7 +101,7 @@ class Effect:
     `scale` turns the SI amplitude into `unit`.
     grid(facts) gives the shapes to be tried, none where the campaign cannot show the effect.
     change(scene, amplitude, shape) -> [P] Nm at the scene's points. before_lag: whether it changes the stationary curve,
-    which friction in loops then lags behind, or the measured torque itself; None where nobody knows and the last shape
+    which friction in loops then lags behind, or the measured torque itself; None where that is unknown and the last shape
     says (1 or 0).
     discrepancies: along what its form is uncertain (`effects.template_discrepancy`); an exact law has none.
     several(scene, settings) -> [P, m] Nm is the same for many (amplitude, shape) at once, where that is cheaper.

@@ -13,6 +13,7 @@ from models.diagnosis.campaign import Campaign, MaintenanceEvent
 from models.diagnosis.campaign import EventKind as Event
 from models.diagnosis.design.design import build_design
 from models.diagnosis.diagnose import diagnose
+from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.pooled_fit.baseline_fit import Baseline, fit_baseline
 from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.diagnosis.report.report import Report
@@ -89,6 +90,12 @@ def test_what_is_taken_out_of_the_catalogue_is_not_named() -> None:
     assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
     assert not report.causes
     assert all(each.effect != "unsettled_dwell" for each in report.candidates)
+
+
+def test_with_an_empty_catalogue_structure_is_unexplained() -> None:
+    report = look(campaign(7, PLANTED["unsettled_dwell"]), without=frozenset(BY_SLUG))
+    assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
+    assert not report.candidates
 
 
 def test_a_bump_in_speed_is_unexplained_and_on_speed() -> None:

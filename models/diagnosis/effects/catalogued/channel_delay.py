@@ -6,6 +6,7 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
 from models.diagnosis.effects.effect import Effect, Family, Kind, Shape, Tried
+from models.diagnosis.effects.first_order_lag import phases_of
 
 
 def _grid(_facts: Facts) -> tuple[Tried, ...]:
@@ -17,7 +18,7 @@ def _change(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
     out = np.zeros_like(scene.curve)
     looping = np.flatnonzero(points.loop >= 0)
     if looping.size:
-        phases = np.flatnonzero(np.diff(points.loop[looping], append=-2))[0] + 1
+        phases = phases_of(points, looping)
         curves = scene.curve[looping].reshape(-1, phases)
         step = amplitude * points.angular_frequency[looping].reshape(-1, phases)[:, :1] * phases / (2 * np.pi)
         out[looping] = (_shifted(curves, np.clip(step, -phases, phases)) - curves).ravel()

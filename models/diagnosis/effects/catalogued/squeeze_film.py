@@ -9,6 +9,7 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Laws, Scene, gradient_of
 from models.diagnosis.design.facts import Facts
 from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Measure, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.first_order_lag import phases_of
 from models.friction.stribeck import GAMMA
 
 #: Pressure to which the amplitude refers [Pa].
@@ -78,7 +79,7 @@ def _over_film(scene: Scene, looping: NDArray[np.intp], amplitude: FloatArray, s
     power, thin, least, sheared = shapes[:4]
     slope = usual_slope(scene.laws, sheared)
     real = slope > 0
-    phases = np.flatnonzero(np.diff(points.loop[looping], append=-2))[0] + 1
+    phases = phases_of(points, looping)
     v = np.ascontiguousarray(points.velocity[looping].reshape(-1, phases).T)[:, :, None]
     pressure = points.pressure[looping].reshape(-1, phases)[:, :1]
     step = 2 * np.pi / (phases * points.angular_frequency[looping].reshape(-1, phases)[:, :1])
@@ -109,7 +110,7 @@ def _over_thickness(scene: Scene, looping: NDArray[np.intp], amplitude: float, s
     asperities carry what the film does not, and carry more under pressure."""
     power, thin, least, time = shape[:4]
     points, middle = scene.points, scene.laws.frame.reference_velocity
-    phases = np.flatnonzero(np.diff(points.loop[looping], append=-2))[0] + 1
+    phases = phases_of(points, looping)
     q, tau = MOST_POWER / (1.0 + thin), LEAST_TIME * 10.0**time
     height = (points.velocity[looping].reshape(-1, phases) / middle + least) ** q
     waves = np.fft.rfft(height, axis=1)

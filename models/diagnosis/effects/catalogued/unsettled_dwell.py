@@ -1,12 +1,12 @@
 """Plateaus too short: each reading still contains a share of the plateau before."""
 
 import numpy as np
-from scipy.linalg import solve_banded
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
 from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.first_order_lag import ends_of
 
 #: What a plateau starts from: the torque before, or the speed before (the film's), at the same pressure or across a change
 #: too.
@@ -36,14 +36,8 @@ def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
         difference = np.clip(difference, -limit, limit)
     else:
         share = float(np.clip(amplitude * (carried[0] if carried else 0.0), 0.0, 0.95))
-        difference = _ends(scene.curve, np.where(follows, share, 0.0))[before] - scene.curve
+        difference = ends_of(scene.curve, np.where(follows, share, 0.0))[before] - scene.curve
     return np.asarray(amplitude * np.where(follows, difference, 0.0), dtype=np.float64)
-
-
-def _ends(curve: FloatArray, share: FloatArray) -> FloatArray:
-    """What each plateau ends with [P] Nm, x = (1 - k) S + k x_before: one follows just after the other."""
-    bands = np.stack([np.ones(share.size), np.append(-share[1:], 0.0)])
-    return np.asarray(solve_banded((1, 0), bands, (1.0 - share) * curve), dtype=np.float64)
 
 
 EFFECT = Effect(
