@@ -1,4 +1,4 @@
-"""What an adopted diagnosis changes in tracking: measurements are freed of artefacts, a life gets an effect's course.
+"""What an adopted diagnosis changes in tracking: artefacts are taken off measurements, courses are added along a life.
 
 An *artefact* (oil temperature, a shifted zero, an unsettled dwell ...) is in the measurement and not in the clutch: its
 torque is taken off every plateau before a curve is fitted. A *course* (running-in, oil change, accelerated wear ...) is in
@@ -42,16 +42,16 @@ class Extension:
     def artefact(self, run: StationaryRun, campaign: Campaign) -> FloatArray:
         """Torque [n] Nm that the artefacts add to each plateau of a run; zero where there are none.
 
-        `campaign` gives what a run alone does not say (maintenance, moments of the other runs); it need not hold `run`.
-        Without oil temperature, what it would have done cannot be taken off and is not.
+        `campaign` gives what a run alone does not hold (maintenance, moments of the other runs); it need not hold `run`.
+        Without oil temperature, its effect cannot be computed and is not taken off.
         """
         count = run.plateaus.torque.size
-        found = np.zeros(count)
+        torque = np.zeros(count)
         usable = np.flatnonzero(run.plateaus.speed != 0)  # as a design takes them: clocks and neighbours are the same
         for rows in np.array_split(usable, max(1, math.ceil(usable.size / _PART))):
             if rows.size:
-                found[rows] = self._on(run, rows, campaign)
-        return found
+                torque[rows] = self._on(run, rows, campaign)
+        return torque
 
     def _on(self, run: StationaryRun, rows: np.ndarray[Any, np.dtype[np.intp]], campaign: Campaign) -> FloatArray:
         part = run.plateaus.take(rows)
@@ -73,7 +73,7 @@ class Extension:
         grid = np.broadcast_arrays(cycles[:, None, None], pressure[:, None], velocity)
         if not self.content["courses"]:
             return np.zeros(shape[:2]), np.zeros(shape[:2])
-        points = _steady_points(*(np.ravel(each) for each in grid))
+        points = _steady_points(*(np.ravel(axis) for axis in grid))
         mean, deviation = self._mean(points, facts_from(self.content["facts"]), {Kind.COURSE})
         return mean.reshape(shape).mean(axis=2), deviation.reshape(shape).mean(axis=2)
 
@@ -96,15 +96,13 @@ class Extension:
         for alternative in self.content["alternatives"]:
             scene = scene_of(_laws(alternative), points, facts)
             mean, variance = np.zeros(points.run.size), np.zeros(points.run.size)
-            for each in alternative["effects"]:
-                effect = BY_SLUG[each["slug"]]
-                if effect.kind in kinds and not _counted(each):
-                    change = _finite(effect.change(scene, each["amplitude"], tuple(each["shape"])))
-                    if effect.kind is Kind.COURSE:
-                        change = np.maximum(
-                            change, -scene.curve
-                        )  # followed far enough, friction ends; it does not turn
-                    relative = each["amplitude_sd"] / max(abs(each["amplitude"]), 1e-300)
+            for stored in alternative["effects"]:
+                effect = BY_SLUG[stored["slug"]]
+                if effect.kind in kinds and not effect.counts_in_severity:
+                    change = _finite(effect.change(scene, stored["amplitude"], tuple(stored["shape"])))
+                    if effect.kind is Kind.COURSE:  # followed far enough, friction ends; it does not reverse
+                        change = np.maximum(change, -scene.curve)
+                    relative = stored["amplitude_sd"] / max(abs(stored["amplitude"]), 1e-300)
                     mean, variance = mean + change, variance + (change * relative) ** 2
             weights.append(float(alternative["weight"]))
             means.append(mean)
@@ -116,8 +114,8 @@ class Extension:
     @property
     def severity_exponent(self) -> float | None:
         """Where load severity was named: ζ grows by (energy/usual energy)^exponent a cycle; else None."""
-        found = self.content.get("severity_exponent")
-        return None if found is None else float(found)
+        exponent = self.content.get("severity_exponent")
+        return None if exponent is None else float(exponent)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON can carry it."""
@@ -135,58 +133,58 @@ def build_extension(
     """From what was fitted: the weight of each alternative, its fit, the deviations of its effects' amplitudes.
 
     The most probable one names the effects. `courses`: whether effects of use are to be followed beyond the data; where
-    they did not help to foretell the last states from the first, a life is tracked without them.
+    they did not help to predict the last states from the first, a life is tracked without them.
     """
     stored = [_stored(weight, fit, deviations) for weight, fit, deviations in alternatives]
-    best = max(stored, key=lambda each: float(each["weight"]))
-    counted = [each["amplitude"] for each in best["effects"] if _counted(each)]
+    best = max(stored, key=lambda alternative: float(alternative["weight"]))
+    exponents = [effect["amplitude"] for effect in best["effects"] if BY_SLUG[effect["slug"]].counts_in_severity]
     return Extension(
-        effects=tuple(each["slug"] for each in best["effects"]),
+        effects=tuple(effect["slug"] for effect in best["effects"]),
         content={
             "facts": facts_to(facts),
             "alternatives": stored,
             "courses": courses,
-            "severity_exponent": counted[0] if counted and courses else None,
+            "severity_exponent": exponents[0] if exponents and courses else None,
         },
     )
 
 
-def _counted(effect: Mapping[str, Any]) -> bool:
-    """Whether an effect is in what ζ counts (`severity_exponent`), and not in a course."""
-    return bool(effect["slug"] == "load_severity")
-
-
 def facts_to(facts: Facts) -> dict[str, Any]:
     """Facts as JSON can carry them: arrays as lists, what is not a number as None."""
-    found: dict[str, Any] = {}
-    for each in fields(Facts):
-        value = getattr(facts, each.name)
+    stored: dict[str, Any] = {}
+    for field in fields(Facts):
+        value = getattr(facts, field.name)
         if isinstance(value, Geometry | Oil):
-            found[each.name] = asdict(value)
+            stored[field.name] = asdict(value)
         elif isinstance(value, np.ndarray | tuple):
-            found[each.name] = [None if math.isnan(float(x)) else float(x) for x in value]
+            stored[field.name] = [None if math.isnan(float(x)) else float(x) for x in value]
         else:
-            found[each.name] = value
-    return found
+            stored[field.name] = value
+    return stored
 
 
 def facts_from(stored: Mapping[str, Any]) -> Facts:
     """The inverse of `facts_to`."""
-    found: dict[str, Any] = dict(stored) | {"geometry": Geometry(**stored["geometry"]), "oil": Oil(**stored["oil"])}
-    for each in fields(Facts):
-        lacking = [] if each.default is MISSING else each.default
-        value = found.setdefault(each.name, lacking)  # what an older build did not store
+    values: dict[str, Any] = dict(stored) | {"geometry": Geometry(**stored["geometry"]), "oil": Oil(**stored["oil"])}
+    for field in fields(Facts):
+        lacking = [] if field.default is MISSING else field.default
+        value = values.setdefault(field.name, lacking)  # what an older build did not store
         if isinstance(value, list):
             numbers = [math.nan if x is None else x for x in value]
-            found[each.name] = np.array(numbers, dtype=np.float64) if each.type is FloatArray else tuple(numbers)
-    return Facts(**found)
+            values[field.name] = np.array(numbers, dtype=np.float64) if field.type is FloatArray else tuple(numbers)
+    return Facts(**values)
 
 
 def _stored(weight: float, fit: Fit, deviations: Sequence[float]) -> dict[str, Any]:
-    frame = {each.name: getattr(fit.laws.frame, each.name) for each in fields(Frame)}
+    frame = {field.name: getattr(fit.laws.frame, field.name) for field in fields(Frame)}
     effects = [
-        {"slug": one.effect.slug, "amplitude": one.amplitude, "amplitude_sd": sd, "shape": list(one.shape)}
-        for one, sd in zip(fit.effects, deviations, strict=True)
+        {
+            "slug": fitted.effect.slug,
+            "amplitude": fitted.amplitude,
+            "amplitude_sd": sd,
+            "shape": list(fitted.shape),
+        }
+        for fitted, sd in zip(fit.effects, deviations, strict=True)
     ]
     frame["loop_pressures"] = fit.laws.frame.loop_pressures.tolist()
     return {"weight": weight, "theta": fit.laws.theta.tolist(), "frame": frame, "effects": effects}
@@ -204,7 +202,7 @@ def _laws(alternative: Mapping[str, Any]) -> Laws:
 
 
 def _steady_points(cycles: FloatArray, pressure: FloatArray, velocity: FloatArray) -> Points:
-    """Plateaus in thought: no temperature but the reference's, no clock, no neighbours."""
+    """Plateaus that were not measured: no temperature but the reference's, no clock, no neighbours."""
     count = cycles.size
     whole, none, zero = np.zeros(count, dtype=np.intp), np.full(count, -1, dtype=np.intp), np.zeros(count)
     nan = np.full(count, np.nan)

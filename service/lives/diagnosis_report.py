@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.report.report import Gain, LoopTrace, Maps, Misfit, Report
+from models.diagnosis.detection.lack_of_fit import Misfit
+from models.diagnosis.report.report import LoopTrace, Maps, Report
+from models.diagnosis.validation.held_out import Gain
 from service.lives.receipt import bar
 from service.readers.units import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
 
@@ -109,7 +111,7 @@ _GAIN = {
     "mse_percent_before": "mse_percent_before",
     "mse_percent_after": "mse_percent_after",
     "log_score_gain": "log_score_gain",
-    "foretelling_log_score_gain": "remaining",
+    "foretelling_log_score_gain": "forecast_log_score_gain",
 }
 
 

@@ -28,6 +28,7 @@ ALLOWED = {
     "models.diagnosis.campaign",
     "models.diagnosis.diagnose",
     "models.diagnosis.report.report",
+    "models.diagnosis.validation.held_out",
     "models.records.plateaus",
     "models.records.runs",
 }

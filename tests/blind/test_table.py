@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from models.diagnosis.report.report import Gain
+from models.diagnosis.validation.held_out import Gain
 from tests.blind import __main__ as blind
 from tests.blind import table
 from tests.blind.rig.loudness import UnreachableError
@@ -79,7 +79,7 @@ def test_what_cannot_be_made_is_an_outcome_that_counts_nowhere(monkeypatch: pyte
 def test_gains_are_held_against_their_targets() -> None:
     good = Gain(
         held_out_runs=(), rmse_before=1.0, rmse_after=0.9, reduction_percent=10.0, reduction_sd=1.0, excess_before=0.5,
-        excess_after=0.2, mse_percent_before=1.0, mse_percent_after=0.8, log_score_gain=1.0, remaining=1.0,
+        excess_after=0.2, mse_percent_before=1.0, mse_percent_after=0.8, log_score_gain=1.0, forecast_log_score_gain=1.0,
     )  # fmt: skip
     trials_ = [Trial("gain/oil_change", (1, k), ("oil_change",), 60.0) for k in range(3)]
     row = "| `oil_change`, λ = 60 | 3 | 0.900 | 0.900 | ≤ 1.02 | met | 0.40 of 3 | ≤ 0.5 | met |"

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from models.diagnosis.campaign import Campaign
-from models.diagnosis.report.report import Gain, Report
+from models.diagnosis.report.report import Report
+from models.diagnosis.validation.held_out import Gain
 from tests.blind.rig.hide import Hidden, hide
 from tests.blind.rig.loudness import UnreachableError
 from tests.blind.rig.more import with_test

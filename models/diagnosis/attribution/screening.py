@@ -1,11 +1,12 @@
-"""Which effect, or which two: marginal likelihood after a linear screen, the best refitted with everything else.
+"""The linear screen: the evidence of every effect and of every two, without refitting anything.
 
     evidence = drop of the cost - ½ ln(1 + s² info) + ln prior of the shape,   summed over the shape grid
 
-with s the prior deviation of the amplitude, a usual and a large one; the gains' scatter is summed over as well. Every
-template is a little wrong, so evidence saturates (`attribution.decide`).
+with s the prior deviation of the amplitude, a usual and a large one; the gains' scatter is summed over as well. The best are
+refitted with everything else free (`attribution.refits`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 from typing import TypeAlias
@@ -15,28 +16,14 @@ from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp
 
 from models.arrays import FloatArray
+from models.diagnosis.criteria import LEAST_INFORMATION, MOST_ALIKE, SHAPES_TRIED
 from models.diagnosis.effects.amplitude_prior import SCALES
-from models.diagnosis.effects.effect import Effect, Shape, Tried
+from models.diagnosis.effects.effect import Effect, Shape
+from models.diagnosis.effects.grid import Column
 from models.diagnosis.pooled_fit.projection import Projected
 
 BoolArray: TypeAlias = NDArray[np.bool_]
 IntArray: TypeAlias = NDArray[np.intp]
-
-#: Twice λ [nats] of an effect of usual size: what shows less cannot be judged.
-LEAST_SEEN = 0.01
-#: An effect is looked for from so many of its shapes, of which no two share more than this of what is visible of them.
-STARTS, ALIKE = 4, 0.9
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Column:
-    """One point of an effect's grid: what was tried, its log prior weight (normalised over the effect's grid), and that of
-    all points that differ from it in smooth shapes only."""
-
-    effect: Effect
-    shape: Shape
-    log_weight: float
-    log_weight_around: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,8 +40,13 @@ class Screened:
     gain: int
     others: tuple["Screened", ...] = ()
 
+    @property
+    def slugs(self) -> tuple[str, ...]:
+        """Public names."""
+        return tuple(effect.slug for effect in self.effects)
 
-def linear_drop(columns: list[Column], projected: Projected, screened: Screened) -> tuple[FloatArray, float]:
+
+def linear_drop(columns: Sequence[Column], projected: Projected, screened: Screened) -> tuple[FloatArray, float]:
     """Amplitudes and the drop of the cost [nats] of a screened candidate at one scatter of the gains."""
     places = list(screened.places)
     precision = np.diag([(SCALES[-1] * columns[place].effect.prior_sd) ** -2.0 for place in places])
@@ -63,60 +55,33 @@ def linear_drop(columns: list[Column], projected: Projected, screened: Screened)
     return np.asarray(amplitudes, dtype=np.float64), 0.5 * float(score @ amplitudes)
 
 
-def columns_of(effects: list[Effect], grids: list[tuple[Tried, ...]]) -> list[Column]:
-    """The flat list of all that is tried."""
-    found = []
-    for effect, grid in zip(effects, grids, strict=True):
-        if grid:
-            total = float(logsumexp([tried.log_weight for tried in grid]))
-            kinds: dict[Shape, list[float]] = {}
-            for tried in grid:
-                kinds.setdefault(_stiff(effect, tried.shape), []).append(tried.log_weight - total)
-            around = {kind: float(logsumexp(logs)) for kind, logs in kinds.items()}
-            found += [
-                Column(
-                    effect=effect,
-                    shape=tried.shape,
-                    log_weight=tried.log_weight - total,
-                    log_weight_around=around[_stiff(effect, tried.shape)],
-                )
-                for tried in grid
-            ]
-    return found
-
-
-def _stiff(effect: Effect, shape: Shape) -> Shape:
-    """The shapes that a refit does not move."""
-    return tuple(value for value, parameter in zip(shape, effect.shapes, strict=True) if not parameter.smooth)
-
-
-def screen(columns: list[Column], projections: list[Projected]) -> list[Screened]:
-    """Every effect alone that the data could show, best first."""
-    null = float(logsumexp([each.evidence for each in projections]))
+def screen(columns: Sequence[Column], projections: Sequence[Projected]) -> list[Screened]:
+    """Every single effect that the data could show, best first."""
+    null = float(logsumexp([projected.evidence for projected in projections]))
     sd = np.array([column.effect.prior_sd for column in columns])
-    positive = np.array([column.effect.positive for column in columns])
+    positive = np.array([column.effect.positive for column in columns], dtype=np.bool_)
     weight = np.array([column.log_weight for column in columns])
-    likely = max(projections, key=lambda each: each.evidence)
+    likely = max(projections, key=lambda projected: projected.evidence)
     table = []
-    for each in projections:
-        info, score = np.diag(each.info)[: sd.size], each.score[: sd.size]
+    for projected in projections:
+        info, score = np.diag(projected.info)[: sd.size], projected.score[: sd.size]
         wide = np.outer(SCALES, sd)
         precision = np.maximum(info, 0.0) + wide**-2
         mean = score / precision
         gain = 0.5 * score * mean - 0.5 * np.log(precision * wide**2)
         gain = gain + np.where(positive, np.log(2.0) + log_ndtr(mean * np.sqrt(precision)), 0.0)
-        table.append(each.evidence + logsumexp(gain, axis=0) - np.log(len(SCALES)) + weight)
+        table.append(projected.evidence + logsumexp(gain, axis=0) - np.log(len(SCALES)) + weight)
     stacked = np.stack(table)
-    found = []
-    for effect in dict.fromkeys(column.effect.slug for column in columns):
-        mine = np.array([i for i, column in enumerate(columns) if column.effect.slug == effect])
-        if not (np.diag(likely.info)[mine] * sd[mine] ** 2 >= LEAST_SEEN).any():
+    screened = []
+    for slug in dict.fromkeys(column.effect.slug for column in columns):
+        mine = np.array([i for i, column in enumerate(columns) if column.effect.slug == slug])
+        if not (np.diag(likely.info)[mine] * sd[mine] ** 2 >= LEAST_INFORMATION).any():
             continue
         best, *others = _unlike(stacked, mine, likely)
         whole = float(logsumexp(stacked[:, mine]))
         around = [columns[place].log_weight_around for place in (best, *others)]
         of_best = whole - float(logsumexp(stacked[:, best])) + columns[best].log_weight
-        found.append(
+        screened.append(
             Screened(
                 effects=(columns[best].effect,),
                 evidence=whole - null,
@@ -137,34 +102,34 @@ def screen(columns: list[Column], projections: list[Projected]) -> list[Screened
                 ),
             )
         )
-    return sorted(found, key=lambda each: -each.evidence)
+    return sorted(screened, key=lambda candidate: -candidate.evidence)
 
 
 def _unlike(table: FloatArray, mine: IntArray, projected: Projected) -> list[int]:
-    """Of an effect's columns the best by evidence [gains, m], and the best ones that no better one resembles."""
+    """Of an effect's columns the best by evidence [gains, m], and the best that no better column resembles."""
     size = np.sqrt(np.maximum(np.diag(projected.info)[mine], 1e-300))
     alike = (projected.info[np.ix_(mine, mine)] / size[:, None] / size) ** 2
     chosen: list[int] = []
     for i in np.argsort(-table[:, mine].max(axis=0)).tolist():
-        if len(chosen) < STARTS and all(alike[i, j] < ALIKE for j in chosen):
+        if len(chosen) < SHAPES_TRIED and all(alike[i, j] < MOST_ALIKE for j in chosen):
             chosen.append(i)
     return [int(mine[i]) for i in chosen]
 
 
-def screen_pairs(columns: list[Column], projections: list[Projected]) -> list[Screened]:
+def screen_pairs(columns: Sequence[Column], projections: Sequence[Projected]) -> list[Screened]:
     """Every two different effects, at the gain scatter that suits each pair best, best first."""
-    null = float(logsumexp([each.evidence for each in projections]))
+    null = float(logsumexp([projected.evidence for projected in projections]))
     slugs = [column.effect.slug for column in columns]
     members = {slug: np.array([i for i, s in enumerate(slugs) if s == slug]) for slug in dict.fromkeys(slugs)}
     sd = np.array([column.effect.prior_sd for column in columns])
     weight = np.array([column.log_weight for column in columns])
-    positive = np.array([column.effect.positive for column in columns])
-    order = np.argsort([-each.evidence for each in projections])[:1].tolist()
-    likely = {int(k) for k in order} | {int(np.argmax([_best(each, sd) for each in projections]))}
+    positive = np.array([column.effect.positive for column in columns], dtype=np.bool_)
+    order = np.argsort([-projected.evidence for projected in projections])[:1].tolist()
+    likely = {int(k) for k in order} | {int(np.argmax([_best(projected, sd) for projected in projections]))}
     best: dict[tuple[str, str], Screened] = {}
     for k, width in product(sorted(likely), SCALES):
-        each = projections[k]
-        value = _values(each, width * sd, positive) + each.evidence - null - np.log(len(SCALES))
+        projected = projections[k]
+        value = _values(projected, width * sd, positive) + projected.evidence - null - np.log(len(SCALES))
         value += weight[:, None] + weight
         for a, b in combinations(members, 2):
             block = value[np.ix_(members[a], members[b])]
@@ -184,21 +149,21 @@ def screen_pairs(columns: list[Column], projections: list[Projected]) -> list[Sc
                 places=(p, q),
                 gain=k,
             )
-    return sorted(best.values(), key=lambda each: -each.evidence)
+    return sorted(best.values(), key=lambda pair: -pair.evidence)
 
 
 def _values(projected: Projected, sd: FloatArray, positive: BoolArray) -> FloatArray:
-    """Evidence [m, m] nats of every two columns with normal priors, -inf where a sign is wrong, a size unheard of, or one of
-    them shows nothing."""
+    """Evidence [m, m] nats of every two columns with normal priors, -inf where a sign is wrong, an amplitude beyond four
+    deviations, or one of them shows nothing."""
     scale = sd[:, None] * sd
     unit = projected.info[: sd.size, : sd.size] * scale
     u = projected.score[: sd.size] * sd
-    one = np.diag(unit) + 1.0
-    determinant = np.maximum(one[:, None] * one - unit**2, 1e-12)
-    drop = 0.5 * (u[:, None] ** 2 * one + u**2 * one[:, None] - 2 * u[:, None] * u * unit) / determinant
-    first = (u[:, None] * one - unit * u) / determinant
+    single = np.diag(unit) + 1.0
+    determinant = np.maximum(single[:, None] * single - unit**2, 1e-12)
+    drop = 0.5 * (u[:, None] ** 2 * single + u**2 * single[:, None] - 2 * u[:, None] * u * unit) / determinant
+    first = (u[:, None] * single - unit * u) / determinant
     wrong = (positive[:, None] & (first < 0)) | (positive & (first.T < 0)) | (np.abs(first) > 4) | (np.abs(first.T) > 4)
-    hidden = np.diag(unit) < LEAST_SEEN
+    hidden = np.diag(unit) < LEAST_INFORMATION
     wrong |= hidden[:, None] | hidden
     return np.where(wrong, -np.inf, drop - 0.5 * np.log(determinant))
 

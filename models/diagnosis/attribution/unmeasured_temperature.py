@@ -1,13 +1,13 @@
-"""What an oil temperature that nobody measured could have done: any slow course, another one in every test.
+"""Evidence of an oil temperature that was not measured: any slow course, a different one in every test.
 
 In a test of duration T the log of the viscosity may follow a_0 + Σ_k a_k cos(2πkt/T) + b_k sin(2πkt/T), k = 1 ... 4, with
 normal coefficients whose deviations fall with k; in loops it is one number a test. The viscous term follows it. That
-is many columns and no amplitude that could be told, so it is judged by its marginal likelihood alone,
+is many columns and no single amplitude to estimate, so it is judged by its marginal likelihood alone,
 
     evidence = ½ sᵀ (I + Λ⁻¹)⁻¹ s - ½ ln det(1 + Λ I)        (s the score, I the information, Λ the prior variances)
 
-averaged over how strongly temperature swings, from test to test and, by itself, within one, and over the gains' scatter, as
-every other evidence is: what gains would do as well is no temperature's.
+averaged over how strongly temperature varies, from test to test and separately within a test, and over the gains'
+scatter, as every other evidence is: what gains explain as well is no evidence of a temperature.
 """
 
 import numpy as np
@@ -15,29 +15,35 @@ from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
 from models.arrays import FloatArray
+from models.diagnosis.criteria import CHANGES_BETWEEN_TESTS, CHANGES_WITHIN_TESTS, USUAL_VISCOSITY_CHANGE
 from models.diagnosis.design.design import Design
-from models.diagnosis.noise.covariance import Noise
-from models.diagnosis.pooled_fit.gauss_newton import Fit, Priors
-from models.diagnosis.pooled_fit.projection import Projected, each_projection, gram_of
+from models.diagnosis.pooled_fit.gauss_newton import Fit
+from models.diagnosis.pooled_fit.gram import gram_of
+from models.diagnosis.pooled_fit.problem import FitProblem
+from models.diagnosis.pooled_fit.projection import Projected, projections_of
 
-#: Deviation of ln ν in a test that swings by some 3 K, and the factors on it that are considered from test to test and
-#: within a test.
-USUAL, BETWEEN, WITHIN = 0.06, (0.5, 1.5, 4.0), (0.0, 0.5, 1.5, 4.0)
+#: Harmonics of a test's duration.
 _WAVES = 4
 
 
-def temperature_evidence(design: Design, noise: Noise, priors: Priors, fitted: Fit) -> float:
+def temperature_evidence(problem: FitProblem, fitted: Fit) -> float:
     """Evidence [nats] of unmeasured courses of oil temperature over none."""
-    columns, between, within = _courses(design, fitted)
-    gram = gram_of(design, noise, priors, fitted, columns)
-    told = [(each.evidence, _averaged(each, between, within)) for each in each_projection(gram, noise)]
-    without, gained = np.array(told).T
+    columns, between, within = _courses(problem.design, fitted)
+    gram = gram_of(problem, fitted, columns)
+    evidences = [
+        (projected.evidence, _averaged(projected, between, within)) for projected in projections_of(gram, problem.noise)
+    ]
+    without, gained = np.array(evidences).T
     return float(logsumexp(without + gained) - logsumexp(without))
 
 
 def _averaged(projected: Projected, between: FloatArray, within: FloatArray) -> float:
     """Over the strengths."""
-    logs = [_marginal(projected, (USUAL * (b * between + w * within)) ** 2) for b in BETWEEN for w in WITHIN]
+    logs = [
+        _marginal(projected, (USUAL_VISCOSITY_CHANGE * (b * between + w * within)) ** 2)
+        for b in CHANGES_BETWEEN_TESTS
+        for w in CHANGES_WITHIN_TESTS
+    ]
     return float(logsumexp(logs) - np.log(len(logs)))
 
 
@@ -68,11 +74,3 @@ def _marginal(projected: Projected, variances: FloatArray) -> float:
     factor = np.linalg.cholesky(np.eye(root.size) + 0.5 * (unit + unit.T))
     half = solve_triangular(factor, score, lower=True)
     return float(0.5 * (half**2).sum() - np.log(np.diag(factor)).sum())
-
-
-def with_unmeasured(probabilities: dict[str, float], unmeasured: float, best: float, slack: float) -> dict[str, float]:
-    """The probabilities with an unmeasured oil temperature of evidence `unmeasured` [nats] beside the others;
-    `best` is that of the best candidate, `slack` what its template may be wrong by."""
-    share = float(1 / (1 + np.exp(-np.clip((unmeasured - best) / (1.0 + 0.5 * slack), -500, 500))))
-    found = {slug: (1 - share) * each for slug, each in probabilities.items() if slug != "oil_temperature"}
-    return dict(sorted({**found, "oil_temperature": share}.items(), key=lambda item: -item[1]))

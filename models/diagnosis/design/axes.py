@@ -1,5 +1,4 @@
-"""Names of the axes on which structure may lie: public channel names, or the test's clock, the cycles, the loop's phase."""
+"""Names of the axes on which structure may live: public channel names, or a name of our own where no channel is it."""
 
-SPEED, PRESSURE, CYCLES = "speed_rpm", "pressure_bar", "cycles"
-TEMPERATURE, CLOCK, PHASE = "oil_temperature_c", "test_clock_s", "loop_phase"
-TORQUE = "torque_nm"
+SPEED, PRESSURE, TORQUE, TEMPERATURE = "speed_rpm", "pressure_bar", "torque_nm", "oil_temperature_c"
+CYCLES, CLOCK, PHASE, FREQUENCY = "cycles", "test_clock_s", "loop_phase", "frequency_hz"

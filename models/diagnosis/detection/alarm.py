@@ -1,90 +1,40 @@
-"""Is there anything beyond noise? The largest projected likelihood ratios against what chance makes of them.
+"""The alarm: three statistics of what the baseline leaves, each against what chance makes of it.
 
-Statistics: the largest over the catalogue's changes and their shape grids, the largest over the smooth contrasts, and the
-highest line of a periodogram over the tests' clock (`detection.periodogram`). The first two are maxima of correlated
-standard normals, whose distribution is simulated and followed into its tail by the number of independent tests that would
-give the same. Each has its part of a total of about 1 % of false alarms.
+The largest likelihood ratio over the catalogue's changes and their shape grids, the largest over the smooth contrasts, and
+the highest line of a periodogram over the tests' clock. Each has its part of a total of about 1 % of false alarms.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr, ndtri
 
-from models.arrays import FloatArray
-from models.diagnosis.pooled_fit.projection import Projected
-
-#: False alarms allowed to each statistic.
-EFFECTS_SHARE, CONTRASTS_SHARE = 0.006, 0.0025
-#: Less than this share of a change is nothing visible. Amplitudes have units of their own: no two changes are compared.
-VISIBLE = 1e-6
-_DRAWS = 400
+from models.diagnosis.criteria import CONTRASTS_FALSE_ALARMS, EFFECTS_FALSE_ALARMS
+from models.diagnosis.detection.likelihood_ratio import AlarmStatistic, largest_ratio
+from models.diagnosis.detection.periodogram import lines
+from models.diagnosis.detection.projected_fit import ProjectedFit
+from models.diagnosis.pooled_fit.problem import FitProblem
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Lead:
-    """A statistic: its value [nats], its threshold, its p-value, and which column it is of."""
+class Alarms:
+    """The three statistics: effects of the catalogue, smooth contrasts, lines over the tests' clock."""
 
-    value: float
-    threshold: float
-    p_value: float
-    index: int
+    effects: AlarmStatistic
+    contrasts: AlarmStatistic
+    lines: AlarmStatistic
 
     @property
     def raised(self) -> bool:
-        """Beyond what chance makes."""
-        return self.value > self.threshold
+        """Whether any of them is beyond its threshold."""
+        return self.effects.raised or self.contrasts.raised or self.lines.raised
 
 
-def likelihood_ratios(projections: list[Projected], columns: slice, one_sided: FloatArray) -> FloatArray:
-    """[m] nats: the best amplitude of each change against none, the gains' scatter free under both."""
-    null = max(each.evidence for each in projections)
-    best = np.full(one_sided.size, -np.inf)
-    for each in projections:
-        z = _standard(each, columns)
-        z = np.where((one_sided > 0) & (z < 0), 0.0, z)
-        best = np.maximum(best, each.evidence + 0.5 * z * z)
-    return best - null
-
-
-def _standard(projected: Projected, columns: slice) -> FloatArray:
-    info = np.diag(projected.info)[columns]
-    visible = info > VISIBLE * np.maximum(projected.whole[columns], 1e-300)
-    return np.where(visible, projected.score[columns] / np.sqrt(np.where(visible, info, 1.0)), 0.0)
-
-
-def lead(
-    projections: list[Projected], columns: slice, one_sided: FloatArray, share: float, rng: np.random.Generator
-) -> Lead:
-    """The largest ratio among `columns` and its threshold for `share` of false alarms."""
-    if one_sided.size == 0:
-        return Lead(value=0.0, threshold=np.inf, p_value=1.0, index=-1)
-    ratios = likelihood_ratios(projections, columns, one_sided)
-    index = int(np.argmax(ratios))
-    tests = _independent_tests(max(projections, key=lambda each: each.evidence), columns, rng)
-    value = max(float(ratios[index]), 0.0)
-    tail = 2 * ndtr(-np.sqrt(2 * value))
-    return Lead(
-        value=value,
-        threshold=0.5 * float(ndtri(-np.expm1(np.log1p(-share) / tests) / 2)) ** 2,
-        p_value=float(-np.expm1(tests * np.log1p(-min(tail, 1 - 1e-12)))),
-        index=index,
+def alarms_of(problem: FitProblem, projected: ProjectedFit, rng: np.random.Generator) -> Alarms:
+    """The alarms of a baseline's fit, projected with the catalogue's columns."""
+    one_sided = np.array([float(column.effect.positive) for column in projected.columns])
+    two_sided = np.zeros(len(projected.contrasts.axes))
+    return Alarms(
+        effects=largest_ratio(projected.projections, projected.effects, one_sided, EFFECTS_FALSE_ALARMS, rng),
+        contrasts=largest_ratio(projected.projections, projected.smooth, two_sided, CONTRASTS_FALSE_ALARMS, rng),
+        lines=lines(problem, projected.fit.residual),
     )
-
-
-def _independent_tests(projected: Projected, columns: slice, rng: np.random.Generator) -> float:
-    """How many independent standard normals have maxima like these correlated ones, in their upper tenth."""
-    info = projected.info[columns, columns]
-    scale = np.sqrt(np.maximum(np.diag(info), 1e-300))
-    keep = np.diag(info) > VISIBLE * np.maximum(projected.whole[columns], 1e-300)
-    if not keep.any() or not np.isfinite(info).all():
-        return float(max(info.shape[0], 1))
-    correlation = (info / scale[:, None] / scale)[np.ix_(keep, keep)]
-    values, vectors = np.linalg.eigh(correlation)
-    strong = values > 1e-6 * values[-1]
-    root = vectors[:, strong] * np.sqrt(values[strong])
-    draws = np.abs(root @ rng.standard_normal((int(strong.sum()), _DRAWS))).max(axis=0)
-    quantiles = np.array([0.8, 0.9, 0.95])
-    tails = 2 * ndtr(-np.quantile(draws, quantiles))
-    counts = np.log(quantiles) / np.log1p(-tails)
-    return float(np.clip(counts.mean(), 1.0, keep.sum()))

@@ -1,9 +1,8 @@
 """Smooth contrasts: shapes of structure that any unknown cause might have, each on the axes on which it lives.
 
 They are relative to the predicted torque (structure in friction scales with it) and are products of cosines over the
-ranges of pressure, speed, clock and torque and over the rank of life, bumps and bends in speed, waves over a loop's
-phase, and single states; waves over speed go through the loops' lag, as friction does. Axes are public channel names, or
-`test_clock_s`, `cycles`, `loop_phase`.
+ranges of pressure, speed, clock and torque and over the rank of life, bumps and kinks in speed, waves over a loop's
+phase, and single states; waves over speed go through the loops' lag, as friction does. Axes: `design.axes`.
 """
 
 from collections.abc import Callable
@@ -22,9 +21,9 @@ from models.diagnosis.design.design import Design
 #: Takes the axis and a column [N] relative to the torque.
 Add: TypeAlias = Callable[[str, FloatArray], None]
 
-#: A sensor that is not straight may be so in many waves over its range; speed may have ripples (an encoder's, a mount's).
+#: Waves of a nonlinear sensor over its range; ripples over speed (an encoder's, a mount's).
 TORQUE_WAVES, SPEED_WAVES = 20, range(4, 17)
-_SEEN_AT_ALL = 1e-6
+_LEAST_WAVE = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +58,7 @@ def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
         for z in range(1, lives + 1):
             add(SPEED if s > z + 1 else CYCLES, _cosine(s, speed) * _cosine(z, life) * steady)
     for wave in _speed_waves(design, prediction).T:
-        if np.abs(wave).max() > _SEEN_AT_ALL * torque.max():  # at even speeds a sine may be 0 at each
+        if np.abs(wave).max() > _LEAST_WAVE * torque.max():  # at even speeds a sine may be 0 at each
             columns.append(wave)
             axes.append(SPEED)
     for p, z, s in product(range(1, presses + 1), range(1, min(lives, 2) + 1), range(1, 4)):

@@ -1,10 +1,10 @@
-"""Lines over the tests' clock: something swings while a test runs, with a phase of its own in every run.
+"""Periodogram over the tests' clock: a line is torque that oscillates while a test runs, with its own phase in every run.
 
     P(ω) = Σ_runs |Σ_i r_i m_i e^{-iωt_i}|² / Σ_i m_i²
 
-with r the whitened residual of a run, its gain taken out, and m = 1/σ for a swing of so many Nm or M/σ for a share of the
-torque, each at the plateaus' own times: noise in proportion to torque would smear a line out of a plain transform. P is a
-sum of exponentials where there is no line, once it is measured against its neighbourhood.
+with r the whitened residual of a run, its gain taken out, and m = 1/σ for an oscillation in Nm or M/σ for one in shares of
+the torque, at the plateaus' own times: noise in proportion to torque would smear a line in a plain transform. Where there is
+no line, P relative to its neighbourhood is a sum of exponential variables.
 """
 
 from dataclasses import dataclass
@@ -14,20 +14,20 @@ from scipy.ndimage import median_filter
 from scipy.stats import gamma
 
 from models.arrays import FloatArray
+from models.diagnosis.criteria import LINES_FALSE_ALARMS
 from models.diagnosis.design.design import Design
-from models.diagnosis.detection.alarm import Lead
+from models.diagnosis.detection.likelihood_ratio import AlarmStatistic
 from models.diagnosis.noise.covariance import Noise, whitened
+from models.diagnosis.pooled_fit.problem import FitProblem
 
-#: False alarms allowed.
-LINES_SHARE = 0.001
-#: Steps are half a cycle a test: it starts at two and a half cycles, so many steps are looked at before, and a neighbourhood
-#: is so many.
+#: Steps of half a cycle a test: the first (two and a half cycles), slower ones that it must exceed, and the size of a
+#: neighbourhood.
 _FIRST, _SLOWER, _NEIGHBOURS = 5, 3, 61
 #: Fewer plateaus in all, or in the longest run, show no line.
 _FEWEST, _FEWEST_IN_A_RUN = 64, 32
-#: Frequencies at most, and gaps between plateaus, in usual steps, beyond which a pause is taken for one of that length.
+#: Frequencies at most, and gaps between plateaus, in usual steps, beyond which a pause is shortened to that length.
 _MOST, _LONGEST_GAP = 4000, 5.0
-_NOTHING = Lead(value=0.0, threshold=np.inf, p_value=1.0, index=-1)
+_NOTHING = AlarmStatistic(value=0.0, threshold=np.inf, p_value=1.0, index=-1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,9 +48,9 @@ class _Run:
         return np.asarray(np.abs(sums) ** 2 / np.maximum((self.weights**2).sum(axis=0), 1e-300), dtype=np.float64)
 
 
-def lines(design: Design, noise: Noise, residual: FloatArray) -> Lead:
+def lines(problem: FitProblem, residual: FloatArray) -> AlarmStatistic:
     """The highest line, summed over the runs."""
-    runs = _runs(design, noise, residual)
+    runs = _runs(problem.design, problem.noise, residual)
     longest = max((run.time.size for run in runs), default=0)
     if sum(run.time.size for run in runs) < _FEWEST or longest < _FEWEST_IN_A_RUN:
         return _NOTHING
@@ -61,19 +61,19 @@ def lines(design: Design, noise: Noise, residual: FloatArray) -> Lead:
     if last < _FEWEST_IN_A_RUN:
         return _NOTHING
     power = np.sum([run.power(_FIRST - _SLOWER, last, np.pi / duration) for run in kept], axis=0)
-    # a line stands out of its neighbourhood: noise that remembers otherwise than was thought does not
+    # a line is above its neighbourhood: noise whose autocorrelation was misjudged is not
     middle = float(gamma.ppf(0.5, len(kept)))
     for column in power.T:
         column /= np.maximum(median_filter(column, size=_NEIGHBOURS, mode="reflect") / middle, 1.0)
-    # ... and above all that is slower: structure that grows the slower it is has no period
+    # ... and above everything slower: structure that is larger the slower it is has no period
     slower = np.maximum.accumulate(power, axis=0)[_SLOWER - 1 : -1]
     power = np.where(power[_SLOWER:] >= slower, power[_SLOWER:], 0.0)
     index = int(np.argmax(power))
     highest = float(power.ravel()[index])
     tests = 1.5 * power.size
-    return Lead(
+    return AlarmStatistic(
         value=max(highest - middle, 0.0),
-        threshold=float(gamma.isf(LINES_SHARE / tests, len(kept))) - middle,
+        threshold=float(gamma.isf(LINES_FALSE_ALARMS / tests, len(kept))) - middle,
         p_value=float(min(1.0, tests * np.exp(float(gamma.logsf(highest, len(kept)))))),
         index=index,
     )
@@ -82,18 +82,18 @@ def lines(design: Design, noise: Noise, residual: FloatArray) -> Lead:
 def _runs(design: Design, noise: Noise, residual: FloatArray) -> list[_Run]:
     steady = slice(0, design.plateaus)
     white = whitened(np.column_stack([residual, design.torque]), design, noise)[steady]
-    found = []
+    runs = []
     for run in np.unique(design.rows.run[steady]):
         mine = np.flatnonzero(design.rows.run[steady] == run)
         left, along = white[mine].T
         deviation = noise.deviation[mine]
         steps = np.maximum(np.diff(design.rows.clock[mine], prepend=design.rows.clock[mine[0]]), 0.0)
         usual = float(np.median(steps[1:])) if mine.size > 1 else 0.0
-        found.append(
+        runs.append(
             _Run(
                 time=np.cumsum(np.minimum(steps, _LONGEST_GAP * usual)),
                 left=left - along * float(along @ left) / max(float(along @ along), 1e-300),
                 weights=np.stack([1 / deviation, np.abs(design.torque[mine]) / deviation], axis=1),
             )
         )
-    return found
+    return runs

@@ -1,16 +1,17 @@
-"""What is expected of an effect's amplitude before anything is measured: most are small, a few are large.
+"""The prior of an effect's amplitude: most are small, a few are large.
 
     p(a) ∝ (1 + a²/(ν s²))^{-(ν + 1)/2}
 
-with s the effect's prior deviation and ν its tails (Student's t; normal where ν is infinite). A normal prior would hold an
-effect of six deviations 18 nats back, and something that imitates it with a small amplitude would be named instead.
+with s the effect's prior deviation and ν its tails (Student's t; normal where ν is infinite). A normal prior would cost an
+effect of six deviations 18 nats, and an effect that imitates it with a small amplitude would be named instead.
 """
 
 import math
 
 from models.diagnosis.effects.effect import Effect
 
-#: Deviations of the two normal distributions that stand for p where everything is linear, in s; each has half the weight.
+#: Deviations of the two normal distributions that approximate p where everything is linear, in s; each has half the weight
+#: (derived: a two-point approximation of the tails above).
 SCALES = (1.0, 6.0)
 
 

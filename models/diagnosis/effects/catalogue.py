@@ -1,5 +1,6 @@
-"""The catalogue: every effect that the diagnosis knows, in the contract's order."""
+"""The catalogue: every effect that the diagnosis can name, in the contract's order."""
 
+from models.diagnosis.design.facts import Facts
 from models.diagnosis.effects.catalogued import (
     accelerated_wear,
     channel_delay,
@@ -19,7 +20,7 @@ from models.diagnosis.effects.catalogued import (
     unsettled_dwell,
     viscous_exponent,
 )
-from models.diagnosis.effects.effect import Effect
+from models.diagnosis.effects.effect import Effect, sized
 
 CATALOGUE: tuple[Effect, ...] = (
     oil_temperature.EFFECT,
@@ -42,3 +43,8 @@ CATALOGUE: tuple[Effect, ...] = (
 )
 
 BY_SLUG = {effect.slug: effect for effect in CATALOGUE}
+
+
+def effects_for(facts: Facts, without: frozenset[str] = frozenset()) -> list[Effect]:
+    """The effects with the priors that fit this campaign's clutch; those whose slugs are in `without` are left out."""
+    return [sized(effect, facts) for effect in CATALOGUE if effect.slug not in without]

@@ -1,9 +1,9 @@
 """What an effect of the catalogue is: one value that says what it is, what it needs and what it changes in torque.
 
 An effect changes the torque at every point of a scene (`baseline.laws.Scene`: the points and what the baseline
-says there) by an amount that one *amplitude*, in engineering units, scales, and *shapes* (a change point, a time
-constant, an exponent) bend. Amplitude 0 is no effect. Adding an effect is adding one file in `effects/` and its name in
-`catalogue.py`.
+says there) by an amount that is scaled by one *amplitude*, in engineering units, and formed by *shapes* (a change point, a
+time constant, an exponent). Amplitude 0 is no effect. Adding an effect is adding one file in `effects/catalogued/` and its
+name in `catalogue.py`; what other chapters need to know of it are fields of the effect, so its slug stands nowhere else.
 """
 
 from collections.abc import Callable, Sequence
@@ -45,20 +45,30 @@ class Family(StrEnum):
 
 
 class Measure(StrEnum):
-    """What the usual size of an effect grows with: a clutch of ten times the torque has a sensor of ten times the zero."""
+    """What the usual size of an effect is in proportion to: a clutch of ten times the torque has a sensor of ten times the
+    zero shift."""
 
     TORQUE = "torque"
     PRESSURE = "pressure"
 
 
-class Bend(StrEnum):
-    """Along what a template may be bent, for nobody knows its form that well; MOTION: in loops against plateaus. How an
-    effect goes with pressure is what tells it from others, and is not bent."""
+class Discrepancy(StrEnum):
+    """Along what a template's form is uncertain (`effects.template_discrepancy`); MOTION: in loops against plateaus. How an
+    effect depends on pressure is what distinguishes it from others, so no discrepancy over pressure is allowed."""
 
     SPEED = "speed"
     LIFE = "life"
     CLOCK = "clock"
     MOTION = "motion"
+
+
+class Resemblance(StrEnum):
+    """Whether an effect looks like a change of oil temperature where temperature was not measured; UNLESS_LOGGED: not where
+    maintenance says that it was done."""
+
+    ALWAYS = "always"
+    UNLESS_LOGGED = "unless_logged"
+    NEVER = "never"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,13 +100,16 @@ class Effect:
     of the amplitude; prior_sd: its prior deviation in that unit (zero mean, either sign unless `positive`), for a clutch of
     the reference's size where it `grows_with` something (`sized`);
     `scale` turns the SI amplitude into `unit`.
-    grid(facts) gives the shapes to be tried, none where the campaign cannot tell the effect.
+    grid(facts) gives the shapes to be tried, none where the campaign cannot show the effect.
     change(scene, amplitude, shape) -> [P] Nm at the scene's points. before_lag: whether it changes the stationary curve,
-    which friction in loops then lags behind, or the measured torque itself; None where nobody knows and the last shape
+    which friction in loops then lags behind, or the measured torque itself; None where that is unknown and the last shape
     says (1 or 0).
-    bends: along what its form is uncertain (`effects.template_discrepancy`); an exact law has none.
+    discrepancies: along what its form is uncertain (`effects.template_discrepancy`); an exact law has none.
     several(scene, settings) -> [P, m] Nm is the same for many (amplitude, shape) at once, where that is cheaper.
     tails: degrees of freedom of the amplitude's prior (`effects.amplitude_prior`), infinite for a normal one.
+    resembles_temperature: whether an oil temperature that was not measured could look like it.
+    counts_in_severity: its amplitude is the exponent by which ζ counts engagements (no torque is added along a life).
+    opposite_physics: a sentence for a negative amplitude, where `physics` holds for a positive one only.
     """
 
     slug: str
@@ -116,10 +129,13 @@ class Effect:
     grid: Callable[[Facts], tuple[Tried, ...]]
     change: Callable[[Scene, float, Shape], FloatArray]
     before_lag: bool | None
-    bends: tuple[Bend, ...]
+    discrepancies: tuple[Discrepancy, ...]
     tails: float = 2.0
     several: Callable[[Scene, Sequence[tuple[float, Shape]]], FloatArray] | None = None
     grows_with: Measure | None = None
+    resembles_temperature: Resemblance = Resemblance.NEVER
+    counts_in_severity: bool = False
+    opposite_physics: str = ""
 
     def changes(self, scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:
         """The changes [P, m] Nm of several (amplitude, shape)."""

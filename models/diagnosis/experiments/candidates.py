@@ -1,7 +1,7 @@
 """Tests that a rig could make next, and the runs that they would add to a campaign.
 
 A trial is made after the last state unless it goes on to later ones. Its torques are not known beforehand and not needed:
-what it would tell hangs on where it measures.
+what it would show depends on where it measures.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from models.records.runs import Plateaus, Record
 SWING = 1000 * 2 * np.pi / 60
 _SAMPLES, _PERIODS = 200, 10
 _HOUR = 3600.0
-#: Light pressures of loops, as multiples: far enough apart to be told from each other.
+#: Light pressures of loops, as multiples: far enough apart to be distinguished.
 LIGHT = (1.0, 1.5, 2.0)
 #: Sweeps over the speeds in a run with the clutch open: there is one pressure only, none.
 PASSES = 5
@@ -182,7 +182,7 @@ def _usual(runs: Sequence[tuple[Run, Plateaus | Record]], trial: Trial) -> Run |
     """The last run under the usual pressures, not one of those that a trial at light pressures or none has added; none where
     the trial's share of its lowest pressure would leave the clutch open."""
     highest = max((float(table.pressure.max()) for _, table in runs), default=0.0)
-    usual = [each for each in runs if max(USUAL * highest, UNLOADED) <= float(each[1].pressure.max())]
+    usual = [pattern for pattern in runs if max(USUAL * highest, UNLOADED) <= float(pattern[1].pressure.max())]
     if not usual:
         return None
     run, table = usual[-1]
@@ -249,8 +249,8 @@ def _loops(pattern: DynamicRun, trial: Trial, cycles: float) -> DynamicRun:
 
 
 def _duty(campaign: Campaign, trial: Trial, ahead: list[float], step: float) -> list[DutyRun]:
-    known = [run.energy for run in campaign.duty if run.energy is not None]
-    usual = float(np.median(known)) if known else None
+    energies = [run.energy for run in campaign.duty if run.energy is not None]
+    usual = float(np.median(energies)) if energies else None
     return [
         DutyRun(
             run_id=f"trial-duty-{k}",

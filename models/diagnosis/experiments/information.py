@@ -1,12 +1,12 @@
-"""What a trial would tell: how far candidates are apart on rows that are not measured yet.
+"""What a trial would show: how far candidates are apart on rows that are not measured yet.
 
-Were candidate a true, a trial would show the torque that a foretells for it; what of the difference d of a's and b's torques
-(over all rows, those measured and those to come) b cannot take up is
+If candidate a is true, a trial shows the torque that a predicts for it; what of the difference d of a's and b's torques
+(over all rows, those measured and those to come) b cannot absorb is
 
     λ_ab = ½ dᵀ V⁻¹ (1 - P_[J_b, U_b]) d      [nats]
 
 with J_b the baseline's sensitivities where b has it, U_b those of b's amplitude, of its smooth shapes unless they are at a
-bound, and of what it may be bent by, each held by its prior. Rows to come have the noise of those measured at their torque.
+bound, and of its model discrepancy, each held by its prior. Rows to come have the noise of those measured at their torque.
 """
 
 from collections.abc import Sequence
@@ -18,93 +18,95 @@ from scipy.optimize import nnls
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import OPEN_DRAG
 from models.diagnosis.baseline.prediction import Prediction, predict
+from models.diagnosis.criteria import DISCREPANCY_SD, LEAST_NOISE
 from models.diagnosis.design.design import Design
 from models.diagnosis.design.points import Points
-from models.diagnosis.effects.template_discrepancy import BEND, bends
-from models.diagnosis.noise.covariance import Noise
-from models.diagnosis.pooled_fit.gauss_newton import (
-    Fit,
-    Fitted,
-    Priors,
+from models.diagnosis.effects.fitted_effect import (
+    FittedEffect,
     effect_columns,
     effect_precisions,
     effect_rows,
     free_shapes,
 )
-from models.diagnosis.pooled_fit.projection import Gram, gram_of, project
+from models.diagnosis.effects.template_discrepancy import discrepancy_factors
+from models.diagnosis.pooled_fit.gauss_newton import Fit
+from models.diagnosis.pooled_fit.gram import Gram, gram_of
+from models.diagnosis.pooled_fit.problem import FitProblem
+from models.diagnosis.pooled_fit.projection import project
 
-#: Noise without torque is at least this share of the usual: what was measured under torque only says little of it.
-LEAST_NOISE = 0.2
 _RANGES = ("velocity", "cycles", "clock")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Rows:
-    """What is foretold for some rows: each candidate's prediction and torque [N] Nm, and the noise [N] Nm."""
+    """What is predicted for some rows: each candidate's prediction and torque [N] Nm, and the noise [N] Nm."""
 
-    design: Design
+    problem: FitProblem
     predictions: tuple[Prediction, ...]
     torques: tuple[FloatArray, ...]
-    deviation: FloatArray
 
 
-class Foretold:
+class CandidateDistances:
     """Distances of candidates, on what was measured and with rows to come."""
 
-    def __init__(self, design: Design, noise: Noise, priors: Priors, fits: tuple[Fit, ...]) -> None:
-        free = priors.free.copy()
-        free[OPEN_DRAG] = True  # a trial with the clutch open brings a drag that nobody knows yet
-        priors = replace(priors, free=free)
-        self._design, self._noise, self._priors, self._fits = design, noise, priors, fits
-        view = _Rows(
-            design=design,
+    def __init__(self, problem: FitProblem, fits: tuple[Fit, ...]) -> None:
+        free = problem.priors.free.copy()
+        free[OPEN_DRAG] = True  # a trial with the clutch open brings a drag that no measurement has determined yet
+        problem = replace(problem, priors=replace(problem.priors, free=free))
+        self._problem, self._fits = problem, fits
+        rows = _Rows(
+            problem=problem,
             predictions=tuple(fit.prediction for fit in fits),
-            torques=tuple(_torque(design, fit.prediction, fit) for fit in fits),
-            deviation=noise.deviation,
+            torques=tuple(_torque(problem.design, fit.prediction, fit) for fit in fits),
         )
-        self._law = _noise_law(design, noise, fits[0].torque)
-        self._known = [self._gram(view, k, priors) for k in range(len(fits))]
+        self._law = _noise_law(problem, fits[0].torque)
+        self._measured = [self._gram(rows, k) for k in range(len(fits))]
 
     def ahead(self, added: Design) -> list[Gram]:
-        """What rows to come would tell, candidate by candidate as the one to be told from."""
+        """What rows to come would show, candidate by candidate as the one to be distinguished from."""
         predictions = tuple(predict(added, fit.laws) for fit in self._fits)
         torques = tuple(_torque(added, at, fit) for at, fit in zip(predictions, self._fits, strict=True))
-        deviation = _usual_deviation(self._law, added, torques[0])
-        view = _Rows(design=added, predictions=predictions, torques=torques, deviation=deviation)
-        none = replace(self._priors, rows=self._priors.rows[:0], means=self._priors.means[:0])
-        return [self._gram(view, k, none) for k in range(len(self._fits))]
+        noise = replace(self._problem.noise, deviation=_usual_deviation(self._law, added, torques[0]))
+        priors = self._problem.priors  # they are in the measured rows already
+        none = replace(priors, rows=priors.rows[:0], means=priors.means[:0])
+        rows = _Rows(
+            problem=FitProblem(design=added, noise=noise, priors=none), predictions=predictions, torques=torques
+        )
+        return [self._gram(rows, k) for k in range(len(self._fits))]
 
     def distances(self, ahead: Sequence[list[Gram]]) -> FloatArray:
-        """λ [k, k] nats of each candidate (row), were it true, against each other one (column), with runs to come."""
-        return self.told(ahead)[0]
+        """λ [k, k] nats of each candidate (row), if it is true, against each other one (column), with runs to come."""
+        return self.with_freedom(ahead)[0]
 
-    def told(self, ahead: Sequence[list[Gram]]) -> tuple[FloatArray, FloatArray]:
+    def with_freedom(self, ahead: Sequence[list[Gram]]) -> tuple[FloatArray, FloatArray]:
         """The same, and [k] nats of what the freedom of each candidate is worth: -½ ln det of all that it has free."""
-        grams = self._known
+        grams = self._measured
         for more in ahead:
-            grams = [_joined(gram, each) for gram, each in zip(grams, more, strict=True)]
-        found = [project(gram, self._noise.run_gain, self._noise.curve_gain) for gram in grams]
-        columns = [0.5 * np.maximum(np.diag(each.info), 0.0) for each in found]
-        return np.stack(columns, axis=1), np.array([each.evidence - each.profile for each in found])
+            grams = [_joined(gram, added) for gram, added in zip(grams, more, strict=True)]
+        noise = self._problem.noise
+        projections = [project(gram, noise.run_gain, noise.curve_gain) for gram in grams]
+        columns = [0.5 * np.maximum(np.diag(projected.info), 0.0) for projected in projections]
+        freedom = [projected.evidence - projected.profile for projected in projections]
+        return np.stack(columns, axis=1), np.array(freedom)
 
-    def _gram(self, view: _Rows, rival: int, priors: Priors) -> Gram:
-        """What rows tell of all candidates' differences from a rival, and of what that one can take up; without priors
+    def _gram(self, rows: _Rows, rival: int) -> Gram:
+        """What rows show of all candidates' differences from a rival, and of what that one can absorb; without priors
         where they are added to others, which have them already."""
-        fit, prediction = self._fits[rival], view.predictions[rival]
+        fit, prediction, design = self._fits[rival], rows.predictions[rival], rows.problem.design
         own, precisions = [], []
-        for each in fit.effects:
-            changes = effect_rows(view.design, prediction, each)
-            bent = changes[:, None] * _bends(self._design, view.design, each)
-            free = free_shapes(each)
-            own += [effect_columns(view.design, prediction, each)[:, free], bent]
-            precisions += [*effect_precisions(each)[free], *[BEND**-2.0] * bent.shape[1]]
-        apart = np.stack([torque - view.torques[rival] for torque in view.torques], axis=1)
+        for effect in fit.effects:
+            changes = effect_rows(design, prediction, effect)
+            discrepancy = changes[:, None] * _discrepancy_factors(self._problem.design, design, effect)
+            free = free_shapes(effect)
+            own += [effect_columns(design, prediction, effect)[:, free], discrepancy]
+            precisions += [*effect_precisions(effect)[free], *[DISCREPANCY_SD**-2.0] * discrepancy.shape[1]]
+        apart = np.stack([torque - rows.torques[rival] for torque in rows.torques], axis=1)
         silent = replace(
-            fit, prediction=prediction, torque=view.torques[rival], residual=np.zeros(apart.shape[0]), effects=()
+            fit, prediction=prediction, torque=rows.torques[rival], residual=np.zeros(apart.shape[0]), effects=()
         )
         columns = np.nan_to_num(np.concatenate([*own, apart], axis=1))
-        gram = gram_of(view.design, replace(self._noise, deviation=view.deviation), priors, silent, columns)
-        if priors.rows.size:
+        gram = gram_of(rows.problem, silent, columns)
+        if rows.problem.priors.rows.size:
             diagonal = gram.base + np.arange(len(precisions))
             gram.matrix[diagonal, diagonal] += precisions
         return replace(gram, base=gram.base + len(precisions))
@@ -112,21 +114,25 @@ class Foretold:
 
 def _torque(design: Design, prediction: Prediction, fit: Fit) -> FloatArray:
     """[N] Nm of a candidate at the rows."""
-    changes = [np.nan_to_num(effect_rows(design, prediction, each)) for each in fit.effects]
+    changes = [np.nan_to_num(effect_rows(design, prediction, effect)) for effect in fit.effects]
     return np.asarray(prediction.torque + sum(changes, np.zeros_like(prediction.torque)), dtype=np.float64)
 
 
-def _bends(known: Design, rows: Design, fitted: Fitted) -> FloatArray:
-    """What an effect may be bent by [N, k] at rows, over the ranges of the known ones: beyond them as at their ends."""
-    if rows is known:
-        return bends(known, fitted.effect)
+def _discrepancy_factors(measured: Design, rows: Design, fitted: FittedEffect) -> FloatArray:
+    """The factors of an effect's model discrepancy [N, k] at rows, over the ranges of those measured: beyond them as at
+    their ends."""
+    if rows is measured:
+        return discrepancy_factors(measured, fitted.effect)
     count = rows.torque.size
-    ends = {name: (getattr(known.rows, name).min(), getattr(known.rows, name).max()) for name in _RANGES}
-    cut = replace(rows.rows, **{name: np.clip(getattr(rows.rows, name), *each) for name, each in ends.items()})
+    ends = {name: (getattr(measured.rows, name).min(), getattr(measured.rows, name).max()) for name in _RANGES}
+    cut = replace(
+        rows.rows, **{name: np.clip(getattr(rows.rows, name), low, high) for name, (low, high) in ends.items()}
+    )
     joined = {
-        each.name: np.concatenate([getattr(known.rows, each.name), getattr(cut, each.name)]) for each in fields(Points)
+        field.name: np.concatenate([getattr(measured.rows, field.name), getattr(cut, field.name)])
+        for field in fields(Points)
     }
-    return bends(replace(known, rows=Points(**joined)), fitted.effect)[-count:]
+    return discrepancy_factors(replace(measured, rows=Points(**joined)), fitted.effect)[-count:]
 
 
 def _joined(first: Gram, second: Gram) -> Gram:
@@ -141,19 +147,20 @@ def _joined(first: Gram, second: Gram) -> Gram:
     )
 
 
-def _noise_law(design: Design, noise: Noise, torque: FloatArray) -> FloatArray:
+def _noise_law(problem: FitProblem, torque: FloatArray) -> FloatArray:
     """(a², b²) [2, 2] of plateaus and of loops, σ² = (a² + b² M²)/n as `noise.estimate` has it; a² is no less than
     LEAST_NOISE has it."""
+    design = problem.design
     steady = np.arange(design.torque.size) < design.plateaus
-    variance = noise.deviation**2 * design.samples
-    found = []
+    variance = problem.noise.deviation**2 * design.samples
+    laws = []
     for part in (steady, ~steady):
         part = part if part.any() else ~part
         columns = np.stack([np.ones(int(part.sum())), torque[part] ** 2], axis=1) / variance[part, None]
         scale = columns.mean(axis=0)
         law = nnls(columns / scale, np.ones(columns.shape[0]))[0] / scale
-        found.append([max(law[0], LEAST_NOISE**2 * float(np.median(variance[part]))), law[1]])
-    return np.array(found)
+        laws.append([max(law[0], LEAST_NOISE**2 * float(np.median(variance[part]))), law[1]])
+    return np.array(laws)
 
 
 def _usual_deviation(law: FloatArray, added: Design, torque: FloatArray) -> FloatArray:

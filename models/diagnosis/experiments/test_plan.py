@@ -1,10 +1,10 @@
-"""Which test would decide: trials are made in thought, and the one that most likely leaves one candidate is taken.
+"""Which test would decide: the trial after which one candidate is most likely left is recommended.
 
-With Δ_ab what a trial adds to λ_ab (`experiments.information`), evidence for a against b would, were a true, be about
-normal afterwards: its mean what it is now, and Δ, and what the freedom of both is worth more by then; its variance
-1 + 2Δ + (ERRS Δ)². a is left alone where it is above what `attribution.decide` asks for, for every b. Trials are
-ranked by the probability of that, over the candidates by their evidence, less COST a run. A cause without a rival is set
-against no effect at all, and of trials that are about as likely to leave it the one with most nats a run is taken.
+With Δ_ab what a trial adds to λ_ab (`experiments.information`), evidence for a against b would, if a is true, be about
+normal afterwards: its mean what it is now, and Δ, and the change of what the freedom of both is worth; its variance
+1 + 2Δ + (PREDICTION_ERROR Δ)². a is left alone where it is above what `attribution.decide` asks for, for every b. Trials are
+ranked by the probability of that, over the candidates by their evidence, less COST_OF_RUN a run. A cause without a rival is
+compared with no effect at all, and of trials that are about as likely to leave it the one with most nats a run is taken.
 """
 
 from collections.abc import Sequence
@@ -14,77 +14,86 @@ import numpy as np
 from scipy.special import ndtr, softmax
 
 from models.arrays import FloatArray
-from models.diagnosis.attribution.decide import CLOSE, LEAST_NAMED, RIVAL, TOLERANCE
 from models.diagnosis.campaign import Campaign
+from models.diagnosis.criteria import (
+    COST_OF_RUN,
+    CREDIBLE_MARGIN,
+    CREDIBLE_MARGIN_SHARE,
+    LEAST_ADVISED,
+    LEAST_NAMED,
+    MOST_ADVISED,
+    MOST_RIVALS,
+    PREDICTION_ERROR,
+    TOLERANCE,
+    WORTHWHILE,
+)
 from models.diagnosis.design.criteria import REFERENCE_TEMPERATURE
 from models.diagnosis.design.design import Design, build_design
 from models.diagnosis.design.facts import facts_of
-from models.diagnosis.effects.catalogued import oil_temperature
+from models.diagnosis.effects.catalogued import oil_temperature, torque_zero_shift
+from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.experiments.candidates import TRIALS, runs_of, with_trial
-from models.diagnosis.experiments.information import Foretold
-from models.diagnosis.noise.covariance import Noise
-from models.diagnosis.pooled_fit.gauss_newton import Fit, Fitted, Priors
-from models.diagnosis.pooled_fit.projection import Gram
-from models.diagnosis.report.report import Advice
+from models.diagnosis.experiments.information import CandidateDistances
+from models.diagnosis.experiments.rivals import Rival
+from models.diagnosis.pooled_fit.gauss_newton import Fit
+from models.diagnosis.pooled_fit.gram import Gram
+from models.diagnosis.pooled_fit.problem import FitProblem
 
-#: Tests advised at most; what one must bring [nats] to be worth its time (where none does, the best one with LEAST is
-#: named).
-MOST, WORTH, LEAST = 3, 3.0, 0.1
-#: Rivals that are compared at most, unless more stand.
-MOST_FITS = 4
-#: What a run must add to the probability that one candidate is left.
-COST = 0.005
-#: What is foretold may be wrong by this share.
-ERRS = 0.4
-_NONE = "baseline"
+#: What a cause is compared with where it has no rival.
+BASELINE = "baseline"
+#: The trial that moves the oil's temperature.
+_WARM = "sweep_60c"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rival:
-    """A candidate's fit and its evidence [nats] over nothing."""
+class Advice:
+    """A test that would decide between two effects (or between an effect and none, then `other` is BASELINE).
 
-    fit: Fit
-    evidence: float
+    `key` names the test for machines (`experiments.candidates.TRIALS`), `nats` is what it is expected to bring.
+    """
+
+    key: str
+    test: str
+    effect: str
+    other: str
+    nats: float
 
 
 def advise(
-    campaign: Campaign,
-    design: Design,
-    noise: Noise,
-    priors: Priors,
-    standing: Sequence[Rival],
-    nearby: Sequence[Rival] = (),
+    campaign: Campaign, problem: FitProblem, credible: Sequence[Rival], nearby: Sequence[Rival] = ()
 ) -> tuple[Advice, ...]:
-    """The trials that leave one of the candidates standing (best first), best trial first. Those nearby are out of the race,
-    but may come back into it."""
-    race = [each for each in standing if each.fit.effects]
+    """The trials that leave one of the credible candidates (best first), best trial first. Those nearby cannot be left, but
+    may become credible again."""
+    race = [rival for rival in credible if rival.fit.effects]
     if not race:
         return ()
-    fitted = [each.fit for each in (*race, *nearby)][: max(len(race), MOST_FITS)]
-    known = np.array([each.evidence for each in (*race, *nearby)][: len(fitted)], dtype=np.float64)
+    rivals = [*race, *nearby][: max(len(race), MOST_RIVALS)]
+    fits = [rival.fit for rival in rivals]
+    evidences = np.array([rival.evidence for rival in rivals], dtype=np.float64)
     with np.errstate(all="ignore"):
-        foretold = Foretold(design, noise, priors, (*fitted, _bare(fitted[0])))
-        before = foretold.told(())
-        found = []
-        for key, rows in _made(campaign, design, foretold).items():
-            chance, other, nats = _brought(before, foretold.told(rows), known, len(race))
-            if np.isfinite(chance) and nats > LEAST:
-                effect, rival = _names(fitted[0], fitted[other] if len(race) > 1 else None)
+        distances = CandidateDistances(problem, (*fits, _bare(fits[0])))
+        before = distances.with_freedom(())
+        ranked = []
+        for key, rows in _made(campaign, problem.design, distances).items():
+            chance, other, nats = _brought(before, distances.with_freedom(rows), evidences, len(race))
+            if np.isfinite(chance) and nats > LEAST_ADVISED:
+                effect, rival = _names(fits[0], fits[other] if len(race) > 1 else None)
                 advice = Advice(key=key, test=TRIALS[key].text, effect=effect, other=rival, nats=nats)
                 runs = runs_of(key)
                 alone = (round(chance, 1), nats / runs)
-                found.append((alone if len(race) == 1 else (chance - COST * runs, nats), advice))
-        first = _thermometer(campaign, design, noise, priors, fitted)
-    ranked = [advice for _, advice in sorted(found, key=lambda each: each[0], reverse=True)]
-    worthy = [advice for i, advice in enumerate(ranked) if i == 0 or advice.nats >= WORTH]
-    return (*first, *worthy)[:MOST]
+                ranked.append((alone if len(race) == 1 else (chance - COST_OF_RUN * runs, nats), advice))
+        first = _thermometer(campaign, problem, fits)
+    ranked.sort(key=lambda trial: trial[0], reverse=True)
+    worthy = [advice for i, (_, advice) in enumerate(ranked) if i == 0 or advice.nats >= WORTHWHILE]
+    return (*first, *worthy)[:MOST_ADVISED]
 
 
 def _brought(
     before: tuple[FloatArray, FloatArray], after: tuple[FloatArray, FloatArray], evidences: FloatArray, racing: int
 ) -> tuple[float, int, float]:
     """By distances and freedoms before and after a trial: the probability that one candidate is left (NaN where it cannot be
-    told), the rival of the best that is hardest to part from it, and the nats between them that the trial brings."""
+    computed), the rival of the best that is hardest to distinguish from it, and the nats between them that the trial
+    brings."""
     count = evidences.size
     gained, freedom = np.maximum(after[0] - before[0], 0.0), (after[1] - before[1])[:count]
     if not (np.isfinite(gained).all() and np.isfinite(freedom).all()):
@@ -96,31 +105,34 @@ def _brought(
     return chance, 1 + int(expected.argmin()), float(expected.min())
 
 
-def decided(gained: FloatArray, seen: FloatArray, evidences: FloatArray, freedom: FloatArray) -> float:
+def decided(gained: FloatArray, measured: FloatArray, evidences: FloatArray, freedom: FloatArray) -> float:
     """The probability that one candidate is left, by what is gained [k, k + 1] nats for row against column (the last one no
-    effect at all), by what is seen [k] nats of each already, by their evidences [k] nats, and by what these change by for
-    nothing but the candidates' `freedom` [k] nats: what has more free pays more for it when more is measured.
+    effect at all), by λ as measured [k] nats of each already, by their evidences [k] nats, and by what these change by for
+    nothing but the candidates' `freedom` [k] nats: a candidate with more freedom pays more for it when more is measured.
 
-    A lead is weighed against the error that a template may have, a share of λ: the more is seen, the further it must be.
+    A lead is compared with the error that a template may have, a share of λ: the larger λ, the larger the lead must be.
     """
     count = evidences.size
     after = evidences + freedom
     lead = after[:, None] - after
     rivals = gained[:count, :count] if count > 1 else gained[:1, -1:]
-    total = (seen + gained[:count, -1])[:, None]
-    needed = np.maximum(CLOSE + RIVAL * total, np.log(LEAST_NAMED / (1 - LEAST_NAMED)) * (1 + 0.5 * TOLERANCE * total))
-    chance = ndtr((lead + rivals - needed) / np.sqrt(1.0 + 2.0 * rivals + (ERRS * rivals) ** 2))
+    total = (measured + gained[:count, -1])[:, None]
+    needed = np.maximum(
+        CREDIBLE_MARGIN + CREDIBLE_MARGIN_SHARE * total,
+        np.log(LEAST_NAMED / (1 - LEAST_NAMED)) * (1 + 0.5 * TOLERANCE * total),
+    )
+    chance = ndtr((lead + rivals - needed) / np.sqrt(1.0 + 2.0 * rivals + (PREDICTION_ERROR * rivals) ** 2))
     if count > 1:
         np.fill_diagonal(chance, 1.0)
     return float(softmax(evidences) @ chance.min(axis=1))
 
 
 def _names(best: Fit, rival: Fit | None) -> tuple[str, str]:
-    """What one has in it that the other has not."""
-    mine = [each.effect.slug for each in best.effects]
-    others = [each.effect.slug for each in rival.effects] if rival is not None else []
+    """An effect of the best that the rival does not have, and one of the rival."""
+    mine = [effect.effect.slug for effect in best.effects]
+    others = [effect.effect.slug for effect in rival.effects] if rival is not None else []
     own = [slug for slug in mine if slug not in others] or mine
-    return own[0], next((slug for slug in others if slug not in mine), _NONE)
+    return own[0], next((slug for slug in others if slug not in mine), BASELINE)
 
 
 def _bare(fit: Fit) -> Fit:
@@ -128,16 +140,16 @@ def _bare(fit: Fit) -> Fit:
     return replace(fit, torque=fit.prediction.torque, effects=())
 
 
-def _made(campaign: Campaign, design: Design, foretold: Foretold) -> dict[str, list[list[Gram]]]:
-    """By trial what its runs would tell, a run each; those that the campaign has a pattern for. Without a thermometer none
-    is made at another temperature, without a loop that could be evaluated none is foretold."""
+def _made(campaign: Campaign, design: Design, distances: CandidateDistances) -> dict[str, list[list[Gram]]]:
+    """By trial what its runs would show, a run each; those that the campaign has a pattern for. Without a thermometer none
+    is made at another temperature, without a loop that could be evaluated no loop is predicted."""
     single = {}
     for key, trial in TRIALS.items():
-        tellable = design.facts.temperature_measured or trial.temperature is None
-        if not trial.parts and tellable and (design.loops > 0 or not trial.loops):
+        possible = design.facts.temperature_measured or trial.temperature is None
+        if not trial.parts and possible and (design.loops > 0 or not trial.loops):
             added = _added(campaign, design, key)
             if added is not None:
-                single[key] = [foretold.ahead(added)] * trial.times
+                single[key] = [distances.ahead(added)] * trial.times
     made = {}
     for key, trial in TRIALS.items():
         parts = trial.parts or (key,)
@@ -146,39 +158,39 @@ def _made(campaign: Campaign, design: Design, foretold: Foretold) -> dict[str, l
     return made
 
 
-def _thermometer(campaign: Campaign, design: Design, noise: Noise, priors: Priors, fits: Sequence[Fit]) -> list[Advice]:
-    """Where oil temperature was not measured and would be mistaken for a shifted zero: measure it, and move it.
+def _thermometer(campaign: Campaign, problem: FitProblem, fits: Sequence[Fit]) -> list[Advice]:
+    """Where oil temperature was not measured and would be mistaken for a shifted zero: measure it, and change it.
 
     What that brings is λ of a temperature effect of the usual size, which a shifted zero does not have.
     """
-    key = "sweep_60c"
-    added = _added(campaign, design, key)
-    mistaken = any(each.effect.slug == "torque_zero_shift" for fit in fits for each in fit.effects)
-    if design.facts.temperature_measured or not mistaken or added is None:
+    shift = torque_zero_shift.EFFECT.slug
+    added = _added(campaign, problem.design, _WARM)
+    mistaken = any(effect.effect.slug == shift for fit in fits for effect in fit.effects)
+    if problem.design.facts.temperature_measured or not mistaken or added is None:
         return []
     added = replace(added, facts=replace(added.facts, reference_temperature=REFERENCE_TEMPERATURE))
     effect = oil_temperature.EFFECT
-    usual = replace(fits[0], effects=(Fitted(effect=effect, amplitude=effect.prior_sd, shape=(0.0,)),))
-    foretold = Foretold(design, noise, priors, (usual, _bare(fits[0])))
-    nats = float(foretold.distances([foretold.ahead(added)])[0, 1])
-    test = f"{TRIALS[key].text}, and oil temperature recorded from now on"
-    return [Advice(key=key, test=test, effect="torque_zero_shift", other=effect.slug, nats=nats)]
+    usual = replace(fits[0], effects=(FittedEffect(effect=effect, amplitude=effect.prior_sd, shape=(0.0,)),))
+    distances = CandidateDistances(problem, (usual, _bare(fits[0])))
+    nats = float(distances.distances([distances.ahead(added)])[0, 1])
+    test = f"{TRIALS[_WARM].text}, and oil temperature recorded from now on"
+    return [Advice(key=_WARM, test=test, effect=shift, other=effect.slug, nats=nats)]
 
 
 def _added(campaign: Campaign, design: Design, key: str) -> Design | None:
-    """The rows of a trial's runs alone, if there are any; of what is then known beside them only what does not move what was
-    fitted."""
+    """The rows of a trial's runs alone, if there are any; of the campaign's facts with the trial only those that do not
+    change what was fitted."""
     then = with_trial(campaign, key)
     if then is None:
         return None
     stationary, dynamic = then.stationary[len(campaign.stationary) :], then.dynamic[len(campaign.dynamic) :]
-    known = design.facts
+    before = design.facts
     facts = replace(
         facts_of(then),
-        states=known.states,
-        reference_temperature=known.reference_temperature,
-        usual_torque=known.usual_torque,
-        usual_pressure=known.usual_pressure,
+        states=before.states,
+        reference_temperature=before.reference_temperature,
+        usual_torque=before.usual_torque,
+        usual_pressure=before.usual_pressure,
     )
     added = replace(build_design(replace(then, stationary=stationary, dynamic=dynamic)), facts=facts)
     return added if added.torque.size else None

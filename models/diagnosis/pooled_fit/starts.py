@@ -1,4 +1,4 @@
-"""Where the pooled fit starts: the curves of a few states fitted one by one, and their parameters laid along the laws."""
+"""Starts of the pooled fit: the curves of a few states fitted one by one, and laws fitted through their parameters."""
 
 from itertools import product
 
@@ -46,13 +46,13 @@ def starting_laws(design: Design, frame: Frame) -> Laws:
             phi = scale * design.facts.life
             fall = falling_weight(high, frame.span, np.array([np.log(decay * frame.span), theta[LOG_CURVATURE]]))[0]
             first, second = (fall, 1 - fall) if k == RATIO else (1 - high, high)
-            found, miss = _along(
+            fresh, cost = _along(
                 first, second, progress_fraction(cycles, phi, _EXPONENT), values[:, k], deviations[:, k]
             )
-            if miss < best:
-                best = miss
+            if cost < best:
+                best = cost
                 theta[k * BLOCK : (k + 1) * BLOCK] = [
-                    *found,
+                    *fresh,
                     np.log(phi * np.expm1(np.log(2.0) / _EXPONENT)),
                     np.log(_EXPONENT),
                 ]
@@ -61,10 +61,10 @@ def starting_laws(design: Design, frame: Frame) -> Laws:
     return Laws(theta=theta, frame=frame)
 
 
-def sober(design: Design, start: Laws) -> Laws:
-    """A start beside it that trusts the curves less: fresh values near their usual size at both ends of the pressures, small
-    shares, half of them at half the life. Where curves hardly determine a parameter, the first start may lie in
-    another valley."""
+def cautious_laws(design: Design, start: Laws) -> Laws:
+    """A second start that trusts the curves' fits less: fresh values near their usual size at both ends of the
+    pressures, small shares, half of them at half the life. Where curves hardly determine a parameter, the first start
+    may lie in another valley."""
     theta = start.theta.copy()
     for k in range(4):
         block = k * BLOCK
@@ -78,25 +78,25 @@ def sober(design: Design, start: Laws) -> Laws:
 def _along(
     first: FloatArray, second: FloatArray, done: FloatArray, value: FloatArray, deviation: FloatArray
 ) -> tuple[list[float], float]:
-    """Two fresh values and their shares, by ridge regression that heeds outliers less: a curve's own
-    fit may be far off where it hardly determines a parameter."""
+    """Two fresh values and their shares, by robust ridge regression, and its cost: a curve's own fit may
+    be far off where it hardly determines a parameter."""
     columns = np.stack([first, second, first * done, second * done], axis=1)
     scale = max(float(np.median(np.abs(value))), 1e-12)
     ridge = np.diag([1e-3, 1e-3, 0.1, 0.1]) / scale
     weight = 1 / deviation
     for _ in range(_ROBUST_STEPS):
         matrix = np.concatenate([columns * weight[:, None], ridge])
-        found = np.linalg.lstsq(matrix, np.concatenate([value * weight, np.zeros(4)]), rcond=None)[0]
-        off = np.abs(value - columns @ found) / deviation
+        solution = np.linalg.lstsq(matrix, np.concatenate([value * weight, np.zeros(4)]), rcond=None)[0]
+        off = np.abs(value - columns @ solution) / deviation
         usual = max(float(np.median(off)), 0.3)
         weight = 1 / (deviation * np.sqrt(1 + (off / (2 * usual)) ** 2))
-    miss = float(np.log1p((off / (2 * usual)) ** 2).sum()) + off.size * float(np.log(usual))
-    u_1, u_2, lost_1, lost_2 = found.tolist()
+    cost = float(np.log1p((off / (2 * usual)) ** 2).sum()) + off.size * float(np.log(usual))
+    u_1, u_2, lost_1, lost_2 = solution.tolist()
     least = 1e-2 * scale
     shares = [
         float(np.clip(lost / (u if abs(u) > least else least), -1.2, 3.0)) for u, lost in ((u_1, lost_1), (u_2, lost_2))
     ]
-    return [u_1, u_2, *shares], miss
+    return [u_1, u_2, *shares], cost
 
 
 def _curve_values(design: Design) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -120,12 +120,12 @@ def _curve_values(design: Design) -> tuple[FloatArray, FloatArray, FloatArray, F
         )
         cycles.append(float(design.rows.cycles[rows[0]]))
     fits = fit_curves(curves)
-    values = np.stack([each.parameters.as_array() for each in fits])
-    deviations = np.stack([each.standard_errors for each in fits])
+    values = np.stack([curve_fit.parameters.as_array() for curve_fit in fits])
+    deviations = np.stack([curve_fit.standard_errors for curve_fit in fits])
     scale = np.maximum(np.median(np.abs(values), axis=0), 1e-9)
     cut = np.clip(values, 0.0, 10 * scale)
     return (
-        np.array([each.pressure for each in fits]),
+        np.array([curve_fit.pressure for curve_fit in fits]),
         np.array(cycles),
         cut,
         np.clip(deviations, 0.01 * scale, 30 * scale) + np.abs(values - cut),

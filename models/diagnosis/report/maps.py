@@ -1,22 +1,24 @@
-"""Where a model misses: whitened residuals over speed and pressure and over cycles, and loops beside what models say."""
+"""Maps of a model's error: whitened residuals over speed and pressure and over cycles, and loops beside what models
+predict."""
 
 import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.design.design import Design
 from models.diagnosis.design.points import IntArray
-from models.diagnosis.noise.covariance import Noise
 from models.diagnosis.pooled_fit.gauss_newton import Fit
+from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.report.report import LoopTrace, Maps
 
-#: Speeds are gathered into at most this many bins, states into as many.
+#: Speeds are gathered into at most this many bins, states into as many (resolution of a map).
 MOST_BINS = 24
 #: Loops shown: so many states by so many pressures, spread evenly.
 SHOWN = 3
 
 
-def residual_maps(design: Design, noise: Noise, baseline: Fit, extended: Fit | None) -> Maps | None:
+def residual_maps(problem: FitProblem, baseline: Fit, extended: Fit | None) -> Maps | None:
     """Means of residual over noise on plateaus (on loops where there are no plateaus) of the closed clutch; None without."""
+    design, noise = problem.design, problem.noise
     rows = np.flatnonzero(design.closed & (design.rows.steady | (design.plateaus == 0)))
     if rows.size == 0:
         return None
@@ -25,9 +27,9 @@ def residual_maps(design: Design, noise: Noise, baseline: Fit, extended: Fit | N
     speeds, of_speed = _binned(speed)
     cycles, of_cycles = _binned(design.rows.cycles[rows])
     after = baseline if extended is None else extended
-    white = [each.residual[rows] / noise.deviation[rows] for each in (baseline, after)]
-    by_speed = [_means(each, of_level, of_speed, (levels.size, speeds.size)) for each in white]
-    by_cycles = [_means(each, of_cycles, of_level, (cycles.size, levels.size)) for each in white]
+    white = [model.residual[rows] / noise.deviation[rows] for model in (baseline, after)]
+    by_speed = [_means(residual, of_level, of_speed, (levels.size, speeds.size)) for residual in white]
+    by_cycles = [_means(residual, of_cycles, of_level, (cycles.size, levels.size)) for residual in white]
     return Maps(
         pressure=levels,
         speed=speeds,

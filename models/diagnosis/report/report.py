@@ -1,22 +1,16 @@
-"""What a diagnosis says: the verdict, its causes, what was seen and where, what the extension gains, which test decides."""
+"""What a diagnosis reports: the verdict, its causes, the misfit and where it lives, what the extension gains, which test
+decides."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 
 from models.arrays import FloatArray
+from models.diagnosis.attribution.verdict import Verdict
+from models.diagnosis.detection.lack_of_fit import Misfit
 from models.diagnosis.effects.estimate import Estimate
+from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.extension import Extension
-
-
-class Verdict(StrEnum):
-    """The honest answers: nothing beyond noise, these causes, one of these, something else, too little data."""
-
-    MODEL_ADEQUATE = "model_adequate"
-    CAUSE_NAMED = "cause_named"
-    CAUSE_AMBIGUOUS = "cause_ambiguous"
-    UNEXPLAINED_STRUCTURE = "unexplained_structure"
-    INSUFFICIENT_DATA = "insufficient_data"
+from models.diagnosis.validation.held_out import Gain
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,61 +24,6 @@ class Candidate:
     log_evidence_gain: float
     estimate: Estimate
     beside: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Where:
-    """An axis on which structure lives: public channel name or `test_clock_s`, `cycles`, `loop_phase`; strength in nats."""
-
-    axis: str
-    strength: float
-    p_value: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Misfit:
-    """How well a model fits: rmse and noise [Nm], the share of the variance beyond noise, and where it lives."""
-
-    rmse: float
-    noise: float
-    unexplained_share: float
-    where: tuple[Where, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Gain:
-    """What the extension gains on runs held out by state and by pressure; rmse [Nm], log score [nats].
-
-    `reduction_sd` [%] is the paired uncertainty of `reduction_percent`. `excess` [Nm] is the error beyond noise. MSE is
-    eq. 5's percentage. `remaining` tells whether the extension also helps to foretell the last states from the first ones:
-    log score gained there [nats].
-    """
-
-    held_out_runs: tuple[str, ...]
-    rmse_before: float
-    rmse_after: float
-    reduction_percent: float
-    reduction_sd: float
-    excess_before: float
-    excess_after: float
-    mse_percent_before: float
-    mse_percent_after: float
-    log_score_gain: float
-    remaining: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Advice:
-    """A test that would decide between two effects (or between an effect and none, then `other` is "baseline").
-
-    `key` names the test for machines (`experiments.candidates.TRIALS`), `nats` is what it is expected to bring.
-    """
-
-    key: str
-    test: str
-    effect: str
-    other: str
-    nats: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

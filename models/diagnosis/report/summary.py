@@ -1,52 +1,47 @@
-"""The paragraph that an engineer would sign: what was looked at, what is wrong, why this cause, what to do next."""
+"""The paragraph that an engineer would sign: what was measured, what is wrong, why this cause, what to do next."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from models.diagnosis.attribution.decide import LEAST_NAMED
+from models.diagnosis.attribution.verdict import Verdict
+from models.diagnosis.criteria import (
+    COMPANION_FROM,
+    FEW_STATES,
+    LARGE_AMPLITUDE,
+    LEAST_NAMED,
+    RIVAL_BELOW,
+    RIVAL_FROM,
+    RIVALS_MENTIONED,
+    VISIBLE_MENTIONED,
+    WEAK_EVIDENCE,
+    WORTHWHILE,
+)
+from models.diagnosis.detection.lack_of_fit import Misfit
+from models.diagnosis.detection.structure_axes import Where
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.estimate import Estimate
-from models.diagnosis.experiments.test_plan import WORTH
-from models.diagnosis.report.report import Advice, Candidate, Gain, Misfit, Verdict, Visible, Where
+from models.diagnosis.experiments.test_plan import BASELINE, Advice
+from models.diagnosis.report.report import Candidate, Visible
+from models.diagnosis.report.wording import (
+    axis_name,
+    conjunction,
+    count_of,
+    effect_name,
+    estimated,
+    evidence_in_words,
+    number,
+    probability,
+    with_unit,
+)
+from models.diagnosis.validation.held_out import Gain
 
-#: Rivals that are spoken of and between which probabilities, effects whose visible amplitude is told.
-_SPOKEN, _RIVAL, _OPEN, _TOLD = 3, 0.001, 0.1, 3
-#: What was fitted beside a cause and not named is told from this probability on.
-_COMPANION = 0.3
-#: An effect beyond so many deviations of its prior is stronger than one would expect.
-_STRONG = 2.0
-#: Fewer states say little of a course over life.
-_COURSE = 3
-#: A share [%] below which its size is not told.
-_LEAST_PERCENT = 0.1
-#: Digits after the point at most.
-_DIGITS = 5
-
-#: What a negative amplitude of an effect means where its physics has another way in mind.
-_OTHERWISE = {
-    "channel_delay": "Torque is ahead of the speed: it is the speed's channel that a filter or the recorder delays."
-}
-#: More evidence than this [nats] decides as well; less than that is none.
-_PLENTY, _LEAST_NATS = 100.0, 1.0
-
-_AXES = {
-    "pressure_bar": "pressure",
-    "torque_nm": "the torque itself",
-    "speed_rpm": "speed",
-    "cycles": "cycles",
-    "test_clock_s": "the time since the test began",
-    "oil_temperature_c": "oil temperature",
-    "loop_phase": "the phase of the loops",
-    "acceleration": "the sign of the acceleration",
-    "frequency_hz": "frequency, in the raw records",
-    "noise": "the scatter itself",
-}
+#: A share [%] below which its size is not given, and axes of structure that are mentioned at most.
+_LEAST_PERCENT, _AXES_MENTIONED = 0.1, 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Findings:
-    """What a report says, before its paragraph."""
+    """What a report says, before its paragraph; `resembles` is the uncatalogued rig fault that does about as well as the
+    best effect, `scatter` [-] that of the runs' gains."""
 
     verdict: Verdict
     causes: tuple[str, ...]
@@ -59,111 +54,116 @@ class Findings:
     notes: tuple[str, ...]
     tests: int
     states: int
-    looks: str = ""  # what is not in the catalogue and does as well
-    scatter: float = 0.0  # of the runs' gains [-]
+    resembles: str = ""
+    scatter: float = 0.0
 
 
-def summarise(found: Findings) -> str:
+def summarise(findings: Findings) -> str:
     """Sentences, in the order in which one would ask."""
-    tell = {
+    sentences = {
         Verdict.MODEL_ADEQUATE: _adequate,
         Verdict.CAUSE_NAMED: _named,
         Verdict.CAUSE_AMBIGUOUS: _ambiguous,
         Verdict.UNEXPLAINED_STRUCTURE: _unexplained,
         Verdict.INSUFFICIENT_DATA: _insufficient,
-    }[found.verdict]
-    fitted = "was fitted" if found.tests == 1 else "were fitted at once"
-    seen = f"{_count(found.tests, 'test')} at {_count(found.states, 'state')} of use {fitted}."
-    parts = [seen, *tell(found), *_gained(found), *_next(found), *_noted(found.notes)]
+    }[findings.verdict](findings)
+    fitted = "was fitted" if findings.tests == 1 else "were fitted at once"
+    data = f"{count_of(findings.tests, 'test')} at {count_of(findings.states, 'state')} of use {fitted}."
+    parts = [data, *sentences, *_gained(findings), *_next(findings), *_noted(findings.notes)]
     return " ".join(part for part in parts if part)
 
 
-def _adequate(found: Findings) -> list[str]:
-    noise = "" if found.baseline is None else f" of {_number(found.baseline.noise)} Nm"
-    scatter = f" ({_number(100 * found.scatter)} % of the torque)" if found.scatter > 0 else ""
+def _adequate(findings: Findings) -> list[str]:
+    noise = "" if findings.baseline is None else f" of {number(findings.baseline.noise)} Nm"
+    scatter = f" ({number(100 * findings.scatter)} % of the torque)" if findings.scatter > 0 else ""
     parts = [
-        f"Nothing stands out of the noise{noise} and the scatter from run to run{scatter}: the model is adequate for these "
-        "data."
+        f"Nothing exceeds the noise{noise} and the scatter from run to run{scatter}: the model is adequate for these data."
     ]
-    told = [each for each in found.visible if each.effect in BY_SLUG and _within_reach(each, each.amplitude)]
-    if told:
-        seen = "; ".join(_seen_from(each) for each in told[:_TOLD])
-        parts.append(f"These data would have shown, nine times in ten and each in its middle form: {seen}.")
-    hidden = [each.effect for each in found.visible if each.effect in BY_SLUG and not _within_reach(each, each.least)]
+    catalogued = [visible for visible in findings.visible if visible.effect in BY_SLUG]
+    shown = [visible for visible in catalogued if _within_reach(visible, visible.amplitude)]
+    if shown:
+        sizes = "; ".join(_detectable(visible) for visible in shown[:VISIBLE_MENTIONED])
+        parts.append(f"These data would have shown, with 90 % power and in the middle one of its forms: {sizes}.")
+    hidden = [visible.effect for visible in catalogued if not _within_reach(visible, visible.least)]
     if hidden:
-        parts.append(f"Even a strong effect would have stayed hidden behind the baseline for: {_listed(hidden)}.")
-    if found.states < _COURSE:
-        parts.append(f"Of a course over life {_count(found.states, 'state')} of use can say little.")
+        names = conjunction([effect_name(slug) for slug in hidden])
+        parts.append(f"Even a large effect would be absorbed by the baseline for: {names}.")
+    if findings.states < FEW_STATES:
+        say = "says" if findings.states == 1 else "say"
+        parts.append(f"{count_of(findings.states, 'state')} of use {say} little about a course over life.")
     return parts
 
 
 def _within_reach(visible: Visible, amplitude: float) -> bool:
-    return amplitude <= _STRONG * visible.usual
+    return amplitude <= LARGE_AMPLITUDE * visible.usual
 
 
-def _seen_from(visible: Visible) -> str:
-    unit = "" if visible.unit in {"-", ""} else f" {visible.unit}"
-    return f"{_name(visible.effect)} ({BY_SLUG[visible.effect].amplitude}) from {_number(visible.amplitude)}{unit} on"
+def _detectable(visible: Visible) -> str:
+    size = with_unit(number(visible.amplitude), visible.unit)
+    return f"{effect_name(visible.effect)} ({BY_SLUG[visible.effect].amplitude}) from {size}"
 
 
-def _named(found: Findings) -> list[str]:
-    chosen = [each for each in found.candidates if each.effect in found.causes]
-    several = len(found.causes) > 1
-    causes = " together with ".join(_name(slug) for slug in found.causes)
-    parts = [_misses(found), f"The cause{'s are' if several else ' is'} {causes}."]
-    parts += [f"{_physics(each)} Here: {_estimate(each.estimate)}." for each in chosen]
-    second = [
-        each for each in found.candidates if each.effect not in found.causes and set(each.beside) & set(found.causes)
+def _named(findings: Findings) -> list[str]:
+    causes = set(findings.causes)
+    chosen = [candidate for candidate in findings.candidates if candidate.effect in causes]
+    others = [candidate for candidate in findings.candidates if candidate.effect not in causes]
+    names = " together with ".join(effect_name(slug) for slug in findings.causes)
+    parts = [_error(findings), f"The cause{'s are' if len(findings.causes) > 1 else ' is'} {names}."]
+    parts += [f"{_physics(candidate)} Here: {estimated(candidate.estimate)}." for candidate in chosen]
+    companions = [
+        f"{effect_name(candidate.effect)} (probability {probability(candidate.probability)})"
+        for candidate in others
+        if set(candidate.beside) & causes and candidate.probability >= COMPANION_FROM
     ]
-    second = [each for each in second if each.probability >= _COMPANION]
-    if second:
-        told = [f"{_name(each.effect)} (probability {_probability(each.probability)})" for each in second]
-        parts.append(f"Something else may be at work beside it, which these data do not tell: {' or '.join(told)}.")
-    best = max((each.log_evidence_gain for each in chosen), default=0.0)
+    if companions:
+        parts.append(
+            f"Another effect may be at work beside it, which these data do not confirm: {' or '.join(companions)}."
+        )
+    best = max((candidate.log_evidence_gain for candidate in chosen), default=0.0)
     rivals = [
-        each  # one that is as good or was fitted with the cause stood beside it, not against it
-        for each in found.candidates
-        if each.effect not in found.causes
-        and _RIVAL < each.probability < _OPEN
-        and each.log_evidence_gain < best - 1.0
-        and not set(each.beside) & set(found.causes)
+        f"{evidence_in_words(best - candidate.log_evidence_gain)} over {effect_name(candidate.effect)}"
+        for candidate in others
+        if RIVAL_FROM < candidate.probability < RIVAL_BELOW
+        and candidate.log_evidence_gain < best - WEAK_EVIDENCE
+        and not set(candidate.beside) & causes  # it was fitted with the cause, not against it
     ]
     if rivals and chosen:
-        told = [f"{_name(each.effect)} by {_number(best - each.log_evidence_gain)} nats" for each in rivals[:_SPOKEN]]
-        parts.append(f"Refitted with everything else free, that explains the data better than {_and(told)}.")
+        parts.append(f"With everything else refitted, the evidence for it is {conjunction(rivals[:RIVALS_MENTIONED])}.")
     return parts
 
 
-def _ambiguous(found: Findings) -> list[str]:
-    known = {each.effect: each for each in found.candidates}
-    told = []
-    for slug in sorted(found.causes, key=lambda slug: -known[slug].probability if slug in known else 0.0):
-        each = known.get(slug)
-        if each is not None and each.estimate.value != 0.0:
-            told.append(f"{_name(slug)} (probability {_probability(each.probability)}; {_estimate(each.estimate)})")
+def _ambiguous(findings: Findings) -> list[str]:
+    candidates = {candidate.effect: candidate for candidate in findings.candidates}
+    sized = {slug: candidate for slug, candidate in candidates.items() if candidate.estimate.value != 0.0}
+    causes = []
+    for slug in sorted(findings.causes, key=lambda slug: -candidates[slug].probability if slug in candidates else 0.0):
+        if slug in sized:
+            chance, size = probability(sized[slug].probability), estimated(sized[slug].estimate)
+            causes.append(f"{effect_name(slug)} (probability {chance}; {size})")
         else:
-            told.append(f"{_name(slug)} (not measured, so it cannot be excluded)")
-    sure = [each.effect for each in known.values() if each.probability >= LEAST_NAMED and each.estimate.value != 0.0]
-    if set(found.causes) <= set(sure):
-        left = "what that leaves is not quite noise, or parts of the data ask for other sizes"
+            causes.append(f"{effect_name(slug)} (not measured, so it cannot be excluded)")
+    sure = {slug for slug, candidate in sized.items() if candidate.probability >= LEAST_NAMED}
+    if set(findings.causes) <= sure:
+        left = "what that leaves is not quite noise, or parts of the data ask for different sizes"
         return [
-            _misses(found),
-            f"It looks like {' together with '.join(told)}, but {left}: something else may be at work too.",
+            _error(findings),
+            f"It looks like {' together with '.join(causes)}, but {left}: something else may be at work too.",
         ]
-    if len(told) == 1:
-        such = f", such as {found.looks}" if found.looks else ""
-        return [_misses(found), f"The cause may be {told[0]}, or something that the catalogue does not hold{such}."]
-    none = f" It may be none of them: {found.looks} would do as well." if found.looks else ""
-    which = "These data cannot tell which of these is the cause, the likeliest first"
-    return [_misses(found), f"{which}: {', '.join(told)}.{none}"]
+    if len(causes) == 1:
+        such = f", such as {findings.resembles}" if findings.resembles else ""
+        return [_error(findings), f"The cause may be {causes[0]}, or something that is not in the catalogue{such}."]
+    none = f" It may be none of them: {findings.resembles} would fit as well." if findings.resembles else ""
+    which = "These data cannot distinguish which of these is the cause, the most probable first"
+    return [_error(findings), f"{which}: {', '.join(causes)}.{none}"]
 
 
-def _unexplained(found: Findings) -> list[str]:
+def _unexplained(findings: Findings) -> list[str]:
     return [
-        _misses(found),
-        "No effect of the catalogue accounts for it, alone or with another: something beyond noise would be left, parts of "
-        "the data would ask for different sizes of the effect, or two would have to undo each other. So no cause is named.",
-        f"It looks most like {found.looks}." if found.looks else "",
+        _error(findings),
+        "No effect of the catalogue explains it, alone or with another: structure beyond noise would be left, parts of the "
+        "data would ask for different sizes of the effect, or two effects would have to cancel each other. So no cause is "
+        "named.",
+        f"It most resembles {findings.resembles}." if findings.resembles else "",
     ]
 
 
@@ -171,128 +171,82 @@ def _insufficient(_: Findings) -> list[str]:
     return ["That is too little to judge the model by."]
 
 
-def _misses(found: Findings) -> str:
-    if found.baseline is None:
+def _error(findings: Findings) -> str:
+    """The baseline's error, and where it lives."""
+    misfit = findings.baseline
+    if misfit is None:
         return ""
-    percent = 100 * found.baseline.unexplained_share
-    share = f"{'less than 0.1' if percent < _LEAST_PERCENT else _number(percent)} % of the squared residual"
-    where = _axes(found.baseline.where)
-    if found.baseline.rmse <= found.baseline.noise:
-        return (
-            f"The baseline misses the data by {_number(found.baseline.rmse)} Nm, no more than noise alone would, but not by "
-            f"chance: what it misses goes together{where}."
-        )
-    return (
-        f"The baseline misses the data by {_number(found.baseline.rmse)} Nm where noise alone would make "
-        f"{_number(found.baseline.noise)} Nm; {share} is structure{where}."
-    )
+    error = f"The baseline model's error is {number(misfit.rmse)} Nm RMS"
+    where = _axes(misfit.where)
+    if misfit.rmse <= misfit.noise:
+        along = f" along {where}" if where else ""
+        return f"{error}, no more than noise alone, but its residuals are not random: they are correlated{along}."
+    percent = 100 * misfit.unexplained_share
+    share = f"{'less than 0.1' if percent < _LEAST_PERCENT else number(percent)} % of the squared residual"
+    lives = f" and lives on {where}" if where else ""
+    return f"{error} (noise alone: {number(misfit.noise)} Nm); {share} is structure{lives}."
 
 
 def _axes(where: Sequence[Where]) -> str:
-    told = [_AXES.get(each.axis, each.axis) for each in where[:2] if each.strength > 0]
-    return f", which lives on {' and '.join(told)}" if told else ""
+    return " and ".join(axis_name(axis.axis) for axis in where[:_AXES_MENTIONED] if axis.strength > 0)
 
 
-def _gained(found: Findings) -> list[str]:
-    gain = found.gain
-    if gain is None or found.verdict in {Verdict.MODEL_ADEQUATE, Verdict.INSUFFICIENT_DATA}:
+def _gained(findings: Findings) -> list[str]:
+    gain = findings.gain
+    if gain is None or findings.verdict in {Verdict.MODEL_ADEQUATE, Verdict.INSUFFICIENT_DATA}:
         return []
     change = f"{abs(gain.reduction_percent):.1f} ± {gain.reduction_sd:.1f} %"
     way = "less" if gain.reduction_percent >= 0 else "more"
     model = {
-        Verdict.CAUSE_AMBIGUOUS: "the model extended by the likeliest that could be fitted",
+        Verdict.CAUSE_AMBIGUOUS: "the model extended by the most probable cause that could be fitted",
         Verdict.UNEXPLAINED_STRUCTURE: "the model with a smooth correction",
-    }.get(found.verdict, "the extended model")
-    beyond = f"; the part beyond noise is {_number(gain.excess_after)} Nm against {_number(gain.excess_before)} Nm"
-    told = (
-        f"On runs that were held out, {model} misses by {_number(gain.rmse_after)} Nm against "
-        f"{_number(gain.rmse_before)} Nm ({change} {way}), noise and gains that scatter included"
+    }.get(findings.verdict, "the extended model")
+    beyond = f"; the part beyond noise is {number(gain.excess_after)} Nm against {number(gain.excess_before)} Nm"
+    error = (
+        f"On runs that were held out, the error of {model} is {number(gain.rmse_after)} Nm against "
+        f"{number(gain.rmse_before)} Nm RMS ({change} {way}), noise and the scatter of gains included"
         f"{beyond if max(gain.excess_after, gain.excess_before) > 0 else ''}."
     )
     if gain.rmse_after > gain.rmse_before and gain.log_score_gain < 0:
-        told += " So it is of no use there."
+        error += " So it does not improve predictions there."
     ahead = (
-        f"It {'also foretells' if gain.reduction_percent > 0 else 'foretells'} the last states better from the first ones."
-        if gain.remaining > 0
-        else "It foretells the last states from the first ones no better: for remaining life it is no gain."
+        f"It {'also predicts' if gain.reduction_percent > 0 else 'predicts'} the last states better from the first ones."
+        if gain.forecast_log_score_gain > 0
+        else "It predicts the last states from the first ones no better: it does not improve remaining life."
     )
-    return [told, ahead]
+    return [error, ahead]
 
 
-def _next(found: Findings) -> list[str]:
-    if not found.advice or found.verdict not in {Verdict.CAUSE_NAMED, Verdict.CAUSE_AMBIGUOUS}:
+def _next(findings: Findings) -> list[str]:
+    if not findings.advice or findings.verdict not in {Verdict.CAUSE_NAMED, Verdict.CAUSE_AMBIGUOUS}:
         return []
-    best = found.advice[0]
-    nats = f"about {_number(best.nats)} nats" if best.nats <= _PLENTY else f"more than {_number(_PLENTY)} nats"
-    pair = f"{_name(best.effect)} and {_name(best.other)}"
-    if best.other == "baseline":
-        pair = f"{_name(best.effect)} and nothing at all"
-    if best.nats < _LEAST_NATS:
-        return ["No test that was considered would tell more."]
-    if best.nats < WORTH:
-        return [f"No single test would decide; the most telling is: {best.test} ({nats} between {pair})."]
-    if best.other == "baseline":
-        return [f"To confirm it: {best.test}. That would add {nats} for or against it."]
-    return [f"What would decide: {best.test}. It would part {pair} by {nats}."]
+    best = findings.advice[0]
+    evidence = f"{evidence_in_words(best.nats)} evidence"
+    other = "no effect at all" if best.other == BASELINE else effect_name(best.other)
+    pair = f"{effect_name(best.effect)} and {other}"
+    if best.nats < WEAK_EVIDENCE:
+        return ["No test that was considered would add evidence."]
+    if best.nats < WORTHWHILE:
+        return [f"No single test would decide; the most informative is: {best.test} ({evidence} between {pair})."]
+    if best.other == BASELINE:
+        return [f"To confirm it: {best.test}. That would give {evidence} on whether it is the cause."]
+    return [f"What would decide: {best.test}. It would give {evidence} between {pair}."]
 
 
 def _noted(notes: Sequence[str]) -> list[str]:
     """Notes on the whole campaign, as sentences; those on single runs, which begin with its name, are counted."""
     single = [note for note in notes if " " not in note.split(":")[0] and ":" in note and not _on_effect(note)]
-    told = [note if note.endswith(".") else f"{note}." for note in notes if note not in single]
-    told = [note[0].upper() + note[1:].replace("_", " ") if _on_effect(note) else note for note in told]
-    stand = "stands" if len(single) == 1 else "stand"
-    return [*told, f"{_count(len(single), 'note')} on single runs {stand} in the report."] if single else told
+    whole = [note if note.endswith(".") else f"{note}." for note in notes if note not in single]
+    whole = [note[0].upper() + note[1:].replace("_", " ") if _on_effect(note) else note for note in whole]
+    return [*whole, f"The report has {count_of(len(single), 'note')} on single runs."] if single else whole
 
 
 def _on_effect(note: str) -> bool:
     return note.split(":")[0] in BY_SLUG
 
 
-def _name(slug: str) -> str:
-    return slug.replace("_", " ")
-
-
 def _physics(candidate: Candidate) -> str:
-    if candidate.estimate.value < 0 and candidate.effect in _OTHERWISE:
-        return _OTHERWISE[candidate.effect]
-    return BY_SLUG[candidate.effect].physics if candidate.effect in BY_SLUG else ""
-
-
-def _listed(slugs: Sequence[str]) -> str:
-    return _and([_name(slug) for slug in slugs])
-
-
-def _and(parts: Sequence[str]) -> str:
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"
-
-
-def _probability(value: float) -> str:
-    return "above 0.99" if value > 0.99 else "below 0.01" if value < 0.01 else f"{value:.2f}"
-
-
-def _estimate(estimate: Estimate) -> str:
-    """Value and deviation to the deviation's second digit."""
-    unit = "" if estimate.unit in {"-", ""} else f" {estimate.unit}"
-    if not estimate.sd > 0:
-        return f"{estimate.name} {_number(estimate.value)}{unit}"
-    digits = max(0, 1 - math.floor(math.log10(estimate.sd)))
-    if digits > _DIGITS:
-        return f"{estimate.name} {_number(estimate.value)} ± {_number(estimate.sd)}{unit}"
-    return f"{estimate.name} {_signed(f'{estimate.value:.{digits}f}')} ± {estimate.sd:.{digits}f}{unit}"
-
-
-def _number(value: float) -> str:
-    """Three digits, without an exponent where that is readable."""
-    if 100 <= abs(value) < 1e6:
-        return _signed(f"{value:,.0f}")
-    return _signed(f"{value:.3g}") if value == 0 or 1e-3 <= abs(value) < 100 else f"{value:.2e}"
-
-
-def _signed(number: str) -> str:
-    """With a minus that is no hyphen."""
-    return number.replace("-", "−")
+    if candidate.effect not in BY_SLUG:
+        return ""
+    effect = BY_SLUG[candidate.effect]
+    return effect.opposite_physics if candidate.estimate.value < 0 and effect.opposite_physics else effect.physics

@@ -1,13 +1,13 @@
-"""What an extension gains on runs that it has not seen: left out by state and by pressure, never by row.
+"""What an extension gains on held-out runs: left out by state and by pressure, never by row.
 
-Baseline and extended model are refitted without the rows of a fold and foretell them. A fold is some of the states, some
-of the pressures, or the last states (what would have been foretold of them from the first ones). The log score is that of
-the held-out rows under the noise, gains of whole runs and curves included; its gain is the difference [nats]. States ahead
-are foretold with the uncertainty of the parameters,
+Baseline and extended model are refitted without the rows of a fold and predict them. A fold is some of the states, some of
+the pressures, or the last states (predicted from the first ones). The log score is that of the held-out rows under the
+noise, gains of whole runs and curves included; its gain is the difference [nats]. The last states are predicted with the
+uncertainty of the parameters,
 
     r ~ N(0, V + J P⁻¹ Jᵀ),     P = Jᵀ V⁻¹ J over the rows before, priors included,
 
-for there a model that extrapolates boldly must not be taken for a better one.
+so that a model that extrapolates boldly is not taken for a better one.
 """
 
 from dataclasses import dataclass, replace
@@ -17,16 +17,23 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import KAPPA, Laws
+from models.diagnosis.criteria import (
+    FEWEST_PRESSURES_HELD_OUT,
+    FEWEST_STATES_AHEAD,
+    FEWEST_STATES_HELD_OUT,
+    FORWARD_SHARE,
+    PRESSURE_FOLDS,
+    STATE_FOLDS,
+)
 from models.diagnosis.design.design import Design
+from models.diagnosis.effects.fitted_effect import effect_columns, effect_precisions
 from models.diagnosis.noise.covariance import Noise, gains_of, whitened, without_gains
-from models.diagnosis.pooled_fit.gauss_newton import Fit, Priors, effect_columns, effect_precisions, fit
-from models.diagnosis.report.report import Gain
+from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
+from models.diagnosis.pooled_fit.problem import FitProblem
 
-#: Folds of states and of pressures, and the share of the states that are foretold from those before.
-STATE_FOLDS, PRESSURE_FOLDS, FORWARD_SHARE = 3, 2, 1 / 3
 #: Rows left out weigh as if their noise were so many times what it is.
 _LEFT_OUT = 1e6
-#: Gauss-Newton steps from the fit to all rows: enough to forget the rows that are held out.
+#: Gauss-Newton steps from the fit to all rows: enough that nothing of the held-out rows is left in the fit.
 _STEPS = 12
 _RESAMPLES = 400
 
@@ -34,8 +41,30 @@ BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Gain:
+    """What the extension gains on runs held out by state and by pressure; rmse [Nm], log score [nats].
+
+    `reduction_sd` [%] is the paired uncertainty of `reduction_percent`. `excess` [Nm] is the error beyond noise. MSE is
+    eq. 5's percentage. `forecast_log_score_gain` [nats] is the gain of log score when the last states are predicted from the
+    first ones.
+    """
+
+    held_out_runs: tuple[str, ...]
+    rmse_before: float
+    rmse_after: float
+    reduction_percent: float
+    reduction_sd: float
+    excess_before: float
+    excess_after: float
+    mse_percent_before: float
+    mse_percent_after: float
+    log_score_gain: float
+    forecast_log_score_gain: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Held:
-    """Rows [h] that were held out once, and what either model missed them by [h] Nm; the log score gained."""
+    """Rows [h] that were held out once, the error of either model there [h] Nm, and the log score gained."""
 
     rows: NDArray[np.intp]
     before: FloatArray
@@ -43,21 +72,19 @@ class _Held:
     score: float
 
 
-def measure_gain(
-    design: Design, noise: Noise, priors: Priors, baseline: Fit, extended: Fit, rng: np.random.Generator
-) -> Gain | None:
+def measure_gain(problem: FitProblem, baseline: Fit, extended: Fit, rng: np.random.Generator) -> Gain | None:
     """The gain of an extended model over the baseline, or None where there are too few states and pressures to leave out."""
-    folds = _folds(design)
-    held = [_held(design, noise, priors, baseline, extended, fold) for fold in folds]
+    design, noise = problem.design, problem.noise
+    held = [_held(problem, baseline, extended, fold) for fold in _folds(design)]
     ahead = _ahead(design)
-    remaining = 0.0
+    forecast = 0.0
     if ahead is not None:
-        scores = [_foretold(design, noise, priors, model, ahead) for model in (baseline, extended)]
-        remaining = scores[1] - scores[0]
+        scores = [_forecast_score(problem, model, ahead) for model in (baseline, extended)]
+        forecast = scores[1] - scores[0]
     if not held:
         return None
-    rows = np.concatenate([each.rows for each in held])
-    before, after = (np.concatenate([getattr(each, name) for each in held]) for name in ("before", "after"))
+    rows = np.concatenate([fold.rows for fold in held])
+    before, after = (np.concatenate([getattr(fold, name) for fold in held]) for name in ("before", "after"))
     reduction, spread = _reduction(design.curve[rows], before, after, rng)
     scatter = (noise.run_gain**2 + noise.curve_gain**2) * design.torque[rows] ** 2
     floor = float(np.mean(noise.deviation[rows] ** 2 + scatter))
@@ -72,20 +99,20 @@ def measure_gain(
         excess_after=_beyond(after, floor),
         mse_percent_before=100 * float(np.mean(before**2)) / max(total, 1e-300),
         mse_percent_after=100 * float(np.mean(after**2)) / max(total, 1e-300),
-        log_score_gain=sum(each.score for each in held) * design.torque.size / rows.size,
-        remaining=remaining,
+        log_score_gain=sum(fold.score for fold in held) * design.torque.size / rows.size,
+        forecast_log_score_gain=forecast,
     )
 
 
 def _folds(design: Design) -> list[BoolArray]:
     folds = []
-    # readings of the open clutch hold no friction to foretell: they are never left out
+    # readings of the open clutch hold no friction to predict: they are never left out
     states, levels = np.unique(design.rows.cycles[design.closed]), design.levels
-    if states.size >= 3:
+    if states.size >= FEWEST_STATES_HELD_OUT:
         inner = min(STATE_FOLDS, states.size)
         # neighbouring states go into different folds
         folds += [design.closed & np.isin(design.rows.cycles, states[start::inner]) for start in range(inner)]
-    if levels.size >= 4:
+    if levels.size >= FEWEST_PRESSURES_HELD_OUT:
         folds += [np.isin(design.level, levels[1:][start::PRESSURE_FOLDS]) for start in range(PRESSURE_FOLDS)]
     return folds
 
@@ -93,7 +120,7 @@ def _folds(design: Design) -> list[BoolArray]:
 def _ahead(design: Design) -> BoolArray | None:
     states = np.unique(design.rows.cycles[design.closed])
     count = max(1, round(FORWARD_SHARE * states.size))
-    return design.closed & (design.rows.cycles >= states[-count]) if states.size >= 4 else None
+    return design.closed & (design.rows.cycles >= states[-count]) if states.size >= FEWEST_STATES_AHEAD else None
 
 
 def _without(noise: Noise, out: BoolArray) -> Noise:
@@ -106,20 +133,21 @@ def _white(columns: FloatArray, design: Design, noise: Noise) -> FloatArray:
     return without_gains(whitened(columns, design, noise), gains, noise.run_gain, noise.curve_gain)
 
 
-def _foretold(design: Design, noise: Noise, priors: Priors, model: Fit, out: BoolArray) -> float:
+def _forecast_score(problem: FitProblem, model: Fit, out: BoolArray) -> float:
     """The log score [nats] of rows that are held out, the uncertainty of what was fitted to the others included."""
+    design, noise, priors = problem.design, problem.noise, problem.priors
     before = _without(noise, out)
-    found = fit(design, before, model.laws, priors, model.effects, steps=_STEPS)
-    own = [effect_columns(design, found.prediction, each) for each in found.effects]
-    jacobian = np.concatenate([found.prediction.jacobian(design)[:, priors.free], *own], axis=1)
-    seen = _white(jacobian, design, before)
-    told = _white(np.column_stack([jacobian, found.residual]), design, _without(noise, ~out))
-    precision = seen.T @ seen
+    refit = fit(problem.with_noise(before), model.laws, model.effects, steps=_STEPS)
+    own = [effect_columns(design, refit.prediction, effect) for effect in refit.effects]
+    jacobian = np.concatenate([refit.prediction.jacobian(design)[:, priors.free], *own], axis=1)
+    fitted = _white(jacobian, design, before)
+    held = _white(np.column_stack([jacobian, refit.residual]), design, _without(noise, ~out))
+    precision = fitted.T @ fitted
     rows = priors.rows[:, priors.free]
     precision[: rows.shape[1], : rows.shape[1]] += rows.T @ rows
-    weak = np.concatenate([np.zeros(rows.shape[1]), *(effect_precisions(each) for each in found.effects)])
+    weak = np.concatenate([np.zeros(rows.shape[1]), *(effect_precisions(effect) for effect in refit.effects)])
     precision[np.diag_indices_from(precision)] += weak + 1e-12 * np.diag(precision)
-    columns, residual = told[:, :-1], told[:, -1]
+    columns, residual = held[:, :-1], held[:, -1]
     scale = 1 / np.sqrt(np.diag(precision))
     inner = (precision + columns.T @ columns) * scale[:, None] * scale
     along = (columns.T @ residual) * scale
@@ -128,29 +156,29 @@ def _foretold(design: Design, noise: Noise, priors: Priors, model: Fit, out: Boo
     return -0.5 * (quadratic + logdet)
 
 
-def _held(design: Design, noise: Noise, priors: Priors, baseline: Fit, extended: Fit, out: BoolArray) -> _Held:
-    masked = _without(noise, out)
-    missed = []
+def _held(problem: FitProblem, baseline: Fit, extended: Fit, out: BoolArray) -> _Held:
+    masked = problem.with_noise(_without(problem.noise, out))
+    errors = []
     for model in (baseline, extended):
-        found = fit(design, masked, model.laws, priors, model.effects, steps=_STEPS)
-        bridged = _bridged(found.laws, design, out)
-        if bridged is not found.laws:
-            found = fit(design, masked, bridged, priors, found.effects, steps=0)
-        missed.append(np.where(out, found.residual, 0.0))
-    squares = np.square(_white(np.stack(missed, axis=1), design, noise)).sum(axis=0)
+        refit = fit(masked, model.laws, model.effects, steps=_STEPS)
+        bridged = _bridged(refit.laws, problem.design, out)
+        if bridged is not refit.laws:
+            refit = fit(masked, bridged, refit.effects, steps=0)
+        errors.append(np.where(out, refit.residual, 0.0))
+    squares = np.square(_white(np.stack(errors, axis=1), problem.design, problem.noise)).sum(axis=0)
     rows = np.flatnonzero(out)
-    return _Held(rows=rows, before=missed[0][rows], after=missed[1][rows], score=0.5 * float(squares[0] - squares[1]))
+    return _Held(rows=rows, before=errors[0][rows], after=errors[1][rows], score=0.5 * float(squares[0] - squares[1]))
 
 
 def _bridged(laws: Laws, design: Design, out: BoolArray) -> Laws:
     """With C at pressures whose loops were all held out taken from the pressures beside them (log C linear between)."""
     nodes = laws.frame.loop_pressures
     looping = ~design.rows.steady
-    known = np.isin(nodes, np.unique(design.level[looping & ~out]))
-    if known.all() or not known.any():
+    kept = np.isin(nodes, np.unique(design.level[looping & ~out]))
+    if kept.all() or not kept.any():
         return laws
     theta = laws.theta.copy()
-    theta[KAPPA] = np.interp(nodes, nodes[known], theta[KAPPA][known])
+    theta[KAPPA] = np.interp(nodes, nodes[kept], theta[KAPPA][kept])
     return replace(laws, theta=theta)
 
 
@@ -159,16 +187,16 @@ def _reduction(
 ) -> tuple[float, float]:
     """By how much the RMSE falls [%], and its deviation: whole curves are drawn anew, both models on the same ones."""
     _, index = np.unique(curve, return_inverse=True)
-    sums = np.stack([np.bincount(index, weights=each**2) for each in (before, after)])
+    sums = np.stack([np.bincount(index, weights=errors**2) for errors in (before, after)])
     drawn = rng.integers(sums.shape[1], size=(_RESAMPLES, sums.shape[1]))
     again = sums[:, drawn].sum(axis=2)
     reductions = 100 * (1 - np.sqrt(again[1] / np.maximum(again[0], 1e-300)))
     return 100 * (1 - _rms(after) / max(_rms(before), 1e-300)), float(np.std(reductions))
 
 
-def _rms(missed: FloatArray) -> float:
-    return float(np.sqrt(np.mean(missed**2)))
+def _rms(errors: FloatArray) -> float:
+    return float(np.sqrt(np.mean(errors**2)))
 
 
-def _beyond(missed: FloatArray, floor: float) -> float:
-    return float(np.sqrt(max(float(np.mean(missed**2)) - floor, 0.0)))
+def _beyond(errors: FloatArray, floor: float) -> float:
+    return float(np.sqrt(max(float(np.mean(errors**2)) - floor, 0.0)))

@@ -1,9 +1,9 @@
-"""Structure without a name: a smooth discrepancy on the axes on which it was seen.
+"""Structure without a name: a smooth correction on the axes on which it lives.
 
     δ(x) = S(v; p, ζ) Σ_k a_k φ_k(x),     a_k ~ N(0, (τ/(1 + k/3))²),     φ_k cosines over the range of each axis
 
-τ is the one that the data find most probable. It fills in between measurements inside the data's range; beyond it the last
-value stands, and nothing of it is followed into the future of a life.
+τ is that of the largest marginal likelihood. The correction interpolates inside the data's range; beyond it the last
+value is kept, and nothing of it is followed into the future of a life.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,21 +14,28 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.baseline.prediction import Prediction
+from models.diagnosis.criteria import (
+    CORRECTION_COSINES,
+    CORRECTION_HARMONICS,
+    CORRECTION_SIZES,
+    MOST_CORRECTION_AXES,
+)
 from models.diagnosis.design.axes import CLOCK, CYCLES, PHASE, PRESSURE, SPEED, TEMPERATURE
 from models.diagnosis.design.design import Design
 from models.diagnosis.design.points import Points
 from models.diagnosis.effects.effect import Effect, Family, Kind, Shape
-from models.diagnosis.noise.covariance import Noise
-from models.diagnosis.pooled_fit.gauss_newton import Fit, Fitted, Priors, fit
-from models.diagnosis.pooled_fit.projection import change_columns, gram_of, project
+from models.diagnosis.effects.fitted_effect import FittedEffect
+from models.diagnosis.effects.grid import change_columns
+from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
+from models.diagnosis.pooled_fit.gram import gram_of
+from models.diagnosis.pooled_fit.problem import FitProblem
+from models.diagnosis.pooled_fit.projection import project
 
-#: What a smooth discrepancy is called where effects are named.
+#: The slug of a smooth correction, which is no effect of the catalogue.
 SLUG = "unexplained_structure"
-#: Cosines along an axis; harmonics of a loop; deviations τ that are tried, as shares of the torque.
-COSINES, HARMONICS = 10, 5
-SIZES = (0.001, 0.003, 0.01, 0.03, 0.1)
-#: Axes that are taken in at most.
-MOST_AXES = 2
+
+#: Gauss-Newton steps: the correction is linear but for the lag of loops.
+_STEPS = 6
 
 _OF_POINTS: dict[str, Callable[[Points], FloatArray]] = {
     SPEED: lambda points: points.velocity,
@@ -38,35 +45,37 @@ _OF_POINTS: dict[str, Callable[[Points], FloatArray]] = {
     TEMPERATURE: lambda points: points.temperature,
 }
 
-#: Axes that can carry a smooth discrepancy.
+#: Axes that can carry a smooth correction.
 AXES = frozenset({*_OF_POINTS, PHASE})
 
 
-def smooth_fit(design: Design, noise: Noise, priors: Priors, baseline: Fit, axes: Sequence[str]) -> Fit | None:
-    """The baseline with a smooth discrepancy on the axes beside it, refitted; None where no axis can carry one."""
-    effects = [effect for axis in axes[:MOST_AXES] for effect in _along(design, axis)]
+def smooth_fit(problem: FitProblem, baseline: Fit, axes: Sequence[str]) -> Fit | None:
+    """The baseline refitted with a smooth correction on the axes; None where no axis can carry one."""
+    effects = [effect for axis in axes[:MOST_CORRECTION_AXES] for effect in _along(problem.design, axis)]
     if not effects:
         return None
-    size = _size(design, noise, priors, baseline, effects)
-    scaled = [replace(each, prior_sd=size * each.prior_sd) for each in effects]
-    start = [Fitted(effect=each, amplitude=0.0, shape=()) for each in scaled]
-    return fit(design, noise, baseline.laws, priors, start, steps=6)
+    size = _size(problem, baseline, effects)
+    scaled = [replace(effect, prior_sd=size * effect.prior_sd) for effect in effects]
+    start = [FittedEffect(effect=effect, amplitude=0.0, shape=()) for effect in scaled]
+    return fit(problem, baseline.laws, start, steps=_STEPS)
 
 
 def _along(design: Design, axis: str) -> list[Effect]:
     """One effect a function: cosines over the axis's range, or a loop's harmonics."""
     if axis == PHASE:
-        waves = [(k, wave) for k in range(1, HARMONICS + 1) for wave in (np.cos, np.sin)] if design.loops else []
+        waves = (
+            [(k, wave) for k in range(1, CORRECTION_HARMONICS + 1) for wave in (np.cos, np.sin)] if design.loops else []
+        )
         return [_effect(k, _harmonic(k, wave), before_lag=False) for k, wave in waves]
     if axis not in _OF_POINTS:
         return []
     place = _OF_POINTS[axis]
     values = place(design.points)
-    known = values[np.isfinite(values)]
-    if known.size == 0 or not np.ptp(known) > 0:
+    measured = values[np.isfinite(values)]
+    if measured.size == 0 or not np.ptp(measured) > 0:
         return []
-    low, high = float(known.min()), float(known.max())
-    count = min(COSINES, np.unique(known).size - 1)
+    low, high = float(measured.min()), float(measured.max())
+    count = min(CORRECTION_COSINES, np.unique(measured).size - 1)
     return [_effect(k, _cosine(place, low, high, k), before_lag=axis != CLOCK) for k in range(1, count + 1)]
 
 
@@ -105,23 +114,26 @@ def _effect(k: int, column: Callable[[Points], FloatArray], *, before_lag: bool)
         grid=lambda _: (),
         change=change,
         before_lag=before_lag,
-        bends=(),
+        discrepancies=(),
         tails=float("inf"),
     )
 
 
-def _size(design: Design, noise: Noise, priors: Priors, baseline: Fit, effects: Sequence[Effect]) -> float:
+def _size(problem: FitProblem, baseline: Fit, effects: Sequence[Effect]) -> float:
     """τ of the largest marginal likelihood: ½ uᵀ (1 + I)⁻¹ u - ½ ln|1 + I|, in units of the prior's deviations."""
     prediction: Prediction = baseline.prediction
     changes = change_columns(
-        design, prediction, [(each.change(prediction.scene, 1.0, ()), each.lags(())) for each in effects]
+        problem.design,
+        prediction,
+        [(effect.change(prediction.scene, 1.0, ()), effect.lags(())) for effect in effects],
     )
-    projected = project(gram_of(design, noise, priors, baseline, changes), noise.run_gain, noise.curve_gain)
-    unit = np.array([each.prior_sd for each in effects])
-    worth = []
-    for size in SIZES:
+    gram = gram_of(problem, baseline, changes)
+    projected = project(gram, problem.noise.run_gain, problem.noise.curve_gain)
+    unit = np.array([effect.prior_sd for effect in effects])
+    logs = []
+    for size in CORRECTION_SIZES:
         scale = size * unit
         inner = np.eye(unit.size) + projected.info * scale[:, None] * scale
         along = projected.score * scale
-        worth.append(0.5 * float(along @ np.linalg.solve(inner, along)) - 0.5 * float(np.linalg.slogdet(inner)[1]))
-    return SIZES[int(np.argmax(worth))]
+        logs.append(0.5 * float(along @ np.linalg.solve(inner, along)) - 0.5 * float(np.linalg.slogdet(inner)[1]))
+    return CORRECTION_SIZES[int(np.argmax(logs))]

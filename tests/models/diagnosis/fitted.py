@@ -9,10 +9,12 @@ from models.diagnosis.baseline.laws import Laws
 from models.diagnosis.baseline.prediction import predict
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.design.design import Design, build_design
-from models.diagnosis.diagnose import Baseline, fit_baseline
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.effect import Shape
-from models.diagnosis.pooled_fit.gauss_newton import Fit, Fitted, fit
+from models.diagnosis.effects.fitted_effect import FittedEffect
+from models.diagnosis.pooled_fit.baseline_fit import Baseline, fit_baseline
+from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
+from models.diagnosis.pooled_fit.problem import FitProblem
 from tests.models.diagnosis.campaigns import Where
 
 
@@ -24,10 +26,14 @@ class Study:
     design: Design
     baseline: Baseline
 
+    @property
+    def problem(self) -> FitProblem:
+        return self.baseline.problem
+
     def extended(self, *effects: tuple[str, float, Shape]) -> Fit:
         """The baseline with effects (slug, first amplitude, shape) fitted along."""
-        start = [Fitted(effect=BY_SLUG[slug], amplitude=first, shape=shape) for slug, first, shape in effects]
-        return fit(self.design, self.baseline.noise, self.baseline.fit.laws, self.baseline.priors, start)
+        start = [FittedEffect(effect=BY_SLUG[slug], amplitude=first, shape=shape) for slug, first, shape in effects]
+        return fit(self.problem, self.baseline.fit.laws, start)
 
 
 def study(campaign: Campaign) -> Study:

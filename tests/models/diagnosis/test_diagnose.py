@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 
 from models.diagnosis import diagnose as diagnose_module
-from models.diagnosis.attribution.decide import Judgement
-from models.diagnosis.attribution.search import Found
+from models.diagnosis.attribution import investigate
+from models.diagnosis.attribution.search import SearchResult, search
+from models.diagnosis.attribution.verdict import Verdict
 from models.diagnosis.campaign import Campaign, MaintenanceEvent
 from models.diagnosis.campaign import EventKind as Event
-from models.diagnosis.detection.alarm import Lead
-from models.diagnosis.detection.raw_records.evidence import RawEvidence
-from models.diagnosis.diagnose import confirmed, diagnose, with_lines
-from models.diagnosis.effects.estimate import Estimate
+from models.diagnosis.design.design import build_design
+from models.diagnosis.diagnose import diagnose
+from models.diagnosis.effects.catalogue import BY_SLUG
+from models.diagnosis.pooled_fit.baseline_fit import Baseline, fit_baseline
 from models.diagnosis.pooled_fit.gauss_newton import Fit
-from models.diagnosis.report.report import Report, Verdict
+from models.diagnosis.report.report import Report
 from models.friction.stribeck import StribeckParameters, torque
 from models.records.runs import Plateaus
 from tests.models.diagnosis.campaigns import Planted, Where, campaign
@@ -91,6 +92,12 @@ def test_what_is_taken_out_of_the_catalogue_is_not_named() -> None:
     assert all(each.effect != "unsettled_dwell" for each in report.candidates)
 
 
+def test_with_an_empty_catalogue_structure_is_unexplained() -> None:
+    report = look(campaign(7, PLANTED["unsettled_dwell"]), without=frozenset(BY_SLUG))
+    assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
+    assert not report.candidates
+
+
 def test_a_bump_in_speed_is_unexplained_and_on_speed() -> None:
     def bump(at: Where) -> np.ndarray:
         return 0.04 * torque(at.velocity, at.parameters) * np.exp(-0.5 * ((at.velocity - 6.0) / 0.7) ** 2)
@@ -148,67 +155,23 @@ def test_a_logged_oil_change_is_preferred_to_an_unlogged_one() -> None:
     assert with_log.log_evidence_gain > without.log_evidence_gain + 1.0
 
 
-def test_what_a_loud_vibration_leaves_in_averages_is_not_named_beside_it() -> None:
-    """A named cause of 15 nats beside a ripple of 300 is the ripple's; one of 60 nats is a cause of its own."""
-    estimate = Estimate(name="ripple amplitude", value=0.1, sd=0.01, unit="Nm")
-    ripple = RawEvidence(effect="shaft_ripple", log_evidence=300.0, estimate=estimate, note="")
-    for nats, causes in ((15.0, ("shaft_ripple",)), (60.0, ("viscous_exponent", "shaft_ripple"))):
-        judged = Judgement(
-            verdict=Verdict.CAUSE_NAMED,
-            causes=("viscous_exponent",),
-            statistics={"lambda": nats, "tolerance": 0.05 * nats},
-        )
-        found = with_lines(judged, (ripple,))
-        assert found.verdict is Verdict.CAUSE_NAMED
-        assert found.causes == causes
-
-
-def test_structure_without_a_name_beside_a_vibration_counts_by_its_own_evidence() -> None:
-    """Beside a ripple of 60 nats, 8 nats without a name are its trace; 91 nats are not, however little of them an effect
-    explains."""
-    estimate = Estimate(name="ripple amplitude", value=0.1, sd=0.01, unit="Nm")
-    ripple = RawEvidence(effect="shaft_ripple", log_evidence=60.0, estimate=estimate, note="")
-    for nats, verdict in ((8.0, Verdict.CAUSE_NAMED), (91.0, Verdict.UNEXPLAINED_STRUCTURE)):
-        statistics = {"lambda": 0.03, "structure": nats, "tolerance": 0.0}
-        judged = Judgement(verdict=Verdict.UNEXPLAINED_STRUCTURE, statistics=statistics)
-        found = with_lines(judged, (ripple,))
-        assert found.verdict is verdict
-        assert found.causes == (("shaft_ripple",) if verdict is Verdict.CAUSE_NAMED else ())
-
-
 def test_a_better_baseline_is_looked_at_anew(monkeypatch: pytest.MonkeyPatch) -> None:
     """What an effect's fit shows the baseline to have missed is no effect: the alarm is raised, or not, from there."""
-    seen: list[Fit] = []
-    search = diagnose.hypotheses_of
+    searched: list[Fit] = []
 
-    def found(*given: object) -> Found:
-        seen.append(given[4])  # type: ignore[arg-type]
-        first = search(*given)  # type: ignore[arg-type]
-        return first if len(seen) > 1 else replace(first, better=calm)
+    def better(baseline: Baseline, *given: object) -> SearchResult:
+        searched.append(baseline.fit)
+        first = search(baseline, *given)  # type: ignore[arg-type]
+        return first if len(searched) > 1 else replace(first, better_baseline=calm)
 
     given = campaign(7, PLANTED["torque_zero_shift"], loops=False)
     expected = look(given).baseline
-    calm = diagnose_module.fit_baseline(diagnose_module.build_design(given)).fit
-    bent = replace(calm, residual=calm.residual + 0.02 * calm.torque * (calm.prediction.scene.points.cycles > 4000))
-    fitted = diagnose_module.fit_baseline
-    monkeypatch.setattr(diagnose_module, "fit_baseline", lambda design: replace(fitted(design), fit=bent))
-    monkeypatch.setattr(diagnose_module, "hypotheses_of", found)
+    calm = fit_baseline(build_design(given)).fit
+    off = replace(calm, residual=calm.residual + 0.02 * calm.torque * (calm.prediction.scene.points.cycles > 4000))
+    monkeypatch.setattr(diagnose_module, "fit_baseline", lambda design: replace(fit_baseline(design), fit=off))
+    monkeypatch.setattr(investigate, "search", better)
     report = look(given)
-    assert [each is other for each, other in zip(seen, (bent, calm), strict=True)] == [True, True]
+    assert [fitted is other for fitted, other in zip(searched, (off, calm), strict=True)] == [True, True]
     assert report.baseline is not None
     assert expected is not None
     assert report.baseline.rmse == pytest.approx(expected.rmse, rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("name", "beyond", "holds"),
-    [("effects", 3.0, False), ("effects", 7.0, True), ("contrasts", 3.0, True), ("contrasts", 1.0, False)],
-)
-def test_an_alarm_that_nothing_confirms_must_be_loud_that_of_the_effects_more_so(
-    name: str, beyond: float, holds: bool
-) -> None:
-    """Where no effect comes to anything once it is refitted, the shape that raised the alarm was one of many."""
-    calm = Lead(value=5.0, threshold=10.0, p_value=0.5, index=0)
-    leads = {**dict.fromkeys(("effects", "contrasts", "lines"), calm), name: replace(calm, value=10.0 + beyond)}
-    assert confirmed(leads, [], -np.inf) is holds
-    assert confirmed(leads, [], 3.5)

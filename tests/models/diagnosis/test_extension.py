@@ -12,9 +12,10 @@ from models.diagnosis.campaign import Campaign, DutyRun, StationaryRun
 from models.diagnosis.design.limits import MOST_PLATEAUS
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.catalogued.torque_zero_shift import DAYS, STRAIGHT
+from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.effects.viscosity import log_viscosity_ratio
 from models.diagnosis.extension import Extension, _laws, build_extension, facts_from, facts_to
-from models.diagnosis.pooled_fit.gauss_newton import Fit, Fitted
+from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.records.runs import Plateaus
 from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.fitted import Study, study, warmth
@@ -36,7 +37,7 @@ def warm() -> Study:
 
 
 def with_effect(given: Study, *effects: tuple[str, float, tuple[float, ...]]) -> Fit:
-    fitted = [Fitted(effect=BY_SLUG[slug], amplitude=a, shape=shape) for slug, a, shape in effects]
+    fitted = [FittedEffect(effect=BY_SLUG[slug], amplitude=a, shape=shape) for slug, a, shape in effects]
     return replace(given.baseline.fit, effects=tuple(fitted))
 
 

@@ -12,21 +12,15 @@ from typing import Any
 
 import numpy as np
 
+from models.diagnosis.attribution.verdict import Verdict
 from models.diagnosis.campaign import Campaign, StationaryRun
+from models.diagnosis.detection.lack_of_fit import Misfit
+from models.diagnosis.detection.structure_axes import Where
 from models.diagnosis.effects.estimate import Estimate
+from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.extension import Extension
-from models.diagnosis.report.report import (
-    Advice,
-    Candidate,
-    Gain,
-    LoopTrace,
-    Maps,
-    Misfit,
-    Report,
-    Verdict,
-    Visible,
-    Where,
-)
+from models.diagnosis.report.report import Candidate, LoopTrace, Maps, Report, Visible
+from models.diagnosis.validation.held_out import Gain
 
 #: Nm that the stand-in takes off every plateau from a cycle on, and that its course loses by 1,000 cycles.
 SHIFT_NM, FROM_CYCLES, COURSE_NM = 1.5, 2000.0, -0.2
@@ -87,7 +81,7 @@ def _report(campaign: Campaign, extension: Extension | None) -> Report:
             mse_percent_before=2.0,
             mse_percent_after=1.0,
             log_score_gain=20.0,
-            remaining=3.0,
+            forecast_log_score_gain=3.0,
         ),
         advice=(
             Advice(

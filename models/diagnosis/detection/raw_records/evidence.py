@@ -34,10 +34,14 @@ from models.diagnosis.detection.raw_records.line import Line
 from models.diagnosis.detection.raw_records.settling_transient import settling_evidence
 from models.diagnosis.detection.raw_records.shaft_orders import best_order
 from models.diagnosis.detection.raw_records.whitened_torque import WhitenedRecord, whitened_record
+from models.diagnosis.effects.catalogued import shaft_ripple, stick_slip, unsettled_dwell
 from models.diagnosis.effects.estimate import Estimate
 from models.records.criteria import SETTLING
 from models.records.plateaus import PlateauCut, cut_plateaus
 from models.records.runs import Record
+
+#: A line of one frequency at all speeds: structure that is no effect of the catalogue.
+FIXED_LINE = "fixed_line"
 
 Run = TypeVar("Run", StationaryRun, DynamicRun)
 
@@ -90,11 +94,11 @@ def _lines(records: list[WhitenedRecord]) -> list[RawEvidence]:
     lines = []
     if order.evidence > LEAST_EVIDENCE and order.amplitude > 0:
         note = f"torque swings {order.position:g} times a revolution at every speed"
-        lines.append(_line_evidence("shaft_ripple", order, "ripple amplitude", note))
+        lines.append(_line_evidence(shaft_ripple.EFFECT.slug, order, "ripple amplitude", note))
     if line.evidence > LEAST_EVIDENCE and line.amplitude > 0:
         low = f"below {100 * line.speed_share:.0f} % of the highest speed and not above"
         note = f"torque swings at {line.position:.3g} Hz {low if slow else 'at all speeds alike'}"
-        lines.append(_line_evidence("stick_slip" if slow else "fixed_line", line, "line amplitude", note))
+        lines.append(_line_evidence(stick_slip.EFFECT.slug if slow else FIXED_LINE, line, "line amplitude", note))
     return lines
 
 
@@ -145,4 +149,6 @@ def _unsettled(dwells: list[tuple[Record, PlateauCut]]) -> list[RawEvidence]:
         value = float(np.median(constants))
         deviation = float(1.4826 * np.median(np.abs(constants - value))) / np.sqrt(constants.size)
     estimate = Estimate(name="settling time constant", value=value, sd=deviation, unit="s")
-    return [RawEvidence(effect="unsettled_dwell", log_evidence=max(alone, together), estimate=estimate, note=note)]
+    return [
+        RawEvidence(effect=unsettled_dwell.EFFECT.slug, log_evidence=max(alone, together), estimate=estimate, note=note)
+    ]

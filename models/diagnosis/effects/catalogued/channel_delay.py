@@ -6,6 +6,7 @@ from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
 from models.diagnosis.effects.effect import Effect, Family, Kind, Shape, Tried
+from models.diagnosis.effects.first_order_lag import phases_of
 
 
 def _grid(_facts: Facts) -> tuple[Tried, ...]:
@@ -17,7 +18,7 @@ def _change(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
     out = np.zeros_like(scene.curve)
     looping = np.flatnonzero(points.loop >= 0)
     if looping.size:
-        phases = np.flatnonzero(np.diff(points.loop[looping], append=-2))[0] + 1
+        phases = phases_of(points, looping)
         curves = scene.curve[looping].reshape(-1, phases)
         step = amplitude * points.angular_frequency[looping].reshape(-1, phases)[:, :1] * phases / (2 * np.pi)
         out[looping] = (_shifted(curves, np.clip(step, -phases, phases)) - curves).ravel()
@@ -36,7 +37,7 @@ def _shifted(curves: FloatArray, steps: FloatArray) -> FloatArray:
 EFFECT = Effect(
     slug="channel_delay",
     title="The torque channel is delayed",
-    physics="A filter or the recorder delays torque against speed: accelerating, torque belongs to a lower speed.",
+    physics="A filter or the recorder delays torque against speed: while accelerating, torque belongs to a lower speed.",
     formula="S(v(t - δ)) - S(v(t)), to first order -δ dS/dt",
     source="anti-aliasing filters and multiplexed recorders; no friction is in it",
     family=Family.DYNAMIC,
@@ -51,5 +52,6 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=True,
-    bends=(),
+    discrepancies=(),
+    opposite_physics="Torque is ahead of the speed: a filter or the recorder delays the speed channel.",
 )

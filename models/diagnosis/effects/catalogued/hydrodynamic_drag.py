@@ -1,14 +1,15 @@
-"""Oil dragged around between and beside the discs: torque that grows with speed and does not care for pressure."""
+"""Oil dragged around between and beside the discs: torque that grows with speed, whatever the pressure."""
 
 import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Bend, Effect, Family, Kind, Measure, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Measure, Shape, ShapeParameter, Tried
 from models.diagnosis.effects.viscosity import log_viscosity_ratio
 
-#: How much less is expected [nats] of a film that ruptures or a drag that does not heed viscosity: Newton's has neither.
+#: Log prior odds [nats] against a film that ruptures or a drag independent of viscosity: Newton's has neither (chosen; no
+#: table).
 _UNUSUAL = 1.5
 
 
@@ -28,7 +29,7 @@ def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     logs = log_viscosity_ratio(scene.points.temperature, scene.facts.reference_temperature, scene.facts.oil)
     relative = scene.points.velocity / scene.laws.frame.reference_velocity
     share = relative**power * (1.0 + rupture) / (1.0 + rupture * relative**2)
-    # an open clutch drags through another gap: that is the baseline's (`Scene.open_powers`), and tells nothing of this one
+    # an open clutch drags through another gap: that is the baseline's (`Scene.open_powers`), and says nothing about this one
     return np.asarray(amplitude * scene.points.engaged * share * np.exp(thinning * logs), dtype=np.float64)
 
 
@@ -56,5 +57,5 @@ EFFECT = Effect(
     change=_change,
     grows_with=Measure.TORQUE,
     before_lag=None,
-    bends=(Bend.SPEED, Bend.MOTION),
+    discrepancies=(Discrepancy.SPEED, Discrepancy.MOTION),
 )

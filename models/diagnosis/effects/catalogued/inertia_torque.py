@@ -19,7 +19,8 @@ def _change(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
 EFFECT = Effect(
     slug="inertia_torque",
     title="Inertia is in the measured torque",
-    physics="A mass between clutch and sensor turns with the shaft: the sensor feels what accelerates it.",
+    physics="A mass between clutch and sensor turns with the shaft: the sensor also measures the torque that "
+    "accelerates it.",
     formula="J dω/dt",
     source="Newton; on the reference's rig the sensor stands on the grounded side, on others it does not",
     family=Family.DYNAMIC,
@@ -35,5 +36,5 @@ EFFECT = Effect(
     change=_change,
     grows_with=Measure.TORQUE,
     before_lag=False,
-    bends=(),
+    discrepancies=(),
 )

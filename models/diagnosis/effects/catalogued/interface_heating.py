@@ -1,12 +1,12 @@
 """Friction heats the interface above the oil's temperature, and torque falls with the power density."""
 
 import numpy as np
-from scipy.linalg import solve_banded
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.first_order_lag import ends_of, phases_of
 
 #: The heat flux to which the amplitude refers [W/m²]: the reference's 20 Nm at 1970 rpm and some, on two faces.
 REFERENCE_FLUX = 0.32e6
@@ -42,8 +42,7 @@ def _along(heat: FloatArray, scene: Scene, settling: float) -> FloatArray:
     ratio = np.maximum(clock[follows] - clock[previous[follows]], 1e-6) / settling
     keep = np.zeros(previous.size)
     keep[follows] = np.exp(-ratio)
-    bands = np.stack([np.ones(keep.size), np.append(-keep[1:], 0.0)])
-    left = solve_banded((1, 0), bands, (1.0 - keep) * heat)  # what each plateau ends with
+    left = ends_of(heat, keep)
     out = heat.copy()
     out[follows] += (left[previous[follows]] - heat[follows]) * (1.0 - keep[follows]) / ratio
     return out
@@ -55,7 +54,7 @@ def _around(heat: FloatArray, scene: Scene, settling: float) -> FloatArray:
     looping = np.flatnonzero(points.loop >= 0)
     if not looping.size:
         return heat
-    phases = np.flatnonzero(np.diff(points.loop[looping], append=-2))[0] + 1
+    phases = phases_of(points, looping)
     waves = np.fft.rfft(heat[looping].reshape(-1, phases), axis=1)
     frequency = points.angular_frequency[looping].reshape(-1, phases)[:, :1]
     waves /= 1 + 1j * np.arange(waves.shape[1]) * frequency * settling
@@ -67,8 +66,8 @@ def _around(heat: FloatArray, scene: Scene, settling: float) -> FloatArray:
 EFFECT = Effect(
     slug="interface_heating",
     title="Frictional heat at the interface lowers the torque",
-    physics="The interface is hotter than the oil by the power that it turns into heat; the boundary film and the oil "
-    "there lose strength.",
+    physics="Frictional power heats the interface above the oil's temperature; the boundary film and the oil there lose "
+    "strength.",
     formula="-S (1 - e^{-a w}), w the heat flux |S| ω/A over 0.32 W/mm², saturating by s and lagging by τ; S or its "
     "viscous part",
     source="Marklund and Larsson, Tribology Int. 41 (2008) 824: friction of wet clutches by interface temperature",
@@ -88,5 +87,5 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=True,
-    bends=(Bend.SPEED, Bend.MOTION),
+    discrepancies=(Discrepancy.SPEED, Discrepancy.MOTION),
 )

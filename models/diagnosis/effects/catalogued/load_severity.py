@@ -5,9 +5,9 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Bend, Effect, Family, Kind, Shape, Tried
+from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Shape, Tried
 
-#: Blocks whose energies differ by less tell no severity.
+#: Blocks whose log energies differ by less than this cannot show a severity (chosen; no table).
 _LEAST_SPREAD = 0.03
 
 
@@ -18,7 +18,7 @@ def _grid(facts: Facts) -> tuple[Tried, ...]:
 
 
 def effective_cycles(cycles: FloatArray, facts: Facts, exponent: float) -> FloatArray:
-    """ζ [n] as it counts for ageing: each engagement by (energy/usual energy)^exponent, usual where nothing was said."""
+    """ζ [n] as it counts for ageing: each engagement by (energy/usual energy)^exponent, usual where no energy was sent."""
     ends = np.concatenate([[0.0], facts.duty_ends])
     lengths = np.maximum(np.diff(ends), 0.0)
     usual = float(np.median(facts.duty_energies))
@@ -51,5 +51,6 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=True,
-    bends=(Bend.LIFE,),
+    discrepancies=(Discrepancy.LIFE,),
+    counts_in_severity=True,
 )

@@ -5,9 +5,9 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Resemblance, Shape, ShapeParameter, Tried
 
-#: What an unlogged change is worth against a logged one, in nats.
+#: Log prior odds [nats] of an unlogged change against a logged one (chosen; no table).
 _UNLOGGED = -2.0
 
 
@@ -52,5 +52,6 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=True,
-    bends=(Bend.SPEED, Bend.LIFE),
+    discrepancies=(Discrepancy.SPEED, Discrepancy.LIFE),
+    resembles_temperature=Resemblance.UNLESS_LOGGED,  # warmer oil is thinner, as fresh oil may be
 )

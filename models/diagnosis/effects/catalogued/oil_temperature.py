@@ -5,11 +5,11 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Shape, ShapeParameter, Tried
 from models.diagnosis.effects.viscosity import log_viscosity_ratio
 from models.friction.stribeck import GAMMA
 
-#: κ where friction hangs on speed times viscosity alone: V_S goes with 1/ν where C_v v^γ goes with ν^γ.
+#: κ where friction depends on speed times viscosity alone: V_S goes with 1/ν where C_v v^γ goes with ν^γ.
 HERSEY = -1.0 / GAMMA
 
 
@@ -48,5 +48,5 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=True,
-    bends=(Bend.SPEED, Bend.MOTION),
+    discrepancies=(Discrepancy.SPEED, Discrepancy.MOTION),
 )

@@ -1,11 +1,21 @@
-"""The pressure gauge is off: the clutch feels another pressure than was written down."""
+"""The pressure gauge is off: the pressure at the clutch is not the recorded one."""
 
 import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Bend, Effect, Family, Kind, Measure, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.effect import (
+    Discrepancy,
+    Effect,
+    Family,
+    Kind,
+    Measure,
+    Resemblance,
+    Shape,
+    ShapeParameter,
+    Tried,
+)
 
 CONSTANT, GROWING, STEP = 0.0, 1.0, 2.0
 
@@ -35,7 +45,7 @@ def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
 EFFECT = Effect(
     slug="pressure_offset",
     title="The pressure reading is off",
-    physics="The clutch is pressed by another pressure than the gauge says; the torque changes as it does with pressure.",
+    physics="The pressure at the clutch differs from the gauge's reading; the torque changes as it does with pressure.",
     formula="a · ∂S/∂p, constant, growing as (ζ/ζ_last)^q, or from a cycle on",
     source="Ompusunggu et al. 2013, fig. 1: one gauge in the line, none at the piston",
     family=Family.SENSOR,
@@ -54,5 +64,6 @@ EFFECT = Effect(
     change=_change,
     grows_with=Measure.PRESSURE,
     before_lag=True,
-    bends=(Bend.LIFE,),
+    discrepancies=(Discrepancy.LIFE,),
+    resembles_temperature=Resemblance.ALWAYS,
 )

@@ -1,11 +1,11 @@
-"""After a pause friction stands off its course and comes back with use."""
+"""After a pause friction is off its course and returns to it with use."""
 
 import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Shape, ShapeParameter, Tried
 
 _HOUR, _MINUTE = 3600.0, 60.0
 WHOLE, STATIC = 0.0, 1.0
@@ -44,15 +44,15 @@ def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
 def _strengths(facts: Facts) -> FloatArray:
     """[r] What settles grows with the logarithm of the pause; 1 after the longest, and where the length is not known."""
     grown = np.log1p(np.maximum(np.array(facts.rest_lengths, dtype=np.float64), 60.0) / _HOUR)
-    known = np.isfinite(grown)
-    return np.where(known, grown / max(float(grown[known].max(initial=0.0)), 1e-9), 1.0)
+    timed = np.isfinite(grown)
+    return np.where(timed, grown / max(float(grown[timed].max(initial=0.0)), 1e-9), 1.0)
 
 
 EFFECT = Effect(
     slug="rest_recovery",
     title="Friction recovered during a rest",
-    physics="While the clutch rests additives settle on the lining and oil drains: friction starts off its course and "
-    "comes back within some cycles or minutes of sliding.",
+    physics="While the clutch rests additives settle on the lining and oil drains: friction starts away from its course "
+    "and returns to it within some cycles or minutes of sliding.",
     formula="a S (ln(1 + rest/1 h)/ln(1 + longest/1 h))^r e^{-(ζ - ζ_rest)/ζ_c}, S or M_s ∂S/∂M_s; with the clock also "
     "e^{-(t - t_rest)/τ}",
     source="boundary films of friction modifiers re-form at rest",
@@ -73,5 +73,5 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=True,
-    bends=(Bend.SPEED, Bend.LIFE, Bend.CLOCK),
+    discrepancies=(Discrepancy.SPEED, Discrepancy.LIFE, Discrepancy.CLOCK),
 )

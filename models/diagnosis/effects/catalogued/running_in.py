@@ -1,11 +1,11 @@
-"""Early in life asperities are worn off: friction starts off eq. 6 and settles onto it."""
+"""Early in life asperities are worn off: friction starts away from eq. 6 and settles onto it."""
 
 import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Bend, Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Shape, ShapeParameter, Tried
 
 STATIC, WHOLE = 0.0, 1.0
 
@@ -27,7 +27,7 @@ def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
 EFFECT = Effect(
     slug="running_in",
     title="Running-in was not finished",
-    physics="The first cycles polish the lining; friction starts off the course that eq. 6 follows later.",
+    physics="The first cycles polish the lining; friction starts away from the course that eq. 6 follows later.",
     formula="a M_s ∂S/∂M_s e^{-ζ/ζ_r}, or a S e^{-ζ/ζ_r}",
     source="Ompusunggu et al. 2013, section 2.3.1: 200 cycles of running-in before cycle 0",
     family=Family.HISTORY,
@@ -45,5 +45,5 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=True,
-    bends=(Bend.SPEED, Bend.LIFE),
+    discrepancies=(Discrepancy.SPEED, Discrepancy.LIFE),
 )

@@ -1,4 +1,4 @@
-"""Torque that swings with the shaft's angle; it stands in raw records and averages out of plateaus."""
+"""Torque that swings with the shaft's angle; it is in raw records and averages out of plateaus."""
 
 from models.diagnosis.effects.effect import Effect, Family, Kind, unchanged, untried
 
@@ -21,5 +21,5 @@ EFFECT = Effect(
     grid=untried,
     change=unchanged,
     before_lag=False,
-    bends=(),
+    discrepancies=(),
 )

@@ -8,24 +8,25 @@ from numpy.typing import NDArray
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Laws, Scene, gradient_of
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Bend, Effect, Family, Kind, Measure, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Measure, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.first_order_lag import phases_of
 from models.friction.stribeck import GAMMA
 
 #: Pressure to which the amplitude refers [Pa].
 REFERENCE_PRESSURE = 5e5
 #: How the film is followed: to first order by powers of speed, by its own equation, or as a thickness that relaxes and
-#: whose strength and time have nothing to do with each other.
+#: whose strength and time are independent of each other.
 FIRST_ORDER, FILM, THICKNESS = 0.0, 1.0, 2.0
 #: The least time of such a thickness [s], and the power of speed that it stays below: with more it would be inertia.
 LEAST_TIME, MOST_POWER = 0.15, 0.55
-#: The log of its prior weight: eq. 7 ties strength and time together.
+#: The log of the prior weight of such a thickness [nats]: eq. 7 ties strength and time together (chosen; no table).
 UNTIED = -1.0
 #: To first order torque falls faster with speed than the film's lag does, for fewer asperities touch: by this power more. A
 #: film of any other kind would be the same at all speeds, as inertia is.
 FEWER = 0.5
-#: A film is followed for this share of a period before its course is taken: it forgets where it began.
+#: A film is followed for this share of a period before its course is taken: it no longer depends on where it began.
 _BEFORE = 1 / 3
-#: Points of a swing that tell a film's usual slope.
+#: Points of a swing from which a film's usual slope is computed.
 _SWING = 24
 
 
@@ -78,7 +79,7 @@ def _over_film(scene: Scene, looping: NDArray[np.intp], amplitude: FloatArray, s
     power, thin, least, sheared = shapes[:4]
     slope = usual_slope(scene.laws, sheared)
     real = slope > 0
-    phases = np.flatnonzero(np.diff(points.loop[looping], append=-2))[0] + 1
+    phases = phases_of(points, looping)
     v = np.ascontiguousarray(points.velocity[looping].reshape(-1, phases).T)[:, :, None]
     pressure = points.pressure[looping].reshape(-1, phases)[:, :1]
     step = 2 * np.pi / (phases * points.angular_frequency[looping].reshape(-1, phases)[:, :1])
@@ -109,7 +110,7 @@ def _over_thickness(scene: Scene, looping: NDArray[np.intp], amplitude: float, s
     asperities carry what the film does not, and carry more under pressure."""
     power, thin, least, time = shape[:4]
     points, middle = scene.points, scene.laws.frame.reference_velocity
-    phases = np.flatnonzero(np.diff(points.loop[looping], append=-2))[0] + 1
+    phases = phases_of(points, looping)
     q, tau = MOST_POWER / (1.0 + thin), LEAST_TIME * 10.0**time
     height = (points.velocity[looping].reshape(-1, phases) / middle + least) ** q
     waves = np.fft.rfft(height, axis=1)
@@ -137,7 +138,7 @@ EFFECT = Effect(
     slug="squeeze_film",
     title="A squeezed film lags behind the speed",
     physics="While speed rises the film is still thin from before and more asperities carry: torque is higher than "
-    "stationary, also where the curve rises; the GMS attractor cannot give that.",
+    "stationary, also where the curve rises; the GMS attractor cannot reproduce that.",
     formula="a (p/5 bar)^x v̇ / (v/v_0 + f)^(y + 1/2), eq. 7's film to first order; or S(w) for S(v) with C_v v^γ (v/w)^s, "
     "ẇ = (v - w)(w/v_0 + f)^y/τ; or a' (p/5 bar)^(1 + x/2) (H - h), τ ḣ = H - h, "
     "H = (v/v_0 + f)^(0.55/(1 + y))",
@@ -163,5 +164,5 @@ EFFECT = Effect(
     several=_changes,
     grows_with=Measure.TORQUE,
     before_lag=None,
-    bends=(Bend.SPEED,),
+    discrepancies=(Discrepancy.SPEED,),
 )

@@ -1,4 +1,4 @@
-"""Self-excited vibration of the driveline at low speed; it stands in raw records."""
+"""Self-excited vibration of the driveline at low speed; it is in raw records."""
 
 from models.diagnosis.effects.effect import Effect, Family, Kind, unchanged, untried
 
@@ -20,5 +20,5 @@ EFFECT = Effect(
     grid=untried,
     change=unchanged,
     before_lag=False,
-    bends=(),
+    discrepancies=(),
 )

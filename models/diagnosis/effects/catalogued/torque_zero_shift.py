@@ -5,7 +5,17 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Bend, Effect, Family, Kind, Measure, Shape, ShapeParameter, Tried
+from models.diagnosis.effects.effect import (
+    Discrepancy,
+    Effect,
+    Family,
+    Kind,
+    Measure,
+    Resemblance,
+    Shape,
+    ShapeParameter,
+    Tried,
+)
 
 #: Courses of the zero: one offset from a cycle on, along the test's clock (straight, or settling), along the life by cycles
 #: or by the days that it took.
@@ -13,7 +23,7 @@ STEP, CLOCK, SETTLING, LIFE, DAYS = 0.0, 1.0, 2.0, 3.0, 4.0
 _HOUR = 3600.0
 #: Times [s] after which a zero has settled to 1/e, each refined by the factor e^x, x the first of the knots below.
 TIMES = (120.0, 400.0)
-#: A zero that wanders along the life is off its straight course by so many amplitudes at knots between its ends.
+#: Knots over life at which a zero may be off its straight course, in amplitudes; on a straight course it is off by none.
 KNOTS, STRAIGHT = (0.0, 1 / 3, 2 / 3, 1.0), (0.0, 0.0)
 
 
@@ -96,5 +106,6 @@ EFFECT = Effect(
     change=_change,
     grows_with=Measure.TORQUE,
     before_lag=False,
-    bends=(Bend.LIFE, Bend.CLOCK),
+    discrepancies=(Discrepancy.LIFE, Discrepancy.CLOCK),
+    resembles_temperature=Resemblance.ALWAYS,
 )

@@ -5,7 +5,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.design.facts import Facts
-from models.diagnosis.effects.effect import Bend, Effect, Family, Kind, Shape, Tried
+from models.diagnosis.effects.effect import Discrepancy, Effect, Family, Kind, Shape, Tried
 
 
 def _grid(_facts: Facts) -> tuple[Tried, ...]:
@@ -37,5 +37,5 @@ EFFECT = Effect(
     grid=_grid,
     change=_change,
     before_lag=True,
-    bends=(Bend.SPEED,),
+    discrepancies=(Discrepancy.SPEED,),
 )

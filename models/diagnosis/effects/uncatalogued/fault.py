@@ -57,7 +57,7 @@ def uncatalogued_fault(
         grid=grid,
         change=change,
         before_lag=False,
-        bends=(),
+        discrepancies=(),
     )
     return UncataloguedFault(effect=effect, axis=axis, description=description)
 

@@ -1,20 +1,44 @@
-"""What stands between evidence and a name: structure that has none, a remainder that is an oddity, a probability."""
+"""What is decided on evidence: structure without a name, a remainder that is an oddity, a probability, vibrations, gains."""
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
 import pytest
 
 from models.arrays import FloatArray
-from models.diagnosis.attribution import decide
-from models.diagnosis.attribution.decide import Closing, Judgement
+from models.diagnosis.attribution.check import Check, Checks
+from models.diagnosis.attribution.decide import (
+    confirmed,
+    credible_set,
+    judge,
+    like_temperature,
+    revise,
+    with_vibrations,
+)
 from models.diagnosis.attribution.evidence import Hypothesis, null_of, refitted
-from models.diagnosis.detection.view import View
+from models.diagnosis.attribution.posterior import PriorOdds
+from models.diagnosis.attribution.verdict import Comparison, HeldOut, Judgement, Proposal, Verdict
+from models.diagnosis.criteria import (
+    AXES_LOG_ODDS,
+    CREDIBLE_MARGIN,
+    CREDIBLE_MARGIN_PAIRS,
+    LEAST_NAMED,
+    LEAST_REMAINDER_P_VALUE,
+    MOST_WORSE,
+    STRUCTURE_FROM,
+    STRUCTURE_SHARE,
+)
+from models.diagnosis.detection.alarm import Alarms
+from models.diagnosis.detection.likelihood_ratio import AlarmStatistic
+from models.diagnosis.detection.raw_records.evidence import RawEvidence
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.pooled_fit.projection import GAINS, gram_of, project
-from models.diagnosis.report.report import Verdict
+from models.diagnosis.effects.estimate import Estimate
+from models.diagnosis.pooled_fit.gauss_newton import Fit
+from models.diagnosis.pooled_fit.gram import gram_of
+from models.diagnosis.pooled_fit.projection import GAINS, project
 from tests.models.diagnosis.campaigns import Where, campaign
 from tests.models.diagnosis.fitted import Study, study
 from tests.models.diagnosis.test_diagnose import late
@@ -35,23 +59,39 @@ def given() -> Study:
 @pytest.fixture(scope="module")
 def best(given: Study) -> Hypothesis:
     """The planted effect alone, refitted."""
-    known = given.baseline
-    null = null_of(given.design, known.noise, known.priors, known.fit)
+    baseline = given.baseline
+    null = null_of(given.problem, baseline.fit)
     effects = given.extended(("unsettled_dwell", 0.05, (0.0, 0.5))).effects
-    return refitted(given.design, known.noise, known.priors, null, known.fit.laws, effects, 0.0, (0.0, 0.0))
+    return refitted(given.problem, null, baseline.fit.laws, effects, 0.0, (0.0, 0.0))
+
+
+def checks_of(given: Study) -> Checks:
+    return Checks(given.problem, np.random.default_rng(1))
+
+
+class Odd(Checks):
+    """Checks with other p-values."""
+
+    def __init__(self, given: Study, left: float, parts: float | None = None) -> None:
+        super().__init__(given.problem, np.random.default_rng(1))
+        self._left, self._parts = left, parts
+
+    def __call__(self, hypothesis: Hypothesis) -> Check:
+        made = super().__call__(hypothesis)
+        parts = made.parts if self._parts is None else replace(made.parts, p_value=self._parts)
+        return replace(made, left=replace(made.left, p_value=self._left), parts=parts)
 
 
 @pytest.fixture
 def judged(given: Study, best: Hypothesis) -> Judge:
-    def judged(structure: float = 0.0) -> Judgement:
-        known, rng = given.baseline, np.random.default_rng(1)
-        return decide.judge(given.design, known.noise, known.priors, [best], structure, -np.inf, rng)
+    def judged(structure: float = 0.0, checks: Checks | None = None) -> Judgement:
+        return judge([best], structure, -np.inf, frozenset(), checks or checks_of(given))
 
     return judged
 
 
 def test_structure_without_a_name_must_lead_by_the_price_of_the_axes(judged: Judge, best: Hypothesis) -> None:
-    beyond = decide.AXES_PRICE + decide.GENERIC * max(best.drop - decide.CLEAR, 0.0)
+    beyond = AXES_LOG_ODDS + STRUCTURE_SHARE * max(best.drop - STRUCTURE_FROM, 0.0)
     assert best.evidence > 5.0
     assert judged(0.0).verdict is Verdict.CAUSE_NAMED
     assert judged(best.evidence + beyond - 0.1).verdict is not Verdict.UNEXPLAINED_STRUCTURE
@@ -62,7 +102,7 @@ def test_a_cause_is_named_from_its_own_probability_on(judged: Judge, best: Hypot
     """Where structure comes near it, the cause stands alone but is no longer named."""
     told = {lead: judged(best.evidence - lead) for lead in np.arange(0.0, 12.0, 0.5)}
     for each in told.values():
-        named = each.probabilities["unsettled_dwell"] >= decide.LEAST_NAMED
+        named = each.probabilities["unsettled_dwell"] >= LEAST_NAMED
         assert each.causes == ("unsettled_dwell",)
         assert each.verdict is (Verdict.CAUSE_NAMED if named else Verdict.CAUSE_AMBIGUOUS)
     assert len({each.verdict for each in told.values()}) == 2
@@ -70,16 +110,9 @@ def test_a_cause_is_named_from_its_own_probability_on(judged: Judge, best: Hypot
 
 @pytest.mark.parametrize(("p_value", "expected"), [(0.06, Verdict.CAUSE_NAMED), (1e-4, Verdict.CAUSE_AMBIGUOUS)])
 def test_a_cause_that_leaves_an_oddity_is_not_named(
-    judged: Judge, monkeypatch: pytest.MonkeyPatch, p_value: float, expected: Verdict
+    given: Study, judged: Judge, p_value: float, expected: Verdict
 ) -> None:
-    close = decide.close
-
-    def odd(*arguments: object) -> Closing:
-        closing = close(*arguments)  # type: ignore[arg-type] # handed on as they are
-        return replace(closing, statistics={**closing.statistics, "closure_p_value": p_value})
-
-    monkeypatch.setattr(decide, "close", odd)
-    assert judged().verdict is expected
+    assert judged(checks=Odd(given, p_value)).verdict is expected
 
 
 @pytest.mark.parametrize(
@@ -91,49 +124,28 @@ def test_a_cause_that_leaves_an_oddity_is_not_named(
     ],
 )
 def test_two_causes_must_agree_in_their_parts_to_be_named(
-    given: Study,
-    best: Hypothesis,
-    monkeypatch: pytest.MonkeyPatch,
-    slugs: tuple[str, ...],
-    p_value: float,
-    expected: Verdict,
+    given: Study, best: Hypothesis, slugs: tuple[str, ...], p_value: float, expected: Verdict
 ) -> None:
     """Parts may differ by what one template errs by; two templates could share a misfit between them."""
-    close, known = decide.close, given.baseline
-
-    def uneven(*arguments: object) -> Closing:
-        closing = close(*arguments)  # type: ignore[arg-type] # handed on as they are
-        return replace(closing, statistics={**closing.statistics, "closure_p_value": 0.9, "parts_p_value": p_value})
-
-    monkeypatch.setattr(decide, "close", uneven)
-    told = replace(best, effects=tuple(BY_SLUG[slug] for slug in slugs), evidence=best.evidence + 40.0)
-    among = [told, best] if len(slugs) > 1 else [told]
-    found = decide.judge(given.design, known.noise, known.priors, among, 0.0, -np.inf, np.random.default_rng(1))
-    assert found.standing == (told,)
+    several = replace(best, effects=tuple(BY_SLUG[slug] for slug in slugs), evidence=best.evidence + 40.0)
+    among = [several, best] if len(slugs) > 1 else [several]
+    found = judge(among, 0.0, -np.inf, frozenset(), Odd(given, 0.9, p_value))
+    assert found.credible == (several,)
     assert found.verdict is expected
 
 
 @pytest.mark.parametrize(("p_value", "expected"), [(0.01, Verdict.CAUSE_NAMED), (1e-4, Verdict.CAUSE_AMBIGUOUS)])
 def test_however_loud_a_cause_is_it_may_leave_a_little_only(
-    given: Study, best: Hypothesis, monkeypatch: pytest.MonkeyPatch, p_value: float, expected: Verdict
+    given: Study, best: Hypothesis, p_value: float, expected: Verdict
 ) -> None:
     """Of a thousand nats a template may be wrong by fifty; what is named leaves no more than three."""
-    close, known = decide.close, given.baseline
-
-    def odd(*arguments: object) -> Closing:
-        closing = close(*arguments)  # type: ignore[arg-type] # handed on as they are
-        return replace(closing, statistics={**closing.statistics, "closure_p_value": p_value})
-
-    monkeypatch.setattr(decide, "close", odd)
-    loud, rng = replace(best, evidence=1000.0, drop=1000.0), np.random.default_rng(1)
-    found = decide.judge(given.design, known.noise, known.priors, [loud], 0.0, -np.inf, rng)
-    assert found.verdict is expected
+    loud = replace(best, evidence=1000.0, drop=1000.0)
+    assert judge([loud], 0.0, -np.inf, frozenset(), Odd(given, p_value)).verdict is expected
 
 
 def test_gains_that_scatter_much_are_less_likely_than_those_that_hardly_do(given: Study) -> None:
     """Without any run to tell them, their prior is left: narrower above the usual scatter than below."""
-    known = given.baseline
-    gram = gram_of(given.design, known.noise, known.priors, known.fit, np.zeros((given.design.torque.size, 0)))
+    gram = gram_of(given.problem, given.baseline.fit)
     untold = replace(gram, along=0.0 * gram.along, squares=0.0 * gram.squares)
     evidence = np.array([project(untold, float(gain), 0.0).evidence for gain in GAINS])
     below, usual, above = np.interp(np.log([0.0025 / 4, 0.0025, 0.0025 * 4]), np.log(GAINS), evidence)
@@ -142,23 +154,51 @@ def test_gains_that_scatter_much_are_less_likely_than_those_that_hardly_do(given
 
 
 @pytest.mark.parametrize(
-    ("slugs", "uneven", "expected"),
+    ("slugs", "uneven", "score", "expected"),
     [
-        (("oil_change", "running_in"), decide.UNEASY / 2, Verdict.CAUSE_AMBIGUOUS),
-        (("oil_change", "running_in"), decide.UNEASY * 2, Verdict.CAUSE_NAMED),
-        (("oil_change",), decide.UNEASY / 2, Verdict.CAUSE_NAMED),
+        (("oil_change", "running_in"), LEAST_REMAINDER_P_VALUE / 2, -1.0, Verdict.CAUSE_AMBIGUOUS),
+        (("oil_change", "running_in"), LEAST_REMAINDER_P_VALUE / 2, 1.0, Verdict.CAUSE_NAMED),
+        (("oil_change", "running_in"), LEAST_REMAINDER_P_VALUE * 2, -1.0, Verdict.CAUSE_NAMED),
+        (("oil_change",), LEAST_REMAINDER_P_VALUE / 2, -1.0, Verdict.CAUSE_NAMED),
     ],
 )
-def test_two_causes_of_other_sizes_in_parts_stand_and_are_not_named(
-    slugs: tuple[str, ...], uneven: float, expected: Verdict
+def test_two_causes_of_other_sizes_in_parts_that_predict_worse_are_not_named(
+    given: Study, best: Hypothesis, slugs: tuple[str, ...], uneven: float, score: float, expected: Verdict
 ) -> None:
-    standing = Hypothesis(effects=tuple(BY_SLUG[slug] for slug in slugs), evidence=30.0, drop=40.0, fit=None)
-    named = Judgement(
-        verdict=Verdict.CAUSE_NAMED, causes=slugs, standing=(standing,), statistics={"parts_p_value": uneven}
-    )
-    assert named.unsure() == replace(named, verdict=expected)
-    for told in set(Verdict) - {Verdict.CAUSE_NAMED}:
-        assert replace(named, verdict=told).unsure().verdict is told
+    made = checks_of(given)(best)
+    comparison = Comparison(
+        best_drop=40.0, structure=0.0, tolerance=2.0, credible=1,
+        check=replace(made, parts=replace(made.parts, p_value=uneven)),
+    )  # fmt: skip
+    credible = Hypothesis(effects=tuple(BY_SLUG[slug] for slug in slugs), evidence=30.0, drop=40.0, fit=None)
+    named = Judgement(verdict=Verdict.CAUSE_NAMED, causes=slugs, credible=(credible,), comparison=comparison)
+    held_out = HeldOut(rmse_before=0.2, rmse_after=0.2, log_score_gain=score, forecast_log_score_gain=0.0)
+    assert revise(named, held_out) == replace(named, verdict=expected)
+    assert revise(named, None) == named
+    for verdict in set(Verdict) - {Verdict.CAUSE_NAMED}:
+        assert revise(replace(named, verdict=verdict), held_out).verdict is verdict
+
+
+@pytest.mark.parametrize(
+    ("after", "score", "proposal"),
+    [
+        (0.2, 1.0, Proposal.PROPOSED),
+        (0.2 * MOST_WORSE * 1.01, 1.0, Proposal.WITHHELD_ERROR),
+        (0.2 * MOST_WORSE * 1.01, -1.0, Proposal.WITHHELD_ERROR),
+        (0.1, -1.0, Proposal.WITHHELD_LOG_SCORE),
+    ],
+)
+def test_an_extension_that_predicts_worse_is_withheld(
+    best: Hypothesis, after: float, score: float, proposal: Proposal
+) -> None:
+    named = Judgement(verdict=Verdict.CAUSE_NAMED, causes=best.slugs, credible=(best,))
+    held_out = HeldOut(rmse_before=0.2, rmse_after=after, log_score_gain=score, forecast_log_score_gain=2.0)
+    revised = revise(named, held_out)
+    assert revised.proposal is proposal
+    assert revised.follow_courses
+    assert revise(named, None).proposal is Proposal.PROPOSED
+    assert not revise(named, None).follow_courses
+    assert revise(replace(named, credible=()), held_out).proposal is Proposal.NONE
 
 
 @pytest.mark.parametrize("logged", [(), (4500.0,)])
@@ -166,32 +206,108 @@ def test_two_causes_of_other_sizes_in_parts_stand_and_are_not_named(
 def test_oil_that_was_warm_may_pass_for_fresh_unless_the_log_says_so(
     given: Study, best: Hypothesis, slug: str, logged: tuple[float, ...]
 ) -> None:
-    design, known = replace(given.design, facts=replace(given.design.facts, oil_changes=logged)), given.baseline
-    imitates = slug in decide.LIKE_TEMPERATURE or (slug == "oil_change" and not logged)
-    assert (slug in decide.like_temperature(design)) == imitates
-    called, rng = replace(best, effects=(BY_SLUG[slug],)), np.random.default_rng(1)
-    found = decide.judge(design, known.noise, known.priors, [called], 0.0, -5.0, rng)
+    facts = replace(given.design.facts, oil_changes=logged)
+    imitates = slug in {"torque_zero_shift", "pressure_offset"} or (slug == "oil_change" and not logged)
+    imitable = like_temperature(facts)
+    assert (slug in imitable) == imitates
+    called = replace(best, effects=(BY_SLUG[slug],))
+    found = judge([called], 0.0, -5.0, imitable, checks_of(given))
     assert found.causes == ((slug, "oil_temperature") if imitates else (slug,))
     assert found.verdict is (Verdict.CAUSE_AMBIGUOUS if imitates else Verdict.CAUSE_NAMED)
-    measured = decide.judge(design, known.noise, known.priors, [called], 0.0, -np.inf, rng)
+    measured = judge([called], 0.0, -np.inf, frozenset(), checks_of(given))
     assert measured.verdict is Verdict.CAUSE_NAMED
 
 
-def test_a_pair_without_the_best_single_may_stand_beside_it(best: Hypothesis) -> None:
-    """Two causes nearly as good as one other are its rivals; two of which it is one tell its own story at length."""
+def passing(_: Hypothesis) -> SimpleNamespace:
+    return SimpleNamespace(passed=True, excess=-1.0)
 
-    def closed(_: Hypothesis) -> Closing:
-        return Closing(closed=True, excess=-1.0, view=cast(View, None), statistics={})
 
-    def price(each: Hypothesis) -> float:
-        return decide.PAIR_PRICE * (len(each.effects) - 1)
+def test_a_pair_without_the_best_single_may_be_its_rival(best: Hypothesis) -> None:
+    """Two causes nearly as good as one other are its rivals; two of which it is one add to the same explanation."""
 
-    def stands(*slugs: str, lead: float) -> bool:
-        pair = replace(
-            best, effects=tuple(BY_SLUG[slug] for slug in slugs), evidence=best.evidence + decide.PAIR_PRICE - lead
+    def is_credible(*slugs: str, lead: float) -> bool:
+        pair = replace(best, effects=tuple(BY_SLUG[slug] for slug in slugs), evidence=best.evidence - lead)
+        pair = replace(pair, evidence=pair.evidence + PriorOdds(slack=0.0)(pair))
+        return pair in credible_set(best, [best, pair], PriorOdds(slack=0.0), cast(Checks, passing))
+
+    assert is_credible("oil_temperature", "inertia_torque", lead=CREDIBLE_MARGIN_PAIRS - 0.5)
+    assert not is_credible("oil_temperature", "inertia_torque", lead=CREDIBLE_MARGIN + 0.5)
+    assert not is_credible(best.slugs[0], "inertia_torque", lead=CREDIBLE_MARGIN_PAIRS - 0.5)
+
+
+def candidate(*slugs: str, evidence: float) -> Hypothesis:
+    effects = tuple(BY_SLUG[slug] for slug in slugs)
+    fitted = cast(Fit, SimpleNamespace())
+    return Hypothesis(effects=effects, evidence=evidence, drop=20.0, fit=fitted)
+
+
+def credible(*given: Hypothesis) -> set[tuple[str, ...]]:
+    """The credible set of usable hypotheses of equal prior odds that all pass their checks."""
+    even = cast(PriorOdds, lambda _: 0.0)
+    return {hypothesis.slugs for hypothesis in credible_set(given[0], given, even, cast(Checks, passing))}
+
+
+def test_what_is_no_better_than_nothing_is_not_credible() -> None:
+    best, close = candidate("oil_change", evidence=3.5), candidate("running_in", evidence=0.2)
+    assert credible(best, close, candidate("inertia_torque", evidence=-0.1)) == {("oil_change",), ("running_in",)}
+
+
+def test_candidates_are_credible_up_to_a_hundredth_of_its_weight() -> None:
+    """4.6 nats are ln 100."""
+    best = candidate("oil_change", evidence=20.0)
+    assert len(credible(best, candidate("running_in", evidence=15.7))) == 2
+    assert len(credible(best, candidate("running_in", evidence=15.2))) == 1
+
+
+def test_pairs_must_be_closer_than_single_effects_to_be_credible() -> None:
+    assert len(credible(candidate("oil_change", evidence=30.0), candidate("running_in", evidence=26.5))) == 2
+    pair, rival = ("oil_change", "inertia_torque"), ("oil_change", "squeeze_film")
+    assert len(credible(candidate(*pair, evidence=60.0), candidate(*rival, evidence=56.5))) == 1
+    assert len(credible(candidate(*pair, evidence=60.0), candidate(*rival, evidence=57.5))) == 2
+
+
+def compared(given: Study, best: Hypothesis, drop: float, structure: float, tolerance: float) -> Comparison:
+    return Comparison(
+        best_drop=drop, structure=structure, tolerance=tolerance, credible=1, check=checks_of(given)(best)
+    )
+
+
+def test_what_a_loud_vibration_leaves_in_averages_is_not_named_beside_it(given: Study, best: Hypothesis) -> None:
+    """A named cause of 15 nats beside a ripple of 300 is the ripple's; one of 60 nats is a cause of its own."""
+    estimate = Estimate(name="ripple amplitude", value=0.1, sd=0.01, unit="Nm")
+    ripple = RawEvidence(effect="shaft_ripple", log_evidence=300.0, estimate=estimate, note="")
+    for nats, causes in ((15.0, ("shaft_ripple",)), (60.0, ("viscous_exponent", "shaft_ripple"))):
+        judged = Judgement(
+            verdict=Verdict.CAUSE_NAMED,
+            causes=("viscous_exponent",),
+            comparison=compared(given, best, nats, 0.0, 0.05 * nats),
         )
-        return pair in decide._standing(best, [best, pair], [best], price, cast(decide._Tested, closed))
+        found = with_vibrations(judged, (ripple,))
+        assert found.verdict is Verdict.CAUSE_NAMED
+        assert found.causes == causes
 
-    assert stands("oil_temperature", "inertia_torque", lead=decide.CLOSE_PAIRS - 0.5)
-    assert not stands("oil_temperature", "inertia_torque", lead=decide.CLOSE + 0.5)
-    assert not stands(best.slugs[0], "inertia_torque", lead=decide.CLOSE_PAIRS - 0.5)
+
+def test_structure_without_a_name_beside_a_vibration_counts_by_its_own_evidence(given: Study, best: Hypothesis) -> None:
+    """Beside a ripple of 60 nats, 8 nats without a name are its trace; 91 nats are not, however little of them an effect
+    explains."""
+    estimate = Estimate(name="ripple amplitude", value=0.1, sd=0.01, unit="Nm")
+    ripple = RawEvidence(effect="shaft_ripple", log_evidence=60.0, estimate=estimate, note="")
+    for nats, verdict in ((8.0, Verdict.CAUSE_NAMED), (91.0, Verdict.UNEXPLAINED_STRUCTURE)):
+        judged = Judgement(verdict=Verdict.UNEXPLAINED_STRUCTURE, comparison=compared(given, best, 0.03, nats, 0.0))
+        found = with_vibrations(judged, (ripple,))
+        assert found.verdict is verdict
+        assert found.causes == (("shaft_ripple",) if verdict is Verdict.CAUSE_NAMED else ())
+
+
+@pytest.mark.parametrize(
+    ("name", "beyond", "holds"),
+    [("effects", 3.0, False), ("effects", 7.0, True), ("contrasts", 3.0, True), ("contrasts", 1.0, False)],
+)
+def test_an_alarm_that_nothing_confirms_must_be_loud_that_of_the_effects_more_so(
+    name: str, beyond: float, holds: bool
+) -> None:
+    """Where no effect comes to anything once it is refitted, the shape that raised the alarm was one of many."""
+    calm = AlarmStatistic(value=5.0, threshold=10.0, p_value=0.5, index=0)
+    alarms = replace(Alarms(effects=calm, contrasts=calm, lines=calm), **{name: replace(calm, value=10.0 + beyond)})
+    assert confirmed(alarms, [], -np.inf) is holds
+    assert confirmed(alarms, [], 3.5)

@@ -12,9 +12,12 @@ from models.diagnosis.design.facts import facts_of
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.catalogued.squeeze_film import usual_slope
 from models.diagnosis.effects.catalogued.torque_zero_shift import CLOCK, STRAIGHT
+from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.experiments.candidates import with_trial
 from models.diagnosis.extension import build_extension
-from models.diagnosis.pooled_fit.gauss_newton import Fitted, fit, priors_of
+from models.diagnosis.pooled_fit.gauss_newton import fit
+from models.diagnosis.pooled_fit.priors import priors_of
+from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.starts import starting_laws
 from models.records.criteria import UNLOADED
 from tests.models.diagnosis.campaigns import campaign
@@ -78,9 +81,9 @@ def test_a_correction_is_what_the_diagnosis_saw_where_some_plateaus_are_open(
     design, known = build_design(given), closed.baseline
     laws = starting_laws(design, frame_of(design))
     priors = priors_of(design, laws.theta, laws.frame)
-    noise = replace(known.noise, deviation=0.01 * np.abs(design.torque) + 0.05)
-    effect = Fitted(effect=BY_SLUG[slug], amplitude=amplitude, shape=shape)
-    fitted = fit(design, noise, laws, priors, (effect,), steps=0)
+    noise = replace(known.problem.noise, deviation=0.01 * np.abs(design.torque) + 0.05)
+    effect = FittedEffect(effect=BY_SLUG[slug], amplitude=amplitude, shape=shape)
+    fitted = fit(FitProblem(design=design, noise=noise, priors=priors), laws, (effect,), steps=0)
     extension = build_extension([(1.0, fitted, [0.01])], design.facts, courses=True)
     found = extension.artefact(mixed, replace(given, stationary=runs[1:]))
     rows = np.flatnonzero(design.rows.run == 0)

@@ -33,9 +33,8 @@ def test_a_logged_oil_change_is_likelier_than_a_temperature_that_nobody_measured
 def test_gains_that_scatter_are_no_evidence_of_a_temperature() -> None:
     """Whatever size of them the noise was given; the control: a temperature is."""
     given = study(campaign(5, temperature=False, gain=0.005))
-    known = given.baseline
-    for size in (2e-4, known.noise.run_gain):
-        noise = replace(known.noise, run_gain=size)
-        assert temperature_evidence(given.design, noise, known.priors, known.fit) < 3.0
+    for size in (2e-4, given.problem.noise.run_gain):
+        problem = given.problem.with_noise(replace(given.problem.noise, run_gain=size))
+        assert temperature_evidence(problem, given.baseline.fit) < 3.0
     warm = study(campaign(5, warmth, temperature=False, gain=0.005))
-    assert temperature_evidence(warm.design, warm.baseline.noise, warm.baseline.priors, warm.baseline.fit) > 10.0
+    assert temperature_evidence(warm.problem, warm.baseline.fit) > 10.0

@@ -24,7 +24,9 @@ from models.diagnosis.baseline.laws import (
 from models.diagnosis.baseline.prediction import frame_of, predict
 from models.diagnosis.design.design import build_design
 from models.diagnosis.noise.estimate import first_noise
-from models.diagnosis.pooled_fit.gauss_newton import fit, priors_of
+from models.diagnosis.pooled_fit.gauss_newton import fit
+from models.diagnosis.pooled_fit.priors import priors_of
+from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.starts import starting_laws
 from models.friction.stribeck import StribeckParameters, torque
 from models.loops.attractor import attractor_torque
@@ -72,7 +74,9 @@ def test_loops_are_the_attractor_law_in_its_periodic_state(attractor: float) -> 
 def test_a_bare_truth_is_fitted_to_a_thousandth() -> None:
     design = build_design(campaign(3, noise=0.0, gain=0.0))
     start = starting_laws(design, frame_of(design))
-    found = fit(design, first_noise(design), start, priors_of(design, start.theta, start.frame))
+    found = fit(
+        FitProblem(design=design, noise=first_noise(design), priors=priors_of(design, start.theta, start.frame)), start
+    )
     assert np.sqrt(np.mean(found.residual**2)) < 1e-3 * np.median(design.torque)
 
 
@@ -143,7 +147,7 @@ def test_the_curvature_stays_within_its_bounds_wherever_a_fit_starts() -> None:
     for begun in (0.25, 20.0):
         theta = start.theta.copy()
         theta[LOG_CURVATURE] = np.log(begun)
-        found = fit(curved, noise, Laws(theta=theta, frame=start.frame), priors)
+        found = fit(FitProblem(design=curved, noise=noise, priors=priors), Laws(theta=theta, frame=start.frame))
         assert CURVATURE_BOUNDS[0] <= np.exp(found.laws.theta[LOG_CURVATURE]) <= CURVATURE_BOUNDS[1] * (1 + 1e-9)
 
 
@@ -158,6 +162,6 @@ def test_a_ratio_that_falls_as_a_hyperbola_is_followed_and_an_exponential_is_not
     held = replace(priors, free=priors.free & (np.arange(theta.size) != LOG_CURVATURE))
     stiff = start.theta.copy()
     stiff[LOG_CURVATURE] = np.log(EXPONENTIAL)
-    free = fit(curved, noise, start, priors)
-    exponential = fit(curved, noise, Laws(theta=stiff, frame=start.frame), held)
+    free = fit(FitProblem(design=curved, noise=noise, priors=priors), start)
+    exponential = fit(FitProblem(design=curved, noise=noise, priors=held), Laws(theta=stiff, frame=start.frame))
     assert np.abs(free.residual).max() < 0.2 * np.abs(exponential.residual).max()

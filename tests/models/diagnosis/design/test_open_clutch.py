@@ -5,21 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.diagnosis.attribution.verdict import Verdict
 from models.diagnosis.baseline.laws import OPEN_DRAG, Laws
 from models.diagnosis.baseline.prediction import frame_of, predict
 from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
+from models.diagnosis.criteria import WORTHWHILE
 from models.diagnosis.design.design import Design, build_design
 from models.diagnosis.detection.contrasts import contrasts_of
-from models.diagnosis.detection.view import blocks_of
-from models.diagnosis.diagnose import diagnose, fit_baseline, missing_for_baseline
+from models.diagnosis.detection.projected_fit import parts_of
+from models.diagnosis.diagnose import diagnose
 from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.effects.effect import unit_changes
 from models.diagnosis.experiments.candidates import PASSES, TRIALS, runs_of, with_trial
-from models.diagnosis.experiments.test_plan import WORTH, Rival, advise
+from models.diagnosis.experiments.rivals import Rival
+from models.diagnosis.experiments.test_plan import advise
 from models.diagnosis.extension import Extension, build_extension
+from models.diagnosis.pooled_fit.baseline_fit import fit_baseline, missing_for_baseline
 from models.diagnosis.pooled_fit.starts import starting_laws
 from models.diagnosis.report.maps import loop_traces, residual_maps
-from models.diagnosis.report.report import Verdict
 from models.diagnosis.validation.held_out import measure_gain
 from tests.models.diagnosis.campaigns import CYCLES, SPEEDS, Where, campaign
 from tests.models.diagnosis.fitted import Study, checked_jacobian, study
@@ -137,8 +140,8 @@ def test_the_jacobian_is_that_of_central_differences(given: Study) -> None:
 
 
 def test_the_drag_is_fitted_and_held_fast_where_there_is_none(swung: Study, given: Study) -> None:
-    assert given.baseline.priors.free[OPEN_DRAG].all()
-    assert not swung.baseline.priors.free[OPEN_DRAG].any()
+    assert given.problem.priors.free[OPEN_DRAG].all()
+    assert not swung.problem.priors.free[OPEN_DRAG].any()
     extended = given.extended(("inertia_torque", 0.001, ()))
     left = extended.residual[~given.design.closed & given.design.rows.steady]
     assert abs(left.std() / 0.05 - 1) < 0.2  # the noise that was put in, though the drag is no polynomial
@@ -160,27 +163,27 @@ def test_an_open_clutch_is_advised_where_it_decides(swung: Study) -> None:
         swung.extended(("squeeze_film", 0.005, (0.4, 0.8, 0.05, 0.7, 1.0, 1.0))),
     ]
     standing = [Rival(fit=each, evidence=0.0) for each in fits]
-    found = advise(swung.campaign, swung.design, swung.baseline.noise, swung.baseline.priors, standing)
+    found = advise(swung.campaign, swung.problem, standing)
     assert found[0].key == "open_clutch"
-    assert found[0].nats > WORTH
+    assert found[0].nats > WORTHWHILE
 
 
 def test_nothing_that_is_said_of_open_rows_is_no_number(given: Study, swung: Study) -> None:
-    design, noise, fit = given.design, given.baseline.noise, given.baseline.fit
+    design, noise, fit = given.design, given.problem.noise, given.baseline.fit
     contrasts = contrasts_of(design, fit.prediction)
     assert np.isfinite(contrasts.columns).all()
     assert np.abs(contrasts.columns[~design.closed]).max() == 0.0
     assert (noise.deviation > 0).all()
     assert np.isfinite(noise.deviation).all()
     extended = given.extended(("inertia_torque", 0.001, ()))
-    assert np.isfinite(blocks_of(design, extended)).all()
-    maps = residual_maps(design, noise, fit, extended)
+    assert np.isfinite(parts_of(design, extended)).all()
+    maps = residual_maps(given.problem, fit, extended)
     assert maps is not None
     np.testing.assert_array_equal(maps.pressure, swung.design.levels)
     assert min(each.pressure for each in loop_traces(design, fit, extended)) > 0
-    gain = measure_gain(design, noise, given.baseline.priors, fit, extended, np.random.default_rng(1))
+    gain = measure_gain(given.problem, fit, extended, np.random.default_rng(1))
     assert gain is not None
-    assert all(np.isfinite([gain.rmse_before, gain.rmse_after, gain.log_score_gain, gain.remaining]))
+    assert all(np.isfinite([gain.rmse_before, gain.rmse_after, gain.log_score_gain, gain.forecast_log_score_gain]))
     assert not {design.runs[run].run_id for run in design.rows.run[~design.closed]} & set(gain.held_out_runs)
 
 

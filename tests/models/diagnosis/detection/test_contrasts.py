@@ -7,8 +7,9 @@ import pytest
 
 from models.arrays import FloatArray
 from models.diagnosis.design.points import Points
-from models.diagnosis.detection.view import view_of
-from models.diagnosis.pooled_fit.projection import gram_of, project
+from models.diagnosis.detection.projected_fit import project_fit
+from models.diagnosis.pooled_fit.gram import gram_of
+from models.diagnosis.pooled_fit.projection import project
 from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.fitted import Study, study
 
@@ -43,10 +44,10 @@ def test_a_contrast_sees_its_share_of_what_is_visible(
 ) -> None:
     """Of λ that is left of the structure beside the baseline, the best single contrast sees so much wherever it lies."""
     known, rows = plain.baseline, plain.design.rows
-    view = view_of(plain.design, known.noise, known.priors, known.fit, [])
+    view = project_fit(plain.problem, known.fit)
     structures = np.stack([shape(rows, at) for at in PLACES], axis=1) * known.fit.torque[:, None]
     columns = np.column_stack([structures, view.contrasts.columns])
-    info = project(gram_of(plain.design, known.noise, known.priors, known.fit, columns), known.noise.run_gain, 0.0).info
+    info = project(gram_of(plain.problem, known.fit, columns), plain.problem.noise.run_gain, 0.0).info
     scale = np.sqrt(np.maximum(np.diag(info), 1e-300))
     shares = (info / scale[:, None] / scale)[: PLACES.size, PLACES.size :] ** 2
     assert shares.max(axis=1).min() > least
@@ -56,14 +57,14 @@ def test_a_contrast_sees_its_share_of_what_is_visible(
 def test_ripples_over_speed_are_seen_through_the_lag_of_loops(plain: Study, waves: float) -> None:
     """Half waves over the range of speeds, in between those that are looked for, and of any phase."""
     known, points = plain.baseline, plain.design.points
-    view = view_of(plain.design, known.noise, known.priors, known.fit, [])
+    view = project_fit(plain.problem, known.fit)
     unit = points.velocity / points.velocity.max()
     ripples = np.stack([np.cos(np.pi * waves * unit + phase) for phase in (0.0, 0.8, 1.6, 2.4)], axis=1)
     prediction = known.fit.prediction
     friction = prediction.scene.curve[:, None] * ripples
     structures = prediction.change_at_rows(plain.design, friction, before_lag=True)
     columns = np.column_stack([structures, view.contrasts.columns])
-    info = project(gram_of(plain.design, known.noise, known.priors, known.fit, columns), known.noise.run_gain, 0.0).info
+    info = project(gram_of(plain.problem, known.fit, columns), plain.problem.noise.run_gain, 0.0).info
     scale = np.sqrt(np.maximum(np.diag(info), 1e-300))
     shares = (info / scale[:, None] / scale)[:4, 4:] ** 2
     assert shares.max(axis=1).min() > 0.45

@@ -1,20 +1,24 @@
 """What swings with a test's clock is found where noise goes with torque, noise alone is not; a sensor's waves too."""
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 import pytest
 
 from models.arrays import FloatArray
-from models.diagnosis.design import axes
 from models.diagnosis.design.autocorrelation import Correlation
+from models.diagnosis.design.axes import TORQUE
 from models.diagnosis.design.design import Design, build_design
 from models.diagnosis.detection import contrasts
-from models.diagnosis.detection.lack_of_fit import axes_of
+from models.diagnosis.detection.likelihood_ratio import AlarmStatistic
 from models.diagnosis.detection.periodogram import lines
-from models.diagnosis.detection.view import view_of
+from models.diagnosis.detection.projected_fit import project_fit
+from models.diagnosis.detection.structure_axes import axes_of
 from models.diagnosis.noise.covariance import Noise
 from models.diagnosis.noise.estimate import first_noise
+from models.diagnosis.pooled_fit.priors import Priors
+from models.diagnosis.pooled_fit.problem import FitProblem
 from models.friction.stribeck import torque
 from tests.models.diagnosis.campaigns import Where, campaign
 from tests.models.diagnosis.fitted import study
@@ -34,6 +38,11 @@ def noise(design: Design) -> Noise:
     return replace(first_noise(design), plateaus=Correlation(), deviation=0.01 * design.torque)
 
 
+def line_of(design: Design, noise: Noise, residual: FloatArray) -> AlarmStatistic:
+    """The highest line in a residual; no prior is in it."""
+    return lines(FitProblem(design=design, noise=noise, priors=cast(Priors, None)), residual)
+
+
 def drawn(design: Design, noise: Noise, seed: int) -> FloatArray:
     white = np.random.default_rng([SEED, seed]).standard_normal(design.torque.size)
     gains = 0.003 * np.random.default_rng([SEED, seed, 1]).standard_normal(len(design.runs))
@@ -41,7 +50,7 @@ def drawn(design: Design, noise: Noise, seed: int) -> FloatArray:
 
 
 def test_noise_alone_has_no_line(design: Design, noise: Noise) -> None:
-    found = [lines(design, noise, drawn(design, noise, seed)) for seed in range(200)]
+    found = [line_of(design, noise, drawn(design, noise, seed)) for seed in range(200)]
     assert not any(each.raised for each in found)
     # p-values are bounds: no more of them are small than should be (10 of 200 below 0.05, deviation 3.1)
     assert 1 <= sum(each.p_value < 0.05 for each in found) <= 20
@@ -53,7 +62,7 @@ def test_a_line_that_is_nearly_as_slow_as_a_test_stands_out(design: Design, nois
     longest = float(rows.clock[rows.steady].max())
     for cycles in (2.5, 2.8, 3.1):
         wave = np.sin(2 * np.pi * cycles * rows.clock / longest + rows.run) * rows.steady
-        assert lines(design, noise, drawn(design, noise, 0) + 0.006 * wave * np.median(design.torque)).raised
+        assert line_of(design, noise, drawn(design, noise, 0) + 0.006 * wave * np.median(design.torque)).raised
 
 
 @pytest.mark.parametrize("share", [False, True], ids=["so many Nm", "a share of the torque"])
@@ -62,10 +71,10 @@ def test_a_swing_is_found_whatever_its_phase_in_each_run(design: Design, noise: 
     phase = np.random.default_rng(SEED).uniform(0, 2 * np.pi, len(design.runs))[rows.run]
     wave = np.sin(2 * np.pi * rows.clock / 90.0 + phase) * rows.steady
     swing = 0.005 * wave * (design.torque if share else np.median(design.torque))
-    found = lines(design, noise, drawn(design, noise, 0) + swing)
+    found = line_of(design, noise, drawn(design, noise, 0) + swing)
     assert found.raised
     assert found.p_value < 1e-3
-    assert lines(design, noise, drawn(design, noise, 0) + 0.02 * swing).p_value > 0.01
+    assert line_of(design, noise, drawn(design, noise, 0) + 0.02 * swing).p_value > 0.01
 
 
 def slow(kind: str, unit: FloatArray) -> FloatArray:
@@ -87,7 +96,7 @@ def test_structure_that_has_no_period_has_no_line(design: Design, noise: Noise, 
     for seed in range(10):
         size = np.random.default_rng([SEED, seed]).standard_normal(len(design.runs))[rows.run]
         for strength in (0.015, 0.05):
-            found = lines(design, noise, drawn(design, noise, seed) + strength * size * course)
+            found = line_of(design, noise, drawn(design, noise, seed) + strength * size * course)
             assert not found.raised, (kind, seed, strength)
 
 
@@ -95,13 +104,13 @@ def test_pauses_and_odd_runs_do_not_hide_a_swing(design: Design, noise: Noise) -
     rows = design.rows
     swing = 0.008 * design.torque * np.sin(2 * np.pi * rows.clock / 30.0 + rows.run) * rows.steady
     residual = drawn(design, noise, 0) + swing
-    assert lines(design, noise, residual).raised
+    assert line_of(design, noise, residual).raised
     paused = np.where((rows.run == 0) & (rows.clock > 300.0), rows.clock + 12 * 3600.0, rows.clock)
     slower = np.where(rows.run == 0, 4.0 * rows.clock, rows.clock)
     for clock in (paused, slower):
-        assert lines(replace(design, rows=replace(rows, clock=clock)), noise, residual).raised
+        assert line_of(replace(design, rows=replace(rows, clock=clock)), noise, residual).raised
     standing = replace(design, rows=replace(rows, clock=np.zeros_like(rows.clock)))
-    assert not lines(standing, noise, residual).raised
+    assert not line_of(standing, noise, residual).raised
 
 
 def test_too_few_plateaus_show_no_line() -> None:
@@ -110,8 +119,8 @@ def test_too_few_plateaus_show_no_line() -> None:
     one = build_design(replace(given, stationary=given.stationary[:1], dynamic=()))
     known = replace(first_noise(one), deviation=0.01 * one.torque)
     swing = 0.03 * one.torque * np.sin(2 * np.pi * one.rows.clock / 30.0)
-    assert lines(one, known, swing).raised
-    assert not lines(replace(one, plateaus=40, chains=one.chains), known, swing).raised
+    assert line_of(one, known, swing).raised
+    assert not line_of(replace(one, plateaus=40, chains=one.chains), known, swing).raised
 
 
 def test_a_sensor_that_is_wavy_over_its_range_is_structure_on_its_reading(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -119,11 +128,10 @@ def test_a_sensor_that_is_wavy_over_its_range_is_structure_on_its_reading(monkey
         return np.asarray(0.1 * np.sin(2 * np.pi * torque(at.velocity, at.parameters) / WAVE), dtype=np.float64)
 
     given = study(campaign(3, waves))
-    known = given.baseline
     found = {}
     for most in (20, 4):
         monkeypatch.setattr(contrasts, "TORQUE_WAVES", most)
-        view = view_of(given.design, known.noise, known.priors, known.fit, [])
-        found[most] = max((each.strength for each in axes_of(view, {}) if each.axis == axes.TORQUE), default=0.0)
+        projected = project_fit(given.problem, given.baseline.fit)
+        found[most] = max((each.strength for each in axes_of(projected) if each.axis == TORQUE), default=0.0)
     assert found[20] > 20.0
     assert found[4] < 0.2 * found[20], found  # the control: few waves hardly show it

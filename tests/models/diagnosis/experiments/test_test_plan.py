@@ -1,4 +1,4 @@
-"""Which test would decide: the right one for pairs that are known to be alike, and as much of it as was foretold."""
+"""Which test would decide: the right one for pairs that are known to be alike, and as much of it as was predicted."""
 
 from dataclasses import replace
 
@@ -7,15 +7,17 @@ import pytest
 
 from models.diagnosis.baseline.prediction import predict
 from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun
+from models.diagnosis.criteria import WORTHWHILE
 from models.diagnosis.design.design import build_design
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.catalogued.torque_zero_shift import STRAIGHT
+from models.diagnosis.effects.fitted_effect import FittedEffect, effect_rows
 from models.diagnosis.experiments import candidates
 from models.diagnosis.experiments.candidates import TRIALS, with_trial
-from models.diagnosis.experiments.information import Foretold
-from models.diagnosis.experiments.test_plan import WORTH, Rival, advise, decided
-from models.diagnosis.pooled_fit.gauss_newton import Fit, Fitted, effect_rows, fit
-from models.diagnosis.report.report import Advice
+from models.diagnosis.experiments.information import CandidateDistances
+from models.diagnosis.experiments.rivals import Rival
+from models.diagnosis.experiments.test_plan import Advice, advise, decided
+from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.records.runs import Plateaus
 from tests.models.diagnosis.campaigns import Where, campaign
 from tests.models.diagnosis.fitted import Study, study, warmth
@@ -36,16 +38,16 @@ def warm() -> Study:
 
 
 def advised(given: Study, *fits: Fit, nearby: tuple[Fit, ...] = ()) -> tuple[Advice, ...]:
-    standing, behind = (
+    credible, behind = (
         [Rival(fit=fit, evidence=height) for fit in some] for some, height in ((fits, 0.0), (nearby, -5.0))
     )
-    return advise(given.campaign, given.design, given.baseline.noise, given.baseline.priors, standing, behind)
+    return advise(given.campaign, given.problem, credible, behind)
 
 
 def test_inertia_and_a_film_are_parted_by_loops(swung):
     found = advised(swung, swung.extended(("inertia_torque", 0.01, ())), swung.extended(squeeze(swung)))
     assert {found[0].effect, found[0].other} == {"inertia_torque", "squeeze_film"}
-    assert found[0].nats > WORTH
+    assert found[0].nats > WORTHWHILE
     assert found[0].test == TRIALS[found[0].key].text
     # the control: a stationary test has no acceleration, and is not advised by itself
     assert all(moving(each.key) for each in found)
@@ -67,18 +69,18 @@ def test_a_zero_is_parted_from_wear_by_an_open_clutch(warm):
     wear = of_size(warm, "accelerated_wear", 0.03, (6000.0, 1.0))
     found = advised(warm, zero, wear)
     assert found[0].key == "open_sweep"
-    assert found[0].nats > WORTH
+    assert found[0].nats > WORTHWHILE
     # the control: the same test again at once tells less than what is worth its time
     assert "repeats" not in {each.key for each in found}
 
 
 def of_size(given: Study, slug: str, amplitude: float, shape: tuple[float, ...]) -> Fit:
     """The baseline with an effect as large as wanted beside it, not fitted."""
-    return replace(given.baseline.fit, effects=(Fitted(effect=BY_SLUG[slug], amplitude=amplitude, shape=shape),))
+    return replace(given.baseline.fit, effects=(FittedEffect(effect=BY_SLUG[slug], amplitude=amplitude, shape=shape),))
 
 
-def test_what_was_foretold_is_what_the_test_brings(warm):
-    """The advised test is made in simulation; the drop between refits without and with the effect rises as foretold."""
+def test_what_was_predicted_is_what_the_test_brings(warm):
+    """The advised test is made in simulation; the drop between refits without and with the effect rises as predicted."""
     extended = warm.extended(("oil_temperature", 0.3, (0.5,)))
     found = advised(warm, extended)
     assert found[0].key in {"sweep_60c", "sweeps_60c"}
@@ -116,7 +118,7 @@ def test_without_oil_temperature_it_is_asked_for(warm):
     first = advised(blind, zero)[0]
     assert (first.key, first.other) == ("sweep_60c", "oil_temperature")
     assert "oil temperature recorded" in first.test
-    assert first.nats > WORTH
+    assert first.nats > WORTHWHILE
     # the control: where it was measured nobody asks for it
     measured = warm.extended(("torque_zero_shift", 0.3, (1.0, 0.0, *STRAIGHT)))
     assert all(each.other != "oil_temperature" for each in advised(warm, measured))
@@ -230,7 +232,7 @@ def test_what_a_trial_leaves_alone():
     assert decided(some, seen, lead, np.array([-3.0, 0.0])) < paid - 0.3
 
 
-def test_one_that_is_not_far_behind_is_reckoned_with(swung):
+def test_a_hypothesis_that_is_not_far_behind_counts(swung):
     """Where the film is out of the race by five nats only, what brings it back is not what is advised first."""
     inertia_fit, film = swung.extended(("inertia_torque", 0.01, ())), swung.extended(squeeze(swung))
     found = advised(swung, inertia_fit, nearby=(film,))
@@ -242,19 +244,17 @@ def test_one_that_is_not_far_behind_is_reckoned_with(swung):
 def test_a_distance_is_what_a_refit_leaves(swung):
     """λ against its own witness: torque of the one is made, the other is fitted to it, and half its squares are left."""
     first, second = swung.extended(("inertia_torque", 0.012, ())), swung.extended(squeeze(swung))
-    noise, priors = swung.baseline.noise, swung.baseline.priors
-    foretold = Foretold(swung.design, noise, priors, (first, second, replace(first, effects=())))
-    distances = foretold.distances(())
+    distances = CandidateDistances(swung.problem, (first, second, replace(first, effects=()))).distances(())
     np.testing.assert_allclose(np.diag(distances)[:2], 0.0, atol=1e-6)
     assert 0 < distances[0, 1] < distances[0, 2]
-    made = replace(swung.design, torque=first.torque)
-    null = fit(made, noise, swung.baseline.fit.laws, priors)
-    whole = fit(made, noise, first.laws, priors, first.effects)
+    made = replace(swung.problem, design=replace(swung.design, torque=first.torque))
+    null = fit(made, swung.baseline.fit.laws)
+    whole = fit(made, first.laws, first.effects)
     assert distances[0, 2] == pytest.approx(null.cost - whole.cost, rel=0.25)
 
 
-def test_loops_are_not_foretold_where_none_could_be_evaluated():
-    """All dynamic tests stood still: what a loop would tell hangs on an attractor that nobody has seen."""
+def test_loops_are_not_predicted_where_none_could_be_evaluated():
+    """All dynamic tests stood still: what a loop would show depends on an attractor that was not measured."""
     moving_oil = campaign(22, warmth)
     still = [
         replace(run, record=replace(run.record, speed=np.full_like(run.record.speed, 100.0)))

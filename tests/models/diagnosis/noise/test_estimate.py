@@ -7,13 +7,14 @@ import pytest
 from scipy.signal import lfilter
 
 from models.arrays import FloatArray
+from models.diagnosis.attribution.verdict import Verdict
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.design.autocorrelation import Correlation, arma
 from models.diagnosis.design.design import Design, build_design
-from models.diagnosis.diagnose import diagnose, fit_baseline
+from models.diagnosis.diagnose import diagnose
 from models.diagnosis.noise.covariance import Noise, gains_of, whitened, without_gains
 from models.diagnosis.noise.estimate import estimate_noise, first_noise
-from models.diagnosis.report.report import Verdict
+from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
 from tests.models.diagnosis.campaigns import PRESSURES, campaign
 
 SEED = 20
@@ -113,7 +114,7 @@ def test_gains_that_scatter_from_pressure_to_pressure_are_no_structure(
     scatter: float, least: float, most: float
 ) -> None:
     given = scattered(campaign(3), scatter)
-    assert least <= fit_baseline(build_design(given)).noise.curve_gain <= most
+    assert least <= fit_baseline(build_design(given)).problem.noise.curve_gain <= most
     assert diagnose(given, rng=np.random.default_rng(0)).verdict is Verdict.MODEL_ADEQUATE
 
 

@@ -1,15 +1,22 @@
-"""What the report makes of a judgement: two causes that foretell badly, and are not one everywhere, are not named."""
+"""What the report makes of a judgement: it repeats the verdict, and says why an extension is withheld."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from models.diagnosis.attribution.decide import Judgement
+from models.diagnosis.attribution.check import Checks
+from models.diagnosis.attribution.decide import revise
 from models.diagnosis.attribution.evidence import Hypothesis
-from models.diagnosis.detection.view import view_of
-from models.diagnosis.report import assemble
-from models.diagnosis.report.report import Gain, Report, Verdict
+from models.diagnosis.attribution.investigate import Investigation
+from models.diagnosis.attribution.search import SearchResult
+from models.diagnosis.attribution.verdict import Comparison, Judgement, Proposal, Verdict
+from models.diagnosis.detection.alarm import alarms_of
+from models.diagnosis.detection.projected_fit import project_fit
+from models.diagnosis.report.assemble import report_of
+from models.diagnosis.report.proposed_extension import withheld_note
+from models.diagnosis.validation.extended_model import Validation
+from models.diagnosis.validation.held_out import Gain
 from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.fitted import Study, study
 from tests.models.diagnosis.report.test_summary import GAIN
@@ -34,37 +41,45 @@ def given() -> Study:
         ((PLANTED,), WORSE, Verdict.CAUSE_NAMED),
     ],
 )
-def test_two_causes_that_foretell_worse_than_none_are_not_named(
+def test_two_causes_that_predict_worse_than_none_are_not_named(
     given: Study,
-    monkeypatch: pytest.MonkeyPatch,
     effects: tuple[tuple[str, float, tuple[float, ...]], ...],
     gain: Gain | None,
     verdict: Verdict,
 ) -> None:
-    monkeypatch.setattr(assemble, "measure_gain", lambda *_: gain)
-    monkeypatch.setattr(assemble, "advise", lambda *_: ())
-    known, fit = given.baseline, given.extended(*effects)
-    view = view_of(given.design, known.noise, known.priors, known.fit, [])
-    standing = Hypothesis(effects=tuple(each.effect for each in fit.effects), evidence=30.0, drop=40.0, fit=fit)
+    problem, fit, rng = given.problem, given.extended(*effects), np.random.default_rng(1)
+    projected = project_fit(problem, given.baseline.fit)
+    hypothesis = Hypothesis(effects=tuple(each.effect for each in fit.effects), evidence=30.0, drop=40.0, fit=fit)
+    made = Checks(problem, rng)(hypothesis)
+    check = replace(made, parts=replace(made.parts, p_value=0.001))
     judgement = Judgement(
         verdict=Verdict.CAUSE_NAMED,
-        causes=standing.slugs,
-        standing=(standing,),
-        view=view,
-        probabilities=dict.fromkeys(standing.slugs, 0.9),
-        statistics={"parts_p_value": 0.001},
+        causes=hypothesis.slugs,
+        credible=(hypothesis,),
+        probabilities=dict.fromkeys(hypothesis.slugs, 0.9),
+        comparison=Comparison(best_drop=40.0, structure=0.0, tolerance=2.0, credible=1, check=check),
     )
-    report: Report = assemble.report_of(
-        given.campaign, given.design, known.noise, known.priors, view, judgement, [standing], None, (), {}, (),
-        np.random.default_rng(1),
-    )  # fmt: skip
+    investigation = Investigation(
+        baseline=given.baseline,
+        projected=projected,
+        alarms=alarms_of(problem, projected, rng),
+        search=SearchResult(problem=problem, hypotheses=(hypothesis,)),
+        raw=(),
+        where=(),
+    )
+    validation = Validation(extended=fit, gain=gain)
+    report = report_of(investigation, revise(judgement, validation.held_out), validation, ())
     assert report.verdict is verdict
-    assert report.causes == standing.slugs
+    assert report.causes == hypothesis.slugs
     assert ("something else may be at work too" in report.summary) == (verdict is Verdict.CAUSE_AMBIGUOUS)
+    assert (report.extension is None) == (gain is WORSE)
+    assert report.statistics["lambda"] == 40.0
+    assert report.statistics["parts_p_value"] == 0.001
 
 
-def test_why_an_extension_is_not_proposed_is_told_by_what_went_wrong() -> None:
-    missed = replace(GAIN, rmse_after=1.1 * GAIN.rmse_before)
-    assert "missed by more with it" in assemble.withheld(missed)
-    unlikely = replace(GAIN, rmse_after=0.9 * GAIN.rmse_before, log_score_gain=-825.0)
-    assert "less probable with it than without, by 825 nats" in assemble.withheld(unlikely)
+def test_why_an_extension_is_not_proposed_is_said() -> None:
+    assert "error on held-out runs is larger" in withheld_note(Proposal.WITHHELD_ERROR, GAIN)
+    unlikely = replace(GAIN, log_score_gain=-825.0)
+    assert "lower with it than without, by 825 nats" in withheld_note(Proposal.WITHHELD_LOG_SCORE, unlikely)
+    assert withheld_note(Proposal.PROPOSED, GAIN) == ""
+    assert withheld_note(Proposal.NONE, None) == ""

@@ -17,12 +17,12 @@ def bumped() -> Study:
 
 
 def test_cells_are_means_of_residual_over_noise(bumped):
-    found = residual_maps(bumped.design, bumped.baseline.noise, bumped.baseline.fit, None)
+    found = residual_maps(bumped.problem, bumped.baseline.fit, None)
     assert found is not None
     assert np.allclose(found.pressure, PRESSURES)
     assert np.allclose(found.speed, SPEEDS)
     assert np.array_equal(found.cycles, CYCLES)
-    design, noise = bumped.design, bumped.baseline.noise
+    design, noise = bumped.design, bumped.problem.noise
     for p in (0, 3):
         for s in (1, 12):
             cell = [
@@ -44,7 +44,7 @@ def test_cells_are_means_of_residual_over_noise(bumped):
 
 
 def test_the_bump_shows_where_it_is(bumped):
-    found = residual_maps(bumped.design, bumped.baseline.noise, bumped.baseline.fit, None)
+    found = residual_maps(bumped.problem, bumped.baseline.fit, None)
     by_speed = found.speed_pressure_before.mean(axis=0)
     velocity = found.speed * 0.058
     assert abs(velocity[int(by_speed.argmax())] - 3.0) < 1.0
@@ -64,7 +64,7 @@ def test_nothing_measured_is_not_a_number(bumped):
         runs.append(replace(run, plateaus=type(table)(**columns)))
     assert holes.any()
     thinned = study(replace(given, stationary=tuple(runs)))
-    found = residual_maps(thinned.design, thinned.baseline.noise, thinned.baseline.fit, None)
+    found = residual_maps(thinned.problem, thinned.baseline.fit, None)
     missing = np.isnan(found.speed_pressure_before)
     assert missing.any()
     assert missing[:-1].sum() == 0
@@ -76,7 +76,7 @@ def test_many_speeds_and_states_are_gathered(bumped):
     many = replace(
         bumped.design, rows=replace(bumped.design.rows, velocity=rng.uniform(0.1, 12, bumped.design.torque.size))
     )
-    found = residual_maps(many, bumped.baseline.noise, bumped.baseline.fit, None)
+    found = residual_maps(replace(bumped.problem, design=many), bumped.baseline.fit, None)
     assert found.speed.size == MOST_BINS
     assert found.speed_pressure_before.shape == (PRESSURES.size, MOST_BINS)
     assert np.all(np.diff(found.speed) > 0)

@@ -1,15 +1,16 @@
-"""A run that is not like the others is named; an effect that all of them show is none."""
+"""An outlying run is named; an effect that all runs show makes none of them an outlier."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from models.diagnosis.attribution.verdict import Verdict
 from models.diagnosis.campaign import Campaign, StationaryRun
 from models.diagnosis.design.design import build_design
-from models.diagnosis.diagnose import diagnose, fit_baseline
-from models.diagnosis.report.outlying_run import odd_run
-from models.diagnosis.report.report import Verdict
+from models.diagnosis.diagnose import diagnose
+from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
+from models.diagnosis.report.outlying_run import outlying_run
 from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.test_diagnose import warm
 
@@ -33,10 +34,10 @@ def too_low(run: StationaryRun) -> StationaryRun:
     )
 
 
-@pytest.mark.parametrize(("spoiled", "place"), [(reversed_torque, 2), (too_low, 4)])
-def test_a_run_that_is_not_like_the_others_is_named(spoiled, place: int) -> None:
+@pytest.mark.parametrize(("changed", "place"), [(reversed_torque, 2), (too_low, 4)])
+def test_a_run_that_is_not_like_the_others_is_named(changed, place: int) -> None:
     given = campaign(2, loops=False, cycles=(0.0, 1000.0, 3000.0, 6000.0, 10000.0, 15000.0, 21000.0))
-    report = diagnose(other(given, place, spoiled(given.stationary[place])), rng=np.random.default_rng(1))
+    report = diagnose(other(given, place, changed(given.stationary[place])), rng=np.random.default_rng(1))
     assert report.verdict in {Verdict.UNEXPLAINED_STRUCTURE, Verdict.CAUSE_AMBIGUOUS}
     assert f"The run {given.stationary[place].run_id} at" in report.summary
 
@@ -45,4 +46,4 @@ def test_a_run_that_is_not_like_the_others_is_named(spoiled, place: int) -> None
 def test_no_run_is_odd_where_all_are_alike(planted) -> None:
     design = build_design(campaign(2, planted, loops=False))
     known = fit_baseline(design)
-    assert odd_run(design, known.noise, known.fit) == ""
+    assert outlying_run(known.problem, known.fit) == ""

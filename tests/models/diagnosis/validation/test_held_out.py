@@ -1,4 +1,4 @@
-"""What an extension gains on runs held out: something where there is an effect, nothing where there is none."""
+"""What an extension gains on held-out runs: something where there is an effect, nothing where there is none."""
 
 from dataclasses import replace
 
@@ -10,9 +10,18 @@ from models.diagnosis.baseline.laws import ATTRACTOR, Scene
 from models.diagnosis.design.autocorrelation import Correlation
 from models.diagnosis.effects import amplitude_prior
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.pooled_fit.gauss_newton import Fit, Fitted, effect_columns, fit
-from models.diagnosis.report.report import Gain
-from models.diagnosis.validation.held_out import _STEPS, _ahead, _bridged, _foretold, _held, _without, measure_gain
+from models.diagnosis.effects.fitted_effect import FittedEffect, effect_columns
+from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
+from models.diagnosis.validation.held_out import (
+    _STEPS,
+    Gain,
+    _ahead,
+    _bridged,
+    _forecast_score,
+    _held,
+    _without,
+    measure_gain,
+)
 from tests.models.diagnosis.campaigns import CYCLES, campaign
 from tests.models.diagnosis.fitted import Study, study, warmth
 
@@ -31,7 +40,7 @@ def plain() -> Study:
 
 def gain_of(given: Study, extended: Fit) -> Gain:
     rng = np.random.default_rng(0)
-    found = measure_gain(given.design, given.baseline.noise, given.baseline.priors, given.baseline.fit, extended, rng)
+    found = measure_gain(given.problem, given.baseline.fit, extended, rng)
     assert found is not None
     return found
 
@@ -39,7 +48,7 @@ def gain_of(given: Study, extended: Fit) -> Gain:
 def test_a_planted_effect_gains_on_what_was_held_out(warm):
     found = gain_of(warm, warm.extended(TEMPERATURE))
     assert found.log_score_gain > 20
-    assert found.remaining > 0
+    assert found.forecast_log_score_gain > 0
     assert found.reduction_percent > 5 * found.reduction_sd > 0
     # most of what was beyond noise is gone
     assert found.excess_after < 0.5 * found.excess_before
@@ -56,33 +65,35 @@ def test_no_effect_no_gain(plain):
 
 
 def test_what_was_learned_of_single_curves_does_not_gain(plain):
-    """A bump in speed of its own for every curve: it fits better, and by row it would foretell better. By run it cannot."""
-    design, noise = plain.design, plain.baseline.noise
+    """A bump in speed of its own for every curve: it fits better, and by row it would predict better. By run it cannot."""
+    design = plain.design
     rng = np.random.default_rng(3)
     sizes = 0.3 * rng.standard_normal(design.curve.max() + 1)
     shape = np.sin(np.pi * design.rows.velocity / design.rows.velocity.max() * 3)
     bumpy = replace(design, torque=design.torque + sizes[design.curve] * shape)
-    null = fit(bumpy, noise, plain.baseline.fit.laws, plain.baseline.priors)
+    problem = replace(plain.problem, design=bumpy)
+    null = fit(problem, plain.baseline.fit.laws)
     start = [
-        Fitted(effect=own_curve(curve, bumpy.curve, shape), amplitude=0.0, shape=()) for curve in range(sizes.size)
+        FittedEffect(effect=own_curve(curve, bumpy.curve, shape), amplitude=0.0, shape=())
+        for curve in range(sizes.size)
     ]
-    memorised = fit(bumpy, noise, null.laws, plain.baseline.priors, start)
+    memorised = fit(problem, null.laws, start)
     learned = null.cost - memorised.cost
     assert learned > 100
-    priors = plain.baseline.priors
-    found = measure_gain(bumpy, noise, priors, null, memorised, np.random.default_rng(0))
+    found = measure_gain(problem, null, memorised, np.random.default_rng(0))
     assert found is not None
     assert found.log_score_gain < 0.15 * learned
     inside = 100 * (1 - np.std(memorised.residual) / np.std(null.residual))
     assert found.reduction_percent < 0.25 * inside
     # curves that are held out are unlearned altogether
     out = bumpy.rows.cycles == CYCLES[2]
-    forgot = fit(bumpy, _without(noise, out), memorised.laws, priors, memorised.effects, steps=2)
+    masked = problem.with_noise(_without(problem.noise, out))
+    forgot = fit(masked, memorised.laws, memorised.effects, steps=2)
     sizes_of = [np.array([each.amplitude for each in model.effects]) for model in (memorised, forgot)]
     mine = np.unique(bumpy.curve[out])
     assert np.abs(sizes_of[1][mine]).max() < 0.01 * np.abs(sizes_of[0][mine]).max()
     # the control: every other row held out, the rest of each curve gives its bump away
-    by_row = _held(bumpy, noise, priors, null, memorised, np.arange(bumpy.torque.size) % 2 == 1)
+    by_row = _held(problem, null, memorised, np.arange(bumpy.torque.size) % 2 == 1)
     assert by_row.score > 0.25 * learned
 
 
@@ -97,17 +108,17 @@ def own_curve(curve, curves, shape):
     )
 
 
-def test_states_ahead_are_foretold_with_the_parameters_uncertainty(warm):
+def test_states_ahead_are_predicted_with_the_parameters_uncertainty(warm):
     """Against the dense normal density of the held-out rows given the others, every matrix written out."""
     given = warm
-    priors = given.baseline.priors
-    noise = replace(given.baseline.noise, plateaus=Correlation(), loops=Correlation(), run_gain=0.0, curve_gain=0.0)
+    priors = given.problem.priors
+    noise = replace(given.problem.noise, plateaus=Correlation(), loops=Correlation(), run_gain=0.0, curve_gain=0.0)
     extended = given.extended(TEMPERATURE)
     out = _ahead(given.design)
     assert out is not None
     for model in (given.baseline.fit, extended):
-        masked = _without(noise, out)
-        found = fit(given.design, masked, model.laws, priors, model.effects, steps=_STEPS)
+        masked = given.problem.with_noise(_without(noise, out))
+        found = fit(masked, model.laws, model.effects, steps=_STEPS)
         own = [effect_columns(given.design, found.prediction, each) for each in found.effects]
         jacobian = np.concatenate([found.prediction.jacobian(given.design)[:, priors.free], *own], axis=1)
         unit = jacobian / noise.deviation[:, None]
@@ -121,11 +132,11 @@ def test_states_ahead_are_foretold_with_the_parameters_uncertainty(warm):
         spread = np.linalg.inv(precision * scale[:, None] * scale) * scale[:, None] * scale
         covariance = np.eye(int(out.sum())) + unit[out] @ spread @ unit[out].T
         density = multivariate_normal.logpdf((found.residual / noise.deviation)[out], cov=covariance)
-        told = _foretold(given.design, noise, priors, model, out)
-        assert told == pytest.approx(density + 0.5 * int(out.sum()) * np.log(2 * np.pi), abs=0.05)
+        score = _forecast_score(given.problem.with_noise(noise), model, out)
+        assert score == pytest.approx(density + 0.5 * int(out.sum()) * np.log(2 * np.pi), abs=0.05)
         # the control: without the parameters' uncertainty it is another number
         bare = -0.5 * float(np.square(found.residual / noise.deviation)[out].sum())
-        assert abs(told - bare) > 1
+        assert abs(score - bare) > 1
 
 
 def test_loops_at_a_pressure_held_out_take_c_from_its_neighbours():
@@ -149,5 +160,5 @@ def test_one_state_and_one_pressure_leave_nothing_out():
     alone = study(campaign(6, loops=False, cycles=(100.0,)))
     design = alone.design
     one = replace(design, level=np.full_like(design.level, 5e5))
-    noise, priors, fitted = alone.baseline.noise, alone.baseline.priors, alone.baseline.fit
-    assert measure_gain(one, noise, priors, fitted, fitted, np.random.default_rng(0)) is None
+    fitted = alone.baseline.fit
+    assert measure_gain(replace(alone.problem, design=one), fitted, fitted, np.random.default_rng(0)) is None

@@ -16,8 +16,7 @@ def bumped() -> Study:
 
 
 def smoothed(given: Study, *axes: str):
-    base = given.baseline
-    return smooth_fit(given.design, base.noise, base.priors, base.fit, axes)
+    return smooth_fit(given.problem, given.baseline.fit, axes)
 
 
 def test_a_bump_in_speed_is_filled_in(bumped):
@@ -30,8 +29,7 @@ def test_a_bump_in_speed_is_filled_in(bumped):
     off = (bumped.design.torque - found.torque)[near].mean()
     assert abs(off) < 0.4 * abs(bumped.baseline.fit.residual[near].mean())
     assert abs((bumped.design.torque - found.torque)[far].mean()) < 0.1
-    base = bumped.baseline
-    gain = measure_gain(bumped.design, base.noise, base.priors, base.fit, found, np.random.default_rng(0))
+    gain = measure_gain(bumped.problem, bumped.baseline.fit, found, np.random.default_rng(0))
     assert gain.log_score_gain > 10
     assert gain.rmse_after < gain.rmse_before
 
@@ -42,8 +40,7 @@ def test_the_wrong_axis_and_no_structure_gain_nothing(bumped):
     plain = study(campaign(41, loops=False))
     found = smoothed(plain, SPEED)
     assert plain.baseline.fit.cost - found.cost < 5
-    base = plain.baseline
-    gain = measure_gain(plain.design, base.noise, base.priors, base.fit, found, np.random.default_rng(0))
+    gain = measure_gain(plain.problem, plain.baseline.fit, found, np.random.default_rng(0))
     assert abs(gain.log_score_gain) < 5
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.diagnosis.attribution.verdict import Verdict
 from models.diagnosis.baseline.laws import Scene
 from models.diagnosis.baseline.prediction import frame_of, predict
 from models.diagnosis.campaign import Campaign
@@ -14,7 +15,6 @@ from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.uncatalogued.catalogue import UNCATALOGUED, UNCATALOGUED_BY_SLUG
 from models.diagnosis.effects.uncatalogued.fault import UncataloguedFault
 from models.diagnosis.pooled_fit.starts import starting_laws
-from models.diagnosis.report.report import Verdict
 from models.friction.stribeck import torque
 from tests.models.diagnosis.campaigns import Planted, Where, campaign
 

@@ -1,14 +1,14 @@
-"""The alarm sees every effect that its campaign can show, whatever the units of its amplitude."""
+"""Likelihood ratios see every effect that its campaign can show, whatever the units of its amplitude."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from models.diagnosis.attribution.screening import columns_of
-from models.diagnosis.detection.alarm import lead, likelihood_ratios
-from models.diagnosis.detection.view import view_of
+from models.diagnosis.detection.likelihood_ratio import largest_ratio, likelihood_ratios
+from models.diagnosis.detection.projected_fit import project_fit
 from models.diagnosis.effects.catalogue import CATALOGUE
+from models.diagnosis.effects.grid import columns_of
 from tests.models.diagnosis.campaigns import campaign
 from tests.models.diagnosis.fitted import study
 
@@ -16,9 +16,7 @@ from tests.models.diagnosis.fitted import study
 @pytest.fixture(scope="module")
 def view():
     given = study(campaign(3))
-    known = given.baseline
-    columns = columns_of(list(CATALOGUE), [effect.grid(given.design.facts) for effect in CATALOGUE])
-    return view_of(given.design, known.noise, known.priors, known.fit, columns)
+    return project_fit(given.problem, given.baseline.fit, columns_of(CATALOGUE, given.design.facts))
 
 
 def test_a_unit_hides_nothing(view):
@@ -35,10 +33,11 @@ def test_a_unit_hides_nothing(view):
     two_sided = np.zeros(units.size)
     usual = likelihood_ratios([projected], view.effects, two_sided)
     np.testing.assert_allclose(likelihood_ratios([other], view.effects, two_sided), usual, rtol=1e-6, atol=1e-9)
-    leads = [
-        lead([each], view.effects, two_sided, 0.006, np.random.default_rng(1)).threshold for each in (projected, other)
+    thresholds = [
+        largest_ratio([scaled], view.effects, two_sided, 0.006, np.random.default_rng(1)).threshold
+        for scaled in (projected, other)
     ]
-    assert leads[0] == pytest.approx(leads[1], abs=0.05)
+    assert thresholds[0] == pytest.approx(thresholds[1], abs=0.05)
 
 
 def test_every_effect_of_the_catalogue_is_looked_at(view):

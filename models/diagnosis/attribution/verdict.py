@@ -1,0 +1,74 @@
+"""What is decided of a campaign: the verdict, and the judgement that it is part of."""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from models.diagnosis.attribution.check import Check
+from models.diagnosis.attribution.evidence import Hypothesis
+
+
+class Verdict(StrEnum):
+    """The honest answers: nothing beyond noise, these causes, one of these, something else, too little data."""
+
+    MODEL_ADEQUATE = "model_adequate"
+    CAUSE_NAMED = "cause_named"
+    CAUSE_AMBIGUOUS = "cause_ambiguous"
+    UNEXPLAINED_STRUCTURE = "unexplained_structure"
+    INSUFFICIENT_DATA = "insufficient_data"
+
+
+class Proposal(StrEnum):
+    """Whether the extended model is proposed for adoption: there is none; it is; it is withheld, for its error on held-out
+    runs is larger than the baseline's, or its log score there is lower."""
+
+    NONE = "none"
+    PROPOSED = "proposed"
+    WITHHELD_ERROR = "withheld_error"
+    WITHHELD_LOG_SCORE = "withheld_log_score"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """The numbers of a comparison of hypotheses [nats]: the drop of the best one's cost, the evidence of structure that no
+    effect explains, what the best template may be wrong by; the size of the credible set; the check of its best member; the
+    evidence of an unmeasured oil temperature where that competes, else None."""
+
+    best_drop: float
+    structure: float
+    tolerance: float
+    credible: int
+    check: Check
+    unmeasured: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeldOut:
+    """How an extended model does on runs that were held out, against the baseline: RMS errors [Nm], gain of log score
+    [nats], and the gain of log score when the last states are predicted from the first ones [nats]."""
+
+    rmse_before: float
+    rmse_after: float
+    log_score_gain: float
+    forecast_log_score_gain: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judgement:
+    """The verdict, its causes, the credible set (hypotheses that the data do not distinguish from the best, best first), the
+    probability of each effect, the numbers of the comparison (None where nothing was compared), the slug of an uncatalogued
+    rig fault that does about as well as the best; after validation, what is proposed and whether effects of use are followed
+    beyond the data."""
+
+    verdict: Verdict
+    causes: tuple[str, ...] = ()
+    credible: tuple[Hypothesis, ...] = ()
+    probabilities: dict[str, float] = field(default_factory=dict)
+    comparison: Comparison | None = None
+    fault: str | None = None
+    proposal: Proposal = Proposal.NONE
+    follow_courses: bool = False
+
+    @property
+    def open(self) -> bool:
+        """Whether something is left to be found out."""
+        return self.verdict in {Verdict.CAUSE_AMBIGUOUS, Verdict.UNEXPLAINED_STRUCTURE}

@@ -1,0 +1,74 @@
+"""The shape grid of all effects as columns: the change of torque of a small amplitude, for every shape that is tried."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+from scipy.special import logsumexp
+
+from models.arrays import FloatArray
+from models.diagnosis.baseline.prediction import Prediction
+from models.diagnosis.design.design import Design
+from models.diagnosis.design.facts import Facts
+from models.diagnosis.effects.effect import Effect, Shape, unit_changes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """One point of an effect's grid: the effect, its shape, its log prior weight (normalised over the effect's grid), and
+    that of all points that differ from it in smooth shapes only."""
+
+    effect: Effect
+    shape: Shape
+    log_weight: float
+    log_weight_around: float
+
+
+def columns_of(effects: Sequence[Effect], facts: Facts) -> list[Column]:
+    """The grids of all effects, one after the other."""
+    columns = []
+    for effect in effects:
+        grid = effect.grid(facts)
+        if grid:
+            total = float(logsumexp([tried.log_weight for tried in grid]))
+            kinds: dict[Shape, list[float]] = {}
+            for tried in grid:
+                kinds.setdefault(_stiff(effect, tried.shape), []).append(tried.log_weight - total)
+            around = {kind: float(logsumexp(logs)) for kind, logs in kinds.items()}
+            columns += [
+                Column(
+                    effect=effect,
+                    shape=tried.shape,
+                    log_weight=tried.log_weight - total,
+                    log_weight_around=around[_stiff(effect, tried.shape)],
+                )
+                for tried in grid
+            ]
+    return columns
+
+
+def _stiff(effect: Effect, shape: Shape) -> Shape:
+    """The shapes that a refit does not move."""
+    return tuple(value for value, parameter in zip(shape, effect.shapes, strict=True) if not parameter.smooth)
+
+
+def columns_at_rows(design: Design, prediction: Prediction, columns: Sequence[Column]) -> FloatArray:
+    """The changes [N, m] of small amplitudes, per unit, at the rows."""
+    changes = list[tuple[FloatArray, bool]]()
+    for _, alike in groupby(columns, key=lambda column: column.effect.slug):
+        group = list(alike)
+        unit = unit_changes(group[0].effect, prediction.scene, [column.shape for column in group])
+        changes += [(unit[:, i], column.effect.lags(column.shape)) for i, column in enumerate(group)]
+    return change_columns(design, prediction, changes)
+
+
+def change_columns(design: Design, prediction: Prediction, changes: list[tuple[FloatArray, bool]]) -> FloatArray:
+    """Changes at the points, each with whether it comes before the lag -> [N, m] at the rows."""
+    out = np.zeros((design.torque.size, len(changes)))
+    for before in (True, False):
+        chosen = [i for i, (_, flag) in enumerate(changes) if flag is before]
+        if chosen:
+            stacked = np.stack([changes[i][0] for i in chosen], axis=1)
+            out[:, chosen] = prediction.change_at_rows(design, stacked, before_lag=before)
+    return out

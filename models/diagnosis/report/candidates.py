@@ -1,0 +1,71 @@
+"""The candidates of a report: each effect that competed, with its probability, evidence and estimated amplitude."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from models.diagnosis.attribution.evidence import Hypothesis
+from models.diagnosis.attribution.verdict import Judgement
+from models.diagnosis.criteria import LEAST_LISTED
+from models.diagnosis.detection.raw_records.evidence import RawEvidence
+from models.diagnosis.effects.catalogue import BY_SLUG
+from models.diagnosis.effects.effect import sized
+from models.diagnosis.effects.estimate import Estimate
+from models.diagnosis.pooled_fit.problem import FitProblem
+from models.diagnosis.pooled_fit.projection import amplitude_deviations
+from models.diagnosis.report.report import Candidate
+
+
+def candidates_of(
+    problem: FitProblem, judgement: Judgement, hypotheses: Sequence[Hypothesis], raw: Sequence[RawEvidence]
+) -> tuple[Candidate, ...]:
+    """Each effect as the verdict has it, else alone, else beside the one that it goes with best."""
+    records = {record.effect: record for record in raw}
+    alone = [hypothesis for hypothesis in hypotheses if len(hypothesis.effects) == 1 and hypothesis.usable]
+    unmeasured = judgement.comparison.unmeasured if judgement.comparison is not None else None
+    candidates = []
+    for slug, probability in judgement.probabilities.items():
+        if probability < LEAST_LISTED and slug not in judgement.causes:
+            continue
+        beside: tuple[str, ...] = ()
+        hypothesis = next((h for h in (*judgement.credible, *alone, *hypotheses) if slug in h.slugs), None)
+        if hypothesis is not None and hypothesis.fit is not None:
+            place = hypothesis.slugs.index(slug)
+            deviation = amplitude_deviations(problem, hypothesis.fit)[place]
+            estimate = _estimate(slug, hypothesis.fit.effects[place].amplitude, deviation)
+            evidence = hypothesis.evidence
+            beside = tuple(other for other in hypothesis.slugs if other != slug)
+        elif slug in records:
+            estimate, evidence = _finite_estimate(records[slug].estimate), records[slug].log_evidence
+        else:  # screened only, or an oil temperature that was not measured
+            estimate = _estimate(slug, 0.0, sized(BY_SLUG[slug], problem.design.facts).prior_sd)
+            evidence = hypothesis.evidence if hypothesis is not None else (unmeasured or 0.0)
+        candidates.append(
+            Candidate(
+                effect=slug,
+                title=BY_SLUG[slug].title,
+                probability=probability,
+                log_evidence_gain=_finite(evidence),
+                estimate=estimate,
+                beside=beside,
+            )
+        )
+    return tuple(candidates)
+
+
+def _estimate(slug: str, amplitude: float, deviation: float) -> Estimate:
+    effect = BY_SLUG[slug]
+    return Estimate(
+        name=effect.amplitude,
+        value=_finite(amplitude * effect.scale),
+        sd=_finite(deviation * effect.scale),
+        unit=effect.unit,
+    )
+
+
+def _finite_estimate(estimate: Estimate) -> Estimate:
+    return Estimate(name=estimate.name, value=_finite(estimate.value), sd=_finite(estimate.sd), unit=estimate.unit)
+
+
+def _finite(value: float) -> float:
+    return float(np.clip(np.nan_to_num(value), -1e300, 1e300))
