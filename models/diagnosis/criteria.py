@@ -92,8 +92,8 @@ MOST_UNDONE, UNDONE_EXCESS = 2.5, 8.0
 # --- attribution: the verdict --------------------------------------------------------------------------------------------
 
 #: An alarm that neither an effect nor an axis of structure confirms must be so much [nats] beyond its threshold
-#: (derived: ln 5, about five times rarer by chance). That of the effects more: where no effect has evidence once refitted, the
-#: shape that raised it was one of many (chosen; no table).
+#: (derived: ln 5, about five times rarer by chance). That of the effects more: where no effect has evidence once
+#: refitted, the shape that raised it was one of many (chosen; no table).
 UNCONFIRMED, UNCONFIRMED_EFFECTS = 1.6, 6.0
 #: Evidence [nats] over no effect from which a cause is considered (chosen; no table).
 LEAST_EVIDENCE = 3.0
