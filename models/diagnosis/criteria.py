@@ -1,8 +1,8 @@
 """Every number on which a diagnosis decides, chapter by chapter: its meaning, its unit, and where it is from.
 
-Nothing goes in; constants come out. "chosen; no table" says that a number was set by trial on hidden effects (`make blind`)
-and that no table of the trials was kept. λ is the expected log-likelihood ratio [nats] of an effect
-(`pooled_fit.projection`), for the best hypothesis estimated by the drop of its cost.
+Nothing goes in; constants come out. "chosen; no table" says that no record was kept of what else was tried;
+docs/diagnosis.md has what the whole does on hidden effects (`make blind`). λ is the expected log-likelihood ratio [nats]
+of an effect (`pooled_fit.projection`), for the best hypothesis estimated by the drop of its cost.
 """
 
 # --- effects -------------------------------------------------------------------------------------------------------------
@@ -53,7 +53,7 @@ LEAST_INFORMATION = 0.01
 #: An effect is searched from so many of its shapes, no two of which share more than this of their visible part [-] (chosen;
 #: no table).
 SHAPES_TRIED, MOST_ALIKE = 4, 0.9
-#: So many single effects and pairs of the linear screens are refitted at most (chosen: by time).
+#: So many single effects and pairs of the linear screens are refitted at most (chosen; no table: it bounds the time).
 SINGLES_REFITTED, PAIRS_REFITTED = 5, 4
 #: ... where the screen has them this close [nats] to the best, and this share of λ more (chosen; no table).
 SCREEN_MARGIN, SCREEN_MARGIN_SHARE = 9.0, 0.2
@@ -69,10 +69,11 @@ FIRSTS_OF_PAIRS, SECONDS_OF_PAIRS, LEAST_SECOND_PROMISE = 2, 3, 3.0
 OTHER_HALF_MARGIN = 6.0
 #: A baseline whose evidence is better by so much [nats] replaces the first one (chosen; no table).
 BETTER_BASELINE = 1.0
-#: So many uncatalogued rig faults are refitted at most, where they promise to come near the best (chosen: by time).
+#: So many uncatalogued rig faults are refitted at most, where they promise to come near the best (chosen; no table: it
+#: bounds the time).
 FAULTS_REFITTED = 2
-#: Deviation of ln ν in a test whose oil temperature varies by some 3 K (derived: ASTM D341 at 85 °C), and the factors on it
-#: that are averaged over from test to test and within a test (chosen; no table).
+#: Deviation of ln ν in a test whose oil temperature varies by some 3 K (derived: about what ASTM D341 gives near 85 °C),
+#: and the factors on it that are averaged over from test to test and within a test (chosen; no table).
 USUAL_VISCOSITY_CHANGE = 0.06
 CHANGES_BETWEEN_TESTS, CHANGES_WITHIN_TESTS = (0.5, 1.5, 4.0), (0.0, 0.5, 1.5, 4.0)
 
@@ -91,15 +92,15 @@ MOST_UNDONE, UNDONE_EXCESS = 2.5, 8.0
 # --- attribution: the verdict --------------------------------------------------------------------------------------------
 
 #: An alarm that neither an effect nor an axis of structure confirms must be so much [nats] beyond its threshold
-#: (derived: about five times rarer by chance). That of the effects more: where no effect has evidence once refitted, the
-#: shape that raised it was one of many (chosen; no table).
+#: (derived: ln 5, about five times rarer by chance). That of the effects more: where no effect has evidence once
+#: refitted, the shape that raised it was one of many (chosen; no table).
 UNCONFIRMED, UNCONFIRMED_EFFECTS = 1.6, 6.0
 #: Evidence [nats] over no effect from which a cause is considered (chosen; no table).
 LEAST_EVIDENCE = 3.0
 #: Hypotheses within this evidence [nats] of the best belong to the credible set (derived: 4.6 = ln 100; pairs, of which
 #: each half has evidence of its own, within less: chosen), and this share of λ more (chosen; no table).
 CREDIBLE_MARGIN, CREDIBLE_MARGIN_PAIRS, CREDIBLE_MARGIN_SHARE = 4.6, 3.0, 0.005
-#: At most so many hypotheses of the credible set are checked (chosen: by time).
+#: At most so many hypotheses of the credible set are checked (chosen; no table: it bounds the time).
 MOST_CHECKED = 4
 #: Log prior odds [nats] against two effects at once, and further against two of one family: the second may correct the
 #: template of the first (chosen; no table).
@@ -107,7 +108,7 @@ PAIR_LOG_ODDS, SAME_FAMILY_LOG_ODDS = 4.0, 8.0
 #: Structure that no effect explains may lead by this share of λ beyond so many nats (below, no template's error shows)
 #: (chosen).
 STRUCTURE_SHARE, STRUCTURE_FROM = 0.05, 20.0
-#: ... and by so many nats in any case (derived: ln 8, the choice among some eight axes).
+#: ... and by so many nats in any case (derived: about ln 8, the choice among some eight axes).
 AXES_LOG_ODDS = 2.0
 #: Probability from which a cause is named, and from which the second of two is (chosen; no table).
 LEAST_NAMED, LEAST_SECOND_NAMED = 0.85, 0.8
@@ -140,7 +141,7 @@ CORRECTION_SIZES = (0.001, 0.003, 0.01, 0.03, 0.1)
 #: Tests advised at most; λ [nats] that one must bring to be worth its time, and that the best one must bring to be listed
 #: where none is worth it (chosen; no table).
 MOST_ADVISED, WORTHWHILE, LEAST_ADVISED = 3, 3.0, 0.1
-#: Rivals that are compared at most, unless the credible set is larger (chosen: by time).
+#: Rivals that are compared at most, unless the credible set is larger (chosen; no table: it bounds the time).
 MOST_RIVALS = 4
 #: Hypotheses so much [nats] behind the best may become rivals again after another test (chosen; no table).
 RIVAL_MARGIN = 8.0

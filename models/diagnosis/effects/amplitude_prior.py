@@ -11,7 +11,7 @@ import math
 from models.diagnosis.effects.effect import Effect
 
 #: Deviations of the two normal distributions that approximate p where everything is linear, in s; each has half the weight
-#: (derived: a two-point approximation of the tails above).
+#: (chosen; no table).
 SCALES = (1.0, 6.0)
 
 
