@@ -3,7 +3,7 @@
 A workflow reads a `ClutchState`, computes outside any transaction, and stores with `unchanged` and `store`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -22,19 +22,15 @@ from service.errors import NotFoundError
 from service.lives.assumptions import ALL_PRESSURES, FLEET, LearnedPrior, kind_of, severity_under
 from service.lives.history import REBUILD, ByPressure, Event, duty_block, moment_of, order
 from service.lives.incoming_run import IncomingRun
-from service.lives.model_correction import RunReader
 from service.lives.recomputation import Adoption, ClutchState, Results, Tracking
 from service.lives.run_analysis import Analysis, LevelFit, Value
 from service.lives.tracks import CARRIED, States, Tracked
 from service.schemas.clutch import ClutchIn
 from service.settings import CODE_VERSION
-from storage import adopted_models, channels, clutches, diagnoses, filter_states, fits, fleet_priors, predictions, runs
+from storage import assumptions, clutches, diagnoses, results, runs
 from storage.clutches import ClutchRow
-from storage.engine.database import Database
-from storage.filter_states import FilterStateRow
-from storage.fits import FitRow
-from storage.predictions import PredictionRow
-from storage.runs import RunInOrder, RunRow
+from storage.results import FilterStateRow, FitRow, PredictionRow
+from storage.runs import RunInOrder
 
 _STATES: dict[str, type[ParticleState] | type[UkfState]] = {"particle": ParticleState, "ukf": UkfState}
 #: Columns of a stored fit that are a fit's own.
@@ -46,15 +42,6 @@ def clutch(connection: Connection, clutch_id: str) -> ClutchRow:
     row = clutches.get(connection, clutch_id)
     if row is None:
         raise NotFoundError(f"no clutch is known as {clutch_id!r}")
-    return row
-
-
-def run(connection: Connection, clutch_id: str, run_id: str) -> RunRow:
-    """The run of a known clutch, or NotFoundError."""
-    clutch(connection, clutch_id)
-    row = runs.get(connection, clutch_id, run_id)
-    if row is None:
-        raise NotFoundError(f"clutch {clutch_id!r} has no run {run_id!r}")
     return row
 
 
@@ -85,7 +72,7 @@ def state(connection: Connection, clutch_id: str, *, also: Extension | None = No
 
 def adoption(connection: Connection, clutch_id: str) -> Adoption | None:
     """What was adopted last, None under the baseline; whether it is in force the history tells."""
-    row = adopted_models.current(connection, clutch_id)
+    row = assumptions.current_adoption(connection, clutch_id)
     if row is None or row.diagnosis_id is None:
         return None
     diagnosed = diagnoses.get(connection, clutch_id, row.diagnosis_id)
@@ -106,20 +93,20 @@ def present_life(connection: Connection, clutch_id: str) -> str:
 
 def events(connection: Connection, clutch_id: str) -> tuple[Event, ...]:
     """All runs of a clutch as its history sees them, ordered; mean COF as the model in force corrects it."""
-    cofs = fits.cofs_of_clutch(connection, clutch_id) | adopted_models.corrected_cofs(connection, clutch_id)
+    cofs = results.cofs_of(connection, clutch_id) | assumptions.corrected_cofs_of(connection, clutch_id)
     return order([_event(row, cofs.get(row.run_key, {})) for row in runs.in_order(connection, clutch_id)])
 
 
 def baseline_cofs(connection: Connection, clutch_id: str) -> dict[str, ByPressure]:
     """Mean COFs by run_id as the baseline has them."""
-    cofs = fits.cofs_of_clutch(connection, clutch_id)
+    cofs = results.cofs_of(connection, clutch_id)
     return {row.run_id: cofs[row.run_key] for row in runs.in_order(connection, clutch_id) if row.run_key in cofs}
 
 
 def levels(connection: Connection, clutch_id: str) -> dict[str, list[LevelFit]]:
     """All fits of a clutch by run_id."""
     names = {row.run_key: row.run_id for row in runs.in_order(connection, clutch_id)}
-    of_runs = fits.of_clutch(connection, clutch_id)
+    of_runs = results.fits_of(connection, clutch_id)
     return {names[run_key]: [_level_fit(row) for row in rows] for run_key, rows in of_runs.items()}
 
 
@@ -130,44 +117,8 @@ def receipts(connection: Connection, clutch_id: str) -> dict[str, dict[str, Any]
 
 def answers(connection: Connection, clutch_id: str) -> list[Any]:
     """Receipts and predictions as they are stored of a clutch: whether they have changed decides on a new revision."""
-    tracks = [predictions.history(connection, clutch_id, method, ALL_PRESSURES) for method in CARRIED]
+    tracks = [results.predictions_of(connection, clutch_id, method, ALL_PRESSURES) for method in CARRIED]
     return [receipts(connection, clutch_id), tracks]
-
-
-def run_reader(database: Database, clutch_id: str) -> RunReader:
-    """The clutch's stored runs, each read in a transaction of its own when it is asked for: none stays open meanwhile."""
-
-    def described(run_id: str) -> IncomingRun:
-        with database.reading() as connection:
-            return incoming(run(connection, clutch_id, run_id), {})
-
-    def with_channels(run_id: str) -> IncomingRun:
-        with database.reading() as connection:
-            row = run(connection, clutch_id, run_id)
-            return incoming(row, channels.read(connection, row.run_key))
-
-    with database.reading() as connection:
-        sampled = channels.samples(connection, clutch_id)
-        names = {row.run_key: row.run_id for row in runs.in_order(connection, clutch_id)}
-    return RunReader(
-        read=with_channels,
-        describe=described,
-        sampled=frozenset(names[run_key] for run_key in sampled if run_key in names),
-    )
-
-
-def incoming(row: RunRow, columns: Mapping[str, NDArray[np.float64]]) -> IncomingRun:
-    """A stored run as it came in."""
-    return IncomingRun(
-        kind=row.kind,
-        cycles=row.cycles,
-        run_id=row.run_id,
-        content_sha256=row.content_sha256,
-        started_at=row.started_at,
-        origin=row.details["origin"],
-        channels=columns,
-        details={name: row.details[name] for name in ("duty", "event", "note") if name in row.details},
-    )
 
 
 def details(incoming_run: IncomingRun, analysis: Analysis) -> dict[str, Any]:
@@ -181,25 +132,25 @@ def unchanged(connection: Connection, clutch_id: str, revision: int) -> bool:
     return clutches.revision(connection, clutch_id) == revision
 
 
-def store(connection: Connection, clutch_id: str, results: Results) -> None:
+def store(connection: Connection, clutch_id: str, computed: Results) -> None:
     """Store results in place of those that were there. The revision is the workflow's to move on."""
-    if results.levels or results.receipts or results.corrected:
+    if computed.levels or computed.receipts or computed.corrected:
         rows = {row.run_id: row.run_key for row in runs.in_order(connection, clutch_id)}
-        for run_id, own in results.levels.items():
-            fits.write(connection, rows[run_id], fit_rows(own, results.cofs.get(run_id, {})))
-        for run_id, receipt in results.receipts.items():
+        for run_id, own in computed.levels.items():
+            results.write_fits(connection, rows[run_id], fit_rows(own, computed.cofs.get(run_id, {})))
+        for run_id, receipt in computed.receipts.items():
             runs.set_receipt(connection, rows[run_id], receipt)
-    if results.corrected_anew:
-        adopted_models.clear_corrected(connection, clutch_id)
-    for run_id, cofs in results.corrected.items():
-        adopted_models.write_corrected(connection, rows[run_id], cofs)
-    if results.tracking is not None:
-        _store_tracking(connection, clutch_id, results.tracking)
+    if computed.corrected_anew:
+        assumptions.clear_corrected_cofs(connection, clutch_id)
+    for run_id, cofs in computed.corrected.items():
+        assumptions.write_corrected_cofs(connection, rows[run_id], cofs)
+    if computed.tracking is not None:
+        _store_tracking(connection, clutch_id, computed.tracking)
 
 
 def _store_tracking(connection: Connection, clutch_id: str, tracking: Tracking) -> None:
     if tracking.anew:
-        predictions.clear(connection, clutch_id)
+        results.clear_predictions(connection, clutch_id)
     rows = [
         PredictionRow(
             cycles=prediction.cycles,
@@ -210,9 +161,9 @@ def _store_tracking(connection: Connection, clutch_id: str, tracking: Tracking) 
         )
         for prediction in tracking.predictions
     ]
-    predictions.put(connection, clutch_id, rows)
-    filter_states.clear(connection, clutch_id)
-    filter_states.put(connection, clutch_id, _filter_rows(tracking.filters))
+    results.put_predictions(connection, clutch_id, rows)
+    results.clear_filter_states(connection, clutch_id)
+    results.put_filter_states(connection, clutch_id, _filter_rows(tracking.filters))
     clutches.set_summary(connection, clutch_id, tracking.rank, tracking.summary)
 
 
@@ -236,7 +187,7 @@ def _filter_rows(filters: States) -> list[FilterStateRow]:
 
 def _filters(connection: Connection, clutch_id: str) -> States | None:
     """The inverse of `_filter_rows`; None where another release stored them."""
-    rows = {method: row for (method, _), row in filter_states.get(connection, clutch_id).items()}
+    rows = {method: row for (method, _), row in results.filter_states_of(connection, clutch_id).items()}
     if any(row.code_version != CODE_VERSION for row in rows.values()):
         return None
     return {method: _tracked(method, row) for method, row in rows.items()}
@@ -254,9 +205,9 @@ def _tracked(method: str, row: FilterStateRow) -> Tracked:
 
 def _learned_prior(connection: Connection, own: ClutchIn, severity: Severity) -> LearnedPrior:
     """The newest prior of the clutch's kind that was not learned from it, and its public name."""
-    row = fleet_priors.current(connection, kind_of(own, severity))
+    row = assumptions.current_fleet_prior(connection, kind_of(own, severity))
     if row is not None and own.clutch_id in row.members:
-        row = fleet_priors.without(connection, row, own.clutch_id)
+        row = assumptions.fleet_prior_without(connection, row, own.clutch_id)
     if row is None:
         return LearnedPrior()
     fleet = FleetPrior.from_dict(row.content)

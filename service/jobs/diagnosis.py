@@ -15,7 +15,7 @@ import numpy as np
 
 from models.diagnosis.campaign import StationaryRun
 from models.diagnosis.extension import Extension
-from service import records
+from service import records, stored_runs
 from service.lives.campaign import CampaignRun, DiagnosedLife, records_to_keep, run_of
 from service.lives.diagnosis_report import public
 from service.lives.history import STATIONARY, Life, lives_of
@@ -85,7 +85,7 @@ def read_life(database: Database, clutch_id: str, *, last_run_key: int) -> Diagn
     life = lives[-1]
     samples = {run_id: by_key[row.run_key] for run_id, row in rows.items() if row.run_key in by_key}
     kept = records_to_keep([event.run_id for event in life.events], samples)
-    reader = records.run_reader(database, clutch_id)
+    reader = stored_runs.run_reader(database, clutch_id)
     campaign: list[CampaignRun] = []
     notes = []
     for event in life.events:
@@ -114,7 +114,7 @@ def before_and_after(
     plain = diagnosed_life.life.with_cofs(cofs)
     predicted = [plain]
     if extension is not None:
-        runs_before = records.run_reader(database, clutch_id).campaign_runs(plain.events, origin=plain.origin)
+        runs_before = stored_runs.run_reader(database, clutch_id).campaign_runs(plain.events, origin=plain.origin)
         tests = [run for run in diagnosed_life.runs if isinstance(run, StationaryRun)]
         freed = corrected_cofs(extension, diagnosed_life.record, plain, runs_before, tests)
         predicted.append(plain.with_cofs({event.run_id: freed.get(event.run_id, event.cofs) for event in plain.events}))

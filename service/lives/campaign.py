@@ -20,10 +20,10 @@ from models.diagnosis.campaign import (
 )
 from models.records.plateaus import cut_plateaus
 from models.records.runs import Plateaus, Record
+from service.columns import CHANNELS
 from service.lives.criteria import MOST_OF_CAMPAIGN, MOST_OF_RECORD
 from service.lives.history import DYNAMIC, MAINTENANCE, STATIONARY, Life
 from service.lives.incoming_run import IncomingRun, sampled_record, stationary_plateaus
-from service.readers.units import CHANNELS
 from service.schemas.clutch import ClutchIn
 
 CampaignRun: TypeAlias = StationaryRun | DynamicRun | DutyRun | MaintenanceEvent

@@ -10,8 +10,7 @@ from models.arrays import FloatArray
 from models.diagnosis.detection.lack_of_fit import Misfit
 from models.diagnosis.report.report import LoopTrace, Maps, Report
 from models.diagnosis.validation.held_out import Gain
-from service.lives.receipt import bar
-from service.readers.units import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
+from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, bar
 
 #: Maps and traces are looked at: more digits than these only weigh.
 _DIGITS = 6

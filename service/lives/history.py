@@ -19,9 +19,9 @@ from models.degradation.severity import Block
 from models.friction.speed_protocol import protocol_speeds
 from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE
 from models.tracking.measurement import Measurement
+from service.columns import RADIANS_PER_SECOND_PER_RPM
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions, Scale
 from service.lives.run_analysis import Value
-from service.readers.units import RADIANS_PER_SECOND_PER_RPM
 
 ByPressure = Mapping[float, Value]
 

@@ -12,10 +12,9 @@ from models.arrays import FloatArray
 from models.records.criteria import UNLOADED
 from models.records.pressure_levels import levels_of
 from models.records.runs import Plateaus, Record
+from service.columns import CHANNELS, whole
 from service.errors import FieldError, InvalidError
 from service.lives.criteria import LEAST_TORQUE_SD, MOST_LEVELS
-from service.readers.units import CHANNELS
-from service.schemas.base import whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,13 +9,13 @@ from models.friction.stribeck import PARAMETER_NAMES
 from models.prognosis.first_passage import weighted_quantiles
 from models.tracking.filters.grid import Grid
 from models.tracking.posterior import Posterior
+from service.columns import bar, whole
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions
 from service.lives.criteria import TRAJECTORY_DRAWS, TRAJECTORY_LATTICE
 from service.lives.history import Life, Series, nearest
-from service.lives.receipt import PARAMETER_UNITS, bar
+from service.lives.payloads import PARAMETER_UNITS
 from service.lives.run_analysis import LevelFit, Value
 from service.lives.tracks import step_rng
-from service.schemas.base import whole
 
 #: A series and a weighted sample of its eq. 6.
 Track = tuple[Series, Posterior]

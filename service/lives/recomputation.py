@@ -12,7 +12,7 @@ from models.clutch import Geometry
 from models.degradation.severity import Severity
 from models.diagnosis.campaign import StationaryRun
 from models.diagnosis.extension import Extension
-from service.lives.assumptions import Assumptions, LearnedPrior, severity_under
+from service.lives.assumptions import Assumptions, LearnedPrior, ModelInForce, severity_under
 from service.lives.history import (
     DYNAMIC,
     ByPressure,
@@ -23,8 +23,7 @@ from service.lives.history import (
     stationary_test_of,
 )
 from service.lives.model_correction import RunReader, corrected_cofs, model_in_force
-from service.lives.prediction import recent, summary_of
-from service.lives.receipt import fit_items, loop_items
+from service.lives.payloads import fit_items, loop_items, recent, summary_of
 from service.lives.run_analysis import LevelFit, loops_of, mean_cofs
 from service.lives.tracks import CARRIED, Prediction, States, follow
 from service.schemas.clutch import ClutchIn
@@ -91,7 +90,8 @@ class ClutchState:
 
     def assumptions_under(self, extension: Extension | None, life: Life | None) -> Assumptions:
         """What a life would be tracked under, were this extension in force."""
-        model = model_in_force(extension, life, self.geometry)
+        adopted = extension is not None and life is not None
+        model = model_in_force(extension, life, self.geometry) if adopted else ModelInForce()
         severity = severity_under(self.record, model.severity_exponent)
         return Assumptions(severity=severity, prior=self.priors[severity], model=model)
 

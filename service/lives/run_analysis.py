@@ -18,10 +18,10 @@ from models.loops.lag_fit import StationaryCurve
 from models.records.criteria import UNLOADED
 from models.records.plateaus import cut_plateaus
 from models.records.runs import Plateaus, curves_by_pressure, loaded
+from service.columns import PASCALS_PER_BAR
 from service.errors import FieldError, InvalidError
 from service.lives.criteria import FEWEST_SPEEDS, POOR_FIT, WIDE_LEVEL
 from service.lives.incoming_run import IncomingRun, SampledChannels, sampled_record, stationary_plateaus
-from service.readers.units import PASCALS_PER_BAR
 
 #: Warnings that depend on what was known when the run arrived: cycles before those of an earlier run, other pressures.
 LATE, OTHER_PRESSURES = "late_arrival", "other_pressures"

@@ -22,14 +22,13 @@ from models.tracking.innovation import last_innovation
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior, Tracker
 from models.tracking.prior import Prior
+from service.columns import PASCALS_PER_BAR, bar
 from service.errors import NotFoundError
 from service.lives.assumptions import ALL_PRESSURES, WEAK, Assumptions
 from service.lives.criteria import PREDICTION_DRAWS
 from service.lives.history import Event, Life, Series, lives_of, nearest_pressure
-from service.lives.prediction import insufficient, off_track, predicted
-from service.lives.receipt import bar
+from service.lives.payloads import insufficient, off_track, predicted
 from service.lives.run_analysis import Notice
-from service.readers.units import PASCALS_PER_BAR
 
 FilterState = ParticleState | UkfState | GridState
 

@@ -3,16 +3,10 @@
 Where several ask for an answer that is not there yet, one computes it and the others wait for it.
 """
 
-import json
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future
-
-
-def to_json(payload: object) -> bytes:
-    """JSON in UTF-8; ValueError on a number that JSON cannot carry: none may leave."""
-    return json.dumps(payload, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
 
 
 class AnswerCache:

@@ -7,7 +7,7 @@ from sqlalchemy import Connection
 
 from service import records
 from service.lives.assumptions import BASELINE
-from service.lives.prediction import SUMMARY
+from service.lives.payloads import SUMMARY
 from storage import clutches, verdicts
 from storage.clutches import ClutchRow
 from storage.engine.database import Database

@@ -25,7 +25,7 @@ from service import records
 from service.lives.assumptions import ALL_PRESSURES, Assumptions
 from service.lives.history import Life, nearest, nearest_pressure, reference_velocities
 from service.lives.parameter_tracks import Track, parameter_tracks, posterior_of, tests_of, track_item
-from service.lives.receipt import notice_items
+from service.lives.payloads import notice_items
 from service.lives.run_analysis import LevelFit, Notice
 from service.lives.tracks import offset_of, step_rng
 from storage.engine.database import Database

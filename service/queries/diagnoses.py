@@ -5,9 +5,9 @@ from typing import Any
 from sqlalchemy import Connection
 
 from service import records
+from service.columns import whole
 from service.errors import NotFoundError
 from service.lives.diagnosis_report import empty
-from service.schemas.base import whole
 from storage import diagnoses
 from storage.diagnoses import DiagnosisRow
 from storage.engine.database import Database

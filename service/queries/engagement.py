@@ -11,13 +11,12 @@ from models.engagements.simulation import Drive, Engagement, PressureProfile, en
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
 from models.prognosis.first_passage import weighted_quantiles
 from service import records
+from service.columns import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, whole
 from service.errors import NotFoundError
 from service.lives.assumptions import Assumptions
 from service.lives.history import Event, Life, Series, lives_of
 from service.lives.parameter_tracks import parameter_series, posterior_of, tests_of
 from service.lives.run_analysis import LevelFit
-from service.readers.units import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
-from service.schemas.base import whole
 from storage.engine.database import Database
 
 

@@ -5,9 +5,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from models.prognosis.fleet import FleetPrior
-from storage import fleet_priors
+from storage import assumptions
+from storage.assumptions import FleetPriorRow
 from storage.engine.database import Database
-from storage.fleet_priors import FleetPriorRow
 
 _KINDS, _OWN = ("friction_material", "reaction_plate", "fluid", "origin"), ("version", "created_at", "clutches")
 COLUMNS = (*_KINDS, "severity", *_OWN)
@@ -16,7 +16,7 @@ COLUMNS = (*_KINDS, "severity", *_OWN)
 def newest(database: Database) -> list[dict[str, Any]]:
     """The newest version of every fleet's prior, in the public shape."""
     with database.reading() as connection:
-        return [_item(row) for row in fleet_priors.all_current(connection)]
+        return [_item(row) for row in assumptions.current_fleet_priors(connection)]
 
 
 def rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:

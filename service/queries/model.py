@@ -7,8 +7,8 @@ from sqlalchemy import Connection
 from models.diagnosis.extension import Extension
 from service import records
 from service.lives.assumptions import BASELINE
-from storage import adopted_models, diagnoses
-from storage.adopted_models import AdoptedRow
+from storage import assumptions, diagnoses
+from storage.assumptions import AdoptedRow
 from storage.engine.database import Database
 
 
@@ -16,7 +16,7 @@ def model(database: Database, clutch_id: str) -> dict[str, Any]:
     """The model in force and all versions, newest first. Raises NotFoundError."""
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
-        rows = adopted_models.versions(connection, clutch_id)
+        rows = assumptions.adoptions_of(connection, clutch_id)
         adoption = records.adoption(connection, clutch_id)
         life = records.present_life(connection, clutch_id)
         in_force = adoption if adoption is not None and adoption.life == life else None

@@ -4,9 +4,10 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from service import records
+from service.errors import NotFoundError
 from service.lives.assumptions import ALL_PRESSURES
 from service.lives.tracks import predict_at
-from storage import predictions
+from storage import clutches, results
 from storage.engine.database import Database
 
 
@@ -19,16 +20,20 @@ def remaining_life(
     computed. Raises NotFoundError for an unknown clutch or a pressure that its first stationary test did not measure.
     """
     with database.reading() as connection:
-        row = records.clutch(connection, clutch_id)
+        row = clutches.get(connection, clutch_id)
+        if row is None:
+            raise NotFoundError(f"no clutch is known as {clutch_id!r}")
         stored = (
-            predictions.at(connection, clutch_id, method, ALL_PRESSURES, at_cycles) if pressure_bar is None else None
+            results.prediction_at(connection, clutch_id, method, ALL_PRESSURES, at_cycles)
+            if pressure_bar is None
+            else None
         )
         state = records.state(connection, clutch_id) if stored is None else None
     head = {
         "clutch_id": clutch_id,
         "method": method,
         "revision": row.revision,
-        "origin": records.record(row).origin,
+        "origin": row.record.get("origin", "measured"),  # earlier releases stored none
     }
     if stored is not None:
         return head | stored.payload

@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from service import records
+from service import records, stored_runs
+from service.columns import whole
 from service.lives.history import DYNAMIC
-from service.schemas.base import whole
 from storage import channels, runs
 from storage.engine.database import Database
 
@@ -36,7 +36,7 @@ def rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
 def one_run(database: Database, clutch_id: str, run_id: str) -> dict[str, Any]:
     """A receipt with the run's channels, bit for bit as they were sent. Raises NotFoundError."""
     with database.reading() as connection:
-        row = records.run(connection, clutch_id, run_id)
+        row = stored_runs.run(connection, clutch_id, run_id)
         columns = channels.read(connection, row.run_key)
     return row.receipt | {"channels": {name: column.tolist() for name, column in columns.items()}}
 

@@ -15,13 +15,14 @@ import numpy as np
 from models.prognosis import scoring
 from models.prognosis.criteria import HORIZON, QUANTILES
 from service import records
+from service.columns import whole
 from service.lives.assumptions import ALL_PRESSURES, Assumptions
 from service.lives.history import Event, Life
-from service.lives.prediction import INSUFFICIENT
+from service.lives.payloads import INSUFFICIENT
 from service.lives.tracks import CARRIED, predict_at
-from service.queries.cache import AnswerCache, to_json
-from service.schemas.base import whole
-from storage import clutches, predictions
+from service.queries.cache import AnswerCache
+from storage import clutches, results
+from storage.encoding.json_text import to_text
 from storage.engine.database import Database
 
 #: α of the α-λ accuracy, of remaining life, and of the prognostic horizon, of the whole life.
@@ -35,7 +36,7 @@ def of_clutch(database: Database, clutch_id: str, *, method: str) -> dict[str, A
     """The scores of a clutch's lives that came to their end; NotFoundError for an unknown clutch."""
     with database.reading() as connection:
         state = records.state(connection, clutch_id)
-        rows = predictions.history(connection, clutch_id, method, ALL_PRESSURES)
+        rows = results.predictions_of(connection, clutch_id, method, ALL_PRESSURES)
     stored = {row.cycles: row.payload for row in rows}
     assumptions = state.assumptions()
     items = []
@@ -75,7 +76,7 @@ def of_fleet(database: Database, cache: AnswerCache, *, method: str) -> dict[str
 def _items(database: Database, cache: AnswerCache, clutch_id: str, revision: int, method: str) -> list[dict[str, Any]]:
     """A clutch's scored lives, kept by its revision."""
     key = (clutch_id, revision, "scores", method)
-    answer = cache.answer(key, lambda: to_json(of_clutch(database, clutch_id, method=method)))
+    answer = cache.answer(key, lambda: to_text(of_clutch(database, clutch_id, method=method)).encode())
     items: list[dict[str, Any]] = json.loads(answer)["items"]
     return items
 

@@ -5,13 +5,13 @@ from typing import Any
 
 from models.friction.criteria import Z90
 from service import records
+from service.columns import whole
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF
 from service.lives.history import STATIONARY
-from service.lives.receipt import PARAMETER_UNITS
-from service.schemas.base import whole
-from storage import predictions, runs
+from service.lives.payloads import PARAMETER_UNITS
+from storage import results, runs
 from storage.engine.database import Database
-from storage.predictions import PredictionRow
+from storage.results import PredictionRow
 
 
 def series(database: Database, clutch_id: str, quantity: str | None) -> list[dict[str, Any]]:
@@ -22,7 +22,7 @@ def series(database: Database, clutch_id: str, quantity: str | None) -> list[dic
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
         rows = runs.page(connection, clutch_id, kind=STATIONARY)
-        predicted = predictions.history(connection, clutch_id, "particle", ALL_PRESSURES)
+        predicted = results.predictions_of(connection, clutch_id, "particle", ALL_PRESSURES)
     measured = (item for row in rows for fit in row.receipt["fits"] for item in _measured(row.receipt, fit))
     ahead = (item for row in predicted for item in _predicted(row))
     return [item for items in (measured, ahead) for item in items if quantity in (None, item["quantity"])]

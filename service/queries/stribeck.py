@@ -5,10 +5,9 @@ from typing import Any
 
 from models.friction.pressure_laws import LinearLaw, PressureLaws, fit_pressure_laws
 from service import records
-from service.lives.receipt import PARAMETER_UNITS
+from service.columns import PASCALS_PER_BAR, whole
+from service.lives.payloads import PARAMETER_UNITS
 from service.lives.run_analysis import LevelFit
-from service.readers.units import PASCALS_PER_BAR
-from service.schemas.base import whole
 from storage import runs
 from storage.engine.database import Database
 from storage.runs import RunRow

@@ -16,14 +16,13 @@ from models.friction.pressure_laws import over_pressure
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters, torque
 from models.prognosis.first_passage import weighted_quantiles
 from service import records
+from service.columns import RADIANS_PER_SECOND_PER_RPM, bar, whole
 from service.errors import NotFoundError
 from service.lives.assumptions import Assumptions
 from service.lives.history import Event, lives_of
 from service.lives.parameter_tracks import Track, parameter_tracks, tests_of
-from service.lives.receipt import PARAMETER_UNITS, bar
+from service.lives.payloads import PARAMETER_UNITS
 from service.lives.run_analysis import LevelFit
-from service.readers.units import RADIANS_PER_SECOND_PER_RPM
-from service.schemas.base import whole
 from storage.engine.database import Database
 
 #: Places along cycles, pressure and speed.

@@ -6,10 +6,10 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from service.columns import CHANNELS
 from service.errors import MOST_QUOTED, FieldError, InvalidError
 from service.readers.limits import LONGEST_MAP
 from service.readers.unit_table import Conversion, conversion, is_unit, spellings
-from service.readers.units import CHANNELS
 
 #: Single letters have their meaning in mechanics: capitals count (M is a torque, n a speed, p a pressure, t a time).
 _LETTERS = {"M": "torque_nm", "n": "speed_rpm", "p": "pressure_bar", "t": "time_s"}

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from models.arrays import FloatArray
+from service.columns import check_arrays
 from service.readers import sandbox
-from service.readers.checks import check_arrays
 from service.readers.csv.read import read_csv
 from service.readers.detect import Format, opened, sniff
 from service.readers.limits import LIMITS, Limits

@@ -23,10 +23,10 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from models.arrays import FloatArray
+from service.columns import CHANNELS
 from service.errors import FieldError, InvalidError, ServiceError, TooLargeError
 from service.readers.detect import Format, is_packed, opened
 from service.readers.limits import Limits
-from service.readers.units import CHANNELS
 
 #: The module that reads each format, the package it needs, and the extra of ours that installs that package.
 READERS = {

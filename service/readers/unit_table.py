@@ -4,7 +4,7 @@ import unicodedata
 from dataclasses import dataclass
 
 from models.arrays import FloatArray
-from service.readers.units import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS
+from service.columns import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,9 +4,9 @@ from typing import Any
 
 import pydantic
 
+from service.columns import check_columns
 from service.errors import MOST_ERRORS, MOST_QUOTED, FieldError, InvalidError
 from service.lives.incoming_run import IncomingRun, name_run
-from service.readers.checks import check_columns
 from service.schemas.run import RUN_IN, DutyRunIn, MaintenanceRunIn
 
 _KINDS = ("stationary_stribeck", "dynamic_stribeck", "duty_cycles", "run_in", "maintenance")

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from models.arrays import FloatArray
+from service.columns import CHANNELS
 from service.readers.detect import Format
 from service.readers.sandbox import READERS
-from service.readers.units import CHANNELS
 
 _ROWS = 50_000
 _GROUP = "rig"

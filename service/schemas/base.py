@@ -4,6 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PlainSerializer, StringConstraints, WithJsonSchema
 
+from service.columns import whole
 from service.schemas.limits import IDENTIFIER_PATTERN, LARGEST_NUMBER, MOST_CYCLES
 
 
@@ -19,11 +20,6 @@ class Answer(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
 
-def whole(value: float) -> float | int:
-    """A float as JSON's shortest number: 7000.0 becomes 7000."""
-    return int(value) if value.is_integer() and abs(value) < 2**53 else value
-
-
 # --- in requests ---
 
 Identifier = Annotated[str, StringConstraints(pattern=IDENTIFIER_PATTERN)]
@@ -33,7 +29,7 @@ Cycles = Annotated[float, Field(ge=0, le=MOST_CYCLES, allow_inf_nan=False, stric
 PositiveNumber = Annotated[float, Field(gt=0, le=LARGEST_NUMBER, allow_inf_nan=False, strict=True)]
 NotNegativeNumber = Annotated[float, Field(ge=0, le=LARGEST_NUMBER, allow_inf_nan=False, strict=True)]
 
-#: A column is checked by `service.readers.checks`, which names row and value among millions.
+#: A column is checked by `service.columns`, which names row and value among millions.
 Column = Annotated[
     list[Any],
     WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 1}),

@@ -1,7 +1,6 @@
 """What a route is given: the service's parts, and arguments that many routes take."""
 
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from typing import Annotated
 
 from fastapi import Query
@@ -22,11 +21,6 @@ class Context:
     cache: AnswerCache
     metrics: Metrics
     diagnoses: DiagnosisQueue
-
-
-def now() -> str:
-    """The time, UTC, ISO 8601."""
-    return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
 Limit = Annotated[int, Query(ge=1, le=MOST_ITEMS, description="Items a page")]

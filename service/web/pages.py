@@ -11,6 +11,7 @@ import io
 import json
 import math
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from datetime import UTC, datetime
 from typing import Any
 
 from fastapi import Request
@@ -18,10 +19,10 @@ from fastapi.responses import Response
 from pydantic import BaseModel
 
 from service.errors import FieldError, InvalidError, NotFoundError, UnsupportedMediaTypeError
-from service.queries.cache import to_json
 from service.web.context import Context
 from service.web.limits import ALL_ITEMS
 from storage import clutches
+from storage.encoding.json_text import to_text
 
 JSON_TYPE = "application/json"
 CSV_TYPE = "text/csv; charset=utf-8"
@@ -29,6 +30,16 @@ CSV_TYPE = "text/csv; charset=utf-8"
 #: Where a page ended: a number, and a name where that is not unique.
 Place = tuple[float, str]
 Rows = Iterable[Mapping[str, Any]]
+
+
+def to_json(payload: object) -> bytes:
+    """JSON in UTF-8; ValueError on a number that JSON cannot carry: none may leave."""
+    return to_text(payload).encode()
+
+
+def now() -> str:
+    """The time, UTC, ISO 8601."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
 def answer(request: Request, payload: object) -> Response:

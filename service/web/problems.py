@@ -21,9 +21,9 @@ from service.errors import (
     UnauthorizedError,
     UnsupportedMediaTypeError,
 )
-from service.queries.cache import to_json
 from service.schemas.problem import Problem
 from service.web.limits import RETRY_AFTER_SECONDS
+from service.web.pages import to_json
 from storage.engine.errors import DatabaseBusy, StorageError
 
 PROBLEM_TYPE = "application/problem+json"

@@ -11,11 +11,11 @@ from typing import Any
 from sqlalchemy import Connection
 
 from models.diagnosis.extension import Extension
-from service import records
+from service import records, stored_runs
 from service.errors import NotFoundError, NothingToAdoptError
 from service.lives.recomputation import Adoption, ClutchState, Results, computed_anew
-from storage import adopted_models, clutches, diagnoses
-from storage.adopted_models import AdoptedRow
+from storage import assumptions, clutches, diagnoses
+from storage.assumptions import AdoptedRow
 from storage.diagnoses import DiagnosisRow
 from storage.engine.database import Database
 
@@ -78,7 +78,7 @@ def _change(
                 version, _ = _newest(connection, clutch_id)
                 diagnosis_id = None if adoption is None else adoption.diagnosis_id
                 row = AdoptedRow(version=version + 1, diagnosis_id=diagnosis_id, adopted_at=adopted_at)
-                adopted_models.adopt(connection, clutch_id, row)
+                assumptions.insert_adoption(connection, clutch_id, row)
                 records.store(connection, clutch_id, results)
                 clutches.bump_revision(connection, clutch_id)
                 return
@@ -93,7 +93,7 @@ def _computed(database: Database, clutch_id: str, adoption: Adoption | None) -> 
     if adoption is not None:
         _require_present(adoption, state.lives[-1].name if state.events else "")
     state = replace(state, adoption=adoption)
-    reader = records.run_reader(database, clutch_id)
+    reader = stored_runs.run_reader(database, clutch_id)
     tests = reader.stationary_tests(state.lives[-1]) if state.events else iter(())
     _, results = computed_anew(state, levels, receipts, tests, reader)
     return state, results
@@ -101,7 +101,7 @@ def _computed(database: Database, clutch_id: str, adoption: Adoption | None) -> 
 
 def _newest(connection: Connection, clutch_id: str) -> tuple[int, str | None]:
     """The number of the newest version (0 before the first) and the diagnosis that it adopts."""
-    row = adopted_models.current(connection, clutch_id)
+    row = assumptions.current_adoption(connection, clutch_id)
     return (0, None) if row is None else (row.version, row.diagnosis_id)
 
 

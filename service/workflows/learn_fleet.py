@@ -15,10 +15,10 @@ from service.lives.history import Life
 from service.lives.recomputation import Results, track
 from service.lives.tracks import CARRIED
 from service.settings import CODE_VERSION
-from storage import clutches, fleet_priors, predictions
+from storage import assumptions, clutches, results
+from storage.assumptions import NOBODY, FleetPriorRow
 from storage.encoding.json_text import Json, to_text
 from storage.engine.database import Database
-from storage.fleet_priors import NOBODY, FleetPriorRow
 
 #: Fewer clutches than this are no fleet [-]. Chosen; no table.
 FEWEST_CLUTCHES = 3
@@ -82,18 +82,18 @@ def _stored_anew(database: Database, fleet: Fleet, now: str) -> bool:
     """Store a fleet's prior and what it is without each of its clutches, where it is not what is stored already."""
     learned = fleet.without()
     with database.reading() as connection:
-        known = fleet_priors.current(connection, fleet.kind)
+        known = assumptions.current_fleet_prior(connection, fleet.kind)
     if learned is None or (known is not None and known.content == learned.to_dict()):
         return False
     version = 1 if known is None else known.version + 1
     rows = _versions(fleet, version, now)
     with database.writing() as connection:
-        newest = fleet_priors.current(connection, fleet.kind)
+        newest = assumptions.current_fleet_prior(connection, fleet.kind)
         if newest is not None and newest.version >= version:  # another refresh was quicker
             return False
         for row in rows:
-            fleet_priors.insert(connection, row)
-        fleet_priors.forget_left_out(connection, fleet.kind, before=version)
+            assumptions.insert_fleet_prior(connection, row)
+        assumptions.forget_left_out(connection, fleet.kind, before=version)
     return True
 
 
@@ -122,15 +122,15 @@ def _brought_up(database: Database, clutch_id: str) -> bool:
         while True:
             with database.reading() as connection:
                 state = records.state(connection, clutch_id)
-                last = predictions.at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)
+                last = results.prediction_at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)
             if last is None or last.payload.get("prior") == dict(state.assumptions().prior.name):
                 return False
-            results = Results(tracking=track(state))
+            retracked = Results(tracking=track(state))
             with database.writing() as connection:
                 if not records.unchanged(connection, clutch_id, state.revision):
                     continue
                 before = records.answers(connection, clutch_id)
-                records.store(connection, clutch_id, results)
+                records.store(connection, clutch_id, retracked)
                 if records.answers(connection, clutch_id) == before:
                     return False
                 clutches.bump_revision(connection, clutch_id)

@@ -6,7 +6,7 @@ from typing import Any
 
 from service import records
 from service.errors import ConflictError
-from service.lives.prediction import RANK_UNKNOWN
+from service.lives.payloads import RANK_UNKNOWN
 from service.schemas.clutch import ClutchIn
 from storage import clutches
 from storage.clutches import ClutchRow

@@ -5,15 +5,14 @@ from typing import Any
 
 from sqlalchemy import Connection
 
-from service import records
+from service import records, stored_runs
 from service.lives.history import order
 from service.lives.incoming_run import IncomingRun
-from service.lives.prediction import OFF_TRACK
-from service.lives.receipt import receipt
+from service.lives.payloads import OFF_TRACK, receipt
 from service.lives.recomputation import Results, computed_anew, loops_anew
 from service.lives.run_analysis import NOTICED_ON_ARRIVAL, Analysis, Notice, analyse
 from service.settings import CODE_VERSION
-from storage import clutches, fits, runs
+from storage import clutches, results, runs
 from storage.engine.database import Database
 from storage.runs import RunRow
 
@@ -51,13 +50,13 @@ def _computed(database: Database, clutch_id: str) -> _Replayed:
     with database.reading() as connection:
         state = records.state(connection, clutch_id)
         rows = runs.page(connection, clutch_id)
-    reader = records.run_reader(database, clutch_id)
+    reader = stored_runs.run_reader(database, clutch_id)
     details, receipts, levels, speed_ranges = {}, {}, {}, {}
     for row in rows:
         run = reader.read(row.run_id)
         analysis = analyse(run, state.geometry)
         details[row.run_id] = records.details(run, analysis)
-        receipts[row.run_id] = _receipt(row, records.incoming(row, {}), analysis)
+        receipts[row.run_id] = _receipt(row, stored_runs.incoming(row, {}), analysis)
         levels[row.run_id] = analysis.fits
         speed_ranges[row.run_id] = analysis.speed_range
     events = order([replace(event, speed_range=speed_ranges[event.run_id]) for event in state.events])
@@ -92,7 +91,7 @@ def _store(connection: Connection, clutch_id: str, replayed: _Replayed) -> int:
     before = records.answers(connection, clutch_id)
     rows = runs.page(connection, clutch_id)
     for row in rows:
-        fits.write(connection, row.run_key, [])
+        results.write_fits(connection, row.run_key, [])
         details, answer = replayed.details[row.run_id], replayed.receipts[row.run_id]
         runs.set_results(connection, row.run_key, details, answer, CODE_VERSION)
     records.store(connection, clutch_id, replace(replayed.results, receipts={}))

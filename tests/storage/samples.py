@@ -16,7 +16,7 @@ from storage import channels, clutches, diagnoses, runs
 from storage.clutches import ClutchRow
 from storage.diagnoses import NewDiagnosis
 from storage.engine.database import Database
-from storage.fits import FitRow
+from storage.results import FitRow
 from storage.runs import NewRun
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from sqlalchemy.exc import IntegrityError
 
-from storage import clutches, filter_states
+from storage import clutches, results
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData
-from storage.filter_states import FilterStateRow
+from storage.results import FilterStateRow
 from tests.storage.samples import clutch_row
 
 CLUTCH = "bench3-017"
@@ -39,32 +39,32 @@ def assert_same(stored: FilterStateRow, expected: FilterStateRow) -> None:
 
 def test_filter_states_come_back_are_replaced_and_cleared(stocked: Database) -> None:
     with stocked.writing() as connection:
-        filter_states.put(connection, CLUTCH, [state("ukf", 0.0), state("grid", 5e5), state("grid", 0.0)])
-        filter_states.put(connection, CLUTCH, [state("grid", 0.0, runs=9)])
-        filter_states.put(connection, CLUTCH, [])
-        filter_states.put(connection, "other", [state("ukf", 0.0)])
+        results.put_filter_states(connection, CLUTCH, [state("ukf", 0.0), state("grid", 5e5), state("grid", 0.0)])
+        results.put_filter_states(connection, CLUTCH, [state("grid", 0.0, runs=9)])
+        results.put_filter_states(connection, CLUTCH, [])
+        results.put_filter_states(connection, "other", [state("ukf", 0.0)])
     with stocked.reading() as connection:
-        states = filter_states.get(connection, CLUTCH)
+        states = results.filter_states_of(connection, CLUTCH)
         assert list(states) == [("grid", 0.0), ("grid", 5e5), ("ukf", 0.0)]
         assert_same(states["grid", 0.0], state("grid", 0.0, runs=9))
         assert_same(states["grid", 5e5], state("grid", 5e5))
     with stocked.writing() as connection:
-        filter_states.clear(connection, CLUTCH)
-        assert filter_states.get(connection, CLUTCH) == {}
-        assert list(filter_states.get(connection, "other")) == [("ukf", 0.0)]
+        results.clear_filter_states(connection, CLUTCH)
+        assert results.filter_states_of(connection, CLUTCH) == {}
+        assert list(results.filter_states_of(connection, "other")) == [("ukf", 0.0)]
 
 
 def test_a_damaged_state_is_named(stocked: Database) -> None:
     with stocked.writing() as connection:
-        filter_states.put(connection, CLUTCH, [state("ukf", 5e5)])
+        results.put_filter_states(connection, CLUTCH, [state("ukf", 5e5)])
         connection.exec_driver_sql("UPDATE filter_state SET arrays = x'00'")
     with (
         stocked.reading() as connection,
         pytest.raises(DamagedData, match=r"state of ukf at 500000 Pa of clutch 'bench3"),
     ):
-        filter_states.get(connection, CLUTCH)
+        results.filter_states_of(connection, CLUTCH)
 
 
 def test_states_belong_to_a_clutch(database: Database) -> None:
     with pytest.raises(IntegrityError, match="FOREIGN KEY"), database.writing() as connection:
-        filter_states.put(connection, "nobody", [state("ukf", 0.0)])
+        results.put_filter_states(connection, "nobody", [state("ukf", 0.0)])

@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 from sqlalchemy.exc import IntegrityError
 
-from storage import fleet_priors
+from storage import assumptions
+from storage.assumptions import NOBODY, FleetPriorRow
 from storage.engine.database import Database
-from storage.fleet_priors import NOBODY, FleetPriorRow
 
 PAPER = FleetPriorRow(
     fleet={"friction_material": "paper", "fluid": "Öl", "severity": {"basis": "cycles", "exponent": 1.0}},
@@ -25,30 +25,30 @@ def test_the_newest_version_of_a_kind_is_current(database: Database) -> None:
     newer = replace(PAPER, version=2, content={"mean": []})
     with database.writing() as connection:
         for row in (PAPER, newer, SINTER, replace(SINTER, version=9, left_out="a")):
-            fleet_priors.insert(connection, row)
+            assumptions.insert_fleet_prior(connection, row)
     with database.reading() as connection:
         backwards = dict(reversed(PAPER.fleet.items()))
-        assert fleet_priors.current(connection, backwards) == newer
-        assert fleet_priors.current(connection, {"friction_material": "cork"}) is None
-        assert fleet_priors.all_current(connection) == [newer, SINTER]
+        assert assumptions.current_fleet_prior(connection, backwards) == newer
+        assert assumptions.current_fleet_prior(connection, {"friction_material": "cork"}) is None
+        assert assumptions.current_fleet_priors(connection) == [newer, SINTER]
 
 
 def test_what_was_said_without_a_clutch_is_found_and_forgotten(database: Database) -> None:
     without_a = replace(PAPER, left_out="a", content={"clutches": 2})
     with database.writing() as connection:
-        fleet_priors.insert(connection, PAPER)
-        fleet_priors.insert(connection, without_a)
-        assert fleet_priors.without(connection, PAPER, "a") == without_a
-        assert fleet_priors.without(connection, PAPER, "b") is None
-        fleet_priors.forget_left_out(connection, PAPER.fleet, before=1)
-        assert fleet_priors.without(connection, PAPER, "a") == without_a
-        fleet_priors.forget_left_out(connection, PAPER.fleet, before=2)
-        assert fleet_priors.without(connection, PAPER, "a") is None
-        assert fleet_priors.current(connection, PAPER.fleet) == PAPER
+        assumptions.insert_fleet_prior(connection, PAPER)
+        assumptions.insert_fleet_prior(connection, without_a)
+        assert assumptions.fleet_prior_without(connection, PAPER, "a") == without_a
+        assert assumptions.fleet_prior_without(connection, PAPER, "b") is None
+        assumptions.forget_left_out(connection, PAPER.fleet, before=1)
+        assert assumptions.fleet_prior_without(connection, PAPER, "a") == without_a
+        assumptions.forget_left_out(connection, PAPER.fleet, before=2)
+        assert assumptions.fleet_prior_without(connection, PAPER, "a") is None
+        assert assumptions.current_fleet_prior(connection, PAPER.fleet) == PAPER
 
 
 def test_a_version_is_stored_once(database: Database) -> None:
     with database.writing() as connection:
-        fleet_priors.insert(connection, PAPER)
+        assumptions.insert_fleet_prior(connection, PAPER)
     with pytest.raises(IntegrityError), database.writing() as connection:
-        fleet_priors.insert(connection, replace(PAPER, content={}))
+        assumptions.insert_fleet_prior(connection, replace(PAPER, content={}))

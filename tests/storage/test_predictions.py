@@ -3,9 +3,9 @@
 import pytest
 from sqlalchemy.exc import IntegrityError
 
-from storage import clutches, predictions
+from storage import clutches, results
 from storage.engine.database import Database
-from storage.predictions import PredictionRow
+from storage.results import PredictionRow
 from tests.storage.samples import clutch_row
 
 CLUTCH = "bench3-017"
@@ -29,31 +29,31 @@ def test_predictions_as_they_would_have_been_said_then(stocked: Database) -> Non
     said = [prediction(cycles) for cycles in (7000.0, 0.0, 3000.0)]
     others = [prediction(9000.0, "ukf"), prediction(9000.0, pressure=5e5)]
     with stocked.writing() as connection:
-        predictions.put(connection, CLUTCH, said + others)
-        predictions.put(connection, "other", [prediction(8000.0)])
-        predictions.put(connection, CLUTCH, [])
+        results.put_predictions(connection, CLUTCH, said + others)
+        results.put_predictions(connection, "other", [prediction(8000.0)])
+        results.put_predictions(connection, CLUTCH, [])
     expected = {None: 7000.0, 1e9: 7000.0, 7000.0: 7000.0, 6999.9: 3000.0, 0.0: 0.0}
     with stocked.reading() as connection:
         for at_cycles, cycles in expected.items():
-            assert predictions.at(connection, CLUTCH, "grid", 0.0, at_cycles) == prediction(cycles)
-        assert predictions.at(connection, CLUTCH, "grid", 0.0, -1.0) is None
-        assert predictions.at(connection, CLUTCH, "particle", 0.0) is None
-        history = predictions.history(connection, CLUTCH, "grid", 0.0)
+            assert results.prediction_at(connection, CLUTCH, "grid", 0.0, at_cycles) == prediction(cycles)
+        assert results.prediction_at(connection, CLUTCH, "grid", 0.0, -1.0) is None
+        assert results.prediction_at(connection, CLUTCH, "particle", 0.0) is None
+        history = results.predictions_of(connection, CLUTCH, "grid", 0.0)
         assert [row.cycles for row in history] == [0.0, 3000.0, 7000.0]
 
 
 def test_predictions_are_replaced_and_cleared_for_one_clutch(stocked: Database) -> None:
     with stocked.writing() as connection:
         for clutch_id in (CLUTCH, "other"):
-            predictions.put(connection, clutch_id, [prediction(0.0), prediction(1.0)])
-        predictions.put(connection, CLUTCH, [prediction(1.0, said="again")])
-        assert predictions.at(connection, CLUTCH, "grid", 0.0) == prediction(1.0, said="again")
-        assert len(predictions.history(connection, CLUTCH, "grid", 0.0)) == 2
-        predictions.clear(connection, CLUTCH)
-        assert predictions.history(connection, CLUTCH, "grid", 0.0) == []
-        assert predictions.at(connection, "other", "grid", 0.0) == prediction(1.0)
+            results.put_predictions(connection, clutch_id, [prediction(0.0), prediction(1.0)])
+        results.put_predictions(connection, CLUTCH, [prediction(1.0, said="again")])
+        assert results.prediction_at(connection, CLUTCH, "grid", 0.0) == prediction(1.0, said="again")
+        assert len(results.predictions_of(connection, CLUTCH, "grid", 0.0)) == 2
+        results.clear_predictions(connection, CLUTCH)
+        assert results.predictions_of(connection, CLUTCH, "grid", 0.0) == []
+        assert results.prediction_at(connection, "other", "grid", 0.0) == prediction(1.0)
 
 
 def test_predictions_belong_to_a_clutch(database: Database) -> None:
     with pytest.raises(IntegrityError, match="FOREIGN KEY"), database.writing() as connection:
-        predictions.put(connection, "nobody", [prediction(0.0)])
+        results.put_predictions(connection, "nobody", [prediction(0.0)])

@@ -2,8 +2,8 @@
 
 import pytest
 
-from storage import adopted_models, clutches, diagnoses, verdicts
-from storage.adopted_models import AdoptedRow
+from storage import assumptions, clutches, diagnoses, verdicts
+from storage.assumptions import AdoptedRow
 from storage.clutches import ClutchRow
 from storage.diagnoses import NewDiagnosis
 from storage.engine.database import Database
@@ -52,6 +52,8 @@ def test_the_newest_that_finished_is_told(stored: Database) -> None:
 def test_adopted_is_what_the_model_in_force_came_from(stored: Database) -> None:
     for version, diagnosis_id in ((1, "d1"), (2, None), (3, "d0")):
         with stored.writing() as connection:
-            adopted_models.adopt(connection, "a", AdoptedRow(version=version, diagnosis_id=diagnosis_id, adopted_at=AT))
+            assumptions.insert_adoption(
+                connection, "a", AdoptedRow(version=version, diagnosis_id=diagnosis_id, adopted_at=AT)
+            )
         with stored.reading() as connection:
             assert verdicts.newest(connection, ["a"])["a"].adopted == (diagnosis_id == "d1")

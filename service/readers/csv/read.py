@@ -3,8 +3,8 @@
 import numpy as np
 
 from models.arrays import FloatArray
+from service.columns import LineOf
 from service.errors import InvalidError
-from service.readers.checks import LineOf
 from service.readers.column_names import choose
 from service.readers.csv.blocks import blocks
 from service.readers.csv.header_rows import read_header_rows

@@ -11,7 +11,6 @@ from fastapi.responses import Response
 from starlette.datastructures import UploadFile
 
 from service.errors import InvalidError
-from service.queries.cache import to_json
 from service.run_files.upload import read_file_run
 from service.schemas.base import Origin
 from service.schemas.parameters import (
@@ -25,8 +24,8 @@ from service.schemas.parameters import (
 )
 from service.schemas.run import Receipt
 from service.web.auth import Ingester
-from service.web.context import Context, now
-from service.web.pages import JSON_TYPE
+from service.web.context import Context
+from service.web.pages import JSON_TYPE, now, to_json
 from service.web.problems import SENDING
 from service.workflows.ingest_run import ingest
 

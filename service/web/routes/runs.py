@@ -7,14 +7,23 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
 from service.queries import runs
-from service.queries.cache import to_json
 from service.run_files.json_run import read_run
 from service.schemas.parameters import ClutchId, RunId
 from service.schemas.run import RUN_IN, Receipt, RunOut, RunPage
 from service.web.auth import Ingester, Reader
-from service.web.context import Context, Cursor, Limit, now
+from service.web.context import Context, Cursor, Limit
 from service.web.limits import USUAL_ITEMS
-from service.web.pages import JSON_TYPE, answer, clutch_answer, described_body, from_cursor, json_body, page
+from service.web.pages import (
+    JSON_TYPE,
+    answer,
+    clutch_answer,
+    described_body,
+    from_cursor,
+    json_body,
+    now,
+    page,
+    to_json,
+)
 from service.web.problems import READING, SENDING
 from service.workflows.ingest_run import ingest
 

@@ -6,8 +6,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from service.queries.cache import AnswerCache, to_json
+from service.queries.cache import AnswerCache
 from service.web.limits import MOST_CACHED_BYTES
+from service.web.pages import to_json
 
 
 def made(cache: AnswerCache, name: str, body: bytes) -> bool:

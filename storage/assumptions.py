@@ -1,0 +1,186 @@
+"""What a clutch is tracked under: the models adopted for it with the mean COFs that they correct, and the fleets' priors.
+
+Priors are kept by kind of clutch, version, and the clutch that was left out.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+
+import sqlalchemy as sa
+from sqlalchemy import Connection, Row, bindparam, delete, func, select
+
+from storage.encoding.json_text import Json, to_list, to_object, to_text
+from storage.tables import adopted_model, corrected_cof, fleet_prior, run
+
+# --- adopted models ---
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AdoptedRow:
+    """A version from 1 on; `diagnosis_id` None is a return to the baseline."""
+
+    version: int
+    diagnosis_id: str | None
+    adopted_at: str
+
+
+_adoption_versions = (
+    select(adopted_model.c.version, adopted_model.c.diagnosis_id, adopted_model.c.adopted_at)
+    .where(adopted_model.c.clutch_id == bindparam("of_clutch"))
+    .order_by(adopted_model.c.version.desc())
+)
+_adoption_newest = _adoption_versions.limit(1)
+_adoption_adopt = sa.insert(adopted_model)
+_adoption_cofs = (
+    select(corrected_cof.c.run_key, corrected_cof.c.pressure, corrected_cof.c.mean_cof, corrected_cof.c.mean_cof_sd)
+    .join(run, run.c.run_key == corrected_cof.c.run_key)
+    .where(run.c.clutch_id == bindparam("of_clutch"))
+    .order_by(corrected_cof.c.run_key, corrected_cof.c.pressure)
+)
+_adoption_write = sa.insert(corrected_cof)
+_adoption_clear_run = delete(corrected_cof).where(corrected_cof.c.run_key == bindparam("of_run"))
+_adoption_clear = delete(corrected_cof).where(
+    corrected_cof.c.run_key.in_(select(run.c.run_key).where(run.c.clutch_id == bindparam("of_clutch")))
+)
+
+
+def current_adoption(connection: Connection, clutch_id: str) -> AdoptedRow | None:
+    """The version in force, None before the first."""
+    row = connection.execute(_adoption_newest, {"of_clutch": clutch_id}).first()
+    return None if row is None else AdoptedRow(**row._asdict())
+
+
+def adoptions_of(connection: Connection, clutch_id: str) -> list[AdoptedRow]:
+    """All versions, newest first."""
+    return [AdoptedRow(**row._asdict()) for row in connection.execute(_adoption_versions, {"of_clutch": clutch_id})]
+
+
+def insert_adoption(connection: Connection, clutch_id: str, row: AdoptedRow) -> None:
+    """Store a version. Raises IntegrityError where it is there or its diagnosis unknown."""
+    connection.execute(_adoption_adopt, {"clutch_id": clutch_id} | asdict(row))
+
+
+def corrected_cofs_of(connection: Connection, clutch_id: str) -> dict[int, dict[float, tuple[float, float]]]:
+    """run_key -> pressure -> mean COF and its deviation under the model in force, where it corrects them."""
+    cofs: dict[int, dict[float, tuple[float, float]]] = {}
+    for run_key, pressure, mean, deviation in connection.execute(_adoption_cofs, {"of_clutch": clutch_id}):
+        cofs.setdefault(run_key, {})[pressure] = (mean, deviation)
+    return cofs
+
+
+def write_corrected_cofs(connection: Connection, run_key: int, cofs: Mapping[float, tuple[float, float]]) -> None:
+    """Store a run's corrected mean COFs by pressure in place of those it had."""
+    connection.execute(_adoption_clear_run, {"of_run": run_key})
+    rows = [
+        {"run_key": run_key, "pressure": pressure, "mean_cof": mean, "mean_cof_sd": deviation}
+        for pressure, (mean, deviation) in cofs.items()
+    ]
+    if rows:
+        connection.execute(_adoption_write, rows)
+
+
+def clear_corrected_cofs(connection: Connection, clutch_id: str) -> None:
+    """Drop all corrected mean COFs of a clutch."""
+    connection.execute(_adoption_clear, {"of_clutch": clutch_id})
+
+
+# --- fleet priors ---
+
+#: Learned from all clutches of the kind.
+NOBODY = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FleetPriorRow:
+    """A prior: `fleet` is the kind of clutch, `left_out` the clutch that was not learned from, or NOBODY."""
+
+    fleet: Json
+    version: int
+    left_out: str
+    created_at: str
+    members: tuple[str, ...]
+    content: Json
+    code_version: str
+
+
+_fleet_insert = sa.insert(fleet_prior)
+_fleet_current = (
+    select(fleet_prior)
+    .where(fleet_prior.c.fleet == bindparam("of_fleet"), fleet_prior.c.left_out == NOBODY)
+    .order_by(fleet_prior.c.version.desc())
+    .limit(1)
+)
+_fleet_without = select(fleet_prior).where(
+    fleet_prior.c.fleet == bindparam("of_fleet"),
+    fleet_prior.c.version == bindparam("of_version"),
+    fleet_prior.c.left_out == bindparam("wanted"),
+)
+_fleet_newest = (
+    select(fleet_prior.c.fleet, func.max(fleet_prior.c.version).label("version"))
+    .where(fleet_prior.c.left_out == NOBODY)
+    .group_by(fleet_prior.c.fleet)
+    .subquery()
+)
+_fleet_all_current = (
+    select(fleet_prior)
+    .join(
+        _fleet_newest,
+        (fleet_prior.c.fleet == _fleet_newest.c.fleet) & (fleet_prior.c.version == _fleet_newest.c.version),
+    )
+    .where(fleet_prior.c.left_out == NOBODY)
+    .order_by(fleet_prior.c.fleet)
+)
+_fleet_forget = delete(fleet_prior).where(
+    fleet_prior.c.fleet == bindparam("of_fleet"),
+    fleet_prior.c.version < bindparam("before"),
+    fleet_prior.c.left_out != NOBODY,
+)
+
+
+def insert_fleet_prior(connection: Connection, row: FleetPriorRow) -> None:
+    """Store a prior. Raises IntegrityError where this version is there."""
+    values = {
+        "fleet": _fleet_key(row.fleet),
+        "version": row.version,
+        "left_out": row.left_out,
+        "created_at": row.created_at,
+        "members": to_text(row.members),
+        "content": to_text(row.content),
+        "code_version": row.code_version,
+    }
+    connection.execute(_fleet_insert, values)
+
+
+def current_fleet_prior(connection: Connection, fleet: Json) -> FleetPriorRow | None:
+    """The newest version of a kind of clutch, learned from all of them; None before the first."""
+    row = connection.execute(_fleet_current, {"of_fleet": _fleet_key(fleet)}).first()
+    return None if row is None else _fleet_row(row)
+
+
+def fleet_prior_without(connection: Connection, prior: FleetPriorRow, clutch_id: str) -> FleetPriorRow | None:
+    """The same version learned from all but one clutch; None where too few were left."""
+    values = {"of_fleet": _fleet_key(prior.fleet), "of_version": prior.version, "wanted": clutch_id}
+    row = connection.execute(_fleet_without, values).first()
+    return None if row is None else _fleet_row(row)
+
+
+def current_fleet_priors(connection: Connection) -> list[FleetPriorRow]:
+    """The newest version of every kind of clutch."""
+    return [_fleet_row(row) for row in connection.execute(_fleet_all_current)]
+
+
+def forget_left_out(connection: Connection, fleet: Json, *, before: int) -> None:
+    """Drop the priors with a clutch left out of all versions before `before`; those learned from all clutches stay."""
+    connection.execute(_fleet_forget, {"of_fleet": _fleet_key(fleet), "before": before})
+
+
+def _fleet_key(fleet: Json) -> str:
+    return to_text(dict(sorted(fleet.items())))
+
+
+def _fleet_row(row: Row[tuple[object, ...]]) -> FleetPriorRow:
+    values = row._asdict()
+    values["fleet"] = to_object(values["fleet"])
+    values["members"] = tuple(to_list(values["members"]))
+    values["content"] = to_object(values["content"])
+    return FleetPriorRow(**values)

@@ -1,0 +1,264 @@
+"""What was computed of a clutch: the fitted curves of its runs, its predictions, and the filters' states after the last run.
+
+Curves are a row a run and pressure level, in SI units (Pa, Nm, m/s). Predictions are remaining life as it was predicted
+after each run, a row a clutch, method, pressure (Pa; 0 = the mean) and cycles. A filter's state makes the next run one step:
+a row a clutch, method and pressure.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+import sqlalchemy as sa
+from numpy.typing import NDArray
+from sqlalchemy import Connection, Row, bindparam, delete, select
+from sqlalchemy.dialects.sqlite import insert
+
+from storage.encoding.codec import pack, unpack
+from storage.encoding.json_text import Json, to_list, to_object, to_text
+from storage.engine.errors import DamagedData
+from storage.tables import filter_state, fit, prediction, run
+
+# --- fits ---
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FitRow:
+    """One curve's fit. `covariance` is the 4 x 4 matrix, row by row, 16 numbers; `mse_percent` None on a flat curve.
+
+    `mean_cof` and its deviation, None where the curve does not determine them, are over the protocol of the first test.
+    """
+
+    pressure: float
+    mean_pressure: float
+    static_torque: float
+    coulomb_ratio: float
+    stribeck_velocity: float
+    viscous_coefficient: float
+    covariance: tuple[float, ...]
+    status: str
+    undetermined: tuple[str, ...]
+    noise: float
+    mse_percent: float | None
+    rmse: float
+    points: int
+    speeds: int
+    mean_cof: float | None
+    mean_cof_sd: float | None
+    message: str
+    code_version: str
+
+
+_FIT_NAMES = tuple(field.name for field in fields(FitRow))
+_fit_columns = [fit.c.run_key, *(fit.c[name] for name in _FIT_NAMES)]
+_fit_insert = sa.insert(fit)
+_fit_delete = delete(fit).where(fit.c.run_key == bindparam("of_run"))
+_fit_of_clutch = (
+    select(*_fit_columns)
+    .join(run, run.c.run_key == fit.c.run_key)
+    .where(run.c.clutch_id == bindparam("of_clutch"))
+    .order_by(run.c.cycles, run.c.run_id, fit.c.pressure)
+)
+
+
+_fit_cofs_of_clutch = (
+    select(fit.c.run_key, fit.c.pressure, fit.c.mean_cof, fit.c.mean_cof_sd)
+    .join(run, run.c.run_key == fit.c.run_key)
+    .where(run.c.clutch_id == bindparam("of_clutch"), fit.c.mean_cof.is_not(None))
+    .order_by(fit.c.run_key, fit.c.pressure)
+)
+
+
+def write_fits(connection: Connection, run_key: int, rows: Sequence[FitRow]) -> None:
+    """Store the fits of a run in place of those it had. Raises ValueError unless a covariance has 16 finite numbers."""
+    connection.execute(_fit_delete, {"of_run": run_key})
+    if rows:
+        connection.execute(_fit_insert, [_fit_values(run_key, row) for row in rows])
+
+
+def fits_of(connection: Connection, clutch_id: str) -> dict[int, list[FitRow]]:
+    """The fits of a clutch's runs by run_key, runs in order, pressures ascending; runs without fits are left out."""
+    fits: dict[int, list[FitRow]] = {}
+    for row in connection.execute(_fit_of_clutch, {"of_clutch": clutch_id}):
+        run_key, curve = _fit_row(row)
+        fits.setdefault(run_key, []).append(curve)
+    return fits
+
+
+def cofs_of(connection: Connection, clutch_id: str) -> dict[int, dict[float, tuple[float, float]]]:
+    """run_key -> pressure -> mean COF and its deviation, of all curves that determine it: as much as tracking needs."""
+    cofs: dict[int, dict[float, tuple[float, float]]] = {}
+    for run_key, pressure, mean, deviation in connection.execute(_fit_cofs_of_clutch, {"of_clutch": clutch_id}):
+        cofs.setdefault(run_key, {})[pressure] = (mean, deviation)
+    return cofs
+
+
+def _fit_values(run_key: int, row: FitRow) -> dict[str, object]:
+    if len(row.covariance) != 16:
+        raise ValueError(f"covariance must hold 16 numbers, got {len(row.covariance)}")
+    values = {name: getattr(row, name) for name in _FIT_NAMES}
+    values["covariance"] = to_text(row.covariance)
+    values["undetermined"] = to_text(row.undetermined)
+    return {"run_key": run_key, **values}
+
+
+def _fit_row(row: Row[Any]) -> tuple[int, FitRow]:
+    run_key: int = row[0]
+    values: dict[str, Any] = dict(zip(_FIT_NAMES, row[1:], strict=True))
+    values["covariance"] = tuple(to_list(values["covariance"]))
+    values["undetermined"] = tuple(to_list(values["undetermined"]))
+    return run_key, FitRow(**values)
+
+
+# --- predictions ---
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PredictionRow:
+    """The prediction of `method` at `cycles` for the quantity at `pressure`."""
+
+    cycles: float
+    method: str
+    pressure: float
+    payload: Json
+    code_version: str
+
+
+_prediction_new = insert(prediction)
+_prediction_put = _prediction_new.on_conflict_do_update(
+    index_elements=["clutch_id", "method", "pressure", "cycles"],
+    set_={"payload": _prediction_new.excluded.payload, "code_version": _prediction_new.excluded.code_version},
+)
+_prediction_of_clutch = prediction.c.clutch_id == bindparam("of_clutch")
+_prediction_series = select(
+    prediction.c.cycles, prediction.c.method, prediction.c.pressure, prediction.c.payload, prediction.c.code_version
+).where(
+    _prediction_of_clutch,
+    prediction.c.method == bindparam("of_method"),
+    prediction.c.pressure == bindparam("of_pressure"),
+)
+_prediction_history = _prediction_series.order_by(prediction.c.cycles)
+_prediction_last = _prediction_series.order_by(prediction.c.cycles.desc()).limit(1)
+_prediction_last_at = _prediction_last.where(prediction.c.cycles <= bindparam("at_most"))
+_prediction_clear = delete(prediction).where(_prediction_of_clutch)
+
+
+def put_predictions(connection: Connection, clutch_id: str, rows: Sequence[PredictionRow]) -> None:
+    """Store predictions, each in place of the one of the same method, pressure and cycles."""
+    values = [
+        {
+            "clutch_id": clutch_id,
+            "method": row.method,
+            "pressure": row.pressure,
+            "cycles": row.cycles,
+            "payload": to_text(row.payload),
+            "code_version": row.code_version,
+        }
+        for row in rows
+    ]
+    if values:
+        connection.execute(_prediction_put, values)
+
+
+def prediction_at(
+    connection: Connection, clutch_id: str, method: str, pressure: float, at_cycles: float | None = None
+) -> PredictionRow | None:
+    """The last prediction of a series, or the last one not beyond `at_cycles`; None where there is none."""
+    values: dict[str, str | float] = {"of_clutch": clutch_id, "of_method": method, "of_pressure": pressure}
+    if at_cycles is None:
+        row = connection.execute(_prediction_last, values).first()
+    else:
+        row = connection.execute(_prediction_last_at, {**values, "at_most": at_cycles}).first()
+    return None if row is None else _prediction_row(*row)
+
+
+def predictions_of(connection: Connection, clutch_id: str, method: str, pressure: float) -> list[PredictionRow]:
+    """All predictions of a series, cycles ascending."""
+    values = {"of_clutch": clutch_id, "of_method": method, "of_pressure": pressure}
+    return [_prediction_row(*row) for row in connection.execute(_prediction_history, values)]
+
+
+def clear_predictions(connection: Connection, clutch_id: str) -> None:
+    """Drop all predictions of a clutch, which are about to be computed again."""
+    connection.execute(_prediction_clear, {"of_clutch": clutch_id})
+
+
+def _prediction_row(cycles: float, method: str, pressure: float, payload: str, code_version: str) -> PredictionRow:
+    return PredictionRow(
+        cycles=cycles, method=method, pressure=pressure, payload=to_object(payload), code_version=code_version
+    )
+
+
+# --- filter states ---
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FilterStateRow:
+    """A filter's named arrays after `runs` runs; `pressure` in Pa, 0 = the mean over the reference pressures."""
+
+    method: str
+    pressure: float
+    runs: int
+    arrays: Mapping[str, NDArray[np.float64]]
+    code_version: str
+
+
+_state_new = insert(filter_state)
+_state_put = _state_new.on_conflict_do_update(
+    index_elements=["clutch_id", "method", "pressure"],
+    set_={
+        "runs": _state_new.excluded.runs,
+        "arrays": _state_new.excluded.arrays,
+        "code_version": _state_new.excluded.code_version,
+    },
+)
+_state_of_clutch = filter_state.c.clutch_id == bindparam("of_clutch")
+_state_get = (
+    select(
+        filter_state.c.method,
+        filter_state.c.pressure,
+        filter_state.c.runs,
+        filter_state.c.arrays,
+        filter_state.c.code_version,
+    )
+    .where(_state_of_clutch)
+    .order_by(filter_state.c.method, filter_state.c.pressure)
+)
+_state_clear = delete(filter_state).where(_state_of_clutch)
+
+
+def put_filter_states(connection: Connection, clutch_id: str, rows: Sequence[FilterStateRow]) -> None:
+    """Store states, each in place of the one of the same method and pressure."""
+    values = [
+        {
+            "clutch_id": clutch_id,
+            "method": row.method,
+            "pressure": row.pressure,
+            "runs": row.runs,
+            "arrays": pack(row.arrays),
+            "code_version": row.code_version,
+        }
+        for row in rows
+    ]
+    if values:
+        connection.execute(_state_put, values)
+
+
+def filter_states_of(connection: Connection, clutch_id: str) -> dict[tuple[str, float], FilterStateRow]:
+    """The states of a clutch by (method, pressure). Raises DamagedData, naming the state."""
+    states = {}
+    for method, pressure, runs, data, code_version in connection.execute(_state_get, {"of_clutch": clutch_id}):
+        try:
+            arrays = unpack(data)
+        except DamagedData as error:
+            raise DamagedData(f"state of {method} at {pressure:g} Pa of clutch {clutch_id!r}: {error}") from error
+        states[method, pressure] = FilterStateRow(
+            method=method, pressure=pressure, runs=runs, arrays=arrays, code_version=code_version
+        )
+    return states
+
+
+def clear_filter_states(connection: Connection, clutch_id: str) -> None:
+    """Drop all states of a clutch, which are about to be computed again."""
+    connection.execute(_state_clear, {"of_clutch": clutch_id})
