@@ -1,0 +1,194 @@
+"""Workflows compute outside the write lock, and compute again where the clutch has changed before they store."""
+
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from models.diagnosis.extension import Extension
+from service.lives import model_correction, recomputation, run_analysis, tracks
+from service.lives.incoming_run import name_run
+from service.run_files.json_run import read_run
+from service.schemas.clutch import ClutchIn
+from service.web.pages import to_json
+from service.workflows import ingest_run, learn_fleet, register_clutch
+from service.workflows.adopt_model import adopt
+from service.workflows.ingest_run import ingest
+from service.workflows.replay import replay_clutch
+from storage import clutches, diagnoses, results, runs
+from storage.diagnoses import NewDiagnosis
+from storage.engine.database import Database, open_database
+from storage.engine.transactions import Transactions
+from tests.service.workflows import stand_in_engine
+from tests.support import stationary
+
+AT = "2026-11-02T10:00:00+00:00"
+CYCLES = (0.0, 1000.0, 2000.0, 3000.0)
+
+
+@pytest.fixture
+def url(tmp_path: Path) -> str:
+    return f"sqlite:///{tmp_path / 'a.db'}"
+
+
+@pytest.fixture
+def database(url: str) -> Iterator[Database]:
+    opened = open_database(url)
+    register_clutch.register(opened, ClutchIn(clutch_id="c1"), created_at=AT)
+    yield opened
+    opened.close()
+
+
+def post(database: Database, cycles: float, run_id: str | None = None) -> dict[str, Any]:
+    body = to_json(stationary(cycles, run_id=run_id or f"r{cycles:g}"))
+    return ingest(database, "c1", read_run(body), received_at=AT)[0]
+
+
+def stored(database: Database) -> list[Any]:
+    """Receipts and predictions as they are stored."""
+    with database.reading() as connection:
+        receipts = [row.receipt for row in runs.page(connection, "c1")]
+        return [receipts, [results.predictions_of(connection, "c1", name, 0.0) for name in tracks.CARRIED]]
+
+
+def diagnosed(database: Database, diagnosis_id: str) -> None:
+    """A finished diagnosis with an extension that the stand-in applies."""
+    with database.writing() as connection:
+        row = NewDiagnosis(
+            clutch_id="c1", diagnosis_id=diagnosis_id, created_at=AT, revision=0, last_run_key=0, life="",
+            as_of_cycles=None, code_version="0",
+        )  # fmt: skip
+        diagnoses.insert(connection, row)
+        extension = Extension(effects=("torque_zero_shift",), content={"shift_nm": 0.5, "course_nm": -0.2}).to_dict()
+        diagnoses.finish(connection, diagnosis_id, AT, {"verdict": "cause_named", "causes": []}, extension)
+
+
+@pytest.fixture
+def numerics(monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
+    """How often something was computed; computing while this process holds the write lock fails the test."""
+    lock, calls = threading.local(), []
+    writing = Transactions.writing
+
+    @contextmanager
+    def watched(self: Transactions) -> Iterator[Any]:
+        with writing(self) as connection:
+            lock.held = True
+            try:
+                yield connection
+            finally:
+                lock.held = False
+
+    monkeypatch.setattr(Transactions, "writing", watched)
+
+    def outside(function: Callable[..., Any]) -> Callable[..., Any]:
+        def called(*arguments: Any, **named: Any) -> Any:
+            assert not getattr(lock, "held", False), f"{function.__name__} ran while the write lock was held"
+            calls.append(function.__name__)
+            return function(*arguments, **named)
+
+        return called
+
+    watched_functions = (
+        run_analysis.analyse, run_analysis.mean_cofs, run_analysis.levels_of, run_analysis.loops_of, tracks.advance,
+        tracks.predict, recomputation.track, recomputation.computed_anew, model_correction.corrected_cofs,
+        learn_fleet.taught, learn_fleet.population,
+    )  # fmt: skip
+    for function in watched_functions:
+        for module in [module for name, module in sys.modules.items() if name.startswith(("service.", "models."))]:
+            if getattr(module, function.__name__, None) is function:
+                monkeypatch.setattr(module, function.__name__, outside(function))
+    for name, method in stand_in_engine.METHODS.items():
+        monkeypatch.setattr(Extension, name, method)
+    return lambda: len(calls)
+
+
+def test_nothing_is_computed_while_the_write_lock_is_held(database: Database, numerics: Callable[[], int]) -> None:
+    diagnosed(database, "d1")
+    errands: list[Callable[[], Any]] = [
+        *(lambda cycles=cycles: post(database, cycles) for cycles in (*CYCLES, 4000.0, 5000.0)),
+        lambda: post(database, 500.0),  # late: everything anew
+        lambda: adopt(database, "c1", "d1", adopted_at=AT),
+        lambda: post(database, 6000.0),
+        lambda: adopt(database, "c1", None, adopted_at=AT),
+        lambda: replay_clutch(database, "c1"),
+        lambda: learn_fleet.refresh(database, now=AT),
+    ]
+    for errand in errands:
+        before = numerics()
+        errand()
+        assert numerics() > before
+
+
+def test_a_run_that_comes_while_another_is_computed_counts_for_it(
+    database: Database, url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another process stores a run between computing and storing: the results are those of both, in whatever order."""
+    computed, calls = ingest_run._computed, []
+
+    def overtaken(*arguments: Any) -> Any:
+        outcome = computed(*arguments)
+        calls.append(1)
+        if len(calls) == 1:
+            other = open_database(url)
+            monkeypatch.setattr(ingest_run, "_computed", computed)
+            post(other, 1000.0)
+            monkeypatch.setattr(ingest_run, "_computed", overtaken)
+            other.close()
+        return outcome
+
+    post(database, 0.0)
+    monkeypatch.setattr(ingest_run, "_computed", overtaken)
+    post(database, 2000.0)
+    assert len(calls) == 2
+    monkeypatch.undo()
+    calm = open_database(f"sqlite:///{tmp_path / 'b.db'}")
+    register_clutch.register(calm, ClutchIn(clutch_id="c1"), created_at=AT)
+    for cycles in (0.0, 1000.0, 2000.0):
+        post(calm, cycles)
+    assert stored(database) == stored(calm)
+    with database.reading() as connection:
+        assert clutches.revision(connection, "c1") == 3
+    calm.close()
+
+
+def test_threads_that_post_to_one_clutch_take_turns(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    computed, inside, most = ingest_run._computed, [], []
+
+    def counted(*arguments: Any) -> Any:
+        inside.append(1)
+        most.append(len(inside))
+        try:
+            return computed(*arguments)
+        finally:
+            inside.pop()
+
+    monkeypatch.setattr(ingest_run, "_computed", counted)
+    posts = [threading.Thread(target=post, args=(database, cycles)) for cycles in CYCLES]
+    for thread in posts:
+        thread.start()
+    for thread in posts:
+        thread.join(120)
+    assert most == [1] * len(CYCLES)  # nobody computed beside another, and nobody twice
+    assert [receipt["cycles"] for receipt in stored(database)[0]] == list(CYCLES)
+
+
+def test_the_same_run_of_two_threads_is_stored_once(database: Database) -> None:
+    answers: list[bool] = []
+
+    def send() -> None:
+        run = name_run(
+            kind="maintenance", cycles=5.0, run_id="oil", started_at=None, origin="measured", channels={},
+            details={"event": "oil_change", "note": ""},
+        )  # fmt: skip
+        answers.append(ingest(database, "c1", run, received_at=AT)[1])
+
+    senders = [threading.Thread(target=send) for _ in range(4)]
+    for thread in senders:
+        thread.start()
+    for thread in senders:
+        thread.join(120)
+    assert sorted(answers) == [False, False, False, True]
