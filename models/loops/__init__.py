@@ -1,4 +1,4 @@
-"""Dynamic Stribeck tests: `dynamic_test` first, then `loop_area` (eq. 8) and `lag_fit` with the two laws of lag.
+"""Dynamic Stribeck tests: `loops` first, then `loop_area` (eq. 8) and `lag_fit` with the two laws of lag.
 
 In: a record of a swinging speed at one or several pressures, and the stationary curves. Out: for each pressure the area and
 direction of the loop of torque over speed, and how far friction lags. Where torque is higher while accelerating, two laws

@@ -22,7 +22,7 @@ FEWEST_SLIDING = 20
 #: A lag is against the law where it is this many deviations below none. Chosen; no table.
 AGAINST = 3.0
 
-# A dynamic test (`dynamic_test`)
+# A dynamic test (`loops`)
 
 #: A speed whose lowest is below minus this share of its swing reverses. Chosen; no table.
 REVERSES = 0.02

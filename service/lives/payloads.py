@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from models.friction.identification import StribeckFit
-from models.loops.dynamic_test import Loop
+from models.loops.loops import Loop
 from models.prognosis.criteria import HORIZON, QUANTILES
 from models.prognosis.first_passage import FirstPassage
 from service.columns import bar, whole

@@ -13,8 +13,8 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.friction.identification import FitStatus, StribeckFit, fit_curves, mean_torques
 from models.friction.speed_protocol import protocol_speeds
-from models.loops.dynamic_test import Loop, evaluate_loops
 from models.loops.lag_fit import StationaryCurve
+from models.loops.loops import Loop, evaluate_loops
 from models.records.criteria import UNLOADED
 from models.records.plateaus import cut_plateaus
 from models.records.runs import Plateaus, curves_by_pressure, loaded

@@ -8,9 +8,9 @@ import pytest
 from models.friction.criteria import Z90
 from models.friction.stribeck import StribeckParameters
 from models.loops import lag_problem
-from models.loops.dynamic_test import LoopStatus, evaluate_loops
 from models.loops.lag_fit import ATTRACTOR, SQUEEZE_FILM, LagFit, LagStatus, StationaryCurve, fit_lag
 from models.loops.loop_area import Direction, clean_samples
+from models.loops.loops import LoopStatus, evaluate_loops
 from models.records.periods import fit_cycle
 from tests.models.loops.dynamic_records import (
     FALLING,

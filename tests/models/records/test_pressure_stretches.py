@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.loops.dynamic_test import evaluate_loops
+from models.loops.loops import evaluate_loops
 from models.records.criteria import LEVEL_GAP
 from models.records.pressure_stretches import pressure_stretches
 from models.records.runs import Record

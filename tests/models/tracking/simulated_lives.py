@@ -11,7 +11,7 @@ from models.clutch import Geometry
 from models.friction.identification import StribeckFit, fit_curves
 from models.friction.speed_protocol import REFERENCE_SPEEDS
 from models.friction.stribeck import PARAMETER_NAMES, torque
-from models.loops.dynamic_test import Loop, evaluate_loops
+from models.loops.loops import Loop, evaluate_loops
 from models.records.runs import curves_by_pressure
 from models.rig.sampled import DynamicTest, sampled_test
 from models.rig.simulated_runs import RunKind, SimulatedRun

@@ -11,7 +11,7 @@ import pytest
 
 from models.clutch import Geometry
 from models.friction.identification import fit_curves
-from models.loops.dynamic_test import evaluate_loops
+from models.loops.loops import evaluate_loops
 from models.records.runs import curves_by_pressure
 from models.rig.campaign import simulate
 from models.rig.programme import Programme

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.loops.dynamic_test import LoopStatus, evaluate_loops
 from models.loops.lag_fit import StationaryCurve
 from models.loops.loop_area import Direction, measured_area
+from models.loops.loops import LoopStatus, evaluate_loops
 from models.records.periods import fit_cycle
 from models.records.runs import Record
 from tests.models.loops.dynamic_records import FALLING, GEOMETRY, SWING, attractor, curve, record, velocity
