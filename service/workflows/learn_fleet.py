@@ -82,10 +82,10 @@ def _stored_anew(database: Database, fleet: Fleet, now: str) -> bool:
     """Store a fleet's prior and what it is without each of its clutches, where it is not what is stored already."""
     learned = fleet.without()
     with database.reading() as connection:
-        known = fleet_priors.current(connection, fleet.kind)
-    if learned is None or (known is not None and known.content == learned.to_dict()):
+        stored = fleet_priors.current(connection, fleet.kind)
+    if learned is None or (stored is not None and stored.content == learned.to_dict()):
         return False
-    version = 1 if known is None else known.version + 1
+    version = 1 if stored is None else stored.version + 1
     rows = _versions(fleet, version, now)
     with database.writing() as connection:
         newest = fleet_priors.current(connection, fleet.kind)
