@@ -59,6 +59,34 @@ def test_paths_exist(path: Path) -> None:
     assert [name for name in modules if not ((ROOT / name).is_dir() or (ROOT / f"{name}.py").is_file())] == []
 
 
+#: `name.py` or `folder/name.py` in backticks, from wherever the page is at home.
+SHORT = re.compile(r"`((?:[\w-]+/)*\w+\.py)`")
+
+
+def missing(text: str) -> list[str]:
+    """The Python files that a text names in backticks, by the end of their path, and that are nowhere in the product or its tests."""
+    ends = {"/".join(path.parts[-n:]) for path in product_files() for n in range(1, len(path.parts) + 1)}
+    return [name for name in SHORT.findall(text) if name not in ends]
+
+
+def product_files() -> list[Path]:
+    """The Python files of the product and its tests, from the top of the repository."""
+    folders = ("models", "service", "storage", "tests")
+    return [path.relative_to(ROOT) for folder in folders for path in (ROOT / folder).rglob("*.py")]
+
+
+@pytest.mark.parametrize("path", [*DOCUMENTS, ROOT / "CHANGELOG.md"], ids=lambda path: path.name)
+def test_files_that_are_named_shortly_exist(path: Path) -> None:
+    """`decide.py` or `attribution/decide.py`; the files that the examples of architecture.md add are theirs."""
+    text = re.sub(r"<!-- example-[a-z-]+ -->.*?<!-- end -->", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+    assert missing(text) == []
+
+
+def test_a_file_that_is_gone_is_noticed() -> None:
+    assert missing("`decide.py` and `attribution/decide.py`, `models/diagnosis/attribution/decide.py`") == []
+    assert missing("`repeats.py`, `detection/decide.py`, `cide.py`") == ["repeats.py", "detection/decide.py", "cide.py"]
+
+
 def test_settings_are_documented() -> None:
     """Every environment variable that the service or the command line reads."""
     sources = [ROOT / "service" / "settings.py", ROOT / "service" / "cli" / "options.py"]
