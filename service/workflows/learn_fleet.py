@@ -7,7 +7,7 @@ learned from the others.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from models.prognosis.criteria import FEWEST_TESTS_TO_LEARN
+from models.prognosis.criteria import FEWEST_CLUTCHES, FEWEST_TESTS_TO_LEARN
 from models.prognosis.fleet import FleetPrior, Taught, population, taught
 from service import records
 from service.lives.assumptions import ALL_PRESSURES, Assumptions, kind_of
@@ -19,9 +19,6 @@ from storage import clutches, fleet_priors, predictions
 from storage.encoding.json_text import Json, to_text
 from storage.engine.database import Database
 from storage.fleet_priors import NOBODY, FleetPriorRow
-
-#: Fewer clutches than this are no fleet [-]. Chosen; no table.
-FEWEST_CLUTCHES = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -64,7 +64,7 @@ SHORT = re.compile(r"`((?:[\w-]+/)*\w+\.py)`")
 
 
 def missing(text: str) -> list[str]:
-    """The Python files that a text names in backticks, by the end of their path, and that are nowhere in the product or its tests."""
+    """The Python files that a text names in backticks and that are nowhere: no path of product or tests ends so."""
     ends = {"/".join(path.parts[-n:]) for path in product_files() for n in range(1, len(path.parts) + 1)}
     return [name for name in SHORT.findall(text) if name not in ends]
 
