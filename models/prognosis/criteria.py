@@ -25,6 +25,8 @@ FAR_APART = 3.0
 
 #: A clutch with fewer tests than this says too little to teach anything. Chosen; no table.
 FEWEST_TESTS_TO_LEARN = 6
+#: Fewer clutches than this are no fleet [-]. Chosen; no table.
+FEWEST_CLUTCHES = 3
 #: The hyperprior: the deviations of (Δ/ξ0, log φ, log ε, log s/ξ0) among clutches of one kind. Chosen; no table.
 HYPER_SD = np.array([0.15, 0.6, 0.4, 0.5])
 #: How many clutches that is worth, and how many the centre of the weak prior is worth as the population's mean. Chosen; no

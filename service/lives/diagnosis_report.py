@@ -48,53 +48,54 @@ def public(
         "summary": report.summary,
         "candidates": [
             {
-                "effect": each.effect,
-                "title": each.title,
-                "probability": finite(each.probability),
-                "log_evidence_gain": finite(each.log_evidence_gain),
+                "effect": candidate.effect,
+                "title": candidate.title,
+                "probability": finite(candidate.probability),
+                "log_evidence_gain": finite(candidate.log_evidence_gain),
                 "estimate": {
-                    "name": each.estimate.name,
-                    "value": finite(each.estimate.value),
-                    "sd": finite(each.estimate.sd),
-                    "unit": each.estimate.unit,
+                    "name": candidate.estimate.name,
+                    "value": finite(candidate.estimate.value),
+                    "sd": finite(candidate.estimate.sd),
+                    "unit": candidate.estimate.unit,
                 },
-                "beside": list(each.beside),
+                "beside": list(candidate.beside),
             }
-            for each in report.candidates
+            for candidate in report.candidates
         ],
         "baseline": _misfit(report.baseline),
         "extended": _misfit(report.extended),
         "gain": _gain(report.gain, before, after),
         "advice": [
-            {"key": each.key, "test": each.test, "separates": [each.effect, each.other], "nats": finite(each.nats)}
-            for each in report.advice
+            {"key": test.key, "test": test.test, "separates": [test.effect, test.other], "nats": finite(test.nats)}
+            for test in report.advice
         ],
         "visible": [
-            {"effect": each.effect, "amplitude": finite(each.amplitude), "unit": each.unit} for each in report.visible
+            {"effect": smallest.effect, "amplitude": finite(smallest.amplitude), "unit": smallest.unit}
+            for smallest in report.visible
         ],
         "notes": [*notes, *report.notes],
         "statistics": {name: finite(value) for name, value in report.statistics.items()},
         "maps": None if report.maps is None else _maps(report.maps, origin),
-        "loops": [_loop(each, origin) for each in report.loops],
+        "loops": [_loop(loop, origin) for loop in report.loops],
     }
 
 
 def finite(value: float) -> float | None:
     """The number where it is one that JSON can carry, else None."""
-    found = float(value)
-    return found if math.isfinite(found) else None
+    number = float(value)
+    return number if math.isfinite(number) else None
 
 
-def _misfit(found: Misfit | None) -> dict[str, Any]:
-    if found is None:
+def _misfit(misfit: Misfit | None) -> dict[str, Any]:
+    if misfit is None:
         return {"rmse_nm": None, "noise_nm": None, "unexplained_share": None, "where": []}
     return {
-        "rmse_nm": finite(found.rmse),
-        "noise_nm": finite(found.noise),
-        "unexplained_share": finite(found.unexplained_share),
+        "rmse_nm": finite(misfit.rmse),
+        "noise_nm": finite(misfit.noise),
+        "unexplained_share": finite(misfit.unexplained_share),
         "where": [
-            {"axis": each.axis, "strength": finite(each.strength), "p_value": finite(each.p_value)}
-            for each in found.where
+            {"axis": axis.axis, "strength": finite(axis.strength), "p_value": finite(axis.p_value)}
+            for axis in misfit.where
         ],
     }
 
@@ -110,45 +111,45 @@ _GAIN = {
     "mse_percent_before": "mse_percent_before",
     "mse_percent_after": "mse_percent_after",
     "log_score_gain": "log_score_gain",
-    "foretelling_log_score_gain": "forecast_log_score_gain",
+    "prediction_log_score_gain": "forecast_log_score_gain",
 }
 
 
-def _gain(found: Gain | None, before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
+def _gain(gain: Gain | None, before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
     return {
-        "held_out_runs": [] if found is None else list(found.held_out_runs),
-        **{public: None if found is None else finite(getattr(found, name)) for public, name in _GAIN.items()},
+        "held_out_runs": [] if gain is None else list(gain.held_out_runs),
+        **{public: None if gain is None else finite(getattr(gain, name)) for public, name in _GAIN.items()},
         "remaining_useful_life": {"before": dict(before), "after": dict(after)},
     }
 
 
-def _maps(found: Maps, origin: float) -> dict[str, Any]:
+def _maps(maps: Maps, origin: float) -> dict[str, Any]:
     return {
         "axes": {
-            "pressure_bar": [bar(each) for each in found.pressure.tolist()],
-            "speed_rpm": _numbers(found.speed / RADIANS_PER_SECOND_PER_RPM),
-            "cycles": _numbers(found.cycles + origin),
+            "pressure_bar": [bar(pressure) for pressure in maps.pressure.tolist()],
+            "speed_rpm": _numbers(maps.speed / RADIANS_PER_SECOND_PER_RPM),
+            "cycles": _numbers(maps.cycles + origin),
         },
         "before": {
-            "speed_pressure": _numbers(found.speed_pressure_before),
-            "pressure_cycles": _numbers(found.pressure_cycles_before),
+            "speed_pressure": _numbers(maps.speed_pressure_before),
+            "pressure_cycles": _numbers(maps.pressure_cycles_before),
         },
         "after": {
-            "speed_pressure": _numbers(found.speed_pressure_after),
-            "pressure_cycles": _numbers(found.pressure_cycles_after),
+            "speed_pressure": _numbers(maps.speed_pressure_after),
+            "pressure_cycles": _numbers(maps.pressure_cycles_after),
         },
     }
 
 
-def _loop(found: LoopTrace, origin: float) -> dict[str, Any]:
+def _loop(loop: LoopTrace, origin: float) -> dict[str, Any]:
     return {
-        "pressure_bar": found.pressure / PASCALS_PER_BAR,
-        "cycles": found.cycles + origin,
-        "frequency_hz": finite(found.frequency),
-        "speed_rpm": _numbers(found.speed / RADIANS_PER_SECOND_PER_RPM),
-        "measured_nm": _numbers(found.measured),
-        "baseline_nm": _numbers(found.baseline),
-        "extended_nm": _numbers(found.extended),
+        "pressure_bar": loop.pressure / PASCALS_PER_BAR,
+        "cycles": loop.cycles + origin,
+        "frequency_hz": finite(loop.frequency),
+        "speed_rpm": _numbers(loop.speed / RADIANS_PER_SECOND_PER_RPM),
+        "measured_nm": _numbers(loop.measured),
+        "baseline_nm": _numbers(loop.baseline),
+        "extended_nm": _numbers(loop.extended),
     }
 
 
@@ -156,4 +157,4 @@ def _numbers(values: FloatArray) -> list[Any]:
     """An array of any shape as nested lists, rounded, with None where a number is not finite."""
     if values.ndim > 1:
         return [_numbers(row) for row in values]
-    return [float(f"{each:.{_DIGITS}g}") if math.isfinite(each) else None for each in np.asarray(values).tolist()]
+    return [float(f"{value:.{_DIGITS}g}") if math.isfinite(value) else None for value in np.asarray(values).tolist()]

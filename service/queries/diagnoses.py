@@ -16,7 +16,7 @@ from storage.engine.database import Database
 _LARGE = ("maps", "loops")
 
 
-def one(database: Database, clutch_id: str, diagnosis_id: str) -> dict[str, Any]:
+def diagnosis(database: Database, clutch_id: str, diagnosis_id: str) -> dict[str, Any]:
     """A diagnosis as it is answered. Raises NotFoundError."""
     with database.reading() as connection:
         records.clutch(connection, clutch_id)

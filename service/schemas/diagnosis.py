@@ -90,7 +90,7 @@ class GainOut(Answer):
     mse_percent_before: Number = Field(description="The baseline's percentage MSE (eq. 5), %")
     mse_percent_after: Number = Field(description="The extended model's percentage MSE (eq. 5), %")
     log_score_gain: Number = Field(description="Gain in log score, nats")
-    foretelling_log_score_gain: Number = Field(
+    prediction_log_score_gain: Number = Field(
         description="Gain in log score when the last states are predicted from the first ones, nats"
     )
     remaining_useful_life: BeforeAndAfter = Field(description="Remaining useful life under both models")

@@ -124,14 +124,14 @@ _OF_LISTS = {"limit", "cursor"}
 def _refuse_unknown_arguments(request: Request) -> None:
     """A mistyped argument must not be answered as if it had not been there."""
     route = request.scope["route"]
-    known = {field.alias for field in route.dependant.query_params} | _OF_LISTS
-    unknown = [name for name in request.query_params if name not in known]
+    arguments = {field.alias for field in route.dependant.query_params} | _OF_LISTS
+    unknown = [name for name in request.query_params if name not in arguments]
     if unknown:
         errors = [
             FieldError(
                 pointer=f"/query/{name}",
                 code="extra_forbidden",
-                message=f"{name} is no argument here; there are: {', '.join(sorted(known)) or 'none'}",
+                message=f"{name} is no argument here; there are: {', '.join(sorted(arguments)) or 'none'}",
                 value=request.query_params[name][:80],
             )
             for name in unknown

@@ -24,9 +24,9 @@ class Metrics:
 
     def exposition(self, database: Database) -> bytes:
         """All metrics as text, the clutches as they stand now."""
-        standing = CollectorRegistry()
-        standing.register(Clutches(database))
-        return generate_latest(self._registry) + generate_latest(standing)
+        clutches = CollectorRegistry()
+        clutches.register(Clutches(database))
+        return generate_latest(self._registry) + generate_latest(clutches)
 
 
 class Clutches(Collector):

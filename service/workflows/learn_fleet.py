@@ -7,7 +7,7 @@ learned from the others.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from models.prognosis.criteria import FEWEST_TESTS_TO_LEARN
+from models.prognosis.criteria import FEWEST_CLUTCHES, FEWEST_TESTS_TO_LEARN
 from models.prognosis.fleet import FleetPrior, Taught, population, taught
 from service import records
 from service.lives.assumptions import ALL_PRESSURES, Assumptions, kind_of
@@ -19,9 +19,6 @@ from storage import assumptions, clutches, results
 from storage.assumptions import NOBODY, FleetPriorRow
 from storage.encoding.json_text import Json, to_text
 from storage.engine.database import Database
-
-#: Fewer clutches than this are no fleet [-]. Chosen; no table.
-FEWEST_CLUTCHES = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,10 +79,10 @@ def _stored_anew(database: Database, fleet: Fleet, now: str) -> bool:
     """Store a fleet's prior and what it is without each of its clutches, where it is not what is stored already."""
     learned = fleet.without()
     with database.reading() as connection:
-        known = assumptions.current_fleet_prior(connection, fleet.kind)
-    if learned is None or (known is not None and known.content == learned.to_dict()):
+        stored = assumptions.current_fleet_prior(connection, fleet.kind)
+    if learned is None or (stored is not None and stored.content == learned.to_dict()):
         return False
-    version = 1 if known is None else known.version + 1
+    version = 1 if stored is None else stored.version + 1
     rows = _versions(fleet, version, now)
     with database.writing() as connection:
         newest = assumptions.current_fleet_prior(connection, fleet.kind)

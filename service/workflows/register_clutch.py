@@ -18,11 +18,11 @@ def register(database: Database, clutch: ClutchIn, *, created_at: str) -> bool:
     record = clutch.model_dump(mode="json")
     content = _content(record)
     with database.reading() as connection:
-        known = clutches.get(connection, clutch.clutch_id)
-    if known is None:
+        stored = clutches.get(connection, clutch.clutch_id)
+    if stored is None:
         with database.writing() as connection:
-            known = clutches.get(connection, clutch.clutch_id)
-            if known is None:
+            stored = clutches.get(connection, clutch.clutch_id)
+            if stored is None:
                 row = ClutchRow(
                     clutch_id=clutch.clutch_id,
                     record=record,
@@ -34,9 +34,9 @@ def register(database: Database, clutch: ClutchIn, *, created_at: str) -> bool:
                 )
                 clutches.insert(connection, row)
                 return True
-    if _content(records.record(known).model_dump(mode="json")) != content:
+    if _content(records.record(stored).model_dump(mode="json")) != content:
         raise ConflictError(
-            f"clutch {known.clutch_id!r} is known with another record; records are not changed by posting"
+            f"clutch {stored.clutch_id!r} is known with another record; records are not changed by posting"
         )
     return False
 

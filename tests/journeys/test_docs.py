@@ -50,13 +50,45 @@ PATH = re.compile(r"(?<![\w/.])((?:models|service|storage|tests|docker|docs)/[\w
 MODULE = re.compile(r"\bpython -m ((?:models|service|tests)[\w.]*)")
 
 
+def own_words(path: Path) -> str:
+    """A document without the examples of architecture.md, which name files that they add; a test carries them out."""
+    return re.sub(r"<!-- example-[a-z-]+ -->.*?<!-- end -->", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+
+
 @pytest.mark.parametrize("path", [*DOCUMENTS, ROOT / "CHANGELOG.md"], ids=lambda path: path.name)
 def test_paths_exist(path: Path) -> None:
     """Every file, folder and module that a document names, from the top of the repository."""
-    text = path.read_text(encoding="utf-8")
+    text = own_words(path)
     assert [name for name in PATH.findall(text) if not (ROOT / name).exists()] == []
     modules = [name.replace(".", "/") for name in MODULE.findall(text)]
     assert [name for name in modules if not ((ROOT / name).is_dir() or (ROOT / f"{name}.py").is_file())] == []
+
+
+#: `name.py` or `folder/name.py` in backticks, from wherever the page is at home.
+SHORT = re.compile(r"`((?:[\w-]+/)*\w+\.py)`")
+
+
+def missing(text: str) -> list[str]:
+    """The Python files that a text names in backticks and that are nowhere: no path of product or tests ends so."""
+    ends = {"/".join(path.parts[-n:]) for path in product_files() for n in range(1, len(path.parts) + 1)}
+    return [name for name in SHORT.findall(text) if name not in ends]
+
+
+def product_files() -> list[Path]:
+    """The Python files of the product and its tests, from the top of the repository."""
+    folders = ("models", "service", "storage", "tests")
+    return [path.relative_to(ROOT) for folder in folders for path in (ROOT / folder).rglob("*.py")]
+
+
+@pytest.mark.parametrize("path", [*DOCUMENTS, ROOT / "CHANGELOG.md"], ids=lambda path: path.name)
+def test_files_that_are_named_shortly_exist(path: Path) -> None:
+    """`decide.py` or `attribution/decide.py`."""
+    assert missing(own_words(path)) == []
+
+
+def test_a_file_that_is_gone_is_noticed() -> None:
+    assert missing("`decide.py` and `attribution/decide.py`, `models/diagnosis/attribution/decide.py`") == []
+    assert missing("`repeats.py`, `detection/decide.py`, `cide.py`") == ["repeats.py", "detection/decide.py", "cide.py"]
 
 
 def test_settings_are_documented() -> None:

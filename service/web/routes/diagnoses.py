@@ -46,7 +46,7 @@ async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchI
     preferred = _WAIT.search(prefer or "")
     wait = WAIT_SECONDS if preferred is None else min(int(preferred[1]), LONGEST_WAIT_SECONDS)
     await asyncio.wait([asyncio.wrap_future(job.done)], timeout=wait)
-    report = await run_in_threadpool(diagnoses.one, context.database, clutch_id, job.diagnosis.diagnosis_id)
+    report = await run_in_threadpool(diagnoses.diagnosis, context.database, clutch_id, job.diagnosis.diagnosis_id)
     headers = {"Location": f"/v1/clutches/{clutch_id}/diagnoses/{job.diagnosis.diagnosis_id}"}
     if preferred is not None:
         headers["Preference-Applied"] = f"wait={wait}"
@@ -66,7 +66,7 @@ def list_diagnoses(
 @router.get("/diagnoses/{diagnosis_id}", response_model=DiagnosisOut, responses=READING)
 def read_diagnosis(request: Request, context: Reader, clutch_id: ClutchId, diagnosis_id: DiagnosisId) -> Response:
     """One diagnosis with its maps and loops."""
-    return answer(request, diagnoses.one(context.database, clutch_id, diagnosis_id))
+    return answer(request, diagnoses.diagnosis(context.database, clutch_id, diagnosis_id))
 
 
 @router.get("/model", response_model=ModelOut, responses=READING)

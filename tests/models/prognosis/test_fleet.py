@@ -91,7 +91,7 @@ def crps(posterior: Posterior, truth: float) -> float:
     return crps_of_sample(np.minimum(ends_of_life(posterior, 0.5), 1e6), posterior.weight, truth)
 
 
-def foretold(prior: FleetPrior, seen: list[Measurement], rng: np.random.Generator) -> tuple[Posterior, Posterior]:
+def predicted(prior: FleetPrior, seen: list[Measurement], rng: np.random.Generator) -> tuple[Posterior, Posterior]:
     """Under the weak prior alone, and under the mixture."""
     beliefs = weak(seen[0], falling=True), prior.prior_for(seen[0])
     under = [GRID.posterior(GRID.from_history(each, seen), 1000, rng) for each in beliefs]
@@ -106,7 +106,7 @@ def scored(prior: FleetPrior, seed: int, count: int) -> float:
         truth = life(rng, 5000.0)
         end = float(ends_of_life(_certain(truth), 0.5)[0])
         if end < 1e6:
-            by_weak, by_both = foretold(prior, measured(truth, 0.3 * end, 8, rng), rng)
+            by_weak, by_both = predicted(prior, measured(truth, 0.3 * end, 8, rng), rng)
             scores.append((crps(by_weak, end) / end, crps(by_both, end) / end))
     both = np.array(scores).sum(axis=0)
     return float(both[1] / both[0])

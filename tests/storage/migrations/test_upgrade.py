@@ -89,6 +89,30 @@ def test_an_older_file_is_brought_up_and_keeps_what_it_holds(tmp_path: Path, mon
     assert integrity(path) == ["ok"]
 
 
+def test_a_report_of_an_earlier_release_reads_with_the_new_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports of earlier releases hold a gain's former key; its value, other keys and quoted text stay as they are."""
+    path = tmp_path / "old.db"
+    whole = command.upgrade
+    monkeypatch.setattr(command, "upgrade", lambda config, _: whole(config, "s0003_fleet_priors"))
+    former = "foretelling_log_score_gain"
+    notes = [f'the key "{former}": of an earlier release']
+    with closing(open_database(f"sqlite:///{path}")) as old, old.writing() as connection:
+        clutches.insert(connection, clutch_row())
+        for number in range(3):
+            diagnoses.insert(connection, new_diagnosis(number))
+        diagnoses.finish(connection, "d0", "later", {"gain": {"log_score_gain": 2.5, former: 1.25}, "notes": notes}, {})
+        diagnoses.finish(connection, "d1", "later", {"gain": {former: None}}, None)
+    monkeypatch.undo()
+    with closing(open_database(f"sqlite:///{path}")) as new, new.reading() as connection:
+        reports = {row.diagnosis_id: row.report for row in diagnoses.page(connection, CLUTCH, limit=10)}
+    gain = {"log_score_gain": 2.5, "prediction_log_score_gain": 1.25}
+    assert reports == {
+        "d0": {"gain": gain, "notes": notes},
+        "d1": {"gain": {"prediction_log_score_gain": None}},
+        "d2": None,
+    }
+
+
 def test_steps_are_one_line_and_named_after_their_files() -> None:
     steps = list(ScriptDirectory.from_config(migrations._config()).walk_revisions())
     assert [Path(step.path).stem for step in steps] == [step.revision for step in steps]

@@ -271,7 +271,7 @@ export interface GainOut {
   rmse_after_nm: number | null;
   reduction_percent: number | null;
   log_score_gain: number | null;
-  prediction_log_score_gain?: number | null;
+  prediction_log_score_gain: number | null;
   remaining_useful_life: BeforeAndAfter;
 }
 

@@ -39,5 +39,5 @@ EFFECT = Effect(
     change=_change,
     grows_with=Measure.TORQUE,
     before_lag=False,
-    bends=(),
+    discrepancies=(),
 )

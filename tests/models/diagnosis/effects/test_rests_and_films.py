@@ -1,4 +1,4 @@
-"""What a rest's length and a film's own equation do, against reckonings of another kind."""
+"""What a rest's length and a film's own equation do, against computations of another kind."""
 
 import itertools
 from dataclasses import replace
