@@ -107,8 +107,8 @@ def _eliminate(sums: Sums, prior: Prior) -> tuple[FloatArray, FloatArray, FloatA
 
 
 def basis(progress: FloatArray, log_scale: FloatArray, log_exponent: FloatArray) -> FloatArray:
-    """b = 1 - (1 + ζ/φ)^-ε, in the shape of ζ/φ, to which ε is broadcast: `degradation.progress_fraction`, three times as
-    quick.
+    """b = 1 - (1 + ζ/φ)^-ε, in the shape of ζ/φ, to which ε is broadcast: `general_order.progress_fraction`, three times
+    as quick.
 
     Accurate to 2e-16 absolute, not relative: here b is only compared with measurement noise.
     """

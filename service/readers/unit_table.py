@@ -1,4 +1,4 @@
-"""The units that a file may state and their conversion to the channels' own units (`units.CHANNELS`); others are refused."""
+"""Units that a file may state and their conversion to the channels' own units (`columns.CHANNELS`); no other is read."""
 
 import unicodedata
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""A run as a JSON body -> `IncomingRun`: pydantic checks the shape, `readers.checks` the millions of numbers."""
+"""A run as a JSON body -> `IncomingRun`: pydantic checks the shape, `service.columns` the millions of numbers."""
 
 from typing import Any
 

@@ -57,9 +57,9 @@ def ingest(database: Database, clutch_id: str, run: IncomingRun, *, received_at:
     """
     with database.reading() as connection:
         clutch = records.clutch(connection, clutch_id)
-        known = runs.get(connection, clutch_id, run.run_id)
-    if known is not None:
-        return _repeat(known, run), False
+        stored = runs.get(connection, clutch_id, run.run_id)
+    if stored is not None:
+        return _repeat(stored, run), False
     with ThreadPoolExecutor(1) as beside:  # deflating a long record lets its cutting run
         encoding = beside.submit(channels.encoded, run.channels)
         analysis = analyse(run, records.record(clutch).geometry.to_model())
@@ -72,21 +72,21 @@ def ingest(database: Database, clutch_id: str, run: IncomingRun, *, received_at:
         while True:
             outcome = _computed(database, clutch_id, arrival)
             with database.writing() as connection:
-                known = runs.get(connection, clutch_id, run.run_id)
-                if known is not None:
-                    return _repeat(known, run), False
+                stored = runs.get(connection, clutch_id, run.run_id)
+                if stored is not None:
+                    return _repeat(stored, run), False
                 if records.unchanged(connection, clutch_id, outcome.revision):
                     _store(connection, clutch_id, arrival, columns, outcome)
                     return outcome.receipt, True
 
 
-def _repeat(known: RunRow, run: IncomingRun) -> dict[str, Any]:
-    if known.content_sha256 != run.content_sha256:
+def _repeat(stored: RunRow, run: IncomingRun) -> dict[str, Any]:
+    if stored.content_sha256 != run.content_sha256:
         raise ConflictError(
-            f"run_id {run.run_id!r} is known with other content: its sha256 is {known.content_sha256}, "
+            f"run_id {run.run_id!r} is known with other content: its sha256 is {stored.content_sha256}, "
             f"that of the content sent is {run.content_sha256}"
         )
-    return known.receipt | {"duplicate": True}
+    return stored.receipt | {"duplicate": True}
 
 
 def _computed(database: Database, clutch_id: str, arrival: Arrival) -> _Outcome:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from models.diagnosis.campaign import Campaign
+from models.diagnosis.diagnose import diagnose
 from models.diagnosis.report.report import Report
 from models.diagnosis.validation.held_out import Gain
 from tests.blind.rig.hide import Hidden, hide
@@ -90,17 +91,17 @@ class Outcome:
         return bool(self.candidates) and self.candidates[0][0] in self.truth
 
 
-def judge(trial: Trial, diagnose: Diagnose | None = None) -> Outcome:
+def judge(trial: Trial, look: Diagnose = diagnose) -> Outcome:
     """Hide, diagnose, and hold what was said beside what was true. A crash is an outcome, and never a good one."""
     try:
         hidden = trial.hidden()
     except UnreachableError as failure:
         return nothing(trial, UNREACHABLE, str(failure))
-    first = last = judged(trial, hidden, campaign(hidden), diagnose)
+    first = last = judged(trial, hidden, campaign(hidden), look)
     advised: list[Outcome] = []
     while len(advised) < trial.follow and last.verdict == "cause_ambiguous" and last.advice:
         hidden = with_test(hidden, last.advice[0])
-        last = judged(trial, hidden, campaign(hidden), diagnose)
+        last = judged(trial, hidden, campaign(hidden), look)
         advised.append(last)
     return replace(first, advised=tuple(advised))
 
@@ -110,9 +111,8 @@ def nothing(trial: Trial, verdict: str, error: str, axes: frozenset[str] = froze
     return Outcome(trial, verdict, frozenset(), (), (), axes, None, (), 0.0, {}, error)
 
 
-def judged(trial: Trial, hidden: Hidden, seen: Campaign, diagnose: Diagnose | None = None) -> Outcome:
+def judged(trial: Trial, hidden: Hidden, seen: Campaign, look: Diagnose = diagnose) -> Outcome:
     """The same where the campaign is at hand."""
-    look = diagnose or diagnose.diagnose
     axes = frozenset().union(*(effect.axes for effect, _ in hidden.effects))
     began = process_time()
     try:

@@ -23,7 +23,7 @@ SEED = 20130816
 #: 1,000 intervals of 90 % hold the truth in 90 % of cases with a standard deviation of 0.95 %: three of them. A film takes
 #: three times as long: fewer records, and three deviations of their number.
 COVERAGE, WITHIN = 0.90, 0.03
-#: `tests/models/test_lag.py` holds the two laws themselves against a stiff integrator.
+#: `tests/models/loops/` holds the two laws themselves against a stiff integrator.
 FINE = np.linspace(-10.0, 15.1, 25_101)
 PERIOD = slice(15_000, 25_001)
 
