@@ -51,7 +51,7 @@ MODULE = re.compile(r"\bpython -m ((?:models|service|tests)[\w.]*)")
 
 
 def own_words(path: Path) -> str:
-    """A document without the examples of architecture.md, which name files that they add; a test carries them out."""
+    """A document without architecture.md's examples, which name files that they add; another test carries them out."""
     return re.sub(r"<!-- example-[a-z-]+ -->.*?<!-- end -->", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
 
 
