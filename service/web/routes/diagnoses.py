@@ -57,7 +57,7 @@ async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchI
 
 @router.get("/diagnoses", response_model=DiagnosisPage, responses=READING)
 def list_diagnoses(
-    request: Request, context: Reader, clutch_id: str, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
+    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
 ) -> Response:
     """Diagnoses without their maps and loops, newest first."""
     items, after = diagnoses.page(context.database, clutch_id, limit=limit, after=from_cursor(cursor))
