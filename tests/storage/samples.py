@@ -106,6 +106,14 @@ def store_diagnoses(database: Database) -> Database:
     return database
 
 
+def store_two_clutches(database: Database) -> Database:
+    """A clutch and another one."""
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+        clutches.insert(connection, clutch_row("other"))
+    return database
+
+
 @contextmanager
 def child(script: str, *arguments: object) -> Iterator[tuple["subprocess.Popen[str]", IO[str], IO[str]]]:
     """A process that runs `script`, what it reads and what it says; killed at the end at the latest."""

@@ -6,21 +6,18 @@ import numpy as np
 import pytest
 from sqlalchemy.exc import IntegrityError
 
-from storage import clutches, results
+from storage import results
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData
 from storage.results import FilterStateRow
-from tests.storage.samples import clutch_row
+from tests.storage.samples import store_two_clutches
 
 CLUTCH = "bench3-017"
 
 
 @pytest.fixture
 def stocked(database: Database) -> Database:
-    with database.writing() as connection:
-        clutches.insert(connection, clutch_row())
-        clutches.insert(connection, clutch_row("other"))
-    return database
+    return store_two_clutches(database)
 
 
 def state(method: str, pressure: float, runs: int = 8) -> FilterStateRow:

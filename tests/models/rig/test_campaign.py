@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.records.runs import curves_by_pressure
 from models.rig.campaign import end_of_life, simulate, simulated_clutch
 from models.rig.programme import CYCLE_ENERGY, WHOLE, Ageing, Programme
 from models.rig.sampled import RawTest
 from models.rig.simulated_runs import DutyBlock, RunKind, SimulatedRun
 from models.rig.stationary import NOISELESS, stationary_test
 from models.rig.truth import SimulatedClutch
+from tests.models.rig.noiseless import curves
 
 RPM = 2 * math.pi / 60
 
@@ -24,12 +24,6 @@ BAR = 1e5
 @pytest.fixture(scope="module")
 def nominal():
     return SimulatedClutch()
-
-
-def curves(clutch, cycles):
-    """Noiseless torque [40] at each pressure in bar, through the simulated test itself."""
-    plateaus = stationary_test(clutch, cycles, np.random.default_rng(0), NOISELESS)
-    return {c.pressure / BAR: c.torque for c in curves_by_pressure(plateaus, clutch.geometry)}
 
 
 def bits(run):

@@ -8,9 +8,8 @@ import pytest
 
 from models.clutch import Geometry
 from models.friction.stribeck import torque
-from models.records.runs import curves_by_pressure
-from models.rig.stationary import NOISELESS, stationary_test
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch, draw
+from tests.models.rig.noiseless import curves
 
 RPM = 2 * math.pi / 60
 
@@ -24,12 +23,6 @@ BAR = 1e5
 @pytest.fixture(scope="module")
 def nominal():
     return SimulatedClutch()
-
-
-def curves(clutch, cycles):
-    """Noiseless torque [40] at each pressure in bar, through the simulated test itself."""
-    plateaus = stationary_test(clutch, cycles, np.random.default_rng(0), NOISELESS)
-    return {c.pressure / BAR: c.torque for c in curves_by_pressure(plateaus, clutch.geometry)}
 
 
 def by_hand(clutch, pressure, cycles, velocity):

@@ -1,6 +1,5 @@
 """What each of the three filters must do on any series, and where they must agree. Large comparisons are statistical."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,26 +16,10 @@ from tests.models.tracking.tracked_series import (
     FILTERS,
     NAMES,
     PRIOR,
-    TYPICAL,
+    WEIRD,
     followed,
-    measured,
     same,
-    series,
 )
-
-WEIRD = {
-    "one": measured([0.0], [0.13]),
-    "constant": measured([0.0, 1e3, 2e3, 3e3, 4e3, 5e3], [0.13] * 6),
-    "rising": measured([0.0, 1e3, 2e3, 3e3, 4e3], [0.10, 0.12, 0.14, 0.16, 0.18]),
-    "jump": measured([0.0, 1e3, 2e3, 3e3, 4e3, 5e3], [0.13, 0.129, 0.128, 0.04, 0.039, 0.2]),
-    "noise free": series(replace(TYPICAL), np.linspace(0.0, 3e4, 31), 0.0),
-    "same progress": measured([0.0, 0.0, 5e3, 5e3, 5e3], [0.13, 0.131, 0.1, 0.1, 0.101]),
-    "out of order": measured([7e3, 0.0, 15e3, 1e3], [0.08, 0.13, 0.065, 0.11]),
-    "huge gap": measured([0.0, 1.0, 2.0, 9e5], [0.13, 0.13, 0.13, 0.02]),
-    "zero": measured([0.0, 1e3, 2e3], [0.0, 1e-5, 2e-5]),
-    "tiny unit": measured([0.0, 1e3, 7e3, 15e3], [2e-9, 2.4e-9, 3.1e-9, 3.3e-9]),
-    "negative": measured([0.0, 1e3, 7e3, 15e3], [-3.0, -2.5, -2.0, -1.9]),
-}
 
 
 @pytest.mark.parametrize(("tracker", "state_type"), FILTERS, ids=NAMES)

@@ -1,7 +1,6 @@
 """The unscented filters: domain, scatter, and starting anew."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,25 +12,9 @@ from models.tracking.prior import weak
 from tests.models.tracking.tracked_series import (
     CAMPAIGN,
     PRIOR,
-    TYPICAL,
+    WEIRD,
     followed,
-    measured,
-    series,
 )
-
-WEIRD = {
-    "one": measured([0.0], [0.13]),
-    "constant": measured([0.0, 1e3, 2e3, 3e3, 4e3, 5e3], [0.13] * 6),
-    "rising": measured([0.0, 1e3, 2e3, 3e3, 4e3], [0.10, 0.12, 0.14, 0.16, 0.18]),
-    "jump": measured([0.0, 1e3, 2e3, 3e3, 4e3, 5e3], [0.13, 0.129, 0.128, 0.04, 0.039, 0.2]),
-    "noise free": series(replace(TYPICAL), np.linspace(0.0, 3e4, 31), 0.0),
-    "same progress": measured([0.0, 0.0, 5e3, 5e3, 5e3], [0.13, 0.131, 0.1, 0.1, 0.101]),
-    "out of order": measured([7e3, 0.0, 15e3, 1e3], [0.08, 0.13, 0.065, 0.11]),
-    "huge gap": measured([0.0, 1.0, 2.0, 9e5], [0.13, 0.13, 0.13, 0.02]),
-    "zero": measured([0.0, 1e3, 2e3], [0.0, 1e-5, 2e-5]),
-    "tiny unit": measured([0.0, 1e3, 7e3, 15e3], [2e-9, 2.4e-9, 3.1e-9, 3.3e-9]),
-    "negative": measured([0.0, 1e3, 7e3, 15e3], [-3.0, -2.5, -2.0, -1.9]),
-}
 
 
 def test_the_ukf_stays_in_its_domain_and_definite() -> None:
