@@ -14,11 +14,11 @@ from service.jobs.queue import DiagnosisQueue
 from service.queries.cache import AnswerCache
 from service.settings import CODE_VERSION, Settings
 from service.web import problems
+from service.web.answers import now
 from service.web.context import Context
 from service.web.limits import MOST_CACHED_BYTES
 from service.web.metrics import Metrics
 from service.web.middleware import BodyLimit, Counting, Heads, SafeHeaders
-from service.web.pages import now
 from service.web.routes import clutches, diagnoses, exports, files, fleet, health, life, runs
 from service.workflows import adopt_model, run_diagnosis
 from storage.diagnoses import NewDiagnosis

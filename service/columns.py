@@ -1,6 +1,7 @@
 """The channels' columns: public names, units and admissible ranges, and the check of what was sent.
 
-Conversion to SI happens here and nowhere else; a column that is wrong gives errors that name channel, row and value.
+Channels are converted to SI here and nowhere else; what units a file states are brought to the channels' own before
+(`readers.unit_table`). A column that is wrong gives errors that name channel, row and value.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""The stationary Stribeck curve of eq. 2-3 and its derivatives.
+"""The stationary Stribeck curve of eq. 2-3, its slope in speed and its gradient in the parameters.
 
     S(v) = sign(v) [M_s (1 + (M̄_c - 1) e) + C_v |v|^γ],    e = exp(-V_S/|v|),    γ = 0.3
 

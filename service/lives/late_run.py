@@ -1,4 +1,4 @@
-"""A run that comes in among those that are stored: what all is computed anew from, where it changes the past."""
+"""A run as it comes in, and the stored runs with it in its place: what all after a late run is computed anew from."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""What an adopted extension changes in tracking: mean COFs freed of artefacts, and the course of the effects of use.
+"""An adopted extension (`models.diagnosis.extension`) applied to a clutch's runs: corrected mean COFs, and the course.
 
 Artefacts are taken off the plateaus of a test and its curves fitted anew, with what was known when it was made: the runs
 before it in the order of the history. So the same history gives the same corrections, in whatever order its runs arrived.

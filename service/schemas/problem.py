@@ -1,4 +1,4 @@
-"""The shape of every error (RFC 9457)."""
+"""The shape of every error in the API's description (RFC 9457); `web.problems` makes them."""
 
 from pydantic import Field
 

@@ -22,8 +22,8 @@ from service.errors import (
     UnsupportedMediaTypeError,
 )
 from service.schemas.problem import Problem
+from service.web.answers import to_json
 from service.web.limits import RETRY_AFTER_SECONDS
-from service.web.pages import to_json
 from storage.engine.errors import DatabaseBusy, StorageError
 
 PROBLEM_TYPE = "application/problem+json"

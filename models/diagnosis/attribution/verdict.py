@@ -1,4 +1,4 @@
-"""What is decided of a campaign: the verdict, and the judgement that it is part of."""
+"""The verdict and the judgement that it is part of, as values; `decide` makes them."""
 
 from dataclasses import dataclass, field
 from enum import StrEnum

@@ -5,7 +5,7 @@ The remainder of a curve (a loop) beyond low polynomials (low harmonics) gives, 
     σ_i² = (a² + b² M_i²)/n_i
 
 (n_i samples in a row) and the correlation w ρ^{|i - j|} of neighbours. A deviation sent along is not used: rigs misjudge it,
-and the data show it as well.
+and the data show it as well. How far repeated runs scatter is estimated with the baseline (`pooled_fit.projection`).
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The extended model of a judgement, and what it gains on held-out runs."""
+"""The extended model of a judgement: the effects that it names, fitted together; its gain is that of `held_out`."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -9,10 +9,10 @@ from service.queries import clutch_list
 from service.run_files.json_run import invalid
 from service.schemas.clutch import ClutchIn, ClutchOut, ClutchPage
 from service.schemas.parameters import ClutchId
+from service.web.answers import JSON_TYPE, answer, described_body, from_cursor, json_body, now, page, tagged, to_json
 from service.web.auth import Ingester, Reader
 from service.web.context import Context, Cursor, Limit
 from service.web.limits import USUAL_ITEMS
-from service.web.pages import JSON_TYPE, answer, described_body, from_cursor, json_body, now, page, tagged, to_json
 from service.web.problems import READING, SENDING
 from service.workflows import register_clutch as registration
 

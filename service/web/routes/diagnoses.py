@@ -14,10 +14,10 @@ from service.run_files.json_run import invalid
 from service.schemas.base import Schema
 from service.schemas.diagnosis import DiagnosisIn, DiagnosisOut, DiagnosisPage, ModelIn, ModelOut
 from service.schemas.parameters import ClutchId, DiagnosisId
+from service.web.answers import JSON_TYPE, answer, described_body, from_cursor, json_body, now, page, to_json
 from service.web.auth import Ingester, Reader
 from service.web.context import Context, Cursor, Limit
 from service.web.limits import LONGEST_WAIT_SECONDS, USUAL_ITEMS, WAIT_SECONDS
-from service.web.pages import JSON_TYPE, answer, described_body, from_cursor, json_body, now, page, to_json
 from service.web.problems import READING, SENDING
 from service.workflows import adopt_model
 

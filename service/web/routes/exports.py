@@ -10,10 +10,10 @@ from service.queries import degradation, fleet_priors, remaining_life, runs, sco
 from service.schemas.curves import LoopItem, SeriesItem
 from service.schemas.life import Method
 from service.schemas.parameters import ClutchId, Quantity
+from service.web.answers import clutch_table, from_cursor, page, table
 from service.web.auth import Reader
 from service.web.context import AtCycles, Cursor, Limit, PressureBar
 from service.web.limits import MOST_ITEMS
-from service.web.pages import clutch_table, from_cursor, page, table
 from service.web.problems import READING
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["spreadsheets"])

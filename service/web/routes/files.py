@@ -23,9 +23,9 @@ from service.schemas.parameters import (
     FileStartedAt,
 )
 from service.schemas.run import Receipt
+from service.web.answers import JSON_TYPE, now, to_json
 from service.web.auth import Ingester
 from service.web.context import Context
-from service.web.pages import JSON_TYPE, now, to_json
 from service.web.problems import SENDING
 from service.workflows.ingest_run import ingest
 

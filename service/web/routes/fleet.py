@@ -6,10 +6,10 @@ from fastapi.responses import Response
 from service.queries import fleet_priors, scores
 from service.schemas.fleet import FleetPriorPage, FleetScores
 from service.schemas.life import Method
+from service.web.answers import answer, from_cursor, sliced
 from service.web.auth import Reader
 from service.web.context import Cursor, Whole
 from service.web.limits import ALL_ITEMS
-from service.web.pages import answer, from_cursor, sliced
 from service.web.problems import READING
 
 router = APIRouter(prefix="/v1/fleet", tags=["fleet"])

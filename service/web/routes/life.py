@@ -15,10 +15,10 @@ from service.schemas.degradation import Degradation, Surfaces
 from service.schemas.fleet import Scores
 from service.schemas.life import Method, RemainingLife
 from service.schemas.parameters import ClutchId, Quantity
+from service.web.answers import clutch_answer, clutch_list_answer, from_cursor, page
 from service.web.auth import Reader
 from service.web.context import AtCycles, Cursor, Limit, PressureBar, Whole
 from service.web.limits import ALL_ITEMS, USUAL_ITEMS
-from service.web.pages import clutch_answer, clutch_list_answer, from_cursor, page
 from service.web.problems import READING
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["remaining life"])

@@ -10,10 +10,7 @@ from service.queries import runs
 from service.run_files.json_run import read_run
 from service.schemas.parameters import ClutchId, RunId
 from service.schemas.run import RUN_IN, Receipt, RunOut, RunPage
-from service.web.auth import Ingester, Reader
-from service.web.context import Context, Cursor, Limit
-from service.web.limits import USUAL_ITEMS
-from service.web.pages import (
+from service.web.answers import (
     JSON_TYPE,
     answer,
     clutch_answer,
@@ -24,6 +21,9 @@ from service.web.pages import (
     page,
     to_json,
 )
+from service.web.auth import Ingester, Reader
+from service.web.context import Context, Cursor, Limit
+from service.web.limits import USUAL_ITEMS
 from service.web.problems import READING, SENDING
 from service.workflows.ingest_run import ingest
 

@@ -7,8 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from service.queries.cache import AnswerCache
+from service.web.answers import to_json
 from service.web.limits import MOST_CACHED_BYTES
-from service.web.pages import to_json
 
 
 def made(cache: AnswerCache, name: str, body: bytes) -> bool:

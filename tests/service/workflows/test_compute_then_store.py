@@ -14,7 +14,7 @@ from service.lives import model_correction, recomputation, run_analysis, tracks
 from service.lives.incoming_run import name_run
 from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
-from service.web.pages import to_json
+from service.web.answers import to_json
 from service.workflows import ingest_run, learn_fleet, register_clutch
 from service.workflows.adopt_model import adopt
 from service.workflows.ingest_run import ingest
