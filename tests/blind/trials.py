@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from models.diagnosis.campaign import Campaign
+from models.diagnosis.diagnose import diagnose as diagnose_campaign
 from models.diagnosis.report.report import Report
 from models.diagnosis.validation.held_out import Gain
 from tests.blind.rig.hide import Hidden, hide
@@ -112,7 +113,7 @@ def nothing(trial: Trial, verdict: str, error: str, axes: frozenset[str] = froze
 
 def judged(trial: Trial, hidden: Hidden, seen: Campaign, diagnose: Diagnose | None = None) -> Outcome:
     """The same where the campaign is at hand."""
-    look = diagnose or diagnose.diagnose
+    look = diagnose or diagnose_campaign
     axes = frozenset().union(*(effect.axes for effect, _ in hidden.effects))
     began = process_time()
     try:
