@@ -50,10 +50,13 @@ def record(row: ClutchRow) -> ClutchIn:
     return ClutchIn.model_validate(row.record)
 
 
-def state(connection: Connection, clutch_id: str, *, also: Extension | None = None) -> ClutchState:
+def state(
+    connection: Connection, clutch_id: str, *, also: Extension | None = None, carried: bool = False
+) -> ClutchState:
     """The clutch's state at its present revision. Raises NotFoundError.
 
     `also`: an extension that may come into force; what fleets taught for its severity is loaded beside the others'.
+    `carried`: with the filters after the last run, to be carried on; all else is computed without them.
     """
     row = clutch(connection, clutch_id)
     own, adopted = record(row), adoption(connection, clutch_id)
@@ -66,7 +69,7 @@ def state(connection: Connection, clutch_id: str, *, also: Extension | None = No
         events=events(connection, clutch_id),
         adoption=adopted,
         priors={severity: _learned_prior(connection, own, severity) for severity in severities},
-        filters=_filters(connection, clutch_id),
+        filters=_filters(connection, clutch_id) if carried else None,
     )
 
 

@@ -90,7 +90,8 @@ class DiagnosisQueue:
             if self._process is not None:
                 self._process.kill()
             self._change.notify_all()
-        self._thread.join()
+        if self._thread.is_alive():  # else the service could not start, and what stopped it is to be seen
+            self._thread.join()
 
     def ask(self, clutch_id: str, *, adopt: bool) -> Job:
         """Have the clutch's runs diagnosed; joins the diagnosis of the very same runs where one waits or runs.

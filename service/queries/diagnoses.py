@@ -14,6 +14,8 @@ from storage.engine.database import Database
 
 #: What a list does not show.
 _LARGE = ("maps", "loops")
+#: What `prediction_log_score_gain` was called until 0.2.
+FORMER_NAME = "foretelling_log_score_gain"
 
 
 def diagnosis(database: Database, clutch_id: str, diagnosis_id: str) -> dict[str, Any]:
@@ -44,22 +46,30 @@ def _items(connection: Connection, clutch_id: str, rows: list[DiagnosisRow]) -> 
     in_force = adoption.diagnosis_id if adoption is not None and adoption.life == life else None
     latest = diagnoses.last_run_key(connection, clutch_id)
     return [
-        {
-            "diagnosis_id": row.diagnosis_id,
-            "clutch_id": row.clutch_id,
-            "status": row.status,
-            "created_at": row.created_at,
-            "finished_at": row.finished_at,
-            "revision": row.revision,
-            "as_of_cycles": None if row.as_of_cycles is None else whole(row.as_of_cycles),
-            "stale": latest > row.last_run_key,
-            "earlier_life": row.life != life,
-            "adoptable": row.extension is not None and row.life == life,
-            "adopted": row.diagnosis_id == in_force,
-            "problem": row.problem,
-            "code_version": row.code_version,
-        }
-        | empty()
-        | (row.report or {})
+        _with_former_name(
+            {
+                "diagnosis_id": row.diagnosis_id,
+                "clutch_id": row.clutch_id,
+                "status": row.status,
+                "created_at": row.created_at,
+                "finished_at": row.finished_at,
+                "revision": row.revision,
+                "as_of_cycles": None if row.as_of_cycles is None else whole(row.as_of_cycles),
+                "stale": latest > row.last_run_key,
+                "earlier_life": row.life != life,
+                "adoptable": row.extension is not None and row.life == life,
+                "adopted": row.diagnosis_id == in_force,
+                "problem": row.problem,
+                "code_version": row.code_version,
+            }
+            | empty()
+            | (row.report or {})
+        )
         for row in rows
     ]
+
+
+def _with_former_name(answer: dict[str, Any]) -> dict[str, Any]:
+    """The answer, a number of the gain under its former name, too: scripts may read it."""
+    gain = answer["gain"]
+    return answer | {"gain": gain | {FORMER_NAME: gain["prediction_log_score_gain"]}}

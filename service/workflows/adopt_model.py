@@ -49,11 +49,12 @@ def finish_and_adopt(
     adoption = Adoption(diagnosis_id=diagnosis_id, life=life, extension=Extension.from_dict(ended["extension"]))
 
     def finish(connection: Connection) -> None:
-        diagnoses.finish(connection, diagnosis_id, at, ended["report"], ended["extension"])
+        if not diagnoses.finish(connection, diagnosis_id, at, ended["report"], ended["extension"]):
+            raise NothingToAdoptError(f"diagnosis {diagnosis_id!r} was ended meanwhile")
 
     try:
         _change(database, clutch_id, adoption, adopted_at=at, before=finish)
-    except NothingToAdoptError:  # a rebuild came meanwhile
+    except NothingToAdoptError:  # a rebuild came meanwhile, or another service declared the diagnosis failed
         return False
     return True
 
@@ -67,16 +68,18 @@ def _change(
     before: Callable[[Connection], None] | None = None,
 ) -> None:
     """Compute under the new model and store, again where the clutch has changed meanwhile."""
-    with database.turn(clutch_id):
+    diagnosis_id = None if adoption is None else adoption.diagnosis_id
+    with database.turn(clutch_id, patient=before is not None):
         while True:
             state, results = _computed(database, clutch_id, adoption)
             with database.writing() as connection:
                 if not records.unchanged(connection, clutch_id, state.revision):
                     continue
+                version, in_force = _newest(connection, clutch_id)
+                if in_force == diagnosis_id:  # the same request, sent twice, was stored while this one waited
+                    return
                 if before is not None:
                     before(connection)
-                version, _ = _newest(connection, clutch_id)
-                diagnosis_id = None if adoption is None else adoption.diagnosis_id
                 row = AdoptedRow(version=version + 1, diagnosis_id=diagnosis_id, adopted_at=adopted_at)
                 assumptions.insert_adoption(connection, clutch_id, row)
                 records.store(connection, clutch_id, results)

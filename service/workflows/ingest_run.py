@@ -70,11 +70,12 @@ def ingest(database: Database, clutch_id: str, run: IncomingRun, *, received_at:
     arrival = Arrival(run=run, sampled=sampled, analysis=analysis, received_at=received_at)
     with database.turn(clutch_id):
         while True:
-            outcome = _computed(database, clutch_id, arrival)
-            with database.writing() as connection:
+            with database.reading() as connection:  # a repeat may have waited for its turn
                 stored = runs.get(connection, clutch_id, run.run_id)
-                if stored is not None:
-                    return _repeat(stored, run), False
+            if stored is not None:
+                return _repeat(stored, run), False
+            outcome = _computed(database, clutch_id, arrival)
+            with database.writing() as connection:  # another process's run of the same name moves the revision
                 if records.unchanged(connection, clutch_id, outcome.revision):
                     _store(connection, clutch_id, arrival, columns, outcome)
                     return outcome.receipt, True
@@ -92,7 +93,7 @@ def _repeat(stored: RunRow, run: IncomingRun) -> dict[str, Any]:
 def _computed(database: Database, clutch_id: str, arrival: Arrival) -> _Outcome:
     """The results of the run in the clutch's history as it is now."""
     with database.reading() as connection:
-        before = records.state(connection, clutch_id)
+        before = records.state(connection, clutch_id, carried=True)
     event = _event_of(arrival)
     life = life_with(order([*before.events, event]), event)
     event = replace(event, cofs=_cofs_of(life, arrival, before))

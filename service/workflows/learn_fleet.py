@@ -115,7 +115,7 @@ def _versions(fleet: Fleet, version: int, now: str) -> Sequence[FleetPriorRow]:
 
 def _brought_up(database: Database, clutch_id: str) -> bool:
     """Track a clutch anew where its stored predictions were made under another prior; whether its answers have changed."""
-    with database.turn(clutch_id):
+    with database.turn(clutch_id, patient=True):
         while True:
             with database.reading() as connection:
                 state = records.state(connection, clutch_id)

@@ -38,7 +38,7 @@ def replay_clutch(database: Database, clutch_id: str) -> int:
 
     The revision moves on only where a result has changed.
     """
-    with database.turn(clutch_id):
+    with database.turn(clutch_id, patient=True):
         while True:
             replayed = _computed(database, clutch_id)
             with database.writing() as connection:

@@ -79,15 +79,20 @@ class Transactions:
             self._writer_lock.release()
 
     @contextmanager
-    def turn(self, name: str) -> Iterator[None]:
+    def turn(self, name: str, *, patient: bool = False) -> Iterator[None]:
         """One thread of this process at a time for a name: who would compute the same results at once waits instead.
 
-        No lock of the database is held meanwhile.
+        No lock of the database is held meanwhile. Raises DatabaseBusy where the turn does not come in time, lest all
+        threads that serve requests wait; work in the background is `patient` and waits as long as it takes.
         """
         with self._turns_lock:
             turn = self._turns.setdefault(name, threading.Lock())
-        with turn:
+        if not turn.acquire(timeout=threading.TIMEOUT_MAX if patient else self.lock_timeout):
+            raise DatabaseBusy(f"{name!r} was computed for more than {self.lock_timeout:g} s")
+        try:
             yield
+        finally:
+            turn.release()
 
     def version(self) -> int:
         """A number that changes with every commit, whichever process made it. Compare it only within this object.

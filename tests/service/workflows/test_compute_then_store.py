@@ -3,30 +3,36 @@
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
 import pytest
+from sqlalchemy import text
 
 from models.diagnosis.extension import Extension
 from service.lives import model_correction, recomputation, run_analysis, tracks
 from service.lives.incoming_run import name_run
+from service.queries import degradation
 from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
 from service.web.answers import to_json
-from service.workflows import ingest_run, learn_fleet, register_clutch
-from service.workflows.adopt_model import adopt
+from service.workflows import adopt_model, ingest_run, learn_fleet, register_clutch
+from service.workflows.adopt_model import adopt, finish_and_adopt
 from service.workflows.ingest_run import ingest
 from service.workflows.replay import replay_clutch
-from storage import clutches, diagnoses, results, runs
+from storage import assumptions, clutches, diagnoses, results, runs
 from storage.diagnoses import NewDiagnosis
 from storage.engine.database import Database, open_database
+from storage.engine.errors import DamagedData, DatabaseBusy
 from storage.engine.transactions import Transactions
 from tests.service.workflows import stand_in_engine
 from tests.support import stationary
 
 AT = "2026-11-02T10:00:00+00:00"
+REPORT = {"verdict": "cause_named", "causes": []}
+EXTENSION = Extension(effects=("torque_zero_shift",), content={"shift_nm": 0.5, "course_nm": -0.2}).to_dict()
 CYCLES = (0.0, 1000.0, 2000.0, 3000.0)
 
 
@@ -57,14 +63,25 @@ def stored(database: Database) -> list[Any]:
 
 def diagnosed(database: Database, diagnosis_id: str) -> None:
     """A finished diagnosis with an extension that the stand-in applies."""
+    begun(database, diagnosis_id)
+    with database.writing() as connection:
+        diagnoses.finish(connection, diagnosis_id, AT, REPORT, EXTENSION)
+
+
+def begun(database: Database, diagnosis_id: str) -> None:
+    """A running diagnosis."""
     with database.writing() as connection:
         row = NewDiagnosis(
             clutch_id="c1", diagnosis_id=diagnosis_id, created_at=AT, revision=0, last_run_key=0, life="",
             as_of_cycles=None, code_version="0",
         )  # fmt: skip
         diagnoses.insert(connection, row)
-        extension = Extension(effects=("torque_zero_shift",), content={"shift_nm": 0.5, "course_nm": -0.2}).to_dict()
-        diagnoses.finish(connection, diagnosis_id, AT, {"verdict": "cause_named", "causes": []}, extension)
+
+
+@pytest.fixture
+def stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, method in stand_in_engine.METHODS.items():
+        monkeypatch.setattr(Extension, name, method)
 
 
 @pytest.fixture
@@ -101,11 +118,10 @@ def numerics(monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
         for module in [module for name, module in sys.modules.items() if name.startswith(("service.", "models."))]:
             if getattr(module, function.__name__, None) is function:
                 monkeypatch.setattr(module, function.__name__, outside(function))
-    for name, method in stand_in_engine.METHODS.items():
-        monkeypatch.setattr(Extension, name, method)
     return lambda: len(calls)
 
 
+@pytest.mark.usefixtures("stand_in")
 def test_nothing_is_computed_while_the_write_lock_is_held(database: Database, numerics: Callable[[], int]) -> None:
     diagnosed(database, "d1")
     errands: list[Callable[[], Any]] = [
@@ -192,3 +208,92 @@ def test_the_same_run_of_two_threads_is_stored_once(database: Database) -> None:
     for thread in senders:
         thread.join(120)
     assert sorted(answers) == [False, False, False, True]
+
+
+@pytest.mark.usefixtures("stand_in")
+def test_a_diagnosis_that_was_declared_failed_meanwhile_is_not_adopted(database: Database) -> None:
+    """A service that starts on the same database ends what the former one still computes; nothing of it comes into force."""
+    post(database, 0.0)
+    begun(database, "d1")
+    before = stored(database)
+    with database.writing() as connection:
+        diagnoses.fail_all(connection, AT, "the service was restarted")
+    ended = {"report": REPORT, "extension": EXTENSION}
+    assert not finish_and_adopt(database, "c1", "d1", ended, life="", at=AT)
+    with database.reading() as connection:
+        assert assumptions.current_adoption(connection, "c1") is None
+        assert clutches.revision(connection, "c1") == 1
+    assert stored(database) == before
+
+
+@pytest.mark.usefixtures("stand_in")
+def test_an_adoption_that_is_asked_for_twice_at_once_makes_one_version(
+    database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    computed = adopt_model._computed
+
+    def overtaken(*arguments: Any) -> Any:
+        monkeypatch.setattr(adopt_model, "_computed", computed)
+        with monkeypatch.context() as other:
+            other.setattr(Transactions, "turn", lambda *_, **__: nullcontext())
+            adopt(database, "c1", "d1", adopted_at=AT)
+        return computed(*arguments)
+
+    post(database, 0.0)
+    diagnosed(database, "d1")
+    monkeypatch.setattr(adopt_model, "_computed", overtaken)
+    adopt(database, "c1", "d1", adopted_at=AT)
+    with database.reading() as connection:
+        row = assumptions.current_adoption(connection, "c1")
+        assert row is not None
+        assert row.version == 1
+        assert clutches.revision(connection, "c1") == 2
+
+
+@pytest.mark.usefixtures("database")
+def test_a_turn_that_does_not_come_in_time_is_refused(url: str) -> None:
+    impatient = open_database(url, lock_timeout=0.05)
+    with impatient.turn("c1"), ThreadPoolExecutor(1) as beside, pytest.raises(DatabaseBusy, match="c1"):
+        beside.submit(post, impatient, 0.0).result(60)
+    assert post(impatient, 0.0)["run_id"] == "r0"
+    impatient.close()
+
+
+def test_only_a_run_that_carries_on_damaged_filters_is_stopped_by_them(database: Database) -> None:
+    post(database, 0.0)
+    post(database, 1000.0)
+    before = stored(database)
+    with database.writing() as connection:
+        connection.execute(text("UPDATE filter_state SET arrays = x'00'"))
+    with pytest.raises(DamagedData):
+        post(database, 2000.0)
+    assert degradation.degradation(database, "c1")["items"]
+    assert replay_clutch(database, "c1") == 2
+    assert stored(database) == before
+    assert post(database, 2000.0)["run_id"] == "r2000"
+
+
+def test_a_repeat_that_waited_for_its_turn_is_not_computed(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A client that gave up waiting sends the run again while the first one is computed."""
+    computed, calls = ingest_run._computed, []
+
+    def counted(*arguments: Any) -> Any:
+        calls.append(1)
+        repeats.append(beside.submit(post, database, 0.0))
+        assert analysed_again.wait(60), "the repeat did not arrive"
+        return computed(*arguments)
+
+    analysed_again, repeats, analyse = threading.Event(), [], ingest_run.analyse
+
+    def noticed(*arguments: Any) -> Any:
+        analysis = analyse(*arguments)
+        if calls:
+            analysed_again.set()
+        return analysis
+
+    monkeypatch.setattr(ingest_run, "_computed", counted)
+    monkeypatch.setattr(ingest_run, "analyse", noticed)
+    with ThreadPoolExecutor(1) as beside:
+        first = post(database, 0.0)
+        assert repeats[0].result(60) == first | {"duplicate": True}
+    assert calls == [1]
