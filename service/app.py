@@ -20,6 +20,7 @@ from service.web.context import Context
 from service.web.limits import MOST_CACHED_BYTES, MOST_REVALIDATED_BYTES
 from service.web.metrics import Metrics
 from service.web.middleware import BodyLimit, Counting, Heads, SafeHeaders
+from service.web.polls import Polls
 from service.web.revalidation import Revalidation
 from service.web.routes import clutches, diagnoses, exports, files, fleet, health, life, runs
 from service.workflows import adopt_model, run_diagnosis
@@ -99,6 +100,7 @@ def create_app(settings: Settings) -> FastAPI:
     for exported in (exports.router, exports.fleet_router):
         app.include_router(exported)
     app.include_router(dashboard.router(assets.load()))
+    app.add_middleware(Polls)
     app.add_middleware(Heads)
     app.add_middleware(BodyLimit, most=settings.most_body_bytes, most_file=settings.most_file_bytes)
     app.add_middleware(SafeHeaders)

@@ -24,6 +24,7 @@ from service.lists import ALL_ITEMS, from_cursor, sliced
 from service.queries.cache import Answer, revision_and_json, to_json
 from service.web.context import Context
 from service.web.limits import LONGEST_WAIT_SECONDS
+from service.web.polls import Again, remember
 from service.web.revalidation import Made
 from storage import clutches
 
@@ -60,10 +61,18 @@ async def clutch_answer(
 
     `name` and `arguments` tell the clutch's answers apart. Where it was made for this revision already, nothing is read.
     """
-    # the revision before the rest is read: what is committed meanwhile is kept under one that nobody asks for again
     revision = _revision(context, clutch_id)
-    key = (clutch_id, revision, name, *arguments)
-    return tagged(request, await kept(context, key, lambda: to_json(make())), JSON_TYPE, revision)
+
+    # the revision before the rest is read: what is committed meanwhile is kept under one that nobody asks for again
+    held = await kept(context, (clutch_id, revision, name, *arguments), lambda: to_json(make()))
+
+    def again(request: Request) -> Response | None:
+        revision = clutches.revision_now(context.database.watch, clutch_id)
+        held = context.cache.held((clutch_id, revision, name, *arguments))
+        return None if held is None else tagged(request, held, JSON_TYPE, revision)
+
+    remember(request, again)
+    return tagged(request, held, JSON_TYPE, revision)
 
 
 async def clutch_table(
@@ -97,6 +106,7 @@ async def computed_answer(
     after = from_cursor(cursor)
     revision, whole = await _computed(context, clutch_id, query, arguments, prefer)
     if limit == ALL_ITEMS and after is None:
+        remember(request, _computed_again(context, clutch_id, query, arguments))
         return tagged(request, whole, JSON_TYPE, revision)
 
     def one_page() -> bytes:
@@ -139,6 +149,19 @@ async def _computed(
 
     key = (clutch_id, _name(query), *arguments)
     return await context.revalidation.answer(key, _revision(context, clutch_id), compute, wait=wait)
+
+
+def _computed_again(
+    context: Context, clutch_id: str, query: Callable[..., dict[str, Any]], arguments: tuple[Hashable, ...]
+) -> Again:
+    key = (clutch_id, _name(query), *arguments)
+
+    def again(request: Request) -> Response | None:
+        revision = clutches.revision_now(context.database.watch, clutch_id)
+        whole = None if revision is None else context.revalidation.held(key, revision)
+        return None if whole is None else tagged(request, whole, JSON_TYPE, revision)
+
+    return again
 
 
 def _name(query: Callable[..., object]) -> str:

@@ -10,6 +10,7 @@ import ipaddress
 import secrets
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated, Literal, get_args
 
 from fastapi import Depends, Request
@@ -77,6 +78,7 @@ def _name(host: str) -> str:
     return host[1:].partition("]")[0] if host.startswith("[") else host.partition(":")[0]
 
 
+@lru_cache(maxsize=256)
 def is_loopback(name: str) -> bool:
     """Whether a host name or address is this machine's own."""
     if name.lower().rstrip(".") == "localhost":
@@ -122,6 +124,8 @@ _OF_LISTS = {"limit", "cursor"}
 
 def _refuse_unknown_arguments(request: Request) -> None:
     """A mistyped argument must not be answered as if it had not been there."""
+    if not request.scope["query_string"]:
+        return
     route = request.scope["route"]
     arguments = {field.alias for field in route.dependant.query_params} | _OF_LISTS
     unknown = [name for name in request.query_params if name not in arguments]

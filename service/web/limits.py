@@ -6,6 +6,8 @@ MOST_CACHED_BYTES = 96 << 20
 LARGE_BODY_BYTES = 1 << 20
 #: Bytes of answers that are kept as they were while newer ones are computed. Chosen: some hundred `/degradation`.
 MOST_REVALIDATED_BYTES = 32 << 20
+#: Addresses whose answers are found again before the request is looked at. Chosen: a page asks for some twenty a clutch.
+MOST_POLLED = 4096
 #: Items a page may hold.
 MOST_ITEMS = 1000
 #: Items of a page where no limit is given.

@@ -36,6 +36,11 @@ class Revalidation:
         self._most = most_bytes
         self._entries: OrderedDict[Hashable, _Entry] = OrderedDict()
 
+    def held(self, key: Hashable, revision: int) -> Answer | None:
+        """The answer where it is of that very revision."""
+        entry = self._entries.get(key)
+        return entry.answer if entry is not None and entry.revision == revision else None
+
     async def answer(
         self, key: Hashable, revision: int, compute: Callable[[], "Future[Made]"], *, wait: float
     ) -> tuple[int, Answer]:

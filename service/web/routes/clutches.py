@@ -1,5 +1,7 @@
 """Clutches: register, list worst first, look up."""
 
+from collections.abc import Hashable
+
 import pydantic
 from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
@@ -15,6 +17,7 @@ from service.web.answers import JSON_TYPE, answer, described_body, json_body, ke
 from service.web.auth import Ingester, Reader
 from service.web.context import Context, Cursor, Limit
 from service.web.limits import USUAL_ITEMS
+from service.web.polls import remember
 from service.web.problems import READING, SENDING
 from service.workflows import register_clutch as registration
 
@@ -61,13 +64,20 @@ async def list_clutches(
 ) -> Response:
     """All clutches with current health and remaining life, the fewest remaining cycles first."""
     after = from_cursor(cursor)
-    # before the rows are read: what is committed meanwhile makes another
-    key = ("clutches", context.database.watch.version(), limit, after)
+
+    def key() -> Hashable:  # before the rows are read: what is committed meanwhile makes another
+        return "clutches", context.database.watch.version(), limit, after
 
     def make() -> bytes:
         return clutch_list.page_as_json(context.database, context.cache, limit=limit, after=after)
 
-    return tagged(request, await kept(context, key, make), JSON_TYPE)
+    def again(request: Request) -> Response | None:
+        held = context.cache.held(key())
+        return None if held is None else tagged(request, held, JSON_TYPE)
+
+    held = await kept(context, key(), make)
+    remember(request, again)
+    return tagged(request, held, JSON_TYPE)
 
 
 @router.get("/{clutch_id}", response_model=ClutchOut, responses=READING)
