@@ -6,6 +6,7 @@ Exit code 1 where a demand of `report.demands` is not met.
 import argparse
 import asyncio
 import gc
+import os
 import platform
 import sqlite3
 import sys
@@ -18,9 +19,9 @@ import httpx2
 from models.rig.programme import WHOLE
 from tests.benchmarks.diagnosis import post_life
 from tests.load import beside, checks
-from tests.load.beside import Beside
+from tests.load.beside import Beside, Processor
 from tests.load.bodies import SAMPLES, TESTS, life
-from tests.load.field import ALONE, Counts, Field
+from tests.load.field import ALONE, Field
 from tests.load.report import Loaded, demands, markdown
 from tests.support import Server, serving
 
@@ -58,17 +59,16 @@ def run(options: Options, folder: Path) -> Loaded:
             post_life(http, DIAGNOSED, options.states, WHOLE)
         gc.collect()
         gc.freeze()  # the prepared bodies stay: no pause to look through them
-        took = [beside.own_seconds(), beside.seconds_of(server.pid)]
+        before = Processor.since_start(server.pid)
         field, noted = asyncio.run(_loaded(options, server, database, lives))
-        generator, service = beside.own_seconds() - took[0], beside.seconds_of(server.pid) - took[1]
+        processor = Processor.since_start(server.pid).minus(before)
         gc.unfreeze()
         return Loaded(
             seconds=options.seconds,
             raw=options.raw,
             counts=field.counts,
             beside=noted,
-            generator=generator,
-            service=service,
+            processor=processor,
             losses=_wrong(options, field, server, database, folder),
         )
 
@@ -116,14 +116,18 @@ def main() -> int:
     parser.add_argument("--rigs", type=int, default=8)
     parser.add_argument("--clients", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--interval", type=float, default=0.0, help="seconds from one run of a rig to its next, at least")
+    parser.add_argument(
+        "--interval", type=float, default=0.0, help="seconds from one run of a rig to its next, at least"
+    )
     parser.add_argument("--raw", action=argparse.BooleanOptionalAction, default=False, help="raw files among the posts")
     options = Options(**vars(parser.parse_args()))
     with tempfile.TemporaryDirectory(prefix="clutchlife-load-") as folder:
         loaded = run(options, Path(folder))
     shown = "with" if options.raw else "without"
     print(f"### {options.rigs} rigs and {options.clients} clients for {options.seconds:g} s, {shown} raw files\n")
-    print(f"Python {platform.python_version()}, SQLite {sqlite3.sqlite_version}, seed {options.seed}\n")
+    print(
+        f"Python {platform.python_version()}, SQLite {sqlite3.sqlite_version}, {os.cpu_count()} cores, seed {options.seed}\n"
+    )
     print(markdown(loaded))
     return 0 if all(each.met for each in demands(loaded)) else 1
 

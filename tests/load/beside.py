@@ -101,12 +101,31 @@ def resident(pid: int) -> int:
         return 0
 
 
-def own_seconds() -> float:
-    """Seconds of the processor that this process has taken."""
-    usage = resource.getrusage(resource.RUSAGE_SELF)
-    return usage.ru_utime + usage.ru_stime
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Processor:
+    """Seconds of the processor since some moment: the generator, the service with its processes, the refreshes, and
+    everything else on the machine."""
+
+    generator: float
+    service: float
+    refreshes: float
+    others: float
+
+    @classmethod
+    def since_start(cls, pid: int) -> "Processor":
+        """Since each began, and the machine; only differences mean anything."""
+        own, children = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+        service = sum(processor_seconds(each) for each in family(pid))
+        generator, refreshes = own.ru_utime + own.ru_stime, children.ru_utime + children.ru_stime
+        others = busy_seconds() - service - generator - refreshes
+        return cls(generator=generator, service=service, refreshes=refreshes, others=others)
+
+    def minus(self, before: "Processor") -> "Processor":
+        """What was taken since `before`."""
+        return Processor(**{name: getattr(self, name) - getattr(before, name) for name in self.__slots__})
 
 
-def seconds_of(pid: int) -> float:
-    """Those of the service, with the processes of it that have ended."""
-    return processor_seconds(pid)
+def busy_seconds() -> float:
+    """Seconds of the processors that the machine has worked since it was started."""
+    user, nice, system, _, _, *interrupts = map(int, Path("/proc/stat").read_text(encoding="ascii").split()[1:9])
+    return (user + nice + system + sum(interrupts[:2])) / os.sysconf("SC_CLK_TCK")

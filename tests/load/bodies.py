@@ -60,7 +60,9 @@ class SentLife:
 
 def posted(address: str, body: bytes, content_type: str = JSON_TYPE) -> bytes:
     """The bytes of a POST."""
-    head = f"POST {address} HTTP/1.1\r\nHost: localhost\r\nContent-Type: {content_type}\r\nContent-Length: {len(body)}\r\n"
+    head = (
+        f"POST {address} HTTP/1.1\r\nHost: localhost\r\nContent-Type: {content_type}\r\nContent-Length: {len(body)}\r\n"
+    )
     return head.encode() + b"\r\n" + body
 
 
@@ -99,9 +101,7 @@ def _after(run: SimulatedRun, clutch: SimulatedClutch, seed: int, count: int) ->
         rng = np.random.default_rng([seed, run.cycles])
         record = sampled_test(clutch, run.wear, DynamicTest(), rng, Sensor())
         name = f"sim-{seed}-dynamic-{run.cycles:05d}"
-        yield _json_post(
-            replace(run, run_id=name, kind=RunKind.DYNAMIC_STRIBECK, plateaus=None, record=record)
-        )
+        yield _json_post(replace(run, run_id=name, kind=RunKind.DYNAMIC_STRIBECK, plateaus=None, record=record))
     if count in _MAINTENANCE:
         event, note = _MAINTENANCE[count]
         run_id = f"sim-{seed}-{event}-{run.cycles:05d}"
@@ -113,9 +113,7 @@ def _json_post(run: SimulatedRun) -> Post:
     return Post(run_id=run.run_id, kind=run.kind.value, content=json.dumps(simulated_body(run)).encode())
 
 
-def _file_post(
-    run: SimulatedRun, clutch: SimulatedClutch, seed: int, folder: Path, samples: int, number: int
-) -> Post:
+def _file_post(run: SimulatedRun, clutch: SimulatedClutch, seed: int, folder: Path, samples: int, number: int) -> Post:
     """The stationary test as its recorder's file: gzipped CSV and, where pyarrow is there, Parquet in turns."""
     rng = np.random.default_rng([seed, run.cycles])
     test = replace(_RAW, rate=_RAW.rate * samples / SAMPLES)

@@ -5,6 +5,7 @@
 
 import asyncio
 import socket
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -12,6 +13,8 @@ import httptools
 
 #: Bytes read at once by `Blocking`.
 _CHUNK = 1 << 18
+#: Seconds after which an idle connection is not used again: the server closes it after 5.
+_IDLE = 2.0
 
 
 class LostError(Exception):
@@ -120,16 +123,24 @@ class Line:
 
 
 class Blocking:
-    """A keep-alive connection that waits for its answers."""
+    """A keep-alive connection that waits for its answers; opened anew where it was idle so long that it may be closed."""
 
     def __init__(self, port: int) -> None:
-        self._socket = socket.create_connection(("127.0.0.1", port), timeout=60)
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._port = port
         self._answers: list[Answer] = []
+        self._open()
+
+    def _open(self) -> None:
+        self._socket = socket.create_connection(("127.0.0.1", self._port), timeout=60)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._reading = Reading(self._answers.append)
+        self._used = time.monotonic()
 
     def ask(self, request: bytes) -> Answer:
         """The answer to a prepared request. Raises LostError."""
+        if time.monotonic() > self._used + _IDLE:
+            self.close()
+            self._open()
         self._answers.clear()
         self._socket.sendall(request)
         while not self._answers:
@@ -137,6 +148,7 @@ class Blocking:
             if not data:
                 raise LostError("closed by the service")
             self._reading.parser.feed_data(data)
+        self._used = time.monotonic()
         return self._answers[0]
 
     def close(self) -> None:

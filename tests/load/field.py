@@ -23,7 +23,7 @@ LIST, LIVEZ = "clutches", "livez"
 LIVEZ_EVERY = 0.1
 #: Seconds after the end until which questions that were planned before it are still asked.
 GRACE = 5.0
-#: Rigs whose clutches have a fluid of their own each: no fleet teaches them, so that a fresh service can be held against them.
+#: Rigs whose clutches have a fluid of their own each: no fleet teaches them, so that a fresh service answers the same.
 ALONE = 2
 #: Seconds that a rig waits after an error where the answer names none, before it sends the same run again.
 _PAUSE = 1.0
