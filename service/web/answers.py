@@ -10,12 +10,14 @@ import hashlib
 import io
 import json
 import math
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+import os
+import re
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, BinaryIO
 
 from fastapi import Request
-from fastapi.responses import Response
+from fastapi.responses import Response, StreamingResponse
 from pydantic import BaseModel
 
 from service.errors import FieldError, InvalidError, NotFoundError, UnsupportedMediaTypeError
@@ -25,7 +27,10 @@ from storage import clutches
 from storage.encoding.json_text import to_text
 
 JSON_TYPE = "application/json"
+PARQUET_TYPE = "application/vnd.apache.parquet"
 CSV_TYPE = "text/csv; charset=utf-8"
+#: Bytes of a file that are sent at once. Chosen: a few writes to the socket.
+_PIECE = 1 << 18
 
 #: Where a page ended: a number, and a name where that is not unique.
 Place = tuple[float, str]
@@ -139,12 +144,38 @@ def encode_table(columns: Sequence[str], rows: Rows) -> bytes:
 
 def tagged(request: Request, body: bytes, media_type: str) -> Response:
     """The body, or 304 where `If-None-Match` names it."""
-    tag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
-    headers = {"ETag": tag, "Cache-Control": "no-cache"}
+    headers = {"ETag": f'"{hashlib.sha256(body).hexdigest()[:32]}"', "Cache-Control": "no-cache"}
+    return unchanged(request, headers) or Response(content=body, media_type=media_type, headers=headers)
+
+
+def unchanged(request: Request, headers: Mapping[str, str]) -> Response | None:
+    """304 where `If-None-Match` names the `ETag` of the headers, else None."""
     asked_for = request.headers.get("if-none-match", "")
-    if asked_for.strip() == "*" or tag in (name.strip().removeprefix("W/") for name in asked_for.split(",")):
-        return Response(status_code=304, headers=headers)
-    return Response(content=body, media_type=media_type, headers=headers)
+    if asked_for.strip() == "*" or headers["ETag"] in (tag.strip().removeprefix("W/") for tag in asked_for.split(",")):
+        return Response(status_code=304, headers=dict(headers))
+    return None
+
+
+def preferred(request: Request, media_types: Sequence[str]) -> str:
+    """The one of our media types that `Accept` weighs most, the first of them where none is named."""
+    weights = {}
+    for part in request.headers.get("accept", "").lower().split(","):
+        name, *parameters = (word.strip() for word in part.split(";"))
+        weight = next((word[2:] for word in parameters if word.startswith("q=")), "1")
+        weights[name] = float(weight) if re.fullmatch(r"[01](\.\d{0,3})?", weight) else 0.0
+    return max(media_types, key=lambda name: weights.get(name, 0.0))
+
+
+def streamed(body: BinaryIO, media_type: str, headers: Mapping[str, str]) -> Response:
+    """An open file as an answer, sent piece by piece and closed at its end."""
+    size = {"Content-Length": str(os.fstat(body.fileno()).st_size)}
+
+    def pieces() -> Iterator[bytes]:
+        with body:
+            while piece := body.read(_PIECE):
+                yield piece
+
+    return StreamingResponse(pieces(), media_type=media_type, headers=dict(headers) | size)
 
 
 def to_cursor(place: Place | None) -> str | None:

@@ -1,33 +1,45 @@
 """Runs: post, list, look up."""
 
+import tempfile
+from pathlib import Path
 from typing import Any
 
 from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
+from service.errors import NotAcceptableError, NotFoundError
 from service.queries import runs
+from service.queries.raw_run.answer import Kind, entity_tag, write_run
 from service.run_files.json_run import read_run
-from service.schemas.parameters import ClutchId, RunId
+from service.schemas.parameters import ClutchId, Points, RunId
 from service.schemas.run import RUN_IN, Receipt, RunOut, RunPage
 from service.web.answers import (
     JSON_TYPE,
-    answer,
+    PARQUET_TYPE,
     clutch_answer,
     described_body,
     from_cursor,
     json_body,
     now,
     page,
+    preferred,
+    streamed,
     to_json,
+    unchanged,
 )
 from service.web.auth import Ingester, Reader
 from service.web.context import Context, Cursor, Limit
 from service.web.limits import USUAL_ITEMS
-from service.web.problems import READING, SENDING
+from service.web.problems import READING, SENDING, described
 from service.workflows.ingest_run import ingest
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}/runs", tags=["runs"])
+
+_PARQUET = {"schema": {"type": "string", "format": "binary"}}
+READING_RUN = described(NotFoundError, NotAcceptableError) | {
+    200: {"model": RunOut, "content": {PARQUET_TYPE: _PARQUET}, "description": "The run; all samples as Parquet"}
+}
 
 EXAMPLE = {
     "run_id": "2026-11-02-stationary-7000",
@@ -75,7 +87,23 @@ def list_runs(
     return clutch_answer(request, context, clutch_id, "runs", make, limit, after)
 
 
-@router.get("/{run_id}", response_model=RunOut, responses=READING)
-def read_run_with_channels(request: Request, context: Reader, clutch_id: ClutchId, run_id: RunId) -> Response:
-    """One receipt with the run's channels as they were sent."""
-    return answer(request, runs.one_run(context.database, clutch_id, run_id))
+@router.get("/{run_id}", response_model=RunOut, responses=READING_RUN)
+def read_run_with_channels(
+    request: Request, context: Reader, clutch_id: ClutchId, run_id: RunId, points: Points = None
+) -> Response:
+    """One receipt with the run's channels: as they were sent or thinned for a plot, as Parquet where `Accept` prefers it."""
+    media_type = preferred(request, (JSON_TYPE, PARQUET_TYPE))
+    kind: Kind = "parquet" if media_type == PARQUET_TYPE else "json"
+    packed = kind == "json" and points is not None and "gzip" in request.headers.get("accept-encoding", "")
+    headers = {"Cache-Control": "no-cache", "Vary": "Accept, Accept-Encoding"}
+    headers |= {"Content-Encoding": "gzip"} if packed else {}
+    headers["ETag"] = entity_tag(context.database, clutch_id, run_id, points=points, kind=kind, compressed=packed)
+    if held := unchanged(request, headers):
+        return held
+    with tempfile.TemporaryDirectory(prefix="clutchlife-") as folder:
+        path = Path(folder) / "body"
+        headers["ETag"] = write_run(
+            context.database, clutch_id, run_id, points=points, kind=kind, path=path, compressed=packed
+        )
+        body = path.open("rb")  # its name goes with the folder, its content when it is closed
+    return streamed(body, media_type, headers)
