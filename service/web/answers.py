@@ -209,12 +209,17 @@ def tagged(request: Request, answer: Answer, media_type: str, revision: int | No
     headers = {"ETag": answer.tag, "Cache-Control": "no-cache"}
     if revision is not None:
         headers["Clutchlife-Revision"] = str(revision)
-    asked_for = request.headers.get("if-none-match", "")
-    if asked_for and (
-        asked_for.strip() == "*" or answer.tag in (name.strip().removeprefix("W/") for name in asked_for.split(","))
-    ):
-        return Response(status_code=304, headers=headers)
-    return Response(content=answer.body, media_type=media_type, headers=headers)
+    return unchanged(request, headers) or Response(content=answer.body, media_type=media_type, headers=headers)
+
+
+def unchanged(request: Request, headers: Mapping[str, str]) -> Response | None:
+    """304 where `If-None-Match` names the `ETag` of the headers, else None."""
+    asked_for = request.headers.get("if-none-match")
+    if asked_for is None:
+        return None
+    if asked_for.strip() == "*" or headers["ETag"] in (tag.strip().removeprefix("W/") for tag in asked_for.split(",")):
+        return Response(status_code=304, headers=dict(headers))
+    return None
 
 
 async def json_body(request: Request) -> bytes:

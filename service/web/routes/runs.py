@@ -1,26 +1,37 @@
 """Runs: post, list, look up."""
 
 import asyncio
+import tempfile
 from functools import partial
+from pathlib import Path
 
 from fastapi import APIRouter, Request
+from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
+from service.errors import NotAcceptableError, NotFoundError
 from service.jobs.workers import Lane
 from service.lists import from_cursor, page
 from service.queries import runs
 from service.queries.cache import to_json
+from service.queries.raw_run.answer import Kind, entity_tag, write_run
 from service.run_files.json_run import read_run
-from service.schemas.parameters import ClutchId, RunId
+from service.schemas.parameters import ClutchId, Points, RunId
 from service.schemas.run import RUN_IN, Receipt, RunOut, RunPage
-from service.web.answers import JSON_TYPE, answer, clutch_answer, described_body, json_body, now
+from service.web.answers import JSON_TYPE, clutch_answer, described_body, json_body, now, unchanged
 from service.web.auth import Ingester, Reader
 from service.web.context import Cursor, Limit
+from service.web.files import PARQUET_TYPE, preferred, streamed
 from service.web.limits import LARGE_BODY_BYTES, USUAL_ITEMS
-from service.web.problems import READING, SENDING
+from service.web.problems import READING, SENDING, described
 from service.workflows.ingest_run import ingest_posted
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}/runs", tags=["runs"])
+
+_PARQUET = {"schema": {"type": "string", "format": "binary"}}
+READING_RUN = described(NotFoundError, NotAcceptableError) | {
+    200: {"model": RunOut, "content": {PARQUET_TYPE: _PARQUET}, "description": "The run; all samples as Parquet"}
+}
 
 EXAMPLE = {
     "run_id": "2026-11-02-stationary-7000",
@@ -66,7 +77,24 @@ async def list_runs(
     return await clutch_answer(request, context, clutch_id, "runs", make, limit, after)
 
 
-@router.get("/{run_id}", response_model=RunOut, responses=READING)
-async def read_run_with_channels(request: Request, context: Reader, clutch_id: ClutchId, run_id: RunId) -> Response:
-    """One receipt with the run's channels as they were sent."""
-    return await answer(request, lambda: runs.one_run(context.database, clutch_id, run_id))
+@router.get("/{run_id}", response_model=RunOut, responses=READING_RUN)
+async def read_run_with_channels(
+    request: Request, context: Reader, clutch_id: ClutchId, run_id: RunId, points: Points = None
+) -> Response:
+    """One receipt with the run's channels: as they were sent or thinned for a plot, as Parquet where `Accept` prefers it."""
+    media_type = preferred(request, (JSON_TYPE, PARQUET_TYPE))
+    kind: Kind = "parquet" if media_type == PARQUET_TYPE else "json"
+    packed = kind == "json" and points is not None and "gzip" in request.headers.get("accept-encoding", "")
+    headers = {"Cache-Control": "no-cache", "Vary": "Accept, Accept-Encoding"}
+    headers |= {"Content-Encoding": "gzip"} if packed else {}
+    headers["ETag"] = await run_in_threadpool(
+        entity_tag, context.database, clutch_id, run_id, points=points, kind=kind, compressed=packed
+    )
+    if held := unchanged(request, headers):
+        return held
+    with tempfile.TemporaryDirectory(prefix="clutchlife-") as folder:
+        path = Path(folder) / "body"
+        write = partial(write_run, points=points, kind=kind, path=path, compressed=packed)
+        headers["ETag"] = await asyncio.wrap_future(context.workers.submit(Lane.FILES, write, clutch_id, run_id))
+        body = path.open("rb")  # its name goes with the folder, its content when it is closed
+    return streamed(body, media_type, headers)
