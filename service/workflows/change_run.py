@@ -14,7 +14,7 @@ from sqlalchemy import Connection
 from service import records, stored_runs
 from service.columns import whole
 from service.errors import NotPossibleNowError
-from service.lives.history import Event, order, stationary_tests_of
+from service.lives.history import DYNAMIC, Event, order, stationary_tests_of
 from service.lives.payloads import OF_HISTORY, notice_items
 from service.lives.plausibility.doubts import doubts
 from service.lives.recomputation import (
@@ -157,7 +157,10 @@ def _corrected(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
     sent = replace(stored_runs.run_reader(database, row.clutch_id).read(row.run_id), cycles=cycles)
     event = loaded.event.at(cycles)
     event = replace(event, cofs=cofs_among(others, event, loaded.levels.get(row.run_id, ())))
-    found = doubts(sent, analyse(sent, others.geometry), event, others)
+    analysis = analyse(sent, others.geometry)
+    if "time_s" in sent.channels and sent.kind != DYNAMIC:  # as on arrival: its plateaus stand for a long record
+        sent = replace(sent, channels={})
+    found = doubts(sent, analysis, event, others)
     return replace(
         row,
         cycles=cycles,
@@ -209,6 +212,9 @@ def _store(connection: Connection, loaded: _Loaded, changed: _Changed, request: 
         fits = records.fit_rows(loaded.levels.get(row.run_id, ()), changed.aside)
         results.write_fits(connection, row.run_key, fits)
     records.store(connection, row.clutch_id, changed.results)
+    before, after = records.standing(loaded.row), records.standing(row)
+    if before["doubts"] == after["doubts"]:
+        del before["doubts"], after["doubts"]
     change = NewChange(
         clutch_id=row.clutch_id,
         run_id=row.run_id,
@@ -216,8 +222,8 @@ def _store(connection: Connection, loaded: _Loaded, changed: _Changed, request: 
         by=request.by,
         action=request.action,
         reason=request.reason,
-        before=records.standing(loaded.row),
-        after=records.standing(row),
+        before=before,
+        after=after,
         revision=clutches.bump_revision(connection, row.clutch_id),
     )
     changes.insert(connection, change)
