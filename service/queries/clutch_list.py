@@ -27,18 +27,22 @@ def look_up(database: Database, clutch_id: str) -> dict[str, Any]:
     return _item(row, verdict)
 
 
-def page(database: Database, *, limit: int, after: Place | None) -> tuple[list[dict[str, Any]], Place | None]:
-    """Clutches with the fewest remaining cycles first, and where the next page starts."""
+def page(
+    database: Database, *, limit: int, after: Place | None, archived: bool = False
+) -> tuple[list[dict[str, Any]], Place | None]:
+    """Clutches in use, or the archived ones, the fewest remaining cycles first, and where the next page starts."""
     with database.reading() as connection:
-        rows = clutches.page(connection, limit=limit + 1, after=after)
+        rows = clutches.page(connection, limit=limit + 1, after=after, archived=archived)
         items = [_item(row, verdict) for row, verdict in _with_verdicts(connection, rows[:limit])]
     return items, _next(rows, limit)
 
 
-def page_as_json(database: Database, cache: AnswerCache, *, limit: int, after: Place | None) -> bytes:
+def page_as_json(
+    database: Database, cache: AnswerCache, *, limit: int, after: Place | None, archived: bool = False
+) -> bytes:
     """The same as JSON; each clutch's item is made once for its revision and verdict."""
     with database.reading() as connection:
-        rows = clutches.page(connection, limit=limit + 1, after=after)
+        rows = clutches.page(connection, limit=limit + 1, after=after, archived=archived)
         found = _with_verdicts(connection, rows[:limit])
     items = [
         cache.answer(("clutch", row.clutch_id, row.revision, to_json(verdict)), partial(_item_as_json, row, verdict))
@@ -79,6 +83,7 @@ def _latest(connection: Connection, row: ClutchRow, verdict: VerdictRow | None) 
 
 def _item(row: ClutchRow, diagnosis: dict[str, Any] | None) -> dict[str, Any]:
     return records.record(row).model_dump(mode="json") | {
+        "archived": row.archived,
         "created_at": row.created_at,
         "revision": row.revision,
         "runs": row.summary.get("runs", 0),

@@ -21,7 +21,7 @@ def curves(database: Database, clutch_id: str, limit: int, after: Place | None) 
     """
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
-        rows = runs.page(connection, clutch_id, limit=limit + 1, after=after, fitted=True)
+        rows = runs.page(connection, clutch_id, limit=limit + 1, after=after, fitted=True, state=runs.ACCEPTED)
         levels = records.levels(connection, clutch_id)
     items = [_item(row, levels.get(row.run_id, [])) for row in rows[:limit]]
     return page(items, (rows[limit - 1].cycles, rows[limit - 1].run_id) if len(rows) > limit else None)

@@ -23,6 +23,8 @@ from storage.keys import KeyRow
 
 Scope = Literal["read", "ingest", "admin"]
 SCOPES: tuple[Scope, ...] = get_args(Scope)
+#: The caller's name where no keys are configured.
+LOCAL = "local"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,19 +47,21 @@ def make_key(scope: Scope, note: str, *, created_at: str) -> tuple[str, KeyRow]:
     return text, row
 
 
-def authorise(watch: Watch, caller: Caller, scope: Scope) -> None:
-    """Let the caller pass, or raise UnauthorizedError or ForbiddenError."""
+def authorise(watch: Watch, caller: Caller, scope: Scope) -> str:
+    """Let the caller pass and return its name, or raise UnauthorizedError or ForbiddenError."""
     if not keys.are_needed(watch):
         _require_loopback(caller)
-        return
+        return LOCAL
     scheme, _, text = (caller.authorization or "").partition(" ")
     if scheme.lower() != "bearer" or not text:
         raise UnauthorizedError("send a key as: Authorization: Bearer KEY")
     granted = keys.grants(watch, _digest(text.strip()))
     if granted is None:
         raise UnauthorizedError("the key is not known, or was revoked")
-    if granted[1] not in SCOPES[SCOPES.index(scope) :]:
-        raise ForbiddenError(f"this needs the scope {scope}, the key has {granted[1]}")
+    key_id, its_scope, note = granted
+    if its_scope not in SCOPES[SCOPES.index(scope) :]:
+        raise ForbiddenError(f"this needs the scope {scope}, the key has {its_scope}")
+    return f"key:{key_id} {note}".rstrip()
 
 
 def _digest(text: str) -> str:
@@ -112,10 +116,16 @@ def allowed(scope: Scope) -> Callable[[Request], Awaitable[Context]]:
     async def check(request: Request) -> Context:
         context = context_of(request)
         _refuse_unknown_arguments(request)
-        authorise(context.database.watch, caller_of(request), scope)
+        request.state.caller = authorise(context.database.watch, caller_of(request), scope)
         return context
 
     return check
+
+
+def name_of_caller(request: Request) -> str:
+    """Who sent a request that was allowed, as the audit trail names it: a key's id and note, or `local`."""
+    name: str = request.state.caller
+    return name
 
 
 #: Tables and short lists are answered whole, and take the arguments of a list.

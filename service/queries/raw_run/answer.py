@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any, BinaryIO, Literal
 
 from models.arrays import FloatArray
-from service import stored_runs
+from service import records, stored_runs
 from service.queries.raw_run.decimation import extreme_rows
 from service.queries.raw_run.formats import Values, parquet_writer, write_json, write_parquet
-from storage import channels
+from storage import changes, channels
 from storage.encoding.json_text import to_text
 from storage.engine.database import Database
 
@@ -94,7 +94,12 @@ def _look_up(database: Database, clutch_id: str, run_id: str) -> _Run:
     with database.reading() as connection:
         row = stored_runs.run(connection, clutch_id, run_id)
         lengths = channels.lengths(connection, row.run_key)
-    return _Run(run_key=row.run_key, head=row.receipt | {"samples": max(lengths.values(), default=0)}, lengths=lengths)
+        trail = changes.page(connection, clutch_id, run_id=run_id)
+    head = records.receipt(row) | {
+        "changes": [change.entry() for change in trail],
+        "samples": max(lengths.values(), default=0),
+    }
+    return _Run(run_key=row.run_key, head=head, lengths=lengths)
 
 
 def _values(database: Database, run_key: int, name: str) -> FloatArray:

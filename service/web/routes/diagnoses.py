@@ -1,9 +1,8 @@
 """Diagnoses: asked for, listed, looked up; and the model that a clutch is tracked under."""
 
 import asyncio
-from typing import Annotated, TypeVar
+from typing import Annotated
 
-import pydantic
 from fastapi import APIRouter, Header, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
@@ -12,8 +11,7 @@ from service.jobs.workers import Lane
 from service.lists import from_cursor, page
 from service.queries import diagnoses, model
 from service.queries.cache import to_json
-from service.run_files.json_run import invalid
-from service.schemas.base import Schema
+from service.run_files.json_run import checked
 from service.schemas.diagnosis import DiagnosisIn, DiagnosisOut, DiagnosisPage, ModelIn, ModelOut
 from service.schemas.parameters import ClutchId, DiagnosisId
 from service.web.answers import JSON_TYPE, answer, described_body, json_body, now, preferred_wait
@@ -25,7 +23,6 @@ from service.workflows import adopt_model
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["diagnosis"])
 
-Body = TypeVar("Body", bound=Schema)
 Prefer = Annotated[
     str | None,
     Header(max_length=200, description=f"`wait=SECONDS`: how long to wait for the report; default {WAIT_SECONDS}"),
@@ -41,7 +38,7 @@ Prefer = Annotated[
 )
 async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchId, prefer: Prefer = None) -> Response:
     """Have all runs of the clutch's present life diagnosed. A question while the same runs are being diagnosed joins in."""
-    question = _read(DiagnosisIn, await json_body(request))
+    question = checked(DiagnosisIn, await json_body(request))
     job = await run_in_threadpool(context.diagnoses.ask, clutch_id, adopt=question.adopt)
     preferred = preferred_wait(prefer)
     wait = WAIT_SECONDS if preferred is None else preferred
@@ -83,17 +80,10 @@ async def read_model(request: Request, context: Reader, clutch_id: ClutchId) -> 
 )
 async def put_model(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
     """Adopt what a diagnosis found, or return to the baseline; all is tracked anew before this is answered."""
-    wanted = _read(ModelIn, await json_body(request))
+    wanted = checked(ModelIn, await json_body(request))
     adopting = context.workers.submit(
         Lane.RUNS, adopt_model.adopt, clutch_id, wanted.diagnosis_id, now(), turn=clutch_id
     )
     await asyncio.wrap_future(adopting)
     answered = await run_in_threadpool(model.model, context.database, clutch_id)
     return Response(content=to_json(answered), media_type=JSON_TYPE)
-
-
-def _read(schema: type[Body], body: bytes) -> Body:
-    try:
-        return schema.model_validate_json(body)
-    except pydantic.ValidationError as error:
-        raise invalid(error) from None

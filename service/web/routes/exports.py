@@ -10,7 +10,7 @@ from service.lists import from_cursor
 from service.queries import degradation, fleet_priors, remaining_life, runs, scores, series, stribeck, surfaces
 from service.schemas.curves import LoopItem, SeriesItem
 from service.schemas.life import Method
-from service.schemas.parameters import ClutchId, Quantity
+from service.schemas.parameters import ClutchId, Quantity, State
 from service.web.answers import Rows, clutch_table, computed_table, table
 from service.web.auth import Reader
 from service.web.context import AtCycles, Cursor, Limit, Prefer, PressureBar
@@ -27,16 +27,35 @@ def _items(payload: Mapping[str, Any]) -> Any:
 
 @router.get("/runs.csv", response_class=Response, responses=READING)
 async def list_runs_csv(
-    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = MOST_ITEMS, cursor: Cursor = None
+    request: Request,
+    context: Reader,
+    clutch_id: ClutchId,
+    state: State = None,
+    limit: Limit = MOST_ITEMS,
+    cursor: Cursor = None,
 ) -> Response:
     """Receipts by cycles as CSV; warnings and fits are counted."""
     after = from_cursor(cursor)
 
     def make() -> Rows:
-        items, _ = runs.page(context.database, clutch_id, limit=limit, after=after)
+        items, _ = runs.page(context.database, clutch_id, limit=limit, after=after, state=state)
         return runs.rows(items)
 
-    return await clutch_table(request, context, clutch_id, "runs", make, runs.COLUMNS, limit, after)
+    return await clutch_table(request, context, clutch_id, "runs", make, runs.COLUMNS, state, limit, after)
+
+
+@router.get("/changes.csv", response_class=Response, responses=READING)
+async def list_changes_csv(
+    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = MOST_ITEMS, cursor: Cursor = None
+) -> Response:
+    """The audit trail as CSV, newest first; what changed is JSON."""
+    after = from_cursor(cursor)
+
+    def make() -> Rows:
+        items, _ = runs.trail(context.database, clutch_id, limit=limit, after=after)
+        return runs.trail_rows(items)
+
+    return await clutch_table(request, context, clutch_id, "changes", make, runs.TRAIL_COLUMNS, limit, after)
 
 
 @router.get("/remaining-useful-life.csv", response_class=Response, responses=READING)

@@ -25,7 +25,7 @@ from service.schemas.parameters import (
 )
 from service.schemas.run import Receipt
 from service.web.answers import JSON_TYPE, now
-from service.web.auth import Ingester
+from service.web.auth import Ingester, name_of_caller
 from service.web.problems import SENDING
 from service.workflows.ingest_run import ingest_posted
 
@@ -74,7 +74,8 @@ async def post_run_file(
             started_at=started_at,
             origin=origin,
         )
-        taken_in = context.workers.submit(Lane.FILES, ingest_posted, clutch_id, read, now(), turn=clutch_id)
+        by = name_of_caller(request)
+        taken_in = context.workers.submit(Lane.FILES, ingest_posted, clutch_id, read, now(), by, turn=clutch_id)
         receipt, new = await asyncio.wrap_future(taken_in)
     headers = {"Location": f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"}
     return Response(content=to_json(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
