@@ -4,7 +4,7 @@ import typer
 
 from service.cli import backup, diagnose, export, fleet, key, model, replay, score, serve, simulate
 from service.cli.demo import demo
-from service.cli.sending import push
+from service.cli.sending import push, spool_commands
 
 app = typer.Typer(
     name="clutchlife",
@@ -23,6 +23,7 @@ app.command()(export.export)
 app.command()(score.score)
 app.command()(replay.replay)
 app.command()(backup.backup)
+app.add_typer(spool_commands.app, name="spool")
 app.add_typer(key.app, name="key")
 app.add_typer(fleet.app, name="fleet")
 
