@@ -58,10 +58,9 @@ def _present(service: Service, spool: Spool) -> bool:
     """Whether the service answers at all, so that it is this run that it does not answer."""
     at_once = Service(http=service.http, patience=0.0)
     try:
-        at_once.get(f"/v1/clutches/{spool.clutch_id}")
+        return at_once.get(f"/v1/clutches/{spool.clutch_id}").get("clutch_id") == spool.clutch_id
     except (ServiceAwayError, RefusedError):
         return False
-    return True
 
 
 def _send(service: Service, spool: Spool, entry: Entry, sent: Sent, report: Report) -> None:
