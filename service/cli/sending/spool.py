@@ -125,8 +125,9 @@ class Spool:
             for (path, parameters), digest in zip(files, digests, strict=True):
                 present = next((other for other in waiting if other.whole and other.digest == digest), None)
                 entry = present or self._kept(_next(waiting), path, parameters)
-                older = [other for other in waiting if _older(other, entry, str(path.resolve()), batch)]
-                self._wait(entry, older, str(path.resolve()))
+                source = str(path.resolve())
+                older = [other for other in waiting if _older(other, entry, source, batch)]
+                self._wait(entry, older, source)
                 gone = {entry.stem, *(other.stem for other in older)}
                 waiting = [*(other for other in waiting if other.stem not in gone), entry]
                 replaced += [other for other in older if other.whole]

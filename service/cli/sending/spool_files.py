@@ -19,14 +19,13 @@ _JOURNAL = "replacing.journal"
 
 
 def write(folder: Path, name: str, content: bytes) -> None:
-    """A file below the spool's folder, whole or not at all, and on the disk."""
+    """A file below the spool's folder, whole or not at all."""
     partial = folder / (Path(name).name + PARTIAL)
     with partial.open("wb") as file:
         file.write(content)
         file.flush()
         os.fsync(file.fileno())
     partial.replace(folder / name)
-    _sync((folder / name).parent)
 
 
 def _sync(folder: Path) -> None:
@@ -43,9 +42,11 @@ def store(folder: Path, entry: Entry, older: Sequence[Entry]) -> None:
     """Make an entry wait, whose bytes are there, in the place of older versions: in one instant."""
     if not older:
         write(folder, entry.stem + ENTRY, entries.encoded(entry))
+        _sync(folder)
         return
     journal = {"entry": entries.encoded(entry).decode(), "older": [other.stem for other in older]}
     write(folder, _JOURNAL, json.dumps(journal).encode())
+    _sync(folder)
     carry_out(folder)
 
 
@@ -57,6 +58,7 @@ def carry_out(folder: Path) -> None:
     journal = json.loads(path.read_bytes())
     entry = entries.decoded(journal["entry"].encode())
     write(folder, entry.stem + ENTRY, entries.encoded(entry))
+    _sync(folder)
     for stem in journal["older"]:
         older = entries.load(folder, stem)
         if entries.digest(stem) == entry.digest:  # the same content, which lacked its parameters
