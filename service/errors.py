@@ -81,6 +81,14 @@ class UnsupportedMediaTypeError(ServiceError):
     title = "The body has a type that is not accepted here"
 
 
+class NotAcceptableError(ServiceError):
+    """The answer cannot be given in the format that was asked for."""
+
+    status = 406
+    slug = "not-acceptable"
+    title = "The answer is not given in this format here"
+
+
 class BusyError(ServiceError):
     """Too many requests of this kind are waiting; the same request may succeed a little later."""
 

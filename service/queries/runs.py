@@ -1,12 +1,12 @@
-"""`/runs` and `/loops`: receipts by cycles, one run with its channels, and the friction loops of the dynamic tests."""
+"""`/runs` and `/loops`: receipts by cycles, and the friction loops of the dynamic tests."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from service import records, stored_runs
+from service import records
 from service.columns import whole
 from service.lives.history import DYNAMIC
-from storage import channels, runs
+from storage import runs
 from storage.engine.database import Database
 
 Place = tuple[float, str]
@@ -31,14 +31,6 @@ def rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
             "warnings": len(item["warnings"]),
             "fits": len(item["fits"]),
         }
-
-
-def one_run(database: Database, clutch_id: str, run_id: str) -> dict[str, Any]:
-    """A receipt with the run's channels, bit for bit as they were sent. Raises NotFoundError."""
-    with database.reading() as connection:
-        row = stored_runs.run(connection, clutch_id, run_id)
-        columns = channels.read(connection, row.run_key)
-    return row.receipt | {"channels": {name: column.tolist() for name, column in columns.items()}}
 
 
 def loops(database: Database, clutch_id: str) -> list[dict[str, Any]]:

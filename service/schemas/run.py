@@ -197,9 +197,14 @@ class Receipt(Answer):
 
 
 class RunOut(Receipt):
-    """A receipt with the run's channels as they were sent."""
+    """A receipt with the run's channels: as they were sent, or with `points` fewer samples of them for a plot."""
 
-    channels: dict[str, list[float]] = Field(description="The channels by name, bit for bit as they were sent")
+    samples: int = Field(description="Samples of each channel as they were sent; 0 for a run without channels")
+    channels: dict[str, list[float]] = Field(
+        description="The channels by name, bit for bit as they were sent and of equal length. With `points`, row k of all "
+        "channels is one sample as it was measured: kept are the lowest and the highest of every channel in each of equal "
+        "bins, the first and the last"
+    )
 
 
 class RunPage(Answer):

@@ -21,8 +21,8 @@ from service.errors import (
     UnauthorizedError,
     UnsupportedMediaTypeError,
 )
+from service.queries.cache import to_json
 from service.schemas.problem import Problem
-from service.web.answers import to_json
 from service.web.limits import RETRY_AFTER_SECONDS
 from storage.engine.errors import DatabaseBusy, StorageError
 

@@ -20,7 +20,7 @@ from storage.diagnoses import DiagnosisRow
 from storage.engine.database import Database
 
 
-def adopt(database: Database, clutch_id: str, diagnosis_id: str | None, *, adopted_at: str) -> None:
+def adopt(database: Database, clutch_id: str, diagnosis_id: str | None, adopted_at: str) -> None:
     """Adopt a diagnosis's extension, or return to the baseline; all is tracked anew.
 
     What is in force already stays and makes no version. Raises NotFoundError for an unknown clutch or diagnosis,
@@ -37,7 +37,7 @@ def adopt(database: Database, clutch_id: str, diagnosis_id: str | None, *, adopt
 
 
 def finish_and_adopt(
-    database: Database, clutch_id: str, diagnosis_id: str, ended: Mapping[str, Any], *, life: str, at: str
+    database: Database, clutch_id: str, diagnosis_id: str, ended: Mapping[str, Any], life: str, at: str
 ) -> bool:
     """Store a finished diagnosis and, in the same transaction, adopt its extension; False where there is nothing to adopt.
 
@@ -69,22 +69,21 @@ def _change(
 ) -> None:
     """Compute under the new model and store, again where the clutch has changed meanwhile."""
     diagnosis_id = None if adoption is None else adoption.diagnosis_id
-    with database.turn(clutch_id, patient=before is not None):
-        while True:
-            state, results = _computed(database, clutch_id, adoption)
-            with database.writing() as connection:
-                if not records.unchanged(connection, clutch_id, state.revision):
-                    continue
-                version, in_force = _newest(connection, clutch_id)
-                if in_force == diagnosis_id:  # the same request, sent twice, was stored while this one waited
-                    return
-                if before is not None:
-                    before(connection)
-                row = AdoptedRow(version=version + 1, diagnosis_id=diagnosis_id, adopted_at=adopted_at)
-                assumptions.insert_adoption(connection, clutch_id, row)
-                records.store(connection, clutch_id, results)
-                clutches.bump_revision(connection, clutch_id)
+    while True:
+        state, results = _computed(database, clutch_id, adoption)
+        with database.writing() as connection:
+            if not records.unchanged(connection, clutch_id, state.revision):
+                continue
+            version, in_force = _newest(connection, clutch_id)
+            if in_force == diagnosis_id:  # the same request, sent twice, was stored while this one waited
                 return
+            if before is not None:
+                before(connection)
+            row = AdoptedRow(version=version + 1, diagnosis_id=diagnosis_id, adopted_at=adopted_at)
+            assumptions.insert_adoption(connection, clutch_id, row)
+            records.store(connection, clutch_id, results)
+            clutches.bump_revision(connection, clutch_id)
+            return
 
 
 def _computed(database: Database, clutch_id: str, adoption: Adoption | None) -> tuple[ClutchState, Results]:

@@ -4,7 +4,7 @@ Everything is computed before the database is locked; where another run of the c
 the history is computed again.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
@@ -49,6 +49,13 @@ class _Outcome:
     results: Results
 
 
+def ingest_posted(
+    database: Database, clutch_id: str, read: Callable[[], IncomingRun], received_at: str
+) -> tuple[dict[str, Any], bool]:
+    """The same of a run that `read` makes of what was posted; also raises what that does."""
+    return ingest(database, clutch_id, read(), received_at=received_at)
+
+
 def ingest(database: Database, clutch_id: str, run: IncomingRun, *, received_at: str) -> tuple[dict[str, Any], bool]:
     """Take in a run; returns its receipt and whether it is new.
 
@@ -68,17 +75,16 @@ def ingest(database: Database, clutch_id: str, run: IncomingRun, *, received_at:
     if sampled and run.kind != DYNAMIC:  # loops are yet to be fitted; another long record need not be held twice
         run = replace(run, channels={})
     arrival = Arrival(run=run, sampled=sampled, analysis=analysis, received_at=received_at)
-    with database.turn(clutch_id):
-        while True:
-            with database.reading() as connection:  # a repeat may have waited for its turn
-                stored = runs.get(connection, clutch_id, run.run_id)
-            if stored is not None:
-                return _repeat(stored, run), False
-            outcome = _computed(database, clutch_id, arrival)
-            with database.writing() as connection:  # another process's run of the same name moves the revision
-                if records.unchanged(connection, clutch_id, outcome.revision):
-                    _store(connection, clutch_id, arrival, columns, outcome)
-                    return outcome.receipt, True
+    while True:
+        with database.reading() as connection:  # a repeat may have waited for its turn
+            stored = runs.get(connection, clutch_id, run.run_id)
+        if stored is not None:
+            return _repeat(stored, run), False
+        outcome = _computed(database, clutch_id, arrival)
+        with database.writing() as connection:  # another process's run of the same name moves the revision
+            if records.unchanged(connection, clutch_id, outcome.revision):
+                _store(connection, clutch_id, arrival, columns, outcome)
+                return outcome.receipt, True
 
 
 def _repeat(stored: RunRow, run: IncomingRun) -> dict[str, Any]:

@@ -38,12 +38,11 @@ def replay_clutch(database: Database, clutch_id: str) -> int:
 
     The revision moves on only where a result has changed.
     """
-    with database.turn(clutch_id, patient=True):
-        while True:
-            replayed = _computed(database, clutch_id)
-            with database.writing() as connection:
-                if records.unchanged(connection, clutch_id, replayed.revision):
-                    return _store(connection, clutch_id, replayed)
+    while True:
+        replayed = _computed(database, clutch_id)
+        with database.writing() as connection:
+            if records.unchanged(connection, clutch_id, replayed.revision):
+                return _store(connection, clutch_id, replayed)
 
 
 def _computed(database: Database, clutch_id: str) -> _Replayed:

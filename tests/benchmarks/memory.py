@@ -3,21 +3,31 @@
 import os
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
+
+
+def family(pid: int) -> list[int]:
+    """A process and all that it has started, itself first; those that have ended by the time they are looked at left out."""
+    found, waiting = [], [pid]
+    while waiting:
+        number = waiting.pop()
+        try:
+            for thread in Path(f"/proc/{number}/task").iterdir():
+                waiting += map(int, (thread / "children").read_text(encoding="ascii").split())
+        except (FileNotFoundError, ProcessLookupError):
+            continue  # it has just ended
+        found.append(number)
+    return found
 
 
 def held(pid: int) -> int:
     """Bytes of a process and its children: what they share with each other is counted once (`Pss` of /proc)."""
-    total, waiting = 0, [pid]
-    while waiting:
-        process = Path(f"/proc/{waiting.pop()}")
-        try:
-            rollup = (process / "smaps_rollup").read_text(encoding="ascii")
+    total = 0
+    for number in family(pid):
+        with suppress(FileNotFoundError, ProcessLookupError):  # it has just ended
+            rollup = Path(f"/proc/{number}/smaps_rollup").read_text(encoding="ascii")
             total += 1024 * sum(int(line.split()[1]) for line in rollup.splitlines() if line.startswith("Pss:"))
-            for thread in (process / "task").iterdir():
-                waiting += map(int, (thread / "children").read_text(encoding="ascii").split())
-        except (FileNotFoundError, ProcessLookupError):
-            continue  # it has just ended
     return total
 
 

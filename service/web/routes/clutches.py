@@ -1,18 +1,23 @@
 """Clutches: register, list worst first, look up."""
 
+from collections.abc import Hashable
+
 import pydantic
 from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
+from service.lists import from_cursor
 from service.queries import clutch_list
+from service.queries.cache import to_json
 from service.run_files.json_run import invalid
 from service.schemas.clutch import ClutchIn, ClutchOut, ClutchPage
 from service.schemas.parameters import ClutchId
-from service.web.answers import JSON_TYPE, answer, described_body, from_cursor, json_body, now, page, tagged, to_json
+from service.web.answers import JSON_TYPE, answer, described_body, json_body, kept, now, tagged
 from service.web.auth import Ingester, Reader
 from service.web.context import Context, Cursor, Limit
 from service.web.limits import USUAL_ITEMS
+from service.web.polls import remember
 from service.web.problems import READING, SENDING
 from service.workflows import register_clutch as registration
 
@@ -54,18 +59,28 @@ def _register(context: Context, body: bytes) -> tuple[dict[str, object], bool]:
 
 
 @router.get("", response_model=ClutchPage, responses=READING)
-def list_clutches(request: Request, context: Reader, limit: Limit = USUAL_ITEMS, cursor: Cursor = None) -> Response:
+async def list_clutches(
+    request: Request, context: Reader, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
+) -> Response:
     """All clutches with current health and remaining life, the fewest remaining cycles first."""
     after = from_cursor(cursor)
-    version = context.database.version()  # before the rows are read: what is committed meanwhile makes another
+
+    def key() -> Hashable:  # before the rows are read: what is committed meanwhile makes another
+        return "clutches", context.database.watch.version(), limit, after
 
     def make() -> bytes:
-        return to_json(page(*clutch_list.page(context.database, limit=limit, after=after)))
+        return clutch_list.page_as_json(context.database, context.cache, limit=limit, after=after)
 
-    return tagged(request, context.cache.answer((version, limit, after), make), JSON_TYPE)
+    def again(request: Request) -> Response | None:
+        held = context.cache.held(key())
+        return None if held is None else tagged(request, held, JSON_TYPE)
+
+    held = await kept(context, key(), make)
+    remember(request, again)
+    return tagged(request, held, JSON_TYPE)
 
 
 @router.get("/{clutch_id}", response_model=ClutchOut, responses=READING)
-def read_clutch(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
+async def read_clutch(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
     """One clutch."""
-    return answer(request, clutch_list.look_up(context.database, clutch_id))
+    return await answer(request, lambda: clutch_list.look_up(context.database, clutch_id))

@@ -23,7 +23,7 @@ STARTER = """
 import sys
 import storage.engine.connect
 import storage.engine.database
-storage.engine.connect.preferred_journal_mode = lambda _: sys.argv[1]
+storage.engine.connect.JOURNAL_MODE = sys.argv[1]
 print("loaded", flush=True)
 for line in sys.stdin:
     database = storage.engine.database.open_database(f"sqlite:///{line.strip()}")

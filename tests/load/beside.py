@@ -1,0 +1,131 @@
+"""What goes on beside the rigs and clients: a diagnosis after the other, fleets refreshed, memory watched."""
+
+import asyncio
+import json
+import os
+import resource
+import sys
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tests.benchmarks.memory import family, processor_seconds
+from tests.load.bodies import asked, posted
+from tests.load.exchange import Line
+from tests.load.field import noted
+
+#: Seconds between two looks at a diagnosis, between two refreshes, and between two looks at the memory.
+LOOK_EVERY, REFRESH_EVERY, WATCH_EVERY = 0.5, 20.0, 1.0
+_PAGE = os.sysconf("SC_PAGE_SIZE")
+
+
+@dataclass(slots=True)
+class Beside:
+    """What is noted of it; seconds and bytes."""
+
+    diagnoses: list[float] = field(default_factory=list)
+    refreshes: list[float] = field(default_factory=list)
+    #: By second: the service alone, and with the processes that it has started.
+    alone: list[int] = field(default_factory=list)
+    together: list[int] = field(default_factory=list)
+    problems: Counter[str] = field(default_factory=Counter)
+
+
+def fleet_refresh(database: Path) -> list[str]:
+    """The command that learns the fleets' priors anew."""
+    return [sys.executable, "-m", "service.cli.main", "fleet", "refresh", "--database", f"sqlite:///{database}"]
+
+
+async def diagnose(port: int, clutch_id: str, end: float, beside: Beside) -> None:
+    """Have a clutch diagnosed, again and again, until the end."""
+    line, loop = Line(port), asyncio.get_running_loop()
+    question = posted(f"/v1/clutches/{clutch_id}/diagnoses", b"{}").replace(b"\r\n", b"\r\nPrefer: wait=0\r\n", 1)
+    while loop.time() < end:
+        started = loop.time()
+        answer = await noted(lambda: line.ask(question), "POST diagnoses", beside.problems)
+        if answer is None or answer.status not in (201, 202):
+            await asyncio.sleep(LOOK_EVERY)
+            continue
+        report = json.loads(answer.body)
+        look = asked(f"/v1/clutches/{clutch_id}/diagnoses/{report['diagnosis_id']}")
+        while report["status"] == "running" and loop.time() < end:
+            await asyncio.sleep(LOOK_EVERY)
+            answer = await noted(lambda look=look: line.ask(look), "GET diagnoses", beside.problems)  # type: ignore[misc]
+            if answer is not None and answer.status == 200:
+                report = json.loads(answer.body)
+        if report["status"] == "finished":
+            beside.diagnoses.append(loop.time() - started)
+        elif report["status"] == "failed":
+            beside.problems[f"diagnosis failed: {report.get('problem') or report.get('summary')}"] += 1
+
+
+async def refresh_fleets(database: Path, begin: float, end: float, beside: Beside) -> None:
+    """Refresh the fleets every so many seconds until the end, in a process of its own."""
+    loop = asyncio.get_running_loop()
+    planned = begin + REFRESH_EVERY / 2
+    while planned < end:
+        await asyncio.sleep(max(0.0, planned - loop.time()))
+        await refresh_once(database, beside)
+        planned = max(planned + REFRESH_EVERY, loop.time())
+
+
+async def refresh_once(database: Path, beside: Beside) -> None:
+    """One refresh, waited for."""
+    loop = asyncio.get_running_loop()
+    started = loop.time()
+    pipe = asyncio.subprocess.PIPE
+    process = await asyncio.create_subprocess_exec(*fleet_refresh(database), stdout=pipe, stderr=pipe)
+    _, errors = await process.communicate()
+    beside.refreshes.append(loop.time() - started)
+    if process.returncode != 0:
+        beside.problems[f"fleet refresh ended with {process.returncode}: {errors[-160:].decode(errors='replace')}"] += 1
+
+
+async def watch(pid: int, begin: float, end: float, beside: Beside) -> None:
+    """Resident memory of the service, alone and with its processes, once a second."""
+    loop = asyncio.get_running_loop()
+    planned = begin
+    while planned < end:
+        await asyncio.sleep(max(0.0, planned - loop.time()))
+        sizes = [resident(each) for each in family(pid)]
+        beside.alone.append(sizes[0])
+        beside.together.append(sum(sizes))
+        planned += WATCH_EVERY
+
+
+def resident(pid: int) -> int:
+    """Bytes of a process in memory, 0 where it has just ended."""
+    try:
+        return int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1]) * _PAGE
+    except (FileNotFoundError, ProcessLookupError):
+        return 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Processor:
+    """Seconds of the processor since some moment: the generator, the service with its processes, the refreshes, and
+    everything else on the machine."""
+
+    generator: float
+    service: float
+    refreshes: float
+    others: float
+
+    @classmethod
+    def since_start(cls, pid: int) -> "Processor":
+        """Since each began, and the machine; only differences mean anything."""
+        own, children = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+        service = sum(processor_seconds(each) for each in family(pid))
+        generator, refreshes = own.ru_utime + own.ru_stime, children.ru_utime + children.ru_stime
+        others = busy_seconds() - service - generator - refreshes
+        return cls(generator=generator, service=service, refreshes=refreshes, others=others)
+
+    def minus(self, before: "Processor") -> "Processor":
+        """What was taken since `before`."""
+        return Processor(**{name: getattr(self, name) - getattr(before, name) for name in self.__slots__})
+
+
+def busy_seconds() -> float:
+    """Seconds of the processors that the machine has worked since it was started."""
+    user, nice, system, _, _, *interrupts = map(int, Path("/proc/stat").read_text(encoding="ascii").split()[1:9])
+    return (user + nice + system + sum(interrupts[:2])) / os.sysconf("SC_CLK_TCK")

@@ -1,0 +1,144 @@
+"""What the rigs post: whole simulated lives as bytes, made before the clock starts."""
+
+import gzip
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
+from pathlib import Path
+from urllib.parse import urlencode
+
+import numpy as np
+
+from models.rig import campaign
+from models.rig.sampled import DynamicTest, RawTest, sampled_test
+from models.rig.simulated_runs import RunKind, SimulatedRun
+from models.rig.stationary import PLATEAU_DURATION, Sensor
+from models.rig.truth import SimulatedClutch
+from service.run_files.record_writer import RecordFormat, write_record
+from service.run_files.simulated import simulated_body, simulated_channels, simulated_head
+
+#: Stationary tests in a life; of these, every tenth has a dynamic test after it, and in the raw variant every fifth is a
+#: recorder's file: about one post in ten, since a duty block stands before most tests.
+TESTS = 40
+DYNAMIC_EVERY = 10
+RAW_EVERY = 5
+#: Samples of a recorder's file; the protocol's 280 plateaus take 1,400 s.
+SAMPLES = 200_000
+_RAW = RawTest(rate=SAMPLES / (280 * PLATEAU_DURATION))
+_RAW_CHANNELS = ("time_s", "pressure_bar", "speed_rpm", "torque_nm")
+#: Maintenance by the number of the stationary test that it follows.
+_MAINTENANCE = {13: ("oil_change", "new oil"), 26: ("rest", "three days")}
+JSON_TYPE = "application/json"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Post:
+    """One run as it is sent: the end of its address, and its body or the file that holds it."""
+
+    run_id: str
+    kind: str
+    raw: bool = False
+    query: str = ""
+    content_type: str = JSON_TYPE
+    content: bytes = b""
+    path: Path | None = None
+
+    def request(self, clutch_id: str) -> bytes:
+        """The bytes of the request."""
+        body = self.content if self.path is None else self.path.read_bytes()
+        return posted(f"/v1/clutches/{clutch_id}/runs{self.query}", body, self.content_type)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SentLife:
+    """The posts of one simulated life in the rig's order."""
+
+    seed: int
+    posts: tuple[Post, ...] = field(repr=False)
+
+
+def posted(address: str, body: bytes, content_type: str = JSON_TYPE) -> bytes:
+    """The bytes of a POST."""
+    head = (
+        f"POST {address} HTTP/1.1\r\nHost: localhost\r\nContent-Type: {content_type}\r\nContent-Length: {len(body)}\r\n"
+    )
+    return head.encode() + b"\r\n" + body
+
+
+def asked(address: str, *headers: str) -> bytes:
+    """The bytes of a GET."""
+    return "\r\n".join((f"GET {address} HTTP/1.1", "Host: localhost", *headers, "", "")).encode()
+
+
+def registration(clutch_id: str, fluid: str = "ATF") -> bytes:
+    """The bytes that register a simulated clutch. Clutches of a fluid are a fleet of their own."""
+    record = {"clutch_id": clutch_id, "origin": "simulated", "fluid": fluid}
+    return posted("/v1/clutches", json.dumps(record).encode())
+
+
+def life(seed: int, *, raw: Path | None = None, tests: int = TESTS, samples: int = SAMPLES) -> SentLife:
+    """A life by its seed; `raw`: the folder for recorders' files, which take the place of every fifth stationary test."""
+    clutch = campaign.simulated_clutch(seed)
+    posts: list[Post] = []
+    count = 0
+    for run in campaign.simulate(seed, stop_fraction=0.01, most_tests=tests):
+        if run.kind is not RunKind.STATIONARY_STRIBECK:
+            posts.append(_json_post(run))
+            continue
+        count += 1
+        if raw is not None and count % RAW_EVERY == 0:
+            posts.append(_file_post(run, clutch, seed, raw, samples, number=count // RAW_EVERY))
+        else:
+            posts.append(_json_post(run))
+        posts += _after(run, clutch, seed, count)
+    return SentLife(seed=seed, posts=tuple(posts))
+
+
+def _after(run: SimulatedRun, clutch: SimulatedClutch, seed: int, count: int) -> Iterator[Post]:
+    """The dynamic test and the maintenance after a stationary test, where there are any."""
+    if count % DYNAMIC_EVERY == 0:
+        rng = np.random.default_rng([seed, run.cycles])
+        record = sampled_test(clutch, run.wear, DynamicTest(), rng, Sensor())
+        name = f"sim-{seed}-dynamic-{run.cycles:05d}"
+        yield _json_post(replace(run, run_id=name, kind=RunKind.DYNAMIC_STRIBECK, plateaus=None, record=record))
+    if count in _MAINTENANCE:
+        event, note = _MAINTENANCE[count]
+        run_id = f"sim-{seed}-{event}-{run.cycles:05d}"
+        body = {"run_id": run_id, "kind": "maintenance", "cycles": run.cycles, "event": event, "note": note}
+        yield Post(run_id=run_id, kind="maintenance", content=json.dumps(body | {"origin": "simulated"}).encode())
+
+
+def _json_post(run: SimulatedRun) -> Post:
+    return Post(run_id=run.run_id, kind=run.kind.value, content=json.dumps(simulated_body(run)).encode())
+
+
+def _file_post(run: SimulatedRun, clutch: SimulatedClutch, seed: int, folder: Path, samples: int, number: int) -> Post:
+    """The stationary test as its recorder's file: gzipped CSV and, where pyarrow is there, Parquet in turns."""
+    rng = np.random.default_rng([seed, run.cycles])
+    test = replace(_RAW, rate=_RAW.rate * samples / SAMPLES)
+    record = sampled_test(clutch, run.wear, test, rng, Sensor())
+    channels = simulated_channels(replace(run, plateaus=None, record=record))
+    channels = {name: channels[name] for name in _RAW_CHANNELS}
+    path = folder / f"{seed}-{run.cycles:05d}.csv"
+    if number % 2 == 0 and find_spec("pyarrow") is not None:
+        import pyarrow as pa
+        import pyarrow.parquet
+
+        path = path.with_suffix(".parquet")
+        pyarrow.parquet.write_table(pa.table(channels), path)
+    else:
+        write_record(path, RecordFormat.CSV, channels, simulated_head(run))
+        packed = path.with_suffix(".csv.gz")
+        packed.write_bytes(gzip.compress(path.read_bytes(), compresslevel=1))
+        path.unlink()
+        path = packed
+    query = {"kind": run.kind.value, "cycles": run.cycles, "run_id": run.run_id, "filename": path.name}
+    return Post(
+        run_id=run.run_id,
+        kind=run.kind.value,
+        raw=True,
+        query="/file?" + urlencode(query | {"origin": "simulated"}),
+        content_type="application/octet-stream",
+        path=path,
+    )

@@ -1,0 +1,109 @@
+"""After the load: nothing acknowledged is lost, and what was computed under load is what calm computing gives."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from tests.load.bodies import asked, registration
+from tests.load.exchange import Answer, Blocking
+from tests.load.field import Acknowledged, reason
+from tests.support import serving
+
+
+def stored_hashes(port: int, clutch_id: str) -> dict[str, str]:
+    """run_id -> content hash of all runs of a clutch, read page by page."""
+    line, found, cursor = Blocking(port), dict[str, str](), ""
+    while True:
+        page = _json(line, f"/v1/clutches/{clutch_id}/runs?limit=50{cursor}")
+        found |= {item["run_id"]: item["content_sha256"] for item in page["items"]}
+        if page["next"] is None:
+            line.close()
+            return found
+        cursor = f"&cursor={page['next']}"
+
+
+def losses(port: int, acknowledged: Mapping[str, Sequence[Acknowledged]]) -> list[str]:
+    """What is lost, doubled or changed of acknowledged runs, in words; empty where nothing is."""
+    return [
+        loss
+        for clutch_id, own in acknowledged.items()
+        for loss in lost_of(clutch_id, own, stored_hashes(port, clutch_id))
+    ]
+
+
+def lost_of(clutch_id: str, acknowledged: Sequence[Acknowledged], stored: Mapping[str, str]) -> list[str]:
+    """What is lost of a clutch's runs, beside what is stored of it by run_id."""
+    wrong = []
+    for run in acknowledged:
+        sha256 = stored.get(run.post.run_id)
+        if sha256 is None:
+            wrong.append(f"{clutch_id}: {run.post.run_id} was acknowledged and is not in /runs")
+        elif sha256 != run.sha256:
+            wrong.append(f"{clutch_id}: {run.post.run_id} has sha256 {sha256}, its receipt said {run.sha256}")
+    # the run that was on its way when the time was over, or whose answer was lost, may be there unacknowledged
+    if len(stored) > len(acknowledged) + 1:
+        wrong.append(f"{clutch_id}: {len(stored)} runs are stored, {len(acknowledged)} were acknowledged")
+    return wrong
+
+
+def calm_differences(
+    folder: Path, port: int, sample: Mapping[str, str], acknowledged: Mapping[str, Sequence[Acknowledged]]
+) -> list[str]:
+    """Differences from a fresh service that is sent the same runs one by one: hashes and remaining life.
+
+    `sample`: the fluid by clutch_id.
+    """
+    wrong = []
+    loaded = Blocking(port)
+    with serving(folder / "calm.db") as server:
+        calm = Blocking(server.port)
+        for clutch_id, fluid in sample.items():
+            _good(calm.ask(registration(clutch_id, fluid)))
+            for run in acknowledged[clutch_id]:
+                receipt = json.loads(_good(calm.ask(run.post.request(clutch_id))).body)
+                if receipt["content_sha256"] != run.sha256:
+                    wrong.append(f"{clutch_id}: {run.post.run_id} posted calmly has another sha256")
+            if remaining_life(calm, clutch_id) != remaining_life(loaded, clutch_id):
+                wrong.append(f"{clutch_id}: the remaining life is not that of the same runs posted calmly")
+        calm.close()
+    loaded.close()
+    return wrong
+
+
+def replay_differences(database: Path, port: int, clutch_ids: Sequence[str]) -> list[str]:
+    """Clutches that a fleet teaches: whose remaining life a replay of the raw runs changes."""
+    line = Blocking(port)
+    before = {clutch_id: remaining_life(line, clutch_id) for clutch_id in clutch_ids}
+    line.close()
+    command = [sys.executable, "-m", "service.cli.main", "replay", *clutch_ids, "--database", f"sqlite:///{database}"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        return [f"replay ended with {done.returncode}: {done.stderr[-160:]}"]
+    line = Blocking(port)
+    wrong = [
+        f"{clutch_id}: a replay changes the remaining life"
+        for clutch_id in clutch_ids
+        if remaining_life(line, clutch_id) != before[clutch_id]
+    ]
+    line.close()
+    return wrong
+
+
+def remaining_life(line: Blocking, clutch_id: str) -> dict[str, Any]:
+    """The answer but for the revision, which says how often something was stored."""
+    answer = _json(line, f"/v1/clutches/{clutch_id}/remaining-useful-life")
+    del answer["revision"]
+    return answer
+
+
+def _json(line: Blocking, address: str) -> Any:
+    return json.loads(_good(line.ask(asked(address))).body)
+
+
+def _good(answer: Answer) -> Answer:
+    if answer.status not in (200, 201):
+        raise AssertionError(f"{answer.status}: {reason(answer)}")
+    return answer

@@ -1,0 +1,160 @@
+"""The table of a load, and which demands it meets."""
+
+import math
+import statistics
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tests.load.beside import Beside, Processor
+from tests.load.field import LIVEZ, ROUTES, Counts
+
+#: The demands of docs/benchmarks.md: ms of 99 of 100 GETs and plain POSTs, posts a second without raw files, and how much
+#: more memory the last third of the time may take, on average, than the middle third. The first third fills caches.
+MOST_GET_MS, MOST_POST_MS, LEAST_POSTS_A_SECOND, MOST_GROWTH = 50.0, 500.0, 15.0, 1.10
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Loaded:
+    """What a load came to; by the clock in `seconds`."""
+
+    seconds: float
+    raw: bool
+    counts: Counts
+    beside: Beside
+    processor: Processor
+    losses: Sequence[str]
+
+    @property
+    def problems(self) -> Counter[str]:
+        """All that was not 2xx or 304, by status and reason."""
+        return self.counts.problems + self.beside.problems
+
+    @property
+    def runs(self) -> int:
+        """Runs acknowledged."""
+        return sum(map(len, self.counts.acknowledged.values()))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Demand:
+    """What is demanded, what was found, and whether that will do."""
+
+    name: str
+    found: str
+    met: bool
+
+
+def quantile(values: Sequence[float], share: float) -> float:
+    """The smallest of the values that at least this share of them do not exceed; infinite of none."""
+    ordered = sorted(values)
+    return ordered[max(0, math.ceil(share * len(ordered)) - 1)] if ordered else math.inf
+
+
+def growth(sizes: Sequence[int]) -> float:
+    """The mean of the last third over that of the middle third; 1 of fewer than three."""
+    third = len(sizes) // 3
+    return statistics.mean(sizes[-third:]) / statistics.mean(sizes[-2 * third : -third]) if third else 1.0
+
+
+def demands(loaded: Loaded) -> list[Demand]:
+    """Each demand beside what was found."""
+    counts, beside = loaded.counts, loaded.beside
+    slowest = max(ROUTES, key=lambda route: quantile(counts.gets[route], 0.99))
+    get = 1e3 * quantile(counts.gets[slowest], 0.99)
+    post = 1e3 * quantile(counts.posts["plain"], 0.99)
+    errors = sum(loaded.problems.values())
+    alone, together = growth(beside.alone), growth(beside.together)
+    pace = loaded.runs / loaded.seconds
+    found = [
+        Demand(name="no error", found=str(errors), met=errors == 0),
+        Demand(
+            name="nothing lost, and the same as posted calmly", found=str(len(loaded.losses)), met=not loaded.losses
+        ),
+        Demand(
+            name=f"GET 99 % < {MOST_GET_MS:.0f} ms, every route",
+            found=f"{get:.0f} ms (`{slowest}`)",
+            met=get < MOST_GET_MS,
+        ),
+        Demand(
+            name=f"POST 99 % < {MOST_POST_MS:.0f} ms, but for raw files",
+            found=f"{post:.0f} ms",
+            met=post < MOST_POST_MS,
+        ),
+        Demand(
+            name=f"memory flat: the last third at most {100 * (MOST_GROWTH - 1):.0f} % above the middle third",
+            found=f"{100 * (alone - 1):+.1f} % alone, {100 * (together - 1):+.1f} % with its processes",
+            met=max(alone, together) <= MOST_GROWTH,
+        ),
+    ]
+    if not loaded.raw:
+        found.append(
+            Demand(
+                name=f"at least {LEAST_POSTS_A_SECOND:.0f} posts a second",
+                found=f"{pace:.1f}",
+                met=pace >= LEAST_POSTS_A_SECOND,
+            )
+        )
+    return found
+
+
+def latencies(loaded: Loaded) -> list[str]:
+    """Quantiles by route."""
+    counts = loaded.counts
+    lines = ["| request | asked | 304 | median, ms | 90 % | 99 % | longest |", "|---|---|---|---|---|---|---|"]
+    lines += [_row(f"GET {route}", counts.gets[route], str(counts.statuses[route, 304])) for route in (*ROUTES, LIVEZ)]
+    names = {"plain": "POST a run", "raw": "POST a raw file", "registration": "POST a clutch"}
+    lines += [_row(name, counts.posts[what], "") for what, name in names.items() if counts.posts[what]]
+    return lines
+
+
+def _row(name: str, taken: Sequence[float], unchanged: str) -> str:
+    shown = " | ".join(f"{1e3 * quantile(taken, share):.1f}" for share in (0.5, 0.9, 0.99, 1.0))
+    return f"| {name} | {len(taken)} | {unchanged} | {shown} |"
+
+
+def totals(loaded: Loaded) -> list[str]:
+    """Everything that is no latency."""
+    counts, beside, taken = loaded.counts, loaded.beside, loaded.processor
+    kinds = ", ".join(f"{count} {kind}" for kind, count in counts.kinds.most_common())
+    half = len(beside.together) // 2
+    rows = {
+        "runs acknowledged": f"{loaded.runs} of {len(counts.acknowledged)} clutches: {kinds}",
+        "posts a second": f"{loaded.runs / loaded.seconds:.1f}",
+        "runs held": str(counts.held),
+        "GETs not asked by the end": str(counts.unasked),
+        "diagnoses finished, s": _spread(beside.diagnoses),
+        "fleet refreshes, s": _spread(beside.refreshes),
+        "memory at half and at the end, MB": (
+            f"alone {_mb(beside.alone, half)} and {_mb(beside.alone, -1)}, "
+            f"with its processes {_mb(beside.together, half)} and {_mb(beside.together, -1)}"
+        ),
+        "processor, s": (
+            f"service {taken.service:.0f}, generator {taken.generator:.1f}, refreshes {taken.refreshes:.0f}, "
+            f"others on the machine {taken.others:.0f}"
+        ),
+        "the generator's own delay at most, ms": f"{1e3 * counts.late:.0f}",
+    }
+    return ["| | |", "|---|---|", *(f"| {name} | {value} |" for name, value in rows.items())]
+
+
+def markdown(loaded: Loaded) -> str:
+    """The whole report."""
+    verdicts = [f"| {each.name} | {each.found} | {'yes' if each.met else '**no**'} |" for each in demands(loaded)]
+    parts = [["| demand | found | met |", "|---|---|---|", *verdicts], latencies(loaded), totals(loaded)]
+    if loaded.problems:
+        errors = [f"| {count} | {problem} |" for problem, count in loaded.problems.most_common(20)]
+        parts.append(["| errors | |", "|---|---|", *errors])
+    if loaded.losses:
+        parts.append(["| lost or different |", "|---|", *(f"| {loss} |" for loss in loaded.losses[:20])])
+    return "\n\n".join("\n".join(part) for part in parts)
+
+
+def _spread(taken: Sequence[float]) -> str:
+    if not taken:
+        return "0"
+    return f"{len(taken)}: median {statistics.median(taken):.1f}, longest {max(taken):.1f}"
+
+
+def _mb(sizes: Sequence[int], index: int) -> str:
+    return f"{sizes[index] / 2**20:.0f}" if sizes else "-"
