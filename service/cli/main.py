@@ -6,7 +6,7 @@ from service.cli import backup, diagnose, export, fleet, key, model, replay, sco
 from service.cli.changes import clutch_changes, run_changes, trail
 from service.cli.changes import runs as run_list
 from service.cli.demo import demo
-from service.cli.sending import push
+from service.cli.sending import push, spool_commands
 
 app = typer.Typer(
     name="clutchlife",
@@ -33,6 +33,7 @@ app.command()(export.export)
 app.command()(score.score)
 app.command()(replay.replay)
 app.command()(backup.backup)
+app.add_typer(spool_commands.app, name="spool")
 app.add_typer(key.app, name="key")
 app.add_typer(fleet.app, name="fleet")
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import httpx2
 import typer
 from rich.console import Console
+from rich.markup import escape
 
 from service.errors import NotFoundError
 from service.settings import DEFAULT_DATABASE, DEFAULT_URL
@@ -67,5 +68,5 @@ def existing(url: str) -> Iterator["Opened"]:
 
 def fail(message: str, code: int = 1) -> NoReturn:
     """Print the error on standard error, and end."""
-    err.print(f"[bold red]clutchlife:[/] {message}", soft_wrap=True)
+    err.print(f"[bold red]clutchlife:[/] {escape(message)}", soft_wrap=True)
     raise typer.Exit(code)
