@@ -87,8 +87,9 @@ def life(seed: int, *, raw: Path | None = None, tests: int = TESTS, samples: int
             posts.append(_json_post(run))
             continue
         count += 1
-        if raw is not None and count % RAW_EVERY == 0:
-            posts.append(_file_post(run, clutch, seed, raw, samples, number=count // RAW_EVERY))
+        # by the seed too: rigs that began together do not make their long tests together
+        if raw is not None and (count + seed) % RAW_EVERY == 0:
+            posts.append(_file_post(run, clutch, seed, raw, samples, parquet=(count + seed) % (2 * RAW_EVERY) == 0))
         else:
             posts.append(_json_post(run))
         posts += _after(run, clutch, seed, count)
@@ -97,7 +98,7 @@ def life(seed: int, *, raw: Path | None = None, tests: int = TESTS, samples: int
 
 def _after(run: SimulatedRun, clutch: SimulatedClutch, seed: int, count: int) -> Iterator[Post]:
     """The dynamic test and the maintenance after a stationary test, where there are any."""
-    if count % DYNAMIC_EVERY == 0:
+    if (count + seed) % DYNAMIC_EVERY == 0:
         rng = np.random.default_rng([seed, run.cycles])
         record = sampled_test(clutch, run.wear, DynamicTest(), rng, Sensor())
         name = f"sim-{seed}-dynamic-{run.cycles:05d}"
@@ -113,7 +114,9 @@ def _json_post(run: SimulatedRun) -> Post:
     return Post(run_id=run.run_id, kind=run.kind.value, content=json.dumps(simulated_body(run)).encode())
 
 
-def _file_post(run: SimulatedRun, clutch: SimulatedClutch, seed: int, folder: Path, samples: int, number: int) -> Post:
+def _file_post(
+    run: SimulatedRun, clutch: SimulatedClutch, seed: int, folder: Path, samples: int, *, parquet: bool
+) -> Post:
     """The stationary test as its recorder's file: gzipped CSV and, where pyarrow is there, Parquet in turns."""
     rng = np.random.default_rng([seed, run.cycles])
     test = replace(_RAW, rate=_RAW.rate * samples / SAMPLES)
@@ -121,9 +124,9 @@ def _file_post(run: SimulatedRun, clutch: SimulatedClutch, seed: int, folder: Pa
     channels = simulated_channels(replace(run, plateaus=None, record=record))
     channels = {name: channels[name] for name in _RAW_CHANNELS}
     path = folder / f"{seed}-{run.cycles:05d}.csv"
-    if number % 2 == 0 and find_spec("pyarrow") is not None:
-        import pyarrow as pa
-        import pyarrow.parquet
+    if parquet and find_spec("pyarrow") is not None:
+        import pyarrow as pa  # type: ignore[import-untyped]  # optional package
+        import pyarrow.parquet  # type: ignore[import-untyped]  # optional package
 
         path = path.with_suffix(".parquet")
         pyarrow.parquet.write_table(pa.table(channels), path)

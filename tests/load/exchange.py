@@ -18,7 +18,7 @@ _IDLE = 2.0
 
 
 class LostError(Exception):
-    """The connection ended before the answer did, or could not be opened."""
+    """No answer, or not the one that was needed: the connection could not be opened, or ended before the answer did."""
 
 
 @dataclass(slots=True)

@@ -51,6 +51,8 @@ class Counts:
     #: By how much the generator itself was late at most.
     late: float = 0.0
     acknowledged: dict[str, list[Acknowledged]] = field(default_factory=lambda: defaultdict(list))
+    #: Runs of which it is not known whether they are stored: no receipt came, and the time was over.
+    unanswered: set[tuple[str, str]] = field(default_factory=set)
     #: Runs that the service has taken in and holds back from the tracks, where it does so.
     held: int = 0
 
@@ -97,6 +99,7 @@ class Field:
                 started = loop.time()
                 answer = await self._sent(line, post.request(clutch_id), "raw" if post.raw else "plain")
                 if answer is None:
+                    self.counts.unanswered.add((clutch_id, post.run_id))
                     return
                 self._acknowledge(clutch_id, post, answer)
                 await _until(started + self.interval)
