@@ -97,9 +97,9 @@ def test_a_mended_clutch_answers_as_one_without_slips(
         assert_same(slipped, right)
         for bench in (slipped, right):  # what is carried on is as right as what is shown
             bench.send(body("test", "next", 6500.0))
-        assert_same(slipped, right)
+        assert_same(slipped, right, degradation_too=False)
         replay_clutch(slipped.database, CLUTCH)
-        assert_same(slipped, right)
+        assert_same(slipped, right, degradation_too=False)
         for bench in (slipped, right):
             bench.close()
 
