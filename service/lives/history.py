@@ -34,7 +34,7 @@ REBUILD = "rebuild"
 class Event:
     """A run as the history sees it.
 
-    `moment` is when it was made [s]. A stationary test has the range of its speeds [rad/s], and mean COF with its
+    `moment` is when it was made [s], `dated` where the rig said so. A stationary test has the range of its speeds [rad/s], and mean COF with its
     deviation by pressure [Pa] where its curves determine it; `duty` is the block that ends with the run, `shift` an event
     that may have shifted the level.
     """
@@ -48,6 +48,7 @@ class Event:
     rebuild: bool = False
     shift: bool = False
     duty: Block | None = None
+    dated: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
