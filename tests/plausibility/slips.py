@@ -104,6 +104,8 @@ def other_size(rng: np.random.Generator, run: Body, other: Campaign) -> Body | N
     theirs = copy.deepcopy(min(tests, key=lambda test: abs(test["cycles"] - run["cycles"])))
     torque = np.array(theirs["channels"]["torque_nm"]) * float(rng.choice(SIZES))
     theirs["channels"]["torque_nm"] = torque.tolist()
+    if not differs(theirs, run):
+        return None
     return _under(run, theirs, cycles=run["cycles"] if rng.random() < 0.5 else theirs["cycles"])
 
 
@@ -112,7 +114,7 @@ def other_age(rng: np.random.Generator, run: Body, other: Campaign) -> Body | No
     tests = [
         theirs
         for theirs in other.runs
-        if theirs["kind"] == run["kind"] and abs(np.log(level(theirs) / level(run))) > np.log(1.2)
+        if theirs["kind"] == run["kind"] and differs(theirs, run)
     ] if "channels" in run and "duty" not in run else []  # fmt: skip
     if not tests:
         return None
@@ -127,6 +129,11 @@ def same_age(_: np.random.Generator, run: Body, other: Campaign) -> Body | None:
         return None
     theirs = min(tests, key=lambda test: abs(np.log(level(test) / level(run))))
     return _under(run, theirs, cycles=run["cycles"])
+
+
+def differs(theirs: Body, run: Body) -> bool:
+    """Whether friction differs by more than a fifth: less is what an honest gain may be misread by."""
+    return bool(abs(np.log(level(theirs) / level(run))) > np.log(1.2))
 
 
 def level(run: Body) -> float:

@@ -12,6 +12,10 @@ from tests.plausibility.simulated import Campaign
 Draw = Callable[[np.random.Generator], Campaign]
 
 
+#: Another clutch's test is tried once a clutch has a course: after so many tests.
+TESTS_BEFORE = 3
+
+
 @dataclass(frozen=True)
 class Outcome:
     """A run that was sent: whence, which slip ("" for an honest one), its kind, tests before it, what was doubted."""
@@ -67,10 +71,17 @@ def one_slip(rng: np.random.Generator, draw: Draw, source: str, group: str) -> O
     while True:
         made, other = draw(rng), draw(rng)
         name, slip = _slip_of(rng, group, other)
-        for k in (1 + rng.permutation(len(made.runs) - 1)).tolist():
+        first = _after_tests(made, TESTS_BEFORE) if name in slips.CLUTCHES else 1
+        for k in (first + rng.permutation(max(len(made.runs) - first, 0))).tolist():
             wrong = slip(rng, made.runs[k])
             if wrong is not None and wrong != made.runs[k]:
                 return _sent(made, k, wrong, source, name)
+
+
+def _after_tests(made: Campaign, count: int) -> int:
+    """The first run after so many stationary tests."""
+    tests = [k for k, run in enumerate(made.runs) if run["kind"] == "stationary_stribeck"]
+    return tests[count - 1] + 1 if len(tests) >= count else len(made.runs)
 
 
 def _slip_of(rng: np.random.Generator, group: str, other: Campaign) -> tuple[str, slips.Slip]:

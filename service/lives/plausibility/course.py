@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
+from models.tracking.measurement import Measurement
 from service.lives.plausibility import criteria
 
 _GRID = np.array(
@@ -110,17 +111,10 @@ class Predicted:
         return math.exp(mean - 2 * math.sqrt(square)), math.exp(mean + 2 * math.sqrt(square))
 
 
-def course_of(
-    cycles: Sequence[float],
-    log_cof: Sequence[float],
-    variance: Sequence[float],
-    epoch: Sequence[int],
-    *,
-    level: float,
-    level_sd: float,
-) -> Course:
-    """The course from columns of equal length."""
-    columns = [np.array(column, dtype=np.float64) for column in (cycles, log_cof, variance, epoch)]
+def course_of(measurements: Sequence[Measurement], *, level: float, level_sd: float) -> Course:
+    """The course of what was measured along a life."""
+    rows = [(m.progress, m.value, m.variance, float(m.epoch)) for m in measurements]
+    columns = np.array(rows, dtype=np.float64).reshape(-1, 4).T
     return Course(
         cycles=columns[0],
         log_cof=columns[1],

@@ -14,11 +14,11 @@ OTHER_CYCLES = 2e-4
 #: A channel in another unit, shared among the units of `slips.UNITS`.
 OTHER_UNIT = 3e-3
 #: Another clutch's file under this clutch's name: with its own cycles, and with those expected here.
-OTHER_CLUTCH = 3e-3
+OTHER_CLUTCH = 2e-2
 #: Anything else that makes a torque or a pressure meaningless: cables, zeros, amplifiers.
 MEANINGLESS = 1e-4
 #: Odds of a slip from which a run is held. Chosen: a held run costs a click, a slip that is taken in ruins a track.
-HELD = 0.5
+HELD = 0.4
 
 # Mean COF that is possible at all (`course`, `slips`)
 
@@ -31,17 +31,22 @@ MEANINGLESS_SD = 3.5
 # The course of mean COF over cycles (`course`)
 
 #: Deviation of the slope of log COF over log(1 + cycles/φ) [-]. Chosen: eq. 6's courses lose half in two or three units.
-SLOPE_SD = 0.25
+SLOPE_SD = 0.15
 #: What the history chooses among: φ [cycles], the deviation by which the slope changes in a unit of log(1 + cycles/φ), and the
 #: scatter from run to run of log COF. Chosen: lives of 10² to 10⁶ cycles, smooth and bent ones, sensors of 0.3 to 5 %.
 SCALES, BENDS, SCATTERS = (30.0, 1_000.0, 30_000.0), (0.03, 0.12, 0.5), (0.003, 0.012, 0.05)
 #: One honest test in so many is off by more than its scatter, and the deviation of that. Chosen: gains that are misread, oil
 #: that nobody logged; the blind rig's hidden effects are honest.
-OUTLYING_SHARE, OUTLYING_SD = 0.03, 0.07
+OUTLYING_SHARE, OUTLYING_SD = 0.02, 0.06
 #: Deviation of the level's step at an event of maintenance. As in `models.tracking.criteria`.
 STEP_SD = 0.05
 #: Deviation of the first level of a rebuilt clutch from that of the life before. Chosen.
 REBUILT_SD = 0.3
+#: The exponent of COF over pressure [-] of wet clutches and its deviation, and how many times log COF changes for one of it:
+#: on that scale it has the same course. Chosen: on the rigs it falls from -0.1 to -0.3.
+TILT, TILT_SD, TILT_SCALE = -0.15, 0.15, 3.0
+#: Highest over lowest pressure of a test from which the exponent is taken. Chosen.
+TILT_SPAN = 1.25
 #: So many tests of a life are looked at, those nearest to the cycles in question. Chosen: what they cost, 2 ms.
 MOST_TESTS = 40
 #: Deviation of a dynamic test's and of an engagement's median COF from a stationary test's mean. Chosen.

@@ -35,7 +35,8 @@ def doubts(run: IncomingRun, analysis: Analysis, event: Event, before: ClutchSta
     history = history_of(before.events, event, corrected=before.extension is not None)
     if reading.cof is not None:
         typed = [cycles for values in mistyped(reading.cycles).values() for cycles in values]
-        history.predict([reading.cycles, history.pace.expected(), *typed])
+        for of_tilt in (False, True)[: 1 + (reading.tilt is not None)]:
+            history.predict([reading.cycles, history.pace.expected(), *typed], of_tilt=of_tilt)
     as_sent = history.log_likelihood(reading)
     slips = list(slips_of(reading, history, before.geometry))
     if not slips:

@@ -40,17 +40,20 @@ class Reading:
 
     `cof` [-] is the median over the rows, of either sign; `pressure` [Pa] and `speed` [rad/s] the highest, `oil` [K] the
     median; `torque` [Nm] the median where the clutch is open. `mean_cof`: by pressure, as the history compares it;
-    `spread`: how far log COF of this kind of run is off a stationary test's.
+    `spread`: how far log COF of this kind of run is off a stationary test's; `tilt`: the exponent of COF over pressure and its
+    deviation. `declared_speed` [rad/s] is what a block of duty says of its engagements.
     """
 
     cycles: float
     cof: float | None = None
     mean_cof: Mapping[float, tuple[float, float]] | None = None
     spread: float = 0.0
+    tilt: tuple[float, float] | None = None
     pressure: float | None = None
     speed: float | None = None
     oil: float | None = None
     torque: float | None = None
+    declared_speed: float | None = None
 
     def scaled(self, *, pressure: float = 1.0, torque: float = 1.0, speed: float = 1.0) -> "Reading":
         """The run if its channels were so many times too large."""
@@ -96,15 +99,29 @@ def reading_of(event: Event, columns: Columns | None, geometry: Geometry) -> Rea
         return Reading(cycles=event.cycles, oil=oil)
     unit = rows.pressure * geometry.torque_per_cof(1.0)
     is_test = event.kind in (STATIONARY, DYNAMIC)
+    declared_speed = None if event.duty is None else event.duty.speed
     return Reading(
         cycles=event.cycles,
         cof=float(np.median(np.sign(rows.speed) * rows.torque / unit)),
         mean_cof=dict(event.cofs) or None,
         spread={STATIONARY: 0.0, DYNAMIC: criteria.DYNAMIC_SD}.get(event.kind, criteria.ENGAGEMENT_SD),
+        tilt=tilt_of(event.cofs),
         pressure=float(rows.pressure.max()) if is_test else None,
-        speed=float(np.abs(rows.speed).max()) if is_test else None,
+        speed=float(np.abs(rows.speed).max()) if is_test or declared_speed else None,
+        declared_speed=declared_speed,
         oil=oil,
     )
+
+
+def tilt_of(cofs: Mapping[float, tuple[float, float]]) -> tuple[float, float] | None:
+    """The exponent of mean COF over pressure by least squares and its deviation; None where pressures are too few or alike."""
+    if len(cofs) < 3 or max(cofs) < criteria.TILT_SPAN * min(cofs):
+        return None
+    x, y = np.log(list(cofs)), np.log([cof for cof, _ in cofs.values()])
+    relative = np.array([sd / cof for cof, sd in cofs.values()])
+    x -= x.mean()
+    square = float(x @ x)
+    return float(x @ y) / square, float(np.sqrt((x * relative) @ (x * relative))) / square
 
 
 def log_or_none(value: float | None) -> float | None:

@@ -62,7 +62,7 @@ def other_cycles(reading: Reading, history: History) -> Iterator[Slip]:
     weight = math.log(criteria.OTHER_CYCLES * anywhere(reading.cycles))
     yield Slip(
         name="other_cycles",
-        log_weight=weight + history.of_cof(likely) + history.of_protocol(reading),
+        log_weight=weight + history.of_friction(likely) + history.of_protocol(reading),
         likely=likely,
     )
 
@@ -87,7 +87,7 @@ def other_clutches(reading: Reading, history: History) -> Iterator[Slip]:
     of_cof = _log_cof_of_any(reading, history, criteria.LOG_COF_SD)
     if of_cof is None:
         return
-    of_cof += history.of_protocol(reading)
+    of_cof += _log_tilt_of_any(reading) + history.of_protocol(reading)
     weight = math.log(0.5 * criteria.OTHER_CLUTCH) + of_cof
     yield Slip(name="other_clutch", log_weight=weight + math.log(anywhere(reading.cycles)), likely=reading)
     yield Slip(name="other_test", log_weight=weight + history.of_cycles(reading), likely=reading)
@@ -97,7 +97,8 @@ def meaningless(reading: Reading, history: History) -> Iterator[Slip]:
     """A torque or a pressure that means nothing."""
     of_cof = _log_cof_of_any(reading, history, criteria.MEANINGLESS_SD)
     if of_cof is not None:
-        weight = math.log(criteria.MEANINGLESS) + of_cof + history.of_cycles(reading) + history.of_protocol(reading)
+        weight = math.log(criteria.MEANINGLESS) + of_cof + _log_tilt_of_any(reading)
+        weight += history.of_cycles(reading) + history.of_protocol(reading)
         yield Slip(name="meaningless", log_weight=weight, likely=reading)
 
 
@@ -124,6 +125,13 @@ def _log_cof_of_any(reading: Reading, history: History, deviation: float) -> flo
         return None
     z = (compared[0] - math.log(criteria.COF)) / deviation
     return -0.5 * z * z - math.log(deviation * math.sqrt(2 * math.pi))
+
+
+def _log_tilt_of_any(reading: Reading) -> float:
+    if reading.tilt is None:
+        return 0.0
+    z = (reading.tilt[0] - criteria.TILT) / criteria.TILT_SD
+    return -0.5 * z * z - math.log(criteria.TILT_SD * math.sqrt(2 * math.pi))
 
 
 def mistyped(cycles: float) -> dict[str, list[float]]:
