@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from time import process_time
 from typing import Any
 
 from service.errors import InvalidError
@@ -20,13 +21,26 @@ from service.lives.history import (
 from service.lives.incoming_run import IncomingRun
 from service.lives.plausibility.doubts import doubts
 from service.lives.recomputation import ClutchState
-from service.lives.run_analysis import Analysis, Notice, analyse, mean_cofs
+from service.lives.run_analysis import Analysis, analyse, mean_cofs
 from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
+from tests.plausibility.ablation import WITHOUT, without
 
 Body = dict[str, Any]
+#: Instead of a code: the run is not stored at all.
+REFUSED = "refused"
 #: When the spool delivers everything: it says nothing of when runs were made.
 RECEIVED = "2026-11-02T00:00:00+00:00"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Codes of the doubts, what they say, how long they took [s], and whether there were any without each mechanism."""
+
+    codes: tuple[str, ...]
+    message: str = ""
+    seconds: float = 0.0
+    without: Mapping[str, bool] = field(default_factory=dict)
 
 
 @dataclass
@@ -41,25 +55,32 @@ class Bench:
         self.clutch = ClutchIn.model_validate({"clutch_id": "bench", **self.record})
         self.geometry = self.clutch.geometry.to_model()
 
-    def offered(self, body: Body) -> tuple[Event, tuple[Notice, ...]]:
-        """The run as the history would see it, and the doubts about it. Raises InvalidError where it is refused."""
-        run, analysis, event = self._read(body)
-        before = ClutchState(record=self.clutch, revision=0, events=self.events, adoption=None, priors={})
-        return event, doubts(run, analysis, event, before)
-
     def accept(self, body: Body) -> None:
         """The run becomes part of the history, whatever is doubted about it."""
         self._accept(self._read(body)[2])
 
-    def answer(self, body: Body) -> tuple[tuple[str, ...], str]:
-        """Codes of the doubts, and what they say; `refused` for a run that is not stored at all. Else it is accepted."""
+    def answer(self, body: Body, *, ablated: bool = False) -> Answer:
+        """What is doubted; a run without doubts is accepted."""
         try:
-            event, notices = self.offered(body)
+            run, analysis, event = self._read(body)
         except InvalidError as error:
-            return ("refused",), str(error)
+            return Answer(codes=(REFUSED,), message=str(error), without={name: True for name in WITHOUT})
+        before = ClutchState(record=self.clutch, revision=0, events=self.events, adoption=None, priors={})
+        began = process_time()
+        notices = doubts(run, analysis, event, before)
+        seconds = process_time() - began
+        held = {}
+        for name in WITHOUT if ablated else ():
+            with without(name):
+                held[name] = bool(doubts(run, analysis, event, before))
         if not notices:
             self._accept(event)
-        return tuple(notice.code for notice in notices), " ".join(notice.message for notice in notices)
+        return Answer(
+            codes=tuple(notice.code for notice in notices),
+            message=" ".join(notice.message for notice in notices),
+            seconds=seconds,
+            without=held,
+        )
 
     def _read(self, body: Body) -> tuple[IncomingRun, Analysis, Event]:
         run = read_run(json.dumps(body).encode())

@@ -8,13 +8,13 @@ slip, times how much better the history and physics predict the run without it.
 # some hundred; `make plausibility` shows what it achieves.
 
 #: A zero too many, a zero lost, two digits swapped: of each.
-DIGIT_SLIP = 2e-3
+DIGIT_SLIP = 4e-3
 #: Any other wrong number of cycles.
 OTHER_CYCLES = 2e-4
 #: A channel in another unit, shared among the units of `slips.UNITS`.
-OTHER_UNIT = 3e-3
+OTHER_UNIT = 1e-2
 #: Another clutch's file under this clutch's name: with its own cycles, and with those expected here.
-OTHER_CLUTCH = 2e-2
+OTHER_CLUTCH = 3e-2
 #: Anything else that makes a torque or a pressure meaningless: cables, zeros, amplifiers.
 MEANINGLESS = 1e-4
 #: Odds of a slip from which a run is held. Chosen: a held run costs a click, a slip that is taken in ruins a track.
@@ -34,7 +34,7 @@ MEANINGLESS_SD = 3.5
 SLOPE_SD = 0.15
 #: What the history chooses among: φ [cycles], the deviation by which the slope changes in a unit of log(1 + cycles/φ), and the
 #: scatter from run to run of log COF. Chosen: lives of 10² to 10⁶ cycles, smooth and bent ones, sensors of 0.3 to 5 %.
-SCALES, BENDS, SCATTERS = (30.0, 1_000.0, 30_000.0), (0.03, 0.12, 0.5), (0.003, 0.012, 0.05)
+SCALES, BENDS, SCATTERS = (30.0, 1_000.0, 30_000.0), (0.02, 0.08, 0.3), (0.003, 0.012, 0.05)
 #: One honest test in so many is off by more than its scatter, and the deviation of that. Chosen: gains that are misread, oil
 #: that nobody logged; the blind rig's hidden effects are honest.
 OUTLYING_SHARE, OUTLYING_SD = 0.02, 0.06

@@ -42,8 +42,10 @@ class Pace:
             ways.append((criteria.JOINS_LATEST, float(_equal(cycles, self.block or 0.0))))
         else:
             ways += [*self._joins(cycles), *self._tiles(cycles)]
-            latest = float(self.cycles[-1])
-            ways.append((criteria.LATE, float(cycles <= latest) / (1.0 + latest) * self._on_grid(cycles)))
+            latest, late = float(self.cycles[-1]), 0.0
+            if cycles <= latest:  # late: anywhere among the known, by the cycles or by their logarithm
+                late = 0.5 / (1.0 + latest) + 0.5 / ((1.0 + cycles) * math.log1p(latest + 1.0))
+            ways.append((criteria.LATE, late * self._on_grid(cycles)))
         total = math.fsum(weight for weight, _ in ways)
         return math.log(math.fsum(weight * probability for weight, probability in ways) / total)
 
@@ -122,7 +124,7 @@ class Pace:
 
 def pace_of(events: Sequence[Event], newest: Event) -> Pace:
     """The pace of the runs before, as the next of its kind is predicted from; run-in is before the first cycle."""
-    step, trusted = _grid([event.cycles for event in events if event.cycles >= 1])
+    step, trusted = grid_of([event.cycles for event in events if event.cycles >= 1])
     return Pace(
         step=step,
         trusted=trusted,
@@ -132,7 +134,7 @@ def pace_of(events: Sequence[Event], newest: Event) -> Pace:
     )
 
 
-def _grid(cycles: Sequence[float]) -> tuple[float, float]:
+def grid_of(cycles: Sequence[float]) -> tuple[float, float]:
     """The greatest step of which all cycles are multiples, and how far it is trusted."""
     whole = {round(value) for value in cycles}
     if len(whole) < 2 or any(not value.is_integer() for value in cycles):
@@ -144,6 +146,11 @@ def anywhere(cycles: float) -> float:
     """Probability of a number of cycles of which nothing is known: log(1 + n) is normal."""
     centre = math.log1p(criteria.CYCLES)
     return normal(math.log1p(cycles), centre, criteria.LOG_CYCLES_SD) / (1.0 + cycles)
+
+
+def log_anywhere(cycles: float) -> float:
+    """Its logarithm."""
+    return math.log(anywhere(cycles))
 
 
 def normal(value: float, mean: float, deviation: float) -> float:

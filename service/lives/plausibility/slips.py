@@ -1,14 +1,14 @@
 """The slips that a run may suffer on its way: each is the run as it would have been without it, and how probable it is."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from models.clutch import Geometry
 from service.columns import RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS
 from service.lives.plausibility import criteria
 from service.lives.plausibility.likelihood import History
-from service.lives.plausibility.pace import anywhere, normal
+from service.lives.plausibility.pace import log_anywhere, normal
 from service.lives.plausibility.reading import Reading
 
 
@@ -20,6 +20,10 @@ class Slip:
     log_weight: float
     likely: Reading
     unit: str = ""
+
+    def against(self, as_sent: float) -> "Slip":
+        """With its weight over that of the run as it was sent."""
+        return replace(self, log_weight=self.log_weight - as_sent)
 
 
 #: Units in which a channel may have been sent: channel, its unit here, the unit, and how many of it are one of ours.
@@ -59,7 +63,7 @@ def digit_slips(reading: Reading, history: History) -> Iterator[Slip]:
 def other_cycles(reading: Reading, history: History) -> Iterator[Slip]:
     """Cycles that are mistyped otherwise: the run was made where the next one is expected."""
     likely = replace(reading, cycles=history.pace.expected())
-    weight = math.log(criteria.OTHER_CYCLES * anywhere(reading.cycles))
+    weight = math.log(criteria.OTHER_CYCLES) + log_anywhere(reading.cycles)
     yield Slip(
         name="other_cycles",
         log_weight=weight + history.of_friction(likely) + history.of_protocol(reading),
@@ -84,20 +88,20 @@ def other_units(reading: Reading, history: History) -> Iterator[Slip]:
 
 def other_clutches(reading: Reading, history: History) -> Iterator[Slip]:
     """Another clutch's test: COF is that of any clutch; its cycles are its own, or those expected here."""
-    of_cof = _log_cof_of_any(reading, history, criteria.LOG_COF_SD)
+    of_cof = log_cof_of_any(reading, history)
     if of_cof is None:
         return
-    of_cof += _log_tilt_of_any(reading) + history.of_protocol(reading)
+    of_cof += log_tilt_of_any(reading) + history.of_protocol(reading)
     weight = math.log(0.5 * criteria.OTHER_CLUTCH) + of_cof
-    yield Slip(name="other_clutch", log_weight=weight + math.log(anywhere(reading.cycles)), likely=reading)
+    yield Slip(name="other_clutch", log_weight=weight + log_anywhere(reading.cycles), likely=reading)
     yield Slip(name="other_test", log_weight=weight + history.of_cycles(reading), likely=reading)
 
 
 def meaningless(reading: Reading, history: History) -> Iterator[Slip]:
     """A torque or a pressure that means nothing."""
-    of_cof = _log_cof_of_any(reading, history, criteria.MEANINGLESS_SD)
+    of_cof = log_cof_of_any(reading, history, criteria.MEANINGLESS_SD)
     if of_cof is not None:
-        weight = math.log(criteria.MEANINGLESS) + of_cof + _log_tilt_of_any(reading)
+        weight = math.log(criteria.MEANINGLESS) + of_cof + log_tilt_of_any(reading)
         weight += history.of_cycles(reading) + history.of_protocol(reading)
         yield Slip(name="meaningless", log_weight=weight, likely=reading)
 
@@ -119,7 +123,8 @@ def dead_pressure(reading: Reading, history: History, geometry: Geometry) -> Ite
     yield Slip(name="dead_pressure", log_weight=weight + history.log_likelihood(reading), likely=reading)
 
 
-def _log_cof_of_any(reading: Reading, history: History, deviation: float) -> float | None:
+def log_cof_of_any(reading: Reading, history: History, deviation: float = criteria.LOG_COF_SD) -> float | None:
+    """log density of a run's COF as that of any clutch; None where it shows none."""
     compared = history.comparable(reading, len(history.lives) - 1)
     if reading.cof is None or compared is None:
         return None
@@ -127,7 +132,8 @@ def _log_cof_of_any(reading: Reading, history: History, deviation: float) -> flo
     return -0.5 * z * z - math.log(deviation * math.sqrt(2 * math.pi))
 
 
-def _log_tilt_of_any(reading: Reading) -> float:
+def log_tilt_of_any(reading: Reading) -> float:
+    """log density of how COF goes with pressure as that of any clutch."""
     if reading.tilt is None:
         return 0.0
     z = (reading.tilt[0] - criteria.TILT) / criteria.TILT_SD
@@ -155,7 +161,3 @@ def mistyped(cycles: float) -> dict[str, list[float]]:
         )
         if values
     }
-
-
-#: What finds slips, by what it looks at; `tests.plausibility` leaves out each in turn.
-Finder = Callable[[Reading, History], Iterator[Slip]]
