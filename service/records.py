@@ -256,6 +256,7 @@ def _event(row: RunInOrder, cofs: ByPressure) -> Event:
         rebuild=row.event == REBUILD,
         shift=row.event not in (None, REBUILD),
         duty=duty_block(row.cycles, row.duty_cycles, row.duty_energy_kj, row.duty_speed_rpm, row.duty_duration_s),
+        dated=row.started_at is not None,
     )
 
 

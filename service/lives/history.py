@@ -35,9 +35,10 @@ REBUILD = "rebuild"
 class Event:
     """A run as the history sees it.
 
-    `moment` is when it was made [s], `arrived` its place in the order of arrival, infinite while it comes in. A stationary
-    test has the range of its speeds [rad/s], and mean COF with its deviation by pressure [Pa] where its curves determine it;
-    `duty` is the block that ends with the run, `shift` an event that may have shifted the level.
+    `moment` is when it was made [s], `dated` whether the rig said so, `arrived` its place in the order of arrival, infinite
+    while it comes in. A stationary test has the range of its speeds [rad/s], and mean COF with its deviation by pressure [Pa]
+    where its curves determine it; `duty` is the block that ends with the run, `shift` an event that may have shifted the
+    level.
     """
 
     run_id: str
@@ -50,6 +51,7 @@ class Event:
     rebuild: bool = False
     shift: bool = False
     duty: Block | None = None
+    dated: bool = False
 
     def at(self, cycles: float) -> "Event":
         """The same run at other cycles since new."""

@@ -257,6 +257,7 @@ def _event_of(arrival: Arrival) -> Event:
         rebuild=maintenance == REBUILD,
         shift=maintenance not in (None, REBUILD),
         duty=duty_block(run.cycles, *(duty.get(name) for name in names)),
+        dated=run.started_at is not None,
     )
 
 

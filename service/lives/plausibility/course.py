@@ -1,0 +1,125 @@
+"""The course of mean COF over a life, as a distribution of what a test at any cycles shows.
+
+With y = log COF and s = log(1 + ζ/φ), ζ the cycles since the life began,
+
+    y(s) = level + slope · s + ∫∫ bend · dW + steps at maintenance + scatter
+
+a Gaussian process whose level, slope and bend (an integrated random walk) are normal, averaged over φ, bend and scatter by
+their marginal likelihood on the tests of the life. Before the first test the level is what physics allows of a wet clutch.
+One test in some is off by more than its scatter. It is looser than eq. 6 on purpose: lives that accelerate, run in
+steeply or drift with their oil are honest.
+
+Source: the integrated Wiener process as a prior of smooth functions is G. Wahba, J. R. Statist. Soc. B 40 (1978) 364.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.tracking.measurement import Measurement
+from service.lives.plausibility import criteria
+
+_GRID = np.array(
+    [(scale, bend, scatter) for scale in criteria.SCALES for bend in criteria.BENDS for scatter in criteria.SCATTERS]
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Course:
+    """The tests of a life: cycles since it began [n], log COF [n], its variance [n], epoch of maintenance [n].
+
+    `level` and `level_sd` are what was known of log COF before the first test.
+    """
+
+    cycles: FloatArray
+    log_cof: FloatArray
+    variance: FloatArray
+    epoch: FloatArray
+    level: float
+    level_sd: float
+
+    def predict(self, cycles: FloatArray, epoch: FloatArray) -> "Predicted":
+        """log COF at cycles [m] since the life began, in epochs [m]."""
+        near = self._nearest(cycles)
+        x, e = np.append(self.cycles[near], cycles), np.append(self.epoch[near], epoch)
+        kernel = self._kernel(x, e)
+        n = len(near)
+        scatter = _GRID[:, 2, None] ** 2
+        noise = self.variance[near] + scatter
+        residual = self.log_cof[near] - self.level
+        if n == 0:
+            mean = np.full((len(_GRID), cycles.size), self.level)
+            variance = np.diagonal(kernel, axis1=1, axis2=2) + scatter
+            return Predicted(log_weight=np.full(len(_GRID), -math.log(len(_GRID))), mean=mean, variance=variance)
+        factor = np.linalg.cholesky(kernel[:, :n, :n] + noise[:, :, None] * np.eye(n))
+        both = np.concatenate([np.broadcast_to(residual[:, None], (len(_GRID), n, 1)), kernel[:, :n, n:]], axis=2)
+        solved = np.linalg.solve(factor, both)
+        of_residual, of_cross = solved[:, :, 0], solved[:, :, 1:]
+        evidence = -0.5 * (of_residual**2).sum(axis=1) - np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+        log_weight = evidence - evidence.max()
+        mean = self.level + np.einsum("gn,gnm->gm", of_residual, of_cross)
+        left = np.diagonal(kernel[:, n:, n:], axis1=1, axis2=2) - (of_cross**2).sum(axis=1)
+        return Predicted(
+            log_weight=log_weight - math.log(np.exp(log_weight).sum()),
+            mean=mean,
+            variance=np.maximum(left, 0.0) + scatter,
+        )
+
+    def _nearest(self, cycles: FloatArray) -> list[int]:
+        """Indices of the tests that are looked at: the nearest to any of the cycles."""
+        if self.cycles.size <= criteria.MOST_TESTS:
+            return list(range(self.cycles.size))
+        apart = np.abs(self.cycles[:, None] - cycles).min(axis=1)
+        return sorted(np.argsort(apart, kind="stable")[: criteria.MOST_TESTS].tolist())
+
+    def _kernel(self, cycles: FloatArray, epoch: FloatArray) -> FloatArray:
+        """Covariance [g, k, k] of y at cycles [k] for each of the grid's choices."""
+        s = np.log1p(cycles / _GRID[:, 0, None])
+        a, b = np.minimum(s[:, :, None], s[:, None, :]), np.maximum(s[:, :, None], s[:, None, :])
+        bent = _GRID[:, 1, None, None] ** 2 * a**2 * (b / 2 - a / 6)
+        steps = criteria.STEP_SD**2 * np.minimum(epoch[:, None], epoch[None, :])
+        return np.asarray(self.level_sd**2 + criteria.SLOPE_SD**2 * a * b + bent + steps)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Predicted:
+    """A mixture of normals: log weight [g], mean [g, m] and variance [g, m] of log COF."""
+
+    log_weight: FloatArray
+    mean: FloatArray
+    variance: FloatArray
+
+    def log_density(self, index: int, log_cof: float, spread: float) -> float:
+        """log density of a test's log COF, whose own deviation is `spread`, at the cycles of that index."""
+        off = (log_cof - self.mean[:, index]) ** 2
+        terms = []
+        for share, extra in ((1.0 - criteria.OUTLYING_SHARE, 0.0), (criteria.OUTLYING_SHARE, criteria.OUTLYING_SD**2)):
+            variance = self.variance[:, index] + spread**2 + extra
+            terms.append(math.log(share) + self.log_weight - 0.5 * (off / variance + np.log(2 * math.pi * variance)))
+        together = np.concatenate(terms)
+        most = float(together.max())
+        return most + math.log(float(np.exp(together - most).sum()))
+
+    def interval(self, index: int, spread: float) -> tuple[float, float]:
+        """COF two deviations below and above its mean at the cycles of that index."""
+        weight = np.exp(self.log_weight)
+        mean = float(weight @ self.mean[:, index])
+        square = float(weight @ (self.variance[:, index] + (self.mean[:, index] - mean) ** 2)) + spread**2
+        return math.exp(mean - 2 * math.sqrt(square)), math.exp(mean + 2 * math.sqrt(square))
+
+
+def course_of(measurements: Sequence[Measurement], *, level: float, level_sd: float) -> Course:
+    """The course of what was measured along a life."""
+    rows = [(m.progress, m.value, m.variance, float(m.epoch)) for m in measurements]
+    columns = np.array(rows, dtype=np.float64).reshape(-1, 4).T
+    return Course(
+        cycles=columns[0],
+        log_cof=columns[1],
+        variance=columns[2],
+        epoch=columns[3],
+        level=level,
+        level_sd=level_sd,
+    )

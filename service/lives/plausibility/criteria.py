@@ -1,0 +1,102 @@
+"""The numbers by which a run is doubted.
+
+A run is doubted where the slips of `slips.py` together are more probable than the run as it was sent: prior odds of a
+slip, times how much better the history and physics predict the run without it.
+"""
+
+# How often which slip is made: prior odds against the run as it was sent [-]. Chosen: people mistype about one number in
+# some hundred; `make plausibility` shows what it achieves.
+
+#: A zero too many, a zero lost, two digits swapped: of each.
+DIGIT_SLIP = 4e-3
+#: Any other wrong number of cycles.
+OTHER_CYCLES = 2e-4
+#: A channel in another unit, shared among the units of `slips.UNITS`.
+OTHER_UNIT = 1e-2
+#: Another clutch's file under this clutch's name: with its own cycles, and with those expected here.
+OTHER_CLUTCH = 3e-2
+#: Anything else that makes a torque or a pressure meaningless: cables, zeros, amplifiers.
+MEANINGLESS = 1e-4
+#: Odds of a slip from which a run is held. Chosen: a held run costs a click, a slip that is taken in ruins a track.
+HELD = 0.4
+
+# Mean COF that is possible at all (`course`, `slips`)
+
+#: Median of a wet clutch's mean COF [-], and the deviation of its logarithm: two deviations cover 0.03 to 0.33. Chosen:
+#: paper, sintered and carbon linings in oil run at 0.05 to 0.2, worn ones at half of that.
+COF, LOG_COF_SD = 0.1, 0.6
+#: The same of a reading that means nothing: three decades to either side within two deviations. Chosen.
+MEANINGLESS_SD = 3.5
+
+# The course of mean COF over cycles (`course`)
+
+#: Deviation of the slope of log COF over log(1 + cycles/φ) [-]. Chosen: eq. 6's courses lose half in two or three units.
+SLOPE_SD = 0.15
+#: What the history chooses among: φ [cycles], the deviation by which the slope changes in a unit of log(1 + cycles/φ), and the
+#: scatter from run to run of log COF. Chosen: lives of 10² to 10⁶ cycles, smooth and bent ones, sensors of 0.3 to 5 %.
+SCALES, BENDS, SCATTERS = (30.0, 1_000.0, 30_000.0), (0.02, 0.08, 0.3), (0.003, 0.012, 0.05)
+#: One honest test in so many is off by more than its scatter, and the deviation of that. Chosen: gains that are misread, oil
+#: that nobody logged; the blind rig's hidden effects are honest.
+OUTLYING_SHARE, OUTLYING_SD = 0.02, 0.06
+#: Deviation of the level's step at an event of maintenance. As in `models.tracking.criteria`.
+STEP_SD = 0.05
+#: Deviation of the first level of a rebuilt clutch from that of the life before. Chosen.
+REBUILT_SD = 0.3
+#: The exponent of COF over pressure [-] of wet clutches and its deviation, and how many times log COF changes for one of it:
+#: on that scale it has the same course. Chosen: on the rigs it falls from -0.1 to -0.3.
+TILT, TILT_SD, TILT_SCALE = -0.15, 0.15, 3.0
+#: Highest over lowest pressure of a test from which the exponent is taken. Chosen.
+TILT_SPAN = 1.25
+#: So many tests of a life are looked at, those nearest to the cycles in question. Chosen: what they cost, 2 ms.
+MOST_TESTS = 40
+#: Deviation of a dynamic test's and of an engagement's median COF from a stationary test's mean. Chosen.
+DYNAMIC_SD, ENGAGEMENT_SD = 0.15, 0.35
+#: The same where pressures are not the reference's, a unit of their logarithm: torque is not quite in proportion.
+OTHER_PRESSURE_SD = 0.35
+
+# Cycles (`pace`): weights of what the next cycles may be. Chosen; only their orders of magnitude matter.
+
+#: At the latest cycles, where this kind is still to come; at other known ones where it is; where this kind was made already.
+JOINS_LATEST, JOINS, REPEATS_TEST = 0.4, 0.05, 0.02
+#: A block that begins where the last known run ended; where any did.
+TILES, TILES_EARLIER = 0.6, 0.1
+#: The very gap that was between two runs before; a gap like those before, a gap of another order, a late run.
+SAME_GAP, LIKE_GAP, OTHER_GAP, LATE = 0.2, 0.15, 0.1, 0.1
+#: Anything.
+ANYWHERE = 0.02
+#: Deviation of log gap around earlier ones, and of one of another order. Chosen.
+LIKE_GAP_SD, OTHER_GAP_SD = 0.3, 1.5
+#: Median and deviation of log(1 + cycles) of a run of which nothing else is known. Chosen: a test of 3·10⁹ cycles is none.
+CYCLES, LOG_CYCLES_SD = 5_000.0, 2.5
+#: Probability that an honest run's `started_at` is out of order with its cycles. Chosen: clocks are set wrongly now and then.
+OUT_OF_ORDER = 2e-3
+
+# Protocols (`likelihood`)
+
+#: Share of tests made at other pressures or speeds than the reference test, deviation of the same and of others' logarithm.
+#: Chosen: a diagnosis advises such tests.
+OTHER_PROTOCOL, SAME_PROTOCOL_SD, OTHER_PROTOCOL_SD = 0.05, 0.03, 1.0
+#: Highest pressure [Pa] and speed [rad/s] of a rig of which nothing is known, and the deviation of their logarithms. Chosen.
+PRESSURE, SPEED, LOG_PROTOCOL_SD = 8e5, 200.0, 1.2
+#: Oil temperature [K] of a test and its deviation. Chosen: wet clutches are tested at 40 to 120 °C.
+OIL, OIL_SD = 273.15 + 80.0, 25.0
+
+# Dead channels (`dead_channels`). Chosen; an honest channel is far from each.
+
+#: Rows below which nothing is said of a channel [-].
+FEWEST_ROWS = 8
+#: A channel whose middle 90 % differ by less than this share of its size stands still.
+STILL = 2e-3
+#: Speed whose middle 90 % differ by less than this share of the highest is no Stribeck test.
+SPEED_STILL = 0.02
+#: Highest over lowest loaded pressure from which torque must follow, and the least exponent of torque over pressure.
+PRESSURE_SPAN, LEAST_EXPONENT = 1.25, 0.4
+#: RMSE over static torque of a single pressure's fit from which pressure was not single.
+SINGLE_LEVEL_RMSE = 0.1
+#: A COF below this is no friction.
+NO_FRICTION = 0.004
+#: Oil temperatures [K] that no oil has: from below what pours, to above what burns.
+COLDEST, HOTTEST = 273.15 - 60.0, 273.15 + 250.0
+
+#: An open clutch's drag over the torque of the pressed one [-], and the deviation of its logarithm. Chosen: a few per cent.
+DRAG, LOG_DRAG_SD = 0.03, 1.2

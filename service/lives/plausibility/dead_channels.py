@@ -1,0 +1,100 @@
+"""Channels that are dead: unplugged, railed, frozen. Said of a run by itself, whatever the history."""
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.clutch import Geometry
+from models.records.criteria import UNLOADED
+from service.columns import PASCALS_PER_BAR, ZERO_CELSIUS
+from service.lives.history import DYNAMIC, STATIONARY
+from service.lives.plausibility import criteria
+from service.lives.plausibility.reading import Columns
+from service.lives.run_analysis import Analysis, Notice
+
+DEAD = "dead_channel"
+
+
+def dead_channels(kind: str, columns: Columns, analysis: Analysis, geometry: Geometry) -> list[Notice]:
+    """What is odd about the channels of a run."""
+    doubts = list(_oil(columns.oil_temperature))
+    pressed = columns.pressure >= UNLOADED
+    if columns.torque.size < criteria.FEWEST_ROWS:
+        return doubts
+    if kind == DYNAMIC and (message := _speed_stands(columns.speed)):
+        doubts.append(message)
+    if not pressed.any():
+        return doubts
+    torque = columns.torque[pressed]
+    rows = columns.loaded()
+    if torque.size >= criteria.FEWEST_ROWS and _spread(torque) <= criteria.STILL * float(np.abs(np.median(torque))):
+        message = f"torque stands still at {np.median(torque):.4g} Nm whatever pressure and speed do: is the sensor connected?"
+        return [*doubts, Notice(code=DEAD, message=message)]
+    if rows.torque.size < criteria.FEWEST_ROWS:
+        return doubts
+    cof = float(np.median(np.abs(rows.torque) / (rows.pressure * geometry.torque_per_cof(1.0))))
+    if cof < criteria.NO_FRICTION:
+        message = f"torque is about zero ({np.median(rows.torque):.3g} Nm, a COF of {cof:.2g}) under pressure: is the sensor connected?"
+        return [*doubts, Notice(code=DEAD, message=message)]
+    if kind in (STATIONARY, DYNAMIC):
+        doubts += _not_following(rows, analysis)
+    return doubts
+
+
+def _not_following(rows: Columns, analysis: Analysis) -> list[Notice]:
+    """Torque that does not go with pressure, or one pressure through whose rows no curve goes."""
+    low, high = np.quantile(rows.pressure, [0.02, 0.98]).tolist()
+    span = f"{low / PASCALS_PER_BAR:.3g} to {high / PASCALS_PER_BAR:.3g} bar"
+    if high > criteria.PRESSURE_SPAN * low:
+        exponent, error = _exponent(rows)
+        if exponent + 3 * error < criteria.LEAST_EXPONENT:
+            message = (
+                f"torque does not follow pressure: it goes with pressure to the power of {exponent:.2f} from {span}, about 1 is "
+                "expected. Is a sensor disconnected, or does a column hold another channel?"
+            )
+            return [Notice(code=DEAD, message=message)]
+        return []
+    for level in analysis.fits:
+        static = float(level.fit.parameters.static_torque)
+        if len(analysis.fits) == 1 and level.fit.points >= criteria.FEWEST_ROWS and level.fit.rmse > criteria.SINGLE_LEVEL_RMSE * max(static, 1e-12):
+            message = (
+                f"pressure stands at {high / PASCALS_PER_BAR:.3g} bar and torque scatters by {level.fit.rmse:.3g} Nm about one "
+                "curve, as if pressure had varied: is its sensor connected?"
+            )
+            return [Notice(code=DEAD, message=message)]
+    return []
+
+
+def _exponent(rows: Columns) -> tuple[float, float]:
+    """The exponent of |torque| over pressure by least squares, and its standard error."""
+    x, y = np.log(rows.pressure), np.log(np.maximum(np.abs(rows.torque), 1e-9))
+    x, y = x - x.mean(), y - y.mean()
+    square = float(x @ x)
+    exponent = float(x @ y) / square
+    left = y - exponent * x
+    # neighbouring rows are alike: a sampled record has far fewer independent ones
+    independent = min(x.size, 40)
+    return exponent, float(np.sqrt(left @ left / x.size * x.size / (square * independent)))
+
+
+def _speed_stands(speed: FloatArray) -> Notice | None:
+    fastest = float(np.abs(speed).max())
+    if fastest > 0 and _spread(speed) > criteria.SPEED_STILL * fastest and fastest > 1.0:
+        return None
+    message = f"speed stands still at {np.median(speed) * 60 / (2 * np.pi):.4g} rpm in a dynamic test: is its sensor connected?"
+    return Notice(code=DEAD, message=message)
+
+
+def _oil(temperature: FloatArray | None) -> list[Notice]:
+    if temperature is None:
+        return []
+    median = float(np.median(temperature))
+    still_at_zero = temperature.size >= criteria.FEWEST_ROWS and bool((temperature == ZERO_CELSIUS).all())
+    if criteria.COLDEST <= median <= criteria.HOTTEST and not still_at_zero:
+        return []
+    message = f"oil temperature is {median - ZERO_CELSIUS:.4g} °C, which no oil has in a test: is the sensor connected?"
+    return [Notice(code=DEAD, message=message)]
+
+
+def _spread(values: FloatArray) -> float:
+    low, high = np.quantile(values, [0.05, 0.95]).tolist()
+    return float(high - low)

@@ -1,0 +1,167 @@
+"""How probable a number of cycles is after those that are known of a clutch.
+
+    P(n) = Σ w_k P_k(n) / Σ w_k
+
+over ways in which the next run comes about: at known cycles where its kind is still to come, at the end of a block that
+begins where another ended, after the gap that was between runs before or one like it, late among those known, or anywhere.
+Runs come in any order and gaps of every size are honest: each way has its share, and none is zero. Cycles are counted in the
+grid that all of them share (every run at a multiple of 500), which is what people and controllers round to.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.arrays import FloatArray
+from service.lives.history import Event
+from service.lives.plausibility import criteria
+
+RUN_IN = "run_in"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pace:
+    """The known cycles [n] of a clutch and those [m] of the next run's kind, both ascending and distinct.
+
+    `block` is the duty cycles that the next run says it ran, None for no block. `step` is the grid of all known cycles, and
+    `trusted` the share of runs to come that are on it.
+    """
+
+    cycles: FloatArray
+    of_kind: FloatArray
+    block: float | None
+    step: float
+    trusted: float
+
+    def log_probability(self, cycles: float) -> float:
+        """log P that the next run is made at `cycles`."""
+        ways = [(criteria.ANYWHERE, anywhere(cycles)), *self._after_gap(cycles)]
+        if self.cycles.size == 0:
+            ways.append((criteria.JOINS_LATEST, float(_equal(cycles, self.block or 0.0))))
+        else:
+            ways += [*self._joins(cycles), *self._tiles(cycles)]
+            latest, late = float(self.cycles[-1]), 0.0
+            if cycles <= latest:  # late: anywhere among the known, by the cycles or by their logarithm
+                late = 0.5 / (1.0 + latest) + 0.5 / ((1.0 + cycles) * math.log1p(latest + 1.0))
+            ways.append((criteria.LATE, late * self._on_grid(cycles)))
+        total = math.fsum(weight for weight, _ in ways)
+        return math.log(math.fsum(weight * probability for weight, probability in ways) / total)
+
+    def expected(self) -> float:
+        """The cycles at which a run that mistook its cycles was most likely made: one gap on."""
+        if self.cycles.size == 0:
+            return self.block or 0.0
+        if self.block is not None:
+            return float(self.cycles[-1]) + self.block
+        return float(self.cycles[-1]) + (float(self._gaps[-1]) if self._gaps.size else 0.0)
+
+    @property
+    def usual_gap(self) -> float | None:
+        """The median of the last gaps between runs of the kind, None where there was none."""
+        return float(np.median(self._gaps[-5:])) if self._gaps.size else None
+
+    @property
+    def _base(self) -> FloatArray:
+        """The cycles that the next run's gap is counted from: those of its kind where there are two, else all."""
+        return self.of_kind if self.of_kind.size > 1 else self.cycles
+
+    @property
+    def _gaps(self) -> FloatArray:
+        return np.diff(self._base)
+
+    def _joins(self, cycles: float) -> list[tuple[float, float]]:
+        made = _among(cycles, self.of_kind)
+        ways = [(criteria.REPEATS_TEST, float(made) / max(self.of_kind.size, 1))]
+        to_come = ~np.isin(self.cycles, self.of_kind)
+        if to_come[-1]:
+            ways.append((criteria.JOINS_LATEST, float(_equal(cycles, float(self.cycles[-1])))))
+        if to_come.any():
+            known_cycles = _among(cycles, self.cycles[to_come])
+            ways.append((criteria.JOINS, float(known_cycles) / float(to_come.sum())))
+        return ways
+
+    def _tiles(self, cycles: float) -> list[tuple[float, float]]:
+        if self.block is None:
+            return []
+        latest = float(_equal(cycles, float(self.cycles[-1]) + self.block))
+        ends = np.union1d(self.cycles, [0.0]) + self.block
+        return [(criteria.TILES, latest), (criteria.TILES_EARLIER, float(_among(cycles, ends)) / ends.size)]
+
+    def _after_gap(self, cycles: float) -> list[tuple[float, float]]:
+        base, gaps = self._base, self._gaps
+        last = float(base[-1]) if base.size else 0.0
+        gap = cycles - last
+        middle = math.log(float(np.median(gaps)) if gaps.size else max(last, 1_000.0))
+        ways = [(criteria.OTHER_GAP, self._density(gap, middle, criteria.OTHER_GAP_SD) * self._on_grid(cycles))]
+        if gaps.size:
+            recency = 0.7 ** np.arange(gaps.size)[::-1]
+            recency /= recency.sum()
+            ways.append((criteria.SAME_GAP, float(recency[np.abs(gaps - gap) < 0.5].sum())))
+            centres, shares = np.log(gaps), recency
+            if gaps.size > 1:  # gaps that grow by a factor, as in 10, 100, 1000
+                centres = np.append(centres, 2 * centres[-1] - centres[-2])
+                shares = np.append(0.8 * shares, 0.2)
+            like = [
+                share * self._density(gap, centre, criteria.LIKE_GAP_SD)
+                for share, centre in zip(shares.tolist(), centres.tolist(), strict=True)
+            ]
+            ways.append((criteria.LIKE_GAP, math.fsum(like) * self._on_grid(cycles)))
+        return ways
+
+    @staticmethod
+    def _density(gap: float, centre: float, deviation: float) -> float:
+        """Density a cycle of a gap whose logarithm is normal; 0 for no gap."""
+        if gap < 0.5:
+            return 0.0
+        return normal(math.log(gap), centre, deviation) / gap
+
+    def _on_grid(self, cycles: float) -> float:
+        """How many times as probable `cycles` is as without the grid: its step on the grid, the rest beside it."""
+        return self.trusted * self.step * float(_equal(cycles % self.step, 0.0)) + 1.0 - self.trusted
+
+
+def pace_of(events: Sequence[Event], newest: Event) -> Pace:
+    """The pace of the runs before, as the next of its kind is predicted from; run-in is before the first cycle."""
+    step, trusted = grid_of([event.cycles for event in events if event.cycles >= 1])
+    return Pace(
+        step=step,
+        trusted=trusted,
+        cycles=np.unique([event.cycles for event in events]),
+        of_kind=np.unique([event.cycles for event in events if event.kind == newest.kind]),
+        block=None if newest.duty is None or newest.kind == RUN_IN else newest.duty.cycles,
+    )
+
+
+def grid_of(cycles: Sequence[float]) -> tuple[float, float]:
+    """The greatest step of which all cycles are multiples, and how far it is trusted."""
+    whole = {round(value) for value in cycles}
+    if len(whole) < 2 or any(not value.is_integer() for value in cycles):
+        return 1.0, 0.0
+    return float(math.gcd(*whole)), len(whole) / (len(whole) + 2.0)
+
+
+def anywhere(cycles: float) -> float:
+    """Probability of a number of cycles of which nothing is known: log(1 + n) is normal."""
+    centre = math.log1p(criteria.CYCLES)
+    return normal(math.log1p(cycles), centre, criteria.LOG_CYCLES_SD) / (1.0 + cycles)
+
+
+def log_anywhere(cycles: float) -> float:
+    """Its logarithm."""
+    return math.log(anywhere(cycles))
+
+
+def normal(value: float, mean: float, deviation: float) -> float:
+    """The density of a normal."""
+    z = (value - mean) / deviation
+    return math.exp(-0.5 * z * z) / (deviation * math.sqrt(2 * math.pi))
+
+
+def _equal(first: float, second: float) -> bool:
+    return abs(first - second) < 0.5
+
+
+def _among(cycles: float, others: FloatArray) -> bool:
+    return bool((np.abs(others - cycles) < 0.5).any())

@@ -1,0 +1,120 @@
+"""`make plausibility`: what is held of campaigns with one slip each and of honest runs, as Markdown; fails below the demand.
+
+Plausibility was developed on the simulated rig with other seeds; the blind rig and the measurements are new to it.
+"""
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from tests.blind.rows import wilson
+from tests.plausibility import slips, trials
+from tests.plausibility.ablation import WITHOUT
+from tests.plausibility.trials import Outcome
+
+#: The demand: of runs with a slip so many are held at least, of honest ones so many at most.
+LEAST_HELD, MOST_FALSE = 0.95, 0.005
+DOCUMENT = Path(__file__).parents[2] / "docs" / "plausibility.md"
+BEGIN, END = "<!-- plausibility -->", "<!-- end of plausibility -->"
+
+
+def percent(hits: int, count: int) -> str:
+    """A share with its 95 % interval."""
+    if count == 0:
+        return "-"
+    low, high = wilson(hits, count)
+    return f"{100 * hits / count:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+
+
+def by_slip(outcomes: Sequence[Outcome]) -> Iterator[str]:
+    """A row a kind of slip: how many of how many are held, on each rig."""
+    yield "| slip | " + " | ".join(trials.RIGS) + " | codes |"
+    yield "|---|" + "---|" * len(trials.RIGS) + "---|"
+    names = [*slips.CYCLES, *slips.UNITS, *slips.CLUTCHES, *slips.ALIKE, *slips.UNPLUGGED]
+    for name in names:
+        mine = [one for one in outcomes if one.slip == name]
+        cells = []
+        for rig in trials.RIGS:
+            here = [one for one in mine if one.source == rig]
+            cells.append(f"{sum(one.held for one in here)} of {len(here)}" if here else "")
+        codes = sorted({code for one in mine for code in one.answer.codes})
+        if mine:
+            yield f"| {name} | " + " | ".join(cells) + " | " + ", ".join(f"`{code}`" for code in codes) + " |"
+
+
+def by_source(outcomes: Sequence[Outcome]) -> Iterator[str]:
+    """A row a source of honest runs: how many are held."""
+    yield "| honest runs of | runs | held | share |"
+    yield "|---|---|---|---|"
+    groups = ("simulated rig", "blind rig, nothing hidden", "blind rig, hidden", "blind rig, with", "real")
+    for group in groups:
+        mine = [one for one in outcomes if one.source.startswith(group)]
+        held = sum(one.held for one in mine)
+        name = {"blind rig, hidden": "blind rig, an effect hidden", "blind rig, with": "blind rig, with an advised test"}
+        yield f"| {name.get(group, group)} | {len(mine)} | {held} | {percent(held, len(mine))} |"
+
+
+def by_mechanism(wrong: Sequence[Outcome], honest: Sequence[Outcome]) -> Iterator[str]:
+    """A row a mechanism that is left out: what is then held."""
+    yield "| left out | slips held | honest held |"
+    yield "|---|---|---|"
+    judged = [one for one in honest if one.answer.without]
+    held, false = sum(one.held for one in wrong), sum(one.held for one in judged)
+    yield f"| nothing | {held} of {len(wrong)} | {false} of {len(judged)} |"
+    for name in WITHOUT:
+        of_wrong = sum(one.answer.without[name] for one in wrong)
+        of_honest = sum(one.answer.without[name] for one in judged)
+        yield f"| {name} | {of_wrong} of {len(wrong)} | {of_honest} of {len(judged)} |"
+
+
+def main() -> int:
+    """Print the tables; 1 where the demand is not met."""
+    parser = argparse.ArgumentParser(prog="python -m tests.plausibility", description=__doc__)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--campaigns", type=int, default=200, help="campaigns with one slip each, half of them a rig")
+    parser.add_argument("--honest", type=int, default=2000, help="honest runs")
+    parser.add_argument("--failures", action="store_true", help="list what was missed and what was held wrongly")
+    parser.add_argument("--write", action="store_true", help=f"put the tables into {DOCUMENT.name}")
+    chosen = parser.parse_args()
+    rigs = {rig: trials.slipped(chosen.seed, chosen.campaigns // len(trials.RIGS), rig) for rig in trials.RIGS}
+    wrong = [one for outcomes in rigs.values() for one in outcomes]
+    aside = [one for rig in trials.RIGS for one in trials.aside(chosen.seed, chosen.campaigns // 10, rig)]
+    honest = list(trials.honest(chosen.seed, chosen.honest))
+    held, false = sum(one.held for one in wrong), sum(one.held for one in honest)
+    met = held >= LEAST_HELD * len(wrong) and false <= MOST_FALSE * len(honest)
+    times = sorted(one.answer.seconds for one in honest if one.kind == "stationary_stribeck")
+    lines = [
+        f"`make plausibility SEED={chosen.seed} CAMPAIGNS={chosen.campaigns} HONEST={chosen.honest}`:",
+        "",
+        "| | runs | held | share | demand |",
+        "|---|---|---|---|---|",
+        *(
+            f"| one slip, {rig} | {len(of)} | {sum(one.held for one in of)} | {percent(sum(one.held for one in of), len(of))} | |"
+            for rig, of in rigs.items()
+        ),
+        f"| **one slip** | {len(wrong)} | {held} | {percent(held, len(wrong))} | ≥ 95 % |",
+        f"| **honest** | {len(honest)} | {false} | {percent(false, len(honest))} | ≤ 0.5 % |",
+        "",
+        *by_slip([*wrong, *aside]),
+        "",
+        *by_source(honest),
+        "",
+        *by_mechanism(wrong, honest),
+        "",
+        f"A stationary test's doubts took {1e3 * times[len(times) // 2]:.1f} ms of a core in the median, "
+        f"{1e3 * times[int(0.99 * len(times))]:.1f} ms in 99 % of runs.",
+    ]
+    print("\n".join(lines))
+    if chosen.failures:
+        for one in (*[o for o in wrong if not o.held], *[o for o in honest if o.held]):
+            print("\n", one.slip or "honest", one.source, one.kind, one.cycles, one.before, one.answer.codes, one.answer.message)
+    if chosen.write:
+        text = DOCUMENT.read_text(encoding="utf-8")
+        head, tail = text.split(BEGIN)[0], text.split(END)[1]
+        DOCUMENT.write_text(f"{head}{BEGIN}\n\n" + "\n".join(lines) + f"\n\n{END}{tail}", encoding="utf-8")
+    return 0 if met else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,102 @@
+"""Campaigns of the blind rig, with and without hidden effects, and of real measurements: plausibility never saw them."""
+
+import csv
+import zlib
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from tests.blind.rig.hide import hide
+from tests.blind.rig.loudness import UnreachableError
+from tests.blind.rig.makers import ALL
+from tests.blind.rig.more import with_test
+from tests.blind.rig.sent import runs
+from tests.plausibility.bench import Body
+from tests.plausibility.simulated import Campaign
+from tests.real import loaders
+from tests.support import stationary
+
+SLUGS = ("", *ALL)
+#: Advised tests that a campaign may end with: other pressures, other temperatures, other ways.
+ADVISED = ("light_sweep", "sweep_60c", "sweep_100c", "falling_speeds", "open_sweep", "loops_0.3hz", "more_states")
+LOUD = (20.0, 50.0, 200.0)
+
+
+def campaign(rng: np.random.Generator, slug: str, *, thin: int = 5, advised: bool = False) -> Campaign:
+    """A campaign of the blind rig that hides an effect ("": none); records are thinned to every so many samples."""
+    states = int(rng.integers(6, 12))
+    seed = [int(rng.integers(1 << 31)), zlib.crc32(slug.encode())]
+    for attempt in range(5):
+        try:
+            slugs, loud = ((slug,), float(rng.choice(LOUD))) if slug else ((), 0.0)
+            hidden = hide([*seed, attempt], slugs, loud, states=states, rate=100.0)
+            break
+        except UnreachableError:
+            continue
+    else:
+        hidden = hide(seed, (), 0.0, states=states)
+    source = f"blind rig, {'hidden ' + slug if slug else 'nothing hidden'}"
+    sent = [_thinned(run, thin) for run in runs(hidden)]
+    if advised:
+        key = str(rng.choice(ADVISED))
+        before = {run["run_id"] for run in sent}
+        later = [_thinned(run, thin) for run in runs(with_test(hidden, key))]
+        sent += [run for run in later if run["run_id"] not in before]
+        source = "blind rig, with an advised test"
+    return Campaign(source=source, runs=sent, record={"origin": "simulated"})
+
+
+def _thinned(run: Body, every: int) -> Body:
+    if "time_s" not in run.get("channels", {}):
+        return run
+    return run | {"channels": {name: values[::every] for name, values in run["channels"].items()}}
+
+
+def real() -> Iterator[Campaign]:
+    """Measured histories as clutches: their friction as it is, or their wear as a clutch's falling COF."""
+    if not loaders.FOLDER.is_dir():
+        return
+    yield Campaign(source="real: traction sweeps", runs=loaders.traction_runs(), record=loaders.TRACTION_CLUTCH)
+    for name, histories in (("filters", _filters()), ("lasers", _lasers()), ("cracks", _cracks())):
+        for number, history in enumerate(histories):
+            sent = [_test(f"{name}-{number}-{k}", cycles, share) for k, (cycles, share) in enumerate(history)]
+            yield Campaign(source=f"real: {name}", runs=sent, record={})
+
+
+def _test(run_id: str, cycles: float, share: float) -> Body:
+    """A stationary test whose mean COF is that share of when new."""
+    body: dict[str, Any] = stationary(round(cycles), run_id=run_id, wear=0.0, noise=0.01)
+    torque = (np.array(body["channels"]["torque_nm"]) * share).tolist()
+    return body | {"channels": body["channels"] | {"torque_nm": torque}}
+
+
+def _rows(*path: str) -> list[dict[str, str]]:
+    with loaders.FOLDER.joinpath(*path).open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def _lasers() -> Iterator[list[tuple[float, float]]]:
+    rows = _rows("laser_degradation", "gaaslaser.csv")
+    for unit in sorted({row["unit"] for row in rows}):
+        yield [(float(row["hours"]), 1.0 - float(row["increase"]) / 100.0) for row in rows if row["unit"] == unit]
+
+
+def _filters() -> Iterator[list[tuple[float, float]]]:
+    """As a falling quantity: a half at 600 Pa; twelve tests along each life."""
+    rows = _rows("filter_lives", "filters_odd.csv")
+    for life in sorted({row["life"] for row in rows}, key=int)[::3]:
+        time, drop = np.array(
+            [(float(row["time_s"]), float(row["differential_pressure_pa"])) for row in rows if row["life"] == life]
+        ).T
+        when = np.linspace(0, time[-1], 12)
+        fallen = np.interp(when, time, drop)
+        yield [(float(at), 1.0 - 0.5 * float(p - fallen[0]) / (600.0 - float(fallen[0]))) for at, p in zip(when, fallen, strict=True)]
+
+
+def _cracks() -> Iterator[list[tuple[float, float]]]:
+    """A crack's length as what friction has lost: a half at the longest; time in thousands of cycles."""
+    rows = _rows("crack_growth", "crack_growth.csv")
+    for unit in range(1, 11):
+        length = [float(row[f"unit{unit}"]) for row in rows]
+        yield [(1e4 * float(row["time"]), 1.0 - 0.5 * x / max(length)) for row, x in zip(rows, length, strict=True)]

@@ -1,0 +1,155 @@
+"""One slip each: an honest run -> the same run as a mistyped number, a wrong unit, a wrong file or a loose cable make it."""
+
+import copy
+from collections.abc import Callable
+
+import numpy as np
+
+from tests.plausibility.bench import Body
+from tests.plausibility.simulated import Campaign
+
+#: A run with its slip, None where this slip changes nothing of this run.
+Slip = Callable[[np.random.Generator, Body], Body | None]
+
+
+def zero_too_many(_: np.random.Generator, run: Body) -> Body | None:
+    return run | {"cycles": run["cycles"] * 10} if run["cycles"] else None
+
+
+def zero_lost(_: np.random.Generator, run: Body) -> Body | None:
+    return run | {"cycles": run["cycles"] // 10} if run["cycles"] and run["cycles"] % 10 == 0 else None
+
+
+def swapped_digits(rng: np.random.Generator, run: Body) -> Body | None:
+    digits = str(int(run["cycles"]))
+    pairs = [k for k in range(len(digits) - 1) if digits[k] != digits[k + 1]]
+    if not pairs:
+        return None
+    k = int(rng.choice(pairs))
+    return run | {"cycles": int(digits[:k] + digits[k + 1] + digits[k] + digits[k + 2 :])}
+
+
+def _scaled(channel: str, factor: float, offset: float = 0.0) -> Slip:
+    def slip(_: np.random.Generator, run: Body) -> Body | None:
+        if channel not in run.get("channels", {}):
+            return None
+        values = (np.array(run["channels"][channel]) * factor + offset).tolist()
+        return run | {"channels": run["channels"] | {channel: values}}
+
+    return slip
+
+
+def _dead(channel: str, reading: Callable[[np.random.Generator, np.ndarray], np.ndarray]) -> Slip:
+    def slip(rng: np.random.Generator, run: Body) -> Body | None:
+        if channel not in run.get("channels", {}):
+            return None
+        values = reading(rng, np.array(run["channels"][channel]))
+        if "time_s" not in run["channels"] and channel in ("pressure_bar", "speed_rpm"):
+            values = np.abs(values)
+        return run | {"channels": run["channels"] | {channel: values.tolist()}}
+
+    return slip
+
+
+def _about(level: float, noise: float) -> Callable[[np.random.Generator, np.ndarray], np.ndarray]:
+    return lambda rng, values: level + noise * rng.standard_normal(values.size)
+
+
+def _frozen(_: np.random.Generator, values: np.ndarray) -> np.ndarray:
+    return np.full(values.size, values[values.size // 2])
+
+
+#: Wrong units: the values as that unit has them, under the name of ours.
+UNITS: dict[str, Slip] = {
+    "pressure in kPa": _scaled("pressure_bar", 100.0),
+    "pressure in psi": _scaled("pressure_bar", 14.503774),
+    "pressure in MPa": _scaled("pressure_bar", 0.1),
+    "torque in lbf ft": _scaled("torque_nm", 0.737562),
+    "torque in kNm": _scaled("torque_nm", 1e-3),
+    "torque in kgf m": _scaled("torque_nm", 0.101972),
+    "speed in rad/s": _scaled("speed_rpm", 2 * np.pi / 60),
+    "speed in 1/s": _scaled("speed_rpm", 1 / 60),
+    "temperature in K": _scaled("oil_temperature_c", 1.0, 273.15),
+    "temperature in °F": _scaled("oil_temperature_c", 1.8, 32.0),
+}
+UNPLUGGED: dict[str, Slip] = {
+    "torque zero": _dead("torque_nm", lambda _, values: 0.0 * values),
+    "torque about zero": _dead("torque_nm", _about(0.02, 0.05)),
+    "torque railed": _dead("torque_nm", _about(200.0, 0.02)),
+    "torque frozen": _dead("torque_nm", _frozen),
+    "pressure about zero": _dead("pressure_bar", _about(0.0, 0.004)),
+    "pressure railed": _dead("pressure_bar", _about(10.0, 0.002)),
+    "pressure frozen": _dead("pressure_bar", _frozen),
+    "speed about zero": _dead("speed_rpm", _about(0.0, 0.3)),
+    "speed frozen": _dead("speed_rpm", _frozen),
+    "temperature zero": _dead("oil_temperature_c", lambda _, values: 0.0 * values),
+    "temperature at -273": _dead("oil_temperature_c", lambda _, values: 0.0 * values - 273.0),
+    "temperature railed": _dead("oil_temperature_c", _about(850.0, 0.1)),
+}
+CYCLES: dict[str, Slip] = {
+    "cycles x 10": zero_too_many,
+    "cycles / 10": zero_lost,
+    "swapped digits": swapped_digits,
+}
+
+#: Sizes of other discs, as their factor of torque at the same COF and pressure (area times radius).
+SIZES = (0.35, 0.5, 0.65, 1.5, 2.0, 3.0)
+
+
+def other_size(rng: np.random.Generator, run: Body, other: Campaign) -> Body | None:
+    """The test that another, larger or smaller clutch had at about these cycles."""
+    tests = [theirs for theirs in other.runs if theirs["kind"] == run["kind"]]
+    if "channels" not in run or "duty" in run or not tests:
+        return None
+    theirs = copy.deepcopy(min(tests, key=lambda test: abs(test["cycles"] - run["cycles"])))
+    torque = np.array(theirs["channels"]["torque_nm"]) * float(rng.choice(SIZES))
+    theirs["channels"]["torque_nm"] = torque.tolist()
+    if not differs(theirs, run):
+        return None
+    return _under(run, theirs, cycles=run["cycles"] if rng.random() < 0.5 else theirs["cycles"])
+
+
+def other_age(rng: np.random.Generator, run: Body, other: Campaign) -> Body | None:
+    """The test of another clutch of the kind, whose COF differs by its age by more than a fifth."""
+    tests = [
+        theirs
+        for theirs in other.runs
+        if theirs["kind"] == run["kind"] and differs(theirs, run)
+    ] if "channels" in run and "duty" not in run else []  # fmt: skip
+    if not tests:
+        return None
+    theirs = tests[int(rng.integers(len(tests)))]
+    return _under(run, theirs, cycles=run["cycles"] if rng.random() < 0.5 else theirs["cycles"])
+
+
+def same_age(_: np.random.Generator, run: Body, other: Campaign) -> Body | None:
+    """The test of another clutch of the kind at the same age, which cannot be told from this one's."""
+    tests = [theirs for theirs in other.runs if theirs["kind"] == run["kind"]]
+    if "channels" not in run or "duty" in run or not tests:
+        return None
+    theirs = min(tests, key=lambda test: abs(np.log(level(test) / level(run))))
+    return _under(run, theirs, cycles=run["cycles"])
+
+
+def differs(theirs: Body, run: Body) -> bool:
+    """Whether friction differs by more than a fifth: less is what an honest gain may be misread by."""
+    return bool(abs(np.log(level(theirs) / level(run))) > np.log(1.2))
+
+
+def level(run: Body) -> float:
+    """The median of torque over pressure of a test."""
+    channels = run["channels"]
+    pressure = np.array(channels["pressure_bar"])
+    return float(np.median(np.array(channels["torque_nm"]) / np.maximum(pressure, 0.1)))
+
+
+def _under(run: Body, theirs: Body, *, cycles: float) -> Body:
+    return {name: run[name] for name in ("run_id", "kind") if name in run} | {
+        name: theirs[name] for name in ("channels", "origin") if name in theirs
+    } | {"cycles": cycles} | {name: theirs[name] for name in ("started_at",) if name in theirs and "started_at" in run}
+
+
+Swap = Callable[[np.random.Generator, Body, Campaign], Body | None]
+CLUTCHES: dict[str, Swap] = {"other clutch, another size": other_size, "other clutch, another age": other_age}
+ALIKE: dict[str, Swap] = {"other clutch, same kind and age": same_age}
+GROUPS = ("cycles x 10", "swapped digits", "wrong unit", "wrong clutch", "sensor unplugged")

@@ -1,0 +1,151 @@
+"""Campaigns with one slip each, and honest runs: what of them is held, and how many of each there are."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tests.plausibility import blind, simulated, slips
+from tests.plausibility.bench import REFUSED, Answer, Bench, Body
+from tests.plausibility.simulated import Campaign
+
+Draw = Callable[[np.random.Generator], Campaign]
+
+
+#: Another clutch's test is tried once a clutch has a course: after so many tests.
+TESTS_BEFORE = 3
+#: So many honest runs of each source are judged without each mechanism too.
+ABLATED = 150
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A run that was sent: whence, which slip ("" for an honest run), its kind, stationary tests before it, the answer."""
+
+    source: str
+    slip: str
+    kind: str
+    cycles: float
+    before: int
+    answer: Answer
+
+    @property
+    def held(self) -> bool:
+        """Not in the track: held, or refused."""
+        return bool(self.answer.codes)
+
+
+def of_simulated(rng: np.random.Generator) -> Campaign:
+    return simulated.campaign(rng)
+
+
+def of_blind(rng: np.random.Generator) -> Campaign:
+    """Half of the campaigns hide an effect; some end with an advised test."""
+    slug = str(rng.choice(blind.SLUGS)) if rng.random() < 0.5 else ""
+    return blind.campaign(rng, slug, advised=bool(rng.random() < 0.15))
+
+
+RIGS: dict[str, Draw] = {"simulated rig": of_simulated, "blind rig": of_blind}
+
+
+def slipped(seed: int, count: int, rig: str) -> list[Outcome]:
+    """So many campaigns of a rig, each with one slip; the groups of slips take turns."""
+    outcomes = []
+    for number in range(count):
+        group = slips.GROUPS[number % len(slips.GROUPS)]
+        rng = np.random.default_rng([seed, 1, list(RIGS).index(rig), number])
+        outcomes.append(one_slip(rng, RIGS[rig], rig, group))
+    return outcomes
+
+
+def aside(seed: int, count: int, rig: str) -> list[Outcome]:
+    """Slips beyond the demand, and one that cannot be told."""
+    outcomes = []
+    for number in range(count):
+        rng = np.random.default_rng([seed, 2, list(RIGS).index(rig), number])
+        outcomes.append(one_slip(rng, RIGS[rig], rig, ("cycles / 10", *slips.ALIKE)[number % 2]))
+    return outcomes
+
+
+def one_slip(rng: np.random.Generator, draw: Draw, source: str, group: str) -> Outcome:
+    """A campaign is sent as it was made until one of its runs slips. The first run is honest."""
+    while True:
+        made, other = draw(rng), draw(rng)
+        name, slip = _slip_of(rng, group, other)
+        first = _after_tests(made, TESTS_BEFORE) if name in slips.CLUTCHES else 1
+        for k in (first + rng.permutation(max(len(made.runs) - first, 0))).tolist():
+            wrong = slip(rng, made.runs[k])
+            if wrong is not None and wrong != made.runs[k]:
+                return _sent(made, k, wrong, source, name)
+
+
+def _after_tests(made: Campaign, count: int) -> int:
+    """The first run after so many stationary tests."""
+    tests = [k for k, run in enumerate(made.runs) if run["kind"] == "stationary_stribeck"]
+    return tests[count - 1] + 1 if len(tests) >= count else len(made.runs)
+
+
+def _slip_of(rng: np.random.Generator, group: str, other: Campaign) -> tuple[str, slips.Slip]:
+    kinds = {"wrong unit": slips.UNITS, "sensor unplugged": slips.UNPLUGGED}.get(group, slips.CYCLES)
+    if group in kinds:
+        return group, kinds[group]
+    swaps = slips.CLUTCHES if group == "wrong clutch" else slips.ALIKE if group in slips.ALIKE else {}
+    if swaps:
+        name = group if group in swaps else str(rng.choice(list(swaps)))
+        swap = swaps[name]
+        return name, lambda rng, run: swap(rng, run, other)
+    name = str(rng.choice(list(kinds)))
+    return name, kinds[name]
+
+
+def _sent(made: Campaign, k: int, wrong: Body, source: str, name: str) -> Outcome:
+    bench = Bench(made.record)
+    for run in made.runs[:k]:
+        bench.accept(run)
+    before = sum(1 for event in bench.events if event.cofs)
+    answer = bench.answer(wrong, ablated=True)
+    return Outcome(source, name, str(wrong["kind"]), float(wrong["cycles"]), before, answer)
+
+
+def honest(seed: int, count: int) -> Iterator[Outcome]:
+    """So many honest runs: two fifths of each rig, a fifth measured; in order, shuffled, one late."""
+    for rig, draw in RIGS.items():
+        yield from _honest_of(np.random.default_rng([seed, 3, list(RIGS).index(rig)]), draw, rig, 2 * count // 5)
+    measured = list(blind.real())
+    if measured:
+        rng = np.random.default_rng([seed, 4])
+        order = [measured[0], *(measured[1:][k] for k in rng.permutation(len(measured) - 1))]
+        sent = 0
+        for campaign in order:
+            for outcome in everything(campaign, ablated=sent < ABLATED):
+                if sent < count // 5:
+                    yield outcome
+                sent += 1
+
+
+def _honest_of(rng: np.random.Generator, draw: Draw, rig: str, count: int) -> Iterator[Outcome]:
+    sent = 0
+    while sent < count:
+        made = draw(rng)
+        if rng.random() < 0.4:
+            made = simulated.shuffled(rng, made)
+        for outcome in everything(made, ablated=sent < ABLATED):
+            if sent < count:
+                yield outcome
+            sent += 1
+
+
+def everything(made: Campaign, *, ablated: bool = False) -> Iterator[Outcome]:
+    """All runs of an honest campaign; one that is held is confirmed."""
+    bench = Bench(made.record)
+    for run in made.runs:
+        before = sum(1 for event in bench.events if event.cofs)
+        answer = bench.answer(run, ablated=ablated)
+        yield Outcome(made.source, "", str(run["kind"]), float(run["cycles"]), before, answer)
+        if answer.codes and REFUSED not in answer.codes:
+            bench.accept(run)
+
+
+def share(outcomes: Sequence[Outcome]) -> float:
+    """Share of runs that were held."""
+    return sum(outcome.held for outcome in outcomes) / max(len(outcomes), 1)
