@@ -69,11 +69,19 @@ def test_a_clutch_with_a_diagnosis_and_all_that_opens(
     assert violations(page) == []
     page.keyboard.press("Escape")
     with page.expect_file_chooser() as chooser:
-        page.get_by_role("button", name="Send a run").click()
+        page.get_by_role("button", name="Send runs").click()
     broken = {"name": "a.csv", "mimeType": "text/csv", "buffer": b"pressure_bar,speed_rpm,torque_nm\n5,20,x\n"}
     chooser.value.set_files([broken])
     dialog = page.get_by_role("dialog", name="Send a run")
+    dialog.get_by_label("Kind of test").select_option("Stationary Stribeck test")
     dialog.get_by_label("Duty cycles since new").fill("9000")
+    dialog.get_by_label("Clutch", exact=True).fill("unknown")
+    page.keyboard.press("Enter")
+    form = page.get_by_role("dialog", name="Register a clutch")
+    form.wait_for()
+    assert violations(page) == []
+    form.get_by_role("button", name="Cancel").click()
+    dialog.get_by_label("Clutch", exact=True).fill("bench")
     page.keyboard.press("Enter")
     dialog.get_by_text("Not stored.").wait_for()
     assert violations(page) == []

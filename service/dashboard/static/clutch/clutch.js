@@ -155,5 +155,5 @@ byId("print").addEventListener("click", () => {
   print();
 });
 const live = new Live(withKey(poll), liveBar(byId("live")), INTERVAL);
-sender(byId("send"), { clutches: () => [ID], sent: () => live.now() });
+sender(byId("send"), { clutch: ID, clutches: () => [], sent: () => live.now() });
 live.start();

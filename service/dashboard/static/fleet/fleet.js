@@ -3,6 +3,7 @@
 // Open this file first (reading, drawing in slices, filtering),
 // then row.js (one clutch's row).
 
+import { register } from "../sending/registration.js";
 import { sender } from "../sending/sending.js";
 import { readAll } from "../shared/api.js";
 import { byId, h } from "../shared/dom.js";
@@ -227,4 +228,8 @@ FIND.addEventListener("input", filter);
 setInterval(updateAges, 15_000);
 const live = new Live(withKey(poll), liveBar(byId("live")), INTERVAL);
 sender(byId("send"), { clutches: () => [...entries.keys()], sent: () => live.now() });
+byId("register").addEventListener("click", async () => {
+  const id = await register("");
+  if (id !== null) location.assign(`/clutches/${encodeURIComponent(id)}`);
+});
 live.start();

@@ -10,17 +10,24 @@ import { cycles, fixed, kindName, significant, withSd, words } from "../shared/f
 /** @import { ClutchOut, Fit, Loop, Parameters, Receipt, RunOut, Warned } from "../shared/types.js" */
 
 /**
+ * What became of a run, in a line.
+ * @param {Receipt} receipt
+ */
+export function outcomeOf(receipt) {
+  const result = receipt.duplicate ? "Stored before: this repeat changed nothing" : "Stored";
+  const run = ` · ${kindName(receipt.kind)} at ${cycles(receipt.cycles, 0, 20)} cycles · `;
+  return h("p", { class: "notice good" }, h("b", {}, result), run, h("code", {}, receipt.run_id));
+}
+
+/**
  * A receipt with the curve that was fitted.
  * @param {Receipt} receipt
  */
 export async function receiptView(receipt) {
-  const result = receipt.duplicate ? "Stored before: this repeat changed nothing" : "Stored";
-  const run = ` · ${kindName(receipt.kind)} at ${cycles(receipt.cycles, 0, 20)} cycles · `;
   const fitted = receipt.fits.length > 0;
   return h(
     "div",
     { class: "receipt" },
-    h("p", { class: "notice good" }, h("b", {}, result), run, h("code", {}, receipt.run_id)),
     warnings(receipt.warnings),
     fitted && (await drawing(receipt)),
     fitted && fitTable(receipt.fits),
