@@ -1,7 +1,7 @@
 // @ts-check
 // The page of one clutch: its answers of the API are read when they change, and shown in sections that are drawn when seen.
-// Open this file first, then head.js (its state in one look), board.js (its charts and their choices), runs.js (its runs)
-// and report.js (the printed page).
+// Open this file first, then head.js (its state in one look), board.js (its charts and their choices), stored.js (its runs,
+// warnings and changes) and report.js (the printed page).
 
 import { Diagnosis } from "../diagnosis/diagnosis.js";
 import { sender } from "../sending/sending.js";
@@ -15,9 +15,10 @@ import { firstRun } from "../shared/welcome.js";
 import { Board } from "./board.js";
 import { head } from "./head.js";
 import { makeReport } from "./report.js";
-import { showRuns } from "./runs.js";
+import { counts } from "./states.js";
+import { Stored } from "./stored.js";
 
-/** @import { ClutchOut, DegradationItem, LoopItem, Receipt, RemainingLife, SeriesItem, StribeckItem } from "../shared/types.js" */
+/** @import { ClutchOut, DegradationItem, LoopItem, Receipt, RemainingLife, SeriesItem, StribeckItem, Warned } from "../shared/types.js" */
 /** @import { Answers } from "./board.js" */
 
 const ID = decodeURIComponent(location.pathname.split("/").at(-1) ?? "");
@@ -63,17 +64,18 @@ async function poll() {
 async function refresh(clutch) {
   /** @type {Answers} */
   const nothing = { clutch, life: null, items: [], predictions: [], tests: [], loops: [], runs: [], events: [] };
+  stored.showArchived(clutch);
   if (clutch.runs === 0) {
     shown = nothing;
     drawHead();
-    if (!document.getElementById("first")) byId("head").after(h("div", { id: "first" }, firstRun(ID)));
+    await showUncounted();
     return;
   }
   if (shown === null) {
     shown = nothing;
     drawHead();
   }
-  const first = await readLife(); // what the first chart needs comes first
+  const { warned, ...first } = await readLife(); // what the first chart needs comes first
   const { board, diagnosis } = begin();
   shown = { ...shown, clutch, ...first };
   drawHead();
@@ -82,19 +84,34 @@ async function refresh(clutch) {
   await diagnosis.poll();
   drawHead();
   const rest = await readRest();
-  shown = { clutch, ...first, ...rest };
-  showRuns(within("runs", ".body"), rest.runs, ID);
+  shown = { clutch, ...first, ...rest, runs: rest.runs.filter(counts) };
+  await stored.show({ ...rest, warned });
   if (rest.events.length > 0) board.life({ ...shown, ...first });
   await board.rest(shown);
   makeReport(byId("report"), shown, board, diagnosis.latest);
 }
 
+/** A clutch without a run that counts: what to do first, and the runs that are held or withdrawn. */
+async function showUncounted() {
+  /** @type {{ items: Receipt[] }} */
+  const { items: runs } = await readAll(`${PATH}/runs?limit=1000`);
+  showSections(runs.length > 0 ? ["runs"] : []);
+  await stored.show({ runs, tests: [], warned: [] });
+  if (!document.getElementById("first")) byId("archived").before(h("div", { id: "first" }, firstRun(ID)));
+}
+
+/** @param {string[]} names */
+function showSections(names) {
+  for (const section of SECTIONS) byId(section).hidden = !names.includes(section);
+  byId("sections").hidden = names.length < SECTIONS.length;
+}
+
 /** Remaining life, degradation and the earlier predictions. */
 async function readLife() {
-  /** @type {[{ body: RemainingLife }, { items: DegradationItem[] }, { items: SeriesItem[] }, { items: SeriesItem[] }]} */
+  /** @type {[{ body: RemainingLife }, { body: { items: DegradationItem[], warnings: Warned[] } }, { items: SeriesItem[] }, { items: SeriesItem[] }]} */
   const [life, degradation, remaining, cof] = await Promise.all([
     read(`${PATH}/remaining-useful-life`),
-    readAll(`${PATH}/degradation`),
+    read(`${PATH}/degradation`),
     readAll(`${PATH}/series?quantity=remaining_cycles`),
     readAll(`${PATH}/series?quantity=mean_cof`),
   ]);
@@ -103,7 +120,8 @@ async function readLife() {
   const predictions = remaining.items.map((row) => {
     return { at: row.cycles, cof: cofAt.get(row.cycles) ?? null, remaining: row };
   });
-  return { life: life.body, items: degradation.items, predictions };
+  const warned = [...life.body.warnings, ...degradation.body.warnings];
+  return { life: life.body, items: degradation.body.items, predictions, warned };
 }
 
 /** Tests, loops, runs and events. */
@@ -114,16 +132,15 @@ async function readRest() {
     readAll(`${PATH}/loops`),
     readAll(`${PATH}/runs?limit=1000`),
   ]);
-  const events = runs.items.filter((run) => run.kind === "maintenance");
+  const events = runs.items.filter((run) => run.kind === "maintenance" && counts(run));
   return { tests: tests.items, loops: loops.items, runs: runs.items, events };
 }
 
 /** The page's parts, made when there is first something to put into them. */
 function begin() {
-  if (parts !== null) return parts;
   document.getElementById("first")?.remove();
-  for (const section of SECTIONS) byId(section).hidden = false;
-  byId("sections").hidden = false;
+  showSections(SECTIONS);
+  if (parts !== null) return parts;
   const board = new Board(ID, fileName, (section) => within(section, ".charts"));
   const diagnosis = new Diagnosis(within("diagnosis", ".body"), ID, fileName, () => live.now());
   parts = { board, diagnosis };
@@ -139,7 +156,7 @@ function drawHead() {
   const place = byId("head");
   if (place.dataset.shown === text) return;
   place.dataset.shown = text;
-  place.replaceChildren(...head(clutch, life, state));
+  place.replaceChildren(...head(clutch, life, state, () => stored.archive(true)));
 }
 
 function showUnregistered() {
@@ -154,6 +171,8 @@ byId("print").addEventListener("click", () => {
   if (shown && parts) makeReport(byId("report"), shown, parts.board, parts.diagnosis.latest);
   print();
 });
+/** @type {Stored} */
+const stored = new Stored(ID, () => live.now());
 const live = new Live(withKey(poll), liveBar(byId("live")), INTERVAL);
 sender(byId("send"), { clutch: ID, clutches: () => [], sent: () => live.now() });
 live.start();

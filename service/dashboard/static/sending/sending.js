@@ -133,14 +133,16 @@ class Sending {
   /** @param {string} id */
   async sendAll(id) {
     const runs = this.left();
+    let held = 0;
     for (const run of runs) {
       if (this.closed) return;
       run.element.scrollIntoView({ block: "nearest" });
-      await run.send(id, this.alone);
-      if (run.progress === "stored") this.page.sent();
+      const receipt = await run.send(id, this.alone);
+      if (receipt !== null) this.page.sent();
+      if (receipt?.state === "held") held += 1;
     }
     const failed = this.left();
-    if (!this.alone) this.answer.replaceChildren(summary(runs.length - failed.length, failed.length, id));
+    if (!this.alone) this.answer.replaceChildren(summary(runs.length - failed.length, failed.length, held, id));
     (failed[0] ?? this.batch.runs[0])?.element.scrollIntoView({ block: "nearest" });
   }
 
@@ -185,10 +187,12 @@ function notRuns(wrong) {
 /**
  * @param {number} stored
  * @param {number} failed
+ * @param {number} held of those that are stored
  * @param {string} id
  */
-function summary(stored, failed, id) {
+function summary(stored, failed, held, id) {
   const text = failed > 0 ? `${stored} stored, ${failed} not stored: see each file.` : `All ${stored} stored.`;
+  const doubted = held > 0 && ` ${held} of them ${held === 1 ? "is" : "are"} held, and must be confirmed or corrected.`;
   const link = h("a", { href: `/clutches/${encodeURIComponent(id)}` }, `Open ${id}`);
-  return h("p", { class: `notice ${failed > 0 ? "bad" : "good"}` }, text, " ", stored > 0 && link);
+  return h("p", { class: `notice ${failed > 0 ? "bad" : "good"}` }, text, doubted, " ", stored > 0 && link);
 }
