@@ -3,6 +3,8 @@
 import typer
 
 from service.cli import backup, diagnose, export, fleet, key, model, replay, score, serve, simulate
+from service.cli.changes import clutch_changes, run_changes, trail
+from service.cli.changes import runs as run_list
 from service.cli.demo import demo
 from service.cli.sending import push
 
@@ -19,6 +21,14 @@ app.command()(simulate.simulate)
 app.command()(push.push)
 app.command()(diagnose.diagnose)
 app.command()(model.model)
+app.command()(run_list.runs)
+app.command()(run_changes.withdraw)
+app.command()(run_changes.restore)
+app.command()(run_changes.confirm)
+app.command()(run_changes.correct)
+app.command()(clutch_changes.edit)
+app.command()(clutch_changes.archive)
+app.command()(trail.changes)
 app.command()(export.export)
 app.command()(score.score)
 app.command()(replay.replay)

@@ -30,6 +30,8 @@ Key = Annotated[str | None, typer.Option("--key", envvar="CLUTCHLIFE_KEY", help=
 Patience = Annotated[float, typer.Option(min=0, help="Seconds to keep trying while the service is away")]
 Seed = Annotated[int, typer.Option(min=0, help="The simulated clutch and its noise; the same seed, the same bits")]
 
+Json = Annotated[bool, typer.Option("--json", help="As the service answers it")]
+
 DATABASE, URL = DEFAULT_DATABASE, DEFAULT_URL
 
 

@@ -24,11 +24,11 @@ def look_up(database: Database, clutch_id: str) -> dict[str, Any]:
 
 
 def page(
-    database: Database, *, limit: int, after: tuple[float, str] | None
+    database: Database, *, limit: int, after: tuple[float, str] | None, archived: bool = False
 ) -> tuple[list[dict[str, Any]], tuple[float, str] | None]:
-    """Clutches with the fewest remaining cycles first, and where the next page starts."""
+    """Clutches in use, or the archived ones, the fewest remaining cycles first, and where the next page starts."""
     with database.reading() as connection:
-        rows = clutches.page(connection, limit=limit + 1, after=after)
+        rows = clutches.page(connection, limit=limit + 1, after=after, archived=archived)
         items = _described(connection, rows[:limit])
     return items, (rows[limit - 1].rank, rows[limit - 1].clutch_id) if len(rows) > limit else None
 
@@ -56,6 +56,7 @@ def _latest(connection: Connection, row: ClutchRow, verdict: VerdictRow | None) 
 
 def _item(row: ClutchRow, diagnosis: dict[str, Any] | None) -> dict[str, Any]:
     return records.record(row).model_dump(mode="json") | {
+        "archived": row.archived,
         "created_at": row.created_at,
         "revision": row.revision,
         "runs": row.summary.get("runs", 0),

@@ -24,7 +24,7 @@ def page(
     """
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
-        rows = runs.page(connection, clutch_id, limit=limit + 1, after=after, fitted=True)
+        rows = runs.page(connection, clutch_id, limit=limit + 1, after=after, fitted=True, state=runs.ACCEPTED)
         levels = records.levels(connection, clutch_id)
     items = [_item(row, levels.get(row.run_id, [])) for row in rows[:limit]]
     return items, (rows[limit - 1].cycles, rows[limit - 1].run_id) if len(rows) > limit else None

@@ -16,9 +16,11 @@ LEAST_PRESSURE_FACTOR, MOST_PRESSURE_FACTOR = 1e-6, 1e6
 #: Exponent of the severity of a duty cycle.
 MOST_SEVERITY_EXPONENT = 10
 
-#: Characters of a material's or fluid's name, a maintenance note, a diagnosis' name, a file's name and a map of channels.
+#: Characters of a material's or fluid's name, a maintenance note, the reason of a change, a diagnosis' name, a file's name
+#: and a map of channels.
 LONGEST_NAME = 200
 LONGEST_NOTE = 4000
+LONGEST_REASON = 500
 LONGEST_DIAGNOSIS_ID = 64
 LONGEST_FILENAME = 255
 LONGEST_MAP = 4000

@@ -10,6 +10,10 @@ ClutchId = Annotated[str, Field(description="The clutch's name")]
 RunId = Annotated[str, Field(description="The run's name")]
 DiagnosisId = Annotated[str, Field(description="The diagnosis' name")]
 Quantity = Annotated[str | None, Field(description="Rows of this quantity only")]
+State = Annotated[
+    Literal["accepted", "held", "withdrawn"] | None, Field(description="Runs in this state only; left out, all")
+]
+Archived = Annotated[bool, Field(description="The archived clutches instead of those in use")]
 
 # --- of a posted file: what a JSON run has in fields ---
 

@@ -22,6 +22,8 @@ from storage.keys import KeyRow
 
 Scope = Literal["read", "ingest", "admin"]
 SCOPES: tuple[Scope, ...] = get_args(Scope)
+#: The caller's name where no keys are configured.
+LOCAL = "local"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,12 +46,12 @@ def make_key(scope: Scope, note: str, *, created_at: str) -> tuple[str, KeyRow]:
     return text, row
 
 
-def authorise(database: Database, caller: Caller, scope: Scope) -> None:
-    """Let the caller pass, or raise UnauthorizedError or ForbiddenError."""
+def authorise(database: Database, caller: Caller, scope: Scope) -> str:
+    """Let the caller pass and return its name, or raise UnauthorizedError or ForbiddenError."""
     with database.reading() as connection:
         if not keys.any_active(connection):
             _require_loopback(caller)
-            return
+            return LOCAL
         scheme, _, text = (caller.authorization or "").partition(" ")
         if scheme.lower() != "bearer" or not text:
             raise UnauthorizedError("send a key as: Authorization: Bearer KEY")
@@ -58,6 +60,7 @@ def authorise(database: Database, caller: Caller, scope: Scope) -> None:
         raise UnauthorizedError("the key is not known, or was revoked")
     if key.scope not in SCOPES[SCOPES.index(scope) :]:
         raise ForbiddenError(f"this needs the scope {scope}, the key has {key.scope}")
+    return f"key:{key.key_id} {key.note}".rstrip()
 
 
 def _digest(text: str) -> str:
@@ -111,10 +114,16 @@ def allowed(scope: Scope) -> Callable[[Request], Context]:
     def check(request: Request) -> Context:
         context = context_of(request)
         _refuse_unknown_arguments(request)
-        authorise(context.database, caller_of(request), scope)
+        request.state.caller = authorise(context.database, caller_of(request), scope)
         return context
 
     return check
+
+
+def name_of_caller(request: Request) -> str:
+    """Who sent a request that was allowed, as the audit trail names it: a key's id and note, or `local`."""
+    name: str = request.state.caller
+    return name
 
 
 #: Tables and short lists are answered whole, and take the arguments of a list.

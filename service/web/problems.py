@@ -16,6 +16,7 @@ from service.errors import (
     ForbiddenError,
     InvalidError,
     NotFoundError,
+    NotPossibleNowError,
     ServiceError,
     TooLargeError,
     UnauthorizedError,
@@ -130,4 +131,5 @@ def _described(title: str) -> dict[str, Any]:
 
 
 READING = described(NotFoundError)
+CHANGING = described(NotFoundError, NotPossibleNowError, TooLargeError, UnsupportedMediaTypeError)
 SENDING = described(NotFoundError, ConflictError, TooLargeError, UnsupportedMediaTypeError)

@@ -1,7 +1,7 @@
 """A client of the service: it waits while the service is away or busy, and raises what the service refuses."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -46,6 +46,20 @@ class Service:
     def put(self, path: str, body: bytes) -> dict[str, Any]:
         """The answer to a JSON body that replaces what is at `path`; raises as `post` does."""
         return self._answer("PUT", path, content=body, headers=JSON)
+
+    def patch(self, path: str, body: bytes) -> dict[str, Any]:
+        """The answer to a JSON body that changes what is at `path`; raises as `post` does."""
+        return self._answer("PATCH", path, content=body, headers=JSON)
+
+    def pages(self, path: str, **params: Any) -> Iterator[dict[str, Any]]:
+        """The items of a list, page by page; raises as `post` does."""
+        cursor: dict[str, str] = {}
+        while True:
+            page = self.get(path, **params, **cursor)
+            yield from page["items"]
+            if page["next"] is None:
+                return
+            cursor = {"cursor": page["next"]}
 
     def post_file(self, path: str, file: Path, parameters: Mapping[str, str]) -> dict[str, Any]:
         """The answer to a run's file; raises as `post` does."""

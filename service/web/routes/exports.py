@@ -9,7 +9,7 @@ from fastapi.responses import Response
 from service.queries import degradation, fleet_priors, remaining_life, runs, scores, series, stribeck, surfaces
 from service.schemas.curves import LoopItem, SeriesItem
 from service.schemas.life import Method
-from service.schemas.parameters import ClutchId, Quantity
+from service.schemas.parameters import ClutchId, Quantity, State
 from service.web.answers import clutch_table, from_cursor, page, table
 from service.web.auth import Reader
 from service.web.context import AtCycles, Cursor, Limit, PressureBar
@@ -26,13 +26,18 @@ def _items(payload: Mapping[str, Any]) -> Any:
 
 @router.get("/runs.csv", response_class=Response, responses=READING)
 def list_runs_csv(
-    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = MOST_ITEMS, cursor: Cursor = None
+    request: Request,
+    context: Reader,
+    clutch_id: ClutchId,
+    state: State = None,
+    limit: Limit = MOST_ITEMS,
+    cursor: Cursor = None,
 ) -> Response:
     """Receipts by cycles as CSV; warnings and fits are counted."""
     after = from_cursor(cursor)
 
     def make() -> object:
-        return page(*runs.page(context.database, clutch_id, limit=limit, after=after))
+        return page(*runs.page(context.database, clutch_id, limit=limit, after=after, state=state))
 
     return clutch_table(
         request,
@@ -42,9 +47,26 @@ def list_runs_csv(
         make,
         lambda payload: runs.rows(_items(payload)),
         runs.COLUMNS,
+        state,
         limit,
         after,
     )
+
+
+@router.get("/changes.csv", response_class=Response, responses=READING)
+def list_changes_csv(
+    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = MOST_ITEMS, cursor: Cursor = None
+) -> Response:
+    """The audit trail as CSV, newest first; what changed is JSON."""
+    after = from_cursor(cursor)
+
+    def make() -> object:
+        return page(*runs.trail(context.database, clutch_id, limit=limit, after=after))
+
+    return clutch_table(
+        request, context, clutch_id, "changes", make, lambda payload: runs.trail_rows(_items(payload)),
+        runs.TRAIL_COLUMNS, limit, after,
+    )  # fmt: skip
 
 
 @router.get("/remaining-useful-life.csv", response_class=Response, responses=READING)

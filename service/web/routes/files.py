@@ -24,7 +24,7 @@ from service.schemas.parameters import (
 )
 from service.schemas.run import Receipt
 from service.web.answers import JSON_TYPE, now, to_json
-from service.web.auth import Ingester
+from service.web.auth import Ingester, name_of_caller
 from service.web.context import Context
 from service.web.problems import SENDING
 from service.workflows.ingest_run import ingest
@@ -64,7 +64,9 @@ async def post_run_file(
         path = Path(folder) / "run"
         filename = await _save(request, path, filename)
         parameters = {"kind": kind, "cycles": cycles, "mapping": map, "run_id": run_id, "origin": origin}
-        receipt, new = await run_in_threadpool(_ingest, context, clutch_id, path, filename, started_at, parameters)
+        receipt, new = await run_in_threadpool(
+            _ingest, context, clutch_id, path, filename, started_at, parameters, name_of_caller(request)
+        )
     headers = {"Location": f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"}
     return Response(content=to_json(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
 
@@ -87,7 +89,13 @@ async def _save(request: Request, path: Path, filename: str) -> str:
 
 
 def _ingest(
-    context: Context, clutch_id: str, path: Path, filename: str, started_at: datetime | None, parameters: dict[str, Any]
+    context: Context,
+    clutch_id: str,
+    path: Path,
+    filename: str,
+    started_at: datetime | None,
+    parameters: dict[str, Any],
+    by: str,
 ) -> tuple[dict[str, Any], bool]:
     # The run is named by none here, so that its columns can go when they are encoded.
     return ingest(
@@ -95,4 +103,5 @@ def _ingest(
         clutch_id,
         read_file_run(path, filename=filename, started_at=started_at, **parameters),
         received_at=now(),
+        by=by,
     )
