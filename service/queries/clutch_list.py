@@ -8,7 +8,7 @@ from sqlalchemy import Connection
 from service import records
 from service.lives.assumptions import BASELINE
 from service.lives.payloads import SUMMARY
-from storage import clutches, verdicts
+from storage import clutches, runs, verdicts
 from storage.clutches import ClutchRow
 from storage.engine.database import Database
 from storage.verdicts import VerdictRow
@@ -36,7 +36,8 @@ def page(
 def _described(connection: Connection, rows: Sequence[ClutchRow]) -> list[dict[str, Any]]:
     """Clutches as they go out."""
     newest = verdicts.newest(connection, [row.clutch_id for row in rows])
-    return [_item(row, _latest(connection, row, newest.get(row.clutch_id))) for row in rows]
+    held = runs.held(connection)
+    return [_item(row, held.get(row.clutch_id, 0), _latest(connection, row, newest.get(row.clutch_id))) for row in rows]
 
 
 def _latest(connection: Connection, row: ClutchRow, verdict: VerdictRow | None) -> dict[str, Any] | None:
@@ -54,12 +55,13 @@ def _latest(connection: Connection, row: ClutchRow, verdict: VerdictRow | None) 
     }
 
 
-def _item(row: ClutchRow, diagnosis: dict[str, Any] | None) -> dict[str, Any]:
+def _item(row: ClutchRow, held: int, diagnosis: dict[str, Any] | None) -> dict[str, Any]:
     return records.record(row).model_dump(mode="json") | {
         "archived": row.archived,
         "created_at": row.created_at,
         "revision": row.revision,
         "runs": row.summary.get("runs", 0),
+        "held": held,
         "summary": {name: (_BEFORE | row.summary)[name] for name in SUMMARY} if row.summary else None,
         "recent": row.summary.get("recent"),
         "diagnosis": diagnosis,
