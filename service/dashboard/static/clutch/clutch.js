@@ -60,43 +60,72 @@ async function poll() {
   }
 }
 
+/**
+ * @param {ClutchOut} clutch
+ * @returns {Answers}
+ */
+const nothingOf = (clutch) => ({
+  clutch,
+  life: null,
+  items: [],
+  predictions: [],
+  tests: [],
+  loops: [],
+  runs: [],
+  events: [],
+});
+
 /** @param {ClutchOut} clutch */
 async function refresh(clutch) {
-  /** @type {Answers} */
-  const nothing = { clutch, life: null, items: [], predictions: [], tests: [], loops: [], runs: [], events: [] };
-  stored.showArchived(clutch);
-  if (clutch.runs === 0) {
-    shown = nothing;
+  store.showArchived(clutch);
+  if (shown === null || clutch.runs === 0) {
+    shown = nothingOf(clutch);
     drawHead();
+  }
+  if (clutch.runs === 0) {
     await showUncounted();
     return;
   }
-  if (shown === null) {
-    shown = nothing;
-    drawHead();
-  }
-  const { warned, ...first } = await readLife(); // what the first chart needs comes first
-  const { board, diagnosis } = begin();
-  shown = { ...shown, clutch, ...first };
-  drawHead();
-  diagnosis.setModel(first.life.model);
-  board.life({ ...shown, ...first });
-  await diagnosis.poll();
-  drawHead();
-  const rest = await readRest();
-  shown = { clutch, ...first, ...rest, runs: rest.runs.filter(counts) };
-  await stored.show({ ...rest, warned });
-  if (rest.events.length > 0) board.life({ ...shown, ...first });
+  // what the first chart needs and what waits for someone come first, neither after the other
+  const [{ board, diagnosis, warned, first }, stored] = await Promise.all([showLife(clutch), showStored()]);
+  const { tests, loops } = await readTests();
+  const runs = stored.filter(counts);
+  const events = runs.filter((run) => run.kind === "maintenance");
+  shown = { clutch, ...first, tests, loops, runs, events };
+  store.showWarnings({ runs: stored, tests, warned });
+  if (events.length > 0) board.life({ ...shown, ...first });
   await board.rest(shown);
   makeReport(byId("report"), shown, board, diagnosis.latest);
 }
 
+/** @param {ClutchOut} clutch */
+async function showLife(clutch) {
+  const { warned, ...first } = await readLife();
+  const { board, diagnosis } = begin();
+  const now = { ...(shown ?? nothingOf(clutch)), clutch, ...first };
+  shown = now;
+  drawHead();
+  diagnosis.setModel(first.life.model);
+  board.life(now);
+  await diagnosis.poll();
+  drawHead();
+  return { board, diagnosis, warned, first };
+}
+
+/** The runs, whether they count or not. */
+async function showStored() {
+  /** @type {{ items: Receipt[] }} */
+  const { items } = await readAll(`${PATH}/runs?limit=1000`);
+  if (items.length > 0) byId("runs").hidden = false;
+  await store.show(items);
+  return items;
+}
+
 /** A clutch without a run that counts: what to do first, and the runs that are held or withdrawn. */
 async function showUncounted() {
-  /** @type {{ items: Receipt[] }} */
-  const { items: runs } = await readAll(`${PATH}/runs?limit=1000`);
-  showSections(runs.length > 0 ? ["runs"] : []);
-  await stored.show({ runs, tests: [], warned: [] });
+  showSections([]);
+  store.showWarnings({ runs: [], tests: [], warned: [] });
+  await showStored();
   if (!document.getElementById("first")) byId("archived").before(h("div", { id: "first" }, firstRun(ID)));
 }
 
@@ -124,16 +153,10 @@ async function readLife() {
   return { life: life.body, items: degradation.body.items, predictions, warned };
 }
 
-/** Tests, loops, runs and events. */
-async function readRest() {
-  /** @type {[{ items: StribeckItem[] }, { items: LoopItem[] }, { items: Receipt[] }]} */
-  const [tests, loops, runs] = await Promise.all([
-    readAll(`${PATH}/stribeck?limit=1000`),
-    readAll(`${PATH}/loops`),
-    readAll(`${PATH}/runs?limit=1000`),
-  ]);
-  const events = runs.items.filter((run) => run.kind === "maintenance" && counts(run));
-  return { tests: tests.items, loops: loops.items, runs: runs.items, events };
+async function readTests() {
+  /** @type {[{ items: StribeckItem[] }, { items: LoopItem[] }]} */
+  const [tests, loops] = await Promise.all([readAll(`${PATH}/stribeck?limit=1000`), readAll(`${PATH}/loops`)]);
+  return { tests: tests.items, loops: loops.items };
 }
 
 /** The page's parts, made when there is first something to put into them. */
@@ -156,7 +179,7 @@ function drawHead() {
   const place = byId("head");
   if (place.dataset.shown === text) return;
   place.dataset.shown = text;
-  place.replaceChildren(...head(clutch, life, state, () => stored.archive(true)));
+  place.replaceChildren(...head(clutch, life, state, () => store.archive(true)));
 }
 
 function showUnregistered() {
@@ -171,8 +194,7 @@ byId("print").addEventListener("click", () => {
   if (shown && parts) makeReport(byId("report"), shown, parts.board, parts.diagnosis.latest);
   print();
 });
-/** @type {Stored} */
-const stored = new Stored(ID, () => live.now());
+const store = new Stored(ID, () => live.now());
 const live = new Live(withKey(poll), liveBar(byId("live")), INTERVAL);
 sender(byId("send"), { clutch: ID, clutches: () => [], sent: () => live.now() });
 live.start();

@@ -47,13 +47,17 @@ export class Stored {
   }
 
   /** @param {{ runs: Receipt[], tests: StribeckItem[], warned: Warned[] }} answers */
-  async show({ runs, tests, warned }) {
+  showWarnings(answers) {
+    const odd = lifeWarnings(answers);
+    fill("warnings", odd.length > 0 ? warningsView(odd, this.reveal) : null);
+  }
+
+  /** @param {Receipt[]} runs by cycles */
+  async show(runs) {
     const held = runs.filter((run) => run.state === "held").reverse();
-    const odd = lifeWarnings({ warned, tests, runs });
     fill("held", held.length > 0 ? heldView(held, this) : null);
     if (!this.shown && location.hash === "#held") byId("held").scrollIntoView();
     this.shown = true;
-    fill("warnings", odd.length > 0 ? warningsView(odd, this.reveal) : null);
     this.list.show(runs);
     await this.audit.show(runs);
   }
