@@ -15,6 +15,7 @@ from sqlalchemy import (
     Table,
     Text,
     UniqueConstraint,
+    text,
 )
 
 metadata = MetaData()
@@ -57,6 +58,7 @@ run = Table(
     Column("doubts", Text, nullable=False, server_default="[]"),
     UniqueConstraint("clutch_id", "run_id", name="run_once_per_clutch"),
     Index("run_in_order", "clutch_id", "cycles", "run_id"),
+    Index("run_held", "clutch_id", sqlite_where=text("state = 'held'")),
 )
 
 channel = Table(

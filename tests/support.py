@@ -8,7 +8,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -96,12 +96,23 @@ def _run(arguments: list[str], environment: dict[str, str]) -> None:
 
 
 class Server:
-    """A service in a process of its own, over a real socket; `loaded`: forked, where its start and memory are no matter."""
+    """A service in a process of its own, over a real socket; `loaded`: forked, where its start and memory are no matter.
 
-    def __init__(self, database: Path, *, port: int | None = None, loaded: bool = False) -> None:
+    `environment`: variables beside those of the tests.
+    """
+
+    def __init__(
+        self,
+        database: Path,
+        *,
+        port: int | None = None,
+        loaded: bool = False,
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
         self.database = database
         self.port = port or free_port()
         self.loaded = loaded
+        self.environment = dict(environment or {})
         self.url = f"http://127.0.0.1:{self.port}"
         self.process: subprocess.Popen[bytes] | BaseProcess | None = None
 
@@ -109,13 +120,14 @@ class Server:
         """Start and wait until it is ready."""
         arguments = ["serve", "--port", str(self.port), "--log-level", "warning"]
         arguments += ["--database", f"sqlite:///{self.database}"]
+        environment = os.environ | self.environment
         if self.loaded:
             # a process that is forked off another's may have none of its own
-            environment = os.environ | {"CLUTCHLIFE_WORKERS": "0"}
+            environment |= {"CLUTCHLIFE_WORKERS": "0"}
             self.process = _LOADED.Process(target=_run, args=(arguments, environment), daemon=True)
             self.process.start()
         else:
-            self.process = subprocess.Popen([sys.executable, "-m", "service.cli.main", *arguments])
+            self.process = subprocess.Popen([sys.executable, "-m", "service.cli.main", *arguments], env=environment)
         wait_until_ready(self.url, lambda: self.exit_code() is not None)
 
     @property
@@ -149,9 +161,9 @@ class Server:
 
 
 @contextmanager
-def serving(database: Path, *, loaded: bool = False) -> Iterator[Server]:
+def serving(database: Path, *, loaded: bool = False, environment: Mapping[str, str] | None = None) -> Iterator[Server]:
     """A running service on that database, stopped at the end whatever happens."""
-    server = Server(database, loaded=loaded)
+    server = Server(database, loaded=loaded, environment=environment)
     server.start()
     try:
         yield server

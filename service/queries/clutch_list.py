@@ -11,7 +11,7 @@ from service.lists import Place, to_cursor
 from service.lives.assumptions import BASELINE
 from service.lives.payloads import SUMMARY
 from service.queries.cache import AnswerCache, to_json
-from storage import clutches, verdicts
+from storage import clutches, runs, verdicts
 from storage.clutches import ClutchRow
 from storage.engine.database import Database
 from storage.verdicts import VerdictRow
@@ -23,8 +23,8 @@ _BEFORE = {"model": dict(BASELINE)}
 def look_up(database: Database, clutch_id: str) -> dict[str, Any]:
     """A clutch; raises NotFoundError."""
     with database.reading() as connection:
-        ((row, verdict),) = _with_verdicts(connection, [records.clutch(connection, clutch_id)])
-    return _item(row, verdict)
+        ((row, held, verdict),) = _shown(connection, [records.clutch(connection, clutch_id)])
+    return _item(row, held, verdict)
 
 
 def page(
@@ -33,7 +33,7 @@ def page(
     """Clutches in use, or the archived ones, the fewest remaining cycles first, and where the next page starts."""
     with database.reading() as connection:
         rows = clutches.page(connection, limit=limit + 1, after=after, archived=archived)
-        items = [_item(row, verdict) for row, verdict in _with_verdicts(connection, rows[:limit])]
+        items = [_item(*clutch) for clutch in _shown(connection, rows[:limit])]
     return items, _next(rows, limit)
 
 
@@ -43,10 +43,10 @@ def page_as_json(
     """The same as JSON; each clutch's item is made once for its revision and verdict."""
     with database.reading() as connection:
         rows = clutches.page(connection, limit=limit + 1, after=after, archived=archived)
-        found = _with_verdicts(connection, rows[:limit])
+        clutches_shown = _shown(connection, rows[:limit])
     items = [
-        cache.answer(("clutch", row.clutch_id, row.revision, to_json(verdict)), partial(_item_as_json, row, verdict))
-        for row, verdict in found
+        cache.answer(("clutch", row.clutch_id, row.revision, to_json(verdict)), partial(_as_json, row, held, verdict))
+        for row, held, verdict in clutches_shown
     ]
     following = to_json(to_cursor(_next(rows, limit)))
     return b'{"items":[' + b",".join(item.body for item in items) + b'],"next":' + following + b"}"
@@ -56,14 +56,15 @@ def _next(rows: Sequence[ClutchRow], limit: int) -> Place | None:
     return (rows[limit - 1].rank, rows[limit - 1].clutch_id) if len(rows) > limit else None
 
 
-def _item_as_json(row: ClutchRow, verdict: dict[str, Any] | None) -> bytes:
-    return to_json(_item(row, verdict))
+def _as_json(row: ClutchRow, held: int, verdict: dict[str, Any] | None) -> bytes:
+    return to_json(_item(row, held, verdict))
 
 
-def _with_verdicts(connection: Connection, rows: Sequence[ClutchRow]) -> list[tuple[ClutchRow, dict[str, Any] | None]]:
-    """Clutches, each with its newest finished diagnosis as it goes out."""
+def _shown(connection: Connection, rows: Sequence[ClutchRow]) -> list[tuple[ClutchRow, int, dict[str, Any] | None]]:
+    """Clutches, each with the number of its held runs and its newest finished diagnosis as it goes out."""
     newest = verdicts.newest(connection, [row.clutch_id for row in rows])
-    return [(row, _latest(connection, row, newest.get(row.clutch_id))) for row in rows]
+    held = runs.held(connection)
+    return [(row, held.get(row.clutch_id, 0), _latest(connection, row, newest.get(row.clutch_id))) for row in rows]
 
 
 def _latest(connection: Connection, row: ClutchRow, verdict: VerdictRow | None) -> dict[str, Any] | None:
@@ -81,12 +82,13 @@ def _latest(connection: Connection, row: ClutchRow, verdict: VerdictRow | None) 
     }
 
 
-def _item(row: ClutchRow, diagnosis: dict[str, Any] | None) -> dict[str, Any]:
+def _item(row: ClutchRow, held: int, diagnosis: dict[str, Any] | None) -> dict[str, Any]:
     return records.record(row).model_dump(mode="json") | {
         "archived": row.archived,
         "created_at": row.created_at,
         "revision": row.revision,
         "runs": row.summary.get("runs", 0),
+        "held": held,
         "summary": {name: (_BEFORE | row.summary)[name] for name in SUMMARY} if row.summary else None,
         "recent": row.summary.get("recent"),
         "diagnosis": diagnosis,

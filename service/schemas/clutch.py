@@ -213,6 +213,7 @@ class ClutchOut(Answer):
     created_at: str = Field(description="When it was registered; UTC, ISO 8601")
     revision: Revision
     runs: int = Field(description="Number of runs that count; those that are held or were withdrawn do not")
+    held: int = Field(description="Number of runs that are held: they wait to be confirmed, corrected or withdrawn")
     summary: ClutchSummary | None = Field(description="Health and remaining life; null before the first run")
     recent: Recent | None = Field(description="The latest past; null before the first run")
     diagnosis: LatestDiagnosis | None = Field(description="The newest finished diagnosis; null without one")

@@ -25,15 +25,15 @@ OPEN_FIRST = re.compile(
 SENTENCE = re.compile(r"[.!?](?:\s|$)")
 
 
-def folders() -> list[Path]:
-    """All folders of the product that hold Python modules or scripts."""
-    files = [path for package in PACKAGES for suffix in ("py", "js") for path in (ROOT / package).rglob(f"*.{suffix}")]
-    return sorted({path.parent for path in files})
+def folders(*places: str) -> list[Path]:
+    """All folders below those places that hold Python modules or scripts."""
+    files = [path for place in places for suffix in ("py", "js") for path in (ROOT / place).rglob(f"*.{suffix}")]
+    return sorted({path.parent for path in files if "node_modules" not in path.parts})
 
 
 def test_a_folder_holds_few_modules() -> None:
     wrong = []
-    for folder in folders():
+    for folder in folders(*PACKAGES, "tests"):
         shown = folder.relative_to(ROOT).as_posix()
         names = [path.name for path in folder.iterdir() if path.suffix in {".py", ".js"} and path.name != "__init__.py"]
         if len(names) > MOST_MODULES and shown not in CATALOGUES:

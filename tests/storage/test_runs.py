@@ -3,6 +3,7 @@
 from dataclasses import asdict, replace
 
 import pytest
+from sqlalchemy import text
 from sqlalchemy.exc import IntegrityError
 
 from storage import clutches, runs
@@ -90,3 +91,19 @@ def test_a_receipt_is_replaced(database: Database) -> None:
 def test_an_unknown_run_is_named(database: Database) -> None:
     with database.writing() as connection, pytest.raises(LookupError, match="run 99"):
         runs.set_results(connection, 99, {}, {}, "0.1.0")
+
+
+def test_held_runs_are_counted_by_clutch_from_an_index_of_their_own(database: Database) -> None:
+    states = ["accepted", "held", "withdrawn", "held"]
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+        clutches.insert(connection, clutch_row("other"))
+        assert runs.held(connection) == {}
+        for number, state in enumerate(states):
+            runs.insert(connection, replace(new_run(number), state=state))
+        runs.insert(connection, replace(new_run(9), clutch_id="other", state="withdrawn"))
+    with database.reading() as connection:
+        assert runs.held(connection) == {CLUTCH: 2}
+        plan = [row.detail for row in connection.execute(text(f"EXPLAIN QUERY PLAN {runs._held}"))]
+    assert len(plan) == 1
+    assert "USING COVERING INDEX run_held" in plan[0]

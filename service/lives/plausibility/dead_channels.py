@@ -55,7 +55,11 @@ def _not_following(rows: Columns, analysis: Analysis) -> list[Notice]:
         return []
     for level in analysis.fits:
         static = float(level.fit.parameters.static_torque)
-        if len(analysis.fits) == 1 and level.fit.points >= criteria.FEWEST_ROWS and level.fit.rmse > criteria.SINGLE_LEVEL_RMSE * max(static, 1e-12):
+        if (
+            len(analysis.fits) == 1
+            and level.fit.points >= criteria.FEWEST_ROWS
+            and level.fit.rmse > criteria.SINGLE_LEVEL_RMSE * max(static, 1e-12)
+        ):
             message = (
                 f"pressure stands at {high / PASCALS_PER_BAR:.3g} bar and torque scatters by {level.fit.rmse:.3g} Nm about one "
                 "curve, as if pressure had varied: is its sensor connected?"

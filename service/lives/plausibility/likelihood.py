@@ -140,7 +140,9 @@ class History:
             epoch = (shifts <= at[:, None]).sum(axis=1).astype(np.float64)
             course = (self.tilts if of_tilt else self.courses)[index]
             made = course.predict(np.maximum(at - origin, 0.0), epoch)
-            self._predicted.update({(index, value, of_tilt): (made, column) for column, value in enumerate(wanted_here)})
+            self._predicted.update(
+                {(index, value, of_tilt): (made, column) for column, value in enumerate(wanted_here)}
+            )
 
     def _lives_at(self, cycles: float) -> list[int]:
         """The life to which cycles belong, the later one first where a rebuild was made at them."""
@@ -205,9 +207,7 @@ def _tilts(life: Life) -> list[Measurement]:
 def _disorder(dated: Sequence[tuple[float, float]]) -> float:
     """Probability that a run of this rig is out of order in time."""
     wrong = sum(
-        1
-        for (before, earlier), (after, later) in itertools.pairwise(dated)
-        if before < after - 0.5 and earlier > later
+        1 for (before, earlier), (after, later) in itertools.pairwise(dated) if before < after - 0.5 and earlier > later
     )
     return (wrong + criteria.OUT_OF_ORDER) / (len(dated) + 1.0)
 

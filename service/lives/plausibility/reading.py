@@ -31,7 +31,9 @@ class Columns:
             np.abs(self.speed) >= 0.02 * fastest
         )
         oil = None if self.oil_temperature is None else self.oil_temperature[rows]
-        return Columns(pressure=self.pressure[rows], speed=self.speed[rows], torque=self.torque[rows], oil_temperature=oil)
+        return Columns(
+            pressure=self.pressure[rows], speed=self.speed[rows], torque=self.torque[rows], oil_temperature=oil
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +68,9 @@ class Reading:
         )
 
 
-def _scaled(values: Mapping[float, tuple[float, float]], pressure: float, torque: float) -> dict[float, tuple[float, float]]:
+def _scaled(
+    values: Mapping[float, tuple[float, float]], pressure: float, torque: float
+) -> dict[float, tuple[float, float]]:
     factor = pressure / torque
     return {level / pressure: (cof * factor, sd * factor) for level, (cof, sd) in values.items()}
 
@@ -75,7 +79,9 @@ def columns_of(run: IncomingRun, analysis: Analysis) -> Columns | None:
     """The rows of a run: the plateaus of a stationary test, the samples of another; None for a run without channels."""
     rows = analysis.plateaus
     if rows is not None:
-        return Columns(pressure=rows.pressure, speed=rows.speed, torque=rows.torque, oil_temperature=rows.oil_temperature)
+        return Columns(
+            pressure=rows.pressure, speed=rows.speed, torque=rows.torque, oil_temperature=rows.oil_temperature
+        )
     if not run.channels:
         return None
     samples = SampledChannels(run.channels)

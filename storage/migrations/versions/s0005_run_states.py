@@ -12,6 +12,7 @@ def upgrade() -> None:
     op.add_column("run", sa.Column("state", sa.Text, nullable=False, server_default="accepted"))
     op.add_column("run", sa.Column("sent_cycles", sa.REAL))
     op.add_column("run", sa.Column("doubts", sa.Text, nullable=False, server_default="[]"))
+    op.create_index("run_held", "run", ["clutch_id"], sqlite_where=sa.text("state = 'held'"))
     op.add_column("clutch", sa.Column("archived", sa.Integer, nullable=False, server_default="0"))
     op.add_column("clutch", sa.Column("registered", sa.Text))
     op.create_table(

@@ -1,7 +1,7 @@
 // @ts-check
 // The page of one clutch: its answers of the API are read when they change, and shown in sections that are drawn when seen.
-// Open this file first, then head.js (its state in one look), board.js (its charts and their choices), runs.js (its runs)
-// and report.js (the printed page).
+// Open this file first, then head.js (its state in one look), board.js (its charts and their choices), stored.js (its runs,
+// warnings and changes) and report.js (the printed page).
 
 import { Diagnosis } from "../diagnosis/diagnosis.js";
 import { sender } from "../sending/sending.js";
@@ -15,9 +15,10 @@ import { firstRun } from "../shared/welcome.js";
 import { Board } from "./board.js";
 import { head } from "./head.js";
 import { makeReport } from "./report.js";
-import { showRuns } from "./runs.js";
+import { counts } from "./states.js";
+import { Stored } from "./stored.js";
 
-/** @import { ClutchOut, DegradationItem, LoopItem, Receipt, RemainingLife, SeriesItem, StribeckItem } from "../shared/types.js" */
+/** @import { ClutchOut, DegradationItem, LoopItem, Receipt, RemainingLife, SeriesItem, StribeckItem, Warned } from "../shared/types.js" */
 /** @import { Answers } from "./board.js" */
 
 const ID = decodeURIComponent(location.pathname.split("/").at(-1) ?? "");
@@ -59,42 +60,87 @@ async function poll() {
   }
 }
 
+/**
+ * @param {ClutchOut} clutch
+ * @returns {Answers}
+ */
+const nothingOf = (clutch) => ({
+  clutch,
+  life: null,
+  items: [],
+  predictions: [],
+  tests: [],
+  loops: [],
+  runs: [],
+  events: [],
+});
+
 /** @param {ClutchOut} clutch */
 async function refresh(clutch) {
-  /** @type {Answers} */
-  const nothing = { clutch, life: null, items: [], predictions: [], tests: [], loops: [], runs: [], events: [] };
-  if (clutch.runs === 0) {
-    shown = nothing;
+  store.showArchived(clutch);
+  if (shown === null || clutch.runs === 0) {
+    shown = nothingOf(clutch);
     drawHead();
-    if (!document.getElementById("first")) byId("head").after(h("div", { id: "first" }, firstRun(ID)));
+  }
+  if (clutch.runs === 0) {
+    await showUncounted();
     return;
   }
-  if (shown === null) {
-    shown = nothing;
-    drawHead();
-  }
-  const first = await readLife(); // what the first chart needs comes first
-  const { board, diagnosis } = begin();
-  shown = { ...shown, clutch, ...first };
-  drawHead();
-  diagnosis.setModel(first.life.model);
-  board.life({ ...shown, ...first });
-  await diagnosis.poll();
-  drawHead();
-  const rest = await readRest();
-  shown = { clutch, ...first, ...rest };
-  showRuns(within("runs", ".body"), rest.runs, ID);
-  if (rest.events.length > 0) board.life({ ...shown, ...first });
+  // what the first chart needs and what waits for someone come first, neither after the other
+  const [{ board, diagnosis, warned, first }, stored] = await Promise.all([showLife(clutch), showStored()]);
+  const { tests, loops } = await readTests();
+  const runs = stored.filter(counts);
+  const events = runs.filter((run) => run.kind === "maintenance");
+  shown = { clutch, ...first, tests, loops, runs, events };
+  store.showWarnings({ runs: stored, tests, warned });
+  if (events.length > 0) board.life({ ...shown, ...first });
   await board.rest(shown);
   makeReport(byId("report"), shown, board, diagnosis.latest);
 }
 
+/** @param {ClutchOut} clutch */
+async function showLife(clutch) {
+  const { warned, ...first } = await readLife();
+  const { board, diagnosis } = begin();
+  const now = { ...(shown ?? nothingOf(clutch)), clutch, ...first };
+  shown = now;
+  drawHead();
+  diagnosis.setModel(first.life.model);
+  board.life(now);
+  await diagnosis.poll();
+  drawHead();
+  return { board, diagnosis, warned, first };
+}
+
+/** The runs, whether they count or not. */
+async function showStored() {
+  /** @type {{ items: Receipt[] }} */
+  const { items } = await readAll(`${PATH}/runs?limit=1000`);
+  if (items.length > 0) byId("runs").hidden = false;
+  await store.show(items);
+  return items;
+}
+
+/** A clutch without a run that counts: what to do first, and the runs that are held or withdrawn. */
+async function showUncounted() {
+  showSections([]);
+  store.showWarnings({ runs: [], tests: [], warned: [] });
+  await showStored();
+  if (!document.getElementById("first")) byId("archived").before(h("div", { id: "first" }, firstRun(ID)));
+}
+
+/** @param {string[]} names */
+function showSections(names) {
+  for (const section of SECTIONS) byId(section).hidden = !names.includes(section);
+  byId("sections").hidden = names.length < SECTIONS.length;
+}
+
 /** Remaining life, degradation and the earlier predictions. */
 async function readLife() {
-  /** @type {[{ body: RemainingLife }, { items: DegradationItem[] }, { items: SeriesItem[] }, { items: SeriesItem[] }]} */
+  /** @type {[{ body: RemainingLife }, { body: { items: DegradationItem[], warnings: Warned[] } }, { items: SeriesItem[] }, { items: SeriesItem[] }]} */
   const [life, degradation, remaining, cof] = await Promise.all([
     read(`${PATH}/remaining-useful-life`),
-    readAll(`${PATH}/degradation`),
+    read(`${PATH}/degradation`),
     readAll(`${PATH}/series?quantity=remaining_cycles`),
     readAll(`${PATH}/series?quantity=mean_cof`),
   ]);
@@ -103,27 +149,21 @@ async function readLife() {
   const predictions = remaining.items.map((row) => {
     return { at: row.cycles, cof: cofAt.get(row.cycles) ?? null, remaining: row };
   });
-  return { life: life.body, items: degradation.items, predictions };
+  const warned = [...life.body.warnings, ...degradation.body.warnings];
+  return { life: life.body, items: degradation.body.items, predictions, warned };
 }
 
-/** Tests, loops, runs and events. */
-async function readRest() {
-  /** @type {[{ items: StribeckItem[] }, { items: LoopItem[] }, { items: Receipt[] }]} */
-  const [tests, loops, runs] = await Promise.all([
-    readAll(`${PATH}/stribeck?limit=1000`),
-    readAll(`${PATH}/loops`),
-    readAll(`${PATH}/runs?limit=1000`),
-  ]);
-  const events = runs.items.filter((run) => run.kind === "maintenance");
-  return { tests: tests.items, loops: loops.items, runs: runs.items, events };
+async function readTests() {
+  /** @type {[{ items: StribeckItem[] }, { items: LoopItem[] }]} */
+  const [tests, loops] = await Promise.all([readAll(`${PATH}/stribeck?limit=1000`), readAll(`${PATH}/loops`)]);
+  return { tests: tests.items, loops: loops.items };
 }
 
 /** The page's parts, made when there is first something to put into them. */
 function begin() {
-  if (parts !== null) return parts;
   document.getElementById("first")?.remove();
-  for (const section of SECTIONS) byId(section).hidden = false;
-  byId("sections").hidden = false;
+  showSections(SECTIONS);
+  if (parts !== null) return parts;
   const board = new Board(ID, fileName, (section) => within(section, ".charts"));
   const diagnosis = new Diagnosis(within("diagnosis", ".body"), ID, fileName, () => live.now());
   parts = { board, diagnosis };
@@ -139,7 +179,7 @@ function drawHead() {
   const place = byId("head");
   if (place.dataset.shown === text) return;
   place.dataset.shown = text;
-  place.replaceChildren(...head(clutch, life, state));
+  place.replaceChildren(...head(clutch, life, state, () => store.archive(true)));
 }
 
 function showUnregistered() {
@@ -154,6 +194,7 @@ byId("print").addEventListener("click", () => {
   if (shown && parts) makeReport(byId("report"), shown, parts.board, parts.diagnosis.latest);
   print();
 });
+const store = new Stored(ID, () => live.now());
 const live = new Live(withKey(poll), liveBar(byId("live")), INTERVAL);
-sender(byId("send"), { clutches: () => [ID], sent: () => live.now() });
+sender(byId("send"), { clutch: ID, clutches: () => [], sent: () => live.now() });
 live.start();

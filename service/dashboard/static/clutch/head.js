@@ -4,7 +4,7 @@
 import { h } from "../shared/dom.js";
 import { cycles, fixed, interval, percent, probability, withSd, words } from "../shared/format.js";
 import { healthBar } from "../shared/sparkline.js";
-import { stateIcon, STATES } from "../shared/state.js";
+import { heldText, stateIcon, STATES } from "../shared/state.js";
 
 /** @import { Content } from "../shared/dom.js" */
 /** @import { State } from "../shared/state.js" */
@@ -14,9 +14,10 @@ import { stateIcon, STATES } from "../shared/state.js";
  * @param {ClutchOut} clutch
  * @param {RemainingLife | null} life null before the first run
  * @param {State} state
+ * @param {() => unknown} archive asks whether the clutch is to be archived
  * @returns {HTMLElement[]}
  */
-export function head(clutch, life, state) {
+export function head(clutch, life, state, archive) {
   const simulated = clutch.origin === "simulated" && h("span", { class: "tag" }, "simulated");
   const title = h(
     "div",
@@ -28,8 +29,10 @@ export function head(clutch, life, state) {
       stateIcon(state.name),
       h("b", {}, STATES[state.name].word),
       h("span", { class: "quiet" }, state.why),
+      clutch.held > 0 && h("a", { href: "#held", class: "mark-held" }, heldText(clutch.held)),
     ),
     h("p", { class: "quiet" }, description(clutch)),
+    clutch.archived ? null : h("button", { type: "button", class: "small", onclick: archive }, "Archive …"),
   );
   return life === null ? [title] : [title, h("dl", { class: "tiles" }, tiles(clutch, life, state))];
 }

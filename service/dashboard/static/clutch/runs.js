@@ -1,77 +1,177 @@
 // @ts-check
-// Every run with its receipt and warnings, and what was done to the clutch, the latest first.
+// Every run with its state, its receipt and what can be done to it, the latest cycles first, page by page.
 
-import { fitTable, loopTable, warnings } from "../sending/receipt.js";
+import { doubtList, fitTable, loopTable, warnings } from "../sending/receipt.js";
 import { clutchPath, readText } from "../shared/api.js";
 import { h, saveText } from "../shared/dom.js";
 import { fixed, kindName, moment, words } from "../shared/format.js";
+import { buttons } from "./held.js";
+import { isCorrected, stateMark } from "./states.js";
 
 /** @import { Receipt } from "../shared/types.js" */
+/** @import { RunAction } from "./changes.js" */
 
-/** Runs that are listed at first. */
-const FIRST = 50;
-let all = false;
-/** @type {Set<string>} */
-const open = new Set();
+/** Runs on a page of the list. */
+const PAGE = 25;
 
-/**
- * Draw the list into `place`.
- * @param {HTMLElement} place
- * @param {Receipt[]} runs by cycles
- * @param {string} clutchId
- */
-export function showRuns(place, runs, clutchId) {
-  const latest = [...runs].reverse();
-  const shown = all ? latest : latest.slice(0, FIRST);
-  const more = latest.length - shown.length;
-  const warned = runs.filter((run) => run.warnings.length > 0).length;
-  const address = `${clutchPath(clutchId)}/runs.csv`;
-  /** @param {Event} event */
-  const save = async (event) => {
-    event.preventDefault(); // with a key a plain link would be refused: the file is fetched as the page fetches everything
-    saveText(`${clutchId}-runs.csv`, await readText(address), "text/csv");
-  };
-  const showAll = () => {
-    all = true;
-    showRuns(place, runs, clutchId);
-  };
-  const summary = `${runs.length} ${runs.length === 1 ? "run" : "runs"}, ${warned} with warnings. As a table: `;
-  place.replaceChildren(
-    h("p", { class: "quiet" }, summary, h("a", { href: address, onclick: save }, "CSV"), "."),
-    h(
-      "div",
-      { class: "runs" },
-      shown.map((run) => item(run)),
-    ),
-    more > 0 ? h("button", { type: "button", onclick: showAll }, `Show ${more} earlier`) : "",
-  );
-}
+export class RunList {
+  /**
+   * @param {HTMLElement} place
+   * @param {string} clutchId
+   * @param {{ act: (action: RunAction, run: Receipt) => unknown, undo: (run: Receipt) => unknown }} page
+   */
+  constructor(place, clutchId, page) {
+    this.place = place;
+    this.clutchId = clutchId;
+    this.page = page;
+    this.first = 0;
+    /** @type {Receipt[]} the latest first */
+    this.runs = [];
+    /** @type {Set<string>} */
+    this.open = new Set();
+  }
 
-/** @param {Receipt} run */
-function item(run) {
-  const inside = h("div", { class: "inside" });
-  const count = run.warnings.length;
-  const warned = count > 0 ? `${count} ${count === 1 ? "warning" : "warnings"}` : "";
-  const details = h(
-    "details",
-    { open: open.has(run.run_id) },
-    h(
-      "summary",
-      {},
-      h("span", { class: "at" }, `${fixed(run.cycles)} cycles`),
-      h("span", {}, nameOf(run)),
-      h("span", {}, resultOf(run)),
-      h("span", { class: count > 0 ? "warned" : "quiet" }, warned),
-      h("span", { class: "quiet" }, moment(run.started_at ?? run.received_at)),
-    ),
-    inside,
-  );
-  details.addEventListener("toggle", () => {
-    if (details.open) open.add(run.run_id);
-    else open.delete(run.run_id);
-    if (details.open && !inside.hasChildNodes()) inside.append(...receipt(run));
-  });
-  return details;
+  /** @param {Receipt[]} runs by cycles */
+  show(runs) {
+    const focused = this.focusedRun();
+    this.runs = [...runs].reverse();
+    this.draw();
+    if (focused !== null) this.summaryOf(focused)?.focus({ preventScroll: true });
+  }
+
+  /** The run whose part of the list has the focus, which drawing takes away. */
+  focusedRun() {
+    const inside = this.place.contains(document.activeElement) ? document.activeElement : null;
+    return inside?.closest("details")?.dataset.run ?? null;
+  }
+
+  /** @param {string} runId */
+  summaryOf(runId) {
+    const details = [...this.place.querySelectorAll("details")].find((element) => element.dataset.run === runId);
+    return details?.querySelector("summary") ?? null;
+  }
+
+  /**
+   * Show a run, opened.
+   * @param {string} runId
+   */
+  reveal(runId) {
+    const index = this.runs.findIndex((run) => run.run_id === runId);
+    if (index < 0) return;
+    this.first = PAGE * Math.floor(index / PAGE);
+    this.open.add(runId);
+    this.draw();
+    const summary = this.summaryOf(runId);
+    summary?.scrollIntoView({ block: "center" });
+    summary?.focus({ preventScroll: true });
+  }
+
+  draw() {
+    const { length } = this.runs;
+    if (this.first >= length) this.first = 0;
+    const listed = this.runs.slice(this.first, this.first + PAGE);
+    const address = `${clutchPath(this.clutchId)}/runs.csv`;
+    /** @param {Event} event */
+    const save = async (event) => {
+      event.preventDefault(); // with a key a plain link would be refused: the file is fetched as the page fetches everything
+      saveText(`${this.clutchId}-runs.csv`, await readText(address), "text/csv");
+    };
+    this.place.replaceChildren(
+      h(
+        "p",
+        { class: "quiet" },
+        `${this.summary()} As a table: `,
+        h("a", { href: address, onclick: save }, "CSV"),
+        ".",
+      ),
+      h(
+        "div",
+        { class: "runs" },
+        listed.map((run) => this.item(run)),
+      ),
+      length > PAGE ? this.pager() : "",
+    );
+  }
+
+  summary() {
+    const { runs } = this;
+    const warned = runs.filter((run) => run.warnings.length > 0).length;
+    const [held, withdrawn] = ["held", "withdrawn"].map((state) => runs.filter((run) => run.state === state).length);
+    const parts = [`${runs.length} ${runs.length === 1 ? "run" : "runs"}`, `${warned} with warnings`];
+    if (held > 0) parts.push(`${held} held`);
+    if (withdrawn > 0) parts.push(`${withdrawn} withdrawn`);
+    return `${parts.join(", ")}.`;
+  }
+
+  pager() {
+    const last = Math.min(this.first + PAGE, this.runs.length);
+    /** @type {(label: string, first: number) => HTMLElement} */
+    const turn = (label, first) => {
+      const go = () => {
+        this.first = first;
+        this.draw();
+        this.place.scrollIntoView({ block: "start" });
+        this.place.querySelector("summary")?.focus({ preventScroll: true });
+      };
+      return h("button", { type: "button", disabled: first < 0 || first >= this.runs.length, onclick: go }, label);
+    };
+    return h(
+      "nav",
+      { class: "buttons start", "aria-label": "Pages of runs" },
+      turn("Later runs", this.first - PAGE),
+      turn("Earlier runs", this.first + PAGE),
+      h("span", { class: "quiet" }, `${this.first + 1} to ${last} of ${this.runs.length}, the latest first`),
+    );
+  }
+
+  /** @param {Receipt} run */
+  item(run) {
+    const inside = h("div", { class: "inside" });
+    const count = run.warnings.length;
+    const warned = count > 0 ? `${count} ${count === 1 ? "warning" : "warnings"}` : "";
+    const name = run.state === "withdrawn" ? "s" : "span";
+    const details = h(
+      "details",
+      { open: this.open.has(run.run_id), "data-run": run.run_id, class: `run-${run.state}` },
+      h(
+        "summary",
+        {},
+        h(name, { class: "at" }, `${fixed(run.cycles)} cycles`),
+        h(name, {}, nameOf(run)),
+        h("span", {}, stateMark(run) || resultOf(run)),
+        h("span", { class: count > 0 ? "warned" : "quiet" }, warned),
+        h("span", { class: "quiet" }, moment(run.started_at ?? run.received_at)),
+      ),
+      inside,
+    );
+    details.addEventListener("toggle", () => {
+      if (details.open) this.open.add(run.run_id);
+      else this.open.delete(run.run_id);
+      if (details.open && !inside.hasChildNodes()) inside.append(...this.inside(run));
+    });
+    return details;
+  }
+
+  /** @param {Receipt} run */
+  inside(run) {
+    const { act, undo } = this.page;
+    const changes = buttons(run, act);
+    if (isCorrected(run) && run.state !== "withdrawn") {
+      changes.append(h("button", { type: "button", onclick: () => undo(run) }, "Undo the correction …"));
+    }
+    return [
+      run.state === "held" ? h("p", {}, "Held: it does not count until it is confirmed or corrected.") : "",
+      run.state === "withdrawn" ? h("p", {}, "Withdrawn: it does not count.") : "",
+      isCorrected(run)
+        ? h("p", {}, `Sent as ${fixed(run.sent_cycles)} cycles, corrected to ${fixed(run.cycles)}.`)
+        : "",
+      run.doubts.length > 0
+        ? h("div", {}, run.state === "held" ? "" : h("b", {}, "It was held because:"), doubtList(run))
+        : "",
+      changes,
+      ...receipt(run),
+    ];
+  }
 }
 
 /** @param {Receipt} run */

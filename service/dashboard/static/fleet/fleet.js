@@ -3,6 +3,7 @@
 // Open this file first (reading, drawing in slices, filtering),
 // then row.js (one clutch's row).
 
+import { register } from "../sending/registration.js";
 import { sender } from "../sending/sending.js";
 import { readAll } from "../shared/api.js";
 import { byId, h } from "../shared/dom.js";
@@ -10,7 +11,7 @@ import { age } from "../shared/format.js";
 import { withKey } from "../shared/key.js";
 import { Live } from "../shared/live.js";
 import { liveBar } from "../shared/live_bar.js";
-import { openVerdict, stateIcon, stateOf, STATES } from "../shared/state.js";
+import { heldText, openVerdict, stateIcon, stateOf, STATES } from "../shared/state.js";
 import { welcome } from "../shared/welcome.js";
 import { COLUMNS, row } from "./row.js";
 
@@ -35,15 +36,19 @@ const FIND = /** @type {HTMLInputElement} */ (byId("find"));
 const entries = new Map();
 /** @type {HTMLElement | null} */
 let body = null;
-/** @type {StateName | null} */
+/** @typedef {StateName | "held" | null} Choice a state, clutches with runs that are held, or all */
+/** @type {Choice} */
 let only = null;
+const ARCHIVED = /** @type {HTMLInputElement} */ (byId("archived"));
 let due = true;
 
 async function poll() {
   const before = due;
+  const archived = ARCHIVED.checked;
   due = true; // until all pages are read: an error midway is made good at the next poll
   /** @type {{ items: ClutchOut[], changed: boolean }} */
-  const { items, changed } = await readAll("/v1/clutches?limit=1000");
+  const { items, changed } = await readAll(`/v1/clutches?limit=1000${archived ? "&archived=true" : ""}`);
+  if (archived !== ARCHIVED.checked) return; // switched meanwhile: the next poll shows the other list
   if (changed || before) show(items);
   due = false;
 }
@@ -60,7 +65,7 @@ function show(items) {
     body = null;
     entries.clear();
     byId("chips").replaceChildren();
-    MAIN.replaceChildren(welcome());
+    MAIN.replaceChildren(ARCHIVED.checked ? h("p", { class: "notice" }, "No clutch is archived.") : welcome());
     return;
   }
   const place = body ?? makeTable();
@@ -115,7 +120,15 @@ function entryOf(clutch, scale) {
   const before = entries.get(clutch.clutch_id);
   if (before?.text === text) return before;
   const state = stateOf(clutch.summary, openVerdict(clutch.diagnosis));
-  const search = [clutch.clutch_id, clutch.friction_material, clutch.fluid, STATES[state.name].word, state.why];
+  const waiting = clutch.held > 0 ? heldText(clutch.held) : "";
+  const search = [
+    clutch.clutch_id,
+    clutch.friction_material,
+    clutch.fluid,
+    STATES[state.name].word,
+    state.why,
+    waiting,
+  ];
   /** @type {Entry} */
   const entry = {
     text,
@@ -175,7 +188,7 @@ function makeTable() {
 const chipOf = (name) => byId("chips").querySelector(`[data-state="${name}"]`);
 
 function drawChips() {
-  /** @type {(name: StateName | null, label: string, count: number) => HTMLElement} */
+  /** @type {(name: Choice, label: string, count: number) => HTMLElement} */
   const chip = (name, label, count) => {
     const choose = () => {
       only = name;
@@ -185,7 +198,7 @@ function drawChips() {
     };
     const pressed = String(only === name);
     const attributes = { type: "button", class: "chip", "data-state": name ?? "all", "aria-pressed": pressed };
-    const icon = name && stateIcon(name);
+    const icon = name && name !== "held" && stateIcon(name);
     return h("button", { ...attributes, onclick: choose }, icon, h("b", {}, String(count)), ` ${label}`);
   };
   const focused = document.activeElement instanceof HTMLElement ? document.activeElement.dataset.state : undefined;
@@ -194,7 +207,9 @@ function drawChips() {
     const count = [...entries.values()].filter(({ state }) => state.name === name).length;
     return count > 0 ? [chip(name, STATES[name].word.toLowerCase(), count)] : [];
   });
-  byId("chips").replaceChildren(chip(null, entries.size === 1 ? "clutch" : "clutches", entries.size), ...states);
+  const held = [...entries.values()].filter(({ clutch }) => clutch.held > 0).length;
+  const all = chip(null, entries.size === 1 ? "clutch" : "clutches", entries.size);
+  byId("chips").replaceChildren(all, ...states, held > 0 ? chip("held", "with held runs", held) : "");
   if (focused) focus(chipOf(focused));
 }
 
@@ -206,8 +221,9 @@ function focus(element) {
 function filter() {
   const wanted = FIND.value.trim().toLowerCase();
   let shown = 0;
-  for (const { element, state, search } of entries.values()) {
-    const hidden = (only !== null && state.name !== only) || !search.includes(wanted);
+  for (const { element, clutch, state, search } of entries.values()) {
+    const chosen = only === null || (only === "held" ? clutch.held > 0 : state.name === only);
+    const hidden = !chosen || !search.includes(wanted);
     if (element) element.hidden = hidden;
     shown += hidden ? 0 : 1;
   }
@@ -224,7 +240,17 @@ function updateAges() {
 }
 
 FIND.addEventListener("input", filter);
+ARCHIVED.addEventListener("change", () => {
+  due = true;
+  only = null;
+  entries.clear();
+  live.now();
+});
 setInterval(updateAges, 15_000);
 const live = new Live(withKey(poll), liveBar(byId("live")), INTERVAL);
-sender(byId("send"), { clutches: () => [...entries.keys()], sent: () => live.now() });
+sender(byId("send"), { clutches: () => (ARCHIVED.checked ? [] : [...entries.keys()]), sent: () => live.now() });
+byId("register").addEventListener("click", async () => {
+  const id = await register("");
+  if (id !== null) location.assign(`/clutches/${encodeURIComponent(id)}`);
+});
 live.start();

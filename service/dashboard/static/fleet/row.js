@@ -4,7 +4,7 @@
 import { h } from "../shared/dom.js";
 import { age, cycles, fixed, interval, kindName, percent, words } from "../shared/format.js";
 import { healthBar, intervalBar, sparkline } from "../shared/sparkline.js";
-import { stateIcon, STATES, VERDICTS } from "../shared/state.js";
+import { heldText, stateIcon, STATES, VERDICTS } from "../shared/state.js";
 
 /** @import { Content } from "../shared/dom.js" */
 /** @import { State, StateName } from "../shared/state.js" */
@@ -44,7 +44,7 @@ export function row(clutch, state, scale) {
     cell("Health", ...health(summary, state.name)),
     cell("Remaining", ...remaining(summary, scale)),
     cell("Mean COF", ...meanCof(clutch)),
-    cell("Last run", ...lastRun(clutch)),
+    cell("Last run", ...lastRun(clutch), held(clutch, address)),
     cell("Diagnosis", ...diagnosis(clutch, address)),
   );
 }
@@ -103,6 +103,14 @@ function lastRun({ recent }) {
     h("time", { datetime: at, title, "data-age": String(when) }, age(when)),
     small(`${kindName(kind)} at ${cycles(count, 0, 20)} cycles`),
   ];
+}
+
+/**
+ * @param {ClutchOut} clutch
+ * @param {string} address
+ */
+function held({ held: count }, address) {
+  return count > 0 && h("a", { href: `${address}#held`, class: "mark-held" }, heldText(count));
 }
 
 /**

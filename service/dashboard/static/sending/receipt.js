@@ -4,23 +4,47 @@
 import { curveOf, measuredOf } from "../charts/stribeck_law.js";
 import { clutchPath, read, readDrawn } from "../shared/api.js";
 import { h, scrolling, svg, symbol, table } from "../shared/dom.js";
-import { cycles, fixed, kindName, significant, withSd, words } from "../shared/format.js";
+import { cycles, fixed, kindName, sentence, significant, withSd, words } from "../shared/format.js";
 
 /** @import { CurvePoint } from "../charts/stribeck_law.js" */
 /** @import { ClutchOut, Fit, Loop, Parameters, Receipt, RunOut, Warned } from "../shared/types.js" */
+
+/**
+ * What became of a run, in a line.
+ * @param {Receipt} receipt
+ */
+export function outcomeOf(receipt) {
+  const held = receipt.state === "held";
+  const result = receipt.duplicate ? "Stored before: this repeat changed nothing" : held ? "Stored and held" : "Stored";
+  const run = ` · ${kindName(receipt.kind)} at ${cycles(receipt.cycles, 0, 20)} cycles · `;
+  const name = h("p", {}, h("b", {}, result), run, h("code", {}, receipt.run_id));
+  if (!held) return h("div", { class: "notice good" }, name);
+  const close = (/** @type {Event} */ event) => {
+    if (event.target instanceof Element) event.target.closest("dialog")?.close();
+  };
+  const address = `/clutches/${encodeURIComponent(receipt.clutch_id)}#held`;
+  const link = h("a", { href: address, onclick: close }, "Confirm, correct or withdraw it");
+  return h("div", { class: "notice odd" }, name, doubtList(receipt), h("p", {}, "It does not count yet. ", link));
+}
+
+/**
+ * Why a run is held, or was.
+ * @param {Receipt} receipt
+ */
+export function doubtList({ doubts }) {
+  const items = doubts.map(({ message }) => h("li", {}, sentence(message)));
+  return h("ul", { class: "doubts" }, items);
+}
 
 /**
  * A receipt with the curve that was fitted.
  * @param {Receipt} receipt
  */
 export async function receiptView(receipt) {
-  const result = receipt.duplicate ? "Stored before: this repeat changed nothing" : "Stored";
-  const run = ` · ${kindName(receipt.kind)} at ${cycles(receipt.cycles, 0, 20)} cycles · `;
   const fitted = receipt.fits.length > 0;
   return h(
     "div",
     { class: "receipt" },
-    h("p", { class: "notice good" }, h("b", {}, result), run, h("code", {}, receipt.run_id)),
     warnings(receipt.warnings),
     fitted && (await drawing(receipt)),
     fitted && fitTable(receipt.fits),

@@ -1,208 +1,198 @@
 // @ts-check
-// Sending a run: a file that is dropped or chosen goes in; its receipt, or every place where it is wrong, comes out.
-// Open this file first: the dialog and the requests. receipt.js shows what the service made of a run,
-// there and in the clutch page's list of runs.
+// Sending runs: files that are dropped or chosen go in; for each its receipt, or every place where it is wrong, comes out.
+// Open this file first: the dialog. Then batch.js (which files are runs), run_file.js (one of them), file_name.js (what its
+// name says), registration.js (a clutch that is not known yet) and receipt.js (what the service made of a run).
 
-import { clutchPath, Problem, read, send, sendJson } from "../shared/api.js";
-import { h } from "../shared/dom.js";
-import { kindName } from "../shared/format.js";
+import { clutchPath, Problem, read } from "../shared/api.js";
+import { field, h } from "../shared/dom.js";
 import { problemView } from "../shared/problem_view.js";
-import { receiptView } from "./receipt.js";
+import { batchOf } from "./batch.js";
+import { takeFiles } from "./dropping.js";
+import { IDENTIFIER, register } from "./registration.js";
+import { similarTo } from "./similar_names.js";
 
-/** @import { Receipt } from "../shared/types.js" */
+/** @import { Batch } from "./batch.js" */
 
-/** @typedef {Record<string, unknown> & { kind: string, cycles?: number, clutch_id?: string }} JsonRun a run as the API takes it */
-
-const KINDS = ["stationary_stribeck", "dynamic_stribeck"];
-const IDENTIFIER = {
-  pattern: "[A-Za-z0-9][A-Za-z0-9._:@+\\-]{0,127}",
-  title: "letters, digits and . _ : @ + -",
-};
-const MOST_JSON_BYTES = 64 * 2 ** 20;
+/**
+ * @typedef {object} Page
+ * @property {string} [clutch] the clutch that the page shows; without one the reader names it
+ * @property {() => string[]} clutches the registered ids
+ * @property {() => unknown} sent hears of stored runs
+ */
 
 /**
  * Make a button and the whole page take files.
  * @param {HTMLElement} button
- * @param {{ clutches: () => string[], sent: () => unknown }} page the registered ids; hears of a stored run
+ * @param {Page} page
  */
-export function sender(button, { clutches, sent }) {
-  /** @param {FileList | null | undefined} files */
-  const take = (files) => {
-    if (files?.length) new Sending(files[0], clutches(), sent).open();
-  };
-  const chooser = h("input", { type: "file", hidden: true, "aria-label": "Run file" });
-  chooser.addEventListener("change", () => take(chooser.files));
-  document.body.append(chooser);
-  button.addEventListener("click", () => {
-    chooser.value = "";
-    chooser.click();
-  });
-  takeDropped(take);
-}
-
-/** @param {(files: FileList | null | undefined) => void} take */
-function takeDropped(take) {
-  let depth = 0;
-  /** @param {number} level elements entered and not yet left */
-  const setDepth = (level) => {
-    depth = level;
-    document.body.classList.toggle("dropping", depth > 0);
-  };
-  /** @param {DragEvent} event */
-  const hasFiles = (event) => event.dataTransfer?.types.includes("Files") ?? false;
-  addEventListener("dragenter", (event) => {
-    if (hasFiles(event)) setDepth(depth + 1);
-  });
-  addEventListener("dragleave", () => setDepth(Math.max(0, depth - 1)));
-  addEventListener("dragover", (event) => {
-    if (hasFiles(event)) event.preventDefault();
-  });
-  addEventListener("drop", (event) => {
-    if (!hasFiles(event)) return;
-    event.preventDefault();
-    setDepth(0);
-    take(event.dataTransfer?.files);
-  });
+export function sender(button, page) {
+  takeFiles(button, async (files) => new Sending(await batchOf(files), page).open());
 }
 
 class Sending {
   /**
-   * @param {File} file
-   * @param {string[]} clutches
-   * @param {() => unknown} sent
+   * @param {Batch} batch
+   * @param {Page} page
    */
-  constructor(file, clutches, sent) {
-    this.file = file;
-    this.clutches = clutches;
-    this.sent = sent;
-    /** @type {JsonRun | null} */
-    this.json = null;
-    this.answer = h("div", { class: "answer", "aria-live": "polite" });
+  constructor(batch, page) {
+    this.batch = batch;
+    this.page = page;
+    this.alone = batch.runs.length === 1;
+    this.clutch = h("input", {
+      id: "to",
+      value: page.clutch ?? namedIn(batch),
+      required: true,
+      list: "registered",
+      autocomplete: "off",
+      spellcheck: "false",
+      ...IDENTIFIER,
+    });
+    this.go = h("button", { class: "main" });
+    this.answer = h("div", { class: "answer", role: "status" });
     this.dialog = h("dialog", { "aria-labelledby": "sending-title" });
-    this.dialog.addEventListener("close", () => this.dialog.remove());
-    this.clutch = h("input", { id: "to", required: true, list: "registered", autocomplete: "off", ...IDENTIFIER });
-    this.go = h("button", { class: "main" }, "Send");
-    const kinds = KINDS.map((value) => h("option", { value, selected: guess(file.name) === value }, kindName(value)));
-    this.kind = h("select", { id: "kind" }, kinds);
-    const number = { type: "number", min: 0, step: "any", required: true, inputmode: "decimal" };
-    this.cycles = h("input", { id: "cycles", ...number });
-    this.map = h("input", { id: "map", placeholder: "torque_nm:Mz,speed_rpm:n", autocomplete: "off" });
+    this.closed = false;
+    this.dialog.addEventListener("close", () => {
+      this.closed = true; // a file that is on its way still arrives; the ones after it are not sent
+      this.dialog.remove();
+    });
   }
 
-  async open() {
-    this.json = await jsonRun(this.file);
-    this.clutch.value = this.json?.clutch_id ?? this.clutches[0] ?? "";
-    const options = this.clutches.map((id) => h("option", { value: id }));
-    const run = this.json ? ` · ${kindName(this.json.kind)} at ${this.json.cycles} cycles` : "";
+  /** The runs that are not stored yet. */
+  left() {
+    return this.batch.runs.filter((run) => run.progress !== "stored");
+  }
+
+  open() {
+    const { runs, wrong } = this.batch;
+    const options = this.page.clutches().map((id) => h("option", { value: id }));
     const submit = (/** @type {SubmitEvent} */ event) => {
       event.preventDefault();
-      this.post();
+      this.send();
     };
     const close = h("button", { type: "button", onclick: () => this.dialog.close() }, "Close");
-    const registered = h("datalist", { id: "registered" }, options);
+    const compare = () => runs.forEach((run) => run.compare(this.clutch.value.trim()));
+    this.clutch.addEventListener("input", compare);
     this.dialog.append(
-      h("h2", { id: "sending-title" }, "Send a run"),
-      h("p", {}, h("b", {}, this.file.name), ` · ${size(this.file.size)}`, run),
+      h("h2", { id: "sending-title" }, runs.length > 1 ? `Send ${runs.length} runs` : "Send a run"),
       h(
         "form",
         { onsubmit: submit },
-        h("div", { class: "fields" }, field(this.clutch, "Clutch", registered), this.json ? null : this.fileFields()),
+        h("div", { class: "fields" }, field(this.clutch, "Clutch", h("datalist", { id: "registered" }, options))),
+        wrong.length > 0 ? notRuns(wrong) : "",
+        h(
+          "ul",
+          { class: "files" },
+          runs.map((run) => run.element),
+        ),
+        this.answer,
         h("div", { class: "buttons" }, close, this.go),
       ),
-      this.answer,
     );
+    this.showGo();
+    compare();
     document.body.append(this.dialog);
     this.dialog.showModal();
-    (!this.json && this.clutch.value ? this.cycles : this.clutch).focus();
+    this.firstEmpty().focus();
   }
 
-  /** What a JSON run says itself and any other file does not. */
-  fileFields() {
-    return [
-      field(this.kind, "Kind of test"),
-      field(this.cycles, "Duty cycles since new"),
-      field(this.map, "Columns by name (only where they are not recognised)"),
-    ];
+  /** The field that the reader has to fill in first, else the button that sends. */
+  firstEmpty() {
+    const fields = this.dialog.querySelectorAll("input[required], select[required]");
+    return (
+      /** @type {HTMLElement[]} */ ([...fields]).find((input) => "value" in input && input.value === "") ?? this.go
+    );
   }
 
-  async post() {
+  showGo() {
+    const { length } = this.left();
+    const tried = this.batch.runs.some((run) => run.progress !== "waiting");
+    const many = this.alone
+      ? ""
+      : tried
+        ? ` the ${length} that ${length === 1 ? "is" : "are"} left`
+        : ` ${length} runs`;
+    this.go.textContent = `Send${many}${tried && this.alone ? " again" : ""}`;
+    this.go.hidden = length === 0;
+  }
+
+  async send() {
     this.go.disabled = true;
-    this.answer.replaceChildren(h("p", { class: "quiet" }, "Sending …"));
+    this.answer.replaceChildren();
     try {
-      const id = this.clutch.value.trim();
-      await register(id);
-      this.answer.replaceChildren(await receiptView(await this.store(id)));
-      this.sent();
+      const id = await this.registered(this.clutch.value.trim());
+      if (id === null) this.answer.replaceChildren(h("p", { class: "notice" }, "Nothing was sent."));
+      else await this.sendAll(id);
     } catch (problem) {
       this.answer.replaceChildren(problemView(problem));
     } finally {
       this.go.disabled = false;
-      this.answer.scrollIntoView({ block: "nearest" });
+      this.showGo();
     }
-  }
-
-  /**
-   * @param {string} id
-   * @returns {Promise<Receipt>}
-   */
-  async store(id) {
-    if (this.json) {
-      const { clutch_id: _, ...run } = this.json;
-      /** @type {{ body: Receipt }} */
-      const { body } = await sendJson("POST", `${clutchPath(id)}/runs`, run);
-      return body;
-    }
-    /** @type {{ body: Receipt }} */
-    const { body } = await send("POST", this.address(id), this.file, { "Content-Type": "application/octet-stream" });
-    return body;
   }
 
   /** @param {string} id */
-  address(id) {
-    const filename = this.file.name.slice(-200);
-    const query = new URLSearchParams({ kind: this.kind.value, cycles: this.cycles.value, filename });
-    if (this.map.value.trim()) query.set("map", this.map.value.trim());
-    return `${clutchPath(id)}/runs/file?${query}`;
+  async sendAll(id) {
+    const runs = this.left();
+    let held = 0;
+    for (const run of runs) {
+      if (this.closed) return;
+      run.element.scrollIntoView({ block: "nearest" });
+      const receipt = await run.send(id, this.alone);
+      if (receipt !== null) this.page.sent();
+      if (receipt?.state === "held") held += 1;
+    }
+    const failed = this.left();
+    if (!this.alone) this.answer.replaceChildren(summary(runs.length - failed.length, failed.length, held, id));
+    (failed[0] ?? this.batch.runs[0])?.element.scrollIntoView({ block: "nearest" });
+  }
+
+  /**
+   * The registered clutch to send to: the one that was named, or the one that the reader registers or chooses now.
+   * @param {string} id
+   * @returns {Promise<string | null>}
+   */
+  async registered(id) {
+    try {
+      await read(clutchPath(id));
+      return id;
+    } catch (problem) {
+      if (!(problem instanceof Problem && problem.status === 404)) throw problem;
+    }
+    const lead = `No clutch is registered as “${id}”. Nothing has been sent yet.`;
+    const chosen = await register(id, {
+      lead,
+      similar: similarTo(id, this.page.clutches()),
+      record: this.batch.record,
+    });
+    if (chosen !== null) this.clutch.value = chosen;
+    return chosen;
   }
 }
 
 /**
- * @param {HTMLInputElement | HTMLSelectElement} input
- * @param {string} text
- * @param {HTMLElement | null} [more]
+ * The clutch that the files name themselves, if they agree.
+ * @param {Batch} batch
  */
-const field = (input, text, more = null) => h("div", {}, h("label", { for: input.id }, text), input, more);
+function namedIn({ runs, record }) {
+  const names = new Set([record?.clutch_id, ...runs.map((run) => run.json?.clutch_id)].filter(Boolean));
+  return names.size === 1 ? [...names][0] : "";
+}
+
+/** @param {string[]} wrong */
+function notRuns(wrong) {
+  const items = wrong.map((text) => h("li", {}, text));
+  return h("div", { class: "notice bad" }, h("b", {}, "Not sent, because they are not runs:"), h("ul", {}, items));
+}
 
 /**
- * A clutch that is not registered yet is registered with the reference clutch's values.
+ * @param {number} stored
+ * @param {number} failed
+ * @param {number} held of those that are stored
  * @param {string} id
  */
-async function register(id) {
-  try {
-    await read(clutchPath(id));
-  } catch (problem) {
-    if (!(problem instanceof Problem && problem.status === 404)) throw problem;
-    await sendJson("POST", "/v1/clutches", { clutch_id: id });
-  }
+function summary(stored, failed, held, id) {
+  const text = failed > 0 ? `${stored} stored, ${failed} not stored: see each file.` : `All ${stored} stored.`;
+  const doubted = held > 0 && ` ${held} of them ${held === 1 ? "is" : "are"} held, and must be confirmed or corrected.`;
+  const link = h("a", { href: `/clutches/${encodeURIComponent(id)}` }, `Open ${id}`);
+  return h("p", { class: `notice ${failed > 0 ? "bad" : "good"}` }, text, doubted, " ", stored > 0 && link);
 }
-
-/**
- * A run as the API takes it, or null where the file is something else.
- * @param {File} file
- * @returns {Promise<JsonRun | null>}
- */
-async function jsonRun(file) {
-  if (file.size > MOST_JSON_BYTES || !/\.json$/i.test(file.name)) return null;
-  try {
-    const run = JSON.parse(await file.text());
-    return typeof run?.kind === "string" ? run : null;
-  } catch {
-    return null;
-  }
-}
-
-/** @param {string} name of the file */
-const guess = (name) => (/dyn|loop/i.test(name) ? "dynamic_stribeck" : "stationary_stribeck");
-
-/** @param {number} bytes */
-const size = (bytes) => (bytes < 1e6 ? `${Math.max(1, Math.round(bytes / 1e3))} kB` : `${(bytes / 1e6).toFixed(1)} MB`);

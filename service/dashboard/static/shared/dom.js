@@ -75,6 +75,14 @@ export function within(id, selector) {
 }
 
 /**
+ * A field below its label.
+ * @param {HTMLInputElement | HTMLSelectElement | HTMLTextAreaElement} input
+ * @param {Content} label
+ * @param {Content} [more] what stands below it
+ */
+export const field = (input, label, more = null) => h("div", {}, h("label", { for: input.id }, label), input, more);
+
+/**
  * A letter with its index.
  * @param {string} letter
  * @param {string} index

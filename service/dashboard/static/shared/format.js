@@ -179,6 +179,16 @@ export function words(name) {
 }
 
 /**
+ * A message of the service as a sentence.
+ * @param {string} text
+ * @param {boolean} [starts] whether it starts with a capital letter
+ */
+export function sentence(text, starts = true) {
+  const first = starts ? text.charAt(0).toUpperCase() : text.charAt(0);
+  return `${first}${text.slice(1)}${/[.?!]$/.test(text) ? "" : "."}`;
+}
+
+/**
  * `60000 ms` as `1 min`.
  * @param {number} milliseconds
  */

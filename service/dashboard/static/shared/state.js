@@ -63,6 +63,12 @@ export function stateOf(summary, verdict = null) {
   return { name: "normal", why: "ageing as modelled" };
 }
 
+/**
+ * How many runs of a clutch wait for someone to look at them.
+ * @param {number} count
+ */
+export const heldText = (count) => `${count} ${count === 1 ? "run" : "runs"} held`;
+
 /** @type {Record<StateName, ["circle" | "path" | "rect", Record<string, string | number>][]>} */
 const SHAPES = {
   failure: [

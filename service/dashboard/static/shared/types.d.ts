@@ -63,7 +63,9 @@ export interface ClutchOut {
   reaction_plate: string;
   fluid: string;
   origin: string;
+  archived: boolean;
   runs: number;
+  held: number;
   summary: ClutchSummary | null;
   recent: Recent | null;
   diagnosis: LatestDiagnosis | null;
@@ -99,6 +101,7 @@ export interface RemainingLife {
   probability_of_reaching: number | null;
   horizon_cycles: number;
   model: ModelName;
+  warnings: Warned[];
 }
 
 export interface Estimate {
@@ -207,6 +210,9 @@ export interface Receipt {
   received_at: string;
   content_sha256: string;
   duplicate: boolean;
+  state: "accepted" | "held" | "withdrawn";
+  doubts: Warned[];
+  sent_cycles: number;
   warnings: Warned[];
   fits: Fit[];
   loops: Loop[];
@@ -214,6 +220,17 @@ export interface Receipt {
   event: string | null;
   note: string | null;
   code_version: string;
+}
+
+/** An entry of the audit trail. */
+export interface Change {
+  at: string;
+  by: string;
+  action: string;
+  run_id: string | null;
+  reason: string;
+  before: Record<string, unknown>;
+  after: Record<string, unknown>;
 }
 
 export interface RunOut extends Receipt {

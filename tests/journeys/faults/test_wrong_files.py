@@ -5,7 +5,6 @@ After each of them the service answers, the clutch is as it was, and neither the
 
 import gzip
 import http.client
-import os
 import threading
 import time
 import zipfile
@@ -35,8 +34,9 @@ HEADER = "time_s,pressure_bar,speed_rpm,torque_nm\n"
 class Watched:
     """A service that runs, with a clutch that has a run, and the memory that its processes take."""
 
-    def __init__(self, server: Server, client: httpx2.Client) -> None:
+    def __init__(self, server: Server, client: httpx2.Client, temporary: Path) -> None:
         self.http = client
+        self.temporary = temporary
         self._pid = server.pid
         client.post("/v1/clutches", json={"clutch_id": "c1"})
         client.post(f"{CLUTCH}/runs", json=stationary(0, run_id="known"))
@@ -74,9 +74,12 @@ class Watched:
 
 @pytest.fixture(scope="module")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Watched]:
-    folder = tmp_path_factory.mktemp("wrong")
-    with serving(folder / "a.db") as server, httpx2.Client(base_url=server.url, timeout=120) as client:
-        yield Watched(server, client)
+    folder, temporary = tmp_path_factory.mktemp("wrong"), tmp_path_factory.mktemp("temporary")
+    with (
+        serving(folder / "a.db", environment={"TMPDIR": str(temporary)}) as server,
+        httpx2.Client(base_url=server.url, timeout=120) as client,
+    ):
+        yield Watched(server, client, temporary)
 
 
 def codes(problem: dict[str, Any]) -> set[str]:
@@ -243,8 +246,9 @@ def test_many_at_once(service: Watched) -> None:
 
 
 def test_nothing_is_left_on_the_disk(service: Watched) -> None:
-    folder = Path(os.environ.get("TMPDIR", "/tmp"))  # noqa: S108
-    before = set(folder.glob("clutchlife-*"))
+    """In the temporary folder, which is this service's own."""
+    begun = service.temporary.stat().st_mtime_ns
     service.refuse(gzip.compress(b"TDSm" + bytes(100)), name="a.tdms.gz")
     service.refuse(b"MDF     4.10" + bytes(100), name="a.mf4")
-    assert set(folder.glob("clutchlife-*")) <= before
+    assert service.temporary.stat().st_mtime_ns > begun, "the readers use another folder: this test sees nothing"
+    assert list(service.temporary.glob("clutchlife-*")) == []

@@ -1,9 +1,7 @@
-"""A clutch's page on the demo's life: every chart drawn, its table, its files, its report; live; runs sent by dropping."""
+"""A clutch's page on the demo's life: every chart drawn, its table, its files, its report; live."""
 
-import base64
 import csv
 import io
-import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -71,20 +69,6 @@ def drawn(page: Page, name: str) -> Locator:
     page.locator(f"#chart-{name}[data-drawn]").wait_for()
     page.wait_for_timeout(100)
     return chart
-
-
-def drop(page: Page, name: str, content: str) -> None:
-    """Drop a file on the page as a person would."""
-    data = base64.b64encode(content.encode()).decode()
-    page.evaluate(
-        """([name, data]) => {
-          const transfer = new DataTransfer();
-          transfer.items.add(new File([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], name));
-          for (const type of ["dragenter", "dragover", "drop"])
-            document.body.dispatchEvent(new DragEvent(type, {bubbles: true, cancelable: true, dataTransfer: transfer}));
-        }""",
-        [name, data],
-    )
 
 
 def test_every_chart_is_drawn(browser: Browser, watched: Watched) -> None:
@@ -210,49 +194,6 @@ def test_a_run_posted_while_the_page_is_open_appears(browser: Browser, tmp_path:
         page.locator("#chart-predicted[data-drawn]").wait_for()
         assert page.evaluate("window.same")
         watched.close()
-
-
-def test_a_file_is_dropped_and_its_receipt_appears(browser: Browser, tmp_path: Path) -> None:
-    with serving(tmp_path / "clutchlife.db", loaded=True) as server:
-        watched = Watched(browser, server.url)
-        page = watched.open("/")
-        page.get_by_role("heading", name="No clutch is registered yet").wait_for()
-        drop(page, "run-0.json", json.dumps(stationary(0)))
-        dialog = page.get_by_role("dialog", name="Send a run")
-        assert "Stationary Stribeck test at 0 cycles" in dialog.inner_text()
-        dialog.get_by_label("Clutch").fill("dropped")
-        dialog.get_by_role("button", name="Send").click()
-        dialog.get_by_text("Stored").wait_for()
-        assert dialog.locator("svg.curve circle").count() == 280
-        assert dialog.locator("svg.curve path").count() == 7
-        assert seen(browser, dialog.locator("svg.curve").screenshot()).is_chart
-        assert dialog.locator("table tbody tr").count() == 7
-        page.keyboard.press("Escape")
-        expect(dialog).to_have_count(0)
-        page.get_by_role("link", name="dropped").wait_for()
-        assert watched.errors() == [
-            "error: Failed to load resource: the server responded with a status of 404 (Not Found)"
-        ]
-        watched.said.clear()  # it asked whether the clutch is known
-        watched.close()
-
-
-def test_what_is_wrong_with_a_file_is_told_by_row(watched: Watched) -> None:
-    page = opened(watched)
-    runs = ONCE.get(f"{watched.url}/v1/clutches/sim-1").json()["runs"]
-    drop(page, "sweep.csv", "pressure_bar,speed_rpm,torque_nm\n5,20,21\n5,120,abc\n5,520,21.5\n5,1020,\n5,1970,20\n")
-    dialog = page.get_by_role("dialog", name="Send a run")
-    dialog.get_by_label("Duty cycles since new").fill("30000")
-    page.keyboard.press("Enter")
-    dialog.get_by_text("Not stored.").wait_for()
-    table = [row.split("\t") for row in dialog.locator("table tbody tr").all_inner_texts()]
-    assert [row[0] for row in table] == ["2", "4"]
-    assert table[0][1:3] == ["/channels/torque_nm/1", "abc"]
-    assert "must be a number" in table[0][3]
-    assert ONCE.get(f"{watched.url}/v1/clutches/sim-1").json()["runs"] == runs
-    dialog.get_by_role("button", name="Close").click()
-    assert [line for line in watched.errors() if "422" not in line] == []
-    watched.said.clear()
 
 
 def test_the_report_is_one_page_and_light(browser: Browser, life: Server) -> None:

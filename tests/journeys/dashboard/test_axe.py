@@ -6,10 +6,11 @@ from typing import Any
 import httpx2
 import pytest
 from axe_playwright_python.base import AXE_SCRIPT
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.driving import Watched, pointed_at, serving_with_engine
-from tests.browser.lives import worn
+from tests.browser.lives import post, worn
+from tests.support import stationary
 
 pytestmark = pytest.mark.browser
 
@@ -23,6 +24,11 @@ def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     with serving_with_engine(tmp_path_factory.mktemp("axe") / "clutchlife.db", ENGINE) as found:
         with httpx2.Client(base_url=found, timeout=60) as http:
             worn(http, "bench", last=4000)
+            odd = stationary(5000, run_id="odd")
+            odd["channels"]["torque_nm"] = [100 * value for value in odd["channels"]["torque_nm"]]
+            assert post(http, "bench", odd)["state"] == "held"
+            post(http, "bench", stationary(4500, run_id="aside"))
+            http.post("/v1/clutches/bench/runs/aside/withdraw", json={"reason": "to look at"}).raise_for_status()
             http.post("/v1/clutches", json={"clutch_id": "waiting"})
             http.post("/v1/clutches/bench/diagnoses", json={"adopt": False}).raise_for_status()
         yield found
@@ -45,7 +51,12 @@ def test_the_fleet(browser: Browser, url: str, scheme: str, viewport: dict[str, 
     watched = Watched(browser, url, color_scheme=scheme, viewport=viewport)
     page = watched.open("/")
     page.locator("table.fleet tbody tr").first.wait_for()
+    page.get_by_role("link", name="1 run held").wait_for()
     assert violations(page) == []
+    page.get_by_role("button", name="Register a clutch").click()
+    page.get_by_role("dialog", name="Register a clutch").wait_for()
+    assert violations(page) == []
+    page.keyboard.press("Escape")
     # the rules themselves can fail
     page.evaluate("document.body.append(Object.assign(document.createElement('img'), {src: '/assets/none'}))")
     assert any(line.startswith("image-alt") for line in violations(page))
@@ -62,18 +73,33 @@ def test_a_clutch_with_a_diagnosis_and_all_that_opens(
     page.locator("#diagnosis .verdict").wait_for()
     page.locator("#chart-fan summary").click()
     page.locator("#chart-fan table").wait_for()
-    page.locator("#runs summary").first.click()
-    page.locator("#runs .facts").first.wait_for()
+    for run_id in ("odd", "aside"):
+        page.locator(f"#runs details[data-run='{run_id}'] summary").click()
+    expect(page.locator("#runs .facts")).to_have_count(2)
+    page.locator("#held").get_by_text("1 run is held").wait_for()
+    page.locator("#runs .changes tbody tr").first.wait_for()
     assert violations(page) == []
+    for button in ("Confirm", "Correct the cycles", "Withdraw"):
+        page.locator("#held").get_by_role("button", name=button).click()
+        assert violations(page) == []
+        page.keyboard.press("Escape")
     page.get_by_role("button", name="Adopt the extended model").click()
     assert violations(page) == []
     page.keyboard.press("Escape")
     with page.expect_file_chooser() as chooser:
-        page.get_by_role("button", name="Send a run").click()
+        page.get_by_role("button", name="Send runs").click()
     broken = {"name": "a.csv", "mimeType": "text/csv", "buffer": b"pressure_bar,speed_rpm,torque_nm\n5,20,x\n"}
     chooser.value.set_files([broken])
     dialog = page.get_by_role("dialog", name="Send a run")
+    dialog.get_by_label("Kind of test").select_option("Stationary Stribeck test")
     dialog.get_by_label("Duty cycles since new").fill("9000")
+    dialog.get_by_label("Clutch", exact=True).fill("unknown")
+    page.keyboard.press("Enter")
+    form = page.get_by_role("dialog", name="Register a clutch")
+    form.wait_for()
+    assert violations(page) == []
+    form.get_by_role("button", name="Cancel").click()
+    dialog.get_by_label("Clutch", exact=True).fill("bench")
     page.keyboard.press("Enter")
     dialog.get_by_text("Not stored.").wait_for()
     assert violations(page) == []
@@ -130,6 +156,20 @@ def test_all_that_is_drawn_stands_out_three_to_one(browser: Browser, url: str, s
         for ground in ("panel", "page"):
             assert contrast(found[name], found[ground]) >= 3, (name, ground)
     assert contrast(found["line"], found["panel"]) < 3  # grid lines carry nothing: the check can fail
+    watched.close()
+
+
+def test_what_was_done_and_an_archived_clutch(browser: Browser, url: str) -> None:
+    watched = Watched(browser, url, viewport=PHONE)
+    page = watched.open("/clutches/waiting")
+    page.get_by_role("button", name="Archive").click()
+    page.get_by_role("dialog").get_by_role("button", name="Archive").click()
+    page.locator(".done").get_by_text("waiting is archived").wait_for()
+    page.locator("#archived").get_by_role("button", name="Bring it back").wait_for()
+    assert violations(page) == []
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+    page.locator(".done").get_by_role("button", name="Undo").click()
+    page.locator(".done").get_by_text("back in the list").wait_for()
     watched.close()
 
 

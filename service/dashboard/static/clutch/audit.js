@@ -1,0 +1,115 @@
+// @ts-check
+// The audit trail: who changed what, when and why; the newest first, page by page.
+
+import { clutchPath, read, readText } from "../shared/api.js";
+import { h, saveText, scrolling, table } from "../shared/dom.js";
+import { fixed, moment, words } from "../shared/format.js";
+import { runLink } from "./warnings.js";
+
+/** @import { Change, ListPage, Receipt } from "../shared/types.js" */
+
+const PAGE = 20;
+const COLUMNS = ["When", "What", "Run", "Who", "Why"];
+
+/** @type {Record<string, string>} */
+const ACTIONS = {
+  hold: "Held on arrival",
+  confirm: "Confirmed",
+  withdraw: "Withdrawn",
+  restore: "Restored",
+  correct: "Cycles corrected",
+  edit: "Clutch edited",
+  archive: "Archived",
+  unarchive: "Brought back",
+};
+
+export class AuditTrail {
+  /**
+   * @param {HTMLElement} place
+   * @param {string} clutchId
+   * @param {(runId: string) => void} reveal shows a run in the list of runs
+   */
+  constructor(place, clutchId, reveal) {
+    this.place = place;
+    this.reveal = reveal;
+    this.clutchId = clutchId;
+    this.pages = 1;
+  }
+
+  /** Read as many pages as are shown. */
+  async read() {
+    /** @type {Change[]} */
+    const changes = [];
+    /** @type {string | null} */
+    let cursor = null;
+    for (let page = 0; page < this.pages && (page === 0 || cursor !== null); page += 1) {
+      /** @type {string} */
+      const more = cursor === null ? "" : `&cursor=${encodeURIComponent(cursor)}`;
+      /** @type {{ body: ListPage<Change> }} */
+      const { body } = await read(`${clutchPath(this.clutchId)}/changes?limit=${PAGE}${more}`);
+      changes.push(...body.items);
+      cursor = body.next ?? null;
+    }
+    return { changes, more: cursor !== null };
+  }
+
+  /** @param {Receipt[]} runs */
+  async show(runs) {
+    const { changes, more } = await this.read();
+    const named = new Map(runs.map((run) => [run.run_id, run]));
+    /** @param {string | null} id */
+    const subject = (id) => {
+      const run = named.get(id ?? "");
+      return run ? runLink(run, this.reveal) : id === null ? "the clutch" : id;
+    };
+    const rows = changes.map((change) => [
+      moment(change.at),
+      actionText(change),
+      subject(change.run_id),
+      change.by === "local" ? "this machine" : change.by.replace(/^key:\s*/, "key "),
+      change.reason || "–",
+    ]);
+    const address = `${clutchPath(this.clutchId)}/changes.csv`;
+    /** @param {Event} event */
+    const save = async (event) => {
+      event.preventDefault();
+      saveText(`${this.clutchId}-changes.csv`, await readText(address), "text/csv");
+    };
+    const next = () => {
+      this.pages += 1;
+      this.show(runs);
+    };
+    this.place.replaceChildren(
+      h("h3", {}, "Changes"),
+      changes.length === 0
+        ? h("p", { class: "quiet" }, "Nothing was held, corrected, withdrawn or edited.")
+        : h(
+            "p",
+            { class: "quiet" },
+            "Who changed what and why, the newest first. As a table: ",
+            h("a", { href: address, onclick: save }, "CSV"),
+            ".",
+          ),
+      rows.length > 0 ? h("div", { class: "panel" }, scrolling("Changes", table("Changes", COLUMNS, rows))) : "",
+      more ? h("button", { type: "button", onclick: next }, "Show earlier changes") : "",
+    );
+  }
+}
+
+/** @param {Change} change */
+function actionText({ action, before, after }) {
+  const name = ACTIONS[action] ?? words(action);
+  if (action === "correct") return `${name}: ${shown(before.cycles)} to ${shown(after.cycles)}`;
+  if (action !== "edit") return name;
+  const fields = Object.keys(after).filter((key) => JSON.stringify(after[key]) !== JSON.stringify(before[key]));
+  return `${name}: ${fields.map((key) => `${words(key).toLowerCase()} ${shown(before[key])} to ${shown(after[key])}`).join("; ")}`;
+}
+
+/** @param {unknown} value */
+function shown(value) {
+  if (typeof value === "number") return Number.isInteger(value) ? fixed(value) : String(value);
+  if (value === null || typeof value !== "object") return String(value ?? "–");
+  return Object.entries(value)
+    .map(([key, part]) => `${words(key).toLowerCase()} ${part}`)
+    .join(", ");
+}

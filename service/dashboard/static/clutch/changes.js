@@ -1,0 +1,256 @@
+// @ts-check
+// Changes to what is stored: a run is confirmed, corrected, withdrawn or restored, a clutch archived or brought back. Each is
+// a question that says what will happen; nothing is ever deleted, and most of it can be undone at once.
+
+import { doubtList } from "../sending/receipt.js";
+import { clutchPath, sendJson } from "../shared/api.js";
+import { field, h } from "../shared/dom.js";
+import { fixed, kindName } from "../shared/format.js";
+import { problemView } from "../shared/problem_view.js";
+import { isCorrected } from "./states.js";
+
+/** @import { Receipt } from "../shared/types.js" */
+
+/** @typedef {"confirm" | "correct" | "withdraw" | "restore"} RunAction */
+/** @typedef {{ text: string, undo: (() => Promise<Done>) | null }} Done what was done, in a sentence, and how it is undone */
+
+/**
+ * @typedef {object} Question
+ * @property {string} title
+ * @property {(string | HTMLElement)[]} lines what will happen
+ * @property {string} action the button's word
+ * @property {boolean} [optional] whether it goes without a reason
+ * @property {number} [cycles] asked for, and their value at first
+ * @property {(reason: string, cycles: number) => Promise<Done>} send
+ */
+
+const LONGEST_REASON = 500;
+
+/** @type {Record<RunAction, string>} */
+export const LABELS = {
+  confirm: "Confirm …",
+  correct: "Correct the cycles …",
+  withdraw: "Withdraw …",
+  restore: "Restore …",
+};
+
+/**
+ * What can be done to a run now.
+ * @param {Receipt} run
+ * @returns {RunAction[]}
+ */
+export function actionsOf({ state }) {
+  if (state === "withdrawn") return ["restore"];
+  return state === "held" ? ["confirm", "correct", "withdraw"] : ["correct", "withdraw"];
+}
+
+/** @param {Receipt} run */
+const named = (run) => `${kindName(run.kind)} at ${fixed(run.cycles)} cycles`;
+
+/** @param {Receipt} run */
+const pathOf = (run) => `${clutchPath(run.clutch_id)}/runs/${encodeURIComponent(run.run_id)}`;
+
+/**
+ * @param {Receipt} run
+ * @param {"confirm" | "withdraw" | "restore"} action
+ * @param {string} reason
+ */
+async function post(run, action, reason) {
+  /** @type {{ body: Receipt }} */
+  const { body } = await sendJson("POST", `${pathOf(run)}/${action}`, { reason });
+  return body;
+}
+
+/**
+ * @param {Receipt} run
+ * @param {number} cycles
+ * @param {string} reason
+ */
+async function patch(run, cycles, reason) {
+  /** @type {{ body: Receipt }} */
+  const { body } = await sendJson("PATCH", pathOf(run), { cycles, reason });
+  return body;
+}
+
+/** @param {Receipt} run */
+const held = (run) => (run.state === "held" ? " It is held: see its doubts." : "");
+
+/**
+ * @param {Receipt} run
+ * @param {number} cycles
+ * @param {string} reason
+ * @returns {Promise<Done>}
+ */
+async function correct(run, cycles, reason) {
+  const after = await patch(run, cycles, reason);
+  const text = `Corrected from ${fixed(run.cycles)} to ${fixed(after.cycles)} cycles.${held(after)}`;
+  return { text, undo: () => correct(after, run.cycles, "the correction is undone") };
+}
+
+/**
+ * @param {Receipt} run
+ * @param {string} reason
+ * @returns {Promise<Done>}
+ */
+async function withdraw(run, reason) {
+  const after = await post(run, "withdraw", reason);
+  return { text: `${named(run)} is withdrawn.`, undo: () => restore(after, "the withdrawal is undone") };
+}
+
+/**
+ * @param {Receipt} run
+ * @param {string} reason
+ * @returns {Promise<Done>}
+ */
+async function restore(run, reason) {
+  const after = await post(run, "restore", reason);
+  const text = `${named(run)} is restored.${held(after)}`;
+  return { text, undo: () => withdraw(after, "the restoration is undone") };
+}
+
+/** @type {Record<RunAction, (run: Receipt) => Omit<Question, "lines"> & { lines: Question["lines"] }>} */
+const QUESTIONS = {
+  confirm: (run) => ({
+    title: "Confirm this run",
+    lines: [doubtList(run), "The run is right all the same: from now on it counts like any other."],
+    action: "Confirm",
+    optional: true,
+    send: async (reason) => {
+      await post(run, "confirm", reason);
+      return { text: `${named(run)} is confirmed.`, undo: null };
+    },
+  }),
+  correct: (run) => ({
+    title: "Correct the cycles",
+    lines: [
+      isCorrected(run) ? `It was sent as ${fixed(run.sent_cycles)} cycles.` : "",
+      "The measured data stay as they were sent. Everything is computed again with the cycles that you give here.",
+    ],
+    action: "Correct",
+    cycles: run.cycles,
+    send: (reason, cycles) => correct(run, cycles, reason),
+  }),
+  withdraw: (run) => ({
+    title: "Withdraw this run",
+    lines: [
+      "It no longer counts, and everything is computed again without it. Nothing is deleted: it can be restored.",
+    ],
+    action: "Withdraw",
+    send: (reason) => withdraw(run, reason),
+  }),
+  restore: (run) => ({
+    title: "Restore this run",
+    lines: ["It gets the state back that it had before it was withdrawn, and everything is computed again."],
+    action: "Restore",
+    send: (reason) => restore(run, reason),
+  }),
+};
+
+/**
+ * Ask about a run.
+ * @param {RunAction} action
+ * @param {Receipt} run
+ * @returns {Promise<Done | null>} null where the reader leaves it
+ */
+export function askRun(action, run) {
+  const question = QUESTIONS[action](run);
+  const name = h("p", {}, h("b", {}, named(run)), " · ", h("code", {}, run.run_id));
+  return ask({ ...question, lines: [name, ...question.lines] });
+}
+
+/**
+ * Back to the cycles as they were sent.
+ * @param {Receipt} run
+ * @returns {Promise<Done | null>}
+ */
+export const askUndo = (run) =>
+  ask({
+    title: "Undo the correction",
+    lines: [`${named(run)} goes back to the ${fixed(run.sent_cycles)} cycles that were sent.`],
+    action: "Undo",
+    send: (reason) => correct(run, run.sent_cycles, reason),
+  });
+
+/**
+ * Archive a clutch, or bring it back.
+ * @param {string} id
+ * @param {boolean} archived what it becomes
+ * @returns {Promise<Done | null>}
+ */
+export const askArchive = (id, archived) =>
+  ask({
+    title: archived ? `Archive ${id}` : `Bring ${id} back`,
+    lines: [
+      archived
+        ? "It leaves the list of clutches and takes no new runs. Nothing is deleted: it can be brought back."
+        : "It is in the list of clutches again and takes new runs.",
+    ],
+    action: archived ? "Archive" : "Bring back",
+    optional: true,
+    send: (reason) => archive(id, archived, reason),
+  });
+
+/**
+ * @param {string} id
+ * @param {boolean} archived
+ * @param {string} reason
+ * @returns {Promise<Done>}
+ */
+async function archive(id, archived, reason) {
+  await sendJson("PATCH", clutchPath(id), { archived, reason });
+  const text = archived ? `${id} is archived.` : `${id} is back in the list of clutches.`;
+  return { text, undo: () => archive(id, !archived, `${archived ? "archiving" : "bringing it back"} is undone`) };
+}
+
+/**
+ * The question in a dialog.
+ * @param {Question} question
+ * @returns {Promise<Done | null>}
+ */
+function ask({ title, lines, action, optional = false, cycles, send }) {
+  const numeric = { type: "number", min: 0, step: "any", required: true, inputmode: "decimal" };
+  const number = h("input", { id: "changed-cycles", value: cycles, ...numeric });
+  const reason = h("input", { id: "reason", required: !optional, maxlength: LONGEST_REASON, autocomplete: "off" });
+  const answer = h("div", { "aria-live": "polite" });
+  const go = h("button", { class: "main" }, action);
+  const dialog = h("dialog", { class: "narrow", "aria-labelledby": "change-title" });
+  /** @type {Done | null} */
+  let result = null;
+  const submit = async (/** @type {SubmitEvent} */ event) => {
+    event.preventDefault();
+    go.disabled = true;
+    try {
+      result = await send(reason.value.trim(), Number(number.value));
+      dialog.close();
+    } catch (problem) {
+      answer.replaceChildren(problemView(problem, "Nothing was changed. "));
+    } finally {
+      go.disabled = false;
+    }
+  };
+  dialog.append(
+    h("h2", { id: "change-title" }, title),
+    ...lines.filter((line) => line !== "").map((line) => (typeof line === "string" ? h("p", {}, line) : line)),
+    h(
+      "form",
+      { onsubmit: submit },
+      h(
+        "div",
+        { class: "fields" },
+        cycles === undefined ? null : field(number, "Duty cycles since new"),
+        field(reason, optional ? "Reason (may be left out)" : "Reason"),
+      ),
+      answer,
+      h("div", { class: "buttons" }, h("button", { type: "button", onclick: () => dialog.close() }, "Cancel"), go),
+    ),
+  );
+  document.body.append(dialog);
+  dialog.showModal();
+  if (cycles !== undefined) number.select();
+  return new Promise((resolve) => {
+    dialog.addEventListener("close", () => {
+      dialog.remove();
+      resolve(result);
+    });
+  });
+}

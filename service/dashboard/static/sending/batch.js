@@ -1,0 +1,80 @@
+// @ts-check
+// Dropped files -> the runs among them: JSON runs, records, and what a campaign's folder says of both (`runs.json`,
+// `clutch.json`, as `clutchlife simulate` writes them).
+
+import { MOST_JSON_BYTES, RunFile } from "./run_file.js";
+
+/** @import { JsonRun, Listed } from "./run_file.js" */
+/** @import { ClutchRecord } from "./registration.js" */
+
+const LIST = "runs.json";
+const RECORD = "clutch.json";
+
+/** @typedef {{ runs: RunFile[], record: ClutchRecord | null, wrong: string[] }} Batch `wrong`: files that are no run, and why */
+
+/**
+ * @param {File[]} files
+ * @returns {Promise<Batch>}
+ */
+export async function batchOf(files) {
+  const listed = await listedRuns(files.find((file) => file.name === LIST));
+  const record = await content(files.find((file) => file.name === RECORD));
+  /** @type {Batch} */
+  const batch = { runs: [], record: record && !("kind" in record) ? record : null, wrong: [] };
+  for (const file of files) {
+    if (file.name === LIST && listed !== null) continue;
+    if (file.name === RECORD && batch.record !== null) continue;
+    if (!/\.json$/i.test(file.name)) batch.runs.push(new RunFile(file, null, listed?.get(file.name)));
+    else {
+      const run = await jsonRun(file);
+      if (typeof run === "string") batch.wrong.push(`${file.name}: ${run}`);
+      else batch.runs.push(new RunFile(file, run, undefined));
+    }
+  }
+  batch.runs.sort((a, b) => a.order() - b.order());
+  return batch;
+}
+
+/**
+ * A JSON run without its channels, or why it is none.
+ * @param {File} file
+ * @returns {Promise<JsonRun | string>}
+ */
+async function jsonRun(file) {
+  if (file.size > MOST_JSON_BYTES) return "too large for JSON; send it as CSV, TDMS, MDF4 or Parquet";
+  const run = await content(file);
+  if (run === null) return "not a run";
+  if (typeof run.kind !== "string") return "not a run: it does not say its “kind”";
+  const { channels: _, ...rest } = run;
+  return rest;
+}
+
+/**
+ * A JSON object, or null where the file is none.
+ * @param {File | undefined} file
+ * @returns {Promise<any>}
+ */
+async function content(file) {
+  if (file === undefined || file.size > MOST_JSON_BYTES) return null;
+  try {
+    const value = JSON.parse(await file.text());
+    return value !== null && typeof value === "object" && !Array.isArray(value) ? value : null;
+  } catch {
+    return null;
+  }
+}
+
+/**
+ * What a list of runs says of each file, by its name; null where there is no such list.
+ * @param {File | undefined} file
+ * @returns {Promise<Map<string, Listed> | null>}
+ */
+async function listedRuns(file) {
+  if (file === undefined || file.size > MOST_JSON_BYTES) return null;
+  try {
+    const entries = JSON.parse(await file.text());
+    return Array.isArray(entries) ? new Map(entries.map((entry) => [entry.file, entry])) : null;
+  } catch {
+    return null;
+  }
+}

@@ -1,0 +1,342 @@
+"""A typo is seen, corrected and undone on the page; a held run is confirmed, one is withdrawn and restored.
+
+After each step every answer of the clutch is that of a clutch which was sent the right things from the start.
+"""
+
+import json
+import re
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+from playwright.sync_api import Browser, Locator, Page, expect
+
+from tests.browser.driving import Watched
+from tests.browser.dropping import drop
+from tests.browser.lives import loops, post
+from tests.support import ONCE, Server, serving, stationary
+
+pytestmark = pytest.mark.browser
+expect.set_options(timeout=20_000)
+
+CLUTCH = "/v1/clutches/bench"
+#: What the answers are compared in; all else of `/runs` is the trail of what was sent.
+ANSWERS = [
+    "/v1/clutches",
+    CLUTCH,
+    *(f"{CLUTCH}/remaining-useful-life?method={method}" for method in ("particle", "ukf", "grid")),
+    f"{CLUTCH}/remaining-useful-life?at_cycles=5000",
+    f"{CLUTCH}/degradation",
+    *(f"{CLUTCH}/series?limit=1000&quantity={quantity}" for quantity in ("mean_cof", "remaining_cycles")),
+    f"{CLUTCH}/stribeck",
+    f"{CLUTCH}/loops",
+]
+#: When something was stored, and how many changes there were.
+TIMES = {"revision", "created_at", "received_at"}
+LAST = 7000
+#: Of the first test; the others follow as their cycles do, 1,000 an hour.
+FIRST = datetime(2026, 11, 2, 8, tzinfo=UTC)
+
+
+def right(cycles: int) -> dict[str, Any]:
+    """A test as it ought to be sent; its name says nothing of its cycles."""
+    return stationary(cycles, run_id=f"test-{cycles // 1000}") | {"started_at": at(cycles)}
+
+
+def at(cycles: int) -> str:
+    return (FIRST + timedelta(hours=cycles / 1000)).isoformat()
+
+
+def typed() -> dict[str, Any]:
+    """The last test with a zero too many."""
+    return right(LAST) | {"cycles": 10 * LAST}
+
+
+def fill(http: httpx2.Client) -> None:
+    """A life up to the test before the last."""
+    http.post("/v1/clutches", json={"clutch_id": "bench"}).raise_for_status()
+    for cycles in range(0, LAST, 1000):
+        assert post(http, "bench", right(cycles))["state"] == "accepted"
+    post(http, "bench", loops(4000, pressures=(5.0,)) | {"started_at": at(4000)})
+
+
+def plain(value: Any) -> Any:
+    """An answer without times and revisions."""
+    if isinstance(value, dict):
+        return {key: plain(part) for key, part in value.items() if key not in TIMES}
+    return [plain(part) for part in value] if isinstance(value, list) else value
+
+
+def answers(url: str) -> dict[str, Any]:
+    return {path: plain(ONCE.get(f"{url}{path}").raise_for_status().json()) for path in ANSWERS}
+
+
+@pytest.fixture(scope="module")
+def references(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """The answers of a clutch that never had a typo: `before` the last test, and `after` it."""
+    with serving(tmp_path_factory.mktemp("right") / "clutchlife.db", loaded=True) as server:
+        with httpx2.Client(base_url=server.url, timeout=60) as http:
+            fill(http)
+            before = answers(server.url)
+            post(http, "bench", right(LAST))
+        return {"before": before, "after": answers(server.url)}
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Server]:
+    """The same life up to the test before the last."""
+    with serving(tmp_path / "clutchlife.db", loaded=True) as running:
+        with httpx2.Client(base_url=running.url, timeout=60) as http:
+            fill(http)
+        yield running
+
+
+@pytest.fixture
+def watched(browser: Browser, server: Server) -> Iterator[Watched]:
+    found = Watched(browser, server.url)
+    yield found
+    found.close()
+
+
+def opened(watched: Watched) -> Page:
+    page = watched.open("/clutches/bench")
+    page.locator("#runs .runs details").first.wait_for()
+    return page
+
+
+def run_in(page: Page, run_id: str) -> Locator:
+    """A run in the list, opened."""
+    details = page.locator(f"#runs details[data-run='{run_id}']")
+    if details.get_attribute("open") is None:
+        details.locator("summary").click()
+    return details
+
+
+def ask(place: Locator, button: str, reason: str, *, cycles: int | None = None) -> None:
+    """Press a run's button and answer its question."""
+    place.get_by_role("button", name=button).click()
+    dialog = place.page.get_by_role("dialog")
+    if cycles is not None:
+        dialog.get_by_label("Duty cycles since new").fill(str(cycles))
+    dialog.get_by_label("Reason").fill(reason)
+    place.page.keyboard.press("Enter")
+    expect(dialog).to_have_count(0)
+
+
+def done(page: Page, text: str) -> None:
+    """The page says what was done, and holds the focus there for the next key."""
+    place = page.locator(".done")
+    expect(place).to_contain_text(text)
+    expect(place).to_be_focused()
+
+
+def settled(page: Page, held: int) -> None:
+    """The page shows so many held runs at its top."""
+    if held == 0:
+        expect(page.locator("#held")).to_be_hidden()
+        expect(page.locator("#head .mark-held")).to_have_count(0)
+    else:
+        expect(page.locator("#held")).to_contain_text(f"{held} run is held")
+        expect(page.locator("#head .mark-held")).to_have_text(f"{held} run held")
+
+
+def trail(page: Page) -> list[list[str]]:
+    """What, who and why in the audit trail."""
+    rows = page.locator("#runs .changes tbody tr")
+    return [[row.locator("td").nth(cell).inner_text() for cell in (1, 3, 4)] for row in rows.all()]
+
+
+def test_a_typo_is_seen_corrected_and_undone(watched: Watched, server: Server, references: dict[str, Any]) -> None:
+    page = opened(watched)
+    assert answers(server.url) == references["before"]
+    drop(page, {"last.json": json.dumps(typed())})
+    sending = page.get_by_role("dialog", name="Send a run")
+    sending.get_by_role("button", name="Send").click()
+    sending.get_by_text("Stored and held").wait_for()
+    sending.get_by_role("link", name="Confirm, correct or withdraw it").click()
+    expect(sending).to_have_count(0)
+
+    settled(page, 1)
+    held = page.locator("#held .held > li")
+    assert "70,000 cycles" in held.inner_text()
+    assert "70000" in held.locator(".doubts").inner_text()
+    listed = page.locator("#runs details[data-run='test-7'] summary")
+    expect(listed).to_contain_text("Held")
+    assert {path: answer for path, answer in answers(server.url).items() if path.startswith(f"{CLUTCH}/")} == {
+        path: answer for path, answer in references["before"].items() if path.startswith(f"{CLUTCH}/")
+    }
+    page.goto(server.url)
+    page.locator("tr[data-clutch='bench']").get_by_role("link", name="1 run held").click()
+    settled(page, 1)
+
+    ask(held, "Correct the cycles", "a zero too many", cycles=LAST)
+    done(page, "Corrected from 70,000 to 7,000 cycles.")
+    settled(page, 0)
+    assert answers(server.url) == references["after"]
+    expect(page.locator("#runs details[data-run='test-7'] summary")).to_contain_text("Sent as 70,000")
+
+    page.locator(".done").get_by_role("button", name="Undo").click()
+    done(page, "Corrected from 7,000 to 70,000 cycles. It is held")
+    settled(page, 1)
+    assert answers(server.url)[f"{CLUTCH}/degradation"] == references["before"][f"{CLUTCH}/degradation"]
+
+    ask(held, "Correct the cycles", "it was a zero too many after all", cycles=LAST)
+    settled(page, 0)
+    assert answers(server.url) == references["after"]
+    ask(run_in(page, "test-7"), "Undo the correction", "only to see it")
+    settled(page, 1)
+    ask(held, "Correct the cycles", "and back", cycles=LAST)
+    settled(page, 0)
+    assert answers(server.url) == references["after"]
+
+    expect(page.locator("#runs .changes tbody tr")).to_have_count(6)
+    changes = trail(page)
+    assert [row[0] for row in changes[:2]] == ["Cycles corrected: 70,000 to 7,000", "Cycles corrected: 7,000 to 70,000"]
+    assert [row[2] for row in changes] == [
+        "and back",
+        "only to see it",
+        "it was a zero too many after all",
+        "the correction is undone",
+        "a zero too many",
+        "–",
+    ]
+    assert changes[-1][0] == "Held on arrival"
+    assert {row[1] for row in changes} == {"this machine"}
+    with page.expect_download() as sheet:
+        page.locator("#runs .changes").get_by_role("link", name="CSV").click()
+    assert Path(sheet.value.path()).read_text(encoding="utf-8").count("a zero too many") == 2
+    # the same file once more is the run that is there already, as it is now
+    drop(page, {"last.json": json.dumps(typed())})
+    sending.get_by_role("button", name="Send").click()
+    sending.get_by_text("Stored before").wait_for()
+    page.keyboard.press("Escape")
+    assert answers(server.url) == references["after"]
+
+
+def test_a_held_run_is_confirmed_and_withdrawn_and_restored(
+    watched: Watched, server: Server, references: dict[str, Any]
+) -> None:
+    with httpx2.Client(base_url=server.url, timeout=60) as http:
+        post(http, "bench", right(LAST))
+        post(http, "bench", right(LAST) | {"run_id": "far", "cycles": 90_000})
+    page = opened(watched)
+    settled(page, 1)
+    held = page.locator("#held .held > li")
+    held.get_by_role("button", name="Confirm").click()
+    page.get_by_role("dialog", name="Confirm this run").get_by_role("button", name="Cancel").click()
+    settled(page, 1)
+    ask(held, "Confirm", "")
+    done(page, "is confirmed")
+    settled(page, 0)
+    counted = answers(server.url)
+    assert counted[f"{CLUTCH}/remaining-useful-life?method=grid"]["as_of_cycles"] == 90_000
+    assert "it was held because" in run_in(page, "far").inner_text().lower()
+
+    ask(run_in(page, "far"), "Withdraw", "another clutch")
+    done(page, "is withdrawn")
+    struck = page.locator("#runs details[data-run='far'] summary")
+    expect(struck.locator("s").first).to_have_css("text-decoration-line", "line-through")
+    expect(struck).to_contain_text("Withdrawn")
+    assert answers(server.url) == references["after"]
+    page.locator(".done").get_by_role("button", name="Undo").click()
+    done(page, "is restored")
+    assert answers(server.url) == counted
+
+    ask(run_in(page, "far"), "Withdraw", "another clutch, surely")
+    expect(struck.locator("s")).to_have_count(2)
+    ask(run_in(page, "far"), "Restore", "it was this one")
+    expect(struck.locator("s")).to_have_count(0)
+    assert answers(server.url) == counted
+    ask(run_in(page, "far"), "Withdraw", "no, another clutch")
+    expect(struck.locator("s")).to_have_count(2)
+    assert answers(server.url) == references["after"]
+    assert [row[0] for row in trail(page)] == [
+        "Withdrawn", "Restored", "Withdrawn", "Restored", "Withdrawn", "Confirmed", "Held on arrival",
+    ]  # fmt: skip
+
+
+def test_a_reason_is_asked_for_and_a_refusal_is_shown(watched: Watched, server: Server) -> None:
+    page = opened(watched)
+    last = run_in(page, "test-6")
+    last.get_by_role("button", name="Withdraw").click()
+    dialog = page.get_by_role("dialog", name="Withdraw this run")
+    dialog.get_by_role("button", name="Withdraw").click()
+    assert dialog.is_visible()
+    dialog.get_by_label("Reason").fill("to see a refusal")
+    page.route(
+        "**/withdraw", lambda route: route.fulfill(status=409, json={"title": "Not possible now", "status": 409})
+    )
+    page.keyboard.press("Enter")
+    dialog.get_by_text("Nothing was changed. Not possible now").wait_for()
+    page.keyboard.press("Escape")
+    assert ONCE.get(f"{server.url}{CLUTCH}/changes").json()["items"] == []
+    assert all("409" in line for line in watched.errors())
+    watched.said.clear()
+
+
+def test_a_clutch_is_archived_and_brought_back(watched: Watched) -> None:
+    page = opened(watched)
+    page.get_by_role("button", name="Archive").click()
+    dialog = page.get_by_role("dialog", name="Archive bench")
+    dialog.get_by_label("Reason").fill("worn out")
+    dialog.get_by_role("button", name="Archive").click()
+    done(page, "bench is archived.")
+    expect(page.locator("#archived")).to_contain_text("takes no new runs")
+    drop(page, {"last.json": json.dumps(right(LAST))})
+    sending = page.get_by_role("dialog", name="Send a run")
+    sending.get_by_role("button", name="Send").click()
+    sending.get_by_text("Not stored.").wait_for()
+    page.keyboard.press("Escape")
+    page.get_by_role("link", name="All clutches").click()
+    page.get_by_role("heading", name="No clutch is registered yet").wait_for()
+    page.get_by_role("switch", name="Archived").check()
+    page.get_by_role("link", name="bench").click()
+    page.locator("#archived").get_by_role("button", name="Bring it back").click()
+    page.get_by_role("dialog").get_by_role("button", name="Bring back").click()
+    done(page, "back in the list")
+    expect(page.locator("#archived")).to_be_empty()
+    expect(page.locator("#runs .changes tbody tr")).to_have_count(2)
+    page.get_by_role("link", name="All clutches").click()
+    page.get_by_role("link", name="bench").wait_for()
+    page.get_by_role("switch", name="Archived").check()
+    page.get_by_text("No clutch is archived.").wait_for()
+    assert all("409" in line for line in watched.errors())
+    watched.said.clear()
+
+
+def test_warnings_of_a_life_stand_on_its_page(watched: Watched, server: Server) -> None:
+    page = opened(watched)
+    expect(page.locator("#warnings")).not_to_contain_text("Off its course")
+    odd = right(LAST)
+    odd["channels"]["torque_nm"] = [0.93 * value for value in odd["channels"]["torque_nm"]]
+    with httpx2.Client(base_url=server.url, timeout=60) as http:
+        assert [warning["code"] for warning in post(http, "bench", odd)["warnings"]] == ["off_track"]
+    warning = page.locator("#warnings li").filter(has_text="Off its course")
+    warning.get_by_text(re.compile("its mean COF of .* lies .* deviations below")).wait_for()
+    link = warning.get_by_role("link", name="Stationary Stribeck test at 7,000 cycles")
+    link.focus()
+    page.keyboard.press("Enter")
+    opened_run = page.locator("#runs details[data-run='test-7'][open]")
+    opened_run.get_by_text("Off track").wait_for()
+    expect(opened_run.locator("summary")).to_be_focused()
+
+
+def test_runs_are_listed_page_by_page_the_latest_first(watched: Watched, server: Server) -> None:
+    with httpx2.Client(base_url=server.url, timeout=60) as http:
+        for cycles in range(6010, 6330, 10):
+            post(http, "bench", {"kind": "maintenance", "cycles": cycles, "event": "other", "note": f"n{cycles}"})
+    page = opened(watched)
+    listed = page.locator("#runs .runs details .at")
+    pager = page.get_by_role("navigation", name="Pages of runs")
+    expect(listed).to_have_count(25)
+    assert listed.first.inner_text() == "6,320 cycles"
+    assert pager.get_by_role("button", name="Later runs").is_disabled()
+    pager.get_by_role("button", name="Earlier runs").click()
+    expect(pager).to_contain_text("26 to 40 of 40")
+    assert listed.last.inner_text() == "0 cycles"
+    assert page.evaluate("document.activeElement.tagName") == "SUMMARY"
+    pager.get_by_role("button", name="Later runs").click()
+    expect(listed).to_have_count(25)
