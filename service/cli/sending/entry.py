@@ -103,8 +103,8 @@ def load(folder: Path, stem: str) -> Entry | None:
 def decoded(content: bytes) -> Entry:
     """The entry whose file holds this; raises ValueError, TypeError or KeyError where it holds none."""
     record: dict[str, Any] = json.loads(content)
-    known = {name: record[name] for name in _NAMES & record.keys()}
-    return Entry(**known | {"head": RunHead(**record["head"]), "sources": tuple(record["sources"])})
+    values = {name: record[name] for name in _NAMES & record.keys()}
+    return Entry(**values | {"head": RunHead(**record["head"]), "sources": tuple(record["sources"])})
 
 
 #: A later release's fields are passed over.
