@@ -19,8 +19,7 @@ from service.web.answers import now
 from service.web.context import Context
 from service.web.limits import MOST_CACHED_BYTES, MOST_REVALIDATED_BYTES
 from service.web.metrics import Metrics
-from service.web.middleware import BodyLimit, Counting, Heads, SafeHeaders
-from service.web.polls import Polls
+from service.web.middleware import BodyLimit, Counting, Heads, Polls, SafeHeaders
 from service.web.revalidation import Revalidation
 from service.web.routes import clutches, diagnoses, exports, files, fleet, health, life, runs
 from service.workflows import adopt_model, run_diagnosis

@@ -6,7 +6,6 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, Row, bindparam, select, tuple_, update
 
 from storage.encoding.json_text import Json, to_object, to_text
-from storage.engine.watch import Watch
 from storage.tables import clutch
 
 
@@ -133,12 +132,6 @@ def revision(connection: Connection, clutch_id: str) -> int | None:
     """The clutch's revision, or None."""
     number: int | None = connection.execute(_revision, {"wanted": clutch_id}).scalar_one_or_none()
     return number
-
-
-def revision_now(watch: Watch, clutch_id: str) -> int | None:
-    """The clutch's revision, or None, without a transaction."""
-    row = watch.row("SELECT revision FROM clutch WHERE clutch_id = ?", clutch_id)
-    return None if row is None else int(row[0])
 
 
 def all_ids(connection: Connection) -> list[str]:

@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass
 import sqlalchemy as sa
 from sqlalchemy import Connection, bindparam, exists, select, update
 
-from storage.engine.watch import Watch
 from storage.tables import access_key
 
 
@@ -33,20 +32,6 @@ _revoke = (
 def insert(connection: Connection, row: KeyRow) -> None:
     """Store a new key. Raises IntegrityError where its id or its secret is taken."""
     connection.execute(_insert, asdict(row))
-
-
-def grants(watch: Watch, secret_sha256: str) -> tuple[str, str, str] | None:
-    """The id, scope and note of the active key with this hash, without a transaction; None where there is none."""
-    row = watch.row(
-        "SELECT key_id, scope, note FROM access_key WHERE secret_sha256 = ? AND revoked_at IS NULL", secret_sha256
-    )
-    return None if row is None else (row[0], row[1], row[2])
-
-
-def are_needed(watch: Watch) -> bool:
-    """Whether any key is active, without a transaction."""
-    row = watch.row("SELECT EXISTS (SELECT 1 FROM access_key WHERE revoked_at IS NULL)")
-    return row is not None and bool(row[0])
 
 
 def any_active(connection: Connection) -> bool:

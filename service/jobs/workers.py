@@ -34,7 +34,7 @@ class Lane(Enum):
 
 
 @dataclass(slots=True)
-class _Call:
+class _Task:
     """A call on its way; `retried` once its process ended without an answer."""
 
     lane: Lane
@@ -54,7 +54,7 @@ class Workers:
         self._sizes = sizes
         self._pools: dict[Lane, Executor] = {}
         self._calls = dict.fromkeys(Lane, 0)
-        self._turns: dict[str, deque[_Call]] = {}
+        self._turns: dict[str, deque[_Task]] = {}
         self._lock = threading.Lock()
         self._closed = False
 
@@ -65,8 +65,8 @@ class Workers:
 
         Function, arguments and result must be picklable. Raises BusyError where too many wait.
         """
-        asked = _Call(lane, function, arguments, turn)
-        asked.answer.set_running_or_notify_cancel()  # nobody who stops waiting stops what is stored
+        task = _Task(lane, function, arguments, turn)
+        task.answer.set_running_or_notify_cancel()  # nobody who stops waiting stops what is stored
         with self._lock:
             if self._closed or self._calls[lane] >= _MOST_WAITING:
                 raise BusyError(f"{self._calls[lane]} requests of this kind wait already: ask again in a little while")
@@ -74,11 +74,11 @@ class Workers:
             if turn is not None:
                 waiting = self._turns.get(turn)
                 if waiting is not None:
-                    waiting.append(asked)
-                    return asked.answer
+                    waiting.append(task)
+                    return task.answer
                 self._turns[turn] = deque()
-        self._start(asked)
-        return asked.answer
+        self._start(task)
+        return task.answer
 
     def is_free(self, lane: Lane) -> bool:
         """Whether a call would begin at once."""
@@ -98,46 +98,46 @@ class Workers:
         for pool in pools:
             pool.shutdown(wait=True, cancel_futures=True)
 
-    def _start(self, asked: _Call) -> None:
+    def _start(self, task: _Task) -> None:
         with self._lock:
-            if not self._closed and asked.lane not in self._pools:
-                self._pools[asked.lane] = self._make(asked.lane)
-            pool = self._pools.get(asked.lane)
+            if not self._closed and task.lane not in self._pools:
+                self._pools[task.lane] = self._make(task.lane)
+            pool = self._pools.get(task.lane)
         if pool is None:
-            self._ended(asked, BusyError("the service is ending"), None)
+            self._ended(task, BusyError("the service is ending"), None)
             return
         try:
-            started = pool.submit(self._wrap, asked.function, asked.arguments)
+            started = pool.submit(self._wrap, task.function, task.arguments)
         except RuntimeError as error:  # the pool is broken, or was closed meanwhile
-            self._ended(asked, error, pool)
+            self._ended(task, error, pool)
         else:
-            started.add_done_callback(lambda done: self._ended(asked, done, pool))
+            started.add_done_callback(lambda done: self._ended(task, done, pool))
 
-    def _ended(self, asked: _Call, ended: "Future[Any] | Exception", pool: Executor | None) -> None:
+    def _ended(self, task: _Task, ended: "Future[Any] | Exception", pool: Executor | None) -> None:
         error = ended if isinstance(ended, Exception) else _error(ended)
         if isinstance(error, BrokenExecutor) and pool is not None:
             with self._lock:
-                if self._pools.get(asked.lane) is pool:
-                    del self._pools[asked.lane]
+                if self._pools.get(task.lane) is pool:
+                    del self._pools[task.lane]
             pool.shutdown(wait=False)
-            if not asked.retried:
-                asked.retried = True
-                self._start(asked)
+            if not task.retried:
+                task.retried = True
+                self._start(task)
                 return
             error = BusyError("the process that worked on this has ended: ask again in a little while")
         following = None
         with self._lock:
-            self._calls[asked.lane] -= 1
-            if asked.turn is not None:
-                waiting = self._turns[asked.turn]
+            self._calls[task.lane] -= 1
+            if task.turn is not None:
+                waiting = self._turns[task.turn]
                 if waiting:
                     following = waiting.popleft()
                 else:
-                    del self._turns[asked.turn]
+                    del self._turns[task.turn]
         if error is not None:
-            asked.answer.set_exception(error)
+            task.answer.set_exception(error)
         elif isinstance(ended, Future):
-            asked.answer.set_result(ended.result())
+            task.answer.set_result(ended.result())
         if following is not None:
             self._start(following)
 

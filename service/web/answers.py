@@ -24,9 +24,8 @@ from service.lists import ALL_ITEMS, from_cursor, sliced
 from service.queries.cache import Answer, revision_and_json, to_json
 from service.web.context import Context
 from service.web.limits import LONGEST_WAIT_SECONDS
-from service.web.polls import Again, remember
+from service.web.middleware import Again, remember
 from service.web.revalidation import Made
-from storage import clutches
 
 JSON_TYPE = "application/json"
 CSV_TYPE = "text/csv; charset=utf-8"
@@ -67,7 +66,7 @@ async def clutch_answer(
     held = await kept(context, (clutch_id, revision, name, *arguments), lambda: to_json(make()))
 
     def again(request: Request) -> Response | None:
-        revision = clutches.revision_now(context.database.watch, clutch_id)
+        revision = context.database.watch.revision(clutch_id)
         held = context.cache.held((clutch_id, revision, name, *arguments))
         return None if held is None else tagged(request, held, JSON_TYPE, revision)
 
@@ -157,7 +156,7 @@ def _computed_again(
     key = (clutch_id, _name(query), *arguments)
 
     def again(request: Request) -> Response | None:
-        revision = clutches.revision_now(context.database.watch, clutch_id)
+        revision = context.database.watch.revision(clutch_id)
         whole = None if revision is None else context.revalidation.held(key, revision)
         return None if whole is None else tagged(request, whole, JSON_TYPE, revision)
 
@@ -175,7 +174,7 @@ def preferred_wait(prefer: str | None) -> int | None:
 
 
 def _revision(context: Context, clutch_id: str) -> int:
-    revision = clutches.revision_now(context.database.watch, clutch_id)
+    revision = context.database.watch.revision(clutch_id)
     if revision is None:
         raise NotFoundError(f"no clutch is known as {clutch_id!r}")
     return revision

@@ -17,7 +17,6 @@ from fastapi import Depends, Request
 
 from service.errors import FieldError, ForbiddenError, InvalidError, UnauthorizedError
 from service.web.context import Context
-from storage import keys
 from storage.engine.watch import Watch
 from storage.keys import KeyRow
 
@@ -49,13 +48,13 @@ def make_key(scope: Scope, note: str, *, created_at: str) -> tuple[str, KeyRow]:
 
 def authorise(watch: Watch, caller: Caller, scope: Scope) -> str:
     """Let the caller pass and return its name, or raise UnauthorizedError or ForbiddenError."""
-    if not keys.are_needed(watch):
+    if not watch.keys_are_needed():
         _require_loopback(caller)
         return LOCAL
     scheme, _, text = (caller.authorization or "").partition(" ")
     if scheme.lower() != "bearer" or not text:
         raise UnauthorizedError("send a key as: Authorization: Bearer KEY")
-    granted = keys.grants(watch, _digest(text.strip()))
+    granted = watch.key(_digest(text.strip()))
     if granted is None:
         raise UnauthorizedError("the key is not known, or was revoked")
     key_id, its_scope, note = granted

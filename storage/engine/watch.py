@@ -1,4 +1,7 @@
-"""What polls ask, without a transaction: whether anything was committed, and rows of small queries, kept until it was."""
+"""What every request asks, without a transaction: whether anything was committed, a clutch's revision, a key's scope.
+
+A row that was read is kept until something is committed.
+"""
 
 import sqlite3
 import threading
@@ -31,7 +34,23 @@ class Watch:
         with self._lock:
             return self._version()
 
-    def row(self, query: str, *values: object) -> tuple[Any, ...] | None:
+    def revision(self, clutch_id: str) -> int | None:
+        """The clutch's revision, or None."""
+        row = self._row("SELECT revision FROM clutch WHERE clutch_id = ?", clutch_id)
+        return None if row is None else int(row[0])
+
+    def key(self, secret_sha256: str) -> tuple[str, str, str] | None:
+        """The id, scope and note of the active key with this hash; None where there is none."""
+        query = "SELECT key_id, scope, note FROM access_key WHERE secret_sha256 = ? AND revoked_at IS NULL"
+        row = self._row(query, secret_sha256)
+        return None if row is None else (row[0], row[1], row[2])
+
+    def keys_are_needed(self) -> bool:
+        """Whether any key is active."""
+        row = self._row("SELECT EXISTS (SELECT 1 FROM access_key WHERE revoked_at IS NULL)")
+        return row is not None and bool(row[0])
+
+    def _row(self, query: str, *values: object) -> tuple[Any, ...] | None:
         """The first row of a query by key as it is now, None where there is none; asked of the file once a commit."""
         key = (query, values)
         with self._lock:

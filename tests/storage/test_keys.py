@@ -14,24 +14,24 @@ def key(key_id: str, secret: str, created_at: str = "2026-01-01T00:00:00Z") -> K
 
 def test_a_key_opens_until_it_is_revoked(database: Database) -> None:
     watch = database.watch
-    assert not keys.are_needed(watch)
+    assert not watch.keys_are_needed()
     with database.writing() as connection:
         keys.insert(connection, key("k2", "bb"))
         keys.insert(connection, key("k1", "aa", "2026-02-01T00:00:00Z"))
         assert keys.any_active(connection)
-    assert keys.are_needed(watch)
-    assert [keys.grants(watch, secret) for secret in ("aa", "cc")] == [("k1", "ingest", "bench 3"), None]
+    assert watch.keys_are_needed()
+    assert [watch.key(secret) for secret in ("aa", "cc")] == [("k1", "ingest", "bench 3"), None]
     with database.writing() as connection:
         assert keys.revoke(connection, "k2", "2026-03-01T00:00:00Z")
         assert not keys.revoke(connection, "k2", "2026-04-01T00:00:00Z")
         assert not keys.revoke(connection, "unknown", "2026-04-01T00:00:00Z")
         assert keys.any_active(connection)
-    assert keys.grants(watch, "bb") is None
+    assert watch.key("bb") is None
     with database.writing() as connection:
         keys.revoke(connection, "k1", "2026-03-02T00:00:00Z")
         assert not keys.any_active(connection)
         listed = keys.all_keys(connection)
-    assert not keys.are_needed(watch)
+    assert not watch.keys_are_needed()
     assert [(row.key_id, row.revoked_at) for row in listed] == [
         ("k2", "2026-03-01T00:00:00Z"),
         ("k1", "2026-03-02T00:00:00Z"),

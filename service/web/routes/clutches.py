@@ -20,7 +20,7 @@ from service.web.answers import JSON_TYPE, answer, clutch_answer, described_body
 from service.web.auth import Ingester, Reader, name_of_caller
 from service.web.context import Context, Cursor, Limit
 from service.web.limits import USUAL_ITEMS
-from service.web.polls import remember
+from service.web.middleware import remember
 from service.web.problems import CHANGING, READING, SENDING
 from service.workflows import register_clutch as registration
 from service.workflows.edit_clutch import edit

@@ -11,7 +11,6 @@ from starlette.datastructures import UploadFile
 
 from service.errors import InvalidError
 from service.jobs.workers import Lane
-from service.queries.cache import to_json
 from service.run_files.upload import read_file_run
 from service.schemas.base import Origin
 from service.schemas.parameters import (
@@ -28,6 +27,7 @@ from service.web.answers import JSON_TYPE, now
 from service.web.auth import Ingester, name_of_caller
 from service.web.problems import SENDING
 from service.workflows.ingest_run import ingest_posted
+from storage.encoding.json_text import to_text
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}/runs", tags=["runs"])
 
@@ -78,7 +78,7 @@ async def post_run_file(
         taken_in = context.workers.submit(Lane.FILES, ingest_posted, clutch_id, read, now(), by, turn=clutch_id)
         receipt, new = await asyncio.wrap_future(taken_in)
     headers = {"Location": f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"}
-    return Response(content=to_json(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
+    return Response(content=to_text(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
 
 
 async def _save(request: Request, path: Path, filename: str) -> str:

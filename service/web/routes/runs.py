@@ -15,7 +15,6 @@ from service.errors import NotAcceptableError, NotFoundError
 from service.jobs.workers import Lane
 from service.lists import from_cursor, page
 from service.queries import runs
-from service.queries.cache import to_json
 from service.queries.raw_run.answer import Kind, entity_tag, write_run
 from service.run_files.json_run import checked, read_run
 from service.schemas.parameters import ClutchId, Points, RunId, State
@@ -28,6 +27,7 @@ from service.web.limits import LARGE_BODY_BYTES, USUAL_ITEMS
 from service.web.problems import CHANGING, READING, SENDING, described
 from service.workflows import change_run
 from service.workflows.ingest_run import ingest_posted
+from storage.encoding.json_text import to_text
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}/runs", tags=["runs"])
 
@@ -67,7 +67,7 @@ async def post_run(request: Request, context: Ingester, clutch_id: ClutchId) -> 
     )
     receipt, new = await asyncio.wrap_future(taken_in)
     headers = {"Location": f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"}
-    return Response(content=to_json(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
+    return Response(content=to_text(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
 
 
 @router.get("", response_model=RunPage, responses=READING)
@@ -172,4 +172,4 @@ async def _changed(
     """The receipt after a change."""
     made = partial(change, **asked, by=name_of_caller(request), at=now())
     changing = context.workers.submit(Lane.RUNS, made, clutch_id, run_id, turn=clutch_id)
-    return Response(content=to_json(await asyncio.wrap_future(changing)), media_type=JSON_TYPE)
+    return Response(content=to_text(await asyncio.wrap_future(changing)), media_type=JSON_TYPE)
