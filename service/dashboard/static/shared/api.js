@@ -81,7 +81,10 @@ const answers = new Map();
  */
 export async function read(path) {
   const before = answers.get(path);
-  const answer = await request(path, before?.tag ? { headers: { "If-None-Match": before.tag } } : {});
+  /** @type {Record<string, string>} */
+  const headers = { Prefer: "wait=60" }; // a page that shows the clutch as it is waits for the newest answer
+  if (before?.tag) headers["If-None-Match"] = before.tag;
+  const answer = await request(path, { headers });
   if (answer.status === 304 && before) {
     await answer.arrayBuffer(); // an answer that is not read to its end keeps its connection busy
     return { body: before.body, changed: false };
