@@ -11,14 +11,17 @@ from fastapi_offline import FastAPIOffline
 from service.dashboard import assets
 from service.dashboard import pages as dashboard
 from service.jobs.queue import DiagnosisQueue
+from service.jobs.workers import Lane, Workers, in_processes, in_threads
 from service.queries.cache import AnswerCache
 from service.settings import CODE_VERSION, Settings
 from service.web import problems
 from service.web.answers import now
 from service.web.context import Context
-from service.web.limits import MOST_CACHED_BYTES
+from service.web.limits import MOST_CACHED_BYTES, MOST_REVALIDATED_BYTES
 from service.web.metrics import Metrics
 from service.web.middleware import BodyLimit, Counting, Heads, SafeHeaders
+from service.web.polls import Polls
+from service.web.revalidation import Revalidation
 from service.web.routes import clutches, diagnoses, exports, files, fleet, health, life, runs
 from service.workflows import adopt_model, run_diagnosis
 from storage.diagnoses import NewDiagnosis
@@ -35,6 +38,7 @@ class _Diagnoses:
     """What the queue asks of the workflows."""
 
     database: Database
+    workers: Workers
 
     def fail_running(self, problem: str) -> None:
         run_diagnosis.fail_running(self.database, problem, at=now())
@@ -46,13 +50,12 @@ class _Diagnoses:
         return run_diagnosis.ask(self.database, clutch_id, created_at=now())
 
     def finish(self, asked_for: NewDiagnosis, ended: Mapping[str, Any], *, adopt: bool) -> None:
-        adopted = (
-            adopt
-            and "report" in ended
-            and adopt_model.finish_and_adopt(
-                self.database, asked_for.clutch_id, asked_for.diagnosis_id, ended, life=asked_for.life, at=now()
-            )
-        )
+        adopted = False
+        if adopt and "report" in ended:
+            clutch_id = asked_for.clutch_id
+            arguments = (clutch_id, asked_for.diagnosis_id, ended, asked_for.life, now())
+            adopting = self.workers.submit(Lane.ANSWERS, adopt_model.finish_and_adopt, *arguments, turn=clutch_id)
+            adopted = adopting.result()
         if not adopted:
             run_diagnosis.finish(self.database, asked_for.diagnosis_id, ended, at=now())
 
@@ -65,14 +68,23 @@ def create_app(settings: Settings) -> FastAPI:
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         database = open_database(settings.database)
-        queue = DiagnosisQueue(f"sqlite:///{database.path.absolute()}", settings, _Diagnoses(database))
+        workers = in_processes(database, settings.workers) if settings.workers else in_threads(database)
+        queue = DiagnosisQueue(f"sqlite:///{database.path.absolute()}", settings, _Diagnoses(database, workers))
         try:
+            workers.warm()
             queue.start()
-            cache = AnswerCache(MOST_CACHED_BYTES)
-            app.state.context = Context(database=database, cache=cache, metrics=metrics, diagnoses=queue)
+            app.state.context = Context(
+                database=database,
+                cache=AnswerCache(MOST_CACHED_BYTES),
+                metrics=metrics,
+                diagnoses=queue,
+                workers=workers,
+                revalidation=Revalidation(MOST_REVALIDATED_BYTES),
+            )
             yield
         finally:
             queue.close()
+            workers.close()
             database.close()
 
     app = FastAPIOffline(
@@ -88,6 +100,7 @@ def create_app(settings: Settings) -> FastAPI:
     for exported in (exports.router, exports.fleet_router):
         app.include_router(exported)
     app.include_router(dashboard.router(assets.load()))
+    app.add_middleware(Polls)
     app.add_middleware(Heads)
     app.add_middleware(BodyLimit, most=settings.most_body_bytes, most_file=settings.most_file_bytes)
     app.add_middleware(SafeHeaders)

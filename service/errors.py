@@ -58,6 +58,20 @@ class ConflictError(ServiceError):
     title = "This name is taken by other content"
 
 
+class ArchivedError(ConflictError):
+    """The clutch is archived: it takes in no more runs."""
+
+    slug = "archived"
+    title = "The clutch is archived"
+
+
+class NotPossibleNowError(ConflictError):
+    """What is asked for makes no sense in the state that the thing is in."""
+
+    slug = "not-possible-now"
+    title = "This is not possible now"
+
+
 class NothingToAdoptError(ConflictError):
     """A diagnosis has no extension that could be adopted, or is of another life."""
 
@@ -79,6 +93,14 @@ class UnsupportedMediaTypeError(ServiceError):
     status = 415
     slug = "unsupported-media-type"
     title = "The body has a type that is not accepted here"
+
+
+class NotAcceptableError(ServiceError):
+    """The answer cannot be given in the format that was asked for."""
+
+    status = 406
+    slug = "not-acceptable"
+    title = "The answer is not given in this format here"
 
 
 class BusyError(ServiceError):

@@ -18,11 +18,12 @@ from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
 from models.prognosis.fleet import FleetPrior
 from models.tracking.filters.particle import ParticleState
 from models.tracking.filters.ukf import UkfState
+from service.columns import whole
 from service.errors import NotFoundError
 from service.lives.assumptions import ALL_PRESSURES, FLEET, LearnedPrior, kind_of, severity_under
 from service.lives.history import REBUILD, ByPressure, Event, duty_block, moment_of, order
 from service.lives.incoming_run import IncomingRun
-from service.lives.recomputation import Adoption, ClutchState, Results, Tracking
+from service.lives.recomputation import Adoption, ClutchState, Results, Tracking, newest_adoption
 from service.lives.run_analysis import Analysis, LevelFit, Value
 from service.lives.tracks import CARRIED, States, Tracked
 from service.schemas.clutch import ClutchIn
@@ -30,7 +31,7 @@ from service.settings import CODE_VERSION
 from storage import assumptions, clutches, diagnoses, results, runs
 from storage.clutches import ClutchRow
 from storage.results import FilterStateRow, FitRow, PredictionRow
-from storage.runs import RunInOrder
+from storage.runs import NewRun, RunInOrder
 
 _STATES: dict[str, type[ParticleState] | type[UkfState]] = {"particle": ParticleState, "ukf": UkfState}
 #: Columns of a stored fit that are a fit's own.
@@ -46,46 +47,61 @@ def clutch(connection: Connection, clutch_id: str) -> ClutchRow:
 
 
 def record(row: ClutchRow) -> ClutchIn:
-    """A clutch's record as it was registered."""
+    """A clutch's record in force."""
     return ClutchIn.model_validate(row.record)
 
 
 def state(
-    connection: Connection, clutch_id: str, *, also: Extension | None = None, carried: bool = False
+    connection: Connection,
+    clutch_id: str,
+    *,
+    also: Extension | None = None,
+    edited: ClutchIn | None = None,
+    carried: bool = False,
 ) -> ClutchState:
     """The clutch's state at its present revision. Raises NotFoundError.
 
     `also`: an extension that may come into force; what fleets taught for its severity is loaded beside the others'.
+    `edited`: a record that is about to come into force in place of the stored one.
     `carried`: with the filters after the last run, to be carried on; all else is computed without them.
     """
     row = clutch(connection, clutch_id)
-    own, adopted = record(row), adoption(connection, clutch_id)
-    extensions = [also, None if adopted is None else adopted.extension]
+    own, adopted = edited or record(row), _adoptions(connection, clutch_id)
+    extensions = [also, *(None if each is None else each.extension for each in adopted)]
     exponents = {None, *(extension.severity_exponent for extension in extensions if extension is not None)}
     severities = {severity_under(own, exponent) for exponent in exponents}
     return ClutchState(
         record=own,
         revision=row.revision,
         events=events(connection, clutch_id),
-        adoption=adopted,
+        adoptions=adopted,
         priors={severity: _learned_prior(connection, own, severity) for severity in severities},
         filters=_filters(connection, clutch_id) if carried else None,
     )
 
 
 def adoption(connection: Connection, clutch_id: str) -> Adoption | None:
-    """What was adopted last, None under the baseline; whether it is in force the history tells."""
-    row = assumptions.current_adoption(connection, clutch_id)
-    if row is None or row.diagnosis_id is None:
-        return None
-    diagnosed = diagnoses.get(connection, clutch_id, row.diagnosis_id)
-    if diagnosed is None or diagnosed.extension is None:
-        return None
-    return Adoption(
-        diagnosis_id=diagnosed.diagnosis_id,
-        life=diagnosed.life,
-        extension=Extension.from_dict(diagnosed.extension),
-    )
+    """What was adopted last of the lives that are in the history, None under the baseline; whether it is in force the
+    present life tells."""
+    adopted = _adoptions(connection, clutch_id)
+    return newest_adoption(adopted, [row.run_id for row in runs.rebuilds(connection, clutch_id)])
+
+
+def _adoptions(connection: Connection, clutch_id: str) -> tuple[Adoption | None, ...]:
+    """What was adopted, newest first, as far back as any history could ask for: one of each life."""
+    adopted: dict[str, Adoption] = {}
+    for row in assumptions.adoptions_of(connection, clutch_id):
+        diagnosed = None if row.diagnosis_id is None else diagnoses.get(connection, clutch_id, row.diagnosis_id)
+        if diagnosed is None or diagnosed.extension is None:
+            return (*adopted.values(), None)
+        if diagnosed.life not in adopted:
+            extension = Extension.from_dict(diagnosed.extension)
+            adopted[diagnosed.life] = Adoption(
+                diagnosis_id=diagnosed.diagnosis_id, life=diagnosed.life, extension=extension
+            )
+        if not diagnosed.life:
+            break
+    return tuple(adopted.values())
 
 
 def present_life(connection: Connection, clutch_id: str) -> str:
@@ -95,26 +111,36 @@ def present_life(connection: Connection, clutch_id: str) -> str:
 
 
 def events(connection: Connection, clutch_id: str) -> tuple[Event, ...]:
-    """All runs of a clutch as its history sees them, ordered; mean COF as the model in force corrects it."""
+    """All accepted runs of a clutch as its history sees them, ordered; mean COF as the model in force corrects it."""
     cofs = results.cofs_of(connection, clutch_id) | assumptions.corrected_cofs_of(connection, clutch_id)
     return order([_event(row, cofs.get(row.run_key, {})) for row in runs.in_order(connection, clutch_id)])
 
 
-def baseline_cofs(connection: Connection, clutch_id: str) -> dict[str, ByPressure]:
-    """Mean COFs by run_id as the baseline has them."""
-    cofs = results.cofs_of(connection, clutch_id)
-    return {row.run_id: cofs[row.run_key] for row in runs.in_order(connection, clutch_id) if row.run_key in cofs}
+def set_aside(connection: Connection, clutch_id: str) -> dict[str, Event]:
+    """The runs that are held or were withdrawn by run_id, as the history would see them; their mean COFs yet to come."""
+    return {row.run_id: _event(row, {}) for row in runs.set_aside(connection, clutch_id)}
 
 
 def levels(connection: Connection, clutch_id: str) -> dict[str, list[LevelFit]]:
     """All fits of a clutch by run_id."""
-    names = {row.run_key: row.run_id for row in runs.in_order(connection, clutch_id)}
+    names = {run_key: run_id for run_id, run_key in runs.keys(connection, clutch_id).items()}
     of_runs = results.fits_of(connection, clutch_id)
     return {names[run_key]: [_level_fit(row) for row in rows] for run_key, rows in of_runs.items()}
 
 
+def receipt(row: NewRun) -> dict[str, Any]:
+    """A run's receipt as it is now: as it is stored, and whether the run counts, why not, and the cycles as sent."""
+    sent_cycles = row.cycles if row.sent_cycles is None else row.sent_cycles
+    return row.receipt | {"state": row.state, "doubts": list(row.doubts), "sent_cycles": whole(sent_cycles)}
+
+
+def standing(row: NewRun) -> dict[str, Any]:
+    """What the audit trail keeps of a run before and after a change."""
+    return {"state": row.state, "cycles": whole(row.cycles), "doubts": list(row.doubts)}
+
+
 def receipts(connection: Connection, clutch_id: str) -> dict[str, dict[str, Any]]:
-    """All receipts of a clutch by run_id."""
+    """All receipts of a clutch by run_id, as they are stored."""
     return {row.run_id: row.receipt for row in runs.page(connection, clutch_id)}
 
 
@@ -138,7 +164,7 @@ def unchanged(connection: Connection, clutch_id: str, revision: int) -> bool:
 def store(connection: Connection, clutch_id: str, computed: Results) -> None:
     """Store results in place of those that were there. The revision is the workflow's to move on."""
     if computed.levels or computed.receipts or computed.corrected:
-        rows = {row.run_id: row.run_key for row in runs.in_order(connection, clutch_id)}
+        rows = runs.keys(connection, clutch_id)
         for run_id, own in computed.levels.items():
             results.write_fits(connection, rows[run_id], fit_rows(own, computed.cofs.get(run_id, {})))
         for run_id, receipt in computed.receipts.items():
@@ -224,6 +250,7 @@ def _event(row: RunInOrder, cofs: ByPressure) -> Event:
         kind=row.kind,
         cycles=row.cycles,
         moment=moment_of(row.started_at, row.received_at),
+        arrived=row.run_key,
         speed_range=None if low is None or high is None else (low, high),
         cofs=cofs,
         rebuild=row.event == REBUILD,

@@ -10,6 +10,8 @@ CODE_VERSION = version("clutchlife")
 DEFAULT_DATABASE = "sqlite:///clutchlife.db"
 DEFAULT_URL = "http://127.0.0.1:8000"
 
+#: Processes that take in runs. Chosen: as `make load` has it, on two cores.
+DEFAULT_WORKERS = 2
 #: Limits, in the units of their environment variables.
 DEFAULT_BODY_MB = 64  # MiB of JSON. Chosen; longer records are posted as files
 DEFAULT_DIAGNOSIS_SECONDS = 300  # s. Chosen; docs/benchmarks.md: the longest diagnosis takes 11 s
@@ -18,13 +20,16 @@ DEFAULT_DIAGNOSIS_MEMORY_MB = 4096  # MiB of address space. Chosen; no table
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """The service's settings; `from_environment` reads CLUTCHLIFE_DATABASE, CLUTCHLIFE_MAX_BODY_MB,
-    CLUTCHLIFE_DIAGNOSIS_SECONDS and CLUTCHLIFE_DIAGNOSIS_MEMORY_MB.
+    """The service's settings; `from_environment` reads CLUTCHLIFE_DATABASE, CLUTCHLIFE_WORKERS,
+    CLUTCHLIFE_MAX_BODY_MB, CLUTCHLIFE_DIAGNOSIS_SECONDS and CLUTCHLIFE_DIAGNOSIS_MEMORY_MB.
     """
 
     database: str = DEFAULT_DATABASE
     #: The function that makes diagnoses, module:function.
     engine: str = "models.diagnosis.diagnose:diagnose"
+
+    #: Processes that take in runs, beside one for files and one for answers; 0: threads of the service itself.
+    workers: int = 0
 
     #: Bytes of a request's body, and of a posted file (chosen: 1 GiB, as `readers.limits` has it unpacked).
     most_body_bytes: int = DEFAULT_BODY_MB * 2**20
@@ -40,14 +45,15 @@ class Settings:
         """Settings from the environment; a database given here wins. Raises ValueError on a limit that is no number."""
         return cls(
             database=database or os.environ.get("CLUTCHLIFE_DATABASE", DEFAULT_DATABASE),
+            workers=_whole("CLUTCHLIFE_WORKERS", DEFAULT_WORKERS, "processes", least=0),
             most_body_bytes=_whole("CLUTCHLIFE_MAX_BODY_MB", DEFAULT_BODY_MB, "megabytes") * 2**20,
             diagnosis_seconds=_whole("CLUTCHLIFE_DIAGNOSIS_SECONDS", DEFAULT_DIAGNOSIS_SECONDS, "seconds"),
             diagnosis_bytes=_whole("CLUTCHLIFE_DIAGNOSIS_MEMORY_MB", DEFAULT_DIAGNOSIS_MEMORY_MB, "megabytes") * 2**20,
         )
 
 
-def _whole(name: str, default: int, unit: str) -> int:
+def _whole(name: str, default: int, unit: str, *, least: int = 1) -> int:
     text = os.environ.get(name, str(default))
-    if not text.isdecimal() or int(text) == 0:
+    if not text.isdecimal() or int(text) < least:
         raise ValueError(f"{name} must be a whole number of {unit}, got {text!r}")
     return int(text)

@@ -1,6 +1,9 @@
-"""Stored runs as they were sent, each read in a transaction of its own when it is asked for."""
+"""Stored runs as they were sent, each read in a transaction of its own when it is asked for, and all results of a clutch
+computed anew from them."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,9 +11,14 @@ from sqlalchemy import Connection
 
 from service import records
 from service.errors import NotFoundError
+from service.lives.history import ByPressure, order
 from service.lives.incoming_run import IncomingRun
 from service.lives.model_correction import RunReader
-from storage import channels, runs
+from service.lives.payloads import receipt
+from service.lives.recomputation import ClutchState, Levels, Receipt, Results, computed_anew, computed_aside
+from service.lives.run_analysis import Analysis, analyse
+from service.settings import CODE_VERSION
+from storage import channels, results, runs
 from storage.engine.database import Database
 from storage.runs import RunRow
 
@@ -38,11 +46,11 @@ def run_reader(database: Database, clutch_id: str) -> RunReader:
 
     with database.reading() as connection:
         sampled = channels.samples(connection, clutch_id)
-        names = {row.run_key: row.run_id for row in runs.in_order(connection, clutch_id)}
+        names = runs.keys(connection, clutch_id)
     return RunReader(
         read=with_channels,
         describe=described,
-        sampled=frozenset(names[run_key] for run_key in sampled if run_key in names),
+        sampled=frozenset(run_id for run_id, run_key in names.items() if run_key in sampled),
     )
 
 
@@ -57,4 +65,68 @@ def incoming(row: RunRow, columns: Mapping[str, NDArray[np.float64]]) -> Incomin
         origin=row.details["origin"],
         channels=columns,
         details={name: row.details[name] for name in ("duty", "event", "note") if name in row.details},
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recomputed:
+    """All results of a clutch, computed anew from its raw runs: what stands beside each run's channels and its receipt by
+    run_id, the levels and mean COFs of runs that are none of the history, and what follows from the history."""
+
+    details: Mapping[str, dict[str, Any]]
+    receipts: Mapping[str, Receipt]
+    aside: Mapping[str, ByPressure]
+    levels: Levels
+    results: Results
+
+
+def recomputed(database: Database, state: ClutchState) -> Recomputed:
+    """Every run of a clutch analysed anew, under the state's record, and all that follows."""
+    with database.reading() as connection:
+        rows, aside = runs.page(connection, state.clutch_id), records.set_aside(connection, state.clutch_id)
+    reader = run_reader(database, state.clutch_id)
+    details, receipts, levels, speed_ranges = {}, {}, {}, {}
+    for row in rows:
+        sent = reader.read(row.run_id)
+        analysis = analyse(sent, state.geometry)
+        details[row.run_id] = records.details(sent, analysis)
+        receipts[row.run_id] = _receipt(row, analysis)
+        levels[row.run_id] = analysis.fits
+        speed_ranges[row.run_id] = analysis.speed_range
+    events = order([replace(event, speed_range=speed_ranges[event.run_id]) for event in state.events])
+    state = replace(state, events=events)
+    tests = reader.stationary_tests(state.lives[-1]) if events else iter(())
+    final, computed = computed_anew(state, levels, receipts, tests, reader, evaluated={})
+    cofs = {}
+    for run_id, event in aside.items():
+        event = replace(event, speed_range=speed_ranges[run_id])
+        cofs[run_id], own = computed_aside(final, event, levels, reader)
+        receipts[run_id] |= own
+    return Recomputed(
+        details=details,
+        receipts=receipts | dict(computed.receipts),
+        aside=cofs,
+        levels=levels,
+        results=replace(computed, receipts={}),
+    )
+
+
+def store_recomputed(connection: Connection, clutch_id: str, anew: Recomputed) -> None:
+    """Store results in place of all that there were. The revision is the workflow's to move on."""
+    keys = runs.keys(connection, clutch_id)
+    for run_id, run_key in keys.items():
+        results.write_fits(connection, run_key, records.fit_rows(anew.levels[run_id], anew.aside.get(run_id, {})))
+        runs.set_results(connection, run_key, anew.details[run_id], anew.receipts[run_id], CODE_VERSION)
+    records.store(connection, clutch_id, anew.results)
+
+
+def _receipt(row: RunRow, analysis: Analysis) -> Receipt:
+    """The receipt anew, its mean COFs, loops and warnings of the history yet to come."""
+    return receipt(
+        row.clutch_id,
+        incoming(row, {}),
+        received_at=row.received_at,
+        levels=analysis.fits,
+        cofs={},
+        warnings=analysis.warnings,
     )

@@ -19,6 +19,14 @@ _of_run = (
     .where(channel.c.run_key == bindparam("of_run"))
     .order_by(channel.c.position)
 )
+_lengths = (
+    select(channel.c.name, channel.c.length)
+    .where(channel.c.run_key == bindparam("of_run"))
+    .order_by(channel.c.position)
+)
+_one = select(channel.c.codec, channel.c.length, channel.c.data).where(
+    channel.c.run_key == bindparam("of_run"), channel.c.name == bindparam("wanted")
+)
 _samples = (
     select(channel.c.run_key, channel.c.length)
     .join(run, run.c.run_key == channel.c.run_key)
@@ -57,13 +65,44 @@ def write(connection: Connection, run_key: int, channels: Encoded) -> None:
 
 def read(connection: Connection, run_key: int) -> dict[str, NDArray[np.float64]]:
     """The channels of a run in the order they were sent, none for a run without. Raises DamagedData."""
-    channels = {}
-    for name, codec, length, data in connection.execute(_of_run, {"of_run": run_key}):
-        try:
-            channels[name] = decode_decimals(data, length) if codec == DECIMAL_CODEC else decode(data, codec, length)
-        except DamagedData as error:
-            raise DamagedData(f"channel {name} of run {run_key}: {error}") from error
-    return channels
+    rows = connection.execute(_of_run, {"of_run": run_key})
+    return {name: _decoded(run_key, name, codec, length, data) for name, codec, length, data in rows}
+
+
+def lengths(connection: Connection, run_key: int) -> dict[str, int]:
+    """How many values each channel of a run has, in the order they were sent; no values are read."""
+    rows = connection.execute(_lengths, {"of_run": run_key})
+    return {name: length for name, length in rows}  # noqa: C416  (rows are no pairs to mypy)
+
+
+@dataclass(frozen=True, slots=True)
+class Stored:
+    """One channel of a run as it is stored, to be decoded when no transaction is open any more."""
+
+    run_key: int
+    name: str
+    codec: str
+    length: int
+    data: bytes
+
+    def values(self) -> NDArray[np.float64]:
+        """The channel [length]. Raises DamagedData."""
+        return _decoded(self.run_key, self.name, self.codec, self.length, self.data)
+
+
+def stored(connection: Connection, run_key: int, name: str) -> Stored:
+    """One channel of a run, not decoded. Raises LookupError where the run has no such channel."""
+    row = connection.execute(_one, {"of_run": run_key, "wanted": name}).first()
+    if row is None:
+        raise LookupError(f"run {run_key} has no channel {name}")
+    return Stored(run_key, name, *row)
+
+
+def _decoded(run_key: int, name: str, codec: str, length: int, data: bytes) -> NDArray[np.float64]:
+    try:
+        return decode_decimals(data, length) if codec == DECIMAL_CODEC else decode(data, codec, length)
+    except DamagedData as error:
+        raise DamagedData(f"channel {name} of run {run_key}: {error}") from error
 
 
 def samples(connection: Connection, clutch_id: str) -> dict[int, int]:

@@ -1,4 +1,4 @@
-"""Clutches: the record as it was posted, and the summary that lists show."""
+"""Clutches: the record in force and the one that was posted, and the summary that lists show."""
 
 from dataclasses import dataclass
 
@@ -6,12 +6,16 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, Row, bindparam, select, tuple_, update
 
 from storage.encoding.json_text import Json, to_object, to_text
+from storage.engine.watch import Watch
 from storage.tables import clutch
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClutchRow:
-    """A clutch. `record` has its defaults filled in, `created_at` is ISO 8601, lists sort by `rank`, ascending."""
+    """A clutch. `record` has its defaults filled in, `created_at` is ISO 8601, lists sort by `rank`, ascending.
+
+    `registered` is the record as it was first posted where it was edited since, else None.
+    """
 
     clutch_id: str
     record: Json
@@ -20,16 +24,33 @@ class ClutchRow:
     revision: int
     rank: float
     summary: Json
+    archived: bool = False
+    registered: Json | None = None
 
 
 _insert = sa.insert(clutch)
 _of_wanted = clutch.c.clutch_id == bindparam("wanted")
 _by_id = select(clutch).where(_of_wanted)
-_worst_first = select(clutch).order_by(clutch.c.rank, clutch.c.clutch_id).limit(bindparam("most"))
+_worst_first = (
+    select(clutch)
+    .where(clutch.c.archived == bindparam("of_archived"))
+    .order_by(clutch.c.rank, clutch.c.clutch_id)
+    .limit(bindparam("most"))
+)
 _worst_first_after = _worst_first.where(
     tuple_(clutch.c.rank, clutch.c.clutch_id) > tuple_(bindparam("after_rank"), bindparam("after_id"))
 )
 _set_summary = update(clutch).where(_of_wanted).values(rank=bindparam("new_rank"), summary=bindparam("new_summary"))
+_set_record = (
+    update(clutch)
+    .where(_of_wanted)
+    .values(
+        record=bindparam("new_record"),
+        content_sha256=bindparam("new_content"),
+        registered=bindparam("new_registered"),
+        archived=bindparam("new_archived"),
+    )
+)
 _bump = update(clutch).where(_of_wanted).values(revision=clutch.c.revision + 1)
 _revision = select(clutch.c.revision).where(_of_wanted)
 _ids = select(clutch.c.clutch_id).order_by(clutch.c.clutch_id)
@@ -46,6 +67,8 @@ def insert(connection: Connection, row: ClutchRow) -> None:
         "revision": row.revision,
         "rank": row.rank,
         "summary": to_text(row.summary),
+        "archived": int(row.archived),
+        "registered": None if row.registered is None else to_text(row.registered),
     }
     connection.execute(_insert, values)
 
@@ -56,13 +79,38 @@ def get(connection: Connection, clutch_id: str) -> ClutchRow | None:
     return None if row is None else _row(row)
 
 
-def page(connection: Connection, *, limit: int, after: tuple[float, str] | None = None) -> list[ClutchRow]:
-    """At most `limit` clutches, worst first; `after` is the (rank, clutch_id) of the last clutch of the page before."""
+def page(
+    connection: Connection, *, limit: int, after: tuple[float, str] | None = None, archived: bool = False
+) -> list[ClutchRow]:
+    """At most `limit` clutches that are archived, or are not, worst first; `after` is the (rank, clutch_id) of the last
+    clutch of the page before."""
+    values: dict[str, object] = {"most": limit, "of_archived": int(archived)}
     if after is None:
-        rows = connection.execute(_worst_first, {"most": limit})
+        rows = connection.execute(_worst_first, values)
     else:
-        rows = connection.execute(_worst_first_after, {"most": limit, "after_rank": after[0], "after_id": after[1]})
+        rows = connection.execute(_worst_first_after, values | {"after_rank": after[0], "after_id": after[1]})
     return [_row(row) for row in rows]
+
+
+def set_record(
+    connection: Connection,
+    clutch_id: str,
+    *,
+    record: Json,
+    content_sha256: str,
+    registered: Json | None,
+    archived: bool,
+) -> None:
+    """Replace a clutch's record, and whether lists leave it out. Raises LookupError on an unknown clutch."""
+    values = {
+        "wanted": clutch_id,
+        "new_record": to_text(record),
+        "new_content": content_sha256,
+        "new_registered": None if registered is None else to_text(registered),
+        "new_archived": int(archived),
+    }
+    if connection.execute(_set_record, values).rowcount != 1:
+        raise LookupError(f"clutch {clutch_id!r} is not stored")
 
 
 def set_summary(connection: Connection, clutch_id: str, rank: float, summary: Json) -> None:
@@ -87,6 +135,12 @@ def revision(connection: Connection, clutch_id: str) -> int | None:
     return number
 
 
+def revision_now(watch: Watch, clutch_id: str) -> int | None:
+    """The clutch's revision, or None, without a transaction."""
+    row = watch.row("SELECT revision FROM clutch WHERE clutch_id = ?", clutch_id)
+    return None if row is None else int(row[0])
+
+
 def all_ids(connection: Connection) -> list[str]:
     """The ids of all clutches, ascending."""
     return list(connection.execute(_ids).scalars())
@@ -101,4 +155,6 @@ def _row(row: Row[tuple[object, ...]]) -> ClutchRow:
     values = row._asdict()
     values["record"] = to_object(values["record"])
     values["summary"] = to_object(values["summary"])
+    values["archived"] = bool(values["archived"])
+    values["registered"] = None if values["registered"] is None else to_object(values["registered"])
     return ClutchRow(**values)

@@ -6,6 +6,7 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, Row, bindparam, select, update
 
 from storage.encoding.json_text import Json, to_object, to_text
+from storage.runs import ACCEPTED
 from storage.tables import diagnosis, run
 
 RUNNING, FINISHED, FAILED = "running", "finished", "failed"
@@ -52,7 +53,12 @@ _newest = (
 )
 _same = (
     select(diagnosis.c.diagnosis_id)
-    .where(_of_clutch, diagnosis.c.status == RUNNING, diagnosis.c.last_run_key == bindparam("up_to"))
+    .where(
+        _of_clutch,
+        diagnosis.c.status == RUNNING,
+        diagnosis.c.last_run_key == bindparam("up_to"),
+        diagnosis.c.revision >= bindparam("since"),
+    )
     .order_by(diagnosis.c.diagnosis_key)
     .limit(1)
 )
@@ -72,7 +78,7 @@ _end_all = (
     .where(diagnosis.c.status == RUNNING)
     .values(status=FAILED, finished_at=bindparam("at"), problem=bindparam("new_problem"))
 )
-_last_run = select(sa.func.max(run.c.run_key)).where(run.c.clutch_id == bindparam("of_clutch"))
+_last_run = select(sa.func.max(run.c.run_key)).where(run.c.clutch_id == bindparam("of_clutch"), run.c.state == ACCEPTED)
 
 
 def insert(connection: Connection, row: NewDiagnosis) -> None:
@@ -92,9 +98,10 @@ def page(connection: Connection, clutch_id: str, *, limit: int, before: float | 
     return [_row(row) for row in connection.execute(_newest, values)]
 
 
-def running(connection: Connection, clutch_id: str, last_run_key: int) -> str | None:
-    """The id of the diagnosis of the same runs that is running, or None."""
-    diagnosis_id: str | None = connection.execute(_same, {"of_clutch": clutch_id, "up_to": last_run_key}).scalar()
+def running(connection: Connection, clutch_id: str, last_run_key: int, *, since: int = 0) -> str | None:
+    """The id of the diagnosis of the same runs that is running, or None; `since` is the revision of their last change."""
+    values = {"of_clutch": clutch_id, "up_to": last_run_key, "since": since}
+    diagnosis_id: str | None = connection.execute(_same, values).scalar()
     return diagnosis_id
 
 
@@ -117,7 +124,7 @@ def fail_all(connection: Connection, at: str, problem: str) -> int:
 
 
 def last_run_key(connection: Connection, clutch_id: str) -> int:
-    """The key of the clutch's run that was stored last, 0 where there is none."""
+    """The key of the clutch's accepted run that was stored last, 0 where there is none."""
     return connection.execute(_last_run, {"of_clutch": clutch_id}).scalar() or 0
 
 

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass
 import sqlalchemy as sa
 from sqlalchemy import Connection, bindparam, exists, select, update
 
+from storage.engine.watch import Watch
 from storage.tables import access_key
 
 
@@ -22,7 +23,6 @@ class KeyRow:
 
 _insert = sa.insert(access_key)
 _active = access_key.c.revoked_at.is_(None)
-_by_hash = select(access_key).where(access_key.c.secret_sha256 == bindparam("wanted"), _active)
 _any_active = select(exists().where(_active))
 _all = select(access_key).order_by(access_key.c.created_at, access_key.c.key_id)
 _revoke = (
@@ -35,10 +35,18 @@ def insert(connection: Connection, row: KeyRow) -> None:
     connection.execute(_insert, asdict(row))
 
 
-def by_secret_hash(connection: Connection, secret_sha256: str) -> KeyRow | None:
-    """The active key with this hash; None where there is none or it has been revoked."""
-    row = connection.execute(_by_hash, {"wanted": secret_sha256}).first()
-    return None if row is None else KeyRow(**row._asdict())
+def grants(watch: Watch, secret_sha256: str) -> tuple[str, str, str] | None:
+    """The id, scope and note of the active key with this hash, without a transaction; None where there is none."""
+    row = watch.row(
+        "SELECT key_id, scope, note FROM access_key WHERE secret_sha256 = ? AND revoked_at IS NULL", secret_sha256
+    )
+    return None if row is None else (row[0], row[1], row[2])
+
+
+def are_needed(watch: Watch) -> bool:
+    """Whether any key is active, without a transaction."""
+    row = watch.row("SELECT EXISTS (SELECT 1 FROM access_key WHERE revoked_at IS NULL)")
+    return row is not None and bool(row[0])
 
 
 def any_active(connection: Connection) -> bool:

@@ -1,17 +1,25 @@
-"""Runs: the request as it was stored, and the receipt that answered it. Their order is by cycles, then by run_id."""
+"""Runs: the request as it was stored, and the receipt that answered it. Their order is by cycles, then by run_id.
 
+Only accepted runs are part of a clutch's history; those that are held or were withdrawn stay stored beside them.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Any
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Row, bindparam, exists, func, or_, select, tuple_, update
+from sqlalchemy import Connection, Row, Select, bindparam, exists, func, or_, select, tuple_, update
 
-from storage.encoding.json_text import Json, to_object, to_text
+from storage.encoding.json_text import Json, to_list, to_object, to_text
 from storage.tables import fit, run
+
+ACCEPTED, HELD, WITHDRAWN = "accepted", "held", "withdrawn"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NewRun:
-    """A run that is about to be stored. `cycles` since new; `details` holds what only some kinds have."""
+    """A run that is about to be stored. `cycles` since new; `details` holds what only some kinds have; `doubts` are why
+    it is or was held, `sent_cycles` the cycles as they were sent where `cycles` was corrected since, else None."""
 
     clutch_id: str
     run_id: str
@@ -23,11 +31,14 @@ class NewRun:
     details: Json
     receipt: Json
     code_version: str
+    state: str = ACCEPTED
+    sent_cycles: float | None = None
+    doubts: Sequence[Any] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunRow(NewRun):
-    """A stored run; `run_key` is what the rows of its channels and fits refer to."""
+    """A stored run; `run_key` is what the rows of its channels and fits refer to, the later it arrived the greater."""
 
     run_key: int
 
@@ -57,14 +68,18 @@ _of_clutch = run.c.clutch_id == bindparam("of_clutch")
 _by_id = select(run).where(_of_clutch, run.c.run_id == bindparam("wanted"))
 _ordered = (
     select(run)
-    .where(_of_clutch, or_(bindparam("of_kind").is_(None), run.c.kind == bindparam("of_kind")))
+    .where(
+        _of_clutch,
+        or_(bindparam("of_kind").is_(None), run.c.kind == bindparam("of_kind")),
+        or_(bindparam("of_state").is_(None), run.c.state == bindparam("of_state")),
+    )
     .order_by(run.c.cycles, run.c.run_id)
     .limit(bindparam("most"))
 )
 _after = tuple_(run.c.cycles, run.c.run_id) > tuple_(bindparam("after_cycles"), bindparam("after_id"))
 _fitted = exists().where(fit.c.run_key == run.c.run_key)
 _LIGHT = tuple(field.name for field in fields(RunInOrder))
-_light = (
+_light_of_any = (
     select(
         *(run.c[name] for name in _LIGHT[:6]),
         func.json_extract(run.c.details, "$.speed_range[0]"),
@@ -78,7 +93,10 @@ _light = (
     .where(_of_clutch)
     .order_by(run.c.cycles, run.c.run_id)
 )
+_light = _light_of_any.where(run.c.state == ACCEPTED)
 _rebuilds = _light.where(func.json_extract(run.c.details, "$.event") == "rebuild")
+_set_aside = _light_of_any.where(run.c.state != ACCEPTED)
+_keys = select(run.c.run_id, run.c.run_key).where(_of_clutch)
 _set_results = update(run).where(run.c.run_key == bindparam("wanted"))
 
 
@@ -87,6 +105,7 @@ def insert(connection: Connection, row: NewRun) -> int:
     values = {field.name: getattr(row, field.name) for field in fields(NewRun)}
     values["details"] = to_text(row.details)
     values["receipt"] = to_text(row.receipt)
+    values["doubts"] = to_text(row.doubts)
     return connection.execute(_insert, values).lastrowid
 
 
@@ -103,13 +122,15 @@ def page(
     limit: int | None = None,
     after: tuple[float, str] | None = None,
     kind: str | None = None,
+    state: str | None = None,
     fitted: bool = False,
 ) -> list[RunRow]:
-    """Runs of a clutch in order, of one kind or all, at most `limit`, behind `after`, the (cycles, run_id) of another.
+    """Runs of a clutch in order, at most `limit`, behind `after`, the (cycles, run_id) of another.
 
-    `fitted`: only runs through which a curve was fitted.
+    Of one kind or all, in one state or any; `fitted`: only runs through which a curve was fitted.
     """
-    values: dict[str, object] = {"of_clutch": clutch_id, "of_kind": kind, "most": -1 if limit is None else limit}
+    values: dict[str, object] = {"of_clutch": clutch_id, "of_kind": kind, "of_state": state}
+    values["most"] = -1 if limit is None else limit
     query = _ordered.where(_fitted) if fitted else _ordered
     if after is not None:
         query = query.where(_after)
@@ -118,15 +139,23 @@ def page(
 
 
 def in_order(connection: Connection, clutch_id: str) -> list[RunInOrder]:
-    """All runs of a clutch in order, without their receipts."""
-    rows = connection.execute(_light, {"of_clutch": clutch_id})
-    return [RunInOrder(**dict(zip(_LIGHT, values, strict=True))) for values in rows]
+    """The accepted runs of a clutch in order, without their receipts."""
+    return _in_order(connection, _light, clutch_id)
 
 
 def rebuilds(connection: Connection, clutch_id: str) -> list[RunInOrder]:
-    """The rebuilds of a clutch in order."""
-    rows = connection.execute(_rebuilds, {"of_clutch": clutch_id})
-    return [RunInOrder(**dict(zip(_LIGHT, values, strict=True))) for values in rows]
+    """The accepted rebuilds of a clutch in order."""
+    return _in_order(connection, _rebuilds, clutch_id)
+
+
+def set_aside(connection: Connection, clutch_id: str) -> list[RunInOrder]:
+    """The runs of a clutch that are held or were withdrawn, in order."""
+    return _in_order(connection, _set_aside, clutch_id)
+
+
+def keys(connection: Connection, clutch_id: str) -> dict[str, int]:
+    """run_id -> run_key of all runs of a clutch."""
+    return {row.run_id: row.run_key for row in connection.execute(_keys, {"of_clutch": clutch_id})}
 
 
 def set_results(connection: Connection, run_key: int, details: Json, receipt: Json, code_version: str) -> None:
@@ -143,8 +172,23 @@ def set_receipt(connection: Connection, run_key: int, receipt: Json) -> None:
         raise LookupError(f"run {run_key} is not stored")
 
 
+def set_state(
+    connection: Connection, run_key: int, *, state: str, cycles: float, sent_cycles: float | None, doubts: Sequence[Any]
+) -> None:
+    """Change whether a run counts, and at which cycles. Raises LookupError on an unknown run."""
+    values = {"state": state, "cycles": cycles, "sent_cycles": sent_cycles, "doubts": to_text(doubts)}
+    if connection.execute(_set_results, {"wanted": run_key} | values).rowcount != 1:
+        raise LookupError(f"run {run_key} is not stored")
+
+
+def _in_order(connection: Connection, query: Select[Any], clutch_id: str) -> list[RunInOrder]:
+    rows = connection.execute(query, {"of_clutch": clutch_id})
+    return [RunInOrder(**dict(zip(_LIGHT, values, strict=True))) for values in rows]
+
+
 def _row(row: Row[tuple[object, ...]]) -> RunRow:
     values = row._asdict()
+    values["doubts"] = tuple(to_list(values["doubts"]))
     values["details"] = to_object(values["details"])
     values["receipt"] = to_object(values["receipt"])
     return RunRow(**values)

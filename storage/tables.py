@@ -19,7 +19,8 @@ from sqlalchemy import (
 
 metadata = MetaData()
 
-#: `record` is the clutch as it was posted, defaults filled in; `rank` sorts lists, worst first ascending.
+#: `record` is the record in force, defaults filled in, `registered` that which was posted, where it was edited since; `rank`
+#: sorts lists, worst first ascending; `archived` is 1 for a clutch that lists leave out.
 clutch = Table(
     "clutch",
     metadata,
@@ -30,10 +31,13 @@ clutch = Table(
     Column("revision", Integer, nullable=False),
     Column("rank", REAL, nullable=False),
     Column("summary", Text, nullable=False),
+    Column("archived", Integer, nullable=False, server_default="0"),
+    Column("registered", Text),
     Index("clutch_worst_first", "rank", "clutch_id"),
 )
 
-#: `details` holds what only some kinds have (duty, event, note, origin); `receipt` is the answer, unchanged.
+#: `details` holds what only some kinds have (duty, event, note, origin); `receipt` is the answer without what is in other
+#: columns: `state` (whether the run counts), `doubts` (why it was held), `sent_cycles` (where `cycles` was corrected since).
 run = Table(
     "run",
     metadata,
@@ -48,6 +52,9 @@ run = Table(
     Column("details", Text, nullable=False),
     Column("receipt", Text, nullable=False),
     Column("code_version", Text, nullable=False),
+    Column("state", Text, nullable=False, server_default="accepted"),
+    Column("sent_cycles", REAL),
+    Column("doubts", Text, nullable=False, server_default="[]"),
     UniqueConstraint("clutch_id", "run_id", name="run_once_per_clutch"),
     Index("run_in_order", "clutch_id", "cycles", "run_id"),
 )
@@ -164,6 +171,24 @@ fleet_prior = Table(
     Column("members", Text, nullable=False),
     Column("content", Text, nullable=False),
     Column("code_version", Text, nullable=False),
+)
+
+#: The audit trail: who changed what of a clutch (`run_id` null) or of one of its runs, when and why, and the revision from
+#: then on. `before` and `after` hold what changed.
+change = Table(
+    "change",
+    metadata,
+    Column("change_key", Integer, primary_key=True),
+    Column("clutch_id", Text, ForeignKey("clutch.clutch_id"), nullable=False),
+    Column("run_id", Text),
+    Column("at", Text, nullable=False),
+    Column("by", Text, nullable=False),
+    Column("action", Text, nullable=False),
+    Column("reason", Text, nullable=False),
+    Column("before", Text, nullable=False),
+    Column("after", Text, nullable=False),
+    Column("revision", Integer, nullable=False),
+    Index("change_in_order", "clutch_id", "change_key"),
 )
 
 access_key = Table(

@@ -9,7 +9,7 @@ from pathlib import Path
 import httpx2
 from playwright.sync_api import Browser, Page
 
-from tests.browser.driving import chromium
+from tests.browser.driving import chromium, pointed_at
 from tests.browser.lives import demo, post
 from tests.support import serving, stationary
 
@@ -71,7 +71,7 @@ def _page(browser: Browser, width: int, height: int, scheme: str = "light") -> I
 
 def _opened(page: Page, address: str) -> None:
     page.goto(address)
-    page.locator("#chart-fan[data-drawn]").wait_for()
+    pointed_at(page)
     page.locator("#runs .runs details").first.wait_for()
 
 

@@ -110,7 +110,9 @@ class Server:
         arguments = ["serve", "--port", str(self.port), "--log-level", "warning"]
         arguments += ["--database", f"sqlite:///{self.database}"]
         if self.loaded:
-            self.process = _LOADED.Process(target=_run, args=(arguments, dict(os.environ)), daemon=True)
+            # a process that is forked off another's may have none of its own
+            environment = os.environ | {"CLUTCHLIFE_WORKERS": "0"}
+            self.process = _LOADED.Process(target=_run, args=(arguments, environment), daemon=True)
             self.process.start()
         else:
             self.process = subprocess.Popen([sys.executable, "-m", "service.cli.main", *arguments])

@@ -4,7 +4,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from service.cli.options import EX_DATAERR, EX_TEMPFAIL, errors_in_a_line, fail
-from service.cli.sending.client import RefusedError, Service, ServiceAwayError, connect
+from service.cli.sending.answers import RefusedError, ServiceAwayError
+from service.cli.sending.client import Service, connect
 
 
 @contextmanager

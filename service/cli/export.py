@@ -1,7 +1,10 @@
-"""`clutchlife export`: all that is stored of a clutch, raw data included, in files that `push` sends again."""
+"""`clutchlife export`: all that is stored of a clutch, raw data included, in files that `push` sends again.
+
+What `push` sends are the runs that count, at the cycles that hold now: another service then gives the same answers. Runs
+that are held, withdrawn or corrected are beside them as they were sent.
+"""
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, get_args
 
@@ -13,6 +16,8 @@ from service.cli.options import URL, ClutchId, Key, Patience, Url, err, errors_i
 from service.cli.sending.client import Service
 from service.run_files import manifest
 
+#: The folder of what was sent and does not count so.
+AS_SENT = "as-sent"
 _SENT = ("run_id", "kind", "cycles", "started_at", "origin", "duty", "event", "note", "channels")
 
 
@@ -35,9 +40,15 @@ def export(
             record = {name: value for name, value in clutch_out.items() if name in ClutchIn.model_fields}
             manifest.write(out_folder / manifest.CLUTCH_FILE, record)
             count = 0
-            for receipt in _pages(service, f"/v1/clutches/{clutch}/runs"):
+            for receipt in service.pages(f"/v1/clutches/{clutch}/runs"):
                 run = service.get(f"/v1/clutches/{clutch}/runs/{receipt['run_id']}")
-                manifest.write(out_folder / f"{count:05d}-{_safe(receipt['run_id'])}.json", _as_sent(run))
+                name = f"{count:05d}-{_safe(receipt['run_id'])}.json"
+                counts, corrected = run["state"] == "accepted", run["cycles"] != run["sent_cycles"]
+                if counts:
+                    manifest.write(out_folder / name, _as_sent(run))
+                if corrected or not counts:
+                    (out_folder / AS_SENT).mkdir(exist_ok=True)
+                    manifest.write(out_folder / AS_SENT / name, _as_sent(run | {"cycles": run["sent_cycles"]}))
                 count += 1
                 progress.advance(task)
             _results(service, clutch, results)
@@ -52,16 +63,6 @@ def _safe(name: str) -> str:
     return "".join(letter if letter.isalnum() or letter in "-_.+@" else "_" for letter in name)
 
 
-def _pages(service: Service, path: str, **params: Any) -> Iterator[dict[str, Any]]:
-    cursor: dict[str, str] = {}
-    while True:
-        page = service.get(path, **params, **cursor)
-        yield from page["items"]
-        if page["next"] is None:
-            return
-        cursor = {"cursor": page["next"]}
-
-
 def _results(service: Service, clutch: str, folder: Path) -> None:
     from service.schemas.life import MethodName  # start-up time
 
@@ -72,13 +73,14 @@ def _results(service: Service, clutch: str, folder: Path) -> None:
         )
     for name in ("degradation", "loops", "series"):
         _write(folder / f"{name}.json", service.get(f"{base}/{name}"))
-    diagnosis_ids = [diagnosis["diagnosis_id"] for diagnosis in _pages(service, f"{base}/diagnoses")]
+    diagnosis_ids = [diagnosis["diagnosis_id"] for diagnosis in service.pages(f"{base}/diagnoses")]
     _write(
         folder / "diagnoses.json", [service.get(f"{base}/diagnoses/{diagnosis_id}") for diagnosis_id in diagnosis_ids]
     )
     _write(folder / "model.json", service.get(f"{base}/model"))
-    _write(folder / "runs.json", list(_pages(service, f"{base}/runs")))
-    _write(folder / "stribeck.json", list(_pages(service, f"{base}/stribeck")))
+    _write(folder / "runs.json", list(service.pages(f"{base}/runs")))
+    _write(folder / "stribeck.json", list(service.pages(f"{base}/stribeck")))
+    _write(folder / "changes.json", list(service.pages(f"{base}/changes")))
 
 
 def _write(path: Path, content: object) -> None:

@@ -3,8 +3,10 @@
 import typer
 
 from service.cli import backup, diagnose, export, fleet, key, model, replay, score, serve, simulate
+from service.cli.changes import clutch_changes, run_changes, trail
+from service.cli.changes import runs as run_list
 from service.cli.demo import demo
-from service.cli.sending import push
+from service.cli.sending import push, spool_commands
 
 app = typer.Typer(
     name="clutchlife",
@@ -19,10 +21,19 @@ app.command()(simulate.simulate)
 app.command()(push.push)
 app.command()(diagnose.diagnose)
 app.command()(model.model)
+app.command()(run_list.runs)
+app.command()(run_changes.withdraw)
+app.command()(run_changes.restore)
+app.command()(run_changes.confirm)
+app.command()(run_changes.correct)
+app.command()(clutch_changes.edit)
+app.command()(clutch_changes.archive)
+app.command()(trail.changes)
 app.command()(export.export)
 app.command()(score.score)
 app.command()(replay.replay)
 app.command()(backup.backup)
+app.add_typer(spool_commands.app, name="spool")
 app.add_typer(key.app, name="key")
 app.add_typer(fleet.app, name="fleet")
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import httpx2
 import typer
 from rich.console import Console
+from rich.markup import escape
 
 from service.errors import NotFoundError
 from service.settings import DEFAULT_DATABASE, DEFAULT_URL
@@ -29,6 +30,8 @@ Url = Annotated[str, typer.Option("--url", envvar="CLUTCHLIFE_URL", help="The ad
 Key = Annotated[str | None, typer.Option("--key", envvar="CLUTCHLIFE_KEY", help="A key, where the service needs one")]
 Patience = Annotated[float, typer.Option(min=0, help="Seconds to keep trying while the service is away")]
 Seed = Annotated[int, typer.Option(min=0, help="The simulated clutch and its noise; the same seed, the same bits")]
+
+Json = Annotated[bool, typer.Option("--json", help="As the service answers it")]
 
 DATABASE, URL = DEFAULT_DATABASE, DEFAULT_URL
 
@@ -65,5 +68,5 @@ def existing(url: str) -> Iterator["Opened"]:
 
 def fail(message: str, code: int = 1) -> NoReturn:
     """Print the error on standard error, and end."""
-    err.print(f"[bold red]clutchlife:[/] {message}", soft_wrap=True)
+    err.print(f"[bold red]clutchlife:[/] {escape(message)}", soft_wrap=True)
     raise typer.Exit(code)

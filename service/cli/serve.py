@@ -1,6 +1,7 @@
 """`clutchlife serve`: the service."""
 
 import gc
+import os
 from contextlib import closing
 from typing import Annotated
 
@@ -42,6 +43,7 @@ def serve(
 
     # the arrays are small: BLAS threads that wait for each other cost more than they gain
     threadpool_limits(limits=1, user_api="blas")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     app = create_app(settings)
     # loaded modules stay: the collector's walk through all of them would delay an answer by a tenth of a second
     gc.collect()

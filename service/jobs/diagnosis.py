@@ -8,7 +8,7 @@ import sys
 import threading
 import zlib
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from service.lives.diagnosis_report import public
 from service.lives.history import STATIONARY, Life, lives_of
 from service.lives.model_correction import corrected_cofs
 from service.lives.tracks import predict_at
-from storage import channels, runs
+from storage import channels, results, runs
 from storage.engine.database import Database, open_database
 
 #: By how much this process yields to the one that answers [nice]. Chosen; no table.
@@ -90,7 +90,8 @@ def read_life(database: Database, clutch_id: str, *, last_run_key: int) -> Diagn
     notes = []
     for event in life.events:
         try:
-            run = run_of(reader.read(event.run_id), origin=life.origin, keep_record=event.run_id in kept)
+            sent = replace(reader.read(event.run_id), cycles=event.cycles)  # corrected meanwhile: the history's hold
+            run = run_of(sent, origin=life.origin, keep_record=event.run_id in kept)
             campaign.append(run)
         except ValueError as error:
             notes.append(f"{event.run_id} is left out: {error}")
@@ -110,7 +111,8 @@ def before_and_after(
         return {}, {}
     with database.reading() as connection:
         state = records.state(connection, clutch_id, also=extension)
-        cofs = records.baseline_cofs(connection, clutch_id)
+        by_key = results.cofs_of(connection, clutch_id)
+        cofs = {run_id: by_key[key] for run_id, key in runs.keys(connection, clutch_id).items() if key in by_key}
     plain = diagnosed_life.life.with_cofs(cofs)
     predicted = [plain]
     if extension is not None:

@@ -5,6 +5,7 @@ Runs may have arrived in any order; the history is ordered by cycles, and at equ
 after it is the new reference. Any other maintenance begins an epoch: it may have shifted the level of what is measured.
 """
 
+import bisect
 import itertools
 import math
 from collections.abc import Mapping, Sequence
@@ -34,20 +35,25 @@ REBUILD = "rebuild"
 class Event:
     """A run as the history sees it.
 
-    `moment` is when it was made [s]. A stationary test has the range of its speeds [rad/s], and mean COF with its
-    deviation by pressure [Pa] where its curves determine it; `duty` is the block that ends with the run, `shift` an event
-    that may have shifted the level.
+    `moment` is when it was made [s], `arrived` its place in the order of arrival, infinite while it comes in. A stationary
+    test has the range of its speeds [rad/s], and mean COF with its deviation by pressure [Pa] where its curves determine it;
+    `duty` is the block that ends with the run, `shift` an event that may have shifted the level.
     """
 
     run_id: str
     kind: str
     cycles: float
     moment: float
+    arrived: float = math.inf
     speed_range: Value | None = None
     cofs: ByPressure = field(default_factory=dict)
     rebuild: bool = False
     shift: bool = False
     duty: Block | None = None
+
+    def at(self, cycles: float) -> "Event":
+        """The same run at other cycles since new."""
+        return replace(self, cycles=cycles, duty=None if self.duty is None else replace(self.duty, end=cycles))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,11 +158,27 @@ def life_with(events: Sequence[Event], event: Event) -> Life:
     return next(life for life in lives_of(events) if event in life.events)
 
 
-def stationary_test_of(events: Sequence[Event], event: Event) -> Event | None:
-    """The stationary test that shows the clutch's state at a dynamic test: the last one up to its cycles, else the next."""
-    tests = [test for test in life_with(events, event).events if test.speed_range is not None]
-    before = [test for test in tests if test.cycles <= event.cycles]
-    return before[-1] if before else (tests[0] if tests else None)
+def stationary_tests_of(events: Sequence[Event]) -> dict[str, str | None]:
+    """run_id of every dynamic test -> that of the stationary test that shows the clutch's state at it: the last one of its
+    life up to its cycles, else the next; None where there is none."""
+    found: dict[str, str | None] = {}
+    for life in lives_of(events):
+        tests = [event for event in life.events if event.speed_range is not None]
+        cycles = [test.cycles for test in tests]
+        for event in life.events:
+            if event.kind == DYNAMIC:
+                place = max(0, bisect.bisect_right(cycles, event.cycles) - 1)
+                found[event.run_id] = tests[place].run_id if tests else None
+    return found
+
+
+def latest_before(events: Sequence[Event]) -> dict[str, float]:
+    """run_id -> the most cycles of all runs that had arrived before it, 0 for the first."""
+    latest, most = {}, 0.0
+    for event in sorted(events, key=lambda event: event.arrived):
+        latest[event.run_id] = most
+        most = max(most, event.cycles)
+    return latest
 
 
 def reference_velocities(speed_range: Value, geometry: Geometry) -> FloatArray:

@@ -35,6 +35,7 @@ class RunReader:
     """A clutch's runs as they were sent, read when they are asked for.
 
     `read(run_id)` gives a run with its channels, `describe(run_id)` without; `sampled` are those that are sampled records.
+    A history's runs are at its cycles, whatever was sent.
     """
 
     read: Callable[[str], IncomingRun]
@@ -44,9 +45,9 @@ class RunReader:
     def campaign_runs(self, events: Sequence[Event], *, origin: float) -> list[CampaignRun]:
         """The runs of a life in order, sampled records left out."""
         return [
-            without_record(self.describe(event.run_id), origin=origin)
+            without_record(_placed(self.describe(event.run_id), event), origin=origin)
             if event.run_id in self.sampled
-            else run_of(self.read(event.run_id), origin=origin)
+            else run_of(_placed(self.read(event.run_id), event), origin=origin)
             for event in events
         ]
 
@@ -56,12 +57,17 @@ class RunReader:
             if event.kind != STATIONARY:
                 continue
             try:
-                run = run_of(self.read(event.run_id), origin=life.origin)
+                run = run_of(_placed(self.read(event.run_id), event), origin=life.origin)
             except ValueError as error:  # a record that this release cuts no longer
                 _log.warning("%s: %s", event.run_id, error)
                 continue
             if isinstance(run, StationaryRun):
                 yield run
+
+
+def _placed(run: IncomingRun, event: Event) -> IncomingRun:
+    """A run at the cycles at which the history has it."""
+    return replace(run, cycles=event.cycles)
 
 
 def corrected_cofs(

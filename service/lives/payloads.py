@@ -1,7 +1,7 @@
 """What goes out of runs and lives, in the public names and units: receipts, predictions, a list's summary, warnings."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
@@ -12,7 +12,7 @@ from models.prognosis.first_passage import FirstPassage
 from service.columns import bar, whole
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions
 from service.lives.criteria import MOST_LINE_POINTS
-from service.lives.history import ByPressure, Event, Series
+from service.lives.history import ByPressure, Event, Life, Series, latest_before, nearest
 from service.lives.incoming_run import IncomingRun
 from service.lives.run_analysis import LevelFit, Notice, Value
 from service.settings import CODE_VERSION
@@ -25,7 +25,9 @@ PARAMETER_UNITS = {
     "viscous_coefficient": ("viscous_coefficient", "Nm/(m/s)^0.3"),
 }
 INSUFFICIENT = "insufficient_data"
-OFF_TRACK = "off_track"
+#: Warnings of a run in its clutch's history, written anew where the history changes: it arrived after a run of more cycles,
+#: its pressures are not those of the first test, its mean COF is not what the tests before it predict.
+OF_HISTORY = LATE, OTHER_PRESSURES, OFF_TRACK = "late_arrival", "other_pressures", "off_track"
 #: What a list shows of a clutch, out of the particle filter's prediction.
 SUMMARY = ("status", "as_of_cycles", "current", "remaining_cycles", "model")
 #: A clutch without a prediction comes after all others in a list.
@@ -175,6 +177,52 @@ def off_track(value: float, deviations: float) -> Notice:
         "an outlying run, or the clutch has left its course"
     )
     return Notice(code=OFF_TRACK, message=message)
+
+
+def history_warnings(
+    lives: Sequence[Life], off_track: Mapping[str, list[dict[str, str]]]
+) -> dict[str, list[dict[str, str]]]:
+    """run_id -> the warnings of a run in its history; `off_track` are those of the predictions right after tests."""
+    latest = latest_before([event for life in lives for event in life.events])
+    return {
+        event.run_id: [
+            *notice_items(_late_arrival(event.cycles, latest[event.run_id])),
+            *notice_items(_other_pressures(life.reference, event.cofs)),
+            *off_track.get(event.run_id, ()),
+        ]
+        for life in lives
+        for event in life.events
+    }
+
+
+def warned_anew(
+    lives: Sequence[Life], off_track: Mapping[str, list[dict[str, str]]], receipts: Mapping[str, dict[str, Any]]
+) -> dict[str, dict[str, Any]]:
+    """The receipts whose warnings of the history change."""
+    changed = {}
+    for run_id, noticed in history_warnings(lives, off_track).items():
+        before = receipts[run_id]["warnings"]
+        after = [warning for warning in before if warning["code"] not in OF_HISTORY] + noticed
+        if after != before:
+            changed[run_id] = receipts[run_id] | {"warnings": after}
+    return changed
+
+
+def _late_arrival(cycles: float, latest: float) -> list[Notice]:
+    """A run that arrived after another of more cycles; `latest` are the most of those that were there."""
+    if cycles >= latest:
+        return []
+    message = f"the run's {cycles:g} cycles lie before the latest known {latest:g}: all was tracked anew"
+    return [Notice(code=LATE, message=message)]
+
+
+def _other_pressures(reference: ByPressure, cofs: ByPressure) -> list[Notice]:
+    """A test that cannot be compared with the reference test: none of its pressures is one of that's."""
+    if not cofs or any(nearest(level, cofs) is not None for level in reference):
+        return []
+    measured = ", ".join(f"{bar(level):g}" for level in sorted(reference))
+    message = f"none of its pressures is one of the first stationary test's ({measured} bar): no track uses it"
+    return [Notice(code=OTHER_PRESSURES, message=message)]
 
 
 def summary_of(payload: dict[str, Any]) -> tuple[dict[str, Any], float]:

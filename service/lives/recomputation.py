@@ -4,7 +4,7 @@ A workflow loads a `ClutchState`, computes `Results` with the functions below, a
 checks that the state's revision is still the newest.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -14,16 +14,24 @@ from models.diagnosis.campaign import StationaryRun
 from models.diagnosis.extension import Extension
 from service.lives.assumptions import Assumptions, LearnedPrior, ModelInForce, severity_under
 from service.lives.history import (
-    DYNAMIC,
     ByPressure,
     Event,
     Life,
+    life_with,
     lives_of,
+    order,
     reference_velocities,
-    stationary_test_of,
+    stationary_tests_of,
 )
 from service.lives.model_correction import RunReader, corrected_cofs, model_in_force
-from service.lives.payloads import fit_items, loop_items, recent, summary_of
+from service.lives.payloads import (
+    RANK_UNKNOWN,
+    fit_items,
+    loop_items,
+    recent,
+    summary_of,
+    warned_anew,
+)
 from service.lives.run_analysis import LevelFit, loops_of, mean_cofs
 from service.lives.tracks import CARRIED, Prediction, States, follow
 from service.schemas.clutch import ClutchIn
@@ -31,30 +39,38 @@ from service.schemas.clutch import ClutchIn
 #: The levels of stationary tests by run_id.
 Levels = Mapping[str, Sequence[LevelFit]]
 Receipt = dict[str, Any]
+#: The filter whose predictions lists and receipts show.
+_SHOWN = "particle"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Adoption:
-    """The diagnosis whose extension was adopted last, and the life that it was made of."""
+    """A diagnosis whose extension was adopted, and the life that it was made of."""
 
     diagnosis_id: str
     life: str
     extension: Extension
 
 
+def newest_adoption(adoptions: Iterable[Adoption | None], lives: Collection[str]) -> Adoption | None:
+    """The newest of what was adopted (None: the baseline), newest first: one of a life whose rebuild is none of the lives
+    any more (it was withdrawn) is passed over."""
+    return next((each for each in adoptions if each is None or not each.life or each.life in lives), None)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClutchState:
     """What the next run's results depend on, at one revision.
 
-    `events` are all runs in the order of the history, mean COF as the model in force corrects it; `priors` what fleets have
-    taught for each severity that may come into force; `filters` the filters' states after the last test, None where another
-    release stored them.
+    `events` are all accepted runs in the order of the history, mean COF as the model in force corrects it; `adoptions` what
+    was adopted, newest first (None: the baseline); `priors` what fleets have taught for each severity that may come into
+    force; `filters` the filters' states after the last test, None where another release stored them.
     """
 
     record: ClutchIn
     revision: int
     events: tuple[Event, ...]
-    adoption: Adoption | None
+    adoptions: tuple[Adoption | None, ...]
     priors: Mapping[Severity, LearnedPrior]
     filters: States | None = None
 
@@ -79,10 +95,15 @@ class ClutchState:
         return lives_of(self.events)
 
     @property
+    def adoption(self) -> Adoption | None:
+        """What was adopted last of the lives that are in the history."""
+        return newest_adoption(self.adoptions, [life.name for life in self.lives])
+
+    @property
     def extension(self) -> Extension | None:
         """The extension that the present life is tracked under, None under the baseline: a rebuild ends an adoption."""
-        name = self.lives[-1].name if self.events else ""
-        return self.adoption.extension if self.adoption is not None and self.adoption.life == name else None
+        name, adoption = self.lives[-1].name if self.events else "", self.adoption
+        return adoption.extension if adoption is not None and adoption.life == name else None
 
     def assumptions(self) -> Assumptions:
         """What the present life is tracked under."""
@@ -98,15 +119,15 @@ class ClutchState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tracking:
-    """Predictions after events, the filters' states after the last, the list's summary and rank, and warnings of the last
-    prediction; `anew` where all that was predicted before is replaced."""
+    """Predictions after events, the filters' states after the last, the list's summary and rank, and by run_id the warnings
+    of the predictions right after tests; `anew` where all that was predicted before is replaced."""
 
-    predictions: tuple[Prediction, ...]
-    filters: States
-    summary: dict[str, Any]
-    rank: float
-    warnings: tuple[dict[str, str], ...]
-    anew: bool
+    predictions: tuple[Prediction, ...] = ()
+    filters: States = field(default_factory=dict)
+    summary: dict[str, Any] = field(default_factory=dict)
+    rank: float = RANK_UNKNOWN
+    warnings: Mapping[str, list[dict[str, str]]] = field(default_factory=dict)
+    anew: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,11 +149,13 @@ def computed_anew(
     receipts: Mapping[str, Receipt],
     tests: Iterable[StationaryRun],
     reader: RunReader,
+    *,
+    evaluated: Mapping[str, str | None],
 ) -> tuple[ClutchState, Results]:
     """Mean COFs over the protocol of each life, freed of the artefacts of the model in force, and all tracked anew.
 
     `levels` and `receipts` are those of all runs; `tests` the stationary tests of the present life, read only where a model
-    is in force. Returns the state with its mean COFs, and what is to be stored.
+    is in force; `evaluated` as `loops_anew` takes it. Returns the state with its mean COFs, and what is to be stored.
     """
     cofs = _all_cofs(state.lives, levels, state.geometry)
     plain = replace(state, events=tuple(replace(event, cofs=cofs.get(event.run_id, {})) for event in state.events))
@@ -141,16 +164,41 @@ def computed_anew(
         plain,
         events=tuple(replace(event, cofs=corrected.get(event.run_id, event.cofs)) for event in plain.events),
     )
-    fitted = {run_id: levels[run_id] for run_id in cofs}
+    fresh = {run_id: receipts[run_id] | {"fits": fit_items(levels[run_id], cofs[run_id])} for run_id in cofs}
+    for run_id, items in loops_anew(final, levels, reader, evaluated).items():
+        fresh[run_id] = receipts[run_id] | {"loops": items}
+    tracking = track(final)
     results = Results(
-        levels=fitted,
+        levels={run_id: levels[run_id] for run_id in cofs},
         cofs=cofs,
-        receipts={run_id: receipts[run_id] | {"fits": fit_items(levels[run_id], cofs[run_id])} for run_id in cofs},
+        receipts=fresh | warned_anew(final.lives, tracking.warnings, {**receipts, **fresh}),
         corrected=corrected,
         corrected_anew=True,
-        tracking=track(final),
+        tracking=tracking,
     )
     return final, results
+
+
+def cofs_among(state: ClutchState, event: Event, levels: Sequence[LevelFit]) -> ByPressure:
+    """A run's mean COFs as they are, or would be, in the history: over the protocol of its life's first stationary test,
+    which may be itself."""
+    speed_range = life_with(order([*state.events, event]), event).speed_range
+    return (
+        {}
+        if speed_range is None
+        else mean_cofs(levels, reference_velocities(speed_range, state.geometry), state.geometry)
+    )
+
+
+def computed_aside(state: ClutchState, event: Event, levels: Levels, reader: RunReader) -> tuple[ByPressure, Receipt]:
+    """The mean COFs of a run that is none of the history, as they would be among it, and what its receipt says of it."""
+    own = levels.get(event.run_id, ())
+    among = replace(state, events=order([*state.events, event]))
+    evaluated = stationary_tests_of(among.events)
+    evaluated.pop(event.run_id, None)
+    cofs = cofs_among(state, event, own)
+    loops = loops_anew(among, levels, reader, evaluated)
+    return cofs, {"fits": fit_items(own, cofs), "loops": loops.get(event.run_id, [])}
 
 
 def _all_cofs(lives: Sequence[Life], levels: Levels, geometry: Geometry) -> dict[str, ByPressure]:
@@ -184,13 +232,10 @@ def corrected_newest(
     return corrected_cofs(state.extension, state.record, life, runs, [test]).get(newest.run_id)
 
 
-def track(state: ClutchState, *, newest: Event | None = None) -> Tracking | None:
-    """Track what the history asks for: one step where `newest` comes last and the filters' states serve, else all of it.
-
-    None for a clutch without runs.
-    """
+def track(state: ClutchState, *, newest: Event | None = None) -> Tracking:
+    """Track what the history asks for: one step where `newest` comes last and the filters' states serve, else all of it."""
     if not state.events:
-        return None
+        return Tracking()
     assumptions, lives = state.assumptions(), state.lives
     carried = None if newest is None else _carried(state, lives[-1], assumptions, newest)
     walks: list[tuple[Life, States, int]] = [(life, {}, 0) for life in lives]
@@ -198,13 +243,17 @@ def track(state: ClutchState, *, newest: Event | None = None) -> Tracking | None
         walks = [(lives[-1], carried, len(lives[-1].events) - 1)]
     predictions: dict[tuple[float, str], Prediction] = {}
     filters: States = {}
+    warnings: dict[str, list[dict[str, str]]] = {}
     for life, start, first_event in walks:
+        measured = set(life.pooled(assumptions).events)
         walk = follow(state.clutch_id, life, assumptions, state.fraction, start, first_event=first_event)
-        for after_event, made in walk:
+        for index, (after_event, made) in enumerate(walk, start=first_event):
             filters = after_event
             predictions |= {(prediction.cycles, prediction.method): prediction for prediction in made}
-    last = predictions[state.events[-1].cycles, "particle"].payload
-    summary, rank = summary_of(last)
+            if index in measured:
+                shown = predictions[life.events[index].cycles, _SHOWN].payload
+                warnings[life.events[index].run_id] = list(shown["warnings"])
+    summary, rank = summary_of(predictions[state.events[-1].cycles, _SHOWN].payload)
     summary |= {
         "runs": len(state.events),
         "recent": recent(state.events, lives[-1].pooled(assumptions)),
@@ -215,7 +264,7 @@ def track(state: ClutchState, *, newest: Event | None = None) -> Tracking | None
         filters=filters,
         summary=summary,
         rank=rank,
-        warnings=tuple(last["warnings"]),
+        warnings=warnings,
         anew=carried is None,
     )
 
@@ -236,16 +285,13 @@ def _carried(state: ClutchState, life: Life, assumptions: Assumptions, newest: E
 
 
 def loops_anew(
-    state: ClutchState, levels: Levels, reader: RunReader, *, since: Event | None = None
+    state: ClutchState, levels: Levels, reader: RunReader, evaluated: Mapping[str, str | None]
 ) -> dict[str, list[dict[str, Any]]]:
-    """run_id -> loops of dynamic tests evaluated anew: of all, or of those whose stationary test is `since`."""
+    """run_id -> loops of the dynamic tests that have another stationary test than that which they were `evaluated` against,
+    by run_id; of those that are not there, too."""
     loops = {}
-    for event in state.events:
-        if event.kind != DYNAMIC:
-            continue
-        test = stationary_test_of(state.events, event)
-        if since is None or (test is not None and test.run_id == since.run_id):
-            own = [] if test is None else levels.get(test.run_id, [])
-            channels = reader.read(event.run_id).channels
-            loops[event.run_id] = loop_items(loops_of(channels, state.geometry, own))
+    for run_id, test in stationary_tests_of(state.events).items():
+        if run_id not in evaluated or evaluated[run_id] != test:
+            own = [] if test is None else levels.get(test, [])
+            loops[run_id] = loop_items(loops_of(reader.read(run_id).channels, state.geometry, own))
     return loops

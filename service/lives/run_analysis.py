@@ -23,10 +23,6 @@ from service.errors import FieldError, InvalidError
 from service.lives.criteria import FEWEST_SPEEDS, POOR_FIT, WIDE_LEVEL
 from service.lives.incoming_run import IncomingRun, SampledChannels, sampled_record, stationary_plateaus
 
-#: Warnings that depend on what was known when the run arrived: cycles before those of an earlier run, other pressures.
-LATE, OTHER_PRESSURES = "late_arrival", "other_pressures"
-NOTICED_ON_ARRIVAL = (LATE, OTHER_PRESSURES)
-
 #: A value and its deviation.
 Value = tuple[float, float]
 

@@ -1,13 +1,16 @@
 """`/v1/clutches`: clutches worst first, with what a list shows of each."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from sqlalchemy import Connection
 
 from service import records
+from service.lists import Place, to_cursor
 from service.lives.assumptions import BASELINE
 from service.lives.payloads import SUMMARY
+from service.queries.cache import AnswerCache, to_json
 from storage import clutches, verdicts
 from storage.clutches import ClutchRow
 from storage.engine.database import Database
@@ -20,23 +23,47 @@ _BEFORE = {"model": dict(BASELINE)}
 def look_up(database: Database, clutch_id: str) -> dict[str, Any]:
     """A clutch; raises NotFoundError."""
     with database.reading() as connection:
-        return _described(connection, [records.clutch(connection, clutch_id)])[0]
+        ((row, verdict),) = _with_verdicts(connection, [records.clutch(connection, clutch_id)])
+    return _item(row, verdict)
 
 
 def page(
-    database: Database, *, limit: int, after: tuple[float, str] | None
-) -> tuple[list[dict[str, Any]], tuple[float, str] | None]:
-    """Clutches with the fewest remaining cycles first, and where the next page starts."""
+    database: Database, *, limit: int, after: Place | None, archived: bool = False
+) -> tuple[list[dict[str, Any]], Place | None]:
+    """Clutches in use, or the archived ones, the fewest remaining cycles first, and where the next page starts."""
     with database.reading() as connection:
-        rows = clutches.page(connection, limit=limit + 1, after=after)
-        items = _described(connection, rows[:limit])
-    return items, (rows[limit - 1].rank, rows[limit - 1].clutch_id) if len(rows) > limit else None
+        rows = clutches.page(connection, limit=limit + 1, after=after, archived=archived)
+        items = [_item(row, verdict) for row, verdict in _with_verdicts(connection, rows[:limit])]
+    return items, _next(rows, limit)
 
 
-def _described(connection: Connection, rows: Sequence[ClutchRow]) -> list[dict[str, Any]]:
-    """Clutches as they go out."""
+def page_as_json(
+    database: Database, cache: AnswerCache, *, limit: int, after: Place | None, archived: bool = False
+) -> bytes:
+    """The same as JSON; each clutch's item is made once for its revision and verdict."""
+    with database.reading() as connection:
+        rows = clutches.page(connection, limit=limit + 1, after=after, archived=archived)
+        found = _with_verdicts(connection, rows[:limit])
+    items = [
+        cache.answer(("clutch", row.clutch_id, row.revision, to_json(verdict)), partial(_item_as_json, row, verdict))
+        for row, verdict in found
+    ]
+    following = to_json(to_cursor(_next(rows, limit)))
+    return b'{"items":[' + b",".join(item.body for item in items) + b'],"next":' + following + b"}"
+
+
+def _next(rows: Sequence[ClutchRow], limit: int) -> Place | None:
+    return (rows[limit - 1].rank, rows[limit - 1].clutch_id) if len(rows) > limit else None
+
+
+def _item_as_json(row: ClutchRow, verdict: dict[str, Any] | None) -> bytes:
+    return to_json(_item(row, verdict))
+
+
+def _with_verdicts(connection: Connection, rows: Sequence[ClutchRow]) -> list[tuple[ClutchRow, dict[str, Any] | None]]:
+    """Clutches, each with its newest finished diagnosis as it goes out."""
     newest = verdicts.newest(connection, [row.clutch_id for row in rows])
-    return [_item(row, _latest(connection, row, newest.get(row.clutch_id))) for row in rows]
+    return [(row, _latest(connection, row, newest.get(row.clutch_id))) for row in rows]
 
 
 def _latest(connection: Connection, row: ClutchRow, verdict: VerdictRow | None) -> dict[str, Any] | None:
@@ -56,6 +83,7 @@ def _latest(connection: Connection, row: ClutchRow, verdict: VerdictRow | None) 
 
 def _item(row: ClutchRow, diagnosis: dict[str, Any] | None) -> dict[str, Any]:
     return records.record(row).model_dump(mode="json") | {
+        "archived": row.archived,
         "created_at": row.created_at,
         "revision": row.revision,
         "runs": row.summary.get("runs", 0),

@@ -8,7 +8,7 @@ from service import records
 from service.columns import whole
 from service.errors import NotFoundError
 from service.lives.diagnosis_report import empty
-from storage import diagnoses
+from storage import changes, diagnoses
 from storage.diagnoses import DiagnosisRow
 from storage.engine.database import Database
 
@@ -44,7 +44,7 @@ def _items(connection: Connection, clutch_id: str, rows: list[DiagnosisRow]) -> 
     life = records.present_life(connection, clutch_id)
     adoption = records.adoption(connection, clutch_id)
     in_force = adoption.diagnosis_id if adoption is not None and adoption.life == life else None
-    latest = diagnoses.last_run_key(connection, clutch_id)
+    latest, changed = diagnoses.last_run_key(connection, clutch_id), changes.last_of_history(connection, clutch_id)
     return [
         _with_former_name(
             {
@@ -55,7 +55,7 @@ def _items(connection: Connection, clutch_id: str, rows: list[DiagnosisRow]) -> 
                 "finished_at": row.finished_at,
                 "revision": row.revision,
                 "as_of_cycles": None if row.as_of_cycles is None else whole(row.as_of_cycles),
-                "stale": latest > row.last_run_key,
+                "stale": latest > row.last_run_key or changed > row.revision,
                 "earlier_life": row.life != life,
                 "adoptable": row.extension is not None and row.life == life,
                 "adopted": row.diagnosis_id == in_force,

@@ -20,7 +20,7 @@ from service.lives.run_analysis import LevelFit
 from storage.engine.database import Database
 
 
-def engaged(database: Database, clutch_id: str, *, at_cycles: float | None) -> dict[str, Any]:
+def engaged(database: Database, clutch_id: str, at_cycles: float | None) -> dict[str, Any]:
     """The engagement that the tracked clutch would give at `at_cycles`, or now. Raises NotFoundError."""
     with database.reading() as connection:
         state, levels = records.state(connection, clutch_id), records.levels(connection, clutch_id)

@@ -12,7 +12,7 @@ from storage.engine.database import Database
 
 
 def remaining_life(
-    database: Database, clutch_id: str, *, method: str, pressure_bar: float | None, at_cycles: float | None
+    database: Database, clutch_id: str, method: str, pressure_bar: float | None, at_cycles: float | None
 ) -> dict[str, Any]:
     """The remaining useful life as it is now, or as it would have been predicted at `at_cycles`.
 

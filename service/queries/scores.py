@@ -32,7 +32,7 @@ STAGES, HALF_STAGE = (0.2, 0.4, 0.6, 0.8), 0.1
 _LOW, _HIGH = "0.05", "0.95"
 
 
-def of_clutch(database: Database, clutch_id: str, *, method: str) -> dict[str, Any]:
+def of_clutch(database: Database, clutch_id: str, method: str) -> dict[str, Any]:
     """The scores of a clutch's lives that came to their end; NotFoundError for an unknown clutch."""
     with database.reading() as connection:
         state = records.state(connection, clutch_id)
@@ -76,8 +76,8 @@ def of_fleet(database: Database, cache: AnswerCache, *, method: str) -> dict[str
 def _items(database: Database, cache: AnswerCache, clutch_id: str, revision: int, method: str) -> list[dict[str, Any]]:
     """A clutch's scored lives, kept by its revision."""
     key = (clutch_id, revision, "scores", method)
-    answer = cache.answer(key, lambda: to_text(of_clutch(database, clutch_id, method=method)).encode())
-    items: list[dict[str, Any]] = json.loads(answer)["items"]
+    answer = cache.answer(key, lambda: to_text(of_clutch(database, clutch_id, method)).encode())
+    items: list[dict[str, Any]] = json.loads(answer.body)["items"]
     return items
 
 

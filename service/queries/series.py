@@ -21,7 +21,7 @@ def series(database: Database, clutch_id: str, quantity: str | None) -> list[dic
     """
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
-        rows = runs.page(connection, clutch_id, kind=STATIONARY)
+        rows = runs.page(connection, clutch_id, kind=STATIONARY, state=runs.ACCEPTED)
         predicted = results.predictions_of(connection, clutch_id, "particle", ALL_PRESSURES)
     measured = (item for row in rows for fit in row.receipt["fits"] for item in _measured(row.receipt, fit))
     ahead = (item for row in predicted for item in _predicted(row))

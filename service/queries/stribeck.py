@@ -6,28 +6,25 @@ from typing import Any
 from models.friction.pressure_laws import LinearLaw, PressureLaws, fit_pressure_laws
 from service import records
 from service.columns import PASCALS_PER_BAR, whole
+from service.lists import Place, page
 from service.lives.payloads import PARAMETER_UNITS
 from service.lives.run_analysis import LevelFit
 from storage import runs
 from storage.engine.database import Database
 from storage.runs import RunRow
 
-Place = tuple[float, str]
 
-
-def page(
-    database: Database, clutch_id: str, *, limit: int, after: Place | None
-) -> tuple[list[dict[str, Any]], Place | None]:
-    """Stationary tests by cycles with their fits and pressure laws, and where the next page starts. Raises NotFoundError.
+def curves(database: Database, clutch_id: str, limit: int, after: Place | None) -> dict[str, Any]:
+    """A page of stationary tests by cycles with their fits and pressure laws. Raises NotFoundError.
 
     A test of the open clutch has neither fits nor laws.
     """
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
-        rows = runs.page(connection, clutch_id, limit=limit + 1, after=after, fitted=True)
+        rows = runs.page(connection, clutch_id, limit=limit + 1, after=after, fitted=True, state=runs.ACCEPTED)
         levels = records.levels(connection, clutch_id)
     items = [_item(row, levels.get(row.run_id, [])) for row in rows[:limit]]
-    return items, (rows[limit - 1].cycles, rows[limit - 1].run_id) if len(rows) > limit else None
+    return page(items, (rows[limit - 1].cycles, rows[limit - 1].run_id) if len(rows) > limit else None)
 
 
 def rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:

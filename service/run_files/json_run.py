@@ -1,13 +1,16 @@
 """A run as a JSON body -> `IncomingRun`: pydantic checks the shape, `service.columns` the millions of numbers."""
 
-from typing import Any
+from typing import Any, TypeVar
 
 import pydantic
 
 from service.columns import check_columns
 from service.errors import MOST_ERRORS, MOST_QUOTED, FieldError, InvalidError
 from service.lives.incoming_run import IncomingRun, name_run
+from service.schemas.base import Schema
 from service.schemas.run import RUN_IN, DutyRunIn, MaintenanceRunIn
+
+Body = TypeVar("Body", bound=Schema)
 
 _KINDS = ("stationary_stribeck", "dynamic_stribeck", "duty_cycles", "run_in", "maintenance")
 
@@ -36,6 +39,14 @@ def read_run(body: bytes) -> IncomingRun:
         channels=check_columns(columns) if columns else {},
         details=details,
     )
+
+
+def checked(schema: type[Body], body: bytes) -> Body:
+    """A small JSON body by its schema; raises InvalidError naming every place that is wrong."""
+    try:
+        return schema.model_validate_json(body)
+    except pydantic.ValidationError as error:
+        raise invalid(error) from None
 
 
 def invalid(error: pydantic.ValidationError) -> InvalidError:

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, PlainSerializer, StringConstraints, WithJsonSchema
 
 from service.columns import whole
-from service.schemas.limits import IDENTIFIER_PATTERN, LARGEST_NUMBER, MOST_CYCLES
+from service.schemas.limits import IDENTIFIER_PATTERN, LARGEST_NUMBER, LONGEST_REASON, MOST_CYCLES
 
 
 class Schema(BaseModel):
@@ -36,6 +36,9 @@ Column = Annotated[
 ]
 
 Origin = Annotated[Literal["measured", "simulated"], Field(description="Whether a rig measured it or it is simulated")]
+
+#: Why something is changed.
+Reason = Annotated[str, StringConstraints(max_length=LONGEST_REASON, strip_whitespace=True)]
 
 # --- in answers ---
 

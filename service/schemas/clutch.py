@@ -1,6 +1,9 @@
 """The clutch record: geometry, oil, end of life. Everything but the name defaults to the reference's clutch."""
 
-from typing import Annotated, Literal, Self
+import hashlib
+import json
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
@@ -14,6 +17,7 @@ from service.schemas.base import (
     NotNegativeNumber,
     Origin,
     PositiveNumber,
+    Reason,
     Revision,
     RunCycles,
     RunName,
@@ -122,6 +126,41 @@ class ClutchIn(Schema):
     origin: Origin = "measured"
 
 
+def content_of(record: Mapping[str, Any]) -> str:
+    """The hash of a record whose defaults are filled in."""
+    return hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()
+
+
+#: The default of a field that may be left out and may not be null.
+_STAYS: Any = None
+
+
+class ClutchEdit(Schema):
+    """Fields of a clutch's record that change, each replaced as a whole; what is left out stays."""
+
+    reason: Reason = Field(default="", description="Why; needed where the record changes")
+    archived: bool = Field(default=_STAYS, strict=True, description="Whether lists leave the clutch out")
+    geometry: GeometryIn = Field(default=_STAYS, description="The friction disc")
+    oil: OilIn = Field(default=_STAYS, description="The oil")
+    end_of_life: EndOfLifeIn = Field(default=_STAYS, description="The end-of-life criterion")
+    friction_material: Name = Field(default=_STAYS, description="The friction material")
+    reaction_plate: Name = Field(default=_STAYS, description="The reaction plate's material")
+    fluid: Name = Field(default=_STAYS, description="The fluid")
+    severity: SeverityIn = Field(default=_STAYS, description="How much a duty cycle ages the clutch")
+    origin: Origin = Field(default=_STAYS)
+
+    @model_validator(mode="after")
+    def _says_why(self) -> Self:
+        if self.fields() and not self.reason:
+            raise ValueError("reason must say why the record changes")
+        return self
+
+    def fields(self) -> dict[str, Any]:
+        """The fields of the record that were given, as JSON."""
+        given = self.model_fields_set - {"reason", "archived"}
+        return self.model_dump(mode="json", include=given)
+
+
 class ClutchSummary(Answer):
     """Current health and remaining life, as lists show them; null while unknown."""
 
@@ -170,9 +209,10 @@ class ClutchOut(Answer):
     fluid: str = Field(description="The fluid")
     severity: SeverityIn = Field(description="How much a duty cycle ages the clutch")
     origin: Origin
+    archived: bool = Field(description="Whether lists leave the clutch out and it takes in no more runs")
     created_at: str = Field(description="When it was registered; UTC, ISO 8601")
     revision: Revision
-    runs: int = Field(description="Number of stored runs")
+    runs: int = Field(description="Number of runs that count; those that are held or were withdrawn do not")
     summary: ClutchSummary | None = Field(description="Health and remaining life; null before the first run")
     recent: Recent | None = Field(description="The latest past; null before the first run")
     diagnosis: LatestDiagnosis | None = Field(description="The newest finished diagnosis; null without one")

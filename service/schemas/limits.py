@@ -16,11 +16,15 @@ LEAST_PRESSURE_FACTOR, MOST_PRESSURE_FACTOR = 1e-6, 1e6
 #: Exponent of the severity of a duty cycle.
 MOST_SEVERITY_EXPONENT = 10
 
-#: Characters of a material's or fluid's name, a maintenance note, a diagnosis' name, a file's name and a map of channels.
+#: Characters of a material's or fluid's name, a maintenance note, the reason of a change, a diagnosis' name, a file's name
+#: and a map of channels.
 LONGEST_NAME = 200
 LONGEST_NOTE = 4000
+LONGEST_REASON = 500
 LONGEST_DIAGNOSIS_ID = 64
 LONGEST_FILENAME = 255
 LONGEST_MAP = 4000
 #: A clutch's or a run's name: safe in an address and as a file's name, 128 characters at most.
 IDENTIFIER_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._:@+-]{0,127}$"
+#: Samples of a channel that a plot may ask for: more than any screen has pixels; all samples need no argument.
+MOST_POINTS = 1_000_000

@@ -1,6 +1,6 @@
 """Runs as they are posted, and the receipts that answer them."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AwareDatetime, Field, StringConstraints, TypeAdapter
 
@@ -14,6 +14,7 @@ from service.schemas.base import (
     NotNegativeNumber,
     Origin,
     PositiveNumber,
+    Reason,
     RunCycles,
     RunName,
     Schema,
@@ -24,6 +25,9 @@ Pressure = Annotated[Column, Field(description="Line pressure, bar")]
 Speed = Annotated[Column, Field(description="Sliding speed, rpm")]
 Torque = Annotated[Column, Field(description="Friction torque, Nm")]
 OilTemperature = Annotated[Column | None, Field(description="Oil temperature, °C")]
+
+
+GivenReason = Annotated[Reason, StringConstraints(min_length=1)]
 
 
 class StationaryChannels(Schema):
@@ -120,6 +124,25 @@ class Warned(Answer):
     message: str = Field(description="The warning in a sentence")
 
 
+class Withdrawal(Schema):
+    """Why a run is withdrawn or restored."""
+
+    reason: GivenReason = Field(description="Why")
+
+
+class Confirmation(Schema):
+    """Why a held run is accepted."""
+
+    reason: Reason = Field(default="", description="Why")
+
+
+class Correction(Schema):
+    """The cycles at which a run was made, and why they are not those that were sent."""
+
+    cycles: Cycles = Field(description="Duty cycles since new when the run was made")
+    reason: GivenReason = Field(description="Why")
+
+
 class Parameters(Answer):
     """The four Stribeck parameters of eq. 3."""
 
@@ -175,6 +198,14 @@ class Loop(Answer):
     message: str = Field(description="The loop in a sentence")
 
 
+State = Annotated[
+    Literal["accepted", "held", "withdrawn"],
+    Field(
+        description="Whether the run counts: `held` until it is confirmed or corrected, `withdrawn` until it is restored"
+    ),
+]
+
+
 class Receipt(Answer):
     """The evaluation of a stored run."""
 
@@ -194,12 +225,42 @@ class Receipt(Answer):
     event: str | None = Field(description="The maintenance event; null for other kinds")
     note: str | None = Field(description="The maintenance note; null for other kinds")
     code_version: str = Field(description="The release that evaluated the run")
+    state: State
+    doubts: list[Warned] = Field(description="Why the run is, or was, held; empty where nothing was odd")
+    sent_cycles: float = Field(description="Cycles as they were sent; `cycles` is what holds now")
+
+
+class Change(Answer):
+    """An entry of the audit trail."""
+
+    at: str = Field(description="When; UTC, ISO 8601")
+    by: str = Field(description="Who: `key:` with the key's id and note, or `local` where no keys are configured")
+    action: Literal["hold", "confirm", "withdraw", "restore", "correct", "edit", "archive", "unarchive"] = Field(
+        description="What was done"
+    )
+    run_id: str | None = Field(description="The run; null where the clutch's record was changed")
+    reason: str = Field(description="Why")
+    before: dict[str, Any] = Field(description="What changed, as it was")
+    after: dict[str, Any] = Field(description="What changed, as it is from then on")
+
+
+class ChangePage(Answer):
+    """The audit trail, newest first."""
+
+    items: list[Change] = Field(description="The entries of this page")
+    next: Next
 
 
 class RunOut(Receipt):
-    """A receipt with the run's channels as they were sent."""
+    """A receipt with the run's channels: as they were sent, or with `points` fewer samples of them for a plot."""
 
-    channels: dict[str, list[float]] = Field(description="The channels by name, bit for bit as they were sent")
+    changes: list[Change] = Field(description="The run's entries of the audit trail, newest first")
+    samples: int = Field(description="Samples of each channel as they were sent; 0 for a run without channels")
+    channels: dict[str, list[float]] = Field(
+        description="The channels by name, bit for bit as they were sent and of equal length. With `points`, row k of all "
+        "channels is one sample as it was measured: kept are the lowest and the highest of every channel in each of equal "
+        "bins, the first and the last"
+    )
 
 
 class RunPage(Answer):

@@ -1,40 +1,39 @@
 """Bodies in, answers out: JSON or CSV with a strong entity tag, 304 where the asker has it already, cursors for pages.
 
-What follows from a clutch's revision alone is computed once and kept (`clutch_answer`, `clutch_table`).
+What follows from a clutch's revision alone is made once and kept (`clutch_answer`); what takes long is computed by a worker
+(`computed_answer`).
 """
 
-import base64
-import binascii
 import csv
-import hashlib
 import io
 import json
-import math
+import re
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from concurrent.futures import Future
 from datetime import UTC, datetime
 from typing import Any
 
 from fastapi import Request
+from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 from pydantic import BaseModel
 
-from service.errors import FieldError, InvalidError, NotFoundError, UnsupportedMediaTypeError
+from service.errors import NotFoundError, UnsupportedMediaTypeError
+from service.jobs.workers import Lane
+from service.lists import ALL_ITEMS, from_cursor, sliced
+from service.queries.cache import Answer, revision_and_json, to_json
 from service.web.context import Context
-from service.web.limits import ALL_ITEMS
+from service.web.limits import LONGEST_WAIT_SECONDS
+from service.web.polls import Again, remember
+from service.web.revalidation import Made
 from storage import clutches
-from storage.encoding.json_text import to_text
 
 JSON_TYPE = "application/json"
 CSV_TYPE = "text/csv; charset=utf-8"
 
-#: Where a page ended: a number, and a name where that is not unique.
-Place = tuple[float, str]
+_WAIT = re.compile(r'(?:^|[,;\s])wait\s*=\s*"?(\d{1,9})"?\s*(?:$|[,;])', re.IGNORECASE)
+
 Rows = Iterable[Mapping[str, Any]]
-
-
-def to_json(payload: object) -> bytes:
-    """JSON in UTF-8; ValueError on a number that JSON cannot carry: none may leave."""
-    return to_text(payload).encode()
 
 
 def now() -> str:
@@ -42,81 +41,149 @@ def now() -> str:
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
-def answer(request: Request, payload: object) -> Response:
+async def answer(request: Request, make: Callable[[], object]) -> Response:
     """A GET's answer that is made anew each time; its ETag is that of the bytes: it changes when and only when they do."""
-    return tagged(request, to_json(payload), JSON_TYPE)
+    return tagged(request, Answer.of(await run_in_threadpool(lambda: to_json(make()))), JSON_TYPE)
 
 
-def clutch_answer(
+async def kept(context: Context, key: Hashable, make: Callable[[], bytes]) -> Answer:
+    """What the cache has for `key`; where it has nothing yet, `make` is called in a thread."""
+    answer = context.cache.held(key)
+    if answer is not None:
+        return answer
+    return await run_in_threadpool(context.cache.answer, key, make)
+
+
+async def clutch_answer(
     request: Request, context: Context, clutch_id: str, name: str, make: Callable[[], object], *arguments: Hashable
 ) -> Response:
     """A GET's answer that follows from a clutch's revision, JSON. Raises NotFoundError.
 
-    `name` and `arguments` tell the clutch's answers apart.
+    `name` and `arguments` tell the clutch's answers apart. Where it was made for this revision already, nothing is read.
     """
-    return tagged(request, _computed(context, clutch_id, name, make, arguments), JSON_TYPE)
+    revision = _revision(context, clutch_id)
+
+    # the revision before the rest is read: what is committed meanwhile is kept under one that nobody asks for again
+    held = await kept(context, (clutch_id, revision, name, *arguments), lambda: to_json(make()))
+
+    def again(request: Request) -> Response | None:
+        revision = clutches.revision_now(context.database.watch, clutch_id)
+        held = context.cache.held((clutch_id, revision, name, *arguments))
+        return None if held is None else tagged(request, held, JSON_TYPE, revision)
+
+    remember(request, again)
+    return tagged(request, held, JSON_TYPE, revision)
 
 
-def clutch_list_answer(
+async def clutch_table(
     request: Request,
     context: Context,
     clutch_id: str,
     name: str,
-    make: Callable[[], dict[str, Any]],
-    limit: int = ALL_ITEMS,
-    cursor: str | None = None,
-    *arguments: Hashable,
-) -> Response:
-    """The same of an answer with `items` that is computed whole, a page of it where one was asked for."""
-    after = from_cursor(cursor)
-    if limit == ALL_ITEMS and after is None:
-        return clutch_answer(request, context, clutch_id, name, make, *arguments)
-
-    def paged() -> object:
-        whole = json.loads(_computed(context, clutch_id, name, make, arguments))
-        return whole | sliced(whole["items"], limit, after)
-
-    return clutch_answer(request, context, clutch_id, name, paged, *arguments, limit, after)
-
-
-def clutch_table(
-    request: Request,
-    context: Context,
-    clutch_id: str,
-    name: str,
-    make: Callable[[], object],
-    rows: Callable[[Any], Rows],
+    make: Callable[[], Rows],
     columns: Sequence[str],
     *arguments: Hashable,
 ) -> Response:
-    """The CSV export of an answer that follows from a clutch's revision: `rows` of its JSON. Raises NotFoundError."""
-
-    def table() -> bytes:
-        return encode_table(columns, rows(json.loads(_computed(context, clutch_id, name, make, arguments))))
-
-    key = (clutch_id, _revision(context, clutch_id), f"{name}.csv", *arguments)
-    return tagged(request, context.cache.answer(key, table), CSV_TYPE)
+    """The CSV export of an answer that follows from a clutch's revision. Raises NotFoundError."""
+    revision = _revision(context, clutch_id)
+    key = (clutch_id, revision, f"{name}.csv", *arguments)
+    return tagged(request, await kept(context, key, lambda: encode_table(columns, make())), CSV_TYPE, revision)
 
 
-def _computed(
-    context: Context, clutch_id: str, name: str, make: Callable[[], object], arguments: tuple[Hashable, ...]
-) -> bytes:
-    # before the rest is read: what is committed meanwhile is kept under a revision that nobody asks for again
-    key = (clutch_id, _revision(context, clutch_id), name, *arguments)
-    return context.cache.answer(key, lambda: to_json(make()))
+async def computed_answer(
+    request: Request,
+    context: Context,
+    clutch_id: str,
+    query: Callable[..., dict[str, Any]],
+    *arguments: Hashable,
+    limit: int = ALL_ITEMS,
+    cursor: str | None = None,
+    prefer: str | None = None,
+) -> Response:
+    """A GET's answer that takes long: `query(database, clutch_id, *arguments)`, computed by a worker; a page of its items
+    where one was asked for. `prefer` is what the sender prefers. Raises NotFoundError.
+    """
+    after = from_cursor(cursor)
+    revision, whole = await _computed(context, clutch_id, query, arguments, prefer)
+    if limit == ALL_ITEMS and after is None:
+        remember(request, _computed_again(context, clutch_id, query, arguments))
+        return tagged(request, whole, JSON_TYPE, revision)
+
+    def one_page() -> bytes:
+        payload = json.loads(whole.body)
+        return to_json(payload | sliced(payload["items"], limit, after))
+
+    key = (clutch_id, revision, _name(query), *arguments, limit, after)
+    return tagged(request, await kept(context, key, one_page), JSON_TYPE, revision)
+
+
+async def computed_table(
+    request: Request,
+    context: Context,
+    clutch_id: str,
+    query: Callable[..., dict[str, Any]],
+    rows: Callable[[Any], Rows],
+    columns: Sequence[str],
+    *arguments: Hashable,
+    prefer: str | None = None,
+) -> Response:
+    """The CSV export of the same: `rows` of its JSON. Raises NotFoundError."""
+    revision, whole = await _computed(context, clutch_id, query, arguments, prefer)
+    key = (clutch_id, revision, f"{_name(query)}.csv", *arguments)
+    exported = await kept(context, key, lambda: encode_table(columns, rows(json.loads(whole.body))))
+    return tagged(request, exported, CSV_TYPE, revision)
+
+
+async def _computed(
+    context: Context,
+    clutch_id: str,
+    query: Callable[..., dict[str, Any]],
+    arguments: tuple[Hashable, ...],
+    prefer: str | None,
+) -> tuple[int, Answer]:
+    preferred = preferred_wait(prefer)
+    wait = preferred if preferred is not None else LONGEST_WAIT_SECONDS if context.workers.is_free(Lane.ANSWERS) else 0
+
+    def compute() -> "Future[Made]":
+        return context.workers.submit(Lane.ANSWERS, revision_and_json, query, clutch_id, arguments)
+
+    key = (clutch_id, _name(query), *arguments)
+    return await context.revalidation.answer(key, _revision(context, clutch_id), compute, wait=wait)
+
+
+def _computed_again(
+    context: Context, clutch_id: str, query: Callable[..., dict[str, Any]], arguments: tuple[Hashable, ...]
+) -> Again:
+    key = (clutch_id, _name(query), *arguments)
+
+    def again(request: Request) -> Response | None:
+        revision = clutches.revision_now(context.database.watch, clutch_id)
+        whole = None if revision is None else context.revalidation.held(key, revision)
+        return None if whole is None else tagged(request, whole, JSON_TYPE, revision)
+
+    return again
+
+
+def _name(query: Callable[..., object]) -> str:
+    return f"{query.__module__}.{query.__qualname__}"
+
+
+def preferred_wait(prefer: str | None) -> int | None:
+    """Seconds that the sender prefers to wait (RFC 7240: `Prefer: wait=SECONDS`), None where it does not say."""
+    preferred = _WAIT.search(prefer or "")
+    return None if preferred is None else min(int(preferred[1]), LONGEST_WAIT_SECONDS)
 
 
 def _revision(context: Context, clutch_id: str) -> int:
-    with context.database.reading() as connection:
-        revision = clutches.revision(connection, clutch_id)
+    revision = clutches.revision_now(context.database.watch, clutch_id)
     if revision is None:
         raise NotFoundError(f"no clutch is known as {clutch_id!r}")
     return revision
 
 
-def table(request: Request, columns: Sequence[str], rows: Rows) -> Response:
+async def table(request: Request, columns: Sequence[str], make: Callable[[], Rows]) -> Response:
     """A GET's answer as CSV that is made anew each time."""
-    return tagged(request, encode_table(columns, rows), CSV_TYPE)
+    return tagged(request, Answer.of(await run_in_threadpool(lambda: encode_table(columns, make()))), CSV_TYPE)
 
 
 def encode_table(columns: Sequence[str], rows: Rows) -> bytes:
@@ -137,48 +204,22 @@ def encode_table(columns: Sequence[str], rows: Rows) -> bytes:
     return text.getvalue().encode()
 
 
-def tagged(request: Request, body: bytes, media_type: str) -> Response:
-    """The body, or 304 where `If-None-Match` names it."""
-    tag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
-    headers = {"ETag": tag, "Cache-Control": "no-cache"}
-    asked_for = request.headers.get("if-none-match", "")
-    if asked_for.strip() == "*" or tag in (name.strip().removeprefix("W/") for name in asked_for.split(",")):
-        return Response(status_code=304, headers=headers)
-    return Response(content=body, media_type=media_type, headers=headers)
+def tagged(request: Request, answer: Answer, media_type: str, revision: int | None = None) -> Response:
+    """The answer, or 304 where `If-None-Match` names it; with the clutch's revision that it is of, where it is of one."""
+    headers = {"ETag": answer.tag, "Cache-Control": "no-cache"}
+    if revision is not None:
+        headers["Clutchlife-Revision"] = str(revision)
+    return unchanged(request, headers) or Response(content=answer.body, media_type=media_type, headers=headers)
 
 
-def to_cursor(place: Place | None) -> str | None:
-    """Where a next page starts, as text that fits an address."""
-    return None if place is None else base64.urlsafe_b64encode(json.dumps(place).encode()).decode().rstrip("=")
-
-
-def from_cursor(cursor: str | None) -> Place | None:
-    """The inverse of `to_cursor`; InvalidError on anything else."""
-    if cursor is None:
+def unchanged(request: Request, headers: Mapping[str, str]) -> Response | None:
+    """304 where `If-None-Match` names the `ETag` of the headers, else None."""
+    asked_for = request.headers.get("if-none-match")
+    if asked_for is None:
         return None
-    try:
-        number, name = json.loads(base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)))
-        place = (float(number), str(name).encode().decode())
-    except (ValueError, TypeError, OverflowError, RecursionError, binascii.Error):
-        place = (math.nan, "")
-    if not math.isfinite(place[0]):
-        message = "cursor must be one that an earlier page gave as next"
-        shown = cursor[:80]
-        error = FieldError(pointer="/query/cursor", code="cursor", message=f"{message}, got {shown!r}", value=shown)
-        raise InvalidError(error.message, errors=[error])
-    return place
-
-
-def sliced(items: Sequence[Any], limit: int, after: Place | None) -> dict[str, Any]:
-    """A page out of a list that is known whole: the place in it is the cursor."""
-    start = 0 if after is None else max(0, int(after[0]))
-    stop = start + limit
-    return page(items[start:stop], (float(stop), "") if stop < len(items) else None)
-
-
-def page(items: Sequence[Any], after: Place | None) -> dict[str, Any]:
-    """The shape of every list."""
-    return {"items": items, "next": to_cursor(after)}
+    if asked_for.strip() == "*" or headers["ETag"] in (tag.strip().removeprefix("W/") for tag in asked_for.split(",")):
+        return Response(status_code=304, headers=dict(headers))
+    return None
 
 
 async def json_body(request: Request) -> bytes:

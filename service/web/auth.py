@@ -8,8 +8,9 @@ browser can reach the service under a name of its own.
 import hashlib
 import ipaddress
 import secrets
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated, Literal, get_args
 
 from fastapi import Depends, Request
@@ -17,11 +18,13 @@ from fastapi import Depends, Request
 from service.errors import FieldError, ForbiddenError, InvalidError, UnauthorizedError
 from service.web.context import Context
 from storage import keys
-from storage.engine.database import Database
+from storage.engine.watch import Watch
 from storage.keys import KeyRow
 
 Scope = Literal["read", "ingest", "admin"]
 SCOPES: tuple[Scope, ...] = get_args(Scope)
+#: The caller's name where no keys are configured.
+LOCAL = "local"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,20 +47,21 @@ def make_key(scope: Scope, note: str, *, created_at: str) -> tuple[str, KeyRow]:
     return text, row
 
 
-def authorise(database: Database, caller: Caller, scope: Scope) -> None:
-    """Let the caller pass, or raise UnauthorizedError or ForbiddenError."""
-    with database.reading() as connection:
-        if not keys.any_active(connection):
-            _require_loopback(caller)
-            return
-        scheme, _, text = (caller.authorization or "").partition(" ")
-        if scheme.lower() != "bearer" or not text:
-            raise UnauthorizedError("send a key as: Authorization: Bearer KEY")
-        key = keys.by_secret_hash(connection, _digest(text.strip()))
-    if key is None:
+def authorise(watch: Watch, caller: Caller, scope: Scope) -> str:
+    """Let the caller pass and return its name, or raise UnauthorizedError or ForbiddenError."""
+    if not keys.are_needed(watch):
+        _require_loopback(caller)
+        return LOCAL
+    scheme, _, text = (caller.authorization or "").partition(" ")
+    if scheme.lower() != "bearer" or not text:
+        raise UnauthorizedError("send a key as: Authorization: Bearer KEY")
+    granted = keys.grants(watch, _digest(text.strip()))
+    if granted is None:
         raise UnauthorizedError("the key is not known, or was revoked")
-    if key.scope not in SCOPES[SCOPES.index(scope) :]:
-        raise ForbiddenError(f"this needs the scope {scope}, the key has {key.scope}")
+    key_id, its_scope, note = granted
+    if its_scope not in SCOPES[SCOPES.index(scope) :]:
+        raise ForbiddenError(f"this needs the scope {scope}, the key has {its_scope}")
+    return f"key:{key_id} {note}".rstrip()
 
 
 def _digest(text: str) -> str:
@@ -78,6 +82,7 @@ def _name(host: str) -> str:
     return host[1:].partition("]")[0] if host.startswith("[") else host.partition(":")[0]
 
 
+@lru_cache(maxsize=256)
 def is_loopback(name: str) -> bool:
     """Whether a host name or address is this machine's own."""
     if name.lower().rstrip(".") == "localhost":
@@ -105,16 +110,22 @@ def caller_of(request: Request) -> Caller:
     )
 
 
-def allowed(scope: Scope) -> Callable[[Request], Context]:
+def allowed(scope: Scope) -> Callable[[Request], Awaitable[Context]]:
     """A dependency that gives the context to callers with that scope and stops the others."""
 
-    def check(request: Request) -> Context:
+    async def check(request: Request) -> Context:
         context = context_of(request)
         _refuse_unknown_arguments(request)
-        authorise(context.database, caller_of(request), scope)
+        request.state.caller = authorise(context.database.watch, caller_of(request), scope)
         return context
 
     return check
+
+
+def name_of_caller(request: Request) -> str:
+    """Who sent a request that was allowed, as the audit trail names it: a key's id and note, or `local`."""
+    name: str = request.state.caller
+    return name
 
 
 #: Tables and short lists are answered whole, and take the arguments of a list.
@@ -123,6 +134,8 @@ _OF_LISTS = {"limit", "cursor"}
 
 def _refuse_unknown_arguments(request: Request) -> None:
     """A mistyped argument must not be answered as if it had not been there."""
+    if not request.scope["query_string"]:
+        return
     route = request.scope["route"]
     arguments = {field.alias for field in route.dependant.query_params} | _OF_LISTS
     unknown = [name for name in request.query_params if name not in arguments]

@@ -3,13 +3,16 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from fastapi import Query
+from fastapi import Header, Query
 
 from models.prognosis.criteria import HORIZON
 from service.jobs.queue import DiagnosisQueue
+from service.jobs.workers import Workers
+from service.lists import ALL_ITEMS
 from service.queries.cache import AnswerCache
-from service.web.limits import ALL_ITEMS, LONGEST_CURSOR, MOST_HORIZONS, MOST_ITEMS, MOST_PRESSURE_BAR
+from service.web.limits import LONGEST_CURSOR, MOST_HORIZONS, MOST_ITEMS, MOST_PRESSURE_BAR
 from service.web.metrics import Metrics
+from service.web.revalidation import Revalidation
 from storage.engine.database import Database
 
 
@@ -21,6 +24,8 @@ class Context:
     cache: AnswerCache
     metrics: Metrics
     diagnoses: DiagnosisQueue
+    workers: Workers
+    revalidation: Revalidation
 
 
 Limit = Annotated[int, Query(ge=1, le=MOST_ITEMS, description="Items a page")]
@@ -38,4 +43,11 @@ PressureBar = Annotated[
 AtCycles = Annotated[
     float | None,
     Query(ge=0, le=HORIZON * MOST_HORIZONS, allow_inf_nan=False, description="As it would have been predicted then"),
+]
+Prefer = Annotated[
+    str | None,
+    Header(
+        max_length=200,
+        description="`wait=SECONDS`: how long to wait for the newest answer where others wait for theirs",
+    ),
 ]

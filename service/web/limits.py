@@ -2,8 +2,14 @@
 
 #: Bytes of computed answers that are kept together. Chosen: some hundred pages of `/degradation`.
 MOST_CACHED_BYTES = 96 << 20
-#: Items a page may hold, and those of lists that are answered whole where no limit is given.
-MOST_ITEMS, ALL_ITEMS = 1000, 1_000_000
+#: Bytes of JSON from which a run waits among files, lest it hold up short ones. Chosen: plateaus take some 10 kB.
+LARGE_BODY_BYTES = 1 << 20
+#: Bytes of answers that are kept as they were while newer ones are computed. Chosen: some hundred `/degradation`.
+MOST_REVALIDATED_BYTES = 32 << 20
+#: Addresses whose answers are found again before the request is looked at. Chosen: a page asks for some twenty a clutch.
+MOST_POLLED = 4096
+#: Items a page may hold.
+MOST_ITEMS = 1000
 #: Items of a page where no limit is given.
 USUAL_ITEMS = 100
 #: Characters of a cursor that are read. Derived: a clutch's name has 128, base64 makes a third more of them.

@@ -16,13 +16,14 @@ from service.errors import (
     ForbiddenError,
     InvalidError,
     NotFoundError,
+    NotPossibleNowError,
     ServiceError,
     TooLargeError,
     UnauthorizedError,
     UnsupportedMediaTypeError,
 )
+from service.queries.cache import to_json
 from service.schemas.problem import Problem
-from service.web.answers import to_json
 from service.web.limits import RETRY_AFTER_SECONDS
 from storage.engine.errors import DatabaseBusy, StorageError
 
@@ -130,4 +131,5 @@ def _described(title: str) -> dict[str, Any]:
 
 
 READING = described(NotFoundError)
+CHANGING = described(NotFoundError, NotPossibleNowError, TooLargeError, UnsupportedMediaTypeError)
 SENDING = described(NotFoundError, ConflictError, TooLargeError, UnsupportedMediaTypeError)

@@ -13,14 +13,15 @@ from sqlalchemy import Connection
 from models.diagnosis.extension import Extension
 from service import records, stored_runs
 from service.errors import NotFoundError, NothingToAdoptError
+from service.lives.history import stationary_tests_of
 from service.lives.recomputation import Adoption, ClutchState, Results, computed_anew
-from storage import assumptions, clutches, diagnoses
+from storage import assumptions, changes, clutches, diagnoses
 from storage.assumptions import AdoptedRow
 from storage.diagnoses import DiagnosisRow
 from storage.engine.database import Database
 
 
-def adopt(database: Database, clutch_id: str, diagnosis_id: str | None, *, adopted_at: str) -> None:
+def adopt(database: Database, clutch_id: str, diagnosis_id: str | None, adopted_at: str) -> None:
     """Adopt a diagnosis's extension, or return to the baseline; all is tracked anew.
 
     What is in force already stays and makes no version. Raises NotFoundError for an unknown clutch or diagnosis,
@@ -29,15 +30,15 @@ def adopt(database: Database, clutch_id: str, diagnosis_id: str | None, *, adopt
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
         diagnosed = None if diagnosis_id is None else _diagnosed(connection, clutch_id, diagnosis_id)
-        _, in_force = _newest(connection, clutch_id)
+        in_force = _in_force(connection, clutch_id, diagnosis_id)
     adoption = None if diagnosed is None else _adoptable(diagnosed)
-    if in_force == diagnosis_id and (adoption is None or _of_present_life(database, clutch_id, adoption)):
+    if in_force and (adoption is None or _of_present_life(database, clutch_id, adoption)):
         return
     _change(database, clutch_id, adoption, adopted_at=adopted_at)
 
 
 def finish_and_adopt(
-    database: Database, clutch_id: str, diagnosis_id: str, ended: Mapping[str, Any], *, life: str, at: str
+    database: Database, clutch_id: str, diagnosis_id: str, ended: Mapping[str, Any], life: str, at: str
 ) -> bool:
     """Store a finished diagnosis and, in the same transaction, adopt its extension; False where there is nothing to adopt.
 
@@ -49,12 +50,16 @@ def finish_and_adopt(
     adoption = Adoption(diagnosis_id=diagnosis_id, life=life, extension=Extension.from_dict(ended["extension"]))
 
     def finish(connection: Connection) -> None:
+        if changes.last_of_history(connection, clutch_id) > _diagnosed(connection, clutch_id, diagnosis_id).revision:
+            raise NothingToAdoptError(f"the runs that diagnosis {diagnosis_id!r} is of were changed meanwhile")
         if not diagnoses.finish(connection, diagnosis_id, at, ended["report"], ended["extension"]):
             raise NothingToAdoptError(f"diagnosis {diagnosis_id!r} was ended meanwhile")
 
     try:
         _change(database, clutch_id, adoption, adopted_at=at, before=finish)
-    except NothingToAdoptError:  # a rebuild came meanwhile, or another service declared the diagnosis failed
+    except (
+        NothingToAdoptError
+    ):  # a rebuild or a correction came meanwhile, or another service declared the diagnosis failed
         return False
     return True
 
@@ -69,22 +74,29 @@ def _change(
 ) -> None:
     """Compute under the new model and store, again where the clutch has changed meanwhile."""
     diagnosis_id = None if adoption is None else adoption.diagnosis_id
-    with database.turn(clutch_id, patient=before is not None):
-        while True:
-            state, results = _computed(database, clutch_id, adoption)
-            with database.writing() as connection:
-                if not records.unchanged(connection, clutch_id, state.revision):
-                    continue
-                version, in_force = _newest(connection, clutch_id)
-                if in_force == diagnosis_id:  # the same request, sent twice, was stored while this one waited
-                    return
-                if before is not None:
-                    before(connection)
-                row = AdoptedRow(version=version + 1, diagnosis_id=diagnosis_id, adopted_at=adopted_at)
-                assumptions.insert_adoption(connection, clutch_id, row)
-                records.store(connection, clutch_id, results)
-                clutches.bump_revision(connection, clutch_id)
+    while True:
+        state, results = _computed(database, clutch_id, adoption)
+        with database.writing() as connection:
+            if not records.unchanged(connection, clutch_id, state.revision):
+                continue
+            if _in_force(connection, clutch_id, diagnosis_id):  # the same request was stored while this one waited
                 return
+            if before is not None:
+                before(connection)
+            newest = assumptions.current_adoption(connection, clutch_id)
+            version = 1 if newest is None else newest.version + 1
+            row = AdoptedRow(version=version, diagnosis_id=diagnosis_id, adopted_at=adopted_at)
+            assumptions.insert_adoption(connection, clutch_id, row)
+            records.store(connection, clutch_id, results)
+            clutches.bump_revision(connection, clutch_id)
+            return
+        if before is not None:
+            before(connection)
+        row = AdoptedRow(version=version + 1, diagnosis_id=diagnosis_id, adopted_at=adopted_at)
+        assumptions.insert_adoption(connection, clutch_id, row)
+        records.store(connection, clutch_id, results)
+        clutches.bump_revision(connection, clutch_id)
+        return
 
 
 def _computed(database: Database, clutch_id: str, adoption: Adoption | None) -> tuple[ClutchState, Results]:
@@ -95,17 +107,21 @@ def _computed(database: Database, clutch_id: str, adoption: Adoption | None) -> 
         levels, receipts = records.levels(connection, clutch_id), records.receipts(connection, clutch_id)
     if adoption is not None:
         _require_present(adoption, state.lives[-1].name if state.events else "")
-    state = replace(state, adoption=adoption)
+    state = replace(state, adoptions=(adoption,))
     reader = stored_runs.run_reader(database, clutch_id)
     tests = reader.stationary_tests(state.lives[-1]) if state.events else iter(())
-    _, results = computed_anew(state, levels, receipts, tests, reader)
+    evaluated = stationary_tests_of(state.events)
+    _, results = computed_anew(state, levels, receipts, tests, reader, evaluated=evaluated)
     return state, results
 
 
-def _newest(connection: Connection, clutch_id: str) -> tuple[int, str | None]:
-    """The number of the newest version (0 before the first) and the diagnosis that it adopts."""
-    row = assumptions.current_adoption(connection, clutch_id)
-    return (0, None) if row is None else (row.version, row.diagnosis_id)
+def _in_force(connection: Connection, clutch_id: str, diagnosis_id: str | None) -> bool:
+    """Whether this was adopted last, of what is of lives in the history; None: a return to the baseline."""
+    if diagnosis_id is None:
+        newest = assumptions.current_adoption(connection, clutch_id)
+        return newest is None or newest.diagnosis_id is None
+    adoption = records.adoption(connection, clutch_id)
+    return adoption is not None and adoption.diagnosis_id == diagnosis_id
 
 
 def _diagnosed(connection: Connection, clutch_id: str, diagnosis_id: str) -> DiagnosisRow:

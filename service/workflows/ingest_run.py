@@ -1,10 +1,10 @@
 """A run comes in: its curves are fitted, the clutch is tracked on or anew, and all is stored in one short transaction.
 
 Everything is computed before the database is locked; where another run of the clutch was stored meanwhile, what depends on
-the history is computed again.
+the history is computed again. A doubtful run is stored with its curves, held, and changes nothing else.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,48 +12,71 @@ from typing import Any
 from sqlalchemy import Connection
 
 from service import records, stored_runs
-from service.columns import bar
-from service.errors import ConflictError
+from service.errors import ArchivedError, ConflictError
 from service.lives.history import (
     DYNAMIC,
     REBUILD,
     ByPressure,
     Event,
-    Life,
     duty_block,
     life_with,
     moment_of,
-    nearest,
     order,
-    reference_velocities,
-    stationary_test_of,
+    stationary_tests_of,
 )
 from service.lives.incoming_run import IncomingRun
 from service.lives.late_run import Arrival, reader_with, test_of, tests_with
-from service.lives.payloads import receipt
-from service.lives.recomputation import ClutchState, Results, computed_anew, corrected_newest, loops_anew, track
-from service.lives.run_analysis import LATE, OTHER_PRESSURES, LevelFit, Notice, analyse, loops_of, mean_cofs
+from service.lives.payloads import history_warnings, notice_items, receipt, warned_anew
+from service.lives.plausibility.doubts import doubts
+from service.lives.recomputation import (
+    ClutchState,
+    Results,
+    cofs_among,
+    computed_anew,
+    corrected_newest,
+    loops_anew,
+    track,
+)
+from service.lives.run_analysis import LevelFit, Notice, analyse, loops_of
 from service.settings import CODE_VERSION
-from storage import channels, clutches, results, runs
+from storage import changes, channels, clutches, results, runs
+from storage.changes import NewChange
 from storage.engine.database import Database
 from storage.runs import NewRun, RunRow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Outcome:
-    """What a run changes in a clutch at a revision: its receipt and mean COFs, and the results of what was there before."""
+    """What a run changes in a clutch at a revision: its receipt and mean COFs, doubts about it, and the results of what was
+    there before."""
 
     revision: int
     receipt: dict[str, Any]
     cofs: ByPressure
     results: Results
+    doubts: tuple[Notice, ...] = ()
+
+    @property
+    def state(self) -> str:
+        """Whether the run counts."""
+        return runs.HELD if self.doubts else runs.ACCEPTED
 
 
-def ingest(database: Database, clutch_id: str, run: IncomingRun, *, received_at: str) -> tuple[dict[str, Any], bool]:
-    """Take in a run; returns its receipt and whether it is new.
+def ingest_posted(
+    database: Database, clutch_id: str, read: Callable[[], IncomingRun], received_at: str, by: str
+) -> tuple[dict[str, Any], bool]:
+    """The same of a run that `read` makes of what was posted; also raises what that does."""
+    return ingest(database, clutch_id, read(), received_at=received_at, by=by)
 
-    The same run again gives the same receipt, marked a duplicate. Raises NotFoundError for an unknown clutch and
-    ConflictError where other content is known under the run's name; then nothing has changed.
+
+def ingest(
+    database: Database, clutch_id: str, run: IncomingRun, *, received_at: str, by: str = "local"
+) -> tuple[dict[str, Any], bool]:
+    """Take in a run that `by` sent; returns its receipt and whether it is new.
+
+    The same run again gives the receipt as it is then, marked a duplicate. Raises NotFoundError for an unknown clutch,
+    ArchivedError for one that takes in no more, and ConflictError where other content is known under the run's name; then
+    nothing has changed.
     """
     with database.reading() as connection:
         clutch = records.clutch(connection, clutch_id)
@@ -68,17 +91,15 @@ def ingest(database: Database, clutch_id: str, run: IncomingRun, *, received_at:
     if sampled and run.kind != DYNAMIC:  # loops are yet to be fitted; another long record need not be held twice
         run = replace(run, channels={})
     arrival = Arrival(run=run, sampled=sampled, analysis=analysis, received_at=received_at)
-    with database.turn(clutch_id):
-        while True:
-            with database.reading() as connection:  # a repeat may have waited for its turn
-                stored = runs.get(connection, clutch_id, run.run_id)
-            if stored is not None:
-                return _repeat(stored, run), False
-            outcome = _computed(database, clutch_id, arrival)
-            with database.writing() as connection:  # another process's run of the same name moves the revision
-                if records.unchanged(connection, clutch_id, outcome.revision):
-                    _store(connection, clutch_id, arrival, columns, outcome)
-                    return outcome.receipt, True
+    while True:
+        with database.reading() as connection:  # a repeat may have waited for its turn
+            stored = runs.get(connection, clutch_id, run.run_id)
+        if stored is not None:
+            return _repeat(stored, run), False
+        outcome = _computed(database, clutch_id, arrival)
+        with database.writing() as connection:  # another process's run of the same name moves the revision
+            if records.unchanged(connection, clutch_id, outcome.revision):
+                return _store(connection, clutch_id, arrival, columns, outcome, by=by), True
 
 
 def _repeat(stored: RunRow, run: IncomingRun) -> dict[str, Any]:
@@ -87,23 +108,19 @@ def _repeat(stored: RunRow, run: IncomingRun) -> dict[str, Any]:
             f"run_id {run.run_id!r} is known with other content: its sha256 is {stored.content_sha256}, "
             f"that of the content sent is {run.content_sha256}"
         )
-    return stored.receipt | {"duplicate": True}
+    return records.receipt(stored) | {"duplicate": True}
 
 
 def _computed(database: Database, clutch_id: str, arrival: Arrival) -> _Outcome:
     """The results of the run in the clutch's history as it is now."""
     with database.reading() as connection:
+        if records.clutch(connection, clutch_id).archived:
+            raise ArchivedError(f"clutch {clutch_id!r} is archived and takes in no more runs")
         before = records.state(connection, clutch_id, carried=True)
     event = _event_of(arrival)
-    life = life_with(order([*before.events, event]), event)
-    event = replace(event, cofs=_cofs_of(life, arrival, before))
+    event = replace(event, cofs=cofs_among(before, event, arrival.analysis.fits))
     state = replace(before, events=order([*before.events, event]))
     levels = _levels(database, state, event, arrival)
-    warnings = [
-        *arrival.analysis.warnings,
-        *_late_arrival(before.events, event),
-        *_other_pressures(state.events, event),
-    ]
     answer = receipt(
         clutch_id,
         arrival.run,
@@ -111,71 +128,64 @@ def _computed(database: Database, clutch_id: str, arrival: Arrival) -> _Outcome:
         levels=arrival.analysis.fits,
         cofs=event.cofs,
         loops=_own_loops(state, event, levels, arrival.run),
-        warnings=warnings,
+        warnings=arrival.analysis.warnings,
     )
-    if _changes_the_past(before, state.events, event):
-        computed = _past_anew(database, state, levels, answer, arrival)
-    else:
-        computed = _carried_on(database, state, event, arrival)
-        if (
-            computed.tracking is not None
-            and event is state.events[-1]
-            and event.cofs
-            and not _other_pressures(state.events, event)
-        ):
-            answer["warnings"] += computed.tracking.warnings
-    if event.speed_range is not None:
-        computed = _with_loops(database, state, event, levels, computed)
+    found = doubts(arrival.run, arrival.analysis, event, before)
+    if found:
+        return _Outcome(revision=before.revision, receipt=answer, cofs=event.cofs, results=Results(), doubts=found)
+    computed = _among(database, before, state, event, levels, answer, arrival)
+    answer = computed.receipts.get(event.run_id, answer)
     others = {run_id: other for run_id, other in computed.receipts.items() if run_id != event.run_id}
     return _Outcome(
         revision=before.revision, receipt=answer, cofs=event.cofs, results=replace(computed, receipts=others)
     )
 
 
-def _carried_on(database: Database, state: ClutchState, event: Event, arrival: Arrival) -> Results:
-    """The filters carried one step on."""
-    corrected = None
-    if state.extension is not None and event is state.events[-1]:
-        runs_before = stored_runs.run_reader(database, state.clutch_id)
-        corrected = corrected_newest(state, event, test_of(arrival, life_with(state.events, event)), runs_before)
-    if corrected is None:
-        return Results(tracking=track(state, newest=event))
-    newest = replace(event, cofs=corrected)
-    freed = replace(state, events=(*state.events[:-1], newest))
-    return Results(corrected={event.run_id: corrected}, tracking=track(freed, newest=newest))
-
-
-def _past_anew(
+def _among(
     database: Database,
+    before: ClutchState,
     state: ClutchState,
+    event: Event,
     levels: Mapping[str, Sequence[LevelFit]],
     answer: dict[str, Any],
     arrival: Arrival,
 ) -> Results:
-    """Everything of the clutch computed anew, the run among the others."""
-    with database.reading() as connection:
-        receipts = records.receipts(connection, state.clutch_id)
-    reader = reader_with(stored_runs.run_reader(database, state.clutch_id), arrival)
-    tests = tests_with(reader, state.lives[-1], arrival)
-    _, computed = computed_anew(state, levels, receipts | {arrival.run.run_id: answer}, tests, reader)
-    return computed
+    """What changes with the run among the others: the filters carried one step on, or everything anew."""
+    if _changes_the_past(before, state.events, event):
+        with database.reading() as connection:
+            receipts = records.receipts(connection, state.clutch_id) | {event.run_id: answer}
+        reader = reader_with(stored_runs.run_reader(database, state.clutch_id), arrival)
+        tests = tests_with(reader, state.lives[-1], arrival)
+        evaluated = _evaluated(before, state, event)
+        return computed_anew(state, levels, receipts, tests, reader, evaluated=evaluated)[1]
+    corrected: dict[str, ByPressure] = {}
+    if state.extension is not None and event is state.events[-1]:
+        runs_before = stored_runs.run_reader(database, state.clutch_id)
+        cofs = corrected_newest(state, event, test_of(arrival, life_with(state.events, event)), runs_before)
+        if cofs is not None:
+            event = replace(event, cofs=cofs)
+            corrected, state = {event.run_id: cofs}, replace(state, events=(*state.events[:-1], event))
+    tracking = track(state, newest=event)
+    noticed = answer["warnings"] + history_warnings(state.lives, tracking.warnings)[event.run_id]
+    changed = {event.run_id: answer | {"warnings": noticed}}
+    evaluated = _evaluated(before, state, event)
+    outdated = evaluated != stationary_tests_of(state.events)
+    if tracking.anew or outdated:
+        with database.reading() as connection:
+            receipts = records.receipts(connection, state.clutch_id) | changed
+        if outdated:
+            stored = stored_runs.run_reader(database, state.clutch_id)
+            loops = loops_anew(state, levels, stored, evaluated)
+            changed |= {run_id: receipts[run_id] | {"loops": items} for run_id, items in loops.items()}
+        if tracking.anew:
+            changed |= warned_anew(state.lives, tracking.warnings, receipts | changed)
+    return Results(corrected=corrected, receipts=changed, tracking=tracking)
 
 
-def _with_loops(
-    database: Database,
-    state: ClutchState,
-    event: Event,
-    levels: Mapping[str, Sequence[LevelFit]],
-    computed: Results,
-) -> Results:
-    """With the loops of dynamic tests whose stationary test the run has become."""
-    if not _has_dynamic_tests(state.events, event):
-        return computed
-    loops = loops_anew(state, levels, stored_runs.run_reader(database, state.clutch_id), since=event)
-    with database.reading() as connection:
-        receipts = records.receipts(connection, state.clutch_id) | dict(computed.receipts)
-    changed = {run_id: receipts[run_id] | {"loops": items} for run_id, items in loops.items()}
-    return replace(computed, receipts={**computed.receipts, **changed})
+def _evaluated(before: ClutchState, state: ClutchState, event: Event) -> dict[str, str | None]:
+    """What the loops of dynamic tests were evaluated against; the run that comes in already is as it should be."""
+    now = stationary_tests_of(state.events)
+    return stationary_tests_of(before.events) | ({event.run_id: now[event.run_id]} if event.kind == DYNAMIC else {})
 
 
 def _levels(database: Database, state: ClutchState, event: Event, arrival: Arrival) -> Mapping[str, Sequence[LevelFit]]:
@@ -188,29 +198,49 @@ def _levels(database: Database, state: ClutchState, event: Event, arrival: Arriv
 
 
 def _store(
-    connection: Connection, clutch_id: str, arrival: Arrival, columns: channels.Encoded, outcome: _Outcome
-) -> None:
-    """The run, its channels and fits, and what it changes; the revision moves on."""
+    connection: Connection,
+    clutch_id: str,
+    arrival: Arrival,
+    columns: channels.Encoded,
+    outcome: _Outcome,
+    *,
+    by: str,
+) -> dict[str, Any]:
+    """The run, its channels and fits, and what it changes; the revision moves on. Returns the receipt."""
     run = arrival.run
-    run_key = runs.insert(
-        connection,
-        NewRun(
-            clutch_id=clutch_id,
-            run_id=run.run_id,
-            kind=run.kind,
-            cycles=run.cycles,
-            started_at=run.started_at,
-            received_at=arrival.received_at,
-            content_sha256=run.content_sha256,
-            details=records.details(run, arrival.analysis),
-            receipt=outcome.receipt,
-            code_version=CODE_VERSION,
-        ),
+    row = NewRun(
+        clutch_id=clutch_id,
+        run_id=run.run_id,
+        kind=run.kind,
+        cycles=run.cycles,
+        started_at=run.started_at,
+        received_at=arrival.received_at,
+        content_sha256=run.content_sha256,
+        details=records.details(run, arrival.analysis),
+        receipt=outcome.receipt,
+        code_version=CODE_VERSION,
+        state=outcome.state,
+        doubts=notice_items(outcome.doubts),
     )
+    run_key = runs.insert(connection, row)
     channels.write(connection, run_key, columns)
     results.write_fits(connection, run_key, records.fit_rows(arrival.analysis.fits, outcome.cofs))
     records.store(connection, clutch_id, outcome.results)
-    clutches.bump_revision(connection, clutch_id)
+    revision = clutches.bump_revision(connection, clutch_id)
+    if outcome.doubts:
+        change = NewChange(
+            clutch_id=clutch_id,
+            run_id=run.run_id,
+            at=arrival.received_at,
+            by=by,
+            action=changes.HOLD,
+            reason="",
+            before={},
+            after=records.standing(row),
+            revision=revision,
+        )
+        changes.insert(connection, change)
+    return records.receipt(row)
 
 
 def _event_of(arrival: Arrival) -> Event:
@@ -230,26 +260,13 @@ def _event_of(arrival: Arrival) -> Event:
     )
 
 
-def _cofs_of(life: Life, arrival: Arrival, state: ClutchState) -> ByPressure:
-    """The run's mean COFs over the protocol of its life's first stationary test, which may be itself."""
-    if life.speed_range is None:
-        return {}
-    return mean_cofs(arrival.analysis.fits, reference_velocities(life.speed_range, state.geometry), state.geometry)
-
-
 def _own_loops(
     state: ClutchState, event: Event, levels: Mapping[str, Sequence[LevelFit]], run: IncomingRun
 ) -> Sequence[Any]:
     if run.kind != DYNAMIC:
         return ()
-    test = stationary_test_of(state.events, event)
-    return loops_of(run.channels, state.geometry, [] if test is None else levels.get(test.run_id, []))
-
-
-def _has_dynamic_tests(events: Sequence[Event], test: Event) -> bool:
-    """Whether any dynamic test is evaluated against this stationary test."""
-    of_tests = (stationary_test_of(events, event) for event in events if event.kind == DYNAMIC)
-    return any(stationary is not None and stationary.run_id == test.run_id for stationary in of_tests)
+    test = stationary_tests_of(state.events)[event.run_id]
+    return loops_of(run.channels, state.geometry, [] if test is None else levels.get(test, []))
 
 
 def _changes_the_past(before: ClutchState, ordered: Sequence[Event], event: Event) -> bool:
@@ -262,21 +279,3 @@ def _changes_the_past(before: ClutchState, ordered: Sequence[Event], event: Even
     if before.adoption is not None and (late or event.rebuild):
         return True
     return late and (event.rebuild or event.speed_range is not None)
-
-
-def _other_pressures(events: Sequence[Event], new: Event) -> list[Notice]:
-    """A test none of whose pressures the reference test had cannot be compared with it."""
-    life = life_with(events, new)
-    if not new.cofs or any(nearest(level, new.cofs) is not None for level in life.reference):
-        return []
-    measured = ", ".join(f"{bar(level):g}" for level in sorted(life.reference))
-    message = f"none of its pressures is one of the first stationary test's ({measured} bar): no track uses it"
-    return [Notice(code=OTHER_PRESSURES, message=message)]
-
-
-def _late_arrival(before: Sequence[Event], new: Event) -> list[Notice]:
-    latest = max((event.cycles for event in before), default=0.0)
-    if new.cycles >= latest:
-        return []
-    message = f"the run's {new.cycles:g} cycles lie before the latest known {latest:g}: all was tracked anew"
-    return [Notice(code=LATE, message=message)]

@@ -12,6 +12,7 @@ from models.prognosis.fleet import FleetPrior, Taught, population, taught
 from service import records
 from service.lives.assumptions import ALL_PRESSURES, Assumptions, kind_of
 from service.lives.history import Life
+from service.lives.payloads import warned_anew
 from service.lives.recomputation import Results, track
 from service.lives.tracks import CARRIED
 from service.settings import CODE_VERSION
@@ -115,20 +116,20 @@ def _versions(fleet: Fleet, version: int, now: str) -> Sequence[FleetPriorRow]:
 
 def _brought_up(database: Database, clutch_id: str) -> bool:
     """Track a clutch anew where its stored predictions were made under another prior; whether its answers have changed."""
-    with database.turn(clutch_id, patient=True):
-        while True:
-            with database.reading() as connection:
-                state = records.state(connection, clutch_id)
-                last = results.prediction_at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)
-            if last is None or last.payload.get("prior") == dict(state.assumptions().prior.name):
+    while True:
+        with database.reading() as connection:
+            state, receipts = records.state(connection, clutch_id), records.receipts(connection, clutch_id)
+            last = results.prediction_at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)
+        if last is None or last.payload.get("prior") == dict(state.assumptions().prior.name):
+            return False
+        tracking = track(state)
+        retracked = Results(tracking=tracking, receipts=warned_anew(state.lives, tracking.warnings, receipts))
+        with database.writing() as connection:
+            if not records.unchanged(connection, clutch_id, state.revision):
+                continue
+            before = records.answers(connection, clutch_id)
+            records.store(connection, clutch_id, retracked)
+            if records.answers(connection, clutch_id) == before:
                 return False
-            retracked = Results(tracking=track(state))
-            with database.writing() as connection:
-                if not records.unchanged(connection, clutch_id, state.revision):
-                    continue
-                before = records.answers(connection, clutch_id)
-                records.store(connection, clutch_id, retracked)
-                if records.answers(connection, clutch_id) == before:
-                    return False
-                clutches.bump_revision(connection, clutch_id)
-                return True
+            clutches.bump_revision(connection, clutch_id)
+            return True

@@ -1,22 +1,20 @@
 """A clutch is registered; what is known already is not changed by posting."""
 
-import hashlib
-import json
-from typing import Any
-
-from service import records
 from service.errors import ConflictError
 from service.lives.payloads import RANK_UNKNOWN
-from service.schemas.clutch import ClutchIn
+from service.schemas.clutch import ClutchIn, content_of
 from storage import clutches
 from storage.clutches import ClutchRow
 from storage.engine.database import Database
 
 
 def register(database: Database, clutch: ClutchIn, *, created_at: str) -> bool:
-    """Register a clutch; returns whether it is new. Raises ConflictError where it is known with other content."""
+    """Register a clutch; returns whether it is new. Raises ConflictError where it is known with other content.
+
+    What is known is the record in force, and, where it was edited, that which was first registered.
+    """
     record = clutch.model_dump(mode="json")
-    content = _content(record)
+    content = content_of(record)
     with database.reading() as connection:
         stored = clutches.get(connection, clutch.clutch_id)
     if stored is None:
@@ -34,13 +32,10 @@ def register(database: Database, clutch: ClutchIn, *, created_at: str) -> bool:
                 )
                 clutches.insert(connection, row)
                 return True
-    if _content(records.record(stored).model_dump(mode="json")) != content:
+    known = [stored.record] if stored.registered is None else [stored.record, stored.registered]
+    # with the defaults of fields that came after a record was stored
+    if content not in [content_of(ClutchIn.model_validate(each).model_dump(mode="json")) for each in known]:
         raise ConflictError(
             f"clutch {stored.clutch_id!r} is known with another record; records are not changed by posting"
         )
     return False
-
-
-def _content(record: dict[str, Any]) -> str:
-    """A record's hash, with the defaults of fields that came after it filled in."""
-    return hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()

@@ -7,7 +7,7 @@ from typing import Any
 from service import records
 from service.lives.history import lives_of
 from service.settings import CODE_VERSION
-from storage import diagnoses
+from storage import changes, diagnoses
 from storage.diagnoses import NewDiagnosis
 from storage.engine.database import Database
 
@@ -35,7 +35,12 @@ def running(database: Database, clutch_id: str) -> str | None:
     """The id of the diagnosis that is running of the very runs that are there now. Raises NotFoundError."""
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
-        return diagnoses.running(connection, clutch_id, diagnoses.last_run_key(connection, clutch_id))
+        return diagnoses.running(
+            connection,
+            clutch_id,
+            diagnoses.last_run_key(connection, clutch_id),
+            since=changes.last_of_history(connection, clutch_id),
+        )
 
 
 def finish(database: Database, diagnosis_id: str, ended: Mapping[str, Any], *, at: str) -> None:

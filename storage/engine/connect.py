@@ -3,7 +3,7 @@
 The driver's own transaction control is switched off: `transactions.py` begins every transaction explicitly.
 
 Source: https://docs.sqlalchemy.org/en/20/dialects/sqlite.html (transactions with the pysqlite driver),
-https://www.sqlite.org/wal.html (the WAL-reset bug, fixed in 3.51.3).
+https://www.sqlite.org/wal.html; why any release of SQLite may use the log here: `write_lock`.
 """
 
 import math
@@ -17,6 +17,8 @@ from sqlalchemy.pool import ConnectionPoolEntry, NullPool, QueuePool
 
 from storage.engine.errors import StorageUnavailable
 
+#: Write-ahead logging: readers and a commit do not wait for each other.
+JOURNAL_MODE = "wal"
 #: Seconds between two attempts to change the journal mode.
 _MODE_RETRY = 0.02
 
@@ -36,42 +38,31 @@ def path_of(url: str) -> Path:
     return Path(path)
 
 
-def preferred_journal_mode(sqlite_version: tuple[int, ...]) -> str:
-    """The journal mode for a release of SQLite: "wal" from 3.51.3 on, before it "delete", the rollback journal.
-
-    Older releases can lose a commit when two processes reset a write-ahead log at the same moment.
-    """
-    return "wal" if sqlite_version >= (3, 51, 3) else "delete"
-
-
 def set_journal_mode(path: Path, lock_timeout: float) -> str:
-    """Set the mode that this SQLite prefers where the file is in another; returns the mode in force.
+    """Put the file into JOURNAL_MODE; returns the mode in force.
 
-    The file itself records "wal"; "delete" is the default. Raises StorageUnavailable where the file cannot leave a mode
-    that this SQLite must not use.
+    A file on a volume that cannot share memory between processes stays with its rollback journal, "delete".
+    Call it under the `WriteLock`. Raises StorageUnavailable where the file is in some third mode.
     """
-    preferred = preferred_journal_mode(sqlite3.sqlite_version_info)
-    # SQLite does not wait where two change the mode at once, since they would wait for each other: so try again here.
+    # SQLite does not wait where others use the file while its mode is changed: so try again here.
     for attempts_left in reversed(range(math.ceil(lock_timeout / _MODE_RETRY) + 1)):
         try:
-            mode = _try_journal_mode(path, preferred)
+            mode = _try_journal_mode(path)
             break
         except sqlite3.OperationalError as error:
             if error.sqlite_errorcode & 0xFF != sqlite3.SQLITE_BUSY or not attempts_left:
                 raise
             time.sleep(_MODE_RETRY)
-    if mode not in {preferred, "delete"}:
-        raise StorageUnavailable(
-            f"{path} is in journal mode {mode}, which this SQLite must not use, and cannot leave it"
-        )
+    if mode not in {"wal", "delete"}:
+        raise StorageUnavailable(f"{path} is in journal mode {mode} and cannot leave it")
     return mode
 
 
-def _try_journal_mode(path: Path, preferred: str) -> str:
+def _try_journal_mode(path: Path) -> str:
     with closing(sqlite3.connect(path, timeout=0.0, isolation_level=None)) as connection:
         mode = str(connection.execute("PRAGMA journal_mode").fetchone()[0])
-        if mode != preferred:
-            mode = str(connection.execute(f"PRAGMA journal_mode={preferred}").fetchone()[0])
+        if mode != JOURNAL_MODE:
+            mode = str(connection.execute(f"PRAGMA journal_mode={JOURNAL_MODE}").fetchone()[0])
     return mode
 
 

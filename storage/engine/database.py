@@ -1,5 +1,6 @@
 """The open database: what the rest of the program holds, and how it comes to be."""
 
+from contextlib import closing
 from pathlib import Path
 
 from storage.engine.backup import copy
@@ -8,6 +9,7 @@ from storage.engine.errors import DatabaseTooNew, StorageUnavailable
 from storage.engine.health import is_ready
 from storage.engine.limits import LOCK_TIMEOUT
 from storage.engine.transactions import Transactions, transaction, translated
+from storage.engine.write_lock import WriteLock
 from storage.migrations.upgrade import current, head, revisions, upgrade
 
 
@@ -36,7 +38,8 @@ def open_database(url: str, *, lock_timeout: float = LOCK_TIMEOUT) -> Database:
     StorageUnavailable where the file cannot be used, DatabaseBusy where others hold it for `lock_timeout` [s].
     """
     path = path_of(url)
-    with translated(path):
+    lock = WriteLock(path, lock_timeout)
+    with translated(path), closing(lock), lock.held():
         journal_mode = set_journal_mode(path, lock_timeout)
         _migrate(path, lock_timeout)
     return Database(path, journal_mode=journal_mode, lock_timeout=lock_timeout)

@@ -1,11 +1,9 @@
 """Transactions of one file: many readers, one writer at a time.
 
 Readers begin by BEGIN, writers by BEGIN IMMEDIATE, so that a writer either has the lock before its first statement or has
-changed nothing. Among the threads of this process writers queue for a lock of our own; SQLite's lock holds off the others.
+changed nothing. Writers of all threads and processes queue for a lock of our own (`write_lock`).
 """
 
-import sqlite3
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,7 +12,9 @@ from sqlalchemy import Connection, Engine
 
 from storage.engine.connect import make_engine
 from storage.engine.driver_errors import DRIVER_ERRORS, store_error
-from storage.engine.errors import DatabaseBusy, StorageUnavailable
+from storage.engine.errors import StorageUnavailable
+from storage.engine.watch import Watch
+from storage.engine.write_lock import WriteLock
 
 
 @contextmanager
@@ -43,20 +43,15 @@ class Transactions:
     def __init__(self, path: Path, lock_timeout: float) -> None:
         self.path = path
         self.lock_timeout = lock_timeout
-        self._writer_lock = threading.Lock()
-        self._turns: dict[str, threading.Lock] = {}
-        self._turns_lock = threading.Lock()
+        self._write_lock = WriteLock(path, lock_timeout)
         self._closed = False
         self._engine = make_engine(path, lock_timeout)
-        self._version_lock = threading.Lock()
         with translated(path):
-            self._version_connection = sqlite3.connect(
-                path, timeout=lock_timeout, isolation_level=None, check_same_thread=False
-            )
+            self.watch = Watch(path, lock_timeout)
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
-        """A connection that sees one state of the database until the block ends. Keep it short: commits wait for it."""
+        """A connection that sees one state of the database until the block ends. Keep it short: the log grows meanwhile."""
         self.refuse_closed()
         with translated(self.path), transaction(self._engine, "BEGIN") as connection:
             yield connection
@@ -68,49 +63,19 @@ class Transactions:
         Raises DatabaseBusy where the lock is not free in time, StorageUnavailable where the file cannot be written.
         """
         self.refuse_closed()
-        if not self._writer_lock.acquire(timeout=self.lock_timeout):
-            raise DatabaseBusy(
-                f"another writer of this process held the database for more than {self.lock_timeout:g} s"
-            )
-        try:
-            with translated(self.path), transaction(self._engine, "BEGIN IMMEDIATE") as connection:
-                yield connection
-        finally:
-            self._writer_lock.release()
-
-    @contextmanager
-    def turn(self, name: str, *, patient: bool = False) -> Iterator[None]:
-        """One thread of this process at a time for a name: who would compute the same results at once waits instead.
-
-        No lock of the database is held meanwhile. Raises DatabaseBusy where the turn does not come in time, lest all
-        threads that serve requests wait; work in the background is `patient` and waits as long as it takes.
-        """
-        with self._turns_lock:
-            turn = self._turns.setdefault(name, threading.Lock())
-        if not turn.acquire(timeout=threading.TIMEOUT_MAX if patient else self.lock_timeout):
-            raise DatabaseBusy(f"{name!r} was computed for more than {self.lock_timeout:g} s")
-        try:
-            yield
-        finally:
-            turn.release()
-
-    def version(self) -> int:
-        """A number that changes with every commit, whichever process made it. Compare it only within this object.
-
-        Read before a query, it shows later whether the query would still give the same rows.
-        """
-        self.refuse_closed()
-        with translated(self.path), self._version_lock:
-            # fetched to the end: an open statement would hold up commits
-            ((number,),) = self._version_connection.execute("PRAGMA data_version").fetchall()
-        return int(number)
+        with (
+            self._write_lock.held(),
+            translated(self.path),
+            transaction(self._engine, "BEGIN IMMEDIATE") as connection,
+        ):
+            yield connection
 
     def close(self) -> None:
         """Close all connections; any later use raises StorageUnavailable. May be called twice."""
         self._closed = True
-        with self._version_lock:
-            self._version_connection.close()
+        self.watch.close()
         self._engine.dispose()
+        self._write_lock.close()
 
     def refuse_closed(self) -> None:
         """Raise StorageUnavailable after `close`."""

@@ -46,6 +46,14 @@ def chromium() -> Iterator[Browser]:
         found.close()
 
 
+def pointed_at(page: Page, chart: str = "fan") -> None:
+    """Point at a chart and away again, as who wants to zoom: from then on the plotting library draws all of them."""
+    page.locator(f"#chart-{chart}[data-sketched]").wait_for()
+    page.locator(f"#chart-{chart} .plot").hover(position={"x": 3, "y": 3})
+    page.mouse.move(0, 0)
+    page.locator(f"#chart-{chart}[data-drawn]").wait_for()
+
+
 class Watched:
     """A page of the service, and what it asked for, said and violated."""
 

@@ -8,7 +8,7 @@ import pytest
 from axe_playwright_python.base import AXE_SCRIPT
 from playwright.sync_api import Browser, Page
 
-from tests.browser.driving import Watched, serving_with_engine
+from tests.browser.driving import Watched, pointed_at, serving_with_engine
 from tests.browser.lives import worn
 
 pytestmark = pytest.mark.browser
@@ -58,7 +58,7 @@ def test_a_clutch_with_a_diagnosis_and_all_that_opens(
 ) -> None:
     watched = Watched(browser, url, color_scheme=scheme, viewport=viewport)
     page = watched.open("/clutches/bench")
-    page.locator("#chart-fan[data-drawn]").wait_for()
+    pointed_at(page)
     page.locator("#diagnosis .verdict").wait_for()
     page.locator("#chart-fan summary").click()
     page.locator("#chart-fan table").wait_for()

@@ -12,7 +12,7 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
-from tests.browser.driving import Watched, launched
+from tests.browser.driving import Watched, launched, pointed_at
 from tests.browser.lives import demo, post
 from tests.browser.pixels import seen
 from tests.support import ONCE, Server, serving, stationary
@@ -59,7 +59,7 @@ def opened(watched: Watched) -> Page:
     if watched.page.url.endswith("/clutches/sim-1"):
         return watched.page
     page = watched.open("/clutches/sim-1")
-    page.locator("#chart-fan[data-drawn]").wait_for()
+    pointed_at(page)
     page.locator("#runs .runs details").first.wait_for()
     return page
 
@@ -198,7 +198,7 @@ def test_a_run_posted_while_the_page_is_open_appears(browser: Browser, tmp_path:
         page.get_by_role("heading", name="No run has arrived").wait_for()
         page.evaluate("window.same = true")
         post(http, "live", stationary(0))
-        page.locator("#chart-fan[data-drawn]").wait_for()
+        pointed_at(page)
         expect(page.locator("#runs .runs details")).to_have_count(1)
         assert page.locator("#chart-predicted").get_by_text("From the third stationary test on").is_visible()
         page.locator("#chart-loop-curves").scroll_into_view_if_needed()

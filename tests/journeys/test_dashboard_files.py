@@ -46,7 +46,7 @@ def test_a_page_names_its_files_by_their_content(http: httpx2.Client, path: str)
 
 
 def test_the_plotting_library_goes_out_compressed(http: httpx2.Client) -> None:
-    name = next(name for name in assets_of(http, PAGES[1]) if name.endswith("plotly.min.js"))
+    name = "/".join([*assets_of(http, PAGES[1])[0].split("/")[:3], "plotly.min.js"])
     with http.stream("GET", name, headers={"Accept-Encoding": "gzip"}) as answer:
         raw = b"".join(answer.iter_raw())
     assert len(raw) < 1_700_000

@@ -1,4 +1,4 @@
-"""The charts before the plotting library is there: drawn light at once, and nothing moves when it takes their place."""
+"""The charts are drawn light until someone points at one, and nothing moves when the plotting library takes their place."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -73,6 +73,10 @@ def test_the_library_takes_the_place_of_the_light_drawing(
     assert len(points) >= 8
     page.evaluate(_FORGET)
 
+    assert held == []
+    with page.expect_request(LIBRARY):
+        chart.hover(position={"x": 3, "y": 3})
+    page.mouse.move(0, 0)
     for route in held:
         route.continue_()
     page.locator("#chart-fan[data-drawn]").wait_for()

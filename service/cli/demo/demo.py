@@ -19,7 +19,8 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 from service.cli.diagnose import ask
 from service.cli.diagnosis_view import shown
 from service.cli.options import Seed, fail, out
-from service.cli.sending.client import Service, ServiceAwayError, connect
+from service.cli.sending.answers import ServiceAwayError
+from service.cli.sending.client import Service, connect
 
 _PORT = 8000
 _START_SECONDS = 60.0

@@ -1,41 +1,20 @@
 """`clutchlife push`: send run files, keep what could not be sent, safe to repeat."""
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.progress import Progress
 
-from service.cli.options import (
-    EX_DATAERR,
-    EX_TEMPFAIL,
-    EX_USAGE,
-    URL,
-    Key,
-    Patience,
-    Url,
-    err,
-    errors_in_a_line,
-    fail,
-    out,
-)
-from service.cli.sending.client import RefusedError, Service, ServiceAwayError, connect
+from service.cli.options import EX_DATAERR, EX_USAGE, URL, Key, Patience, Url, errors_in_a_line, fail
+from service.cli.sending.client import Service
+from service.cli.sending.entry import Entry
 from service.cli.sending.spool import Spool, default_folder
+from service.cli.sending.transmission import say, transmit
 from service.run_files import manifest
 
 SPOOL = default_folder()
-
-
-@dataclass
-class Sent:
-    """How many of the pushed runs were stored, were stored already, were refused, or failed inside the service."""
-
-    stored: int = 0
-    duplicates: int = 0
-    refused: int = 0
-    failed: int = 0
+SpoolFolder = Annotated[Path, typer.Option("--spool", help="Where runs wait until the service has stored them")]
 
 
 def push(
@@ -43,7 +22,7 @@ def push(
     clutch: Annotated[str, typer.Option(help="The clutch that was tested")],
     url: Url = URL,
     key: Key = None,
-    spool: Annotated[Path, typer.Option("--spool", help="Where runs wait until the service has stored them")] = SPOOL,
+    spool: SpoolFolder = SPOOL,
     patience: Patience = 60.0,
     kind: Annotated[str | None, typer.Option(help="For files that are not JSON: the kind of run")] = None,
     cycles: Annotated[float | None, typer.Option(help="For files that are not JSON: duty cycles since new")] = None,
@@ -51,7 +30,8 @@ def push(
 ) -> None:
     """Send run files: JSON, or CSV, TDMS, MDF4 and Parquet, with their kind and cycles in a runs.json or in options.
 
-    Runs that the service cannot store now wait in the spool and are sent first next time.
+    Runs that the service cannot store now wait in the spool and are sent first next time. A file that is pushed again with
+    other content takes the place of the version that waits.
     """
     with errors_in_a_line():
         try:
@@ -59,40 +39,43 @@ def push(
         except FileNotFoundError as error:
             fail(str(error), EX_DATAERR)
         for record in manifest.unlisted(paths):
-            err.print(f"{record} is not listed in {manifest.MANIFEST} and not sent", markup=False, soft_wrap=True)
+            say(f"{record} is not listed in {manifest.MANIFEST} and not sent")
         waiting = Spool.of(spool, url, clutch)
-        for file in files:
-            if file.path.suffix == ".json":
-                waiting.add(file.path.read_bytes())
-            else:
-                parameters = _parameters(file, kind, cycles)
-                waiting.add_file(file.path, ({} if channel_map is None else {"map": channel_map}) | parameters)
-        with connect(url, key=key) as http, Progress(console=err, transient=True) as progress:
-            task = progress.add_task("sending", total=len(list(waiting.waiting())))
+        digests, replaced = waiting.add([_request(file, kind, cycles, channel_map) for file in files])
+        for entry in replaced:
+            say(_replacement(waiting, entry))
+        _warn_of_others(waiting, digests)
+        transmit([waiting], url, key, patience, lambda service, _: _register(service, clutch, paths))
 
-            def show_wait(reason: str, seconds: float) -> None:
-                progress.update(task, description=f"{reason}; again in {seconds:.0f} s")
 
-            service = Service(http=http, patience=patience, on_wait=show_wait)
-            sent = Sent()
-            try:
-                _register(service, clutch, paths)
-                for entry in waiting.waiting():
-                    _send(service, clutch, waiting, entry, sent)
-                    progress.update(task, description="sending", advance=1)
-            except ServiceAwayError as error:
-                left = len(list(waiting.waiting()))
-                fail(f"{error}; {left} runs wait in {waiting.folder}: push again to send them", EX_TEMPFAIL)
-            except RefusedError as error:
-                fail(str(error), EX_DATAERR)
-        out.print(f"{sent.stored} stored, {sent.duplicates} known already, {sent.refused} refused")
-        if sent.failed:
-            fail(
-                f"the service failed on {sent.failed} runs, which wait in {waiting.folder}: see its log",
-                EX_TEMPFAIL,
-            )
-        if sent.refused:
-            fail(f"refused runs and the reasons are in {waiting.folder / 'refused'}", EX_DATAERR)
+def _request(
+    file: manifest.RunFile, kind: str | None, cycles: float | None, channel_map: str | None
+) -> tuple[Path, dict[str, str] | None]:
+    """A file and the parameters of its request; None for a JSON body."""
+    if file.path.suffix == ".json":
+        return file.path, None
+    mapped = {} if channel_map is None else {"map": channel_map}
+    return file.path, mapped | _parameters(file, kind, cycles)
+
+
+def _replacement(spool: Spool, entry: Entry) -> str:
+    stored = "; a try got no answer, so it may be stored: withdraw it then" if entry.perhaps_stored else ""
+    place = spool.folder / "replaced" / entry.body
+    return f"{entry.label}: the version that waited since {entry.since} is replaced and not sent, see {place}{stored}"
+
+
+def _warn_of_others(spool: Spool, digests: set[str]) -> None:
+    """One line where the spool holds other runs of the clutch than those that were just given."""
+    others = [entry for entry in spool.waiting() if entry.digest not in digests]
+    refused = len([entry for entry in spool.refused() if entry.digest not in digests])
+    parts = []
+    if others:
+        oldest = min(entry.since for entry in others)
+        parts.append(f"{len(others)} other runs of {spool.clutch_id} wait since {oldest} and are sent too")
+    if refused:
+        parts.append(f"{refused} were refused and are not sent")
+    if parts:
+        say(f"{', '.join(parts)}: see clutchlife spool list")
 
 
 def _parameters(file: manifest.RunFile, kind: str | None, cycles: float | None) -> dict[str, str]:
@@ -116,26 +99,3 @@ def _register(service: Service, clutch_id: str, paths: list[Path]) -> None:
         raise ValueError(f"{record} must hold a JSON object")  # noqa: TRY004  (a wrong file, not a wrong call)
     body["clutch_id"] = clutch_id
     service.post("/v1/clutches", json.dumps(body).encode())
-
-
-def _send(service: Service, clutch_id: str, waiting: Spool, entry: Path, sent: Sent) -> None:
-    try:
-        parameters = waiting.parameters(entry)
-        if parameters is None:
-            receipt = service.post(f"/v1/clutches/{clutch_id}/runs", entry.read_bytes())
-        else:
-            receipt = service.post_file(f"/v1/clutches/{clutch_id}/runs/file", entry, parameters)
-    except RefusedError as error:
-        if error.status in (0, 401, 403, 404):
-            raise
-        if error.status >= 500:
-            sent.failed += 1
-            err.print(f"failed, {error}: {entry} stays in the spool", markup=False, soft_wrap=True)
-            return
-        sent.refused += 1
-        aside = waiting.refused(entry, error.problem)
-        err.print(f"refused, {error}: {aside}", markup=False, soft_wrap=True)
-        return
-    waiting.done(entry)
-    sent.duplicates += receipt["duplicate"]
-    sent.stored += not receipt["duplicate"]

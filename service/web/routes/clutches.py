@@ -1,20 +1,29 @@
-"""Clutches: register, list worst first, look up."""
+"""Clutches: register, list worst first, look up, edit and archive, and the audit trail."""
 
-import pydantic
+import asyncio
+from collections.abc import Hashable
+from functools import partial
+
 from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
-from service.queries import clutch_list
-from service.run_files.json_run import invalid
-from service.schemas.clutch import ClutchIn, ClutchOut, ClutchPage
-from service.schemas.parameters import ClutchId
-from service.web.answers import JSON_TYPE, answer, described_body, from_cursor, json_body, now, page, tagged, to_json
-from service.web.auth import Ingester, Reader
+from service.jobs.workers import Lane
+from service.lists import from_cursor, page
+from service.queries import clutch_list, runs
+from service.queries.cache import to_json
+from service.run_files.json_run import checked
+from service.schemas.clutch import ClutchEdit, ClutchIn, ClutchOut, ClutchPage
+from service.schemas.parameters import Archived, ClutchId
+from service.schemas.run import ChangePage
+from service.web.answers import JSON_TYPE, answer, clutch_answer, described_body, json_body, kept, now, tagged
+from service.web.auth import Ingester, Reader, name_of_caller
 from service.web.context import Context, Cursor, Limit
 from service.web.limits import USUAL_ITEMS
-from service.web.problems import READING, SENDING
+from service.web.polls import remember
+from service.web.problems import CHANGING, READING, SENDING
 from service.workflows import register_clutch as registration
+from service.workflows.edit_clutch import edit
 
 router = APIRouter(prefix="/v1/clutches", tags=["clutches"])
 
@@ -45,27 +54,64 @@ async def register_clutch(request: Request, context: Ingester) -> Response:
 
 
 def _register(context: Context, body: bytes) -> tuple[dict[str, object], bool]:
-    try:
-        clutch = ClutchIn.model_validate_json(body)
-    except pydantic.ValidationError as error:
-        raise invalid(error) from None
+    clutch = checked(ClutchIn, body)
     new = registration.register(context.database, clutch, created_at=now())
     return clutch_list.look_up(context.database, clutch.clutch_id), new
 
 
 @router.get("", response_model=ClutchPage, responses=READING)
-def list_clutches(request: Request, context: Reader, limit: Limit = USUAL_ITEMS, cursor: Cursor = None) -> Response:
+async def list_clutches(
+    request: Request, context: Reader, archived: Archived = False, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
+) -> Response:
     """All clutches with current health and remaining life, the fewest remaining cycles first."""
     after = from_cursor(cursor)
-    version = context.database.version()  # before the rows are read: what is committed meanwhile makes another
+
+    def key() -> Hashable:  # before the rows are read: what is committed meanwhile makes another
+        return "clutches", context.database.watch.version(), archived, limit, after
 
     def make() -> bytes:
-        return to_json(page(*clutch_list.page(context.database, limit=limit, after=after)))
+        return clutch_list.page_as_json(context.database, context.cache, limit=limit, after=after, archived=archived)
 
-    return tagged(request, context.cache.answer((version, limit, after), make), JSON_TYPE)
+    def again(request: Request) -> Response | None:
+        held = context.cache.held(key())
+        return None if held is None else tagged(request, held, JSON_TYPE)
+
+    held = await kept(context, key(), make)
+    remember(request, again)
+    return tagged(request, held, JSON_TYPE)
 
 
 @router.get("/{clutch_id}", response_model=ClutchOut, responses=READING)
-def read_clutch(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
+async def read_clutch(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
     """One clutch."""
-    return answer(request, clutch_list.look_up(context.database, clutch_id))
+    return await answer(request, lambda: clutch_list.look_up(context.database, clutch_id))
+
+
+@router.patch(
+    "/{clutch_id}",
+    response_model=ClutchOut,
+    responses=CHANGING,
+    openapi_extra=described_body(
+        ClutchEdit, {"reason": "the drawing says so", "geometry": {"inner_diameter_mm": 98, "outer_diameter_mm": 133}}
+    ),
+)
+async def edit_clutch(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
+    """Edit a clutch's record, each given field as a whole, and archive it or bring it back; results are computed anew."""
+    asked = checked(ClutchEdit, await json_body(request))
+    made = partial(edit, archived=asked.archived, reason=asked.reason, by=name_of_caller(request), at=now())
+    await asyncio.wrap_future(context.workers.submit(Lane.RUNS, made, clutch_id, asked.fields(), turn=clutch_id))
+    clutch = await run_in_threadpool(clutch_list.look_up, context.database, clutch_id)
+    return Response(content=to_json(clutch), media_type=JSON_TYPE)
+
+
+@router.get("/{clutch_id}/changes", response_model=ChangePage, responses=READING)
+async def list_changes(
+    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
+) -> Response:
+    """Who changed what of the clutch and its runs, when and why: the newest first."""
+    after = from_cursor(cursor)
+
+    def make() -> object:
+        return page(*runs.trail(context.database, clutch_id, limit=limit, after=after))
+
+    return await clutch_answer(request, context, clutch_id, "changes", make, limit, after)

@@ -1,31 +1,28 @@
 """Diagnoses: asked for, listed, looked up; and the model that a clutch is tracked under."""
 
 import asyncio
-import re
-from typing import Annotated, Any, TypeVar
+from typing import Annotated
 
-import pydantic
 from fastapi import APIRouter, Header, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
+from service.jobs.workers import Lane
+from service.lists import from_cursor, page
 from service.queries import diagnoses, model
-from service.run_files.json_run import invalid
-from service.schemas.base import Schema
+from service.queries.cache import to_json
+from service.run_files.json_run import checked
 from service.schemas.diagnosis import DiagnosisIn, DiagnosisOut, DiagnosisPage, ModelIn, ModelOut
 from service.schemas.parameters import ClutchId, DiagnosisId
-from service.web.answers import JSON_TYPE, answer, described_body, from_cursor, json_body, now, page, to_json
+from service.web.answers import JSON_TYPE, answer, described_body, json_body, now, preferred_wait
 from service.web.auth import Ingester, Reader
-from service.web.context import Context, Cursor, Limit
-from service.web.limits import LONGEST_WAIT_SECONDS, USUAL_ITEMS, WAIT_SECONDS
+from service.web.context import Cursor, Limit
+from service.web.limits import USUAL_ITEMS, WAIT_SECONDS
 from service.web.problems import READING, SENDING
 from service.workflows import adopt_model
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["diagnosis"])
 
-_WAIT = re.compile(r'(?:^|[,;\s])wait\s*=\s*"?(\d{1,9})"?\s*(?:$|[,;])', re.IGNORECASE)
-
-Body = TypeVar("Body", bound=Schema)
 Prefer = Annotated[
     str | None,
     Header(max_length=200, description=f"`wait=SECONDS`: how long to wait for the report; default {WAIT_SECONDS}"),
@@ -41,10 +38,10 @@ Prefer = Annotated[
 )
 async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchId, prefer: Prefer = None) -> Response:
     """Have all runs of the clutch's present life diagnosed. A question while the same runs are being diagnosed joins in."""
-    question = _read(DiagnosisIn, await json_body(request))
+    question = checked(DiagnosisIn, await json_body(request))
     job = await run_in_threadpool(context.diagnoses.ask, clutch_id, adopt=question.adopt)
-    preferred = _WAIT.search(prefer or "")
-    wait = WAIT_SECONDS if preferred is None else min(int(preferred[1]), LONGEST_WAIT_SECONDS)
+    preferred = preferred_wait(prefer)
+    wait = WAIT_SECONDS if preferred is None else preferred
     await asyncio.wait([asyncio.wrap_future(job.done)], timeout=wait)
     report = await run_in_threadpool(diagnoses.diagnosis, context.database, clutch_id, job.diagnosis.diagnosis_id)
     headers = {"Location": f"/v1/clutches/{clutch_id}/diagnoses/{job.diagnosis.diagnosis_id}"}
@@ -55,24 +52,24 @@ async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchI
 
 
 @router.get("/diagnoses", response_model=DiagnosisPage, responses=READING)
-def list_diagnoses(
+async def list_diagnoses(
     request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
 ) -> Response:
     """Diagnoses without their maps and loops, newest first."""
-    items, after = diagnoses.page(context.database, clutch_id, limit=limit, after=from_cursor(cursor))
-    return answer(request, page(items, after))
+    after = from_cursor(cursor)
+    return await answer(request, lambda: page(*diagnoses.page(context.database, clutch_id, limit=limit, after=after)))
 
 
 @router.get("/diagnoses/{diagnosis_id}", response_model=DiagnosisOut, responses=READING)
-def read_diagnosis(request: Request, context: Reader, clutch_id: ClutchId, diagnosis_id: DiagnosisId) -> Response:
+async def read_diagnosis(request: Request, context: Reader, clutch_id: ClutchId, diagnosis_id: DiagnosisId) -> Response:
     """One diagnosis with its maps and loops."""
-    return answer(request, diagnoses.diagnosis(context.database, clutch_id, diagnosis_id))
+    return await answer(request, lambda: diagnoses.diagnosis(context.database, clutch_id, diagnosis_id))
 
 
 @router.get("/model", response_model=ModelOut, responses=READING)
-def read_model(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
+async def read_model(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
     """The model that tracking and remaining life use, and all that were adopted."""
-    return answer(request, model.model(context.database, clutch_id))
+    return await answer(request, lambda: model.model(context.database, clutch_id))
 
 
 @router.put(
@@ -83,18 +80,10 @@ def read_model(request: Request, context: Reader, clutch_id: ClutchId) -> Respon
 )
 async def put_model(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
     """Adopt what a diagnosis found, or return to the baseline; all is tracked anew before this is answered."""
-    wanted = _read(ModelIn, await json_body(request))
-    answered = await run_in_threadpool(_adopt, context, clutch_id, wanted.diagnosis_id)
+    wanted = checked(ModelIn, await json_body(request))
+    adopting = context.workers.submit(
+        Lane.RUNS, adopt_model.adopt, clutch_id, wanted.diagnosis_id, now(), turn=clutch_id
+    )
+    await asyncio.wrap_future(adopting)
+    answered = await run_in_threadpool(model.model, context.database, clutch_id)
     return Response(content=to_json(answered), media_type=JSON_TYPE)
-
-
-def _adopt(context: Context, clutch_id: str, diagnosis_id: str | None) -> dict[str, Any]:
-    adopt_model.adopt(context.database, clutch_id, diagnosis_id, adopted_at=now())
-    return model.model(context.database, clutch_id)
-
-
-def _read(schema: type[Body], body: bytes) -> Body:
-    try:
-        return schema.model_validate_json(body)
-    except pydantic.ValidationError as error:
-        raise invalid(error) from None

@@ -6,13 +6,14 @@ from typing import Any
 from fastapi import APIRouter, Request
 from fastapi.responses import Response
 
+from service.lists import from_cursor
 from service.queries import degradation, fleet_priors, remaining_life, runs, scores, series, stribeck, surfaces
 from service.schemas.curves import LoopItem, SeriesItem
 from service.schemas.life import Method
-from service.schemas.parameters import ClutchId, Quantity
-from service.web.answers import clutch_table, from_cursor, page, table
+from service.schemas.parameters import ClutchId, Quantity, State
+from service.web.answers import Rows, clutch_table, computed_table, table
 from service.web.auth import Reader
-from service.web.context import AtCycles, Cursor, Limit, PressureBar
+from service.web.context import AtCycles, Cursor, Limit, Prefer, PressureBar
 from service.web.limits import MOST_ITEMS
 from service.web.problems import READING
 
@@ -25,128 +26,131 @@ def _items(payload: Mapping[str, Any]) -> Any:
 
 
 @router.get("/runs.csv", response_class=Response, responses=READING)
-def list_runs_csv(
-    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = MOST_ITEMS, cursor: Cursor = None
+async def list_runs_csv(
+    request: Request,
+    context: Reader,
+    clutch_id: ClutchId,
+    state: State = None,
+    limit: Limit = MOST_ITEMS,
+    cursor: Cursor = None,
 ) -> Response:
     """Receipts by cycles as CSV; warnings and fits are counted."""
     after = from_cursor(cursor)
 
-    def make() -> object:
-        return page(*runs.page(context.database, clutch_id, limit=limit, after=after))
+    def make() -> Rows:
+        items, _ = runs.page(context.database, clutch_id, limit=limit, after=after, state=state)
+        return runs.rows(items)
 
-    return clutch_table(
-        request,
-        context,
-        clutch_id,
-        "runs",
-        make,
-        lambda payload: runs.rows(_items(payload)),
-        runs.COLUMNS,
-        limit,
-        after,
-    )
+    return await clutch_table(request, context, clutch_id, "runs", make, runs.COLUMNS, state, limit, after)
+
+
+@router.get("/changes.csv", response_class=Response, responses=READING)
+async def list_changes_csv(
+    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = MOST_ITEMS, cursor: Cursor = None
+) -> Response:
+    """The audit trail as CSV, newest first; what changed is JSON."""
+    after = from_cursor(cursor)
+
+    def make() -> Rows:
+        items, _ = runs.trail(context.database, clutch_id, limit=limit, after=after)
+        return runs.trail_rows(items)
+
+    return await clutch_table(request, context, clutch_id, "changes", make, runs.TRAIL_COLUMNS, limit, after)
 
 
 @router.get("/remaining-useful-life.csv", response_class=Response, responses=READING)
-def remaining_useful_life_csv(
+async def remaining_useful_life_csv(
     request: Request,
     context: Reader,
     clutch_id: ClutchId,
     method: Method = "particle",
     pressure_bar: PressureBar = None,
     at_cycles: AtCycles = None,
+    prefer: Prefer = None,
 ) -> Response:
     """Quantiles of remaining and end-of-life cycles, a row each."""
 
-    def make() -> object:
-        return remaining_life.remaining_life(
-            context.database, clutch_id, method=method, pressure_bar=pressure_bar, at_cycles=at_cycles
-        )
-
-    return clutch_table(
-        request, context, clutch_id, "remaining-useful-life", make, remaining_life.rows, remaining_life.COLUMNS,
-        method, pressure_bar, at_cycles,
+    return await computed_table(
+        request, context, clutch_id, remaining_life.remaining_life, remaining_life.rows, remaining_life.COLUMNS,
+        method, pressure_bar, at_cycles, prefer=prefer,
     )  # fmt: skip
 
 
 @router.get("/degradation.csv", response_class=Response, responses=READING)
-def degradation_csv(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
+async def degradation_csv(request: Request, context: Reader, clutch_id: ClutchId, prefer: Prefer = None) -> Response:
     """Eq. 6's coefficients, a row a quantity and pressure."""
-
-    def make() -> object:
-        return degradation.degradation(context.database, clutch_id)
-
-    return clutch_table(request, context, clutch_id, "degradation", make, degradation.rows, degradation.COLUMNS)
+    return await computed_table(
+        request, context, clutch_id, degradation.degradation, degradation.rows, degradation.COLUMNS, prefer=prefer
+    )
 
 
 @router.get("/stribeck.csv", response_class=Response, responses=READING)
-def stribeck_csv(
-    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = MOST_ITEMS, cursor: Cursor = None
+async def stribeck_csv(
+    request: Request,
+    context: Reader,
+    clutch_id: ClutchId,
+    limit: Limit = MOST_ITEMS,
+    cursor: Cursor = None,
+    prefer: Prefer = None,
 ) -> Response:
     """The fits, a row a test and pressure."""
-    after = from_cursor(cursor)
-
-    def make() -> object:
-        return page(*stribeck.page(context.database, clutch_id, limit=limit, after=after))
-
-    return clutch_table(
-        request, context, clutch_id, "stribeck", make, lambda payload: stribeck.rows(_items(payload)),
-        ("run_id", "cycles"), limit, after,
+    return await computed_table(
+        request, context, clutch_id, stribeck.curves, lambda payload: stribeck.rows(_items(payload)),
+        ("run_id", "cycles"), limit, from_cursor(cursor), prefer=prefer,
     )  # fmt: skip
 
 
 @router.get("/surfaces.csv", response_class=Response, responses=READING)
-def surfaces_csv(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
+async def surfaces_csv(request: Request, context: Reader, clutch_id: ClutchId, prefer: Prefer = None) -> Response:
     """The surfaces, a row a count of cycles, a pressure and a speed."""
-
-    def make() -> object:
-        return surfaces.surface(context.database, clutch_id)
-
-    return clutch_table(request, context, clutch_id, "surfaces", make, surfaces.rows, ("cycles", "pressure_bar"))
+    return await computed_table(
+        request, context, clutch_id, surfaces.surface, surfaces.rows, ("cycles", "pressure_bar"), prefer=prefer
+    )
 
 
 @router.get("/scores.csv", response_class=Response, responses=READING)
-def clutch_scores_csv(request: Request, context: Reader, clutch_id: ClutchId, method: Method = "particle") -> Response:
+async def clutch_scores_csv(
+    request: Request, context: Reader, clutch_id: ClutchId, method: Method = "particle", prefer: Prefer = None
+) -> Response:
     """The scored predictions, a row each."""
-
-    def make() -> object:
-        return scores.of_clutch(context.database, clutch_id, method=method)
-
-    return clutch_table(
-        request, context, clutch_id, "scores", make, lambda payload: scores.rows(_items(payload)),
-        ("end_of_life_cycles", "cycles"), method,
+    return await computed_table(
+        request, context, clutch_id, scores.of_clutch, lambda payload: scores.rows(_items(payload)),
+        ("end_of_life_cycles", "cycles"), method, prefer=prefer,
     )  # fmt: skip
 
 
 @router.get("/loops.csv", response_class=Response, responses=READING)
-def loops_csv(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
+async def loops_csv(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
     """Friction loops, a row each."""
 
-    def make() -> object:
-        return page(runs.loops(context.database, clutch_id), None)
+    def make() -> Rows:
+        return runs.loops(context.database, clutch_id)
 
-    return clutch_table(request, context, clutch_id, "loops", make, _items, tuple(LoopItem.model_fields))
+    return await clutch_table(request, context, clutch_id, "loops", make, tuple(LoopItem.model_fields))
 
 
 @router.get("/series.csv", response_class=Response, responses=READING)
-def series_csv(request: Request, context: Reader, clutch_id: ClutchId, quantity: Quantity = None) -> Response:
+async def series_csv(request: Request, context: Reader, clutch_id: ClutchId, quantity: Quantity = None) -> Response:
     """The flat rows as CSV."""
 
-    def make() -> object:
-        return page(series.series(context.database, clutch_id, quantity), None)
+    def make() -> Rows:
+        return series.series(context.database, clutch_id, quantity)
 
-    return clutch_table(request, context, clutch_id, "series", make, _items, tuple(SeriesItem.model_fields), quantity)
+    return await clutch_table(request, context, clutch_id, "series", make, tuple(SeriesItem.model_fields), quantity)
 
 
 @fleet_router.get("/scores.csv", response_class=Response, responses=READING)
-def fleet_scores_csv(request: Request, context: Reader, method: Method = "particle") -> Response:
+async def fleet_scores_csv(request: Request, context: Reader, method: Method = "particle") -> Response:
     """How right the predictions of all were, a row a stage of life, the last one all of them."""
-    payload = scores.of_fleet(context.database, context.cache, method=method)
-    stages = [*payload["stages"], {"share_of_life": None} | payload["overall"]]
-    return table(request, tuple(stages[0]), stages)
+
+    def make() -> Rows:
+        payload = scores.of_fleet(context.database, context.cache, method=method)
+        return [*payload["stages"], {"share_of_life": None} | payload["overall"]]
+
+    return await table(request, ("share_of_life",), make)
 
 
 @fleet_router.get("/priors.csv", response_class=Response, responses=READING)
-def priors_csv(request: Request, context: Reader) -> Response:
+async def priors_csv(request: Request, context: Reader) -> Response:
     """The fleet's priors, a row each."""
-    return table(request, fleet_priors.COLUMNS, fleet_priors.rows(fleet_priors.newest(context.database)))
+    return await table(request, fleet_priors.COLUMNS, lambda: fleet_priors.rows(fleet_priors.newest(context.database)))

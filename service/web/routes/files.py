@@ -1,16 +1,17 @@
 """Runs as files: the body itself, or a form with a `file` part; kept on disk while they are read, never in memory whole."""
 
+import asyncio
 import tempfile
-from datetime import datetime
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from fastapi import APIRouter, Request
-from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 from starlette.datastructures import UploadFile
 
 from service.errors import InvalidError
+from service.jobs.workers import Lane
+from service.queries.cache import to_json
 from service.run_files.upload import read_file_run
 from service.schemas.base import Origin
 from service.schemas.parameters import (
@@ -23,11 +24,10 @@ from service.schemas.parameters import (
     FileStartedAt,
 )
 from service.schemas.run import Receipt
-from service.web.answers import JSON_TYPE, now, to_json
-from service.web.auth import Ingester
-from service.web.context import Context
+from service.web.answers import JSON_TYPE, now
+from service.web.auth import Ingester, name_of_caller
 from service.web.problems import SENDING
-from service.workflows.ingest_run import ingest
+from service.workflows.ingest_run import ingest_posted
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}/runs", tags=["runs"])
 
@@ -63,8 +63,20 @@ async def post_run_file(
     with tempfile.TemporaryDirectory(prefix="clutchlife-") as folder:
         path = Path(folder) / "run"
         filename = await _save(request, path, filename)
-        parameters = {"kind": kind, "cycles": cycles, "mapping": map, "run_id": run_id, "origin": origin}
-        receipt, new = await run_in_threadpool(_ingest, context, clutch_id, path, filename, started_at, parameters)
+        read = partial(
+            read_file_run,
+            path,
+            filename=filename,
+            kind=kind,
+            cycles=cycles,
+            mapping=map,
+            run_id=run_id,
+            started_at=started_at,
+            origin=origin,
+        )
+        by = name_of_caller(request)
+        taken_in = context.workers.submit(Lane.FILES, ingest_posted, clutch_id, read, now(), by, turn=clutch_id)
+        receipt, new = await asyncio.wrap_future(taken_in)
     headers = {"Location": f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"}
     return Response(content=to_json(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
 
@@ -84,15 +96,3 @@ async def _save(request: Request, path: Path, filename: str) -> str:
             while chunk := await sent.read(_CHUNK):
                 file.write(chunk)
         return sent.filename or filename
-
-
-def _ingest(
-    context: Context, clutch_id: str, path: Path, filename: str, started_at: datetime | None, parameters: dict[str, Any]
-) -> tuple[dict[str, Any], bool]:
-    # The run is named by none here, so that its columns can go when they are encoded.
-    return ingest(
-        context.database,
-        clutch_id,
-        read_file_run(path, filename=filename, started_at=started_at, **parameters),
-        received_at=now(),
-    )

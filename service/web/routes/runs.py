@@ -1,33 +1,40 @@
-"""Runs: post, list, look up."""
+"""Runs: post, list, look up, and what is changed of them afterwards."""
 
+import asyncio
+import tempfile
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
+from service.errors import NotAcceptableError, NotFoundError
+from service.jobs.workers import Lane
+from service.lists import from_cursor, page
 from service.queries import runs
-from service.run_files.json_run import read_run
-from service.schemas.parameters import ClutchId, RunId
-from service.schemas.run import RUN_IN, Receipt, RunOut, RunPage
-from service.web.answers import (
-    JSON_TYPE,
-    answer,
-    clutch_answer,
-    described_body,
-    from_cursor,
-    json_body,
-    now,
-    page,
-    to_json,
-)
-from service.web.auth import Ingester, Reader
+from service.queries.cache import to_json
+from service.queries.raw_run.answer import Kind, entity_tag, write_run
+from service.run_files.json_run import checked, read_run
+from service.schemas.parameters import ClutchId, Points, RunId, State
+from service.schemas.run import RUN_IN, Confirmation, Correction, Receipt, RunOut, RunPage, Withdrawal
+from service.web.answers import JSON_TYPE, clutch_answer, described_body, json_body, now, unchanged
+from service.web.auth import Ingester, Reader, name_of_caller
 from service.web.context import Context, Cursor, Limit
-from service.web.limits import USUAL_ITEMS
-from service.web.problems import READING, SENDING
-from service.workflows.ingest_run import ingest
+from service.web.files import PARQUET_TYPE, preferred, streamed
+from service.web.limits import LARGE_BODY_BYTES, USUAL_ITEMS
+from service.web.problems import CHANGING, READING, SENDING, described
+from service.workflows import change_run
+from service.workflows.ingest_run import ingest_posted
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}/runs", tags=["runs"])
+
+_PARQUET = {"schema": {"type": "string", "format": "binary"}}
+READING_RUN = described(NotFoundError, NotAcceptableError) | {
+    200: {"model": RunOut, "content": {PARQUET_TYPE: _PARQUET}, "description": "The run; all samples as Parquet"}
+}
 
 EXAMPLE = {
     "run_id": "2026-11-02-stationary-7000",
@@ -53,29 +60,116 @@ EXAMPLE = {
 async def post_run(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
     """Post a run, in any order of cycles. The receipt says what was made of it; by then it is stored for good."""
     body = await json_body(request)
-    receipt, new = await run_in_threadpool(_ingest, context, clutch_id, body)
+    by = name_of_caller(request)
+    lane = Lane.RUNS if len(body) <= LARGE_BODY_BYTES else Lane.FILES
+    taken_in = context.workers.submit(
+        lane, ingest_posted, clutch_id, partial(read_run, body), now(), by, turn=clutch_id
+    )
+    receipt, new = await asyncio.wrap_future(taken_in)
     headers = {"Location": f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"}
     return Response(content=to_json(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
 
 
-def _ingest(context: Context, clutch_id: str, body: bytes) -> tuple[dict[str, Any], bool]:
-    return ingest(context.database, clutch_id, read_run(body), received_at=now())
-
-
 @router.get("", response_model=RunPage, responses=READING)
-def list_runs(
-    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
+async def list_runs(
+    request: Request,
+    context: Reader,
+    clutch_id: ClutchId,
+    state: State = None,
+    limit: Limit = USUAL_ITEMS,
+    cursor: Cursor = None,
 ) -> Response:
     """Receipts by cycles."""
     after = from_cursor(cursor)
 
     def make() -> object:
-        return page(*runs.page(context.database, clutch_id, limit=limit, after=after))
+        return page(*runs.page(context.database, clutch_id, limit=limit, after=after, state=state))
 
-    return clutch_answer(request, context, clutch_id, "runs", make, limit, after)
+    return await clutch_answer(request, context, clutch_id, "runs", make, state, limit, after)
 
 
-@router.get("/{run_id}", response_model=RunOut, responses=READING)
-def read_run_with_channels(request: Request, context: Reader, clutch_id: ClutchId, run_id: RunId) -> Response:
-    """One receipt with the run's channels as they were sent."""
-    return answer(request, runs.one_run(context.database, clutch_id, run_id))
+@router.get("/{run_id}", response_model=RunOut, responses=READING_RUN)
+async def read_run_with_channels(
+    request: Request, context: Reader, clutch_id: ClutchId, run_id: RunId, points: Points = None
+) -> Response:
+    """One receipt with the run's channels: as they were sent or thinned for a plot, as Parquet where `Accept` prefers it."""
+    media_type = preferred(request, (JSON_TYPE, PARQUET_TYPE))
+    kind: Kind = "parquet" if media_type == PARQUET_TYPE else "json"
+    packed = kind == "json" and points is not None and "gzip" in request.headers.get("accept-encoding", "")
+    headers = {"Cache-Control": "no-cache", "Vary": "Accept, Accept-Encoding"}
+    headers |= {"Content-Encoding": "gzip"} if packed else {}
+    headers["ETag"] = await run_in_threadpool(
+        entity_tag, context.database, clutch_id, run_id, points=points, kind=kind, compressed=packed
+    )
+    if held := unchanged(request, headers):
+        return held
+    with tempfile.TemporaryDirectory(prefix="clutchlife-") as folder:
+        path = Path(folder) / "body"
+        write = partial(write_run, points=points, kind=kind, path=path, compressed=packed)
+        headers["ETag"] = await asyncio.wrap_future(context.workers.submit(Lane.FILES, write, clutch_id, run_id))
+        body = path.open("rb")  # its name goes with the folder, its content when it is closed
+    return streamed(body, media_type, headers)
+
+
+@router.patch(
+    "/{run_id}",
+    response_model=Receipt,
+    responses=CHANGING,
+    openapi_extra=described_body(Correction, {"cycles": 7000, "reason": "typed a zero too many"}),
+)
+async def correct_run(request: Request, context: Ingester, clutch_id: ClutchId, run_id: RunId) -> Response:
+    """Correct a run's cycles; it counts where it is plausible there. What was sent stays stored."""
+    asked = checked(Correction, await json_body(request))
+    return await _changed(
+        change_run.correct, request, context, clutch_id, run_id, cycles=asked.cycles, reason=asked.reason
+    )
+
+
+@router.post(
+    "/{run_id}/withdraw",
+    response_model=Receipt,
+    responses=CHANGING,
+    openapi_extra=described_body(Withdrawal, {"reason": "the torque sensor was unplugged"}),
+)
+async def withdraw_run(request: Request, context: Ingester, clutch_id: ClutchId, run_id: RunId) -> Response:
+    """Take a run out of the clutch's history. It stays stored and listed."""
+    asked = checked(Withdrawal, await json_body(request))
+    return await _changed(change_run.withdraw, request, context, clutch_id, run_id, reason=asked.reason)
+
+
+@router.post(
+    "/{run_id}/restore",
+    response_model=Receipt,
+    responses=CHANGING,
+    openapi_extra=described_body(Withdrawal, {"reason": "it was the other sensor"}),
+)
+async def restore_run(request: Request, context: Ingester, clutch_id: ClutchId, run_id: RunId) -> Response:
+    """Take a withdrawal back: the run is accepted or held as it was before."""
+    asked = checked(Withdrawal, await json_body(request))
+    return await _changed(change_run.restore, request, context, clutch_id, run_id, reason=asked.reason)
+
+
+@router.post(
+    "/{run_id}/confirm",
+    response_model=Receipt,
+    responses=CHANGING,
+    openapi_extra=described_body(Confirmation, {"reason": "the clutch was run over the weekend"}),
+)
+async def confirm_run(request: Request, context: Ingester, clutch_id: ClutchId, run_id: RunId) -> Response:
+    """Accept a held run as it was sent."""
+    asked = checked(Confirmation, await json_body(request))
+    return await _changed(change_run.confirm, request, context, clutch_id, run_id, reason=asked.reason)
+
+
+async def _changed(
+    change: Callable[..., dict[str, Any]],
+    request: Request,
+    context: Context,
+    clutch_id: str,
+    run_id: str,
+    **asked: Any,
+) -> Response:
+    """The receipt after a change."""
+    made = partial(change, **asked, by=name_of_caller(request), at=now())
+    changing = context.workers.submit(Lane.RUNS, made, clutch_id, run_id, turn=clutch_id)
+    return Response(content=to_json(await asyncio.wrap_future(changing)), media_type=JSON_TYPE)

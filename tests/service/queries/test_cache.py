@@ -6,8 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from service.queries.cache import AnswerCache
-from service.web.answers import to_json
+from service.queries.cache import AnswerCache, to_json
 from service.web.limits import MOST_CACHED_BYTES
 
 
@@ -19,7 +18,7 @@ def made(cache: AnswerCache, name: str, body: bytes) -> bool:
         calls.append(name)
         return body
 
-    assert cache.answer(name, make) == body
+    assert cache.answer(name, make).body == body
     return bool(calls)
 
 
@@ -53,9 +52,9 @@ def test_of_several_that_ask_at_once_one_computes() -> None:
         first = pool.submit(cache.answer, "a", make)
         assert started.wait(30)
         others = [pool.submit(cache.answer, "a", make) for _ in range(3)]
-        assert cache.answer("b", lambda: b"not held up") == b"not held up"
+        assert cache.answer("b", lambda: b"not held up").body == b"not held up"
         release.set()
-        assert {answer.result(30) for answer in (first, *others)} == {b"once"}
+        assert {answer.result(30).body for answer in (first, *others)} == {b"once"}
     assert len(calls) == 1
 
 
@@ -69,7 +68,7 @@ def test_what_fails_fails_for_all_and_is_tried_again() -> None:
     for make in attempts:
         with pytest.raises(LookupError, match="not there"):
             cache.answer("a", make)
-    assert cache.answer("a", lambda: b"there") == b"there"
+    assert cache.answer("a", lambda: b"there").body == b"there"
 
 
 def test_no_number_leaves_that_json_cannot_carry() -> None:

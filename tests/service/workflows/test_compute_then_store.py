@@ -3,8 +3,7 @@
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +14,9 @@ from models.diagnosis.extension import Extension
 from service.lives import model_correction, recomputation, run_analysis, tracks
 from service.lives.incoming_run import name_run
 from service.queries import degradation
+from service.queries.cache import to_json
 from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
-from service.web.answers import to_json
 from service.workflows import adopt_model, ingest_run, learn_fleet, register_clutch
 from service.workflows.adopt_model import adopt, finish_and_adopt
 from service.workflows.ingest_run import ingest
@@ -25,7 +24,7 @@ from service.workflows.replay import replay_clutch
 from storage import assumptions, clutches, diagnoses, results, runs
 from storage.diagnoses import NewDiagnosis
 from storage.engine.database import Database, open_database
-from storage.engine.errors import DamagedData, DatabaseBusy
+from storage.engine.errors import DamagedData
 from storage.engine.transactions import Transactions
 from tests.service.workflows import stand_in_engine
 from tests.support import stationary
@@ -171,27 +170,6 @@ def test_a_run_that_comes_while_another_is_computed_counts_for_it(
     calm.close()
 
 
-def test_threads_that_post_to_one_clutch_take_turns(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
-    computed, inside, most = ingest_run._computed, [], []
-
-    def counted(*arguments: Any) -> Any:
-        inside.append(1)
-        most.append(len(inside))
-        try:
-            return computed(*arguments)
-        finally:
-            inside.pop()
-
-    monkeypatch.setattr(ingest_run, "_computed", counted)
-    posts = [threading.Thread(target=post, args=(database, cycles)) for cycles in CYCLES]
-    for thread in posts:
-        thread.start()
-    for thread in posts:
-        thread.join(120)
-    assert most == [1] * len(CYCLES)  # nobody computed beside another, and nobody twice
-    assert [receipt["cycles"] for receipt in stored(database)[0]] == list(CYCLES)
-
-
 def test_the_same_run_of_two_threads_is_stored_once(database: Database) -> None:
     answers: list[bool] = []
 
@@ -234,9 +212,7 @@ def test_an_adoption_that_is_asked_for_twice_at_once_makes_one_version(
 
     def overtaken(*arguments: Any) -> Any:
         monkeypatch.setattr(adopt_model, "_computed", computed)
-        with monkeypatch.context() as other:
-            other.setattr(Transactions, "turn", lambda *_, **__: nullcontext())
-            adopt(database, "c1", "d1", adopted_at=AT)
+        adopt(database, "c1", "d1", adopted_at=AT)
         return computed(*arguments)
 
     post(database, 0.0)
@@ -248,15 +224,6 @@ def test_an_adoption_that_is_asked_for_twice_at_once_makes_one_version(
         assert row is not None
         assert row.version == 1
         assert clutches.revision(connection, "c1") == 2
-
-
-@pytest.mark.usefixtures("database")
-def test_a_turn_that_does_not_come_in_time_is_refused(url: str) -> None:
-    impatient = open_database(url, lock_timeout=0.05)
-    with impatient.turn("c1"), ThreadPoolExecutor(1) as beside, pytest.raises(DatabaseBusy, match="c1"):
-        beside.submit(post, impatient, 0.0).result(60)
-    assert post(impatient, 0.0)["run_id"] == "r0"
-    impatient.close()
 
 
 def test_only_a_run_that_carries_on_damaged_filters_is_stopped_by_them(database: Database) -> None:
@@ -271,29 +238,3 @@ def test_only_a_run_that_carries_on_damaged_filters_is_stopped_by_them(database:
     assert replay_clutch(database, "c1") == 2
     assert stored(database) == before
     assert post(database, 2000.0)["run_id"] == "r2000"
-
-
-def test_a_repeat_that_waited_for_its_turn_is_not_computed(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A client that gave up waiting sends the run again while the first one is computed."""
-    computed, calls = ingest_run._computed, []
-
-    def counted(*arguments: Any) -> Any:
-        calls.append(1)
-        repeats.append(beside.submit(post, database, 0.0))
-        assert analysed_again.wait(60), "the repeat did not arrive"
-        return computed(*arguments)
-
-    analysed_again, repeats, analyse = threading.Event(), [], ingest_run.analyse
-
-    def noticed(*arguments: Any) -> Any:
-        analysis = analyse(*arguments)
-        if calls:
-            analysed_again.set()
-        return analysis
-
-    monkeypatch.setattr(ingest_run, "_computed", counted)
-    monkeypatch.setattr(ingest_run, "analyse", noticed)
-    with ThreadPoolExecutor(1) as beside:
-        first = post(database, 0.0)
-        assert repeats[0].result(60) == first | {"duplicate": True}
-    assert calls == [1]

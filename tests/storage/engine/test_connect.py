@@ -7,24 +7,8 @@ from pathlib import Path
 import pytest
 
 from storage import clutches
-from storage.engine.connect import preferred_journal_mode
 from storage.engine.database import Database, open_database
 from tests.storage.samples import clutch_row
-
-
-@pytest.mark.parametrize(
-    ("version", "mode"),
-    [
-        ((3, 40, 1), "delete"),
-        ((3, 51, 2), "delete"),
-        ((3, 51, 3), "wal"),
-        ((3, 51, 10), "wal"),
-        ((3, 52, 0), "wal"),
-        ((4, 0, 0), "wal"),
-    ],
-)
-def test_journal_mode_of_a_release(version: tuple[int, ...], mode: str) -> None:
-    assert preferred_journal_mode(version) == mode
 
 
 def journal_mode_of_file(path: Path) -> str:
@@ -44,7 +28,7 @@ def test_a_file_of_another_sqlite_is_turned_and_keeps_its_rows(
 ) -> None:
     url = f"sqlite:///{tmp_path}/a.db"
     with monkeypatch.context() as patch:
-        patch.setattr("storage.engine.connect.preferred_journal_mode", lambda _: earlier)
+        patch.setattr("storage.engine.connect.JOURNAL_MODE", earlier)
         with closing(open_database(url)) as database, database.writing() as connection:
             clutches.insert(connection, clutch_row())
     assert journal_mode_of_file(tmp_path / "a.db") == earlier

@@ -23,7 +23,7 @@ import storage.engine.database
 from storage import channels, clutches, runs
 from tests.storage.samples import columns, new_run
 path, mode, moment, length = sys.argv[1], sys.argv[2], sys.argv[3], int(sys.argv[4])
-storage.engine.connect.preferred_journal_mode = lambda _: mode
+storage.engine.connect.JOURNAL_MODE = mode
 database = storage.engine.database.open_database(f"sqlite:///{path}")
 def reached(name):
     if name == moment:
@@ -50,7 +50,7 @@ import storage.engine.connect
 import storage.engine.database
 from tests.storage.samples import store_run
 path, mode = sys.argv[1], sys.argv[2]
-storage.engine.connect.preferred_journal_mode = lambda _: mode
+storage.engine.connect.JOURNAL_MODE = mode
 database = storage.engine.database.open_database(f"sqlite:///{path}")
 for number in range(1, 100_000):
     with database.writing() as connection:

@@ -24,7 +24,7 @@ import storage.engine.connect
 import storage.engine.database
 from tests.storage.samples import store_run
 path, mode, first, number = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4])
-storage.engine.connect.preferred_journal_mode = lambda _: mode
+storage.engine.connect.JOURNAL_MODE = mode
 database = storage.engine.database.open_database(f"sqlite:///{path}")
 print("open", flush=True)
 sys.stdin.readline()
@@ -188,21 +188,21 @@ def test_two_processes_lose_nothing(tmp_path: Path, journal_mode: str) -> None:
 
 
 def test_the_version_changes_with_every_commit_and_with_nothing_else(database: Database) -> None:
-    numbers = [database.version(), database.version()]
+    numbers = [database.watch.version(), database.watch.version()]
     with database.writing() as connection:
         connection.exec_driver_sql("CREATE TABLE extra (x)")
-        numbers.append(database.version())  # not committed yet
+        numbers.append(database.watch.version())  # not committed yet
     assert len(set(numbers)) == 1
-    numbers.append(database.version())
+    numbers.append(database.watch.version())
     with contextlib.suppress(RuntimeError), database.writing() as connection:
         connection.exec_driver_sql("INSERT INTO extra VALUES (1)")
         raise RuntimeError
-    assert database.version() == numbers[-1] != numbers[0]
+    assert database.watch.version() == numbers[-1] != numbers[0]
     with database.reading() as connection:
         connection.exec_driver_sql("SELECT * FROM extra").fetchall()
-    assert database.version() == numbers[-1]
+    assert database.watch.version() == numbers[-1]
     other = open_database(f"sqlite:///{database.path}")
     with other.writing() as connection:
         connection.exec_driver_sql("INSERT INTO extra VALUES (2)")
-    assert database.version() not in numbers
+    assert database.watch.version() not in numbers
     other.close()

@@ -2,6 +2,7 @@
 
 import sqlite3
 from contextlib import ExitStack, closing
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -9,8 +10,10 @@ from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
+from sqlalchemy import Connection, insert
 
-from storage import clutches, diagnoses, runs
+from storage import clutches, diagnoses, runs, tables
+from storage.encoding.json_text import to_text
 from storage.engine.database import Database, open_database
 from storage.engine.errors import DatabaseTooNew, StorageUnavailable
 from storage.migrations import upgrade as migrations
@@ -23,7 +26,7 @@ STARTER = """
 import sys
 import storage.engine.connect
 import storage.engine.database
-storage.engine.connect.preferred_journal_mode = lambda _: sys.argv[1]
+storage.engine.connect.JOURNAL_MODE = sys.argv[1]
 print("loaded", flush=True)
 for line in sys.stdin:
     database = storage.engine.database.open_database(f"sqlite:///{line.strip()}")
@@ -68,13 +71,26 @@ def test_a_second_start_changes_nothing(database: Database) -> None:
     assert database.path.read_bytes() == before
 
 
+def insert_as_before(connection: Connection) -> None:
+    """A clutch and a run as the first release stored them, in the columns that it had."""
+    row = {field.name: getattr(clutch_row(), field.name) for field in fields(clutch_row())}
+    for name in ("archived", "registered"):
+        del row[name]
+    row |= {name: to_text(row[name]) for name in ("record", "summary")}
+    connection.execute(insert(tables.clutch), row)
+    sent = {field.name: getattr(new_run(1), field.name) for field in fields(new_run(1))}
+    for name in ("state", "sent_cycles", "doubts"):
+        del sent[name]
+    sent |= {name: to_text(sent[name]) for name in ("details", "receipt")}
+    connection.execute(insert(tables.run), sent)
+
+
 def test_an_older_file_is_brought_up_and_keeps_what_it_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "old.db"
     whole = command.upgrade
     monkeypatch.setattr(command, "upgrade", lambda config, _: whole(config, "s0001_first_tables"))
     with closing(open_database(f"sqlite:///{path}")) as old, old.writing() as connection:
-        clutches.insert(connection, clutch_row())
-        runs.insert(connection, new_run(1))
+        insert_as_before(connection)
     monkeypatch.undo()
     with closing(sqlite3.connect(path)) as connection:
         names = {row[0] for row in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
@@ -83,7 +99,9 @@ def test_an_older_file_is_brought_up_and_keeps_what_it_holds(tmp_path: Path, mon
     with closing(open_database(f"sqlite:///{path}")) as new, new.writing() as connection:
         assert migrations.current(connection) == migrations.head()
         assert clutches.get(connection, CLUTCH) == clutch_row()
-        assert [row.run_id for row in runs.page(connection, CLUTCH)] == ["run-0001"]
+        (row,) = runs.page(connection, CLUTCH)
+        assert (row.run_id, row.state, row.sent_cycles, row.doubts) == ("run-0001", "accepted", None, ())
+        assert [row.run_id for row in runs.in_order(connection, CLUTCH)] == ["run-0001"]
         diagnoses.insert(connection, new_diagnosis(0))
         assert diagnoses.running(connection, CLUTCH, 1) == "d0"
     assert integrity(path) == ["ok"]
@@ -97,7 +115,7 @@ def test_a_report_of_an_earlier_release_reads_with_the_new_key(tmp_path: Path, m
     former = "foretelling_log_score_gain"
     notes = [f'the key "{former}": of an earlier release']
     with closing(open_database(f"sqlite:///{path}")) as old, old.writing() as connection:
-        clutches.insert(connection, clutch_row())
+        insert_as_before(connection)
         for number in range(3):
             diagnoses.insert(connection, new_diagnosis(number))
         diagnoses.finish(connection, "d0", "later", {"gain": {"log_score_gain": 2.5, former: 1.25}, "notes": notes}, {})

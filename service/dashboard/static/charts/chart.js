@@ -1,13 +1,13 @@
 // @ts-check
 // The charts: answers of the API go in, figures with a title, a table, a PNG and a CSV come out. Open this file first (one
-// chart; until the plotting library is loaded, and where it does not load, its drawing is a light one), then life.js: like
-// fan.js, loops.js, parameters.js and stribeck.js it says what its charts show; the other files say how a chart is drawn.
+// chart; until someone points at it, and where the plotting library does not load, its drawing is a light one), then life.js:
+// like fan.js, loops.js, parameters.js and stribeck.js it says what its charts show; the others say how a chart is drawn.
 
 import { h, save, saveText, scrolling, symbol, table } from "../shared/dom.js";
 import { settled } from "./frame.js";
 import { base, config } from "./layout.js";
 import { colours } from "./palette.js";
-import { has3d, painted, plotly } from "./plotting.js";
+import { has3d, painted, plotly, want, wanted } from "./plotting.js";
 import { sketch } from "./sketch.js";
 
 /** @import { Content } from "../shared/dom.js" */
@@ -36,6 +36,11 @@ const visibility = new IntersectionObserver(
   },
   { rootMargin: "400px" },
 );
+const resizing = new ResizeObserver((entries) => {
+  for (const { target } of entries) charts.get(target)?.resized();
+});
+/** @param {PointerEvent} event of a finger, it may be about to scroll: a tap is a click */
+const pointed = (event) => event.pointerType !== "touch" && want();
 
 export class Chart {
   /** @param {Options} options */
@@ -53,7 +58,8 @@ export class Chart {
     this.note = h("p", { class: "note" });
     this.controls = h("div", { class: "controls" });
     const style = { "min-height": `${height}px` };
-    this.plot = h("div", { class: "plot", role: "img", "aria-label": title, style });
+    const watched = { onpointerenter: pointed, onclick: want };
+    this.plot = h("div", { class: "plot", role: "img", "aria-label": title, style, ...watched });
     this.table = scrolling(`${title}: table`);
     this.details = h("details", { ontoggle: () => this.fill() }, h("summary", {}, "Table"), this.table);
     this.tools = h(
@@ -71,8 +77,9 @@ export class Chart {
       this.plot,
       this.details,
     );
-    charts.set(this.element, this);
+    for (const element of [this.element, this.plot]) charts.set(element, this);
     visibility.observe(this.element);
+    resizing.observe(this.plot);
     document.addEventListener("themechange", () => this.redraw());
   }
 
@@ -117,6 +124,8 @@ export class Chart {
     this.turn += 1;
     const { turn } = this;
     if (!this.element.dataset.drawn) this.sketch();
+    if (this.element.dataset.sketched) await wanted;
+    if (turn !== this.turn) return;
     let library;
     try {
       library = await plotly();
@@ -155,6 +164,11 @@ export class Chart {
     this.plot.append(sketch(figure, { width: this.plot.clientWidth, height: this.height }));
     this.element.dataset.sketched = "yes";
     painted().then(() => performance.mark(`sketched ${this.id}`));
+  }
+
+  /** The light drawing is of one width; the library follows by itself. */
+  resized() {
+    if (this.element.dataset.sketched && !this.element.dataset.drawn && this.plot.clientWidth > 0) this.sketch();
   }
 
   clear() {

@@ -1,14 +1,27 @@
 // @ts-check
-// The plotting library, loaded once, where a chart is drawn and after what can be drawn without it: running its megabytes
-// keeps the page busy for a second.
+// The plotting library, loaded once, where a chart cannot be drawn without it or someone points at one that can: it is as
+// large as all else that a page loads, ten times over, and running it keeps the page busy for a second.
 
 /** @import { Plotting } from "./types.js" */
 
 /** @type {Promise<Plotting> | null} */
 let loading = null;
 
+let ask = () => {};
+/**
+ * When something has needed the library.
+ * @type {Promise<void>}
+ */
+export const wanted = new Promise((resolve) => {
+  ask = resolve;
+});
+
+/** Draw by the library from now on what is drawn light: someone points at it, to zoom or to read values. */
+export const want = () => ask();
+
 /** Plotly, when its script has run; it is a file of this service. */
 export function plotly() {
+  want();
   loading ??= painted().then(script);
   return loading;
 }

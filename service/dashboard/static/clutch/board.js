@@ -7,12 +7,12 @@ import { meanCof, remainingCycles } from "../charts/life.js";
 import { loopAreas, loopCurves, loopPressures } from "../charts/loops.js";
 import { landscape, parameter, PARAMETER_NAMES, PARAMETERS } from "../charts/parameters.js";
 import { flat, pressuresOf, spread, surface } from "../charts/stribeck.js";
-import { clutchPath, read } from "../shared/api.js";
+import { readDrawn } from "../shared/api.js";
 import { fixed } from "../shared/format.js";
 
 /** @import { Prediction } from "../charts/fan.js" */
 /** @import { ParameterName } from "../charts/parameters.js" */
-/** @import { Channels, ClutchOut, DegradationItem, LoopItem, Receipt, RemainingLife, RunOut, StribeckItem } from "../shared/types.js" */
+/** @import { Channels, ClutchOut, DegradationItem, LoopItem, Receipt, RemainingLife, StribeckItem } from "../shared/types.js" */
 
 /**
  * @typedef {object} Answers what the page has read of the clutch
@@ -110,26 +110,24 @@ export class Board {
   }
 
   /**
-   * The raw channels of the tests that are drawn; a run never changes, so each is read once.
+   * The channels of the tests that are drawn; a run's samples never change, so each is read once.
    * @param {Answers} answers
    */
   async readChannels({ tests, loops }) {
     const dynamic = [...new Set(loops.map((loop) => loop.run_id))];
     const stationary = tests.map((test) => test.run_id);
-    const drawn = [...spread(stationary, MOST_ON_SURFACE), ...spread(stationary), ...spread(dynamic)];
+    const spatial = this.chosen.over === "cycles" ? spread(stationary, MOST_ON_SURFACE) : [];
     const picked = [this.chosen.run, this.chosen.loopRun].filter(
       (id) => stationary.includes(id ?? "") || dynamic.includes(id ?? ""),
     );
-    const ids = new Set([...drawn, ...picked]);
+    const ids = new Set([...spread(stationary), ...spread(dynamic), ...spatial, ...picked]);
     await Promise.all([...ids].map((id) => this.readRun(id)));
   }
 
   /** @param {string | undefined} id */
   async readRun(id) {
     if (id === undefined || this.channels[id]) return;
-    /** @type {{ body: RunOut }} */
-    const { body } = await read(`${clutchPath(this.clutchId)}/runs/${encodeURIComponent(id)}`);
-    this.channels[id] = body.channels;
+    this.channels[id] = (await readDrawn(this.clutchId, id)).body.channels;
   }
 
   /**
@@ -180,8 +178,9 @@ export class Board {
         ["cycles", "cycles"],
       ],
       over,
-      (value) => {
+      async (value) => {
         this.chosen.over = value === "cycles" ? "cycles" : "pressure";
+        if (this.answers) await this.readChannels(this.answers);
         this.again((latest) => this.stribeck(latest));
       },
     );

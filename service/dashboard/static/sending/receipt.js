@@ -2,7 +2,7 @@
 // What the service made of a run: the curve, the fits, the warnings.
 
 import { curveOf, measuredOf } from "../charts/stribeck_law.js";
-import { clutchPath, read } from "../shared/api.js";
+import { clutchPath, read, readDrawn } from "../shared/api.js";
 import { h, scrolling, svg, symbol, table } from "../shared/dom.js";
 import { cycles, fixed, kindName, significant, withSd, words } from "../shared/format.js";
 
@@ -91,9 +91,9 @@ const MOST_SPEED = 2000;
  * @param {Receipt} receipt
  */
 async function drawing(receipt) {
-  const path = clutchPath(receipt.clutch_id);
+  const { clutch_id: clutchId, run_id: runId } = receipt;
   /** @type {[{ body: RunOut }, { body: ClutchOut }]} */
-  const [run, clutch] = await Promise.all([read(`${path}/runs/${encodeURIComponent(receipt.run_id)}`), read(path)]);
+  const [run, clutch] = await Promise.all([readDrawn(clutchId, runId), read(clutchPath(clutchId))]);
   const curves = receipt.fits.map((fit) => ({
     measured: measuredOf(run.body.channels, fit.pressure_bar),
     fitted: curveOf(fit, clutch.body, 0, MOST_SPEED),

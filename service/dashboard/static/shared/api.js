@@ -3,7 +3,7 @@
 // chapter. Open this file first (the reader's key, entity tags, errors as values), then dom.js and format.js; the shapes of
 // the API's answers are in types.d.ts.
 
-/** @import { ListPage, ProblemError } from "./types.js" */
+/** @import { ListPage, ProblemError, RunOut } from "./types.js" */
 
 const KEY = "clutchlife-key";
 
@@ -150,3 +150,15 @@ export const readText = async (path) => (await request(path)).text();
 
 /** @param {string} id */
 export const clutchPath = (id) => `/v1/clutches/${encodeURIComponent(id)}`;
+
+/** Samples of a run that a drawing asks for: as many as it shows, whatever the length of the record. */
+const POINTS = 2000;
+
+/**
+ * A run with its channels, thinned to what is drawn.
+ * @param {string} clutchId
+ * @param {string} runId
+ * @returns {Promise<{ body: RunOut, changed: boolean }>}
+ */
+export const readDrawn = (clutchId, runId) =>
+  read(`${clutchPath(clutchId)}/runs/${encodeURIComponent(runId)}?points=${POINTS}`);

@@ -217,6 +217,7 @@ export interface Receipt {
 }
 
 export interface RunOut extends Receipt {
+  samples: number;
   channels: Channels;
 }
 

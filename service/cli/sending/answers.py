@@ -1,0 +1,127 @@
+"""What an answer means to a sender: the service's, not now, or never.
+
+| answer | meaning | what becomes of a run |
+|---|---|---|
+| 2xx with a JSON object | the service's answer | stored |
+| 2xx with anything else, 3xx, 511 | a login page, a proxy, a wrong address | waits; tried again while patience lasts |
+| 408, 425, 429, 502, 503, 504, other 5xx | not now | waits; tried again while patience lasts |
+| 500 | the service failed on this request | waits; the next run is sent |
+| 401, 403, 404, 407, and the service's `archived` | the key, the address or the clutch is wrong | all wait; sending ends |
+| the service's `invalid-content` (422), `conflict` (409), `too-large` (413) | the run is bad | refused |
+| any other 4xx, or one without the service's problem type | not the service, or not the run | waits; the next run is sent |
+"""
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from email.utils import parsedate_to_datetime
+from typing import Any
+
+import httpx2
+
+#: Statuses below 500 that pass by themselves: a slow request, one that came too early, too many of them.
+_TRANSIENT = (408, 425, 429)
+#: Statuses that hold for every run of a clutch: no key, no permission, no such clutch or address, a proxy's key; 0 is an
+#: address that cannot be asked.
+_ALL_RUNS = (0, 401, 403, 404, 407)
+#: Answers to a request that has stored nothing: not taken yet (425, 429, 503), or taken by somebody else (redirected).
+_STORED_NOTHING = (301, 302, 303, 307, 308, 425, 429, 503, 511)
+#: The service's own types of problem that are about the content of one run, and that are about the clutch.
+_TYPE = "urn:clutchlife:problem:"
+_OF_THE_RUN = tuple(_TYPE + slug for slug in ("invalid-content", "conflict", "too-large"))
+_CONFLICT, _ARCHIVED = _TYPE + "conflict", _TYPE + "archived"
+#: Characters of an answer that is no problem report, quoted as its detail.
+_MOST_QUOTED = 500
+
+
+class ServiceAwayError(Exception):
+    """The service did not answer, or was busy, for longer than the patience.
+
+    `perhaps_stored`: a try reached a server and got no answer of the service, so it may have been carried out.
+    """
+
+    def __init__(self, message: str, *, perhaps_stored: bool = True) -> None:
+        super().__init__(message)
+        self.perhaps_stored = perhaps_stored
+
+
+class RefusedError(Exception):
+    """The service refused the request; repeating it would be refused again."""
+
+    def __init__(self, status: int, problem: dict[str, Any]) -> None:
+        super().__init__(f"{status}: {problem.get('detail') or problem.get('title') or 'refused'}")
+        self.status = status
+        self.problem = problem
+
+    @property
+    def of_the_run(self) -> bool:
+        """Whether the service itself says that this run's content is refused; a proxy's 4xx does not."""
+        return 400 <= self.status < 500 and self.problem.get("type") in _OF_THE_RUN
+
+    @property
+    def of_all_runs(self) -> bool:
+        """Whether every other run of the clutch would get this answer too."""
+        return self.status in _ALL_RUNS or self.problem.get("type") == _ARCHIVED
+
+    @property
+    def other_content(self) -> bool:
+        """Whether the service holds other content under the run's name."""
+        return self.problem.get("type") == _CONFLICT
+
+
+def passing(response: httpx2.Response, answer: dict[str, Any] | None) -> str | None:
+    """Why the answer, with the JSON object in it, is none of the service's or means "not now"; None where it is final."""
+    status = response.status_code
+    if status < 300:
+        if answer is not None:
+            return None
+        media = response.headers.get("Content-Type", "nothing")[:_MOST_QUOTED]
+        return f"status {status} with {media}, not an answer of the service: a login page or a proxy?"
+    if status < 400:
+        target = response.headers.get("Location", "nowhere")[:_MOST_QUOTED]
+        return f"status {status}, a redirect to {target}: is the address right?"
+    if status in _TRANSIENT or status > 500:
+        return f"status {status}"
+    return None
+
+
+def perhaps_stored(response: httpx2.Response) -> bool:
+    """Whether the service may have carried out a request that got this passing answer."""
+    return response.status_code not in _STORED_NOTHING
+
+
+def content(response: httpx2.Response) -> dict[str, Any] | None:
+    """The JSON object of an answer; None where it holds none."""
+    try:
+        answer = response.json()
+    except (ValueError, RecursionError):
+        return None
+    return answer if isinstance(answer, dict) else None
+
+
+def problem(response: httpx2.Response) -> dict[str, Any]:
+    """The problem report of a refusal, or its text as one."""
+    report = content(response)
+    return {"detail": response.text[:_MOST_QUOTED]} if report is None else report
+
+
+def retry_after(headers: Mapping[str, str], *, now: datetime | None = None) -> float:
+    """Seconds that `Retry-After` asks to wait: a number of them or a date (RFC 9110, section 10.2.3); 0 where it is neither.
+
+    A date counts from the answer's own `Date`, so that a wrong clock on this side does not matter.
+    """
+    text = headers.get("Retry-After", "").strip()
+    if text.isascii() and text.isdigit():
+        return float(text)
+    date = _moment(text)
+    if date is None:
+        return 0.0
+    start = _moment(headers.get("Date", "")) or now or datetime.now(UTC)
+    return max(0.0, (date - start).total_seconds())
+
+
+def _moment(text: str) -> datetime | None:
+    try:
+        date = parsedate_to_datetime(text)
+    except (ValueError, TypeError, IndexError, OverflowError):
+        return None
+    return date if date.tzinfo is not None else date.replace(tzinfo=UTC)

@@ -1,0 +1,133 @@
+"""What waits in a spool, sent: each run is stored, refused, or stays."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from service.cli.sending import entry as entries
+from service.cli.sending.answers import RefusedError, ServiceAwayError
+from service.cli.sending.client import NoLongerWantedError, Service
+from service.cli.sending.entry import Entry
+from service.cli.sending.spool import Spool
+
+#: Runs in a row that an otherwise present service does not answer, after which it is taken to be away. Chosen: one run that
+#: it cannot take must not hold up the others; two cost twice the patience.
+_MOST_UNANSWERED = 2
+
+Report = Callable[[str], None]
+
+
+@dataclass(slots=True)
+class Sent:
+    """How many runs were stored, were stored already, were refused, or stay because they alone were not taken."""
+
+    stored: int = 0
+    duplicates: int = 0
+    refused: int = 0
+    failed: int = 0
+    #: Runs in a row that were not answered.
+    unanswered: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.stored} stored, {self.duplicates} known already, {self.refused} refused"
+
+
+def deliver(service: Service, spool: Spool, sent: Sent, report: Report, on_run: Callable[[], None]) -> None:
+    """Send what waits in a spool, counted in `sent`; the caller holds `spool.sending`. `on_run` is called after every run.
+
+    Raises ServiceAwayError where the service is away, RefusedError where it would refuse every run.
+    """
+    spool.begin()
+    for entry in spool.broken():
+        report(f"{spool.body(entry)} was not kept whole and is not sent: push its file again")
+    for entry in spool.waiting():
+        try:
+            _send(service, spool, entry, sent, report)
+        except NoLongerWantedError:
+            continue
+        except ServiceAwayError as error:
+            spool.note(entry, last_answer=str(error), perhaps_stored=entry.perhaps_stored or error.perhaps_stored)
+            sent.unanswered += 1
+            if sent.unanswered == _MOST_UNANSWERED or not _present(service, spool):
+                raise
+            _stays(spool, entry, sent, report, str(error))
+        on_run()
+
+
+def _present(service: Service, spool: Spool) -> bool:
+    """Whether the service answers at all, so that it is this run that it does not answer."""
+    at_once = Service(http=service.http, patience=0.0)
+    try:
+        return at_once.get(f"/v1/clutches/{spool.clutch_id}").get("clutch_id") == spool.clutch_id
+    except (ServiceAwayError, RefusedError):
+        return False
+
+
+def _send(service: Service, spool: Spool, entry: Entry, sent: Sent, report: Report) -> None:
+    """One run; raises NoLongerWantedError where it waits no more, and what `deliver` raises."""
+    answer = "sent, and no answer was received"
+    spool.note(entry, tries=entry.tries + 1, last_try=entries.stamp(), last_answer=answer, perhaps_stored=True)
+    address = f"/v1/clutches/{spool.clutch_id}/runs" + ("" if entry.parameters is None else "/file")
+    try:
+        receipt = service.post_file(address, spool.body(entry), entry.parameters, lambda: spool.awaits(entry))
+    except FileNotFoundError as error:
+        raise NoLongerWantedError from error
+    except RefusedError as error:
+        sent.unanswered = 0
+        spool.note(entry, last_answer=str(error), perhaps_stored=entry.perhaps_stored or error.status >= 500)
+        if error.of_all_runs:
+            raise
+        if not error.of_the_run:
+            _stays(spool, entry, sent, report, str(error))
+            return
+        sent.refused += 1
+        _refused(spool, entry, error, report)
+        return
+    if not {"run_id", "duplicate"} <= receipt.keys():
+        raise ServiceAwayError(f"{service.http.base_url}: the answer is no receipt, so it is not the service's")
+    sent.unanswered = 0
+    sent.duplicates += bool(receipt["duplicate"])
+    sent.stored += not receipt["duplicate"]
+    waited = spool.done(entry)
+    for line in _remarks(receipt, spool, waited=waited):
+        report(line)
+
+
+def _stays(spool: Spool, entry: Entry, sent: Sent, report: Report, reason: str) -> None:
+    sent.failed += 1
+    spool.note(entry, failures=entry.failures + 1)
+    report(f"not taken, {reason}: {entry.label} stays in the spool, {spool.body(entry)}")
+
+
+def _refused(spool: Spool, entry: Entry, error: RefusedError, report: Report) -> None:
+    aside = spool.refuse(entry, error.problem)
+    place = "a newer version has replaced it" if aside is None else str(aside)
+    report(f"refused, {error}: {place}")
+    if error.other_content:
+        report(
+            f"{entry.label}: the service holds other content under this run_id: it was corrected since, or the name is "
+            f"another run's. It is not sent again: clutchlife runs {spool.clutch_id} shows it, clutchlife correct mends it"
+        )
+
+
+def _remarks(receipt: dict[str, Any], spool: Spool, *, waited: bool) -> list[str]:
+    """What the sender has to know of a stored run: that it is doubted, or not what was sent any more."""
+    run_id, cycles = receipt["run_id"], receipt.get("cycles")
+    sent_cycles = receipt.get("sent_cycles", cycles)
+    lines = []
+    if receipt.get("state") == "withdrawn":
+        lines.append(f"{run_id} was stored before and withdrawn since: it stays withdrawn, and waits no more")
+    if receipt.get("state") == "held":
+        doubts = "; ".join(str(doubt.get("message")) for doubt in receipt.get("doubts", ()))
+        lines.append(f"{run_id} is held: {doubts}")
+    if receipt["duplicate"] and cycles != sent_cycles:
+        lines.append(
+            f"{run_id} was stored before and corrected since, from {sent_cycles:g} to {cycles:g} cycles: it stays "
+            "corrected, and waits no more"
+        )
+    if not waited:
+        lines.append(
+            f"{run_id} was stored while a newer version of it was pushed: if both are stored, withdraw this one: "
+            f"clutchlife withdraw {spool.clutch_id} {run_id}"
+        )
+    return lines

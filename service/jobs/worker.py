@@ -1,0 +1,47 @@
+"""A worker process: it opens the database once and calls what it is sent, one call after the other."""
+
+import gc
+import importlib
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from storage.engine.database import Database, open_database
+
+#: What nearly every call needs, loaded before the first comes.
+LOADED_EARLY = ("service.workflows.ingest_run", "service.run_files.json_run", "service.run_files.upload")
+
+_opened: list[Database] = []
+
+
+def begin(database_url: str, nice: int) -> None:
+    """Prepare this process: it yields by `nice`, ends with the service, and leaves interrupts from a terminal to it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_the_service, daemon=True).start()
+    os.nice(nice)
+    threadpool_limits(limits=1, user_api="blas")
+    for name in LOADED_EARLY:
+        importlib.import_module(name)
+    gc.freeze()  # what is loaded stays: the collector need not walk through it
+    _opened.append(open_database(database_url))
+
+
+def call(function: Callable[..., Any], arguments: Sequence[Any]) -> Any:
+    """What `function(database, *arguments)` returns or raises."""
+    return function(_opened[0], *arguments)
+
+
+def load(_: Database) -> None:
+    """Nothing: what nearly every call needs is loaded when a process begins."""
+
+
+def _end_with_the_service() -> None:
+    service = multiprocessing.parent_process()
+    if service is not None:
+        service.join()
+        os._exit(3)

@@ -1,0 +1,118 @@
+"""`/runs/{run_id}`: the receipt of a run with its channels; its entity tag needs the run's row alone, not the channels.
+
+The body is written to a file, so that it may be made in another process than the one that answers.
+"""
+
+import gzip
+import hashlib
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, BinaryIO, Literal
+
+from models.arrays import FloatArray
+from service import records, stored_runs
+from service.queries.raw_run.decimation import extreme_rows
+from service.queries.raw_run.formats import Values, parquet_writer, write_json, write_parquet
+from storage import changes, channels
+from storage.encoding.json_text import to_text
+from storage.engine.database import Database
+
+Kind = Literal["json", "parquet"]
+
+#: The channel that samples have and plateaus do not.
+_TIME = "time_s"
+#: Part of the tags: raised when the same run is answered otherwise than by earlier releases.
+_FORM = 1
+#: How hard a body is compressed. Chosen: higher levels take twice the time for one hundredth less.
+_LEVEL = 6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Run:
+    """A stored run before its channels are read: what is said of it, and how many values its channels have, by name."""
+
+    run_key: int
+    head: dict[str, Any]
+    lengths: dict[str, int]
+
+    @property
+    def samples(self) -> int:
+        """Values of each channel, 0 for a run without."""
+        return max(self.lengths.values(), default=0)
+
+    def tag(self, points: int | None, kind: Kind, compressed: bool) -> str:
+        """The entity tag of the answer: raw channels never change, so their hash in the receipt stands for them."""
+        writer = parquet_writer() if kind == "parquet" else "json"
+        content = to_text([_FORM, self.head, points, writer, compressed])
+        return f'"{hashlib.sha256(content.encode()).hexdigest()[:32]}"'
+
+
+def entity_tag(
+    database: Database, clutch_id: str, run_id: str, *, points: int | None, kind: Kind, compressed: bool = False
+) -> str:
+    """The tag that `write_run` will return unless the run's receipt changes meanwhile; reads no channel.
+
+    Raises NotFoundError, and NotAcceptableError where the format is not written here.
+    """
+    return _look_up(database, clutch_id, run_id).tag(points, kind, compressed)
+
+
+def write_run(
+    database: Database,
+    clutch_id: str,
+    run_id: str,
+    *,
+    points: int | None,
+    kind: Kind,
+    path: Path,
+    compressed: bool = False,
+) -> str:
+    """Write the body of the answer to `path` and return the entity tag of what was written.
+
+    `points`: as many samples of a sampled record at most, chosen by `decimation`; plateaus are written whole, and so is
+    Parquet. `compressed`: JSON as a gzip file. Memory: one channel as it is stored and one decoded; for Parquet all decoded.
+    Raises NotFoundError, and NotAcceptableError where the format is not written here.
+    """
+    run = _look_up(database, clutch_id, run_id)
+    names = tuple(run.lengths)
+    values = partial(_values, database, run.run_key)
+    if kind == "parquet":
+        write_parquet(path, run.head, names, values)
+    else:
+        with path.open("wb") as file, _packed(file) if compressed else file as body:
+            write_json(body, run.head, names, _thinned(run, values, points))
+    return run.tag(points, kind, compressed)
+
+
+def _packed(file: BinaryIO) -> gzip.GzipFile:
+    """What packs into an open file, the same bytes at all times."""
+    return gzip.GzipFile(filename="", mode="wb", compresslevel=_LEVEL, fileobj=file, mtime=0)
+
+
+def _look_up(database: Database, clutch_id: str, run_id: str) -> _Run:
+    with database.reading() as connection:
+        row = stored_runs.run(connection, clutch_id, run_id)
+        lengths = channels.lengths(connection, row.run_key)
+        trail = changes.page(connection, clutch_id, run_id=run_id)
+    head = records.receipt(row) | {
+        "changes": [change.entry() for change in trail],
+        "samples": max(lengths.values(), default=0),
+    }
+    return _Run(run_key=row.run_key, head=head, lengths=lengths)
+
+
+def _values(database: Database, run_key: int, name: str) -> FloatArray:
+    """A channel, decoded when the transaction that read it has ended."""
+    with database.reading() as connection:
+        stored = channels.stored(connection, run_key, name)
+    return stored.values()
+
+
+def _thinned(run: _Run, values: Values, points: int | None) -> Values:
+    """The channels of a plot; all values of plateaus and of short records."""
+    if points is None or run.samples <= points or _TIME not in run.lengths:
+        return values
+    drawn = [name for name in run.lengths if name != _TIME]
+    rows = extreme_rows(map(values, drawn), len(drawn), samples=run.samples, points=points)
+    return lambda name: values(name)[rows]

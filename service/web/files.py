@@ -1,0 +1,35 @@
+"""Answers that are files: chosen by `Accept`, made by a worker, sent piece by piece."""
+
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import BinaryIO
+
+from fastapi import Request
+from fastapi.responses import Response, StreamingResponse
+
+PARQUET_TYPE = "application/vnd.apache.parquet"
+#: Bytes of a file that are sent at once. Chosen: a few writes to the socket.
+_PIECE = 1 << 18
+
+
+def preferred(request: Request, media_types: Sequence[str]) -> str:
+    """The one of our media types that `Accept` weighs most, the first of them where none is named."""
+    weights = {}
+    for part in request.headers.get("accept", "").lower().split(","):
+        name, *parameters = (word.strip() for word in part.split(";"))
+        weight = next((word[2:] for word in parameters if word.startswith("q=")), "1")
+        weights[name] = float(weight) if re.fullmatch(r"[01](\.\d{0,3})?", weight) else 0.0
+    return max(media_types, key=lambda name: weights.get(name, 0.0))
+
+
+def streamed(body: BinaryIO, media_type: str, headers: Mapping[str, str]) -> Response:
+    """An open file as an answer, sent piece by piece and closed at its end."""
+    size = {"Content-Length": str(os.fstat(body.fileno()).st_size)}
+
+    def pieces() -> Iterator[bytes]:
+        with body:
+            while piece := body.read(_PIECE):
+                yield piece
+
+    return StreamingResponse(pieces(), media_type=media_type, headers=dict(headers) | size)

@@ -1,0 +1,88 @@
+"""Answers that take a second to compute: made by a worker, once, and given as they were while a newer one is made.
+
+The directive stale-while-revalidate of RFC 5861, decided by the service: where nobody waits for a worker, who asks waits
+for the newest answer; where the workers have more to do, the last one is given at once and its revision says of when it is.
+`Prefer: wait=SECONDS` waits in any case.
+"""
+
+import asyncio
+import logging
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from concurrent.futures import Future
+from dataclasses import dataclass
+
+from service.queries.cache import Answer
+
+#: What a worker returns: the revision that it computed the answer from, and the answer's bytes.
+Made = tuple[int, bytes]
+
+_log = logging.getLogger("clutchlife")
+
+
+@dataclass(slots=True)
+class _Entry:
+    """The last answer and the revision that it is of; the making of the next."""
+
+    revision: int = -1
+    answer: Answer | None = None
+    making: "asyncio.Task[None] | None" = None
+
+
+class Revalidation:
+    """The last answer by key; the least lately asked for goes first. Used from the event loop alone."""
+
+    def __init__(self, most_bytes: int) -> None:
+        self._most = most_bytes
+        self._entries: OrderedDict[Hashable, _Entry] = OrderedDict()
+
+    def held(self, key: Hashable, revision: int) -> Answer | None:
+        """The answer where it is of that very revision."""
+        entry = self._entries.get(key)
+        return entry.answer if entry is not None and entry.revision == revision else None
+
+    async def answer(
+        self, key: Hashable, revision: int, compute: Callable[[], "Future[Made]"], *, wait: float
+    ) -> tuple[int, Answer]:
+        """The answer at `revision` or later, or the last one where it is not there within `wait` [s]; and its revision.
+
+        Where none was ever made, it is waited for. Raises what `compute` raises to those who wait.
+        """
+        entry = self._entries.setdefault(key, _Entry())
+        self._entries.move_to_end(key)
+        deadline = asyncio.get_running_loop().time() + wait
+        while entry.answer is None or entry.revision < revision:
+            making = entry.making
+            if making is None:
+                making = entry.making = asyncio.create_task(self._make(key, entry, compute))
+                making.add_done_callback(_logged)
+            left = deadline - asyncio.get_running_loop().time()
+            if entry.answer is None:
+                await asyncio.shield(making)
+            elif left <= 0 or not (await asyncio.wait([making], timeout=left))[0]:
+                break
+            else:
+                making.result()
+        return entry.revision, entry.answer
+
+    async def _make(self, key: Hashable, entry: _Entry, compute: Callable[[], "Future[Made]"]) -> None:
+        try:
+            revision, body = await asyncio.wrap_future(compute())
+        except BaseException:
+            if entry.answer is None:
+                self._entries.pop(key, None)
+            raise
+        finally:
+            entry.making = None
+        entry.revision, entry.answer = revision, Answer.of(body)
+        while len(self._entries) > 1 and self._held() > self._most:
+            self._entries.popitem(last=False)
+
+    def _held(self) -> int:
+        return sum(len(entry.answer.body) for entry in self._entries.values() if entry.answer is not None)
+
+
+def _logged(made: "asyncio.Task[None]") -> None:
+    """Who was given the last answer does not hear that the next one failed."""
+    if not made.cancelled() and made.exception() is not None:
+        _log.warning("an answer could not be computed anew: %s", made.exception())

@@ -1,0 +1,127 @@
+"""A clutch's record is edited, or the clutch archived: what depends on the record is computed anew before it is stored.
+
+Curves depend on the geometry alone: where it changes, every run is fitted again. The record that was registered stays
+stored.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Connection
+
+from service import records, stored_runs
+from service.lives.history import stationary_tests_of
+from service.lives.recomputation import Results, computed_anew
+from service.schemas.clutch import ClutchIn, content_of
+from service.stored_runs import Recomputed
+from storage import changes, clutches
+from storage.changes import NewChange
+from storage.clutches import ClutchRow
+from storage.engine.database import Database
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Edited:
+    """A clutch as it was and as it is to be, and what then follows: nothing, results of its history, or all of them."""
+
+    before: ClutchRow
+    record: dict[str, Any]
+    archived: bool
+    results: Results | Recomputed | None
+
+
+def edit(
+    database: Database,
+    clutch_id: str,
+    fields: Mapping[str, Any],
+    *,
+    archived: bool | None,
+    reason: str,
+    by: str,
+    at: str,
+) -> None:
+    """Replace these fields of a clutch's record, each as a whole, and archive the clutch or bring it back (None: neither).
+
+    What is so already is not changed. Raises NotFoundError.
+    """
+    while True:
+        edited = _computed(database, clutch_id, fields, archived)
+        if not _entries(edited):
+            return
+        with database.writing() as connection:
+            if records.unchanged(connection, clutch_id, edited.before.revision):
+                _store(connection, edited, reason=reason, by=by, at=at)
+                return
+
+
+def _computed(database: Database, clutch_id: str, fields: Mapping[str, Any], archived: bool | None) -> _Edited:
+    with database.reading() as connection:
+        row = records.clutch(connection, clutch_id)
+    before = records.record(row)
+    record = ClutchIn.model_validate(before.model_dump(mode="json") | dict(fields))
+    return _Edited(
+        before=row,
+        record=record.model_dump(mode="json"),
+        archived=row.archived if archived is None else archived,
+        results=None if record == before else _results(database, before, record),
+    )
+
+
+def _results(database: Database, before: ClutchIn, record: ClutchIn) -> Results | Recomputed:
+    """What follows from the record as it is to be."""
+    with database.reading() as connection:
+        state = records.state(connection, record.clutch_id, edited=record)
+        levels, receipts = records.levels(connection, record.clutch_id), records.receipts(connection, record.clutch_id)
+    if record.geometry != before.geometry:
+        return stored_runs.recomputed(database, state)
+    reader = stored_runs.run_reader(database, record.clutch_id)
+    tests = reader.stationary_tests(state.lives[-1]) if state.events else iter(())
+    evaluated = stationary_tests_of(state.events)
+    return computed_anew(state, levels, receipts, tests, reader, evaluated=evaluated)[1]
+
+
+def _entries(edited: _Edited) -> list[tuple[str, dict[str, Any], dict[str, Any]]]:
+    """What the audit trail says: the action, and what changes as it was and as it is."""
+    before = records.record(edited.before).model_dump(mode="json")
+    names = [name for name in before if before[name] != edited.record[name]]
+    entries = []
+    if names:
+        entries.append(
+            (changes.EDIT, {name: before[name] for name in names}, {name: edited.record[name] for name in names})
+        )
+    if edited.archived != edited.before.archived:
+        action = changes.ARCHIVE if edited.archived else changes.UNARCHIVE
+        entries.append((action, {"archived": edited.before.archived}, {"archived": edited.archived}))
+    return entries
+
+
+def _store(connection: Connection, edited: _Edited, *, reason: str, by: str, at: str) -> None:
+    """The record and what follows, and the entries of the audit trail; the revision moves on."""
+    row, clutch_id = edited.before, edited.before.clutch_id
+    clutches.set_record(
+        connection,
+        clutch_id,
+        record=edited.record,
+        content_sha256=content_of(edited.record),
+        registered=row.record if row.registered is None and edited.results is not None else row.registered,
+        archived=edited.archived,
+    )
+    if isinstance(edited.results, Recomputed):
+        stored_runs.store_recomputed(connection, clutch_id, edited.results)
+    elif edited.results is not None:
+        records.store(connection, clutch_id, edited.results)
+    revision = clutches.bump_revision(connection, clutch_id)
+    for action, before, after in _entries(edited):
+        change = NewChange(
+            clutch_id=clutch_id,
+            run_id=None,
+            at=at,
+            by=by,
+            action=action,
+            reason=reason,
+            before=before,
+            after=after,
+            revision=revision,
+        )
+        changes.insert(connection, change)

@@ -1,0 +1,94 @@
+"""The audit trail: who changed what of a clutch or of one of its runs, when and why. Rows are added, never changed."""
+
+from dataclasses import dataclass, fields
+
+import sqlalchemy as sa
+from sqlalchemy import Connection, Row, bindparam, func, or_, select
+
+from storage.encoding.json_text import Json, to_object, to_text
+from storage.tables import change
+
+HOLD, CONFIRM, WITHDRAW, RESTORE, CORRECT = "hold", "confirm", "withdraw", "restore", "correct"
+EDIT, ARCHIVE, UNARCHIVE = "edit", "archive", "unarchive"
+#: What changes a clutch's history, and with it what a diagnosis was made of.
+OF_HISTORY = (CONFIRM, WITHDRAW, RESTORE, CORRECT, EDIT)
+#: What the trail shows of a change.
+SHOWN = ("at", "by", "action", "run_id", "reason", "before", "after")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewChange:
+    """A change that is about to be stored: `run_id` None where it is of the clutch, `revision` the clutch's after it."""
+
+    clutch_id: str
+    run_id: str | None
+    at: str
+    by: str
+    action: str
+    reason: str
+    before: Json
+    after: Json
+    revision: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChangeRow(NewChange):
+    """A stored change; the later, the greater its key."""
+
+    change_key: int
+
+    def entry(self) -> Json:
+        """What the trail shows of it."""
+        return {name: getattr(self, name) for name in SHOWN}
+
+
+_NEW = tuple(field.name for field in fields(NewChange))
+_insert = sa.insert(change)
+_of_clutch = change.c.clutch_id == bindparam("of_clutch")
+_newest_first = (
+    select(change)
+    .where(
+        _of_clutch,
+        change.c.change_key < bindparam("before_key"),
+        or_(bindparam("of_run").is_(None), change.c.run_id == bindparam("of_run")),
+    )
+    .order_by(change.c.change_key.desc())
+    .limit(bindparam("most"))
+)
+_last_of_history = select(func.max(change.c.revision)).where(_of_clutch, change.c.action.in_(OF_HISTORY))
+
+
+def insert(connection: Connection, row: NewChange) -> None:
+    """Store a change. Raises IntegrityError where the clutch is unknown."""
+    values = {name: getattr(row, name) for name in _NEW}
+    connection.execute(_insert, values | {"before": to_text(row.before), "after": to_text(row.after)})
+
+
+def page(
+    connection: Connection,
+    clutch_id: str,
+    *,
+    run_id: str | None = None,
+    limit: int | None = None,
+    before: float | None = None,
+) -> list[ChangeRow]:
+    """Changes of a clutch and its runs, or of one run, newest first; `before` is the key of the last of the page before."""
+    values = {
+        "of_clutch": clutch_id,
+        "of_run": run_id,
+        "most": -1 if limit is None else limit,
+        "before_key": 2.0**62 if before is None else before,
+    }
+    return [_row(row) for row in connection.execute(_newest_first, values)]
+
+
+def last_of_history(connection: Connection, clutch_id: str) -> int:
+    """The revision of the last change of what the clutch's history holds, 0 where there was none."""
+    return connection.execute(_last_of_history, {"of_clutch": clutch_id}).scalar() or 0
+
+
+def _row(row: Row[tuple[object, ...]]) -> ChangeRow:
+    values = row._asdict()
+    values["before"] = to_object(values["before"])
+    values["after"] = to_object(values["after"])
+    return ChangeRow(**values)

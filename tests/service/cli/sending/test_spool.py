@@ -1,0 +1,206 @@
+"""The spool on disk: what waits, what replaces what, and what an earlier release left."""
+
+import hashlib
+import json
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from service.cli.sending import entry as entries
+from service.cli.sending.client import Service
+from service.cli.sending.delivery import Sent, deliver
+from service.cli.sending.folder_lock import HeldError
+from service.cli.sending.spool import Spool
+from tests.service.cli.sending.stand_in_service import URL, StandInService, body
+
+
+@pytest.fixture
+def spool(tmp_path: Path) -> Spool:
+    return Spool.of(tmp_path / "spool", URL, "c1")
+
+
+def written(path: Path, content: bytes) -> Path:
+    path.write_bytes(content)
+    return path
+
+
+def contents(spool: Spool) -> list[bytes]:
+    return [spool.body(entry).read_bytes() for entry in spool.waiting()]
+
+
+def set_aside(spool: Spool) -> list[bytes]:
+    return [(spool.folder / "replaced" / entry.body).read_bytes() for entry in spool.replaced()]
+
+
+def test_runs_wait_in_the_order_in_which_they_came(spool: Spool, tmp_path: Path) -> None:
+    for cycles in (3, 1, 2):
+        spool.add([(written(tmp_path / f"{cycles}.json", body(cycles)), None)])
+    assert contents(spool) == [body(3), body(1), body(2)]
+    assert [entry.head.cycles for entry in spool.waiting()] == [3, 1, 2]
+    assert {(entry.url, entry.clutch_id, entry.tries) for entry in spool.waiting()} == {(URL, "c1", 0)}
+
+
+def test_the_same_content_waits_once(spool: Spool, tmp_path: Path) -> None:
+    for name in ("a.json", "b.json", "a.json"):
+        assert spool.add([(written(tmp_path / name, body(1)), None)])[1] == []
+    (entry,) = spool.waiting()
+    assert [Path(source).name for source in entry.sources] == ["a.json", "b.json"]
+
+
+def test_a_corrected_file_replaces_the_version_that_waits(spool: Spool, tmp_path: Path) -> None:
+    run = tmp_path / "run.json"
+    spool.add([(written(run, body(70000)), None)])
+    _, replaced = spool.add([(written(run, body(7000)), None)])
+    assert [entry.head.cycles for entry in replaced] == [70000]
+    assert (contents(spool), set_aside(spool)) == ([body(7000)], [body(70000)])
+    spool.add([(written(run, body(70000)), None)])  # it was right after all
+    assert (contents(spool), set_aside(spool)) == ([body(70000)], [body(70000), body(7000)])
+
+
+def test_a_run_of_the_same_name_is_replaced_from_any_file(spool: Spool, tmp_path: Path) -> None:
+    spool.add([(written(tmp_path / "a.json", body(70000, "r1")), None)])
+    spool.add([(written(tmp_path / "b.json", body(7000, "r1")), None)])
+    assert contents(spool) == [body(7000, "r1")]
+    record = written(tmp_path / "c.csv", b"torque_nm\n1\n")
+    spool.add([(record, {"kind": "stationary_stribeck", "cycles": "7000.0", "run_id": "r1"})])
+    assert contents(spool) == [b"torque_nm\n1\n"]
+    assert len(set_aside(spool)) == 2
+
+
+def test_a_records_corrected_cycles_replace_it(spool: Spool, tmp_path: Path) -> None:
+    record = written(tmp_path / "c.csv", b"torque_nm\n1\n")
+    spool.add([(record, {"kind": "stationary_stribeck", "cycles": "70000.0"})])
+    spool.add([(record, {"kind": "stationary_stribeck", "cycles": "7000.0"})])
+    (entry,) = spool.waiting()
+    assert entry.parameters == {"kind": "stationary_stribeck", "cycles": "7000.0"}
+
+
+def test_a_file_that_is_used_for_every_run_replaces_none(spool: Spool, tmp_path: Path) -> None:
+    run = tmp_path / "latest.json"
+    for cycles in (1, 2, 3):
+        spool.add([(written(run, body(cycles, f"r{cycles}")), None)])
+        spool.add(
+            [(written(tmp_path / "other.json", body(cycles, started_at=f"2026-01-0{cycles}", note=str(cycles))), None)]
+        )
+    assert len(contents(spool)) == 6
+    assert set_aside(spool) == []
+
+
+def test_files_of_one_call_do_not_replace_each_other(spool: Spool, tmp_path: Path) -> None:
+    """Two recordings under one name by mistake: the service refuses the second, and it is seen."""
+    files = [(written(tmp_path / f"{cycles}.json", body(cycles, "r1")), None) for cycles in (1, 2)]
+    for _ in range(2):
+        assert spool.add(files)[1] == []
+        assert contents(spool) == [body(1, "r1"), body(2, "r1")]
+
+
+def test_a_clock_that_is_set_back_changes_no_order(
+    spool: Spool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = tmp_path / "run.json"
+    for cycles, year in ((70000, 2030), (7000, 2026)):
+        monkeypatch.setattr(entries, "stamp", lambda year=year: f"{year}-01-01T00:00:00+00:00")
+        spool.add([(written(run, body(cycles)), None)])
+        spool.add([(written(tmp_path / f"{year}.json", body(year)), None)])
+    assert contents(spool) == [body(2030), body(7000), body(2026)]
+
+
+def old_release(spool: Spool, number: int, content: bytes, parameters: dict[str, str] | None = None) -> Path:
+    """A run as the release before kept it."""
+    spool.folder.mkdir(parents=True, exist_ok=True)
+    digest = hashlib.sha256(content)
+    if parameters is None:
+        return written(spool.folder / f"{number:08d}-{digest.hexdigest()[:24]}.json", content)
+    digest.update(json.dumps(parameters, sort_keys=True).encode())
+    kept = written(spool.folder / f"{number:08d}-{digest.hexdigest()[:24]}.run", content)
+    written(kept.with_suffix(".asked"), json.dumps(parameters).encode())
+    return kept
+
+
+PARAMETERS = {"kind": "stationary_stribeck", "cycles": "5.0", "filename": "a.csv"}
+
+
+def test_a_spool_of_the_release_before_is_read_and_sent(spool: Spool, tmp_path: Path) -> None:
+    old_release(spool, 1, body(1, "r1"))
+    old_release(spool, 2, b"csv", PARAMETERS)
+    old_release(spool, 3, body(70000, "r3"))
+    old_release(spool, 4, b"no json")
+    assert [entry.head.run_id for entry in spool.waiting()] == ["r1", None, "r3", None]
+    assert spool.waiting()[1].parameters == PARAMETERS
+    assert Spool.every(spool.folder.parent) == [Spool(folder=spool.folder)]
+    _, replaced = spool.add([(written(tmp_path / "a.json", body(7000, "r3")), None)])
+    assert [entry.head.cycles for entry in replaced] == [70000]
+    spool.add([(written(tmp_path / "a.csv", b"csv"), PARAMETERS)])
+    assert contents(spool) == [body(1, "r1"), b"csv", b"no json", body(7000, "r3")]
+    assert Spool.every(spool.folder.parent) == [spool]
+    for entry in spool.waiting():
+        assert spool.done(entry)
+    spool.begin()
+    assert sorted(path.name for path in spool.folder.iterdir()) == ["changing.lock", "replaced"]
+
+
+def test_a_record_whose_parameters_were_lost_waits_for_its_file(spool: Spool, tmp_path: Path) -> None:
+    """The release before wrote the parameters after the record."""
+    old_release(spool, 1, b"csv", PARAMETERS).with_suffix(".asked").unlink()
+    spool.begin()
+    assert spool.waiting() == []
+    assert len(spool.broken()) == 1
+    _, replaced = spool.add([(written(tmp_path / "a.csv", b"csv"), PARAMETERS)])
+    assert (contents(spool), spool.broken(), replaced) == ([b"csv"], [], [])
+
+
+def test_an_entry_that_cannot_be_read_is_kept_and_named(spool: Spool, tmp_path: Path) -> None:
+    for cycles in (1, 2):
+        spool.add([(written(tmp_path / f"{cycles}.json", body(cycles)), None)])
+    damaged = spool.folder / (spool.waiting()[0].stem + ".entry")
+    damaged.write_text('{"head": ')
+    spool.begin()
+    assert contents(spool) == [body(2)]
+    assert [spool.body(entry).read_bytes() for entry in spool.broken()] == [body(1)]
+
+
+def test_fields_of_a_later_release_are_passed_over(spool: Spool, tmp_path: Path) -> None:
+    spool.add([(written(tmp_path / "1.json", body(1)), None)])
+    path = spool.folder / (spool.waiting()[0].stem + ".entry")
+    path.write_text(json.dumps(json.loads(path.read_bytes()) | {"colour": "red"}))
+    assert contents(spool) == [body(1)]
+
+
+def test_a_stored_run_takes_its_refused_and_replaced_copies_along(spool: Spool, tmp_path: Path) -> None:
+    run = tmp_path / "run.json"
+    spool.add([(written(run, body(1)), None)])
+    assert spool.refuse(spool.waiting()[0], {"detail": "no"}) == spool.folder / "refused" / spool.refused()[0].body
+    assert spool.problem(spool.refused()[0]) == {"detail": "no"}
+    for cycles in (1, 2, 1):
+        spool.add([(written(run, body(cycles)), None)])
+    assert (len(spool.refused()), len(spool.replaced())) == (1, 2)
+    assert spool.done(spool.waiting()[0])
+    assert (spool.refused(), set_aside(spool)) == ([], [body(2)])
+
+
+def test_only_one_process_sends_at_a_time(spool: Spool) -> None:
+    with spool.sending(0.0), pytest.raises(HeldError), spool.sending(0.0):
+        pass
+    with spool.sending(0.0):
+        pass
+
+
+def test_many_push_at_once_and_nothing_is_lost(spool: Spool, tmp_path: Path) -> None:
+    service, together = StandInService(), threading.Barrier(4)
+
+    def push(sender: int) -> None:
+        own = Spool.of(tmp_path / "spool", URL, "c1")
+        together.wait()
+        for turn in range(8):
+            # a run of this sender's, a run that all have, and a run that all correct
+            for name, cycles in ((f"s{sender}-{turn}", 1), (f"all-{turn}", 2)):
+                own.add([(written(tmp_path / f"{sender}-{name}.json", body(cycles, name)), None)])
+            with own.sending(60.0):
+                deliver(Service(http=service.client()), own, Sent(), lambda _line: None, lambda: None)
+
+    with ThreadPoolExecutor(4) as senders:
+        list(senders.map(push, range(4)))
+    assert spool.waiting() == spool.refused() == spool.replaced() == spool.broken() == []
+    assert len(service.stored) == 4 * 8 + 8

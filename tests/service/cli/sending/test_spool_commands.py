@@ -1,0 +1,250 @@
+"""`clutchlife spool` and what `push` says of the spool, as an engineer types them."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+from typer.testing import CliRunner
+
+from service.cli.main import app
+from service.cli.sending import transmission
+from service.cli.sending.spool import Spool
+from tests.service.cli.sending.stand_in_service import URL, StandInService, body, problem
+from tests.service.cli.sending.test_spool import PARAMETERS, old_release, written
+
+
+class Terminal:
+    """A terminal at a rig, whose service is in memory."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.service = StandInService()
+        self.asked: list[str] = []
+
+    def connect(self, url: str, *, key: str | None = None) -> httpx2.Client:
+        """The client that a command gets."""
+        assert key is None
+        self.asked.append(url)
+        client = self.service.client()
+        client.base_url = httpx2.URL(url)
+        return client
+
+    def __call__(self, *arguments: str | Path, code: int = 0, answer: str = "") -> str:
+        called = [*map(str, arguments), "--spool", str(self.folder / "spool")]
+        done = CliRunner().invoke(app, called, input=answer)
+        assert done.exit_code == code, done.output
+        return done.output
+
+    def push(self, content: bytes, name: str = "run.json", *, code: int = 0, clutch: str = "c1", url: str = URL) -> str:
+        """Push one run without waiting."""
+        file = written(self.folder / name, content)
+        return self("push", file, "--clutch", clutch, "--url", url, "--patience", "0", code=code)
+
+    def listed(self) -> list[dict[str, Any]]:
+        """What `spool list --json` prints."""
+        items: list[dict[str, Any]] = json.loads(self("spool", "list", "--json"))["items"]
+        return items
+
+
+@pytest.fixture
+def terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Terminal:
+    terminal = Terminal(tmp_path)
+    monkeypatch.setattr(transmission, "connect", terminal.connect)
+    return terminal
+
+
+def away(_request: httpx2.Request) -> httpx2.Response:
+    return httpx2.Response(503)
+
+
+def present(_request: httpx2.Request) -> None:
+    return None
+
+
+def test_what_waits_is_listed_with_its_tries_and_the_last_answer(terminal: Terminal) -> None:
+    assert "nothing is in the spool" in terminal("spool", "list")
+    terminal.push(body(-1, "bad"), "bad.json", code=65)
+    terminal.service.instead = lambda request: None if request.method == "GET" else away(request)
+    terminal.push(body(70000), code=75)
+    terminal.push(body(7000), code=75)
+    terminal.push(body(8000, "r2"), "other.json", code=75, clutch="c2")
+    lines = terminal("spool", "list").splitlines()
+    assert [line.split()[0] for line in lines if line.startswith("  ")] in (
+        ["waiting", "refused", "replaced", "waiting"],
+        ["waiting", "waiting", "refused", "replaced"],
+    )
+    text = "\n".join(lines)
+    assert f"c1 at {URL}, in " in text
+    assert "cycles: must not be negative" in text
+    waiting, refused, replaced = (item for item in terminal.listed() if item["clutch_id"] == "c1")
+    assert (waiting["run_id"], waiting["cycles"], waiting["tries"]) == (None, 7000, 1)
+    assert waiting["files"] == [str(terminal.folder / "run.json")]
+    assert "status 503" in waiting["last_answer"]
+    assert (refused["run_id"], refused["problem"]["status"]) == ("bad", 422)
+    assert (replaced["state"], replaced["cycles"]) == ("replaced", 70000)
+    for item in (waiting, refused, replaced):
+        assert Path(item["path"]).read_bytes().startswith(b"{")
+    assert "c2" not in terminal("spool", "list", "--clutch", "c1")
+
+
+def test_a_run_that_was_corrected_while_the_service_was_away_is_delivered_corrected(terminal: Terminal) -> None:
+    terminal.service.instead = away
+    assert "1 runs wait" in terminal.push(body(70000), code=75)
+    output = terminal.push(body(7000), code=75)
+    assert "is replaced and not sent, see " in output
+    assert "may be stored" not in output
+    terminal.service.instead = present
+    assert "1 stored, 0 known already, 0 refused" in terminal("spool", "send", "--url", URL)
+    assert list(terminal.service.stored.values()) == [body(7000)]
+
+
+def test_a_replaced_version_that_may_be_stored_is_named(terminal: Terminal) -> None:
+    terminal.service.instead = lambda request: None if request.method == "GET" else httpx2.Response(504)
+    terminal.push(body(70000), code=75)
+    terminal.service.instead = present
+    assert "it may be stored: withdraw it" in terminal.push(body(7000))
+
+
+def test_push_names_other_runs_that_wait_in_one_line(terminal: Terminal) -> None:
+    terminal.push(body(-1), "bad.json", code=65)
+    terminal.service.instead = away
+    assert "other runs" not in terminal.push(body(1), "1.json", code=75).replace("1 were refused", "")
+    terminal.push(body(2), "2.json", code=75)
+    terminal.service.instead = present
+    (line,) = (line for line in terminal.push(body(3), "3.json").splitlines() if "other runs" in line)
+    assert line.startswith("2 other runs of c1 wait since ")
+    assert line.endswith("and are sent too, 1 were refused and are not sent: see clutchlife spool list")
+    assert len(terminal.service.stored) == 3
+
+
+def test_the_spool_is_emptied_after_a_question(terminal: Terminal) -> None:
+    assert "nothing to delete" in terminal("spool", "empty")
+    terminal.push(body(-1), "bad.json", code=65)
+    terminal.service.instead = away
+    terminal.push(body(1), "1.json", code=75)
+    terminal.push(body(2), "2.json", code=75, clutch="c2")
+    for answer in ("n\n", ""):
+        output = terminal("spool", "empty", answer=answer, code=1)
+        assert "Delete these 3 for good? 2 of them wait and were never stored." in output
+        assert len(terminal.listed()) == 3
+    assert "1 deleted, 0 of them never stored" in terminal("spool", "empty", "--refused", answer="y\n")
+    assert [item["state"] for item in terminal.listed()] == ["waiting", "waiting"]
+    output = terminal("spool", "empty", "--clutch", "c2", "--yes")
+    assert "2.json" in output
+    assert [item["clutch_id"] for item in terminal.listed()] == ["c1"]
+    terminal("spool", "empty", "--yes")
+    assert terminal.listed() == []
+    left = [path for path in (terminal.folder / "spool").rglob("*") if path.is_file() and path.suffix != ".lock"]
+    assert left == []
+
+
+def test_the_spool_is_not_emptied_under_a_sender(terminal: Terminal) -> None:
+    terminal.service.instead = away
+    terminal.push(body(1), code=75)
+    with Spool.of(terminal.folder / "spool", URL, "c1").sending(0.0):
+        assert "a process is sending" in terminal("spool", "empty", "--yes", code=75)
+        assert "another process is sending from the spool; 2 runs wait" in terminal.push(body(2), "2.json", code=75)
+    assert len(terminal.listed()) == 2
+
+
+def test_only_runs_for_the_address_are_sent_there(terminal: Terminal) -> None:
+    terminal.service.instead = away
+    terminal.push(body(1), "1.json", code=75)
+    terminal.push(body(2), "2.json", code=75, clutch="c2")
+    terminal.push(body(3), "3.json", code=75, url="http://other.test")
+    terminal.service.instead, terminal.asked = present, []
+    output = terminal("spool", "send", "--url", URL + "/", "--clutch", "c2")
+    assert (list(terminal.service.stored.values()), "1 stored" in output) == ([body(2)], True)
+    output = terminal("spool", "send", "--url", URL)
+    assert "are not sent: they are of c1 at http://other.test" in output
+    assert sorted(terminal.service.stored.values()) == [body(1), body(2)]
+    assert "http://other.test" not in terminal.asked
+    assert "nothing waits for" in terminal("spool", "send", "--url", URL)
+
+
+def test_runs_of_the_release_before_are_listed_and_sent_once_their_clutch_is_given(terminal: Terminal) -> None:
+    spool = Spool.of(terminal.folder / "spool", URL, "c1")
+    old_release(spool, 1, body(1, "r1"))
+    old_release(spool, 2, b"csv", PARAMETERS)
+    old_release(spool, 3, b"csv 2", PARAMETERS).with_suffix(".asked").unlink()
+    assert [(item["state"], item["clutch_id"]) for item in terminal.listed()] == [
+        ("waiting", None),
+        ("waiting", None),
+        ("broken", None),
+    ]
+    assert "clutch not stated" in terminal("spool", "list")
+    assert "give --clutch" in terminal("spool", "send", "--url", URL)
+    output = terminal("spool", "send", "--url", URL, "--clutch", "c1")
+    assert "2 stored" in output
+    assert "was not kept whole and is not sent" in output
+
+
+def test_refusals_end_the_command_as_data_errors_and_absence_as_a_failure_for_now(terminal: Terminal) -> None:
+    terminal.service.instead = lambda _request: problem(401, "unauthorized", "a key [is] needed")
+    assert "a key [is] needed; 1 runs wait in" in terminal.push(body(1), code=65)
+    terminal.service.instead = lambda request: None if request.method == "GET" else httpx2.Response(500)
+    assert "1 runs were not taken and stay" in terminal.push(body(1), code=75)
+    terminal.service.instead = lambda _request: httpx2.Response(200, html="<p>log in</p>")
+    assert "a login page or a proxy?" in terminal.push(body(1), code=75)
+    assert len(terminal.listed()) == 1
+
+
+class Killing(BaseHTTPRequestHandler):
+    """Kills the client while it waits for the answer to its first run; answers every other request."""
+
+    client: subprocess.Popen[str] | None = None
+    started = threading.Event()
+
+    def do_GET(self) -> None:
+        self._answer(b'{"clutch_id": "c1"}')
+
+    def do_POST(self) -> None:
+        self.rfile.read(int(self.headers["Content-Length"]))
+        self.started.wait(60)
+        if self.client is not None:
+            os.kill(self.client.pid, signal.SIGKILL)
+            self.client.wait()
+            Killing.client = None
+            return
+        self._answer(b'{"run_id": "r1", "duplicate": true}')
+
+    def _answer(self, content: bytes) -> None:
+        self.send_response(200)
+        self.send_header("Content-Length", str(len(content)))
+        self.end_headers()
+        self.wfile.write(content)
+
+    def log_message(self, *_arguments: object) -> None:
+        """Say nothing."""
+
+
+def test_a_push_that_is_killed_while_the_service_answers_is_known_to_have_been_sent(tmp_path: Path) -> None:
+    file = written(tmp_path / "run.json", body(1, "r1"))
+    with ThreadingHTTPServer(("127.0.0.1", 0), Killing) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        try:
+            arguments = ["push", str(file), "--clutch", "c1", "--url", f"http://127.0.0.1:{server.server_port}"]
+            arguments += ["--spool", str(tmp_path / "spool")]
+            Killing.client = killed = subprocess.Popen(
+                [sys.executable, "-m", "service.cli.main", *arguments], text=True
+            )
+            Killing.started.set()
+            assert killed.wait(120) == -signal.SIGKILL
+            (spool,) = Spool.every(tmp_path / "spool")
+            (entry,) = spool.waiting()
+            assert (entry.tries, entry.perhaps_stored) == (1, True)
+            done = CliRunner().invoke(app, arguments)
+            assert "0 stored, 1 known already, 0 refused" in done.output
+            assert spool.waiting() == []
+        finally:
+            server.shutdown()
+            thread.join()

@@ -1,0 +1,161 @@
+"""Calls in lanes of workers: the same in threads and in processes, turns, bounds, and processes that end."""
+
+import multiprocessing
+import multiprocessing.connection
+import os
+import signal
+import time
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from service.errors import BusyError, InvalidError
+from service.jobs import workers as module
+from service.jobs.workers import Lane, Workers, in_processes, in_threads
+from service.queries.cache import to_json
+from service.run_files.json_run import read_run
+from service.schemas.clutch import ClutchIn
+from service.workflows import register_clutch
+from service.workflows.ingest_run import ingest_posted
+from storage.engine.database import Database, open_database
+from tests.service.jobs import calls
+from tests.support import stationary
+
+AT = "2026-11-02T10:00:00+00:00"
+IN_TIME = 120.0
+
+
+@pytest.fixture
+def database(tmp_path: Path) -> Iterator[Database]:
+    opened = open_database(f"sqlite:///{tmp_path / 'a.db'}")
+    register_clutch.register(opened, ClutchIn(clutch_id="c1"), created_at=AT)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture(params=["threads", "processes"])
+def workers(database: Database, request: pytest.FixtureRequest) -> Iterator[Workers]:
+    made = in_threads(database) if request.param == "threads" else in_processes(database, 2)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def processes(database: Database) -> Iterator[Workers]:
+    made = in_processes(database, 1)
+    yield made
+    made.close()
+
+
+def test_a_call_sees_what_was_committed_before_it(database: Database, workers: Workers) -> None:
+    assert workers.submit(Lane.RUNS, calls.ids).result(IN_TIME) == ["c1"]
+    register_clutch.register(database, ClutchIn(clutch_id="c2"), created_at=AT)
+    assert [workers.submit(lane, calls.ids).result(IN_TIME) for lane in Lane] == [["c1", "c2"]] * 3
+
+
+def test_an_error_of_the_service_comes_back_whole(workers: Workers) -> None:
+    with pytest.raises(InvalidError, match="wrong") as caught:
+        workers.submit(Lane.RUNS, calls.refused).result(IN_TIME)
+    assert (caught.value.total, caught.value.errors[0].row, caught.value.errors[0].value) == (7, 3, "v")
+
+
+def test_calls_of_one_turn_run_one_after_the_other_and_hold_up_no_other(workers: Workers, tmp_path: Path) -> None:
+    log, closed, opened = tmp_path / "log", tmp_path / "closed", tmp_path / "opened"
+    opened.touch()
+    ours = [
+        workers.submit(lane, calls.logged, log, name, closed, turn="c1")
+        for lane, name in ((Lane.RUNS, "a"), (Lane.FILES, "b"), (Lane.RUNS, "c"))
+    ]
+    assert workers.submit(Lane.RUNS, calls.logged, log, "other", opened, turn="c2").result(IN_TIME) == "other"
+    assert not any(call.done() for call in ours)
+    closed.touch()
+    assert [call.result(IN_TIME) for call in ours] == ["a", "b", "c"]
+    assert [mark for mark in log.read_text().split() if "other" not in mark] == ["+a", "-a", "+b", "-b", "+c", "-c"]
+
+
+def test_a_lane_is_free_until_all_of_it_works(workers: Workers, tmp_path: Path) -> None:
+    gate = tmp_path / "gate"
+    assert workers.is_free(Lane.ANSWERS)
+    held = workers.submit(Lane.ANSWERS, calls.logged, tmp_path / "log", "a", gate)
+    assert not workers.is_free(Lane.ANSWERS)
+    assert workers.is_free(Lane.RUNS)
+    gate.touch()
+    held.result(IN_TIME)
+    assert workers.is_free(Lane.ANSWERS)
+
+
+def test_more_than_may_wait_are_refused(workers: Workers, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_MOST_WAITING", 2)
+    gate = tmp_path / "gate"
+    held = [workers.submit(Lane.FILES, calls.logged, tmp_path / "log", name, gate) for name in "ab"]
+    with pytest.raises(BusyError, match="2 requests"):
+        workers.submit(Lane.FILES, calls.ids)
+    assert workers.submit(Lane.RUNS, calls.ids).result(IN_TIME) == ["c1"]
+    gate.touch()
+    assert [call.result(IN_TIME) for call in held] == ["a", "b"]
+    assert workers.submit(Lane.FILES, calls.ids).result(IN_TIME) == ["c1"]
+
+
+def test_both_kinds_take_in_the_same_runs_alike(tmp_path: Path) -> None:
+    receipts = []
+    for name, make in (("threads", in_threads), ("processes", lambda opened: in_processes(opened, 2))):
+        database = open_database(f"sqlite:///{tmp_path / name}.db")
+        register_clutch.register(database, ClutchIn(clutch_id="c1"), created_at=AT)
+        made = make(database)
+        bodies = [to_json(stationary(1000.0 * number, run_id=f"r{number}")) for number in range(4)]
+        taken_in = [
+            made.submit(Lane.RUNS, ingest_posted, "c1", partial(read_run, body), AT, turn="c1") for body in bodies
+        ]
+        receipts.append([call.result(IN_TIME) for call in taken_in])
+        made.close()
+        database.close()
+    assert receipts[0] == receipts[1]
+
+
+def test_a_process_that_ends_is_replaced_and_its_call_made_once_more(processes: Workers, tmp_path: Path) -> None:
+    assert processes.submit(Lane.RUNS, calls.dies, tmp_path / "once", 1).result(IN_TIME) == "alive"
+    with pytest.raises(BusyError, match="has ended"):
+        processes.submit(Lane.RUNS, calls.dies, tmp_path / "twice", 2).result(IN_TIME)
+    assert processes.submit(Lane.RUNS, calls.ids).result(IN_TIME) == ["c1"]
+
+
+def test_nothing_is_begun_after_the_end(database: Database, tmp_path: Path) -> None:
+    made = in_threads(database)
+    gate = tmp_path / "gate"
+    gate.touch()
+    assert made.submit(Lane.RUNS, calls.logged, tmp_path / "log", "a", gate).result(IN_TIME) == "a"
+    made.close()
+    with pytest.raises(BusyError):
+        made.submit(Lane.RUNS, calls.ids)
+
+
+def _serve(path: str, answer: "multiprocessing.connection.Connection") -> None:
+    """A service with workers that waits to be killed."""
+    made = in_processes(open_database(f"sqlite:///{path}"), 1)
+    answer.send([made.submit(lane, calls.pid).result(IN_TIME) for lane in Lane])
+    signal.pause()
+
+
+def test_workers_end_with_a_service_that_is_killed(database: Database) -> None:
+    ours, theirs = multiprocessing.Pipe()
+    service = multiprocessing.get_context("spawn").Process(target=_serve, args=(str(database.path), theirs))
+    service.start()
+    assert ours.poll(IN_TIME)
+    pids = ours.recv()
+    assert len(set(pids)) == len(Lane)
+    assert service.pid is not None
+    os.kill(service.pid, signal.SIGKILL)
+    service.join(IN_TIME)
+    deadline = time.monotonic() + IN_TIME
+    while any(Path(f"/proc/{pid}").exists() and "Z" not in _state(pid) for pid in pids):
+        assert time.monotonic() < deadline, "a worker outlives its service"
+        time.sleep(0.02)
+
+
+def _state(pid: int) -> str:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except FileNotFoundError:
+        return "Z"

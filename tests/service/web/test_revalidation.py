@@ -1,0 +1,108 @@
+"""Slow answers: waited for where there is none, given as they were while a newer one is made, made once."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from concurrent.futures import Future
+
+import pytest
+
+from service.queries.cache import Answer
+from service.web.revalidation import Made, Revalidation
+
+
+class Worker:
+    """Makes what it is asked for when the test says so."""
+
+    def __init__(self) -> None:
+        self.asked: list[Future[Made]] = []
+
+    def compute(self) -> "Future[Made]":
+        self.asked.append(Future())
+        return self.asked[-1]
+
+    async def gives(self, revision: int, body: bytes) -> None:
+        """Answer the call that waits."""
+        self.asked[-1].set_result((revision, body))
+        await _settled()
+
+
+async def _settled() -> None:
+    for _ in range(10):
+        await asyncio.sleep(0)
+
+
+def run(scenario: Callable[[Revalidation, Worker], Awaitable[None]]) -> None:
+    """The scenario in a loop of its own, with room for two answers of 4 bytes."""
+
+    async def whole() -> None:
+        await asyncio.wait_for(scenario(Revalidation(8), Worker()), 30)
+
+    asyncio.run(whole())
+
+
+def test_the_first_answer_is_waited_for_and_made_once() -> None:
+    async def scenario(kept: Revalidation, worker: Worker) -> None:
+        waiting = [asyncio.create_task(kept.answer("a", 1, worker.compute, wait=0)) for _ in range(3)]
+        await _settled()
+        assert not any(task.done() for task in waiting)
+        await worker.gives(1, b"one")
+        assert {task.result() for task in waiting} == {(1, Answer.of(b"one"))}
+        assert await kept.answer("a", 1, worker.compute, wait=0) == (1, Answer.of(b"one"))
+        assert len(worker.asked) == 1
+        assert kept.held("a", 1) == Answer.of(b"one")
+        assert kept.held("a", 2) is None
+
+    run(scenario)
+
+
+def test_who_does_not_wait_gets_the_last_one_while_the_next_is_made() -> None:
+    async def scenario(kept: Revalidation, worker: Worker) -> None:
+        first = asyncio.create_task(kept.answer("a", 1, worker.compute, wait=0))
+        await _settled()
+        await worker.gives(1, b"one")
+        assert (await first)[0] == 1
+        assert await kept.answer("a", 2, worker.compute, wait=0) == (1, Answer.of(b"one"))
+        assert await kept.answer("a", 3, worker.compute, wait=0.01) == (1, Answer.of(b"one"))
+        patient = asyncio.create_task(kept.answer("a", 3, worker.compute, wait=20))
+        await _settled()
+        assert len(worker.asked) == 2  # for all of them
+        await worker.gives(2, b"two")
+        assert not patient.done()  # a revision came while it was made
+        await worker.gives(3, b"3rd")
+        assert await patient == (3, Answer.of(b"3rd"))
+        assert len(worker.asked) == 3
+
+    run(scenario)
+
+
+def test_what_fails_is_told_to_those_who_wait_and_tried_again() -> None:
+    async def scenario(kept: Revalidation, worker: Worker) -> None:
+        first = asyncio.create_task(kept.answer("a", 1, worker.compute, wait=0))
+        await _settled()
+        worker.asked[-1].set_exception(LookupError("not there"))
+        with pytest.raises(LookupError, match="not there"):
+            await first
+        again = asyncio.create_task(kept.answer("a", 1, worker.compute, wait=0))
+        await _settled()
+        await worker.gives(1, b"one")
+        assert (await again)[0] == 1
+        waiting = asyncio.create_task(kept.answer("a", 2, worker.compute, wait=20))
+        await _settled()
+        worker.asked[-1].set_exception(LookupError("not now"))
+        with pytest.raises(LookupError, match="not now"):
+            await waiting
+        assert await kept.answer("a", 2, worker.compute, wait=0) == (1, Answer.of(b"one"))
+
+    run(scenario)
+
+
+def test_the_least_lately_asked_for_goes_first() -> None:
+    async def scenario(kept: Revalidation, worker: Worker) -> None:
+        for name in "abc":
+            asking = asyncio.create_task(kept.answer(name, 1, worker.compute, wait=0))
+            await _settled()
+            await worker.gives(1, b"four")
+            await asking
+        assert [kept.held(name, 1) is not None for name in "abc"] == [False, True, True]
+
+    run(scenario)

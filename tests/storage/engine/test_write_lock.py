@@ -1,0 +1,105 @@
+"""The lock beside the file: one writer among all threads and processes, and commits that pass readers by."""
+
+import multiprocessing
+import multiprocessing.connection
+import os
+import signal
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from storage.engine.database import Database, open_database
+from storage.engine.errors import DatabaseBusy, StorageUnavailable
+from storage.engine.write_lock import WriteLock
+
+IN_TIME = 60.0
+_SPAWN = multiprocessing.get_context("spawn")
+
+
+def _hold(path: str, say: "multiprocessing.connection.Connection") -> None:
+    with WriteLock(Path(path), IN_TIME).held():
+        say.send("held")
+        say.recv()
+
+
+def _count(path: str, counter: str, times: int) -> None:
+    """Read, wait a moment and write a number: two at once would lose steps."""
+    lock = WriteLock(Path(path), IN_TIME)
+    for _ in range(times):
+        with lock.held():
+            number = int(Path(counter).read_text())
+            time.sleep(0.0005)
+            Path(counter).write_text(str(number + 1))
+
+
+def test_processes_and_threads_take_it_one_at_a_time(tmp_path: Path) -> None:
+    path, counter = tmp_path / "a.db", tmp_path / "counter"
+    counter.write_text("0")
+    others = [_SPAWN.Process(target=_count, args=(str(path), str(counter), 60)) for _ in range(2)]
+    for other in others:
+        other.start()
+    lock = WriteLock(path, IN_TIME)
+
+    def count() -> None:
+        for _ in range(60):
+            with lock.held():
+                number = int(counter.read_text())
+                time.sleep(0.0005)
+                counter.write_text(str(number + 1))
+
+    with ThreadPoolExecutor(2) as pool:
+        for done in [pool.submit(count) for _ in range(2)]:
+            done.result(IN_TIME)
+    for other in others:
+        other.join(IN_TIME)
+        assert other.exitcode == 0
+    assert counter.read_text() == "240"
+
+
+def test_who_does_not_get_it_in_time_is_told_and_a_kill_frees_it(tmp_path: Path) -> None:
+    ours, theirs = multiprocessing.Pipe()
+    other = _SPAWN.Process(target=_hold, args=(str(tmp_path / "a.db"), theirs))
+    other.start()
+    assert ours.poll(IN_TIME)
+    assert ours.recv() == "held"
+    impatient = WriteLock(tmp_path / "a.db", 0.05)
+    with pytest.raises(DatabaseBusy, match="another process"), impatient.held():
+        pytest.fail("two writers at once")
+    assert other.pid is not None
+    os.kill(other.pid, signal.SIGKILL)
+    other.join(IN_TIME)
+    with impatient.held():
+        pass
+
+
+def test_a_lock_that_cannot_be_made_is_no_write(tmp_path: Path) -> None:
+    with pytest.raises(StorageUnavailable, match="lock"), WriteLock(tmp_path / "nowhere" / "a.db", 0.05).held():
+        pytest.fail("written without the lock")
+
+
+def test_an_exception_inside_frees_it(tmp_path: Path) -> None:
+    lock = WriteLock(tmp_path / "a.db", 0.05)
+    with pytest.raises(RuntimeError, match="inside"), lock.held():
+        raise RuntimeError("inside")
+    with lock.held():
+        pass
+    lock.close()
+    with lock.held():  # a file that was closed is opened again
+        pass
+
+
+def test_a_commit_waits_for_no_reader_and_no_reader_for_a_commit(database: Database) -> None:
+    other = open_database(f"sqlite:///{database.path}", lock_timeout=0.05)
+    count = "SELECT count(*) FROM clutch"
+    with other.reading() as reader:  # open all the while
+        assert reader.exec_driver_sql(count).scalar_one() == 0
+        with database.writing() as connection:
+            connection.exec_driver_sql("INSERT INTO clutch VALUES ('a', '{}', '', '', 0, 0.0, '{}')")
+            with other.reading() as second:  # begun while the transaction is
+                assert second.exec_driver_sql(count).scalar_one() == 0
+        assert reader.exec_driver_sql(count).scalar_one() == 0
+        with other.reading() as third:
+            assert third.exec_driver_sql(count).scalar_one() == 1
+    other.close()
