@@ -5,6 +5,8 @@
 # make score   how good the prognosis is, on simulated lives: the tables of docs/prognosis.md  (SEED= SIZE= PARTS= ARGS=--write)
 # make rivals  the same beside other packages, in an environment of their own                (SEED= SIZE=)
 # make blind   hides effects and wants them found: the table of docs/diagnosis.md      (SEED= SIZE=small|full ONLY= ARGS=)
+# make load     rigs and clients against a running service, what they wait and what is lost: a table of docs/benchmarks.md
+#              (ARGS="--seconds 60 --no-raw"); a few minutes, on a machine that does nothing else
 # make real    what is said of real measurements; make benchmark: how long things take; make picture: README's pictures;
 #              make figures: the figures of docs/
 # make architecture  the picture, the ways and the examples of docs/architecture.md, from the code
@@ -19,7 +21,7 @@ JAVASCRIPT := tests/javascript/node_modules
 LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --exclude-newer "7 days" \
 	--custom-compile-command "make lock"
 
-.PHONY: demo test check lowest benchmark real figures architecture blind score rivals picture lock clean
+.PHONY: demo test check lowest benchmark load real figures architecture blind score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
@@ -50,6 +52,9 @@ picture: $(VENV)/.tests
 
 benchmark: $(VENV)/.tests
 	$(BIN)/python -m tests.benchmarks $(ARGS)
+
+load: $(VENV)/.tests
+	$(BIN)/python -m tests.load $(ARGS)
 
 real: $(VENV)/.tests
 	$(BIN)/python -m tests.real $(ARGS)

@@ -37,6 +37,15 @@ def processor_seconds(pid: int) -> float:
     return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
 
 
+def family_seconds(pid: int) -> float:
+    """Time of the processor that a process and all that it has started have taken, the ended that it waited for too."""
+    total = 0.0
+    for number in family(pid):
+        with suppress(FileNotFoundError, ProcessLookupError):  # it has just ended
+            total += processor_seconds(number)
+    return total
+
+
 def added(pid: int, work: Callable[[], object], every: float = 0.02) -> int:
     """By how many bytes a process and its children grow at most while some work is being done; looked at `every` s."""
     rest, seen, done = held(pid), [0], threading.Event()

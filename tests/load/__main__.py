@@ -38,7 +38,8 @@ _REPLAYED = 2
 class Options:
     """The load's size; `interval`: seconds from one run of a rig to its next, at least.
 
-    `tests` in a life, `samples` of a raw file and `states` of the diagnosed clutch are fewer where a test asks for it.
+    Where a test asks for it, `tests` in a life, `samples` of a raw file and `states` of the diagnosed clutch are fewer, and
+    services are forked off a loaded process (`loaded`).
     """
 
     seconds: float = 180.0
@@ -50,6 +51,7 @@ class Options:
     tests: int = TESTS
     samples: int = SAMPLES
     states: int = STATES
+    loaded: bool = False
 
 
 def run(options: Options, folder: Path) -> Loaded:
@@ -63,13 +65,12 @@ def run(options: Options, folder: Path) -> Loaded:
         )
         for number in range(options.rigs)
     ]
-    database = folder / "load.db"
-    with serving(database) as server:
+    with serving(folder / "load.db", loaded=options.loaded) as server:
         with httpx2.Client(base_url=server.url, timeout=120) as http:
             post_life(http, DIAGNOSED, options.states, WHOLE)
         with _all_kept():
             before = Processor.since_start(server.pid)
-            field, noted = asyncio.run(_loaded(options, server, database, lives))
+            field, noted = asyncio.run(_loaded(options, server, lives))
             processor = Processor.since_start(server.pid).minus(before)
         return Loaded(
             seconds=options.seconds,
@@ -77,7 +78,7 @@ def run(options: Options, folder: Path) -> Loaded:
             counts=field.counts,
             beside=noted,
             processor=processor,
-            losses=_wrong(field, server, database, folder),
+            losses=_wrong(field, server, folder),
         )
 
 
@@ -92,7 +93,7 @@ def _all_kept() -> Iterator[None]:
         gc.unfreeze()
 
 
-async def _loaded(options: Options, server: Server, database: Path, lives: Sequence[SentLife]) -> tuple[Field, Beside]:
+async def _loaded(options: Options, server: Server, lives: Sequence[SentLife]) -> tuple[Field, Beside]:
     begin = asyncio.get_running_loop().time() + 0.5
     end = begin + options.seconds
     field = Field(
@@ -109,14 +110,14 @@ async def _loaded(options: Options, server: Server, database: Path, lives: Seque
     await asyncio.gather(
         *field.tasks(),
         beside.diagnose(server.port, DIAGNOSED, end, noted),
-        beside.refresh_fleets(database, begin, end, noted),
+        beside.refresh_fleets(server.database, begin, end, noted),
         beside.watch(server.pid, begin, end, noted),
     )
-    await beside.refresh_once(database, noted)  # all clutches under what is known at the end
+    await beside.refresh_once(server.database, noted)  # all clutches under what is known at the end
     return field, noted
 
 
-def _wrong(field: Field, server: Server, database: Path, folder: Path) -> list[str]:
+def _wrong(field: Field, server: Server, folder: Path) -> list[str]:
     """What is lost, and what calm computing gives otherwise: of the first clutch of some rigs."""
     counts = field.counts
     first = [(number, f"load-{number}-000") for number in range(field.rigs)]
@@ -125,8 +126,8 @@ def _wrong(field: Field, server: Server, database: Path, folder: Path) -> list[s
     taught = [clutch_id for clutch_id in posted if clutch_id not in alone][:_REPLAYED]
     asked_for: tuple[Callable[[], list[str]], ...] = (
         lambda: checks.losses(server.port, counts),
-        lambda: checks.calm_differences(folder, server.port, alone, counts.acknowledged),
-        lambda: checks.replay_differences(database, server.port, taught),
+        lambda: checks.calm_differences(folder, server, alone, counts.acknowledged),
+        lambda: checks.replay_differences(server, taught),
     )
     most = min(ALONE, field.rigs)
     wrong = [] if len(alone) == most else [f"runs of {len(alone)} clutches to be posted calmly, not of {most}"]

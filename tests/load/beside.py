@@ -9,8 +9,8 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tests.benchmarks.memory import family, processor_seconds
-from tests.load.bodies import asked, posted
+from tests.benchmarks.memory import family, family_seconds
+from tests.load.bodies import JSON_TYPE, asked, posted
 from tests.load.exchange import Line
 from tests.load.field import noted
 
@@ -39,7 +39,7 @@ def fleet_refresh(database: Path) -> list[str]:
 async def diagnose(port: int, clutch_id: str, end: float, beside: Beside) -> None:
     """Have a clutch diagnosed, again and again, until the end."""
     line, loop = Line(port), asyncio.get_running_loop()
-    question = posted(f"/v1/clutches/{clutch_id}/diagnoses", b"{}").replace(b"\r\n", b"\r\nPrefer: wait=0\r\n", 1)
+    question = posted(f"/v1/clutches/{clutch_id}/diagnoses", b"{}", JSON_TYPE, "Prefer: wait=0")
     while loop.time() < end:
         started = loop.time()
         answer = await noted(lambda: line.ask(question), "POST diagnoses", beside.problems)
@@ -115,7 +115,7 @@ class Processor:
     def since_start(cls, pid: int) -> "Processor":
         """Since each began, and the machine; only differences mean anything."""
         own, children = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-        service = sum(processor_seconds(each) for each in family(pid))
+        service = family_seconds(pid)
         generator, refreshes = own.ru_utime + own.ru_stime, children.ru_utime + children.ru_stime
         others = busy_seconds() - service - generator - refreshes
         return cls(generator=generator, service=service, refreshes=refreshes, others=others)

@@ -16,7 +16,7 @@ from models.rig.simulated_runs import RunKind, SimulatedRun
 from models.rig.stationary import PLATEAU_DURATION, Sensor
 from models.rig.truth import SimulatedClutch
 from service.run_files.record_writer import RecordFormat, write_record
-from service.run_files.simulated import simulated_body, simulated_channels, simulated_head
+from service.run_files.simulated import simulated_body, simulated_channels, simulated_clutch_body, simulated_head
 
 #: Stationary tests in a life; of these, every tenth has a dynamic test after it, and in the raw variant every fifth is a
 #: recorder's file: about one post in ten, since a duty block stands before most tests.
@@ -58,12 +58,10 @@ class SentLife:
     posts: tuple[Post, ...] = field(repr=False)
 
 
-def posted(address: str, body: bytes, content_type: str = JSON_TYPE) -> bytes:
+def posted(address: str, body: bytes, content_type: str = JSON_TYPE, *headers: str) -> bytes:
     """The bytes of a POST."""
-    head = (
-        f"POST {address} HTTP/1.1\r\nHost: localhost\r\nContent-Type: {content_type}\r\nContent-Length: {len(body)}\r\n"
-    )
-    return head.encode() + b"\r\n" + body
+    lines = (f"POST {address} HTTP/1.1", "Host: localhost", f"Content-Type: {content_type}", *headers)
+    return "\r\n".join((*lines, f"Content-Length: {len(body)}", "", "")).encode() + body
 
 
 def asked(address: str, *headers: str) -> bytes:
@@ -73,8 +71,7 @@ def asked(address: str, *headers: str) -> bytes:
 
 def registration(clutch_id: str, fluid: str = "ATF") -> bytes:
     """The bytes that register a simulated clutch. Clutches of a fluid are a fleet of their own."""
-    record = {"clutch_id": clutch_id, "origin": "simulated", "fluid": fluid}
-    return posted("/v1/clutches", json.dumps(record).encode())
+    return posted("/v1/clutches", json.dumps(simulated_clutch_body(clutch_id) | {"fluid": fluid}).encode())
 
 
 def life(seed: int, *, raw: Path | None = None, tests: int = TESTS, samples: int = SAMPLES) -> SentLife:

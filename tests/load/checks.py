@@ -10,7 +10,7 @@ from typing import Any
 from tests.load.bodies import asked, registration
 from tests.load.exchange import Answer, Blocking, LostError
 from tests.load.field import Acknowledged, Counts, reason
-from tests.support import serving
+from tests.support import Server, serving
 
 
 def stored_hashes(port: int, clutch_id: str) -> dict[str, str]:
@@ -58,15 +58,15 @@ def lost_of(
 
 
 def calm_differences(
-    folder: Path, port: int, sample: Mapping[str, str], acknowledged: Mapping[str, Sequence[Acknowledged]]
+    folder: Path, loaded: Server, sample: Mapping[str, str], acknowledged: Mapping[str, Sequence[Acknowledged]]
 ) -> list[str]:
     """Differences from a fresh service that is sent the same runs one by one: hashes and remaining life.
 
     `sample`: the fluid by clutch_id.
     """
     wrong = []
-    loaded = Blocking(port)
-    with serving(folder / "calm.db") as server:
+    line = Blocking(loaded.port)
+    with serving(folder / "calm.db", loaded=loaded.loaded) as server:
         calm = Blocking(server.port)
         for clutch_id, fluid in sample.items():
             _good(calm.ask(registration(clutch_id, fluid)))
@@ -74,23 +74,31 @@ def calm_differences(
                 receipt = json.loads(_good(calm.ask(run.post.request(clutch_id))).body)
                 if receipt["content_sha256"] != run.sha256:
                     wrong.append(f"{clutch_id}: {run.post.run_id} posted calmly has another sha256")
-            if remaining_life(calm, clutch_id) != remaining_life(loaded, clutch_id):
+            if remaining_life(calm, clutch_id) != remaining_life(line, clutch_id):
                 wrong.append(f"{clutch_id}: the remaining life is not that of the same runs posted calmly")
         calm.close()
-    loaded.close()
+    line.close()
     return wrong
 
 
-def replay_differences(database: Path, port: int, clutch_ids: Sequence[str]) -> list[str]:
+def replay_differences(loaded: Server, clutch_ids: Sequence[str]) -> list[str]:
     """Clutches that a fleet teaches: whose remaining life a replay of the raw runs changes."""
-    line = Blocking(port)
+    line = Blocking(loaded.port)
     before = {clutch_id: remaining_life(line, clutch_id) for clutch_id in clutch_ids}
     line.close()
-    command = [sys.executable, "-m", "service.cli.main", "replay", *clutch_ids, "--database", f"sqlite:///{database}"]
+    command = [
+        sys.executable,
+        "-m",
+        "service.cli.main",
+        "replay",
+        *clutch_ids,
+        "--database",
+        f"sqlite:///{loaded.database}",
+    ]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         return [f"replay ended with {done.returncode}: {done.stderr[-160:]}"]
-    line = Blocking(port)
+    line = Blocking(loaded.port)
     wrong = [
         f"{clutch_id}: a replay changes the remaining life"
         for clutch_id in clutch_ids

@@ -81,7 +81,12 @@ class Field:
         rng = random.Random(self.seed)  # noqa: S311  (no secret)
         return [
             *(self._rig(number) for number in range(self.rigs)),
-            *(self._client(number, rng.random()) for number in range(self.clients)),
+            *(
+                self._client(number, phase, part)
+                for number in range(self.clients)
+                for phase in (rng.random(),)
+                for part in range(len(ROUTES))
+            ),
             self._livez(),
         ]
 
@@ -133,13 +138,14 @@ class Field:
 
     # --- clients ---
 
-    async def _client(self, number: int, phase: float) -> None:
-        """A dashboard, which names the answer that it has, or a script, which does not."""
-        line, tags = Line(self.port), dict[str, str]()
+    async def _client(self, number: int, phase: float, part: int) -> None:
+        """What a client asks of one route, on a connection of its own as a browser does.
+
+        A dashboard names the answer that it has, a script does not.
+        """
+        line, tags, route = Line(self.port), dict[str, str](), ROUTES[part]
         dashboard = number % 2 == 0
-        for number_asked in itertools.count():
-            tick, part = divmod(number_asked, len(ROUTES))
-            route = ROUTES[part]
+        for tick in itertools.count():
             planned = self.begin + phase + tick + part / len(ROUTES)
             if planned >= self.end:
                 return

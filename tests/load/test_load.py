@@ -75,7 +75,9 @@ def test_a_life_is_whole_and_the_same_for_a_seed(tmp_path: Path) -> None:
 
 
 def test_a_request_says_how_long_it_is() -> None:
-    assert posted("/x", b"{}", "text/csv").endswith(b"Content-Type: text/csv\r\nContent-Length: 2\r\n\r\n{}")
+    assert posted("/x", b"{}", "text/csv", "Prefer: x").endswith(
+        b"Content-Type: text/csv\r\nPrefer: x\r\nContent-Length: 2\r\n\r\n{}"
+    )
     assert asked("/x", 'If-None-Match: "a"') == b'GET /x HTTP/1.1\r\nHost: localhost\r\nIf-None-Match: "a"\r\n\r\n'
 
 
@@ -118,31 +120,29 @@ def test_a_lost_connection_is_an_error_and_the_next_question_opens_another() -> 
 
 
 def test_a_service_that_stands_is_charged_for_all_that_was_to_be_asked() -> None:
-    """One slow answer keeps a client's connection: its next questions are late by what is left of it."""
+    """One slow answer keeps a client's connection: its next question is late by what is left of it."""
 
-    async def main() -> Field:
+    async def main() -> list[float]:
         loop = asyncio.get_running_loop()
         begin = loop.time()
         answered: list[bytes] = []
 
         async def answer(head: bytes) -> bytes:
             if not answered:
-                await asyncio.sleep(begin + 1.0 - loop.time())  # it stands until then
+                await asyncio.sleep(begin + 1.5 - loop.time())  # it stands until then
             answered.append(head)
             return response("200 OK")
 
         server, port = await stub(answer)
-        field = field_on(port, begin, 1.0)
+        field = field_on(port, begin, 2.0)
         field.rigs, field.on_rigs = 1, ["c"]
-        await field._client(0, 0.0)
+        await field._client(0, 0.0, 0)
         server.close()
-        return field
+        return field.counts.gets[ROUTES[0]]
 
-    gets = asyncio.run(main()).counts.gets
-    assert set(gets) == set(ROUTES)
-    for part, route in enumerate(ROUTES):
-        assert len(gets[route]) == 1
-        assert gets[route][0] >= 1.0 - part / len(ROUTES) - 1e-6
+    first, second = asyncio.run(main())
+    assert first >= 1.5 - 1e-6
+    assert second >= 0.5 - 1e-6
 
 
 def test_a_dashboard_names_the_answer_that_it_has_and_a_script_does_not() -> None:
@@ -156,13 +156,19 @@ def test_a_dashboard_names_the_answer_that_it_has_and_a_script_does_not() -> Non
         server, port = await stub(answer)
         field = field_on(port, asyncio.get_running_loop().time() - 2.0, 2.0)  # all of it is due
         field.rigs, field.on_rigs = 1, ["c"]
-        await field._client(number, 0.0)
+        for part in range(len(ROUTES)):
+            await field._client(number, 0.0, part)
         server.close()
         return heads
 
     dashboard, script = asyncio.run(main(0)), asyncio.run(main(1))
-    assert len(dashboard) == len(script) == 2 * len(ROUTES)
-    assert [b'If-None-Match: "7"' in head for head in dashboard] == [False] * 4 + [True] * 4
+    assert {head.split()[1] for head in script} == {
+        b"/v1/clutches/c/remaining-useful-life",
+        b"/v1/clutches/c/degradation",
+        b"/v1/clutches",
+        b"/v1/clutches/c/runs",
+    }
+    assert [b'If-None-Match: "7"' in head for head in dashboard] == [False, True] * len(ROUTES)
     assert not any(b"If-None-Match" in head for head in script)
 
 
@@ -247,7 +253,8 @@ def test_each_demand_can_fail_by_itself() -> None:
 
 
 def test_a_small_load_has_no_error_and_loses_nothing(tmp_path: Path) -> None:
-    options = Options(seconds=4.0, rigs=3, clients=3, raw=True, tests=6, samples=2_000, states=2)
+    # the first test of the first life of this seed is a raw file
+    options = Options(seconds=4.0, rigs=3, clients=3, seed=4, raw=True, tests=6, samples=2_000, states=2, loaded=True)
     loaded = run(options, tmp_path)
     assert not loaded.problems
     assert list(loaded.losses) == []
