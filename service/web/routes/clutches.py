@@ -97,9 +97,9 @@ async def read_clutch(request: Request, context: Reader, clutch_id: ClutchId) ->
 )
 async def edit_clutch(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
     """Edit a clutch's record, each given field as a whole, and archive it or bring it back; results are computed anew."""
-    asked = checked(ClutchEdit, await json_body(request))
-    made = partial(edit, archived=asked.archived, reason=asked.reason, by=name_of_caller(request), at=now())
-    await asyncio.wrap_future(context.workers.submit(Lane.RUNS, made, clutch_id, asked.fields(), turn=clutch_id))
+    wanted = checked(ClutchEdit, await json_body(request))
+    made = partial(edit, archived=wanted.archived, reason=wanted.reason, by=name_of_caller(request), at=now())
+    await asyncio.wrap_future(context.workers.submit(Lane.RUNS, made, clutch_id, wanted.fields(), turn=clutch_id))
     clutch = await run_in_threadpool(clutch_list.look_up, context.database, clutch_id)
     return Response(content=to_json(clutch), media_type=JSON_TYPE)
 

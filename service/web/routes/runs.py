@@ -119,9 +119,9 @@ async def read_run_with_channels(
 )
 async def correct_run(request: Request, context: Ingester, clutch_id: ClutchId, run_id: RunId) -> Response:
     """Correct a run's cycles; it counts where it is plausible there. What was sent stays stored."""
-    asked = checked(Correction, await json_body(request))
+    wanted = checked(Correction, await json_body(request))
     return await _changed(
-        change_run.correct, request, context, clutch_id, run_id, cycles=asked.cycles, reason=asked.reason
+        change_run.correct, request, context, clutch_id, run_id, cycles=wanted.cycles, reason=wanted.reason
     )
 
 
@@ -133,8 +133,8 @@ async def correct_run(request: Request, context: Ingester, clutch_id: ClutchId, 
 )
 async def withdraw_run(request: Request, context: Ingester, clutch_id: ClutchId, run_id: RunId) -> Response:
     """Take a run out of the clutch's history. It stays stored and listed."""
-    asked = checked(Withdrawal, await json_body(request))
-    return await _changed(change_run.withdraw, request, context, clutch_id, run_id, reason=asked.reason)
+    wanted = checked(Withdrawal, await json_body(request))
+    return await _changed(change_run.withdraw, request, context, clutch_id, run_id, reason=wanted.reason)
 
 
 @router.post(
@@ -145,8 +145,8 @@ async def withdraw_run(request: Request, context: Ingester, clutch_id: ClutchId,
 )
 async def restore_run(request: Request, context: Ingester, clutch_id: ClutchId, run_id: RunId) -> Response:
     """Take a withdrawal back: the run is accepted or held as it was before."""
-    asked = checked(Withdrawal, await json_body(request))
-    return await _changed(change_run.restore, request, context, clutch_id, run_id, reason=asked.reason)
+    wanted = checked(Withdrawal, await json_body(request))
+    return await _changed(change_run.restore, request, context, clutch_id, run_id, reason=wanted.reason)
 
 
 @router.post(
@@ -157,8 +157,8 @@ async def restore_run(request: Request, context: Ingester, clutch_id: ClutchId, 
 )
 async def confirm_run(request: Request, context: Ingester, clutch_id: ClutchId, run_id: RunId) -> Response:
     """Accept a held run as it was sent."""
-    asked = checked(Confirmation, await json_body(request))
-    return await _changed(change_run.confirm, request, context, clutch_id, run_id, reason=asked.reason)
+    wanted = checked(Confirmation, await json_body(request))
+    return await _changed(change_run.confirm, request, context, clutch_id, run_id, reason=wanted.reason)
 
 
 async def _changed(
@@ -167,9 +167,9 @@ async def _changed(
     context: Context,
     clutch_id: str,
     run_id: str,
-    **asked: Any,
+    **wanted: Any,
 ) -> Response:
     """The receipt after a change."""
-    made = partial(change, **asked, by=name_of_caller(request), at=now())
+    made = partial(change, **wanted, by=name_of_caller(request), at=now())
     changing = context.workers.submit(Lane.RUNS, made, clutch_id, run_id, turn=clutch_id)
     return Response(content=to_text(await asyncio.wrap_future(changing)), media_type=JSON_TYPE)
