@@ -23,14 +23,16 @@ _MOST_WAITING = 256
 
 
 class Lane(Enum):
-    """What waits for what: runs that are taken in, files and raw records, and answers that are computed.
+    """What waits for what: runs that are taken in, answers that somebody waits for, files and raw records, and answers that
+    are made anew while the last ones are given.
 
     The values are by how much a lane's processes yield to the one that answers [nice]. Chosen by `make load`.
     """
 
     RUNS = 1
+    ANSWERS = 3
     FILES = 5
-    ANSWERS = 10
+    RENEWALS = 10
 
 
 @dataclass(slots=True)
@@ -80,10 +82,10 @@ class Workers:
         self._start(task)
         return task.answer
 
-    def is_free(self, lane: Lane) -> bool:
-        """Whether a call would begin at once."""
+    def are_idle(self) -> bool:
+        """Whether no call waits or runs in any lane."""
         with self._lock:
-            return self._calls[lane] < self._sizes[lane]
+            return not any(self._calls.values())
 
     def warm(self) -> None:
         """Have the processes that take in runs started and loaded; waits for nothing."""
@@ -147,10 +149,10 @@ def _error(ended: "Future[Any]") -> BaseException | None:
 
 
 def in_processes(database: Database, processes: int) -> Workers:
-    """Workers in processes of their own: `processes` that take in runs, one for files, one for answers."""
+    """Workers in processes of their own: `processes` that take in runs, one for each other lane."""
     context = multiprocessing.get_context("forkserver")  # loads the libraries once, for all that are forked off it
     context.set_forkserver_preload([worker.__name__, *worker.LOADED_EARLY])
-    sizes = {Lane.RUNS: processes, Lane.FILES: 1, Lane.ANSWERS: 1}
+    sizes = dict.fromkeys(Lane, 1) | {Lane.RUNS: processes}
     url = f"sqlite:///{database.path.absolute()}"
 
     def make(lane: Lane) -> Executor:
@@ -163,7 +165,7 @@ def in_processes(database: Database, processes: int) -> Workers:
 
 def in_threads(database: Database) -> Workers:
     """The same calls in threads of this process."""
-    sizes = {Lane.RUNS: 2, Lane.FILES: 1, Lane.ANSWERS: 1}
+    sizes = dict.fromkeys(Lane, 1) | {Lane.RUNS: 2}
 
     def make(lane: Lane) -> Executor:
         return ThreadPoolExecutor(sizes[lane], thread_name_prefix=lane.name.lower())

@@ -37,8 +37,8 @@ class Event:
 
     `moment` is when it was made [s], `dated` whether the rig said so, `arrived` its place in the order of arrival, infinite
     while it comes in. A stationary test has the range of its speeds [rad/s], and mean COF with its deviation by pressure
-    [Pa] where its curves determine it; `duty` is the block that ends with the run, `shift` an event that may have shifted the
-    level.
+    [Pa] where its curves determine it; `duty` is the block that ends with the run, `shift` an event that may have shifted
+    the level.
     """
 
     run_id: str

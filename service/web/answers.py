@@ -141,10 +141,11 @@ async def _computed(
     prefer: str | None,
 ) -> tuple[int, Answer]:
     preferred = preferred_wait(prefer)
-    wait = preferred if preferred is not None else LONGEST_WAIT_SECONDS if context.workers.is_free(Lane.ANSWERS) else 0
+    wait = preferred if preferred is not None else LONGEST_WAIT_SECONDS if context.workers.are_idle() else 0
 
-    def compute() -> "Future[Made]":
-        return context.workers.submit(Lane.ANSWERS, revision_and_json, query, clutch_id, arguments)
+    def compute(waited_for: bool) -> "Future[Made]":
+        lane = Lane.ANSWERS if waited_for else Lane.RENEWALS
+        return context.workers.submit(lane, revision_and_json, query, clutch_id, arguments)
 
     key = (clutch_id, _name(query), *arguments)
     return await context.revalidation.answer(key, _revision(context, clutch_id), compute, wait=wait)

@@ -1,7 +1,7 @@
 """Answers that take a second to compute: made by a worker, once, and given as they were while a newer one is made.
 
-The directive stale-while-revalidate of RFC 5861, decided by the service: where nobody waits for a worker, who asks waits
-for the newest answer; where the workers have more to do, the last one is given at once and its revision says of when it is.
+The directive stale-while-revalidate of RFC 5861, decided by the service: where the workers are idle, who asks waits for
+the newest answer; where they have more to do, the last one is given at once and its revision says of when it is.
 `Prefer: wait=SECONDS` waits in any case.
 """
 
@@ -12,10 +12,12 @@ from collections.abc import Callable, Hashable
 from concurrent.futures import Future
 from dataclasses import dataclass
 
+from service.errors import BusyError
 from service.queries.cache import Answer
 
 #: What a worker returns: the revision that it computed the answer from, and the answer's bytes.
 Made = tuple[int, bytes]
+Compute = Callable[[bool], "Future[Made]"]
 
 _log = logging.getLogger("clutchlife")
 
@@ -41,20 +43,26 @@ class Revalidation:
         entry = self._entries.get(key)
         return entry.answer if entry is not None and entry.revision == revision else None
 
-    async def answer(
-        self, key: Hashable, revision: int, compute: Callable[[], "Future[Made]"], *, wait: float
-    ) -> tuple[int, Answer]:
+    async def answer(self, key: Hashable, revision: int, compute: Compute, *, wait: float) -> tuple[int, Answer]:
         """The answer at `revision` or later, or the last one where it is not there within `wait` [s]; and its revision.
 
-        Where none was ever made, it is waited for. Raises what `compute` raises to those who wait.
+        Where none was ever made, it is waited for. `compute` is told whether who asks waits; what it raises is raised to
+        those who do.
         """
-        entry = self._entries.setdefault(key, _Entry())
-        self._entries.move_to_end(key)
+        entry = self._entries.get(key, _Entry())
         deadline = asyncio.get_running_loop().time() + wait
         while entry.answer is None or entry.revision < revision:
             making = entry.making
             if making is None:
-                making = entry.making = asyncio.create_task(self._make(key, entry, compute))
+                waits = entry.answer is None or wait > 0
+                try:
+                    computing = compute(waits)
+                except BusyError:
+                    if waits:
+                        raise
+                    break
+                self._entries[key] = entry
+                making = entry.making = asyncio.create_task(self._make(key, entry, computing))
                 making.add_done_callback(_logged)
             left = deadline - asyncio.get_running_loop().time()
             if entry.answer is None:
@@ -63,11 +71,13 @@ class Revalidation:
                 break
             else:
                 making.result()
+        self._entries[key] = entry
+        self._entries.move_to_end(key)
         return entry.revision, entry.answer
 
-    async def _make(self, key: Hashable, entry: _Entry, compute: Callable[[], "Future[Made]"]) -> None:
+    async def _make(self, key: Hashable, entry: _Entry, computing: "Future[Made]") -> None:
         try:
-            revision, body = await asyncio.wrap_future(compute())
+            revision, body = await asyncio.wrap_future(computing)
         except BaseException:
             if entry.answer is None:
                 self._entries.pop(key, None)

@@ -52,7 +52,7 @@ def processes(database: Database) -> Iterator[Workers]:
 def test_a_call_sees_what_was_committed_before_it(database: Database, workers: Workers) -> None:
     assert workers.submit(Lane.RUNS, calls.ids).result(IN_TIME) == ["c1"]
     register_clutch.register(database, ClutchIn(clutch_id="c2"), created_at=AT)
-    assert [workers.submit(lane, calls.ids).result(IN_TIME) for lane in Lane] == [["c1", "c2"]] * 3
+    assert [workers.submit(lane, calls.ids).result(IN_TIME) for lane in Lane] == [["c1", "c2"]] * len(Lane)
 
 
 def test_an_error_of_the_service_comes_back_whole(workers: Workers) -> None:
@@ -75,15 +75,14 @@ def test_calls_of_one_turn_run_one_after_the_other_and_hold_up_no_other(workers:
     assert [mark for mark in log.read_text().split() if "other" not in mark] == ["+a", "-a", "+b", "-b", "+c", "-c"]
 
 
-def test_a_lane_is_free_until_all_of_it_works(workers: Workers, tmp_path: Path) -> None:
+def test_they_are_idle_until_one_works(workers: Workers, tmp_path: Path) -> None:
     gate = tmp_path / "gate"
-    assert workers.is_free(Lane.ANSWERS)
+    assert workers.are_idle()
     held = workers.submit(Lane.ANSWERS, calls.logged, tmp_path / "log", "a", gate)
-    assert not workers.is_free(Lane.ANSWERS)
-    assert workers.is_free(Lane.RUNS)
+    assert not workers.are_idle()
     gate.touch()
     held.result(IN_TIME)
-    assert workers.is_free(Lane.ANSWERS)
+    assert workers.are_idle()
 
 
 def test_more_than_may_wait_are_refused(workers: Workers, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,7 +105,7 @@ def test_both_kinds_take_in_the_same_runs_alike(tmp_path: Path) -> None:
         made = make(database)
         bodies = [to_json(stationary(1000.0 * number, run_id=f"r{number}")) for number in range(4)]
         taken_in = [
-            made.submit(Lane.RUNS, ingest_posted, "c1", partial(read_run, body), AT, turn="c1") for body in bodies
+            made.submit(Lane.RUNS, ingest_posted, "c1", partial(read_run, body), AT, "local", turn="c1") for body in bodies
         ]
         receipts.append([call.result(IN_TIME) for call in taken_in])
         made.close()
