@@ -51,21 +51,23 @@ class Revalidation:
         """
         entry = self._entries.get(key, _Entry())
         deadline = asyncio.get_running_loop().time() + wait
-        while entry.answer is None or entry.revision < revision:
+        while True:
+            answer = entry.answer
+            if answer is not None and entry.revision >= revision:
+                break
             making = entry.making
             if making is None:
-                waits = entry.answer is None or wait > 0
                 try:
-                    computing = compute(waits)
+                    computing = compute(answer is None or wait > 0)
                 except BusyError:
-                    if waits:
+                    if answer is None or wait > 0:
                         raise
                     break
                 self._entries[key] = entry
                 making = entry.making = asyncio.create_task(self._make(key, entry, computing))
                 making.add_done_callback(_logged)
             left = deadline - asyncio.get_running_loop().time()
-            if entry.answer is None:
+            if answer is None:
                 await asyncio.shield(making)
             elif left <= 0 or not (await asyncio.wait([making], timeout=left))[0]:
                 break
@@ -73,7 +75,7 @@ class Revalidation:
                 making.result()
         self._entries[key] = entry
         self._entries.move_to_end(key)
-        return entry.revision, entry.answer
+        return entry.revision, answer
 
     async def _make(self, key: Hashable, entry: _Entry, computing: "Future[Made]") -> None:
         try:
