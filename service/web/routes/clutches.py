@@ -1,12 +1,11 @@
 """Clutches: register, list worst first, look up."""
 
-import pydantic
 from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
 from service.queries import clutch_list
-from service.run_files.json_run import invalid
+from service.run_files.json_run import read_body
 from service.schemas.clutch import ClutchIn, ClutchOut, ClutchPage
 from service.schemas.parameters import ClutchId
 from service.web.answers import JSON_TYPE, answer, described_body, from_cursor, json_body, now, page, tagged, to_json
@@ -45,10 +44,7 @@ async def register_clutch(request: Request, context: Ingester) -> Response:
 
 
 def _register(context: Context, body: bytes) -> tuple[dict[str, object], bool]:
-    try:
-        clutch = ClutchIn.model_validate_json(body)
-    except pydantic.ValidationError as error:
-        raise invalid(error) from None
+    clutch = read_body(ClutchIn, body)
     new = registration.register(context.database, clutch, created_at=now())
     return clutch_list.look_up(context.database, clutch.clutch_id), new
 

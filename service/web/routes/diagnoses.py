@@ -2,16 +2,14 @@
 
 import asyncio
 import re
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
-import pydantic
 from fastapi import APIRouter, Header, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
 from service.queries import diagnoses, model
-from service.run_files.json_run import invalid
-from service.schemas.base import Schema
+from service.run_files.json_run import read_body
 from service.schemas.diagnosis import DiagnosisIn, DiagnosisOut, DiagnosisPage, ModelIn, ModelOut
 from service.schemas.parameters import ClutchId, DiagnosisId
 from service.web.answers import JSON_TYPE, answer, described_body, from_cursor, json_body, now, page, to_json
@@ -25,7 +23,6 @@ router = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["diagnosis"])
 
 _WAIT = re.compile(r'(?:^|[,;\s])wait\s*=\s*"?(\d{1,9})"?\s*(?:$|[,;])', re.IGNORECASE)
 
-Body = TypeVar("Body", bound=Schema)
 Prefer = Annotated[
     str | None,
     Header(max_length=200, description=f"`wait=SECONDS`: how long to wait for the report; default {WAIT_SECONDS}"),
@@ -41,7 +38,7 @@ Prefer = Annotated[
 )
 async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchId, prefer: Prefer = None) -> Response:
     """Have all runs of the clutch's present life diagnosed. A question while the same runs are being diagnosed joins in."""
-    question = _read(DiagnosisIn, await json_body(request))
+    question = read_body(DiagnosisIn, await json_body(request))
     job = await run_in_threadpool(context.diagnoses.ask, clutch_id, adopt=question.adopt)
     preferred = _WAIT.search(prefer or "")
     wait = WAIT_SECONDS if preferred is None else min(int(preferred[1]), LONGEST_WAIT_SECONDS)
@@ -83,7 +80,7 @@ def read_model(request: Request, context: Reader, clutch_id: ClutchId) -> Respon
 )
 async def put_model(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
     """Adopt what a diagnosis found, or return to the baseline; all is tracked anew before this is answered."""
-    wanted = _read(ModelIn, await json_body(request))
+    wanted = read_body(ModelIn, await json_body(request))
     answered = await run_in_threadpool(_adopt, context, clutch_id, wanted.diagnosis_id)
     return Response(content=to_json(answered), media_type=JSON_TYPE)
 
@@ -91,10 +88,3 @@ async def put_model(request: Request, context: Ingester, clutch_id: ClutchId) ->
 def _adopt(context: Context, clutch_id: str, diagnosis_id: str | None) -> dict[str, Any]:
     adopt_model.adopt(context.database, clutch_id, diagnosis_id, adopted_at=now())
     return model.model(context.database, clutch_id)
-
-
-def _read(schema: type[Body], body: bytes) -> Body:
-    try:
-        return schema.model_validate_json(body)
-    except pydantic.ValidationError as error:
-        raise invalid(error) from None
