@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from service.columns import CHANNELS
 from service.errors import MOST_QUOTED, FieldError, InvalidError
-from service.readers.limits import LONGEST_MAP
+from service.readers.limits import LONGEST_MAP, LONGEST_NAME, LONGEST_TITLE, LONGEST_UNIT
 from service.readers.unit_table import Conversion, conversion, is_unit, spellings
 
 #: Single letters have their meaning in mechanics: capitals count (M is a torque, n a speed, p a pressure, t a time).
@@ -59,8 +59,11 @@ class Taken:
 
 
 def _key(name: str) -> str:
-    """Names that differ in case, blanks, dashes or in ö for oe are one name."""
-    plain = unicodedata.normalize("NFC", name).strip().casefold()
+    """Names that differ in case, blanks, dashes or in ö for oe are one name.
+
+    Composing letters takes time with the square of the length where accents are piled up: only short names are composed.
+    """
+    plain = (unicodedata.normalize("NFC", name) if len(name) <= LONGEST_NAME else name).strip().casefold()
     plain = plain.replace("oel", "öl").replace("ϑ", "theta").replace("ω", "omega")
     return re.sub(r"[\s._\-]+", "_", plain).strip("_")
 
@@ -70,17 +73,23 @@ _BY_KEY |= {name: name for name in CHANNELS}
 _BRACKETED = re.compile(r"(?P<name>[^\[\](){}<>]*)[\[({<](?P<unit>[^\[\](){}<>]*)[\])}>]\s*")
 _PER = re.compile(r"(?P<name>[^/]+)/\s*(?P<unit>.+)")
 _IN = re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>\S.*)")
+_MARK = re.compile(r"[\s_]+")
 
 
 def known_channel(name: str) -> str | None:
     """The public channel that a name stands for, or None."""
     bare = name.strip()
-    return _LETTERS.get(bare) or (_BY_KEY.get(_key(bare)) if len(bare) > 1 else None)
+    return _LETTERS.get(bare) or (_BY_KEY.get(_key(bare)) if 1 < len(bare) <= LONGEST_NAME else None)
 
 
 def header_of(text: str) -> Header:
-    """A column's title -> name and unit: `torque [Nm]`, `torque (Nm)`, `M / Nm`, `Druck in bar`, `speed_rad_s`."""
+    """A column's title -> name and unit: `torque [Nm]`, `torque (Nm)`, `M / Nm`, `Druck in bar`, `speed_rad_s`.
+
+    Raises InvalidError on a text that is too long for a title.
+    """
     title = text.strip()
+    if len(title) > LONGEST_TITLE:
+        raise _long_title(title)
     if known_channel(title):
         return Header(title)
     if match := _BRACKETED.fullmatch(title):
@@ -89,11 +98,17 @@ def header_of(text: str) -> Header:
         match = pattern.fullmatch(title)
         if match and (known_channel(match["name"]) or is_unit(match["unit"])):
             return Header(match["name"].strip(), bare_unit(match["unit"]))
-    for mark in re.finditer(r"[\s_]+", title):
+    for mark in _MARK.finditer(title, max(0, len(title) - LONGEST_UNIT - 1)):
         name, unit = title[: mark.start()], title[mark.end() :]
         if known_channel(name) and is_unit(unit):
             return Header(name, unit)
     return Header(title)
+
+
+def _long_title(title: str) -> InvalidError:
+    shown = title[:MOST_QUOTED]
+    message = f"a column's title must not be longer than {LONGEST_TITLE} characters, got {len(title)}: {shown!r} ..."
+    return InvalidError(message, errors=[FieldError(pointer="", code="title_too_long", message=message, value=shown)])
 
 
 def bare_unit(text: str) -> str | None:

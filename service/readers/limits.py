@@ -4,6 +4,9 @@ from dataclasses import dataclass
 
 #: Bytes of one line of CSV. Chosen; 1,000 columns of 60 characters fit.
 LONGEST_LINE_BYTES = 1 << 16
+#: Characters of a column's title, of a name that may be a channel's, and of a unit that may be known; longer names and units
+#: are unknown. Chosen: three times the longest that is known, for blanks in it, and for a title what no recorder writes.
+LONGEST_TITLE, LONGEST_NAME, LONGEST_UNIT = 1000, 100, 40
 #: Characters of a map of channels. Chosen; no table.
 LONGEST_MAP = 4096
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from models.arrays import FloatArray
 from service.columns import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS
+from service.readers.limits import LONGEST_UNIT
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +90,8 @@ _AS_WRITTEN = str.maketrans(
 
 def conversion(channel: str, unit: str) -> Conversion | None:
     """From a stated unit to the channel's own; None where the unit is not in the table."""
+    if len(unit) > LONGEST_UNIT:
+        return None
     table = UNITS[CHANNELS[channel].unit]
     written = unicodedata.normalize("NFC", unit).translate(_AS_WRITTEN).strip()
     return table.get(written) or table.get(written.replace(" ", ""))

@@ -1,28 +1,43 @@
-"""A run as a JSON body -> `IncomingRun`: pydantic checks the shape, `service.columns` the millions of numbers."""
+"""A run as a JSON body -> `IncomingRun`: pydantic checks the shape, `service.columns` the millions of numbers.
 
+Other bodies that are JSON come in here too. Whatever is sent, memory stays within some ten times its size.
+"""
+
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 import pydantic
+import pydantic_core
 
-from service.columns import check_columns
+from service.columns import CHANNELS, check_columns
 from service.errors import MOST_ERRORS, MOST_QUOTED, FieldError, InvalidError
 from service.lives.incoming_run import IncomingRun, name_run
-from service.schemas.base import Schema
-from service.schemas.run import RUN_IN, DutyRunIn, MaintenanceRunIn
+from service.run_files.json_marks import Fields, invalid_json, too_many_marks
+from service.schemas.limits import LONGEST_NOTE, MOST_MARKS
+from service.schemas.run import RUN_IN, Duty, DutyRunIn, DynamicRunIn, MaintenanceRunIn, StationaryRunIn
 
-Body = TypeVar("Body", bound=Schema)
+#: Items of a list and characters of a name that are checked by a schema: more than a message quotes.
+_MOST_SHOWN = 100
 
+Answer = TypeVar("Answer")
+Body = TypeVar("Body", bound=pydantic.BaseModel)
+
+#: The fields that any run may have.
+_FIELDS: Fields = {
+    "": {name for run in (StationaryRunIn, DynamicRunIn, DutyRunIn, MaintenanceRunIn) for name in run.model_fields},
+    "channels": CHANNELS.keys(),
+    "duty": Duty.model_fields.keys(),
+}
 _KINDS = ("stationary_stribeck", "dynamic_stribeck", "duty_cycles", "run_in", "maintenance")
 
 
 def read_run(body: bytes) -> IncomingRun:
     """The run in a JSON body; raises InvalidError naming every place that is wrong."""
-    try:
-        run = RUN_IN.validate_json(body)
-    except pydantic.ValidationError as error:
-        raise invalid(error) from None
+    sent = _parsed(body, _FIELDS)
+    run = _validated(RUN_IN.validate_json, sent)
     channels = getattr(run, "channels", None)
-    columns = {} if channels is None else channels.model_dump(exclude_none=True)
+    given = () if channels is None else channels.model_dump(exclude_none=True)
+    columns = {name: sent["channels"][name] for name in given}
     details: dict[str, Any] = {}
     if isinstance(run, DutyRunIn):
         # a field that was added later must not change the hash of a run that was sent without it
@@ -42,14 +57,40 @@ def read_run(body: bytes) -> IncomingRun:
 
 
 def checked(schema: type[Body], body: bytes) -> Body:
-    """A small JSON body by its schema; raises InvalidError naming every place that is wrong."""
+    """Any other JSON body as its schema has it; raises InvalidError naming every place that is wrong."""
+    return _validated(schema.model_validate_json, _parsed(body, {"": schema.model_fields.keys()}))
+
+
+def _parsed(body: bytes, fields: Fields) -> Any:
+    """What the body says, in memory of some ten times its size. Raises InvalidError."""
+    if sum(map(body.count, (b'"', b"[", b"{"))) > MOST_MARKS:
+        raise too_many_marks(body, fields)
     try:
-        return schema.model_validate_json(body)
+        return pydantic_core.from_json(body)
+    except ValueError as error:
+        raise invalid_json(str(error)) from None
+
+
+def _validated(validate: Callable[[bytes], Answer], sent: object) -> Answer:
+    """The sent value by its schema, long lists and texts cut: a channel is a list here, `check_columns` reads its values.
+
+    pydantic copies whatever is wrong, with all that it holds, once an error.
+    """
+    try:
+        return validate(pydantic_core.to_json(_cut(sent), inf_nan_mode="constants"))
     except pydantic.ValidationError as error:
-        raise invalid(error) from None
+        raise _invalid(error) from None
 
 
-def invalid(error: pydantic.ValidationError) -> InvalidError:
+def _cut(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name[:_MOST_SHOWN]: _cut(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_cut(item) for item in value[:_MOST_SHOWN]]
+    return value[: LONGEST_NOTE + 1] if isinstance(value, str) else value
+
+
+def _invalid(error: pydantic.ValidationError) -> InvalidError:
     """pydantic's errors as the service's: pointer, row, value, rule."""
     details = error.errors(include_url=False, include_context=False)
     errors = [_field_error(item["loc"], item["type"], item["msg"], item["input"]) for item in details[:MOST_ERRORS]]
@@ -64,7 +105,7 @@ def _field_error(loc: tuple[int | str, ...], code: str, rule: str, value: object
         value = value.get("kind", "") if isinstance(value, dict) else value
     pointer = "".join(f"/{str(part).replace('~', '~0').replace('/', '~1')}" for part in place)
     name = ".".join(str(part) for part in place) or "the body"
-    shown = "" if code in ("missing", "json_invalid") else repr(value)[:MOST_QUOTED]
+    shown = "" if code == "missing" else repr(value)[:MOST_QUOTED]
     rule = rule.removeprefix("Value error, ")
     message = f"{name}: {rule}" + (f", got {shown}" if shown and "got" not in rule else "")
     row = place[-1] + 1 if place and isinstance(place[-1], int) else None

@@ -26,5 +26,7 @@ LONGEST_FILENAME = 255
 LONGEST_MAP = 4000
 #: A clutch's or a run's name: safe in an address and as a file's name, 128 characters at most.
 IDENTIFIER_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._:@+-]{0,127}$"
+#: Quotation marks and opening brackets of a JSON body. Derived: those of a note that consists of them, and as many again.
+MOST_MARKS = 10_000
 #: Samples of a channel that a plot may ask for: more than any screen has pixels; all samples need no argument.
 MOST_POINTS = 1_000_000

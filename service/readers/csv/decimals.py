@@ -18,8 +18,9 @@ from models.arrays import FloatArray
 Words = NDArray[np.uint64]
 Indices = NDArray[np.intp]
 
-#: A number: no hexadecimals, no underscores, no words but nan and inf, which `check_arrays` refuses with their row.
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?|[+-]?(nan|inf|infinity)", re.IGNORECASE | re.ASCII)
+#: A number: no hexadecimals, no underscores, no words but nan and inf, which `check_arrays` refuses with their row. Digits
+#: are never given back, or a long run of them with a letter behind it would be tried from every digit to every other.
+NUMBER = re.compile(r"[+-]?(\d++(\.\d*+)?|\.\d++)([eE][+-]?\d{1,4})?|[+-]?(nan|inf|infinity)", re.IGNORECASE | re.ASCII)
 
 _NEWLINE, _POINT, _PLUS, _MINUS, _SMALL_E, _LARGE_E = b"\n.+-eE"
 _EXACT_POWERS = 10.0 ** np.arange(23)

@@ -68,14 +68,16 @@ def test_the_library_takes_the_place_of_the_light_drawing(
     page.locator("#chart-fan summary").click()
     page.locator("#chart-fan table tbody tr").nth(20).wait_for()
     page.locator("#chart-fan summary").click()
+    chart.scroll_into_view_if_needed()
     points = page.locator("#chart-fan .sketch circle").evaluate_all(_LIGHT)
     said, box = texts(page, "#chart-fan .plot"), chart.bounding_box()
     assert len(points) >= 8
     page.evaluate(_FORGET)
 
+    assert box is not None
     assert held == []
     with page.expect_request(LIBRARY):
-        chart.hover(position={"x": 3, "y": 3})
+        page.mouse.move(box["x"] + 3, box["y"] + 3)
     page.mouse.move(0, 0)
     for route in held:
         route.continue_()
