@@ -24,7 +24,7 @@ _lengths = (
     .where(channel.c.run_key == bindparam("of_run"))
     .order_by(channel.c.position)
 )
-_one = select(channel.c.codec, channel.c.length, channel.c.data).where(
+_by_name = select(channel.c.codec, channel.c.length, channel.c.data).where(
     channel.c.run_key == bindparam("of_run"), channel.c.name == bindparam("wanted")
 )
 _samples = (
@@ -92,7 +92,7 @@ class Stored:
 
 def stored(connection: Connection, run_key: int, name: str) -> Stored:
     """One channel of a run, not decoded. Raises LookupError where the run has no such channel."""
-    row = connection.execute(_one, {"of_run": run_key, "wanted": name}).first()
+    row = connection.execute(_by_name, {"of_run": run_key, "wanted": name}).first()
     if row is None:
         raise LookupError(f"run {run_key} has no channel {name}")
     return Stored(run_key, name, *row)
