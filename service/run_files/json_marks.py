@@ -99,16 +99,16 @@ class _Search:
     def _count(self) -> None:
         """Go on behind what is wrong in the same way many times in a row: it is counted, and not looked at."""
         outer = self._outer()
-        known: Set[str] = frozenset()
+        allowed: Set[str] = frozenset()
         if outer is not None and outer in self._fields:
-            repeated, known = _PLAIN_FIELDS, self._fields[outer]
+            repeated, allowed = _PLAIN_FIELDS, self._fields[outer]
         elif self._in_channel():
             repeated = _TEXTS
         else:
             return
-        if found := repeated.match(self._body, self._place):
-            start, self._place = found.span()
-            right = sum(self._body.count(f'"{name}"'.encode(), start, self._place) for name in known)
+        if run := repeated.match(self._body, self._place):
+            start, self._place = run.span()
+            right = sum(self._body.count(f'"{name}"'.encode(), start, self._place) for name in allowed)
             self.total += self._body.count(_TEXT, start, self._place) // 2 - right
 
     def _name(self, start: int, end: int) -> None:

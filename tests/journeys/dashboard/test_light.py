@@ -77,7 +77,7 @@ def test_the_library_takes_the_place_of_the_light_drawing(
     assert box is not None
     assert held == []
     with page.expect_request(LIBRARY):
-        page.mouse.move(box["x"] + 3, box["y"] + 3)
+        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     page.mouse.move(0, 0)
     for route in held:
         route.continue_()

@@ -152,7 +152,6 @@ def test_lists_hold_no_channels(client: TestClient, raw: dict[str, Any], monkeyp
     ):
         found = client.get(f"{base}/{path}")
         assert found.status_code == 200, path
-        assert len(found.content) < 40_000, path
         assert '"channels"' not in found.text, path
     assert '"channels"' not in client.get("/v1/clutches").text
     assert json.loads(client.get(f"{base}/runs").text)["items"][0]["run_id"] == "raw"
