@@ -66,15 +66,15 @@ def state(
     `carried`: with the filters after the last run, to be carried on; all else is computed without them.
     """
     row = clutch(connection, clutch_id)
-    own, adopted = edited or record(row), _adoptions(connection, clutch_id)
-    extensions = [also, *(None if each is None else each.extension for each in adopted)]
+    own, adoptions = edited or record(row), _adoptions(connection, clutch_id)
+    extensions = [also, *(None if adopted is None else adopted.extension for adopted in adoptions)]
     exponents = {None, *(extension.severity_exponent for extension in extensions if extension is not None)}
     severities = {severity_under(own, exponent) for exponent in exponents}
     return ClutchState(
         record=own,
         revision=row.revision,
         events=events(connection, clutch_id),
-        adoptions=adopted,
+        adoptions=adoptions,
         priors={severity: _learned_prior(connection, own, severity) for severity in severities},
         filters=_filters(connection, clutch_id) if carried else None,
     )
@@ -134,7 +134,7 @@ def receipt(row: NewRun) -> dict[str, Any]:
     return row.receipt | {"state": row.state, "doubts": list(row.doubts), "sent_cycles": whole(sent_cycles)}
 
 
-def standing(row: NewRun) -> dict[str, Any]:
+def summary(row: NewRun) -> dict[str, Any]:
     """What the audit trail keeps of a run before and after a change."""
     return {"state": row.state, "cycles": whole(row.cycles), "doubts": list(row.doubts)}
 

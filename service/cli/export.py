@@ -1,7 +1,7 @@
 """`clutchlife export`: all that is stored of a clutch, raw data included, in files that `push` sends again.
 
-What `push` sends are the runs that count, at the cycles that hold now: another service then gives the same answers. Runs that
-are held, withdrawn or corrected are beside them as they were sent.
+What `push` sends are the runs that count, at the cycles that hold now: another service then gives the same answers. Runs
+that are held, withdrawn or corrected are beside them as they were sent.
 """
 
 import json

@@ -161,15 +161,15 @@ def life_with(events: Sequence[Event], event: Event) -> Life:
 def stationary_tests_of(events: Sequence[Event]) -> dict[str, str | None]:
     """run_id of every dynamic test -> that of the stationary test that shows the clutch's state at it: the last one of its
     life up to its cycles, else the next; None where there is none."""
-    found: dict[str, str | None] = {}
+    names: dict[str, str | None] = {}
     for life in lives_of(events):
         tests = [event for event in life.events if event.speed_range is not None]
         cycles = [test.cycles for test in tests]
         for event in life.events:
             if event.kind == DYNAMIC:
                 place = max(0, bisect.bisect_right(cycles, event.cycles) - 1)
-                found[event.run_id] = tests[place].run_id if tests else None
-    return found
+                names[event.run_id] = tests[place].run_id if tests else None
+    return names
 
 
 def latest_before(events: Sequence[Event]) -> dict[str, float]:

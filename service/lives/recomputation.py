@@ -55,7 +55,9 @@ class Adoption:
 def newest_adoption(adoptions: Iterable[Adoption | None], lives: Collection[str]) -> Adoption | None:
     """The newest of what was adopted (None: the baseline), newest first: one of a life whose rebuild is none of the lives
     any more (it was withdrawn) is passed over."""
-    return next((each for each in adoptions if each is None or not each.life or each.life in lives), None)
+    return next(
+        (adoption for adoption in adoptions if adoption is None or not adoption.life or adoption.life in lives), None
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -130,7 +130,7 @@ def _load(database: Database, request: _Request) -> _Loaded:
             state=state,
             levels=records.levels(connection, clutch_id),
             receipts=records.receipts(connection, clutch_id),
-            withdrawn_from=next((each.before["state"] for each in trail if each.action == changes.WITHDRAW), ""),
+            withdrawn_from=next((change.before["state"] for change in trail if change.action == changes.WITHDRAW), ""),
         )
 
 
@@ -160,13 +160,13 @@ def _corrected(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
     analysis = analyse(sent, others.geometry)
     if "time_s" in sent.channels and sent.kind != DYNAMIC:  # as on arrival: its plateaus stand for a long record
         sent = replace(sent, channels={})
-    found = doubts(sent, analysis, event, others)
+    doubtful = doubts(sent, analysis, event, others)
     return replace(
         row,
         cycles=cycles,
         sent_cycles=None if cycles == sent_cycles else sent_cycles,
-        state=runs.HELD if found else runs.ACCEPTED,
-        doubts=tuple(notice_items(found)),
+        state=runs.HELD if doubtful else runs.ACCEPTED,
+        doubts=tuple(notice_items(doubtful)),
     )
 
 
@@ -186,7 +186,7 @@ def _computed(database: Database, loaded: _Loaded, row: RunRow) -> _Changed:
     aside = None
     if not own:
         aside, parts = computed_aside(after, event, loaded.levels, reader)
-        warnings = [each for each in receipts[run_id]["warnings"] if each["code"] not in OF_HISTORY]
+        warnings = [warning for warning in receipts[run_id]["warnings"] if warning["code"] not in OF_HISTORY]
         receipts[run_id] |= parts | {"warnings": warnings}
     receipt = computed.receipts.get(run_id, receipts[run_id])
     computed = replace(computed, receipts={**computed.receipts, run_id: receipt})
@@ -212,7 +212,7 @@ def _store(connection: Connection, loaded: _Loaded, changed: _Changed, request: 
         fits = records.fit_rows(loaded.levels.get(row.run_id, ()), changed.aside)
         results.write_fits(connection, row.run_key, fits)
     records.store(connection, row.clutch_id, changed.results)
-    before, after = records.standing(loaded.row), records.standing(row)
+    before, after = records.summary(loaded.row), records.summary(row)
     if before["doubts"] == after["doubts"]:
         del before["doubts"], after["doubts"]
     change = NewChange(

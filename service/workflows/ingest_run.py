@@ -124,9 +124,9 @@ def _computed(database: Database, clutch_id: str, arrival: Arrival) -> _Outcome:
         loops=_own_loops(state, event, levels, arrival.run),
         warnings=arrival.analysis.warnings,
     )
-    found = doubts(arrival.run, arrival.analysis, event, before)
-    if found:
-        return _Outcome(revision=before.revision, receipt=answer, cofs=event.cofs, results=Results(), doubts=found)
+    doubtful = doubts(arrival.run, arrival.analysis, event, before)
+    if doubtful:
+        return _Outcome(revision=before.revision, receipt=answer, cofs=event.cofs, results=Results(), doubts=doubtful)
     computed = _among(database, before, state, event, levels, answer, arrival)
     answer = computed.receipts.get(event.run_id, answer)
     others = {run_id: other for run_id, other in computed.receipts.items() if run_id != event.run_id}
@@ -230,7 +230,7 @@ def _store(
             action=changes.HOLD,
             reason="",
             before={},
-            after=records.standing(row),
+            after=records.summary(row),
             revision=revision,
         )
         changes.insert(connection, change)

@@ -119,10 +119,12 @@ def _brought_up(database: Database, clutch_id: str) -> bool:
     with database.turn(clutch_id, patient=True):
         while True:
             with database.reading() as connection:
-                state, receipts = records.state(connection, clutch_id), records.receipts(connection, clutch_id)
+                state = records.state(connection, clutch_id)
                 last = results.prediction_at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)
             if last is None or last.payload.get("prior") == dict(state.assumptions().prior.name):
                 return False
+            with database.reading() as connection:
+                receipts = records.receipts(connection, clutch_id)
             tracking = track(state)
             retracked = Results(tracking=tracking, receipts=warned_anew(state.lives, tracking.warnings, receipts))
             with database.writing() as connection:

@@ -32,9 +32,11 @@ def register(database: Database, clutch: ClutchIn, *, created_at: str) -> bool:
                 )
                 clutches.insert(connection, row)
                 return True
-    known = [stored.record] if stored.registered is None else [stored.record, stored.registered]
+    stored_records = [stored.record] if stored.registered is None else [stored.record, stored.registered]
     # with the defaults of fields that came after a record was stored
-    if content not in [content_of(ClutchIn.model_validate(each).model_dump(mode="json")) for each in known]:
+    if content not in [
+        content_of(ClutchIn.model_validate(record).model_dump(mode="json")) for record in stored_records
+    ]:
         raise ConflictError(
             f"clutch {stored.clutch_id!r} is known with another record; records are not changed by posting"
         )

@@ -45,6 +45,21 @@ def test_lists_are_worst_first_and_pages_join_without_gap_or_repeat(database: Da
         assert clutches.all_ids(connection) == ["a", "b", "c", "d", "e"]
 
 
+def test_archived_clutches_are_listed_apart(database: Database) -> None:
+    with database.writing() as connection:
+        for clutch_id in ("a", "b"):
+            clutches.insert(connection, clutch_row(clutch_id))
+        content = {"record": {"fluid": "new"}, "content_sha256": "cd", "registered": {"fluid": "old"}}
+        clutches.set_record(connection, "a", **content, archived=True)
+        with pytest.raises(LookupError, match="'nobody'"):
+            clutches.set_record(connection, "nobody", **content, archived=True)
+    with database.reading() as connection:
+        assert [row.clutch_id for row in clutches.page(connection, limit=9)] == ["b"]
+        (row,) = clutches.page(connection, limit=9, archived=True)
+        assert (row.clutch_id, row.record, row.registered) == ("a", {"fluid": "new"}, {"fluid": "old"})
+        assert clutches.page(connection, limit=9, after=(row.rank, "a"), archived=True) == []
+
+
 def test_summary_and_revision(database: Database) -> None:
     with database.writing() as connection:
         clutches.insert(connection, clutch_row())

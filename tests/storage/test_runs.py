@@ -65,6 +65,36 @@ def test_runs_of_one_kind_and_without_a_limit(database: Database) -> None:
         assert runs.page(connection, CLUTCH, kind="maintenance") == []
 
 
+def test_only_accepted_runs_are_part_of_the_history(database: Database) -> None:
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+        held = replace(new_run(1), state=runs.HELD, doubts=[{"code": "odd"}])
+        keys = [runs.insert(connection, row) for row in (new_run(0), held, new_run(2))]
+        runs.set_state(connection, keys[2], state=runs.WITHDRAWN, cycles=7.0, sent_cycles=2000.0, doubts=())
+        with pytest.raises(LookupError, match="run 99"):
+            runs.set_state(connection, 99, state=runs.HELD, cycles=0.0, sent_cycles=None, doubts=())
+    with database.reading() as connection:
+        assert [row.run_id for row in runs.in_order(connection, CLUTCH)] == ["run-0000"]
+        assert [row.run_id for row in runs.set_aside(connection, CLUTCH)] == ["run-0002", "run-0001"]
+        assert runs.keys(connection, CLUTCH) == {f"run-000{number}": key for number, key in enumerate(keys)}
+        (found,) = runs.page(connection, CLUTCH, state=runs.HELD)
+        assert (found.state, found.doubts, found.sent_cycles) == ("held", ({"code": "odd"},), None)
+        withdrawn = runs.get(connection, CLUTCH, "run-0002")
+        assert withdrawn is not None
+        assert (withdrawn.state, withdrawn.cycles, withdrawn.sent_cycles) == ("withdrawn", 7.0, 2000.0)
+        assert len(runs.page(connection, CLUTCH)) == 3
+
+
+def test_a_rebuild_that_is_held_is_none(database: Database) -> None:
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+        rebuild = replace(new_run(0), kind="maintenance", details={"event": "rebuild"})
+        runs.insert(connection, rebuild)
+        runs.insert(connection, replace(rebuild, run_id="held", state=runs.HELD))
+    with database.reading() as connection:
+        assert [row.run_id for row in runs.rebuilds(connection, CLUTCH)] == ["run-0000"]
+
+
 def test_a_run_belongs_to_a_clutch_and_its_id_is_taken_once(database: Database) -> None:
     with pytest.raises(IntegrityError, match="FOREIGN KEY"), database.writing() as connection:
         runs.insert(connection, new_run())

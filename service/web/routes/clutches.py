@@ -92,13 +92,13 @@ def read_clutch(request: Request, context: Reader, clutch_id: ClutchId) -> Respo
 )
 async def edit_clutch(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
     """Edit a clutch's record, each given field as a whole, and archive it or bring it back; results are computed anew."""
-    asked = checked(ClutchEdit, await json_body(request))
-    clutch = await run_in_threadpool(_edit, context, clutch_id, asked, name_of_caller(request))
+    wanted = checked(ClutchEdit, await json_body(request))
+    clutch = await run_in_threadpool(_edit, context, clutch_id, wanted, name_of_caller(request))
     return Response(content=to_json(clutch), media_type=JSON_TYPE)
 
 
-def _edit(context: Context, clutch_id: str, asked: ClutchEdit, by: str) -> dict[str, object]:
-    edit(context.database, clutch_id, asked.fields(), archived=asked.archived, reason=asked.reason, by=by, at=now())
+def _edit(context: Context, clutch_id: str, wanted: ClutchEdit, by: str) -> dict[str, object]:
+    edit(context.database, clutch_id, wanted.fields(), archived=wanted.archived, reason=wanted.reason, by=by, at=now())
     return clutch_list.look_up(context.database, clutch_id)
 
 

@@ -96,9 +96,9 @@ def read_run_with_channels(request: Request, context: Reader, clutch_id: ClutchI
 )
 async def correct_run(request: Request, context: Ingester, clutch_id: ClutchId, run_id: RunId) -> Response:
     """Correct a run's cycles; it counts where it is plausible there. What was sent stays stored."""
-    asked = checked(Correction, await json_body(request))
+    wanted = checked(Correction, await json_body(request))
     return await _changed(
-        change_run.correct, request, context, clutch_id, run_id, cycles=asked.cycles, reason=asked.reason
+        change_run.correct, request, context, clutch_id, run_id, cycles=wanted.cycles, reason=wanted.reason
     )
 
 
@@ -110,8 +110,8 @@ async def correct_run(request: Request, context: Ingester, clutch_id: ClutchId, 
 )
 async def withdraw_run(request: Request, context: Ingester, clutch_id: ClutchId, run_id: RunId) -> Response:
     """Take a run out of the clutch's history. It stays stored and listed."""
-    asked = checked(Withdrawal, await json_body(request))
-    return await _changed(change_run.withdraw, request, context, clutch_id, run_id, reason=asked.reason)
+    wanted = checked(Withdrawal, await json_body(request))
+    return await _changed(change_run.withdraw, request, context, clutch_id, run_id, reason=wanted.reason)
 
 
 @router.post(
@@ -122,8 +122,8 @@ async def withdraw_run(request: Request, context: Ingester, clutch_id: ClutchId,
 )
 async def restore_run(request: Request, context: Ingester, clutch_id: ClutchId, run_id: RunId) -> Response:
     """Take a withdrawal back: the run is accepted or held as it was before."""
-    asked = checked(Withdrawal, await json_body(request))
-    return await _changed(change_run.restore, request, context, clutch_id, run_id, reason=asked.reason)
+    wanted = checked(Withdrawal, await json_body(request))
+    return await _changed(change_run.restore, request, context, clutch_id, run_id, reason=wanted.reason)
 
 
 @router.post(
@@ -134,8 +134,8 @@ async def restore_run(request: Request, context: Ingester, clutch_id: ClutchId, 
 )
 async def confirm_run(request: Request, context: Ingester, clutch_id: ClutchId, run_id: RunId) -> Response:
     """Accept a held run as it was sent."""
-    asked = checked(Confirmation, await json_body(request))
-    return await _changed(change_run.confirm, request, context, clutch_id, run_id, reason=asked.reason)
+    wanted = checked(Confirmation, await json_body(request))
+    return await _changed(change_run.confirm, request, context, clutch_id, run_id, reason=wanted.reason)
 
 
 async def _changed(
@@ -144,9 +144,9 @@ async def _changed(
     context: Context,
     clutch_id: str,
     run_id: str,
-    **asked: Any,
+    **wanted: Any,
 ) -> Response:
     """The receipt after a change."""
     by, at = name_of_caller(request), now()
-    receipt = await run_in_threadpool(change, context.database, clutch_id, run_id, **asked, by=by, at=at)
+    receipt = await run_in_threadpool(change, context.database, clutch_id, run_id, **wanted, by=by, at=at)
     return Response(content=to_json(receipt), media_type=JSON_TYPE)

@@ -1,0 +1,81 @@
+"""Slips on the command line: seen, mended, exported; and a life that was mended is answered as one without slips."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from tests.journeys.test_command_line import clutchlife
+from tests.support import ONCE, Server, serving, stationary
+
+PRESSURES = (4.0, 6.0)
+
+
+def post(
+    server: Server, clutch: str, cycles: float, *, run_id: str, sent: float | None = None, gain: float = 1.0
+) -> Any:
+    body = stationary(cycles, run_id=run_id, pressures=PRESSURES)
+    body["channels"]["torque_nm"] = [gain * torque for torque in body["channels"]["torque_nm"]]
+    body["cycles"] = cycles if sent is None else sent
+    return ONCE.post(f"{server.url}/v1/clutches/{clutch}/runs", json=body).json()
+
+
+def life(server: Server, clutch: str) -> Any:
+    answer = ONCE.get(f"{server.url}/v1/clutches/{clutch}/remaining-useful-life").json()
+    return {name: value for name, value in answer.items() if name != "revision"}
+
+
+def test_slips_are_seen_and_mended_in_the_terminal(server: Server, tmp_path: Path) -> None:
+    ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "c1"})
+    at = ("--url", server.url)
+    for cycles in (0.0, 1000.0, 2000.0):
+        post(server, "c1", cycles, run_id=f"r{cycles:g}")
+    whole = life(server, "c1")
+    assert "c1 has no held runs" in clutchlife("runs", "c1", "--held", *at)
+    assert post(server, "c1", 3000.0, run_id="odd", gain=60.0)["state"] == "held"  # a mean COF of 3
+    assert life(server, "c1") == whole
+    held = clutchlife("runs", "c1", "--held", *at)
+    assert "held" in held
+    assert "odd" in held
+    assert "mean COF" in held
+    assert "withdrawn" in clutchlife("withdraw", "c1", "odd", "--reason", "in lbf", *at)
+    assert "held" in clutchlife("restore", "c1", "odd", "--reason", "look again", *at)
+    assert "accepted" in clutchlife("confirm", "c1", "odd", *at)
+    assert life(server, "c1") != whole
+    clutchlife("withdraw", "c1", "odd", "--reason", "in lbf", *at)
+    assert life(server, "c1") == whole
+    post(server, "c1", 4000.0, run_id="typo", sent=4001.0)
+    assert "sent as 4001" in clutchlife("correct", "c1", "typo", "--cycles", "4000", "--reason", "a slip", *at)
+    assert "sent as 4001" in clutchlife("runs", "c1", *at)
+    states = [item["state"] for item in json.loads(clutchlife("runs", "c1", "--json", *at))]
+    assert sorted(states) == ["accepted"] * 4 + ["withdrawn"]
+    edit = ("edit", "c1", "--set", "end_of_life.cof_fraction=0.4", "--set", "fluid=CVTF", "--reason", "a letter", *at)
+    assert 'fluid = "CVTF"' in clutchlife(*edit)
+    assert life(server, "c1")["criterion"]["fraction"] == 0.4
+    assert "FIELD=VALUE" in clutchlife("edit", "c1", "--set", "fluid", "--reason", "x", *at, code=64)
+    assert "no clutch is known" in clutchlife("archive", "nobody", *at, code=65)
+    assert "archived" in clutchlife("archive", "c1", "--reason", "worn out", *at)
+    assert "in use" in clutchlife("archive", "c1", "--undo", *at)
+    trail = clutchlife("changes", "c1", *at)
+    assert "local  correct typo (cycles 4001 -> 4000): a slip" in trail
+    actions = [item["action"] for item in json.loads(clutchlife("changes", "c1", "--json", *at))]
+    assert actions == [
+        "unarchive", "archive", "edit", "correct", "withdraw", "confirm", "restore", "withdraw", "hold",
+    ]  # fmt: skip
+    exported_and_pushed_elsewhere(server, tmp_path)
+
+
+def exported_and_pushed_elsewhere(server: Server, tmp_path: Path) -> None:
+    """An export holds what counts; what was sent and does not is beside it, and the audit trail."""
+    folder = tmp_path / "export"
+    clutchlife("export", "c1", "--out", folder, "--url", server.url)
+    aside = {path.name[6:]: json.loads(path.read_bytes())["cycles"] for path in (folder / "as-sent").iterdir()}
+    assert aside == {"odd.json": 3000, "typo.json": 4001}
+    trail = json.loads((folder / "results" / "changes.json").read_bytes())
+    assert trail[-1]["action"] == "hold"
+    assert {item["run_id"]: item["state"] for item in json.loads((folder / "results" / "runs.json").read_bytes())}[
+        "odd"
+    ] == "withdrawn"
+    with serving(tmp_path / "second.db", loaded=True) as second:
+        spool = ("--spool", tmp_path / "spool")
+        assert "4 stored" in clutchlife("push", folder, "--clutch", "c1", "--url", second.url, *spool)
+        assert life(second, "c1") == life(server, "c1")

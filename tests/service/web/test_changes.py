@@ -1,0 +1,126 @@
+"""Runs and clutches changed over HTTP: who did it, entity tags, bodies that are refused."""
+
+import pytest
+from fastapi.testclient import TestClient
+
+from service.web.auth import make_key
+from storage import keys
+from storage.engine.database import open_database
+from tests.support import stationary
+
+BASE = "/v1/clutches/c1"
+RUN = f"{BASE}/runs/a"
+
+
+def post(client: TestClient, **headers: str) -> None:
+    body = stationary(7000.0, run_id="a", pressures=(5.0,), speeds=(20, 120, 520, 1020, 1970))
+    answer = client.post(f"{BASE}/runs", json=body, headers=headers)
+    assert (answer.status_code, answer.json()["state"], answer.json()["sent_cycles"]) == (201, "accepted", 7000)
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_doubted(monkeypatch: pytest.MonkeyPatch) -> None:
+    for workflow in ("ingest_run", "change_run"):
+        monkeypatch.setattr(f"service.workflows.{workflow}.doubts", lambda *_: ())
+
+
+def test_a_change_moves_the_tag_on_and_its_repeat_does_not(client: TestClient) -> None:
+    post(client)
+    tags = []
+    for _ in range(2):
+        tags.append(client.get(f"{BASE}/runs").headers["etag"])
+        answer = client.patch(RUN, json={"cycles": 700, "reason": "a zero too many"})
+        assert (answer.status_code, answer.json()["cycles"]) == (200, 700)
+    tags.append(client.get(f"{BASE}/runs").headers["etag"])
+    assert tags[0] != tags[1] == tags[2]
+    assert client.get(f"{BASE}/remaining-useful-life").json()["as_of_cycles"] == 700
+    (entry,) = client.get(f"{BASE}/changes").json()["items"]
+    assert entry | {"at": ""} == {
+        "at": "", "by": "local", "action": "correct", "run_id": "a", "reason": "a zero too many",
+        "before": {"state": "accepted", "cycles": 7000}, "after": {"state": "accepted", "cycles": 700},
+    }  # fmt: skip
+    assert client.get(RUN).json()["changes"] == [entry]
+
+
+def test_states_and_pages_are_asked_for(client: TestClient) -> None:
+    post(client)
+    for change, state in (("withdraw", "withdrawn"), ("restore", "accepted"), ("withdraw", "withdrawn")):
+        assert client.post(f"{RUN}/{change}", json={"reason": "x"}).json()["state"] == state
+    assert [len(client.get(f"{BASE}/runs?state={s}").json()["items"]) for s in ("accepted", "withdrawn")] == [0, 1]
+    assert client.get(f"{BASE}/runs?state=lost").status_code == 422
+    first = client.get(f"{BASE}/changes?limit=2").json()
+    second = client.get(f"{BASE}/changes?limit=2&cursor={first['next']}").json()
+    assert [each["action"] for each in first["items"] + second["items"]] == ["withdraw", "restore", "withdraw"]
+    assert second["next"] is None
+    lines = client.get(f"{BASE}/changes.csv").text.splitlines()
+    assert (len(lines), lines[0]) == (4, "at,by,action,run_id,reason,before,after")
+    assert client.get("/v1/clutches/c1").json()["runs"] == 0
+
+
+def test_the_trail_names_the_key(client: TestClient, database_url: str) -> None:
+    secrets = {}
+    database = open_database(database_url)
+    for scope, note in (("ingest", "bench 3"), ("read", "")):
+        secrets[scope], row = make_key(scope, note, created_at="2026-01-01")
+        with database.writing() as connection:
+            keys.insert(connection, row)
+        if scope == "ingest":
+            key_id = row.key_id
+    database.close()
+    headers = {scope: {"Authorization": f"Bearer {secret}"} for scope, secret in secrets.items()}
+    post(client, **headers["ingest"])
+    reason = {"reason": "a slip"}
+    assert client.post(f"{RUN}/withdraw", json=reason).status_code == 401
+    assert client.post(f"{RUN}/withdraw", json=reason, headers=headers["read"]).status_code == 403
+    assert client.patch(BASE, json={"archived": True}, headers=headers["read"]).status_code == 403
+    assert client.post(f"{RUN}/withdraw", json=reason, headers=headers["ingest"]).status_code == 200
+    (entry,) = client.get(f"{BASE}/changes", headers=headers["read"]).json()["items"]
+    assert entry["by"] == f"key:{key_id} bench 3"
+
+
+@pytest.mark.parametrize(
+    ("method", "address", "body", "status"),
+    [
+        ("POST", f"{RUN}/withdraw", {}, 422),
+        ("POST", f"{RUN}/withdraw", {"reason": "  "}, 422),
+        ("POST", f"{RUN}/withdraw", {"reason": "x" * 501}, 422),
+        ("POST", f"{RUN}/withdraw", {"reason": "x", "cycles": 3}, 422),
+        ("POST", f"{RUN}/restore", {}, 422),
+        ("POST", f"{RUN}/confirm", {}, 200),
+        ("PATCH", RUN, {"cycles": 3}, 422),
+        ("PATCH", RUN, {"cycles": -3, "reason": "x"}, 422),
+        ("PATCH", RUN, {"cycles": "3", "reason": "x"}, 422),
+        ("PATCH", RUN, {"reason": "x"}, 422),
+        ("POST", f"{BASE}/runs/nobody/withdraw", {"reason": "x"}, 404),
+        ("PATCH", "/v1/clutches/nobody/runs/a", {"cycles": 3, "reason": "x"}, 404),
+        ("PATCH", "/v1/clutches/nobody", {"archived": True}, 404),
+        ("PATCH", BASE, {"fluid": "CVTF"}, 422),
+        ("PATCH", BASE, {"fluid": None, "reason": "x"}, 422),
+        ("PATCH", BASE, {"archived": None}, 422),
+        ("PATCH", BASE, {"clutch_id": "c2", "reason": "x"}, 422),
+        ("PATCH", BASE, {"geometry": {"inner_diameter_mm": 200}, "reason": "x"}, 422),
+        ("PATCH", BASE, {"reason": "nothing else"}, 200),
+        ("PATCH", BASE, {}, 200),
+    ],
+)
+def test_bodies_that_are_refused_change_nothing(
+    client: TestClient, method: str, address: str, body: dict[str, object], status: int
+) -> None:
+    post(client)
+    before = client.get(BASE).json()
+    answer = client.request(method, address, json=body)
+    assert answer.status_code == status, answer.text
+    assert client.get(BASE).json() == before
+    assert client.get(f"{BASE}/changes").json()["items"] == []
+
+
+def test_an_archived_clutch_refuses_runs(client: TestClient) -> None:
+    post(client)
+    assert client.patch(BASE, json={"archived": True}).json()["archived"]
+    answer = client.post(f"{BASE}/runs", json=stationary(8000.0))
+    assert (answer.status_code, answer.json()["type"]) == (409, "urn:clutchlife:problem:archived")
+    assert client.get("/v1/clutches").json()["items"] == []
+    assert [item["clutch_id"] for item in client.get("/v1/clutches?archived=true").json()["items"]] == ["c1"]
+    assert client.post(f"{RUN}/withdraw", json={"reason": "x"}).status_code == 200
+    answer = client.patch(RUN, json={"cycles": 3, "reason": "x"})
+    assert (answer.status_code, answer.json()["type"]) == (409, "urn:clutchlife:problem:not-possible-now")

@@ -1,0 +1,178 @@
+"""Two benches: one that was sent slips and mended, one that was sent the right things from the start; and all their answers.
+
+Doubts are stood in for: a run is held where its start carries the mark of a second of 59, at cycles below 50,000. What is
+tested is what happens to held runs, not which are.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from models.diagnosis.extension import Extension
+from service.lives.run_analysis import Notice
+from service.queries import clutch_list, degradation, remaining_life, runs, scores, series, stribeck
+from service.run_files.json_run import read_run
+from service.schemas.clutch import ClutchIn
+from service.web.answers import to_json
+from service.workflows import change_run, ingest_run, register_clutch
+from service.workflows.adopt_model import adopt
+from service.workflows.ingest_run import ingest
+from storage import diagnoses, results
+from storage.diagnoses import NewDiagnosis
+from storage.engine.database import Database, open_database
+from tests.service.workflows import stand_in_engine
+from tests.support import stationary, torque_nm
+
+CLUTCH = "c1"
+AT = "2026-11-02T10:00:00+00:00"
+WHO = {"by": "local", "at": AT}
+PRESSURES, OTHER_PRESSURES, SPEEDS = (4.0, 6.0), (5.0, 7.0), tuple(range(20, 1971, 150))
+EXTENSION = Extension(effects=("torque_zero_shift",), content={"shift_nm": 0.5, "course_nm": -0.2}).to_dict()
+#: What only the audit knows of a run.
+OF_THE_AUDIT = ("state", "doubts", "sent_cycles", "content_sha256")
+#: The second of the start of a run that is doubted.
+ODD = ":59+00:00"
+
+
+def doubts(run: Any, *_: Any) -> tuple[Notice, ...]:
+    """A stand-in: what carries the mark is held."""
+    odd = run.started_at is not None and run.started_at.endswith(ODD) and run.cycles < 50_000
+    return (Notice(code="odd", message="it carries the mark"),) if odd else ()
+
+
+@contextmanager
+def stood_in(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Doubts, and what an adopted extension does, are stood in for."""
+    with monkeypatch.context() as patched:
+        for name, method in stand_in_engine.METHODS.items():
+            patched.setattr(Extension, name, method)
+        for workflow in (ingest_run, change_run):
+            patched.setattr(workflow, "doubts", doubts)
+        yield
+
+
+def body(kind: str, run_id: str, cycles: float, *, wear: float | None = None, odd: bool = False) -> dict[str, Any]:
+    """A run as it is sent: `test`, `other` (pressures), `few` (speeds), `loop`, `duty`, `rebuild`, `oil_change`."""
+    head = {"run_id": run_id, "cycles": cycles, "started_at": f"2026-01-01T00:00{ODD if odd else ':00+00:00'}"}
+    if kind in ("test", "other", "few"):
+        return (
+            stationary(
+                cycles,
+                wear=wear,
+                noise=0.02,
+                pressures=OTHER_PRESSURES if kind == "other" else PRESSURES,
+                speeds=SPEEDS[1:-1] if kind == "few" else SPEEDS,
+            )
+            | head
+        )
+    if kind == "loop":
+        return {"kind": "dynamic_stribeck", "channels": loop_channels()} | head
+    if kind == "duty":
+        duty = {"cycles": 400, "energy_per_cycle_kj": 18.0, "initial_speed_rpm": 2000}
+        return {"kind": "duty_cycles", "duty": duty} | head
+    return {"kind": "maintenance", "event": kind} | head
+
+
+def loop_channels() -> dict[str, list[float]]:
+    """Two periods of a dynamic test at 5 bar."""
+    time = [0.25 * n for n in range(81)]
+    speed = [1000.0 * (1 + math.sin(2 * math.pi * 0.1 * t)) for t in time]
+    torque = [torque_nm(4.0, n, 0.1) + 0.3 * math.cos(2 * math.pi * 0.1 * t) for t, n in zip(time, speed, strict=True)]
+    return {"time_s": time, "pressure_bar": [4.0] * len(time), "speed_rpm": speed, "torque_nm": torque}
+
+
+class Bench:
+    """A service's database with one clutch, asked without HTTP."""
+
+    def __init__(self, path: Path, record: Mapping[str, Any] | None = None) -> None:
+        self.database: Database = open_database(f"sqlite:///{path}")
+        record = {"clutch_id": CLUTCH} | dict(record or {})
+        register_clutch.register(self.database, ClutchIn.model_validate(record), created_at=AT)
+
+    def send(self, run: Mapping[str, Any]) -> dict[str, Any]:
+        """Post a run; its receipt."""
+        return ingest(self.database, CLUTCH, read_run(to_json(run)), received_at=AT)[0]
+
+    def diagnose(self, diagnosis_id: str, life: str, revision: int = 10**6) -> None:
+        """Store a finished diagnosis of a life, whose extension the stand-in applies."""
+        row = NewDiagnosis(
+            clutch_id=CLUTCH, diagnosis_id=diagnosis_id, created_at=AT, revision=revision, last_run_key=0, life=life,
+            as_of_cycles=None, code_version="0",
+        )  # fmt: skip
+        with self.database.writing() as connection:
+            diagnoses.insert(connection, row)
+            diagnoses.finish(connection, diagnosis_id, AT, {"verdict": "cause_named", "causes": []}, EXTENSION)
+
+    def adopt(self, diagnosis_id: str | None) -> None:
+        """Adopt a diagnosis, or return to the baseline."""
+        adopt(self.database, CLUTCH, diagnosis_id, adopted_at=AT)
+
+    def withdraw(self, run_id: str) -> dict[str, Any]:
+        """Withdraw a run."""
+        return change_run.withdraw(self.database, CLUTCH, run_id, reason="a slip", **WHO)
+
+    def restore(self, run_id: str) -> dict[str, Any]:
+        """Restore a run."""
+        return change_run.restore(self.database, CLUTCH, run_id, reason="no slip", **WHO)
+
+    def confirm(self, run_id: str) -> dict[str, Any]:
+        """Confirm a run."""
+        return change_run.confirm(self.database, CLUTCH, run_id, reason="", **WHO)
+
+    def correct(self, run_id: str, cycles: float) -> dict[str, Any]:
+        """Correct a run."""
+        return change_run.correct(self.database, CLUTCH, run_id, cycles=cycles, reason="a slip", **WHO)
+
+    def receipts(self) -> dict[str, dict[str, Any]]:
+        """All receipts by run_id."""
+        return {item["run_id"]: item for item in runs.page(self.database, CLUTCH, limit=1000, after=None)[0]}
+
+    def answers(self, *, degradation_too: bool = True) -> dict[str, Any]:
+        """Everything that follows from the history, revisions and what only the audit knows apart.
+
+        `/degradation` is most of the work: it may be left out where it was looked at already.
+        """
+        database = self.database
+        named: dict[str, Any] = {
+            method: remaining_life.remaining_life(database, CLUTCH, method=method, pressure_bar=None, at_cycles=None)
+            for method in ("particle", "ukf", "grid")
+        }
+        named["earlier"] = remaining_life.remaining_life(
+            database, CLUTCH, method="particle", pressure_bar=None, at_cycles=2500.0
+        )
+        if degradation_too:
+            named["degradation"] = degradation.degradation(database, CLUTCH)
+        named["stribeck"] = stribeck.page(database, CLUTCH, limit=1000, after=None)[0]
+        named["series"] = series.series(database, CLUTCH, None)
+        named["loops"] = runs.loops(database, CLUTCH)
+        named["scores"] = scores.of_clutch(database, CLUTCH, method="particle")
+        named["clutch"] = clutch_list.look_up(database, CLUTCH)
+        named["runs"] = [
+            {name: value for name, value in receipt.items() if name not in OF_THE_AUDIT}
+            for receipt in self.receipts().values()
+            if receipt["state"] == "accepted"
+        ]
+        with database.reading() as connection:
+            named["predictions"] = {
+                method: results.predictions_of(connection, CLUTCH, method, 0.0) for method in ("particle", "ukf")
+            }
+        return {name: without_revision(answer) for name, answer in named.items()}
+
+    def close(self) -> None:
+        """Close the database."""
+        self.database.close()
+
+
+def without_revision(answer: Any) -> Any:
+    """An answer without the revision that it names."""
+    return {name: value for name, value in answer.items() if name != "revision"} if isinstance(answer, dict) else answer
+
+
+def assert_same(mended: Bench, right: Bench, *, degradation_too: bool = True) -> None:
+    """Every answer of the one is that of the other, to the last bit."""
+    ours, theirs = (bench.answers(degradation_too=degradation_too) for bench in (mended, right))
+    assert [name for name in theirs if ours[name] != theirs[name]] == []

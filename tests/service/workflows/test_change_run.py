@@ -1,0 +1,333 @@
+"""After a slip is mended, every answer is that of a clutch that was sent the right things from the start."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from service.errors import ConflictError, NotFoundError, NotPossibleNowError
+from service.queries import diagnoses as diagnosis_query
+from service.queries import runs as run_query
+from service.run_files.json_run import read_run
+from service.web.answers import to_json
+from service.workflows import change_run, run_diagnosis
+from service.workflows.adopt_model import finish_and_adopt
+from service.workflows.ingest_run import ingest
+from service.workflows.replay import replay_clutch
+from storage import assumptions, clutches
+from storage.engine.database import open_database
+from tests.service.workflows.benches import AT, CLUTCH, EXTENSION, Bench, assert_same, body, stood_in
+
+KINDS = ("test", "test", "test", "test", "few", "other", "loop", "duty", "oil_change", "rebuild")
+
+
+@dataclass(frozen=True)
+class Sent:
+    """A run as it should have been sent, and what went wrong: how it is sent, and how it is mended."""
+
+    run: dict[str, Any]
+    slip: str
+    wrong_cycles: float
+
+
+@st.composite
+def campaigns(draw: st.DrawFn) -> tuple[list[Sent], list[int]]:
+    """Runs in the order in which they are sent, and after how many arrivals each slip is mended."""
+    count = draw(st.integers(4, 7))
+    sent = []
+    for number in range(count):
+        kind = draw(st.sampled_from(KINDS))
+        cycles = draw(st.integers(0, 6)) * 1000.0
+        slip = draw(st.sampled_from(["", "", "cycles", "held", "extra", "held extra", "restored", "odd cycles"]))
+        run = body(kind, f"r{number}-{kind}", cycles, odd="held" in slip or "odd" in slip)
+        sent.append(Sent(run=run, slip=slip, wrong_cycles=draw(st.sampled_from([100.0, 2500.0, 70_000.0]))))
+    mended = [draw(st.integers(number + 1, count)) for number in range(count)]
+    return sent, mended
+
+
+def arrive(bench: Bench, sent: Sent) -> None:
+    """Send a run with its slip."""
+    wrong = {"cycles": sent.wrong_cycles} if "cycles" in sent.slip else {}
+    receipt = bench.send(sent.run | wrong)
+    odd = ("held" in sent.slip or "odd" in sent.slip) and receipt["cycles"] < 50_000
+    assert receipt["state"] == ("held" if odd else "accepted")
+
+
+def mend(bench: Bench, sent: Sent) -> None:
+    """Mend a run's slip."""
+    name = sent.run["run_id"]
+    if "cycles" in sent.slip:
+        bench.correct(name, sent.run["cycles"])
+    if "extra" in sent.slip or sent.slip == "restored":
+        bench.withdraw(name)
+    if sent.slip == "restored":
+        bench.restore(name)
+    if sent.slip in ("held", "odd cycles"):
+        bench.confirm(name)
+
+
+@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
+@given(campaign=campaigns(), adopted=st.booleans(), severity=st.sampled_from(["cycles", "dissipated_energy"]))
+def test_a_mended_clutch_answers_as_one_without_slips(
+    monkeypatch: pytest.MonkeyPatch, campaign: tuple[list[Sent], list[int]], adopted: bool, severity: str
+) -> None:
+    sent, mended_after = campaign
+    record = {"severity": {"basis": severity}}
+    with stood_in(monkeypatch), TemporaryDirectory() as folder:
+        slipped, right = Bench(Path(folder) / "slipped.db", record), Bench(Path(folder) / "right.db", record)
+        for bench in (slipped, right):
+            bench.diagnose("d1", "")
+            if adopted:
+                bench.adopt("d1")
+        for number, one in enumerate(sent, start=1):
+            arrive(slipped, one)
+            for other, after in zip(sent, mended_after, strict=True):
+                if after == number:
+                    mend(slipped, other)
+        with monkeypatch.context() as believed:
+            believed.setattr("service.workflows.ingest_run.doubts", lambda *_: ())
+            for one in sent:
+                if "extra" not in one.slip:
+                    right.send(one.run)
+        assert_same(slipped, right)
+        for bench in (slipped, right):  # what is carried on is as right as what is shown
+            bench.send(body("test", "next", 6500.0))
+        assert_same(slipped, right, degradation_too=False)
+        replay_clutch(slipped.database, CLUTCH)
+        assert_same(slipped, right, degradation_too=False)
+        for bench in (slipped, right):
+            bench.close()
+
+
+@pytest.fixture
+def benches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Bench, Bench]]:
+    """A bench that slips, and one that does not."""
+    with stood_in(monkeypatch):
+        both = Bench(tmp_path / "slipped.db"), Bench(tmp_path / "right.db")
+        yield both
+        for bench in both:
+            bench.close()
+
+
+def test_the_only_test_is_withdrawn(benches: tuple[Bench, Bench]) -> None:
+    slipped, untouched = benches
+    slipped.send(body("test", "a", 0.0))
+    slipped.withdraw("a")
+    assert_same(slipped, untouched)
+    assert slipped.answers()["clutch"]["summary"] is None
+    for bench in benches:
+        bench.send(body("test", "b", 0.0))
+    assert_same(slipped, untouched)
+
+
+def test_the_reference_test_is_withdrawn_and_comes_back(benches: tuple[Bench, Bench]) -> None:
+    slipped, right = benches
+    names = {"a": "few", "b": "test", "c": "test", "l": "loop"}
+    for number, (name, kind) in enumerate(names.items()):
+        slipped.send(body(kind, name, 1000.0 * number))
+        if name != "a":
+            right.send(body(kind, name, 1000.0 * number))
+    whole = slipped.answers()
+    slipped.withdraw("a")
+    assert_same(slipped, right)
+    assert slipped.answers()["runs"] != whole["runs"]  # other speeds, other means
+    slipped.restore("a")
+    assert slipped.answers() == whole
+
+
+def test_a_late_arrival_is_none_once_the_run_that_made_it_late_is_gone(benches: tuple[Bench, Bench]) -> None:
+    bench, _ = benches
+    bench.send(body("test", "first", 0.0))
+    bench.send(body("test", "slip", 70_000.0, wear=0.05))
+    late = bench.send(body("test", "late", 1000.0))
+    assert [warning["code"] for warning in late["warnings"]] == ["late_arrival"]
+    bench.correct("slip", 700.0)
+    assert [receipt["warnings"] for receipt in bench.receipts().values()] == [[], [], []]
+    bench.correct("slip", 70_000.0)
+    assert bench.receipts()["late"]["warnings"] == late["warnings"]
+    assert bench.receipts()["slip"]["sent_cycles"] == 70_000
+
+
+def test_a_rebuild_that_was_none_takes_its_adoption_along(benches: tuple[Bench, Bench]) -> None:
+    """What was adopted before it is in force again, and again what was adopted after it where it comes back."""
+    slipped, right = benches
+    for bench in benches:
+        for cycles in (0.0, 1000.0, 2000.0):
+            bench.send(body("test", f"a{cycles:g}", cycles))
+        bench.diagnose("of-the-first", "")
+        bench.adopt("of-the-first")
+    slipped.send(body("rebuild", "new-lining", 2500.0))
+    for bench in benches:
+        for cycles in (3000.0, 4000.0):
+            bench.send(body("test", f"b{cycles:g}", cycles))
+    slipped.diagnose("of-the-second", "new-lining")
+    slipped.adopt("of-the-second")
+    whole = slipped.answers()
+    assert whole["particle"]["model"]["name"] == "extended"
+    slipped.withdraw("new-lining")
+    ours, theirs = slipped.answers(), right.answers()
+    for answer in (ours, theirs):
+        del answer["clutch"]["diagnosis"]  # the newest one is another
+    assert ours == theirs
+    assert ours["particle"]["model"]["name"] == "extended"
+    slipped.restore("new-lining")
+    assert slipped.answers() == whole
+
+
+def test_a_run_of_an_earlier_life_is_corrected(benches: tuple[Bench, Bench]) -> None:
+    slipped, right = benches
+    for bench, cycles in ((slipped, 100.0), (right, 1000.0)):
+        bench.send(body("test", "a", 0.0))
+        bench.send(body("test", "b", 1000.0) | {"cycles": cycles})
+        bench.send(body("test", "c", 2000.0))
+        bench.send(body("rebuild", "new-lining", 3000.0))
+        bench.send(body("test", "d", 3000.0))
+        bench.send(body("test", "e", 4000.0))
+    slipped.correct("b", 1000.0)
+    assert_same(slipped, right)
+    slipped.correct("b", 3500.0)  # into the present life
+    assert slipped.receipts()["b"]["state"] == "accepted"
+    assert slipped.answers()["clutch"]["summary"] != right.answers()["clutch"]["summary"]
+
+
+@pytest.mark.parametrize("kind", ["test", "loop", "duty", "oil_change", "rebuild"])
+def test_what_is_held_is_in_no_answer(benches: tuple[Bench, Bench], kind: str) -> None:
+    held, never = benches
+    for bench in benches:
+        for cycles in (0.0, 1000.0, 2000.0):
+            bench.send(body("test", f"a{cycles:g}", cycles))
+    receipt = held.send(body(kind, "odd", 1500.0, odd=True))
+    assert (receipt["state"], receipt["doubts"]) == ("held", [{"code": "odd", "message": "it carries the mark"}])
+    assert held.receipts()["odd"] == receipt
+    assert bool(receipt["fits"]) == (kind == "test")
+    assert_same(held, never)
+    for bench in benches:
+        bench.send(body("test", "next", 3000.0))
+    assert_same(held, never)
+    replay_clutch(held.database, CLUTCH)
+    assert_same(held, never)
+    assert held.receipts()["odd"]["state"] == "held"
+    assert held.receipts()["odd"]["doubts"] == receipt["doubts"]
+
+
+def test_states_and_what_changes_nothing(benches: tuple[Bench, Bench]) -> None:
+    bench, _ = benches
+    bench.send(body("test", "a", 0.0))
+    held = bench.send(body("test", "odd", 1000.0, odd=True))
+
+    def unchanged(change: Callable[[], dict[str, Any]], expected: dict[str, Any]) -> None:
+        revision, trail = revision_of(bench), trail_of(bench)
+        assert change() == expected
+        assert (revision_of(bench), trail_of(bench)) == (revision, trail)
+
+    unchanged(lambda: bench.restore("odd"), held)
+    unchanged(lambda: bench.correct("odd", 1000.0), held)
+    withdrawn = bench.withdraw("odd")
+    assert withdrawn == held | {"state": "withdrawn"}
+    unchanged(lambda: bench.withdraw("odd"), withdrawn)
+    unchanged(lambda: bench.confirm("odd"), withdrawn)
+    with pytest.raises(NotPossibleNowError, match="restore it"):
+        bench.correct("odd", 2000.0)
+    assert bench.restore("odd") == held  # as it was before
+    accepted = bench.confirm("odd")
+    assert (accepted["state"], accepted["doubts"]) == ("accepted", held["doubts"])
+    unchanged(lambda: bench.confirm("odd"), accepted)
+    unchanged(lambda: bench.restore("odd"), accepted)
+    assert bench.correct("odd", 2000.0)["state"] == "held"  # doubted there, too
+    assert bench.correct("odd", 60_000.0)["doubts"] == []  # plausible there
+    back = bench.correct("odd", 1000.0)
+    assert (back["state"], back["cycles"], back["sent_cycles"]) == ("held", 1000, 1000)
+    actions = [(each["action"], each["after"]["state"]) for each in trail_of(bench)]
+    assert actions[::-1] == [
+        ("hold", "held"), ("withdraw", "withdrawn"), ("restore", "held"), ("confirm", "accepted"),
+        ("correct", "held"), ("correct", "accepted"), ("correct", "held"),
+    ]  # fmt: skip
+    with pytest.raises(NotFoundError, match="nobody"):
+        bench.withdraw("nobody")
+
+
+def test_what_was_sent_stays_what_was_sent(benches: tuple[Bench, Bench]) -> None:
+    """The hash is of what was sent: it is known again, and other content is refused, whatever was mended."""
+    bench, _ = benches
+    sent = body("test", "a", 7000.0)
+    first = bench.send(sent)
+    corrected = bench.correct("a", 700.0)
+    assert corrected["content_sha256"] == first["content_sha256"]
+    assert bench.send(sent) == corrected | {"duplicate": True}
+    with pytest.raises(ConflictError):
+        bench.send(sent | {"cycles": 700.0})
+    withdrawn = bench.withdraw("a")
+    assert bench.send(sent) == withdrawn | {"duplicate": True}
+    run = run_query.one_run(bench.database, CLUTCH, "a")
+    assert run["channels"] == {name: [float(x) for x in column] for name, column in sent["channels"].items()}
+    assert [(each["action"], each["before"]["cycles"]) for each in run["changes"]] == [
+        ("withdraw", 700), ("correct", 7000),
+    ]  # fmt: skip
+
+
+def test_two_corrections_at_once_end_as_one_after_the_other(
+    benches: tuple[Bench, Bench], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another process changes another run between computing and storing: both changes hold."""
+    slipped, right = benches
+    for bench in benches:
+        for cycles in (0.0, 1000.0, 2000.0):
+            bench.send(body("test", f"a{cycles:g}", cycles))
+    for name in ("a1000", "a2000"):
+        right.withdraw(name)
+    computed, calls = change_run._computed, []
+
+    def overtaken(*arguments: Any) -> Any:
+        outcome = computed(*arguments)
+        calls.append(1)
+        if len(calls) == 1:
+            other = open_database(f"sqlite:///{slipped.database.path}")
+            change_run.withdraw(other, CLUTCH, "a2000", reason="meanwhile", by="local", at=AT)
+            ingest(other, CLUTCH, read_run(to_json(body("test", "new", 3000.0))), received_at=AT)
+            other.close()
+        return outcome
+
+    monkeypatch.setattr(change_run, "_computed", overtaken)
+    slipped.withdraw("a1000")
+    right.send(body("test", "new", 3000.0))
+    assert len(calls) == 3  # its own twice, the other's once
+    assert_same(slipped, right)
+
+
+def test_a_diagnosis_of_what_was_changed_meanwhile_is_stale_and_not_adopted(benches: tuple[Bench, Bench]) -> None:
+    bench, _ = benches
+    for cycles in (0.0, 1000.0, 70_000.0):
+        bench.send(body("test", f"a{cycles:g}", cycles))
+    asked_for = run_diagnosis.ask(bench.database, CLUTCH, created_at=AT)
+    assert run_diagnosis.running(bench.database, CLUTCH) == asked_for.diagnosis_id
+    bench.send(body("test", "odd", 1500.0, odd=True))  # held: the runs are the same
+    assert run_diagnosis.running(bench.database, CLUTCH) == asked_for.diagnosis_id
+    bench.correct("a70000", 7000.0)
+    assert run_diagnosis.running(bench.database, CLUTCH) is None
+    before = bench.answers()
+    ended = {"report": {"verdict": "cause_named", "causes": []}, "extension": EXTENSION}
+    finished = finish_and_adopt(bench.database, CLUTCH, asked_for.diagnosis_id, ended, life="", at=AT)
+    assert not finished
+    with bench.database.reading() as connection:
+        assert assumptions.current_adoption(connection, CLUTCH) is None
+    assert bench.answers() == before
+    run_diagnosis.finish(bench.database, asked_for.diagnosis_id, ended, at=AT)
+    assert diagnosis_query.diagnosis(bench.database, CLUTCH, asked_for.diagnosis_id)["stale"]
+    fresh = run_diagnosis.ask(bench.database, CLUTCH, created_at=AT)
+    assert not diagnosis_query.diagnosis(bench.database, CLUTCH, fresh.diagnosis_id)["stale"]
+
+
+def revision_of(bench: Bench) -> int:
+    with bench.database.reading() as connection:
+        found = clutches.revision(connection, CLUTCH)
+    assert found is not None
+    return found
+
+
+def trail_of(bench: Bench) -> list[dict[str, Any]]:
+    return run_query.trail(bench.database, CLUTCH, limit=1000, after=None)[0]
