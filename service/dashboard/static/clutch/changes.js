@@ -211,7 +211,7 @@ function ask({ title, lines, action, optional = false, cycles, send }) {
   const numeric = { type: "number", min: 0, step: "any", required: true, inputmode: "decimal" };
   const number = h("input", { id: "changed-cycles", value: cycles, ...numeric });
   const reason = h("input", { id: "reason", required: !optional, maxlength: LONGEST_REASON, autocomplete: "off" });
-  const answer = h("div", { "aria-live": "polite" });
+  const answer = h("div", { class: "answer", "aria-live": "polite" });
   const go = h("button", { class: "main" }, action);
   const dialog = h("dialog", { class: "narrow", "aria-labelledby": "change-title" });
   /** @type {Done | null} */
@@ -219,6 +219,7 @@ function ask({ title, lines, action, optional = false, cycles, send }) {
   const submit = async (/** @type {SubmitEvent} */ event) => {
     event.preventDefault();
     go.disabled = true;
+    answer.replaceChildren(h("p", { class: "quiet" }, "Computing …"));
     try {
       result = await send(reason.value.trim(), Number(number.value));
       dialog.close();

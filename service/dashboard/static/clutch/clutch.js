@@ -34,6 +34,11 @@ const fileName = () => ID.replaceAll(/[^\w.-]+/g, "_");
 let shown = null;
 let due = true;
 /**
+ * The clutch as it was read last: another part of the page may have read a newer one meanwhile.
+ * @type {ClutchOut | null}
+ */
+let latest = null;
+/**
  * The page's parts, once there is something to put into them.
  * @type {{ board: Board, diagnosis: Diagnosis } | null}
  */
@@ -41,7 +46,7 @@ let parts = null;
 document.title = `${ID} · Clutchlife`;
 
 async function poll() {
-  /** @type {{ body: ClutchOut, changed: boolean }} */
+  /** @type {{ body: ClutchOut }} */
   let answer;
   try {
     answer = await read(PATH);
@@ -50,7 +55,8 @@ async function poll() {
     showUnregistered();
     return;
   }
-  due ||= answer.changed; // until all of it is read: an error midway is made good at the next poll
+  due ||= answer.body !== latest; // until all of it is read: an error midway is made good at the next poll
+  latest = answer.body;
   if (due) {
     await refresh(answer.body);
     due = false;

@@ -55,7 +55,7 @@ export class RunFile {
     this.remark = h("p", { class: "remark", role: "status" });
     this.fields = h("fieldset", { class: "fields" }, json ? null : this.fileFields());
     this.element = h(
-      "li",
+      "div",
       { class: "file", role: "group", "aria-label": file.name },
       h(
         "p",

@@ -80,7 +80,7 @@ class Sending {
         h("div", { class: "fields" }, field(this.clutch, "Clutch", h("datalist", { id: "registered" }, options))),
         wrong.length > 0 ? notRuns(wrong) : "",
         h(
-          "ul",
+          "div",
           { class: "files" },
           runs.map((run) => run.element),
         ),
