@@ -18,7 +18,7 @@ OTHER_CLUTCH = 3e-2
 #: Anything else that makes a torque or a pressure meaningless: cables, zeros, amplifiers.
 MEANINGLESS = 1e-4
 #: Odds of a slip from which a run is held. Chosen: a held run costs a click, a slip that is taken in ruins a track.
-HELD = 0.4
+HELD = 0.3
 
 # Mean COF that is possible at all (`course`, `slips`)
 
@@ -49,8 +49,8 @@ TILT, TILT_SD, TILT_SCALE = -0.15, 0.15, 3.0
 TILT_SPAN = 1.25
 #: So many tests of a life are looked at, those nearest to the cycles in question. Chosen: what they cost, 2 ms.
 MOST_TESTS = 40
-#: Deviation of a dynamic test's and of an engagement's median COF from a stationary test's mean. Chosen.
-DYNAMIC_SD, ENGAGEMENT_SD = 0.15, 0.35
+#: Deviation of a dynamic test's and of an engagement's COF from a stationary test's mean. Chosen.
+DYNAMIC_SD, ENGAGEMENT_SD = 0.03, 0.35
 #: The same where pressures are not the reference's, a unit of their logarithm: torque is not quite in proportion.
 OTHER_PRESSURE_SD = 0.35
 
@@ -91,8 +91,8 @@ STILL = 2e-3
 SPEED_STILL = 0.02
 #: Highest over lowest loaded pressure from which torque must follow, and the least exponent of torque over pressure.
 PRESSURE_SPAN, LEAST_EXPONENT = 1.25, 0.4
-#: RMSE over static torque of a single pressure's fit from which pressure was not single.
-SINGLE_LEVEL_RMSE = 0.1
+#: Scatter of torque [-] at one speed and one pressure from which pressure was not one: loops and stick-slip are less.
+SINGLE_LEVEL_SPREAD = 0.1
 #: A COF below this is no friction.
 NO_FRICTION = 0.004
 #: Oil temperatures [K] that no oil has: from below what pours, to above what burns.

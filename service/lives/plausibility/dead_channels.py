@@ -9,12 +9,12 @@ from service.columns import PASCALS_PER_BAR, ZERO_CELSIUS
 from service.lives.history import DYNAMIC, STATIONARY
 from service.lives.plausibility import criteria
 from service.lives.plausibility.reading import Columns
-from service.lives.run_analysis import Analysis, Notice
+from service.lives.run_analysis import Notice
 
 DEAD = "dead_channel"
 
 
-def dead_channels(kind: str, columns: Columns, analysis: Analysis, geometry: Geometry) -> list[Notice]:
+def dead_channels(kind: str, columns: Columns, geometry: Geometry) -> list[Notice]:
     """What is odd about the channels of a run."""
     doubts = list(_oil(columns.oil_temperature))
     pressed = columns.pressure >= UNLOADED
@@ -36,12 +36,12 @@ def dead_channels(kind: str, columns: Columns, analysis: Analysis, geometry: Geo
         message = f"torque is about zero ({np.median(rows.torque):.3g} Nm, a COF of {cof:.2g}) under pressure: is the sensor connected?"
         return [*doubts, Notice(code=DEAD, message=message)]
     if kind in (STATIONARY, DYNAMIC):
-        doubts += _not_following(rows, analysis)
+        doubts += _not_following(rows, geometry)
     return doubts
 
 
-def _not_following(rows: Columns, analysis: Analysis) -> list[Notice]:
-    """Torque that does not go with pressure, or one pressure through whose rows no curve goes."""
+def _not_following(rows: Columns, geometry: Geometry) -> list[Notice]:
+    """Torque that does not go with pressure, or scatters at one pressure as if that had varied."""
     low, high = np.quantile(rows.pressure, [0.02, 0.98]).tolist()
     span = f"{low / PASCALS_PER_BAR:.3g} to {high / PASCALS_PER_BAR:.3g} bar"
     if high > criteria.PRESSURE_SPAN * low:
@@ -53,14 +53,13 @@ def _not_following(rows: Columns, analysis: Analysis) -> list[Notice]:
             )
             return [Notice(code=DEAD, message=message)]
         return []
-    for level in analysis.fits:
-        static = float(level.fit.parameters.static_torque)
-        if len(analysis.fits) == 1 and level.fit.points >= criteria.FEWEST_ROWS and level.fit.rmse > criteria.SINGLE_LEVEL_RMSE * max(static, 1e-12):
-            message = (
-                f"pressure stands at {high / PASCALS_PER_BAR:.3g} bar and torque scatters by {level.fit.rmse:.3g} Nm about one "
-                "curve, as if pressure had varied: is its sensor connected?"
-            )
-            return [Notice(code=DEAD, message=message)]
+    spreads = [float(np.std(cofs) / abs(np.mean(cofs))) for cofs in rows.cof_by_speed(geometry) if cofs.size >= 3]
+    if spreads and float(np.median(spreads)) > criteria.SINGLE_LEVEL_SPREAD:
+        message = (
+            f"pressure stands at {high / PASCALS_PER_BAR:.3g} bar and torque at one speed scatters by "
+            f"{100 * float(np.median(spreads)):.0f} %, as if pressure had varied: is its sensor connected?"
+        )
+        return [Notice(code=DEAD, message=message)]
     return []
 
 

@@ -28,7 +28,7 @@ def doubts(run: IncomingRun, analysis: Analysis, event: Event, before: ClutchSta
     `event` is the run as the history sees it, with its mean COFs; `before` the clutch's state without it.
     """
     columns = columns_of(run, analysis)
-    odd = [] if columns is None else dead_channels(event.kind, columns, analysis, before.geometry)
+    odd = [] if columns is None else dead_channels(event.kind, columns, before.geometry)
     if odd:
         return tuple(odd)
     reading = reading_of(event, columns, before.geometry)

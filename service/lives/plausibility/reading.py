@@ -15,6 +15,10 @@ from service.lives.plausibility import criteria
 from service.lives.run_analysis import Analysis
 
 
+#: Bins of speed.
+_BINS = 16
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Columns:
     """The rows of a run in SI units: pressure [n] Pa, speed [n] rad/s, torque [n] Nm, oil temperature [n] K or None."""
@@ -34,11 +38,20 @@ class Columns:
         return Columns(pressure=self.pressure[rows], speed=self.speed[rows], torque=self.torque[rows], oil_temperature=oil)
 
 
+    def cof_by_speed(self, geometry: Geometry) -> list[FloatArray]:
+        """COF of the rows, positive where torque brakes, in equal bins of speed that hold rows."""
+        cof = np.sign(self.speed) * self.torque / (self.pressure * geometry.torque_per_cof(1.0))
+        speed = np.abs(self.speed)
+        low, high = float(speed.min()), float(speed.max())
+        bins = np.minimum(((speed - low) / max(high - low, 1e-9) * _BINS).astype(np.intp), _BINS - 1)
+        return [cof[bins == number] for number in np.unique(bins)]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
     """A run as its likelihood is computed from; None where it does not show a value.
 
-    `cof` [-] is the median over the rows, of either sign; `pressure` [Pa] and `speed` [rad/s] the highest, `oil` [K] the
+    `cof` [-] is the mean over the speeds, of either sign; `pressure` [Pa] and `speed` [rad/s] the highest, `oil` [K] the
     median; `torque` [Nm] the median where the clutch is open. `mean_cof`: by pressure, as the history compares it;
     `spread`: how far log COF of this kind of run is off a stationary test's; `tilt`: the exponent of COF over pressure and its
     deviation. `declared_speed` [rad/s] is what a block of duty says of its engagements.
@@ -97,12 +110,11 @@ def reading_of(event: Event, columns: Columns | None, geometry: Geometry) -> Rea
     rows = columns.loaded()
     if rows.torque.size == 0:
         return Reading(cycles=event.cycles, oil=oil)
-    unit = rows.pressure * geometry.torque_per_cof(1.0)
     is_test = event.kind in (STATIONARY, DYNAMIC)
     declared_speed = None if event.duty is None else event.duty.speed
     return Reading(
         cycles=event.cycles,
-        cof=float(np.median(np.sign(rows.speed) * rows.torque / unit)),
+        cof=float(np.mean([np.median(cofs) for cofs in rows.cof_by_speed(geometry)])),
         mean_cof=dict(event.cofs) or None,
         spread={STATIONARY: 0.0, DYNAMIC: criteria.DYNAMIC_SD}.get(event.kind, criteria.ENGAGEMENT_SD),
         tilt=tilt_of(event.cofs),
