@@ -63,7 +63,8 @@ def aside(seed: int, count: int, rig: str) -> list[Outcome]:
     outcomes = []
     for number in range(count):
         rng = np.random.default_rng([seed, 2, list(RIGS).index(rig), number])
-        outcomes.append(one_slip(rng, RIGS[rig], rig, ("cycles / 10", *slips.ALIKE)[number % 2]))
+        names = (*slips.OTHERS, *slips.ALIKE)
+        outcomes.append(one_slip(rng, RIGS[rig], rig, names[number % len(names)]))
     return outcomes
 
 
@@ -86,7 +87,9 @@ def _after_tests(made: Campaign, count: int) -> int:
 
 
 def _slip_of(rng: np.random.Generator, group: str, other: Campaign) -> tuple[str, slips.Slip]:
-    kinds = {"wrong unit": slips.UNITS, "sensor unplugged": slips.UNPLUGGED}.get(group, slips.CYCLES)
+    kinds = {"wrong unit": slips.UNITS, "sensor unplugged": slips.UNPLUGGED}.get(
+        group, slips.CYCLES | slips.OTHERS
+    )
     if group in kinds:
         return group, kinds[group]
     swaps = slips.CLUTCHES if group == "wrong clutch" else slips.ALIKE if group in slips.ALIKE else {}

@@ -42,11 +42,6 @@ OUTLYING_SHARE, OUTLYING_SD = 0.02, 0.06
 STEP_SD = 0.05
 #: Deviation of the first level of a rebuilt clutch from that of the life before. Chosen.
 REBUILT_SD = 0.3
-#: The exponent of COF over pressure [-] of wet clutches and its deviation, and how many times log COF changes for one of it:
-#: on that scale it has the same course. Chosen: on the rigs it falls from -0.1 to -0.3.
-TILT, TILT_SD, TILT_SCALE = -0.15, 0.15, 3.0
-#: Highest over lowest pressure of a test from which the exponent is taken. Chosen.
-TILT_SPAN = 1.25
 #: So many tests of a life are looked at, those nearest to the cycles in question. Chosen: what they cost, 2 ms.
 MOST_TESTS = 40
 #: Deviation of a dynamic test's and of an engagement's COF from a stationary test's mean. Chosen.

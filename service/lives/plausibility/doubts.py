@@ -45,8 +45,7 @@ def weighed(reading: Reading, history: History, geometry: Geometry) -> list[Slip
     """All slips that may have been made, with their weights over that of the run as it was sent."""
     if reading.cof is not None:
         typed = [cycles for values in mistyped(reading.cycles).values() for cycles in values]
-        for of_tilt in (False, True)[: 1 + (reading.tilt is not None)]:
-            history.predict([reading.cycles, history.pace.expected(), *typed], of_tilt=of_tilt)
+        history.predict([reading.cycles, history.pace.expected(), *typed])
     as_sent = history.log_likelihood(reading)
     return [slip.against(as_sent) for slip in slips_of(reading, history, geometry)]
 

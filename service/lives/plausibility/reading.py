@@ -53,15 +53,13 @@ class Reading:
 
     `cof` [-] is the mean over the speeds, of either sign; `pressure` [Pa] and `speed` [rad/s] the highest, `oil` [K] the
     median; `torque` [Nm] the median where the clutch is open. `mean_cof`: by pressure, as the history compares it;
-    `spread`: how far log COF of this kind of run is off a stationary test's; `tilt`: the exponent of COF over pressure and its
-    deviation. `declared_speed` [rad/s] is what a block of duty says of its engagements.
+    `spread`: how far log COF of this kind of run is off a stationary test's. `declared_speed` [rad/s] is what a block of duty says of its engagements.
     """
 
     cycles: float
     cof: float | None = None
     mean_cof: Mapping[float, tuple[float, float]] | None = None
     spread: float = 0.0
-    tilt: tuple[float, float] | None = None
     pressure: float | None = None
     speed: float | None = None
     oil: float | None = None
@@ -117,23 +115,11 @@ def reading_of(event: Event, columns: Columns | None, geometry: Geometry) -> Rea
         cof=float(np.mean([np.median(cofs) for cofs in rows.cof_by_speed(geometry)])),
         mean_cof=dict(event.cofs) or None,
         spread={STATIONARY: 0.0, DYNAMIC: criteria.DYNAMIC_SD}.get(event.kind, criteria.ENGAGEMENT_SD),
-        tilt=tilt_of(event.cofs),
         pressure=float(rows.pressure.max()) if is_test else None,
         speed=float(np.abs(rows.speed).max()) if is_test or declared_speed else None,
         declared_speed=declared_speed,
         oil=oil,
     )
-
-
-def tilt_of(cofs: Mapping[float, tuple[float, float]]) -> tuple[float, float] | None:
-    """The exponent of mean COF over pressure by least squares and its deviation; None where pressures are too few or alike."""
-    if len(cofs) < 3 or max(cofs) < criteria.TILT_SPAN * min(cofs):
-        return None
-    x, y = np.log(list(cofs)), np.log([cof for cof, _ in cofs.values()])
-    relative = np.array([sd / cof for cof, sd in cofs.values()])
-    x -= x.mean()
-    square = float(x @ x)
-    return float(x @ y) / square, float(np.sqrt((x * relative) @ (x * relative))) / square
 
 
 def log_or_none(value: float | None) -> float | None:
