@@ -51,7 +51,10 @@ def by_source(outcomes: Sequence[Outcome]) -> Iterator[str]:
     for group in groups:
         mine = [one for one in outcomes if one.source.startswith(group)]
         held = sum(one.held for one in mine)
-        name = {"blind rig, hidden": "blind rig, an effect hidden", "blind rig, with": "blind rig, with an advised test"}
+        name = {
+            "blind rig, hidden": "blind rig, an effect hidden",
+            "blind rig, with": "blind rig, with an advised test",
+        }
         yield f"| {name.get(group, group)} | {len(mine)} | {held} | {percent(held, len(mine))} |"
 
 
@@ -108,7 +111,16 @@ def main() -> int:
     print("\n".join(lines))
     if chosen.failures:
         for one in (*[o for o in wrong if not o.held], *[o for o in honest if o.held]):
-            print("\n", one.slip or "honest", one.source, one.kind, one.cycles, one.before, one.answer.codes, one.answer.message)
+            print(
+                "\n",
+                one.slip or "honest",
+                one.source,
+                one.kind,
+                one.cycles,
+                one.before,
+                one.answer.codes,
+                one.answer.message,
+            )
     if chosen.write:
         text = DOCUMENT.read_text(encoding="utf-8")
         head, tail = text.split(BEGIN)[0], text.split(END)[1]

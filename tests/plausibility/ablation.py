@@ -43,7 +43,6 @@ WITHOUT: dict[str, tuple[tuple[object, str, Callable[..., Any]], ...]] = {
     "slip: other cycles": ((slips, "other_cycles", _nothing),),
     "slip: units": ((slips, "other_units", _nothing),),
     "slip: another clutch": ((slips, "other_clutches", _nothing),),
-    "slip: meaningless": ((slips, "meaningless", _nothing),),
     "slip: dead pressure": ((slips, "dead_pressure", _nothing),),
     "dead channels": ((doubts, "dead_channels", lambda *_: []),),
 }

@@ -1,4 +1,4 @@
-"""A clutch to which runs are sent as to the service, without its database and its tracking: what is doubted, what refused."""
+"""A clutch to which runs are sent as to the service, without its database and tracking: what is doubted, what refused."""
 
 import json
 from collections.abc import Mapping
@@ -64,7 +64,7 @@ class Bench:
         try:
             run, analysis, event = self._read(body)
         except InvalidError as error:
-            return Answer(codes=(REFUSED,), message=str(error), without={name: True for name in WITHOUT})
+            return Answer(codes=(REFUSED,), message=str(error), without=dict.fromkeys(WITHOUT, True))
         before = ClutchState(record=self.clutch, revision=0, events=self.events, adoption=None, priors={})
         began = process_time()
         notices = doubts(run, analysis, event, before)

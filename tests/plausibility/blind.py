@@ -91,7 +91,10 @@ def _filters() -> Iterator[list[tuple[float, float]]]:
         ).T
         when = np.linspace(0, time[-1], 12)
         fallen = np.interp(when, time, drop)
-        yield [(float(at), 1.0 - 0.5 * float(p - fallen[0]) / (600.0 - float(fallen[0]))) for at, p in zip(when, fallen, strict=True)]
+        yield [
+            (float(at), 1.0 - 0.5 * float(p - fallen[0]) / (600.0 - float(fallen[0])))
+            for at, p in zip(when, fallen, strict=True)
+        ]
 
 
 def _cracks() -> Iterator[list[tuple[float, float]]]:

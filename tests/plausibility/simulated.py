@@ -121,9 +121,7 @@ def _rebuilt(rng: np.random.Generator, runs: list[Body], seed: int, sensor: Sens
     for since in schedule(rng, "even")[:5]:
         if since > before:
             duty = {"cycles": since - before, "energy_per_cycle_kj": 18.0}
-            after.append(
-                {"run_id": f"rd{since}", "kind": "duty_cycles", "cycles": latest + since, "duty": duty}
-            )
+            after.append({"run_id": f"rd{since}", "kind": "duty_cycles", "cycles": latest + since, "duty": duty})
         body = simulated_body(_test(clutch, latest + since, since, rng, sensor))
         after.append(body | {"run_id": f"rs{since}", "cycles": latest + since})
         before = since

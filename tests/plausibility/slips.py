@@ -161,9 +161,12 @@ def level(run: Body) -> float:
 
 
 def _under(run: Body, theirs: Body, *, cycles: float) -> Body:
-    return {name: run[name] for name in ("run_id", "kind") if name in run} | {
-        name: theirs[name] for name in ("channels", "origin") if name in theirs
-    } | {"cycles": cycles} | {name: theirs[name] for name in ("started_at",) if name in theirs and "started_at" in run}
+    return (
+        {name: run[name] for name in ("run_id", "kind") if name in run}
+        | {name: theirs[name] for name in ("channels", "origin") if name in theirs}
+        | {"cycles": cycles}
+        | {name: theirs[name] for name in ("started_at",) if name in theirs and "started_at" in run}
+    )
 
 
 Swap = Callable[[np.random.Generator, Body, Campaign], Body | None]

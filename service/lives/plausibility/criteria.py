@@ -10,13 +10,11 @@ slip, times how much better the history and physics predict the run without it.
 #: A zero too many, a zero lost, two digits swapped: of each.
 DIGIT_SLIP = 4e-3
 #: Any other wrong number of cycles.
-OTHER_CYCLES = 2e-4
+OTHER_CYCLES = 1e-3
 #: A channel in another unit, shared among the units of `slips.UNITS`.
 OTHER_UNIT = 1e-2
 #: Another clutch's file under this clutch's name: with its own cycles, and with those expected here.
 OTHER_CLUTCH = 3e-2
-#: Anything else that makes a torque or a pressure meaningless: cables, zeros, amplifiers.
-MEANINGLESS = 1e-4
 #: Odds of a slip from which a run is held. Chosen: a held run costs a click, a slip that is taken in ruins a track.
 HELD = 0.3
 
@@ -25,8 +23,6 @@ HELD = 0.3
 #: Median of a wet clutch's mean COF [-], and the deviation of its logarithm: two deviations cover 0.03 to 0.33. Chosen:
 #: paper, sintered and carbon linings in oil run at 0.05 to 0.2, worn ones at half of that.
 COF, LOG_COF_SD = 0.1, 0.6
-#: The same of a reading that means nothing: three decades to either side within two deviations. Chosen.
-MEANINGLESS_SD = 3.5
 
 # The course of mean COF over cycles (`course`)
 
@@ -71,8 +67,9 @@ OUT_OF_ORDER = 2e-3
 #: Share of tests made at other pressures or speeds than the reference test, deviation of the same and of others' logarithm.
 #: Chosen: a diagnosis advises such tests.
 OTHER_PROTOCOL, SAME_PROTOCOL_SD, OTHER_PROTOCOL_SD = 0.05, 0.03, 1.0
-#: Highest pressure [Pa] and speed [rad/s] of a rig of which nothing is known, and the deviation of their logarithms. Chosen.
-PRESSURE, SPEED, LOG_PROTOCOL_SD = 8e5, 200.0, 1.2
+#: Highest pressure [Pa] and speed [rad/s] of a rig of which nothing is known, and the deviations of their logarithms. Chosen:
+#: slow rigs are many.
+PRESSURE, LOG_PRESSURE_SD, SPEED, LOG_SPEED_SD = 8e5, 1.2, 200.0, 2.0
 #: Oil temperature [K] of a test and its deviation. Chosen: wet clutches are tested at 40 to 120 °C.
 OIL, OIL_SD = 273.15 + 80.0, 25.0
 

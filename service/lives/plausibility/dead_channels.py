@@ -5,7 +5,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.records.criteria import UNLOADED
-from service.columns import PASCALS_PER_BAR, ZERO_CELSIUS
+from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS
 from service.lives.history import DYNAMIC, STATIONARY
 from service.lives.plausibility import criteria
 from service.lives.plausibility.reading import Columns
@@ -20,8 +20,8 @@ def dead_channels(kind: str, columns: Columns, geometry: Geometry) -> list[Notic
     pressed = columns.pressure >= UNLOADED
     if columns.torque.size < criteria.FEWEST_ROWS:
         return doubts
-    if kind == DYNAMIC and (message := _speed_stands(columns.speed)):
-        doubts.append(message)
+    if kind == DYNAMIC:
+        doubts += _speed_stands(columns.speed)
     if not pressed.any():
         return doubts
     torque = columns.torque[pressed]
@@ -53,11 +53,12 @@ def _not_following(rows: Columns, geometry: Geometry) -> list[Notice]:
             )
             return [Notice(code=DEAD, message=message)]
         return []
-    spreads = [float(np.std(cofs) / abs(np.mean(cofs))) for cofs in rows.cof_by_speed(geometry) if cofs.size >= 3]
-    if spreads and float(np.median(spreads)) > criteria.SINGLE_LEVEL_SPREAD:
+    cofs, spreads = rows.cof_by_speed(geometry)
+    scatter = float(np.median(spreads / np.maximum(np.abs(cofs), 1e-12)))
+    if scatter > criteria.SINGLE_LEVEL_SPREAD:
         message = (
-            f"pressure stands at {high / PASCALS_PER_BAR:.3g} bar and torque at one speed scatters by "
-            f"{100 * float(np.median(spreads)):.0f} %, as if pressure had varied: is its sensor connected?"
+            f"pressure stands at {high / PASCALS_PER_BAR:.3g} bar and torque at one speed scatters by {100 * scatter:.0f} %, as if "
+            "pressure had varied: is its sensor connected?"
         )
         return [Notice(code=DEAD, message=message)]
     return []
@@ -75,12 +76,13 @@ def _exponent(rows: Columns) -> tuple[float, float]:
     return exponent, float(np.sqrt(left @ left / x.size * x.size / (square * independent)))
 
 
-def _speed_stands(speed: FloatArray) -> Notice | None:
+def _speed_stands(speed: FloatArray) -> list[Notice]:
     fastest = float(np.abs(speed).max())
-    if fastest > 0 and _spread(speed) > criteria.SPEED_STILL * fastest and fastest > 1.0:
-        return None
-    message = f"speed stands still at {np.median(speed) * 60 / (2 * np.pi):.4g} rpm in a dynamic test: is its sensor connected?"
-    return Notice(code=DEAD, message=message)
+    if fastest > 1.0 and _spread(speed) > criteria.SPEED_STILL * fastest:
+        return []
+    rpm = float(np.median(speed)) / RADIANS_PER_SECOND_PER_RPM
+    message = f"speed stands still at {rpm:.4g} rpm in a dynamic test: is its sensor connected?"
+    return [Notice(code=DEAD, message=message)]
 
 
 def _oil(temperature: FloatArray | None) -> list[Notice]:

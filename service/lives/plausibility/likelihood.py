@@ -14,7 +14,7 @@ import numpy as np
 
 from models.tracking.measurement import Measurement
 from service.lives.assumptions import Assumptions
-from service.lives.history import Event, Life, lives_of
+from service.lives.history import Event, Life, lives_of, pooled_value
 from service.lives.plausibility import criteria
 from service.lives.plausibility.course import Course, Predicted, course_of
 from service.lives.plausibility.pace import Pace, normal, pace_of
@@ -36,6 +36,7 @@ class History:
     corrected: bool
     dated: tuple[tuple[float, float], ...]
     disorder: float
+    protocol: tuple[float | None, float | None]
     _predicted: dict[tuple[int, float], tuple[Predicted, int]] = field(default_factory=dict)
     _of_cycles: dict[float, float] = field(default_factory=dict)
 
@@ -75,12 +76,9 @@ class History:
         """log COF of a reading as the tests of a life show it, and its deviation; None where COF is not positive."""
         spread = math.hypot(reading.spread, criteria.STEP_SD if self.corrected else 0.0)
         first = next((event for event in self.lives[life].events if event.cofs), None) if self.lives else None
-        if reading.mean_cof and first is not None:
-            pair = Life(origin=0.0, events=(first, replace(first, cofs=reading.mean_cof)))
-            measurements = pair.pooled(Assumptions()).measurements
-            if len(measurements) == 2 and measurements[-1].value > 0:
-                value = measurements[-1].value
-                return math.log(value), math.hypot(spread, math.sqrt(measurements[-1].variance) / value)
+        pooled = pooled_value(first.cofs, reading.mean_cof) if reading.mean_cof and first is not None else None
+        if pooled is not None and pooled[0] > 0:
+            return math.log(pooled[0]), math.hypot(spread, pooled[1] / pooled[0])
         if reading.mean_cof:
             cof = math.fsum(cof for cof, _ in reading.mean_cof.values()) / len(reading.mean_cof)
         else:
@@ -93,11 +91,9 @@ class History:
 
     def of_protocol(self, reading: Reading) -> float:
         """The part of pressures, speeds and oil temperature."""
-        reference = next((life for life in reversed(self.lives) if life.speed_range is not None), None)
-        pressures = max(reference.reference, default=None) if reference is not None else None
-        speeds = reference.speed_range[1] if reference is not None and reference.speed_range is not None else None
-        total = _log_protocol(reading.pressure, pressures, criteria.PRESSURE)
-        total += _log_protocol(reading.speed, reading.declared_speed or speeds, criteria.SPEED)
+        pressure, speed = self.protocol
+        total = _log_protocol(reading.pressure, pressure, (criteria.PRESSURE, criteria.LOG_PRESSURE_SD))
+        total += _log_protocol(reading.speed, reading.declared_speed or speed, (criteria.SPEED, criteria.LOG_SPEED_SD))
         if reading.oil is not None:
             total += _log_normal(reading.oil, criteria.OIL, criteria.OIL_SD)
         return total
@@ -159,6 +155,7 @@ def history_of(events: Sequence[Event], newest: Event, *, corrected: bool) -> Hi
         corrected=corrected,
         dated=dated,
         disorder=_disorder(dated),
+        protocol=_protocol(lives),
     )
 
 
@@ -171,12 +168,18 @@ def _log_cofs(life: Life) -> list[Measurement]:
     ]
 
 
+def _protocol(lives: Sequence[Life]) -> tuple[float | None, float | None]:
+    """The highest pressure [Pa] and speed [rad/s] of the last life's reference test, None where there was none."""
+    for life in reversed(lives):
+        if life.speed_range is not None:
+            return max(life.reference, default=None), life.speed_range[1]
+    return None, None
+
+
 def _disorder(dated: Sequence[tuple[float, float]]) -> float:
     """Probability that a run of this rig is out of order in time."""
     wrong = sum(
-        1
-        for (before, earlier), (after, later) in itertools.pairwise(dated)
-        if before < after - 0.5 and earlier > later
+        1 for (before, earlier), (after, later) in itertools.pairwise(dated) if before < after - 0.5 and earlier > later
     )
     return (wrong + criteria.OUT_OF_ORDER) / (len(dated) + 1.0)
 
@@ -192,12 +195,12 @@ def _contradicts(cycles: float, moment: float, others: Sequence[tuple[float, flo
     )
 
 
-def _log_protocol(value: float | None, reference: float | None, usual: float) -> float:
+def _log_protocol(value: float | None, reference: float | None, usual: tuple[float, float]) -> float:
     """log density of a test's highest pressure or speed: the reference test's, or another."""
     if value is None or value <= 0:
         return 0.0
     if reference is None or reference <= 0:
-        return _log_normal(math.log(value), math.log(usual), criteria.LOG_PROTOCOL_SD)
+        return _log_normal(math.log(value), math.log(usual[0]), usual[1])
     off = math.log(value / reference)
     same = (1.0 - criteria.OTHER_PROTOCOL) * normal(off, 0.0, criteria.SAME_PROTOCOL_SD)
     return math.log(same + criteria.OTHER_PROTOCOL * normal(off, 0.0, criteria.OTHER_PROTOCOL_SD) + _LEAST)

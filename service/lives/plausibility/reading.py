@@ -35,16 +35,20 @@ class Columns:
             np.abs(self.speed) >= 0.02 * fastest
         )
         oil = None if self.oil_temperature is None else self.oil_temperature[rows]
-        return Columns(pressure=self.pressure[rows], speed=self.speed[rows], torque=self.torque[rows], oil_temperature=oil)
+        return Columns(
+            pressure=self.pressure[rows], speed=self.speed[rows], torque=self.torque[rows], oil_temperature=oil
+        )
 
-
-    def cof_by_speed(self, geometry: Geometry) -> list[FloatArray]:
-        """COF of the rows, positive where torque brakes, in equal bins of speed that hold rows."""
+    def cof_by_speed(self, geometry: Geometry) -> tuple[FloatArray, FloatArray]:
+        """Mean COF [b] in equal bins of speed, positive where torque brakes, and its scatter [b] about that; bins with rows."""
         cof = np.sign(self.speed) * self.torque / (self.pressure * geometry.torque_per_cof(1.0))
         speed = np.abs(self.speed)
         low, high = float(speed.min()), float(speed.max())
         bins = np.minimum(((speed - low) / max(high - low, 1e-9) * _BINS).astype(np.intp), _BINS - 1)
-        return [cof[bins == number] for number in np.unique(bins)]
+        rows = np.bincount(bins)
+        mean = np.bincount(bins, weights=cof) / np.maximum(rows, 1)
+        square = np.bincount(bins, weights=(cof - mean[bins]) ** 2) / np.maximum(rows, 1)
+        return mean[rows > 0], np.sqrt(square[rows > 0])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,7 +81,9 @@ class Reading:
         )
 
 
-def _scaled(values: Mapping[float, tuple[float, float]], pressure: float, torque: float) -> dict[float, tuple[float, float]]:
+def _scaled(
+    values: Mapping[float, tuple[float, float]], pressure: float, torque: float
+) -> dict[float, tuple[float, float]]:
     factor = pressure / torque
     return {level / pressure: (cof * factor, sd * factor) for level, (cof, sd) in values.items()}
 
@@ -86,7 +92,9 @@ def columns_of(run: IncomingRun, analysis: Analysis) -> Columns | None:
     """The rows of a run: the plateaus of a stationary test, the samples of another; None for a run without channels."""
     rows = analysis.plateaus
     if rows is not None:
-        return Columns(pressure=rows.pressure, speed=rows.speed, torque=rows.torque, oil_temperature=rows.oil_temperature)
+        return Columns(
+            pressure=rows.pressure, speed=rows.speed, torque=rows.torque, oil_temperature=rows.oil_temperature
+        )
     if not run.channels:
         return None
     samples = SampledChannels(run.channels)
@@ -112,7 +120,7 @@ def reading_of(event: Event, columns: Columns | None, geometry: Geometry) -> Rea
     declared_speed = None if event.duty is None else event.duty.speed
     return Reading(
         cycles=event.cycles,
-        cof=float(np.mean([np.median(cofs) for cofs in rows.cof_by_speed(geometry)])),
+        cof=float(rows.cof_by_speed(geometry)[0].mean()),
         mean_cof=dict(event.cofs) or None,
         spread={STATIONARY: 0.0, DYNAMIC: criteria.DYNAMIC_SD}.get(event.kind, criteria.ENGAGEMENT_SD),
         pressure=float(rows.pressure.max()) if is_test else None,

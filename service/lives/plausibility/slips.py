@@ -47,7 +47,6 @@ def slips_of(reading: Reading, history: History, geometry: Geometry) -> Iterator
     yield from other_cycles(reading, history)
     yield from other_units(reading, history)
     yield from other_clutches(reading, history)
-    yield from meaningless(reading, history)
     yield from dead_pressure(reading, history, geometry)
 
 
@@ -100,15 +99,6 @@ def other_clutches(reading: Reading, history: History) -> Iterator[Slip]:
     yield Slip(name="other_test", log_weight=weight + history.of_cycles(reading), likely=reading)
 
 
-def meaningless(reading: Reading, history: History) -> Iterator[Slip]:
-    """A torque or a pressure that means nothing."""
-    of_cof = log_cof_of_any(reading, history, criteria.MEANINGLESS_SD)
-    if of_cof is not None:
-        weight = math.log(criteria.MEANINGLESS) + of_cof
-        weight += history.of_cycles(reading) + history.of_protocol(reading)
-        yield Slip(name="meaningless", log_weight=weight, likely=reading)
-
-
 def dead_pressure(reading: Reading, history: History, geometry: Geometry) -> Iterator[Slip]:
     """A torque of a pressed clutch, and a pressure that says it is open."""
     if reading.torque is None or reading.torque <= 0:
@@ -126,13 +116,13 @@ def dead_pressure(reading: Reading, history: History, geometry: Geometry) -> Ite
     yield Slip(name="dead_pressure", log_weight=weight + history.log_likelihood(reading), likely=reading)
 
 
-def log_cof_of_any(reading: Reading, history: History, deviation: float = criteria.LOG_COF_SD) -> float | None:
+def log_cof_of_any(reading: Reading, history: History) -> float | None:
     """log density of a run's COF as that of any clutch; None where it shows none."""
     compared = history.comparable(reading, len(history.lives) - 1)
     if reading.cof is None or compared is None:
         return None
-    z = (compared[0] - math.log(criteria.COF)) / deviation
-    return -0.5 * z * z - math.log(deviation * math.sqrt(2 * math.pi))
+    z = (compared[0] - math.log(criteria.COF)) / criteria.LOG_COF_SD
+    return -0.5 * z * z - math.log(criteria.LOG_COF_SD * math.sqrt(2 * math.pi))
 
 
 def mistyped(cycles: float) -> dict[str, list[float]]:

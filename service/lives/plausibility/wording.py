@@ -28,7 +28,7 @@ def doubt(slip: Slip, reading: Reading, history: History) -> Notice:
             "pressure sensor connected? Withdraw the run, or confirm it."
         )
         return Notice(code=DEAD, message=message)
-    return _of_cof(slip, reading, history)
+    return _of_cof(reading, history)
 
 
 def negative(reading: Reading) -> Notice:
@@ -75,7 +75,9 @@ def _cof_there(reading: Reading, history: History) -> str:
     predicted, column = history.predicted(reading.cycles)
     low, high = predicted.interval(column, compared[1])
     cof = math.exp(compared[0])
-    return "" if low <= cof <= high else f"Its mean COF of {cof:.3g} is not that of those cycles, {low:.3g} to {high:.3g}."
+    return (
+        "" if low <= cof <= high else f"Its mean COF of {cof:.3g} is not that of those cycles, {low:.3g} to {high:.3g}."
+    )
 
 
 def _of_unit(slip: Slip, reading: Reading, history: History) -> Notice:
@@ -91,7 +93,9 @@ def _of_unit(slip: Slip, reading: Reading, history: History) -> Notice:
         size = "" if scale is None else f" is up to {scale:.4g} {ours}"
         cof = f" a COF of {reading.cof:.3g}" if reading.cof is not None else ""
         expected = _expected(reading, history)
-        message = f"{channel}{size or ' gives'}{' and gives' if size else ''}{cof}, {expected}: was it sent in {slip.unit}?"
+        message = (
+            f"{channel}{size or ' gives'}{' and gives' if size else ''}{cof}, {expected}: was it sent in {slip.unit}?"
+        )
     return Notice(code=UNIT, message=f"{message} Withdraw the run and send it in the channel's unit, or confirm it.")
 
 
@@ -101,16 +105,12 @@ def _expected(reading: Reading, history: History) -> str:
     return f"where {low:.3g} to {high:.3g} is expected"
 
 
-def _of_cof(slip: Slip, reading: Reading, history: History) -> Notice:
+def _of_cof(reading: Reading, history: History) -> Notice:
     compared = history.comparable(reading, max(len(history.lives) - 1, 0))
     cof = reading.cof if compared is None else math.exp(compared[0])
     log_off = abs(math.log(max(cof or 1e-9, 1e-9) / criteria.COF)) / criteria.LOG_COF_SD
-    beyond = log_off > 2.5 or slip.name == "meaningless" and not history.lives
-    cause = (
-        "Is a sensor or a unit wrong?"
-        if slip.name == "meaningless"
-        else "Is it another clutch's test, or the geometry another clutch's?"
-    )
+    beyond = log_off > 2.5
+    cause = "Is a sensor or a unit wrong?" if beyond else "Is it another clutch's test?"
     message = f"mean COF is {cof:.3g}, {_expected(reading, history)} at {_number(reading.cycles)} cycles. {cause} Withdraw the run, or confirm it."
     return Notice(code=BEYOND_PHYSICS if beyond else OFF_COURSE, message=message)
 
