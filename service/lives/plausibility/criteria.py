@@ -85,7 +85,7 @@ SPEED_STILL = 0.02
 PRESSURE_SPAN, LEAST_EXPONENT = 1.25, 0.4
 #: Scatter of torque [-] at one speed and one pressure from which pressure was not one: loops and stick-slip are less.
 SINGLE_LEVEL_SPREAD = 0.1
-#: A COF below this is no friction.
+#: A mean COF below this is no friction where torque scatters about zero by half of itself and more.
 NO_FRICTION = 0.004
 #: Oil temperatures [K] that no oil has: from below what pours, to above what burns.
 COLDEST, HOTTEST = 273.15 - 60.0, 273.15 + 250.0

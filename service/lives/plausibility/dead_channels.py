@@ -31,9 +31,12 @@ def dead_channels(kind: str, columns: Columns, geometry: Geometry) -> list[Notic
         return [*doubts, Notice(code=DEAD, message=message)]
     if rows.torque.size < criteria.FEWEST_ROWS:
         return doubts
-    cof = float(np.median(np.abs(rows.torque) / (rows.pressure * geometry.torque_per_cof(1.0))))
-    if cof < criteria.NO_FRICTION:
-        message = f"torque is about zero ({np.median(rows.torque):.3g} Nm, a COF of {cof:.2g}) under pressure: is the sensor connected?"
+    cof = float(np.abs(rows.cof_by_speed(geometry)[0]).mean())
+    if cof < criteria.NO_FRICTION and float(rows.torque.std()) > 0.5 * float(np.abs(rows.torque.mean())):
+        message = (
+            f"torque is noise about zero ({rows.torque.mean():.3g} ± {rows.torque.std():.3g} Nm) under pressure: is the sensor "
+            "connected?"
+        )
         return [*doubts, Notice(code=DEAD, message=message)]
     if kind in (STATIONARY, DYNAMIC):
         doubts += _not_following(rows, geometry)

@@ -48,7 +48,8 @@ def _of_cycles(slip: Slip, reading: Reading, history: History) -> Notice:
     cof = _cof_there(reading, history)
     if cof:
         sentences.append(cof)
-    ask = f"Is it {_number(slip.likely.cycles)}? " if slip.name != "other_cycles" else ""
+    guessed = slip.name != "other_cycles" and history.pace.cycles.size > 0
+    ask = f"Is it {_number(slip.likely.cycles)}? " if guessed else ""
     message = " ".join([*sentences, f"{ask}Confirm or correct it."])
     return Notice(code=AGAINST_TIME if against_time else OFF_PACE, message=message)
 
