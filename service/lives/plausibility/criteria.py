@@ -87,8 +87,8 @@ PRESSURE_SPAN, LEAST_EXPONENT = 1.25, 0.4
 SINGLE_LEVEL_SPREAD = 0.1
 #: A mean COF below this is no friction where torque scatters about zero by half of itself and more.
 NO_FRICTION = 0.004
-#: Oil temperatures [K] that no oil has: from below what pours, to above what burns.
-COLDEST, HOTTEST = 273.15 - 60.0, 273.15 + 250.0
+#: Oil temperatures [K] that no sensor in oil shows: below what pours, above what K under the name of °C may be.
+COLDEST, HOTTEST = 273.15 - 60.0, 273.15 + 450.0
 
 #: An open clutch's drag over the torque of the pressed one [-], and the deviation of its logarithm. Chosen: a few per cent.
 DRAG, LOG_DRAG_SD = 0.03, 1.2
