@@ -7,6 +7,7 @@
 # make blind   hides effects and wants them found: the table of docs/diagnosis.md      (SEED= SIZE=small|full ONLY= ARGS=)
 # make load     rigs and clients against a running service, what they wait and what is lost: a table of docs/benchmarks.md
 #              (ARGS="--seconds 60 --no-raw"); a few minutes, on a machine that does nothing else
+# make plausibility  sends mistyped and honest runs: the tables of docs/plausibility.md  (SEED= CAMPAIGNS= HONEST= ARGS=--write)
 # make real    what is said of real measurements; make benchmark: how long things take; make picture: README's pictures;
 #              make figures: the figures of docs/
 # make architecture  the picture, the ways and the examples of docs/architecture.md, from the code
@@ -21,7 +22,7 @@ JAVASCRIPT := tests/javascript/node_modules
 LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --exclude-newer "7 days" \
 	--custom-compile-command "make lock"
 
-.PHONY: demo test check lowest benchmark load real figures architecture blind score rivals picture lock clean
+.PHONY: demo test check lowest benchmark load real figures architecture blind plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
@@ -67,6 +68,9 @@ architecture: $(VENV)/.tests
 
 blind: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.blind $(ARGS)
+
+plausibility: $(VENV)/.tests
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.plausibility $(if $(SEED),--seed $(SEED)) $(if $(CAMPAIGNS),--campaigns $(CAMPAIGNS)) $(if $(HONEST),--honest $(HONEST)) $(ARGS)
 
 score: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.score $(PARTS) $(if $(SEED),--seed $(SEED)) $(if $(SIZE),--size $(SIZE)) $(ARGS)

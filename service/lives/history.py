@@ -113,7 +113,7 @@ class Life:
     def pooled(self, assumptions: Assumptions) -> Series:
         """Mean COF over the pressures of the reference test."""
         reference = self.reference
-        pooled = [_pooled(reference, event.cofs) for event in self.events]
+        pooled = [pooled_value(reference, event.cofs) for event in self.events]
         return self.series(assumptions, MEAN_COF, ALL_PRESSURES, pooled)
 
     def at(self, assumptions: Assumptions, level: float) -> Series:
@@ -226,7 +226,7 @@ def moment_of(started_at: str | None, received_at: str) -> float:
     return datetime.fromisoformat(started_at or received_at).timestamp()
 
 
-def _pooled(reference: ByPressure, values: ByPressure) -> Value | None:
+def pooled_value(reference: ByPressure, values: ByPressure) -> Value | None:
     """Mean over the reference pressures; for a pressure that is missing the rest stands, scaled as in the reference."""
     if values.keys() == reference.keys():
         matched = dict(values)

@@ -5,7 +5,9 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 from unittest.mock import patch
 
-from service.lives.plausibility import doubts, pace, slips
+from models.arrays import FloatArray
+from service.lives.plausibility import course, doubts, pace, slips
+from service.lives.plausibility.course import Predicted
 from service.lives.plausibility.likelihood import History
 from service.lives.plausibility.pace import Pace
 
@@ -26,19 +28,21 @@ def _of_any(history: History, reading: Any) -> float:
     return slips.log_cof_of_any(reading, history) or 0.0
 
 
+def _unlimited(log_weight: FloatArray, mean: FloatArray, variance: FloatArray) -> Predicted:
+    return Predicted(log_weight=log_weight, mean=mean, variance=variance)
+
+
 #: What is replaced by what, by the mechanism that this leaves out.
 WITHOUT: dict[str, tuple[tuple[object, str, Callable[..., Any]], ...]] = {
     "the pace of cycles": ((Pace, "log_probability", _anywhere),),
-    "the grid of cycles": ((pace, "grid_of", lambda _: (1.0, 0.0)),),
     "order in time": ((History, "of_time", _zero),),
+    "physics of COF": ((course, "_possible", _unlimited),),
     "the course of COF": ((History, "of_cof", _of_any),),
-    "COF over pressure": ((History, "of_tilt", _zero), (slips, "log_tilt_of_any", _zero)),
     "pressure, speed, oil": ((History, "of_protocol", _zero),),
     "slip: digits": ((slips, "digit_slips", _nothing),),
     "slip: other cycles": ((slips, "other_cycles", _nothing),),
     "slip: units": ((slips, "other_units", _nothing),),
     "slip: another clutch": ((slips, "other_clutches", _nothing),),
-    "slip: meaningless": ((slips, "meaningless", _nothing),),
     "slip: dead pressure": ((slips, "dead_pressure", _nothing),),
     "dead channels": ((doubts, "dead_channels", lambda *_: []),),
 }

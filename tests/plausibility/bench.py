@@ -1,4 +1,4 @@
-"""A clutch to which runs are sent as to the service, without its database and its tracking: what is doubted, what refused."""
+"""A clutch to which runs are sent as to the service, without its database and tracking: what is doubted, what refused."""
 
 import json
 from collections.abc import Mapping

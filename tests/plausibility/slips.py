@@ -29,6 +29,22 @@ def swapped_digits(rng: np.random.Generator, run: Body) -> Body | None:
     return run | {"cycles": int(digits[:k] + digits[k + 1] + digits[k] + digits[k + 2 :])}
 
 
+def wrong_digit(rng: np.random.Generator, run: Body) -> Body | None:
+    """The first digit, or the second, is another one."""
+    digits = str(int(run["cycles"]))
+    if len(digits) < 3:
+        return None
+    k = int(rng.integers(2))
+    other = str(rng.choice([digit for digit in "123456789" if digit != digits[k]]))
+    return run | {"cycles": int(digits[:k] + other + digits[k + 1 :])}
+
+
+def wrong_gain(rng: np.random.Generator, run: Body) -> Body | None:
+    """An amplifier's range is off by a factor of three to fifty, up or down."""
+    factor = float(np.exp(rng.choice([-1.0, 1.0]) * rng.uniform(np.log(3), np.log(50))))
+    return _scaled("torque_nm", factor)(rng, run)
+
+
 def _scaled(channel: str, factor: float, offset: float = 0.0) -> Slip:
     def slip(_: np.random.Generator, run: Body) -> Body | None:
         if channel not in run.get("channels", {}):
@@ -88,9 +104,10 @@ UNPLUGGED: dict[str, Slip] = {
 }
 CYCLES: dict[str, Slip] = {
     "cycles x 10": zero_too_many,
-    "cycles / 10": zero_lost,
     "swapped digits": swapped_digits,
 }
+#: Slips that nobody demanded.
+OTHERS: dict[str, Slip] = {"cycles / 10": zero_lost, "a wrong digit": wrong_digit, "torque at a wrong gain": wrong_gain}
 
 #: Sizes of other discs, as their factor of torque at the same COF and pressure (area times radius).
 SIZES = (0.35, 0.5, 0.65, 1.5, 2.0, 3.0)

@@ -63,7 +63,8 @@ def aside(seed: int, count: int, rig: str) -> list[Outcome]:
     outcomes = []
     for number in range(count):
         rng = np.random.default_rng([seed, 2, list(RIGS).index(rig), number])
-        outcomes.append(one_slip(rng, RIGS[rig], rig, ("cycles / 10", *slips.ALIKE)[number % 2]))
+        names = (*slips.OTHERS, *slips.ALIKE)
+        outcomes.append(one_slip(rng, RIGS[rig], rig, names[number % len(names)]))
     return outcomes
 
 
@@ -86,7 +87,7 @@ def _after_tests(made: Campaign, count: int) -> int:
 
 
 def _slip_of(rng: np.random.Generator, group: str, other: Campaign) -> tuple[str, slips.Slip]:
-    kinds = {"wrong unit": slips.UNITS, "sensor unplugged": slips.UNPLUGGED}.get(group, slips.CYCLES)
+    kinds = {"wrong unit": slips.UNITS, "sensor unplugged": slips.UNPLUGGED}.get(group, slips.CYCLES | slips.OTHERS)
     if group in kinds:
         return group, kinds[group]
     swaps = slips.CLUTCHES if group == "wrong clutch" else slips.ALIKE if group in slips.ALIKE else {}
@@ -110,7 +111,7 @@ def _sent(made: Campaign, k: int, wrong: Body, source: str, name: str) -> Outcom
 def honest(seed: int, count: int) -> Iterator[Outcome]:
     """So many honest runs: two fifths of each rig, a fifth measured; in order, shuffled, one late."""
     for rig, draw in RIGS.items():
-        yield from _honest_of(np.random.default_rng([seed, 3, list(RIGS).index(rig)]), draw, rig, 2 * count // 5)
+        yield from _honest_of(np.random.default_rng([seed, 3, list(RIGS).index(rig)]), draw, 2 * count // 5)
     measured = list(blind.real())
     if measured:
         rng = np.random.default_rng([seed, 4])
@@ -123,7 +124,7 @@ def honest(seed: int, count: int) -> Iterator[Outcome]:
                 sent += 1
 
 
-def _honest_of(rng: np.random.Generator, draw: Draw, rig: str, count: int) -> Iterator[Outcome]:
+def _honest_of(rng: np.random.Generator, draw: Draw, count: int) -> Iterator[Outcome]:
     sent = 0
     while sent < count:
         made = draw(rng)

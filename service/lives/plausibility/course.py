@@ -53,7 +53,7 @@ class Course:
         if n == 0:
             mean = np.full((len(_GRID), cycles.size), self.level)
             variance = np.diagonal(kernel, axis1=1, axis2=2) + scatter
-            return Predicted(log_weight=np.full(len(_GRID), -math.log(len(_GRID))), mean=mean, variance=variance)
+            return _possible(np.full(len(_GRID), -math.log(len(_GRID))), mean, variance)
         factor = np.linalg.cholesky(kernel[:, :n, :n] + noise[:, :, None] * np.eye(n))
         both = np.concatenate([np.broadcast_to(residual[:, None], (len(_GRID), n, 1)), kernel[:, :n, n:]], axis=2)
         solved = np.linalg.solve(factor, both)
@@ -62,11 +62,7 @@ class Course:
         log_weight = evidence - evidence.max()
         mean = self.level + np.einsum("gn,gnm->gm", of_residual, of_cross)
         left = np.diagonal(kernel[:, n:, n:], axis1=1, axis2=2) - (of_cross**2).sum(axis=1)
-        return Predicted(
-            log_weight=log_weight - math.log(np.exp(log_weight).sum()),
-            mean=mean,
-            variance=np.maximum(left, 0.0) + scatter,
-        )
+        return _possible(log_weight - math.log(np.exp(log_weight).sum()), mean, np.maximum(left, 0.0) + scatter)
 
     def _nearest(self, cycles: FloatArray) -> list[int]:
         """Indices of the tests that are looked at: the nearest to any of the cycles."""
@@ -109,6 +105,15 @@ class Predicted:
         mean = float(weight @ self.mean[:, index])
         square = float(weight @ (self.variance[:, index] + (self.mean[:, index] - mean) ** 2)) + spread**2
         return math.exp(mean - 2 * math.sqrt(square)), math.exp(mean + 2 * math.sqrt(square))
+
+
+def _possible(log_weight: FloatArray, mean: FloatArray, variance: FloatArray) -> Predicted:
+    """A prediction together with what physics allows at any cycles: far from all tests that is all there is to say."""
+    physics = criteria.LOG_COF_SD**2
+    both = 1.0 / (1.0 / variance + 1.0 / physics)
+    return Predicted(
+        log_weight=log_weight, mean=both * (mean / variance + math.log(criteria.COF) / physics), variance=both
+    )
 
 
 def course_of(measurements: Sequence[Measurement], *, level: float, level_sd: float) -> Course:

@@ -5,23 +5,23 @@ import numpy as np
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.records.criteria import UNLOADED
-from service.columns import PASCALS_PER_BAR, ZERO_CELSIUS
+from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS
 from service.lives.history import DYNAMIC, STATIONARY
 from service.lives.plausibility import criteria
 from service.lives.plausibility.reading import Columns
-from service.lives.run_analysis import Analysis, Notice
+from service.lives.run_analysis import Notice
 
 DEAD = "dead_channel"
 
 
-def dead_channels(kind: str, columns: Columns, analysis: Analysis, geometry: Geometry) -> list[Notice]:
+def dead_channels(kind: str, columns: Columns, geometry: Geometry) -> list[Notice]:
     """What is odd about the channels of a run."""
     doubts = list(_oil(columns.oil_temperature))
     pressed = columns.pressure >= UNLOADED
     if columns.torque.size < criteria.FEWEST_ROWS:
         return doubts
-    if kind == DYNAMIC and (message := _speed_stands(columns.speed)):
-        doubts.append(message)
+    if kind == DYNAMIC:
+        doubts += _speed_stands(columns.speed)
     if not pressed.any():
         return doubts
     torque = columns.torque[pressed]
@@ -31,17 +31,20 @@ def dead_channels(kind: str, columns: Columns, analysis: Analysis, geometry: Geo
         return [*doubts, Notice(code=DEAD, message=message)]
     if rows.torque.size < criteria.FEWEST_ROWS:
         return doubts
-    cof = float(np.median(np.abs(rows.torque) / (rows.pressure * geometry.torque_per_cof(1.0))))
-    if cof < criteria.NO_FRICTION:
-        message = f"torque is about zero ({np.median(rows.torque):.3g} Nm, a COF of {cof:.2g}) under pressure: is the sensor connected?"
+    cof = float(np.abs(rows.cof_by_speed(geometry)[0]).mean())
+    if cof < criteria.NO_FRICTION and float(rows.torque.std()) > 0.5 * float(np.abs(rows.torque.mean())):
+        message = (
+            f"torque is noise about zero ({rows.torque.mean():.3g} ± {rows.torque.std():.3g} Nm) under pressure: is the sensor "
+            "connected?"
+        )
         return [*doubts, Notice(code=DEAD, message=message)]
     if kind in (STATIONARY, DYNAMIC):
-        doubts += _not_following(rows, analysis)
+        doubts += _not_following(rows, geometry)
     return doubts
 
 
-def _not_following(rows: Columns, analysis: Analysis) -> list[Notice]:
-    """Torque that does not go with pressure, or one pressure through whose rows no curve goes."""
+def _not_following(rows: Columns, geometry: Geometry) -> list[Notice]:
+    """Torque that does not go with pressure, or scatters at one pressure as if that had varied."""
     low, high = np.quantile(rows.pressure, [0.02, 0.98]).tolist()
     span = f"{low / PASCALS_PER_BAR:.3g} to {high / PASCALS_PER_BAR:.3g} bar"
     if high > criteria.PRESSURE_SPAN * low:
@@ -53,18 +56,14 @@ def _not_following(rows: Columns, analysis: Analysis) -> list[Notice]:
             )
             return [Notice(code=DEAD, message=message)]
         return []
-    for level in analysis.fits:
-        static = float(level.fit.parameters.static_torque)
-        if (
-            len(analysis.fits) == 1
-            and level.fit.points >= criteria.FEWEST_ROWS
-            and level.fit.rmse > criteria.SINGLE_LEVEL_RMSE * max(static, 1e-12)
-        ):
-            message = (
-                f"pressure stands at {high / PASCALS_PER_BAR:.3g} bar and torque scatters by {level.fit.rmse:.3g} Nm about one "
-                "curve, as if pressure had varied: is its sensor connected?"
-            )
-            return [Notice(code=DEAD, message=message)]
+    cofs, spreads = rows.cof_by_speed(geometry)
+    scatter = float(np.median(spreads / np.maximum(np.abs(cofs), 1e-12)))
+    if scatter > criteria.SINGLE_LEVEL_SPREAD:
+        message = (
+            f"pressure stands at {high / PASCALS_PER_BAR:.3g} bar and torque at one speed scatters by {100 * scatter:.0f} %, as if "
+            "pressure had varied: is its sensor connected?"
+        )
+        return [Notice(code=DEAD, message=message)]
     return []
 
 
@@ -80,12 +79,13 @@ def _exponent(rows: Columns) -> tuple[float, float]:
     return exponent, float(np.sqrt(left @ left / x.size * x.size / (square * independent)))
 
 
-def _speed_stands(speed: FloatArray) -> Notice | None:
+def _speed_stands(speed: FloatArray) -> list[Notice]:
     fastest = float(np.abs(speed).max())
-    if fastest > 0 and _spread(speed) > criteria.SPEED_STILL * fastest and fastest > 1.0:
-        return None
-    message = f"speed stands still at {np.median(speed) * 60 / (2 * np.pi):.4g} rpm in a dynamic test: is its sensor connected?"
-    return Notice(code=DEAD, message=message)
+    if fastest > 1.0 and _spread(speed) > criteria.SPEED_STILL * fastest:
+        return []
+    rpm = float(np.median(speed)) / RADIANS_PER_SECOND_PER_RPM
+    message = f"speed stands still at {rpm:.4g} rpm in a dynamic test: is its sensor connected?"
+    return [Notice(code=DEAD, message=message)]
 
 
 def _oil(temperature: FloatArray | None) -> list[Notice]:

@@ -28,7 +28,7 @@ def doubts(run: IncomingRun, analysis: Analysis, event: Event, before: ClutchSta
     `event` is the run as the history sees it, with its mean COFs; `before` the clutch's state without it.
     """
     columns = columns_of(run, analysis)
-    odd = [] if columns is None else dead_channels(event.kind, columns, analysis, before.geometry)
+    odd = [] if columns is None else dead_channels(event.kind, columns, before.geometry)
     if odd:
         return tuple(odd)
     reading = reading_of(event, columns, before.geometry)
@@ -45,8 +45,7 @@ def weighed(reading: Reading, history: History, geometry: Geometry) -> list[Slip
     """All slips that may have been made, with their weights over that of the run as it was sent."""
     if reading.cof is not None:
         typed = [cycles for values in mistyped(reading.cycles).values() for cycles in values]
-        for of_tilt in (False, True)[: 1 + (reading.tilt is not None)]:
-            history.predict([reading.cycles, history.pace.expected(), *typed], of_tilt=of_tilt)
+        history.predict([reading.cycles, history.pace.expected(), *typed])
     as_sent = history.log_likelihood(reading)
     return [slip.against(as_sent) for slip in slips_of(reading, history, geometry)]
 

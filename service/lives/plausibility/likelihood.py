@@ -14,11 +14,11 @@ import numpy as np
 
 from models.tracking.measurement import Measurement
 from service.lives.assumptions import Assumptions
-from service.lives.history import Event, Life, lives_of
+from service.lives.history import Event, Life, lives_of, pooled_value
 from service.lives.plausibility import criteria
 from service.lives.plausibility.course import Course, Predicted, course_of
 from service.lives.plausibility.pace import Pace, normal, pace_of
-from service.lives.plausibility.reading import Reading, log_or_none, tilt_of
+from service.lives.plausibility.reading import Reading, log_or_none
 
 #: The least density that counts: no slip is proved by a number that underflows.
 _LEAST = 1e-250
@@ -33,20 +33,16 @@ class History:
     pace: Pace
     lives: tuple[Life, ...]
     courses: tuple[Course, ...]
-    tilts: tuple[Course, ...]
     corrected: bool
     dated: tuple[tuple[float, float], ...]
     disorder: float
-    _predicted: dict[tuple[int, float, bool], tuple[Predicted, int]] = field(default_factory=dict)
+    protocol: tuple[float | None, float | None]
+    _predicted: dict[tuple[int, float], tuple[Predicted, int]] = field(default_factory=dict)
     _of_cycles: dict[float, float] = field(default_factory=dict)
 
     def log_likelihood(self, reading: Reading) -> float:
         """log L of a reading as the honest reading of this clutch."""
-        return self.of_cycles(reading) + self.of_friction(reading) + self.of_protocol(reading)
-
-    def of_friction(self, reading: Reading) -> float:
-        """The part of COF and of how it goes with pressure."""
-        return self.of_cof(reading) + self.of_tilt(reading)
+        return self.of_cycles(reading) + self.of_cof(reading) + self.of_protocol(reading)
 
     def of_cycles(self, reading: Reading) -> float:
         """The part of cycles: their pace, and their order in time where runs are dated."""
@@ -76,27 +72,13 @@ class History:
             best = max(best, predicted.log_density(column, *compared))
         return max(best, math.log(_LEAST))
 
-    def of_tilt(self, reading: Reading) -> float:
-        """The part of the exponent of COF over pressure, by its course; 0 for a run that shows none."""
-        if reading.tilt is None:
-            return 0.0
-        tilt, sd = reading.tilt
-        densities = []
-        for index in self._lives_at(reading.cycles):
-            predicted, column = self.predicted(reading.cycles, index, of_tilt=True)
-            densities.append(predicted.log_density(column, criteria.TILT_SCALE * tilt, criteria.TILT_SCALE * sd))
-        return max(densities) + math.log(criteria.TILT_SCALE)
-
     def comparable(self, reading: Reading, life: int) -> tuple[float, float] | None:
         """log COF of a reading as the tests of a life show it, and its deviation; None where COF is not positive."""
         spread = math.hypot(reading.spread, criteria.STEP_SD if self.corrected else 0.0)
         first = next((event for event in self.lives[life].events if event.cofs), None) if self.lives else None
-        if reading.mean_cof and first is not None:
-            pair = Life(origin=0.0, events=(first, replace(first, cofs=reading.mean_cof)))
-            measurements = pair.pooled(Assumptions()).measurements
-            if len(measurements) == 2 and measurements[-1].value > 0:
-                value = measurements[-1].value
-                return math.log(value), math.hypot(spread, math.sqrt(measurements[-1].variance) / value)
+        pooled = pooled_value(first.cofs, reading.mean_cof) if reading.mean_cof and first is not None else None
+        if pooled is not None and pooled[0] > 0:
+            return math.log(pooled[0]), math.hypot(spread, pooled[1] / pooled[0])
         if reading.mean_cof:
             cof = math.fsum(cof for cof, _ in reading.mean_cof.values()) / len(reading.mean_cof)
         else:
@@ -109,23 +91,21 @@ class History:
 
     def of_protocol(self, reading: Reading) -> float:
         """The part of pressures, speeds and oil temperature."""
-        reference = next((life for life in reversed(self.lives) if life.speed_range is not None), None)
-        pressures = max(reference.reference, default=None) if reference is not None else None
-        speeds = reference.speed_range[1] if reference is not None and reference.speed_range is not None else None
-        total = _log_protocol(reading.pressure, pressures, criteria.PRESSURE)
-        total += _log_protocol(reading.speed, reading.declared_speed or speeds, criteria.SPEED)
+        pressure, speed = self.protocol
+        total = _log_protocol(reading.pressure, pressure, (criteria.PRESSURE, criteria.LOG_PRESSURE_SD))
+        total += _log_protocol(reading.speed, reading.declared_speed or speed, (criteria.SPEED, criteria.LOG_SPEED_SD))
         if reading.oil is not None:
             total += _log_normal(reading.oil, criteria.OIL, criteria.OIL_SD)
         return total
 
-    def predicted(self, cycles: float, life: int | None = None, *, of_tilt: bool = False) -> tuple[Predicted, int]:
-        """log COF (or the scaled tilt) at cycles since new, of the life to which they belong, and its column there."""
+    def predicted(self, cycles: float, life: int | None = None) -> tuple[Predicted, int]:
+        """log COF at cycles since new, of the life to which they belong, and the column of the prediction."""
         index = self._lives_at(cycles)[0] if life is None else life
-        if (index, cycles, of_tilt) not in self._predicted:
-            self.predict([cycles], of_tilt=of_tilt)
-        return self._predicted[index, cycles, of_tilt]
+        if (index, cycles) not in self._predicted:
+            self.predict([cycles])
+        return self._predicted[index, cycles]
 
-    def predict(self, cycles: Sequence[float], *, of_tilt: bool) -> None:
+    def predict(self, cycles: Sequence[float]) -> None:
         """Predict at all of these cycles at once; what follows asks for it."""
         by_life: dict[int, list[float]] = {}
         for wanted in dict.fromkeys(cycles):
@@ -138,11 +118,8 @@ class History:
                 origin, shifts = life.origin, np.array([event.cycles for event in life.events if event.shift])
             at = np.array(wanted_here)
             epoch = (shifts <= at[:, None]).sum(axis=1).astype(np.float64)
-            course = (self.tilts if of_tilt else self.courses)[index]
-            made = course.predict(np.maximum(at - origin, 0.0), epoch)
-            self._predicted.update(
-                {(index, value, of_tilt): (made, column) for column, value in enumerate(wanted_here)}
-            )
+            made = self.courses[index].predict(np.maximum(at - origin, 0.0), epoch)
+            self._predicted.update({(index, value): (made, column) for column, value in enumerate(wanted_here)})
 
     def _lives_at(self, cycles: float) -> list[int]:
         """The life to which cycles belong, the later one first where a rebuild was made at them."""
@@ -159,18 +136,15 @@ class History:
 def history_of(events: Sequence[Event], newest: Event, *, corrected: bool) -> History:
     """The history before a run; `corrected`: a model in force corrects the mean COFs of tests."""
     lives = tuple(lives_of(events)) if events else ()
-    courses, tilts = [], []
+    courses: list[Course] = []
     level, level_sd = math.log(criteria.COF), criteria.LOG_COF_SD
-    tilt, tilt_sd = criteria.TILT, criteria.TILT_SD
     for life in lives:
-        of_cof, of_tilt = _log_cofs(life), _tilts(life)
-        courses.append(course_of(of_cof, level=level, level_sd=level_sd))
-        tilts.append(course_of(of_tilt, level=criteria.TILT_SCALE * tilt, level_sd=criteria.TILT_SCALE * tilt_sd))
-        if of_cof:
-            level, level_sd = of_cof[0].value, criteria.REBUILT_SD
+        measurements = _log_cofs(life)
+        courses.append(course_of(measurements, level=level, level_sd=level_sd))
+        if measurements:
+            level, level_sd = measurements[0].value, criteria.REBUILT_SD
     if not lives:
         courses.append(course_of([], level=level, level_sd=level_sd))
-        tilts.append(course_of([], level=criteria.TILT_SCALE * tilt, level_sd=criteria.TILT_SCALE * tilt_sd))
     dated = tuple(sorted(_dated_start(event) for event in events if event.dated))
     return History(
         events=tuple(events),
@@ -178,10 +152,10 @@ def history_of(events: Sequence[Event], newest: Event, *, corrected: bool) -> Hi
         pace=pace_of(events, newest),
         lives=lives,
         courses=tuple(courses),
-        tilts=tuple(tilts),
         corrected=corrected,
         dated=dated,
         disorder=_disorder(dated),
+        protocol=_protocol(lives),
     )
 
 
@@ -194,14 +168,12 @@ def _log_cofs(life: Life) -> list[Measurement]:
     ]
 
 
-def _tilts(life: Life) -> list[Measurement]:
-    """The scaled exponents of COF over pressure of the tests of a life."""
-    values = []
-    for event in life.events:
-        tilt = tilt_of(event.cofs)
-        scaled = None if tilt is None else (criteria.TILT_SCALE * tilt[0], criteria.TILT_SCALE * tilt[1])
-        values.append(scaled)
-    return list(life.series(Assumptions(), "tilt", 0.0, values).measurements)
+def _protocol(lives: Sequence[Life]) -> tuple[float | None, float | None]:
+    """The highest pressure [Pa] and speed [rad/s] of the last life's reference test, None where there was none."""
+    for life in reversed(lives):
+        if life.speed_range is not None:
+            return max(life.reference, default=None), life.speed_range[1]
+    return None, None
 
 
 def _disorder(dated: Sequence[tuple[float, float]]) -> float:
@@ -223,12 +195,12 @@ def _contradicts(cycles: float, moment: float, others: Sequence[tuple[float, flo
     )
 
 
-def _log_protocol(value: float | None, reference: float | None, usual: float) -> float:
+def _log_protocol(value: float | None, reference: float | None, usual: tuple[float, float]) -> float:
     """log density of a test's highest pressure or speed: the reference test's, or another."""
     if value is None or value <= 0:
         return 0.0
     if reference is None or reference <= 0:
-        return _log_normal(math.log(value), math.log(usual), criteria.LOG_PROTOCOL_SD)
+        return _log_normal(math.log(value), math.log(usual[0]), usual[1])
     off = math.log(value / reference)
     same = (1.0 - criteria.OTHER_PROTOCOL) * normal(off, 0.0, criteria.SAME_PROTOCOL_SD)
     return math.log(same + criteria.OTHER_PROTOCOL * normal(off, 0.0, criteria.OTHER_PROTOCOL_SD) + _LEAST)

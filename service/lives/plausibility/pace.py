@@ -4,8 +4,7 @@
 
 over ways in which the next run comes about: at known cycles where its kind is still to come, at the end of a block that
 begins where another ended, after the gap that was between runs before or one like it, late among those known, or anywhere.
-Runs come in any order and gaps of every size are honest: each way has its share, and none is zero. Cycles are counted in the
-grid that all of them share (every run at a multiple of 500), which is what people and controllers round to.
+Runs come in any order and gaps of every size are honest: each way has its share, and none is zero.
 """
 
 import math
@@ -25,15 +24,12 @@ RUN_IN = "run_in"
 class Pace:
     """The known cycles [n] of a clutch and those [m] of the next run's kind, both ascending and distinct.
 
-    `block` is the duty cycles that the next run says it ran, None for no block. `step` is the grid of all known cycles, and
-    `trusted` the share of runs to come that are on it.
+    `block` is the duty cycles that the next run says it ran, None for no block.
     """
 
     cycles: FloatArray
     of_kind: FloatArray
     block: float | None
-    step: float
-    trusted: float
 
     def log_probability(self, cycles: float) -> float:
         """log P that the next run is made at `cycles`."""
@@ -45,7 +41,7 @@ class Pace:
             latest, late = float(self.cycles[-1]), 0.0
             if cycles <= latest:  # late: anywhere among the known, by the cycles or by their logarithm
                 late = 0.5 / (1.0 + latest) + 0.5 / ((1.0 + cycles) * math.log1p(latest + 1.0))
-            ways.append((criteria.LATE, late * self._on_grid(cycles)))
+            ways.append((criteria.LATE, late))
         total = math.fsum(weight for weight, _ in ways)
         return math.log(math.fsum(weight * probability for weight, probability in ways) / total)
 
@@ -94,7 +90,7 @@ class Pace:
         last = float(base[-1]) if base.size else 0.0
         gap = cycles - last
         middle = math.log(float(np.median(gaps)) if gaps.size else max(last, 1_000.0))
-        ways = [(criteria.OTHER_GAP, self._density(gap, middle, criteria.OTHER_GAP_SD) * self._on_grid(cycles))]
+        ways = [(criteria.OTHER_GAP, self._density(gap, middle, criteria.OTHER_GAP_SD))]
         if gaps.size:
             recency = 0.7 ** np.arange(gaps.size)[::-1]
             recency /= recency.sum()
@@ -107,7 +103,7 @@ class Pace:
                 share * self._density(gap, centre, criteria.LIKE_GAP_SD)
                 for share, centre in zip(shares.tolist(), centres.tolist(), strict=True)
             ]
-            ways.append((criteria.LIKE_GAP, math.fsum(like) * self._on_grid(cycles)))
+            ways.append((criteria.LIKE_GAP, math.fsum(like)))
         return ways
 
     @staticmethod
@@ -117,29 +113,14 @@ class Pace:
             return 0.0
         return normal(math.log(gap), centre, deviation) / gap
 
-    def _on_grid(self, cycles: float) -> float:
-        """How many times as probable `cycles` is as without the grid: its step on the grid, the rest beside it."""
-        return self.trusted * self.step * float(_equal(cycles % self.step, 0.0)) + 1.0 - self.trusted
-
 
 def pace_of(events: Sequence[Event], newest: Event) -> Pace:
     """The pace of the runs before, as the next of its kind is predicted from; run-in is before the first cycle."""
-    step, trusted = grid_of([event.cycles for event in events if event.cycles >= 1])
     return Pace(
-        step=step,
-        trusted=trusted,
         cycles=np.unique([event.cycles for event in events]),
         of_kind=np.unique([event.cycles for event in events if event.kind == newest.kind]),
         block=None if newest.duty is None or newest.kind == RUN_IN else newest.duty.cycles,
     )
-
-
-def grid_of(cycles: Sequence[float]) -> tuple[float, float]:
-    """The greatest step of which all cycles are multiples, and how far it is trusted."""
-    whole = {round(value) for value in cycles}
-    if len(whole) < 2 or any(not value.is_integer() for value in cycles):
-        return 1.0, 0.0
-    return float(math.gcd(*whole)), len(whole) / (len(whole) + 2.0)
 
 
 def anywhere(cycles: float) -> float:

@@ -15,6 +15,10 @@ from service.lives.plausibility import criteria
 from service.lives.run_analysis import Analysis
 
 
+#: Bins of speed.
+_BINS = 16
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Columns:
     """The rows of a run in SI units: pressure [n] Pa, speed [n] rad/s, torque [n] Nm, oil temperature [n] K or None."""
@@ -35,22 +39,31 @@ class Columns:
             pressure=self.pressure[rows], speed=self.speed[rows], torque=self.torque[rows], oil_temperature=oil
         )
 
+    def cof_by_speed(self, geometry: Geometry) -> tuple[FloatArray, FloatArray]:
+        """Mean COF [b] in equal bins of speed, positive where torque brakes, and its scatter [b] about that; bins with rows."""
+        cof = np.sign(self.speed) * self.torque / (self.pressure * geometry.torque_per_cof(1.0))
+        speed = np.abs(self.speed)
+        low, high = float(speed.min()), float(speed.max())
+        bins = np.minimum(((speed - low) / max(high - low, 1e-9) * _BINS).astype(np.intp), _BINS - 1)
+        rows = np.bincount(bins)
+        mean = np.bincount(bins, weights=cof) / np.maximum(rows, 1)
+        square = np.bincount(bins, weights=(cof - mean[bins]) ** 2) / np.maximum(rows, 1)
+        return mean[rows > 0], np.sqrt(square[rows > 0])
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
     """A run as its likelihood is computed from; None where it does not show a value.
 
-    `cof` [-] is the median over the rows, of either sign; `pressure` [Pa] and `speed` [rad/s] the highest, `oil` [K] the
+    `cof` [-] is the mean over the speeds, of either sign; `pressure` [Pa] and `speed` [rad/s] the highest, `oil` [K] the
     median; `torque` [Nm] the median where the clutch is open. `mean_cof`: by pressure, as the history compares it;
-    `spread`: how far log COF of this kind of run is off a stationary test's; `tilt`: the exponent of COF over pressure and its
-    deviation. `declared_speed` [rad/s] is what a block of duty says of its engagements.
+    `spread`: how far log COF of this kind of run is off a stationary test's. `declared_speed` [rad/s] is what a block of duty says of its engagements.
     """
 
     cycles: float
     cof: float | None = None
     mean_cof: Mapping[float, tuple[float, float]] | None = None
     spread: float = 0.0
-    tilt: tuple[float, float] | None = None
     pressure: float | None = None
     speed: float | None = None
     oil: float | None = None
@@ -103,31 +116,18 @@ def reading_of(event: Event, columns: Columns | None, geometry: Geometry) -> Rea
     rows = columns.loaded()
     if rows.torque.size == 0:
         return Reading(cycles=event.cycles, oil=oil)
-    unit = rows.pressure * geometry.torque_per_cof(1.0)
     is_test = event.kind in (STATIONARY, DYNAMIC)
     declared_speed = None if event.duty is None else event.duty.speed
     return Reading(
         cycles=event.cycles,
-        cof=float(np.median(np.sign(rows.speed) * rows.torque / unit)),
+        cof=float(rows.cof_by_speed(geometry)[0].mean()),
         mean_cof=dict(event.cofs) or None,
         spread={STATIONARY: 0.0, DYNAMIC: criteria.DYNAMIC_SD}.get(event.kind, criteria.ENGAGEMENT_SD),
-        tilt=tilt_of(event.cofs),
         pressure=float(rows.pressure.max()) if is_test else None,
         speed=float(np.abs(rows.speed).max()) if is_test or declared_speed else None,
         declared_speed=declared_speed,
         oil=oil,
     )
-
-
-def tilt_of(cofs: Mapping[float, tuple[float, float]]) -> tuple[float, float] | None:
-    """The exponent of mean COF over pressure by least squares and its deviation; None where pressures are too few or alike."""
-    if len(cofs) < 3 or max(cofs) < criteria.TILT_SPAN * min(cofs):
-        return None
-    x, y = np.log(list(cofs)), np.log([cof for cof, _ in cofs.values()])
-    relative = np.array([sd / cof for cof, sd in cofs.values()])
-    x -= x.mean()
-    square = float(x @ x)
-    return float(x @ y) / square, float(np.sqrt((x * relative) @ (x * relative))) / square
 
 
 def log_or_none(value: float | None) -> float | None:

@@ -47,7 +47,6 @@ def slips_of(reading: Reading, history: History, geometry: Geometry) -> Iterator
     yield from other_cycles(reading, history)
     yield from other_units(reading, history)
     yield from other_clutches(reading, history)
-    yield from meaningless(reading, history)
     yield from dead_pressure(reading, history, geometry)
 
 
@@ -66,7 +65,7 @@ def other_cycles(reading: Reading, history: History) -> Iterator[Slip]:
     weight = math.log(criteria.OTHER_CYCLES) + log_anywhere(reading.cycles)
     yield Slip(
         name="other_cycles",
-        log_weight=weight + history.of_friction(likely) + history.of_protocol(reading),
+        log_weight=weight + history.of_cof(likely) + history.of_protocol(reading),
         likely=likely,
     )
 
@@ -87,23 +86,17 @@ def other_units(reading: Reading, history: History) -> Iterator[Slip]:
 
 
 def other_clutches(reading: Reading, history: History) -> Iterator[Slip]:
-    """Another clutch's test: COF is that of any clutch; its cycles are its own, or those expected here."""
+    """Another clutch's test: COF is that of any clutch; its cycles are its own, or those expected here.
+
+    Before the first test of a clutch any clutch's may be its own.
+    """
     of_cof = log_cof_of_any(reading, history)
-    if of_cof is None:
+    if of_cof is None or not any(course.cycles.size for course in history.courses):
         return
-    of_cof += log_tilt_of_any(reading) + history.of_protocol(reading)
+    of_cof += history.of_protocol(reading)
     weight = math.log(0.5 * criteria.OTHER_CLUTCH) + of_cof
     yield Slip(name="other_clutch", log_weight=weight + log_anywhere(reading.cycles), likely=reading)
     yield Slip(name="other_test", log_weight=weight + history.of_cycles(reading), likely=reading)
-
-
-def meaningless(reading: Reading, history: History) -> Iterator[Slip]:
-    """A torque or a pressure that means nothing."""
-    of_cof = log_cof_of_any(reading, history, criteria.MEANINGLESS_SD)
-    if of_cof is not None:
-        weight = math.log(criteria.MEANINGLESS) + of_cof + log_tilt_of_any(reading)
-        weight += history.of_cycles(reading) + history.of_protocol(reading)
-        yield Slip(name="meaningless", log_weight=weight, likely=reading)
 
 
 def dead_pressure(reading: Reading, history: History, geometry: Geometry) -> Iterator[Slip]:
@@ -123,21 +116,13 @@ def dead_pressure(reading: Reading, history: History, geometry: Geometry) -> Ite
     yield Slip(name="dead_pressure", log_weight=weight + history.log_likelihood(reading), likely=reading)
 
 
-def log_cof_of_any(reading: Reading, history: History, deviation: float = criteria.LOG_COF_SD) -> float | None:
+def log_cof_of_any(reading: Reading, history: History) -> float | None:
     """log density of a run's COF as that of any clutch; None where it shows none."""
     compared = history.comparable(reading, len(history.lives) - 1)
     if reading.cof is None or compared is None:
         return None
-    z = (compared[0] - math.log(criteria.COF)) / deviation
-    return -0.5 * z * z - math.log(deviation * math.sqrt(2 * math.pi))
-
-
-def log_tilt_of_any(reading: Reading) -> float:
-    """log density of how COF goes with pressure as that of any clutch."""
-    if reading.tilt is None:
-        return 0.0
-    z = (reading.tilt[0] - criteria.TILT) / criteria.TILT_SD
-    return -0.5 * z * z - math.log(criteria.TILT_SD * math.sqrt(2 * math.pi))
+    z = (compared[0] - math.log(criteria.COF)) / criteria.LOG_COF_SD
+    return -0.5 * z * z - math.log(criteria.LOG_COF_SD * math.sqrt(2 * math.pi))
 
 
 def mistyped(cycles: float) -> dict[str, list[float]]:

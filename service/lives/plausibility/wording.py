@@ -28,7 +28,7 @@ def doubt(slip: Slip, reading: Reading, history: History) -> Notice:
             "pressure sensor connected? Withdraw the run, or confirm it."
         )
         return Notice(code=DEAD, message=message)
-    return _of_cof(slip, reading, history)
+    return _of_cof(reading, history)
 
 
 def negative(reading: Reading) -> Notice:
@@ -48,7 +48,8 @@ def _of_cycles(slip: Slip, reading: Reading, history: History) -> Notice:
     cof = _cof_there(reading, history)
     if cof:
         sentences.append(cof)
-    ask = f"Is it {_number(slip.likely.cycles)}? " if slip.name != "other_cycles" else ""
+    guessed = slip.name != "other_cycles" and history.pace.cycles.size > 0
+    ask = f"Is it {_number(slip.likely.cycles)}? " if guessed else ""
     message = " ".join([*sentences, f"{ask}Confirm or correct it."])
     return Notice(code=AGAINST_TIME if against_time else OFF_PACE, message=message)
 
@@ -105,16 +106,12 @@ def _expected(reading: Reading, history: History) -> str:
     return f"where {low:.3g} to {high:.3g} is expected"
 
 
-def _of_cof(slip: Slip, reading: Reading, history: History) -> Notice:
+def _of_cof(reading: Reading, history: History) -> Notice:
     compared = history.comparable(reading, max(len(history.lives) - 1, 0))
     cof = reading.cof if compared is None else math.exp(compared[0])
     log_off = abs(math.log(max(cof or 1e-9, 1e-9) / criteria.COF)) / criteria.LOG_COF_SD
-    beyond = log_off > 2.5 or (slip.name == "meaningless" and not history.lives)
-    cause = (
-        "Is a sensor or a unit wrong?"
-        if slip.name == "meaningless"
-        else "Is it another clutch's test, or the geometry another clutch's?"
-    )
+    beyond = log_off > 2.5
+    cause = "Is a sensor or a unit wrong?" if beyond else "Is it another clutch's test?"
     message = f"mean COF is {cof:.3g}, {_expected(reading, history)} at {_number(reading.cycles)} cycles. {cause} Withdraw the run, or confirm it."
     return Notice(code=BEYOND_PHYSICS if beyond else OFF_COURSE, message=message)
 
