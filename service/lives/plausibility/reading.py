@@ -14,7 +14,6 @@ from service.lives.incoming_run import IncomingRun, SampledChannels
 from service.lives.plausibility import criteria
 from service.lives.run_analysis import Analysis
 
-
 #: Bins of speed.
 _BINS = 16
 
