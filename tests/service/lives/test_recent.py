@@ -86,13 +86,13 @@ def _forgotten(client: TestClient, database: Database) -> set[bool]:
 
 def test_a_list_is_made_anew_only_after_a_commit(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[int] = []
-    page = clutch_list.page
+    page = clutch_list.page_as_json
 
     def counted(*arguments: Any, **named: Any) -> Any:
         made.append(1)
         return page(*arguments, **named)
 
-    monkeypatch.setattr(clutch_list, "page", counted)
+    monkeypatch.setattr(clutch_list, "page_as_json", counted)
     first = client.get("/v1/clutches")
     again = client.get("/v1/clutches", headers={"If-None-Match": first.headers["etag"]})
     assert (again.status_code, len(made)) == (304, 1)

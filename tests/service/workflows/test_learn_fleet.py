@@ -115,3 +115,25 @@ def test_posting_on_and_tracking_anew_agree_under_a_fleets_prior(url: str) -> No
         # the random numbers depend on the name: quantiles agree to what a thousand draws leave
         ends = np.array([[said["end_of_life_cycles"][q] for q in ("0.25", "0.5")] for said in answers])
         assert ends[0] == pytest.approx(ends[1], rel=0.1)
+
+
+def test_a_run_that_comes_before_its_clutch_is_brought_up_has_all_of_it_tracked_anew(
+    url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A fleet has learned, and a run is quicker than the refresh: what is stored is what a replay gives."""
+    with client_of(url) as client:
+        for number, scale in enumerate((5000.0, 6000.0, 7000.0)):
+            post(client, f"old-{number}", scale, last=6000)
+        post(client, "new", 6000.0, last=3000)
+        with monkeypatch.context() as slow:
+            slow.setattr(learn_fleet, "_brought_up", lambda *_: False)
+            refresh(url)
+        body = stationary(4000, wear=wear(4000, 6000.0), speeds=SPEEDS, pressures=(5.0,), run_id="next")
+        assert client.post("/v1/clutches/new/runs", json=body).status_code == 201
+        assert client.get(LIFE.format("new")).json()["prior"]["name"] == "fleet"
+    with closing(open_database(url)) as database:
+        with database.reading() as connection:
+            before = records.answers(connection, "new")
+        replay_clutch(database, "new")
+        with database.reading() as connection:
+            assert records.answers(connection, "new") == before
