@@ -105,7 +105,8 @@ def test_both_kinds_take_in_the_same_runs_alike(tmp_path: Path) -> None:
         made = make(database)
         bodies = [to_json(stationary(1000.0 * number, run_id=f"r{number}")) for number in range(4)]
         taken_in = [
-            made.submit(Lane.RUNS, ingest_posted, "c1", partial(read_run, body), AT, "local", turn="c1") for body in bodies
+            made.submit(Lane.RUNS, ingest_posted, "c1", partial(read_run, body), AT, "local", turn="c1")
+            for body in bodies
         ]
         receipts.append([call.result(IN_TIME) for call in taken_in])
         made.close()
