@@ -146,11 +146,11 @@ class Bench:
         )
         if degradation_too:
             named["degradation"] = degradation.degradation(database, CLUTCH)
-        named["stribeck"] = stribeck.page(database, CLUTCH, limit=1000, after=None)[0]
+        named["stribeck"] = stribeck.curves(database, CLUTCH, 1000, None)
         named["series"] = series.series(database, CLUTCH, None)
         named["loops"] = runs.loops(database, CLUTCH)
         named["scores"] = scores.of_clutch(database, CLUTCH, method="particle")
-        named["clutch"] = clutch_list.look_up(database, CLUTCH)
+        named["clutch"] = clutch_list.look_up(database, CLUTCH) | {"held": None}
         named["runs"] = [
             {name: value for name, value in receipt.items() if name not in OF_THE_AUDIT}
             for receipt in self.receipts().values()

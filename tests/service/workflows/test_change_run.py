@@ -1,5 +1,6 @@
 """After a slip is mended, every answer is that of a clutch that was sent the right things from the start."""
 
+import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,11 +12,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from service.errors import ConflictError, NotFoundError, NotPossibleNowError
+from service.lives.plausibility import doubts as rules
 from service.queries import diagnoses as diagnosis_query
 from service.queries import runs as run_query
+from service.queries.raw_run.answer import write_run
 from service.run_files.json_run import read_run
 from service.web.answers import to_json
-from service.workflows import change_run, run_diagnosis
+from service.workflows import change_run, ingest_run, run_diagnosis
 from service.workflows.adopt_model import finish_and_adopt
 from service.workflows.ingest_run import ingest
 from service.workflows.replay import replay_clutch
@@ -102,6 +105,29 @@ def test_a_mended_clutch_answers_as_one_without_slips(
         assert_same(slipped, right, degradation_too=False)
         for bench in (slipped, right):
             bench.close()
+
+
+def test_a_zero_too_many_is_held_and_corrected_by_the_rules_in_force(
+    benches: tuple[Bench, Bench], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A test of 7,000 cycles that was sent as 70,000: nothing changes until it is corrected, and then all is right."""
+    slipped, right = benches
+    for workflow in (change_run, ingest_run):
+        monkeypatch.setattr(workflow, "doubts", rules.doubts)
+    for cycles in range(0, 7000, 1000):
+        for bench in benches:
+            assert bench.send(body("test", f"r{cycles}", cycles))["state"] == "accepted"
+    assert slipped.send(body("test", "last", 7000.0) | {"cycles": 70_000.0})["state"] == "held"
+    assert_same(slipped, right, degradation_too=False)
+    corrected = slipped.correct("last", 7000.0)
+    assert (corrected["state"], corrected["doubts"]) == ("accepted", [])
+    right.send(body("test", "last", 7000.0))
+    assert_same(slipped, right)
+    assert slipped.correct("last", 70_000.0)["state"] == "held"
+    assert slipped.confirm("last")["state"] == "accepted"
+    assert slipped.answers(degradation_too=False)["clutch"]["summary"]["as_of_cycles"] == 70_000
+    slipped.correct("last", 7000.0)
+    assert_same(slipped, right, degradation_too=False)
 
 
 @pytest.fixture
@@ -251,7 +277,7 @@ def test_states_and_what_changes_nothing(benches: tuple[Bench, Bench]) -> None:
         bench.withdraw("nobody")
 
 
-def test_what_was_sent_stays_what_was_sent(benches: tuple[Bench, Bench]) -> None:
+def test_what_was_sent_stays_what_was_sent(benches: tuple[Bench, Bench], tmp_path: Path) -> None:
     """The hash is of what was sent: it is known again, and other content is refused, whatever was mended."""
     bench, _ = benches
     sent = body("test", "a", 7000.0)
@@ -263,7 +289,8 @@ def test_what_was_sent_stays_what_was_sent(benches: tuple[Bench, Bench]) -> None
         bench.send(sent | {"cycles": 700.0})
     withdrawn = bench.withdraw("a")
     assert bench.send(sent) == withdrawn | {"duplicate": True}
-    run = run_query.one_run(bench.database, CLUTCH, "a")
+    write_run(bench.database, CLUTCH, "a", points=None, kind="json", path=tmp_path / "run")
+    run = json.loads((tmp_path / "run").read_bytes())
     assert run["channels"] == {name: [float(x) for x in column] for name, column in sent["channels"].items()}
     assert [(each["action"], each["before"]["cycles"]) for each in run["changes"]] == [
         ("withdraw", 700), ("correct", 7000),
