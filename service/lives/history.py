@@ -34,9 +34,9 @@ REBUILD = "rebuild"
 class Event:
     """A run as the history sees it.
 
-    `moment` is when it was made [s], `dated` where the rig said so. A stationary test has the range of its speeds [rad/s], and mean COF with its
-    deviation by pressure [Pa] where its curves determine it; `duty` is the block that ends with the run, `shift` an event
-    that may have shifted the level.
+    `moment` is when it was made [s], `dated` where the rig said so. A stationary test has the range of its speeds [rad/s],
+    and mean COF with its deviation by pressure [Pa] where its curves determine it; `duty` is the block that ends with the
+    run, `shift` an event that may have shifted the level.
     """
 
     run_id: str
