@@ -33,13 +33,7 @@ def test_the_history_on_the_bench_is_that_of_the_service(tmp_path: Path) -> None
             ingest(database, "bench", read_run(json.dumps(body).encode()), received_at=RECEIVED)
         with database.reading() as connection:
             events = records.state(connection, "bench").events
-    assert {event.run_id: event.dated for event in events} == {
-        "s500": False,
-        "s0": True,
-        "s1000": False,
-        "d": True,
-        "m": False,
-    }
+    assert {event.run_id for event in events if event.dated} == {"s0", "d"}
     for mine, theirs in zip(bench.events, events, strict=True):
         assert mine.cofs.keys() == theirs.cofs.keys()
         for level, value in mine.cofs.items():

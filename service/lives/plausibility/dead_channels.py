@@ -52,8 +52,8 @@ def _not_following(rows: Columns, geometry: Geometry) -> list[Notice]:
         exponent, error = _exponent(rows)
         if exponent + 3 * error < criteria.LEAST_EXPONENT:
             message = (
-                f"torque does not follow pressure: it goes with pressure to the power of {exponent:.2f} from {span}, about 1 "
-                "is expected. Is a sensor disconnected, or does a column hold another channel?"
+                f"torque does not follow pressure: it goes with pressure to the power of {exponent:.2f} from {span}, about "
+                "1 is expected. Is a sensor disconnected, or does a column hold another channel?"
             )
             return [Notice(code=DEAD, message=message)]
         return []
@@ -61,8 +61,8 @@ def _not_following(rows: Columns, geometry: Geometry) -> list[Notice]:
     scatter = float(np.median(spreads / np.maximum(np.abs(cofs), 1e-12)))
     if scatter > criteria.SINGLE_LEVEL_SPREAD:
         message = (
-            f"pressure stands at {high / PASCALS_PER_BAR:.3g} bar and torque at one speed scatters by {100 * scatter:.0f} %, "
-            "as if pressure had varied: is its sensor connected?"
+            f"pressure stands at {high / PASCALS_PER_BAR:.3g} bar and torque at one speed scatters by {100 * scatter:.0f} "
+            "%, as if pressure had varied: is its sensor connected?"
         )
         return [Notice(code=DEAD, message=message)]
     return []

@@ -34,8 +34,8 @@ def doubt(slip: Slip, reading: Reading, history: History) -> Notice:
 def negative(reading: Reading) -> Notice:
     """The doubt of a torque that pushes."""
     message = (
-        f"torque acts with the sliding, a COF of {reading.cof:.3g}: is the sign of torque or speed the wrong way round? Send "
-        "it with a positive torque, or confirm it."
+        f"torque acts with the sliding, a COF of {reading.cof:.3g}: is the sign of torque or speed the wrong way round? "
+        "Send it with a positive torque, or confirm it."
     )
     return Notice(code=BEYOND_PHYSICS, message=message)
 
