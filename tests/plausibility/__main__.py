@@ -71,6 +71,11 @@ def by_mechanism(wrong: Sequence[Outcome], honest: Sequence[Outcome]) -> Iterato
         yield f"| {name} | {of_wrong} of {len(wrong)} | {of_honest} of {len(judged)} |"
 
 
+def _counted(title: str, outcomes: Sequence[Outcome]) -> str:
+    held = sum(one.held for one in outcomes)
+    return f"| {title} | {len(outcomes)} | {held} | {percent(held, len(outcomes))} | |"
+
+
 def main() -> int:
     """Print the tables; 1 where the demand is not met."""
     parser = argparse.ArgumentParser(prog="python -m tests.plausibility", description=__doc__)
@@ -92,10 +97,7 @@ def main() -> int:
         "",
         "| | runs | held | share | demand |",
         "|---|---|---|---|---|",
-        *(
-            f"| one slip, {rig} | {len(of)} | {sum(one.held for one in of)} | {percent(sum(one.held for one in of), len(of))} | |"
-            for rig, of in rigs.items()
-        ),
+        *(_counted(f"one slip, {rig}", outcomes) for rig, outcomes in rigs.items()),
         f"| **one slip** | {len(wrong)} | {held} | {percent(held, len(wrong))} | ≥ 95 % |",
         f"| **honest** | {len(honest)} | {false} | {percent(false, len(honest))} | ≤ 0.5 % |",
         "",

@@ -28,8 +28,8 @@ COF, LOG_COF_SD = 0.1, 0.6
 
 #: Deviation of the slope of log COF over log(1 + cycles/φ) [-]. Chosen: eq. 6's courses lose half in two or three units.
 SLOPE_SD = 0.15
-#: What the history chooses among: φ [cycles], the deviation by which the slope changes in a unit of log(1 + cycles/φ), and the
-#: scatter from run to run of log COF. Chosen: lives of 10² to 10⁶ cycles, smooth and bent ones, sensors of 0.3 to 5 %.
+#: What the history chooses among: φ [cycles], the deviation by which the slope changes in a unit of log(1 + cycles/φ), and
+#: the scatter from run to run of log COF. Chosen: lives of 10² to 10⁶ cycles, smooth and bent ones, sensors of 0.3 to 5 %.
 SCALES, BENDS, SCATTERS = (30.0, 1_000.0, 30_000.0), (0.02, 0.08, 0.3), (0.003, 0.012, 0.05)
 #: One honest test in so many is off by more than its scatter, and the deviation of that. Chosen: gains that are misread, oil
 #: that nobody logged; the blind rig's hidden effects are honest.
@@ -59,7 +59,8 @@ ANYWHERE = 0.02
 LIKE_GAP_SD, OTHER_GAP_SD = 0.3, 1.5
 #: Median and deviation of log(1 + cycles) of a run of which nothing else is known. Chosen: a test of 3·10⁹ cycles is none.
 CYCLES, LOG_CYCLES_SD = 5_000.0, 2.5
-#: Probability that an honest run's `started_at` is out of order with its cycles. Chosen: clocks are set wrongly now and then.
+#: Probability that an honest run's `started_at` is out of order with its cycles. Chosen: clocks are set wrongly at
+#: times.
 OUT_OF_ORDER = 2e-3
 
 # Protocols (`likelihood`)
@@ -67,8 +68,8 @@ OUT_OF_ORDER = 2e-3
 #: Share of tests made at other pressures or speeds than the reference test, deviation of the same and of others' logarithm.
 #: Chosen: a diagnosis advises such tests.
 OTHER_PROTOCOL, SAME_PROTOCOL_SD, OTHER_PROTOCOL_SD = 0.05, 0.03, 1.0
-#: Highest pressure [Pa] and speed [rad/s] of a rig of which nothing is known, and the deviations of their logarithms. Chosen:
-#: slow rigs are many.
+#: Highest pressure [Pa] and speed [rad/s] of a rig of which nothing is known, and the deviations of their logarithms.
+#: Chosen: slow rigs are many.
 PRESSURE, LOG_PRESSURE_SD, SPEED, LOG_SPEED_SD = 8e5, 1.2, 200.0, 2.0
 #: Oil temperature [K] of a test and its deviation. Chosen: wet clutches are tested at 40 to 120 °C.
 OIL, OIL_SD = 273.15 + 80.0, 25.0

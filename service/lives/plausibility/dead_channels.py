@@ -27,15 +27,16 @@ def dead_channels(kind: str, columns: Columns, geometry: Geometry) -> list[Notic
     torque = columns.torque[pressed]
     rows = columns.loaded()
     if torque.size >= criteria.FEWEST_ROWS and _spread(torque) <= criteria.STILL * float(np.abs(np.median(torque))):
-        message = f"torque stands still at {np.median(torque):.4g} Nm whatever pressure and speed do: is the sensor connected?"
+        level = float(np.median(torque))
+        message = f"torque stands still at {level:.4g} Nm whatever pressure and speed do: is the sensor connected?"
         return [*doubts, Notice(code=DEAD, message=message)]
     if rows.torque.size < criteria.FEWEST_ROWS:
         return doubts
     cof = float(np.abs(rows.cof_by_speed(geometry)[0]).mean())
     if cof < criteria.NO_FRICTION and float(rows.torque.std()) > 0.5 * float(np.abs(rows.torque.mean())):
         message = (
-            f"torque is noise about zero ({rows.torque.mean():.3g} ± {rows.torque.std():.3g} Nm) under pressure: is the sensor "
-            "connected?"
+            f"torque is noise about zero ({rows.torque.mean():.3g} ± {rows.torque.std():.3g} Nm) under pressure: is the "
+            "sensor connected?"
         )
         return [*doubts, Notice(code=DEAD, message=message)]
     if kind in (STATIONARY, DYNAMIC):
@@ -51,8 +52,8 @@ def _not_following(rows: Columns, geometry: Geometry) -> list[Notice]:
         exponent, error = _exponent(rows)
         if exponent + 3 * error < criteria.LEAST_EXPONENT:
             message = (
-                f"torque does not follow pressure: it goes with pressure to the power of {exponent:.2f} from {span}, about 1 is "
-                "expected. Is a sensor disconnected, or does a column hold another channel?"
+                f"torque does not follow pressure: it goes with pressure to the power of {exponent:.2f} from {span}, about "
+                "1 is expected. Is a sensor disconnected, or does a column hold another channel?"
             )
             return [Notice(code=DEAD, message=message)]
         return []
@@ -60,8 +61,8 @@ def _not_following(rows: Columns, geometry: Geometry) -> list[Notice]:
     scatter = float(np.median(spreads / np.maximum(np.abs(cofs), 1e-12)))
     if scatter > criteria.SINGLE_LEVEL_SPREAD:
         message = (
-            f"pressure stands at {high / PASCALS_PER_BAR:.3g} bar and torque at one speed scatters by {100 * scatter:.0f} %, as if "
-            "pressure had varied: is its sensor connected?"
+            f"pressure stands at {high / PASCALS_PER_BAR:.3g} bar and torque at one speed scatters by {100 * scatter:.0f} "
+            "%, as if pressure had varied: is its sensor connected?"
         )
         return [Notice(code=DEAD, message=message)]
     return []

@@ -39,7 +39,7 @@ class Columns:
         )
 
     def cof_by_speed(self, geometry: Geometry) -> tuple[FloatArray, FloatArray]:
-        """Mean COF [b] in equal bins of speed, positive where torque brakes, and its scatter [b] about that; bins with rows."""
+        """Mean COF [b] in equal bins of speed that hold rows, positive where torque brakes, and its scatter [b] there."""
         cof = np.sign(self.speed) * self.torque / (self.pressure * geometry.torque_per_cof(1.0))
         speed = np.abs(self.speed)
         low, high = float(speed.min()), float(speed.max())
@@ -55,8 +55,9 @@ class Reading:
     """A run as its likelihood is computed from; None where it does not show a value.
 
     `cof` [-] is the mean over the speeds, of either sign; `pressure` [Pa] and `speed` [rad/s] the highest, `oil` [K] the
-    median; `torque` [Nm] the median where the clutch is open. `mean_cof`: by pressure, as the history compares it;
-    `spread`: how far log COF of this kind of run is off a stationary test's. `declared_speed` [rad/s] is what a block of duty says of its engagements.
+    median; `torque` [Nm] the median where the clutch is open. `mean_cof`: by pressure, as the history compares it; `spread`:
+    how far log COF of this kind of run is off a stationary test's. `declared_speed` [rad/s] is what a block of duty says of
+    its engagements.
     """
 
     cycles: float

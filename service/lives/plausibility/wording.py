@@ -24,8 +24,8 @@ def doubt(slip: Slip, reading: Reading, history: History) -> Notice:
         return _of_unit(slip, reading, history)
     if slip.name == "dead_pressure":
         message = (
-            f"pressure says that the clutch is open, and its torque of {reading.torque:.3g} Nm is that of a pressed one: is the "
-            "pressure sensor connected? Withdraw the run, or confirm it."
+            f"pressure says that the clutch is open, and its torque of {reading.torque:.3g} Nm is that of a pressed one: is "
+            "the pressure sensor connected? Withdraw the run, or confirm it."
         )
         return Notice(code=DEAD, message=message)
     return _of_cof(reading, history)
@@ -34,8 +34,8 @@ def doubt(slip: Slip, reading: Reading, history: History) -> Notice:
 def negative(reading: Reading) -> Notice:
     """The doubt of a torque that pushes."""
     message = (
-        f"torque acts with the sliding, a COF of {reading.cof:.3g}: is the sign of torque or speed the wrong way round? Send it "
-        "with a positive torque, or confirm it."
+        f"torque acts with the sliding, a COF of {reading.cof:.3g}: is the sign of torque or speed the wrong way round? "
+        "Send it with a positive torque, or confirm it."
     )
     return Notice(code=BEYOND_PHYSICS, message=message)
 
@@ -60,7 +60,8 @@ def _gap(reading: Reading, history: History) -> str:
         return f"{_number(reading.cycles)} cycles are more than clutches last."
     before = cycles[cycles < reading.cycles - 0.5]
     if before.size == 0 or reading.cycles <= cycles[-1] + 0.5:
-        return f"{_number(reading.cycles)} cycles lie among those of earlier runs, the last of which was at {_number(cycles[-1])}."
+        latest = _number(float(cycles[-1]))
+        return f"{_number(reading.cycles)} cycles lie among those of earlier runs, the last of which was at {latest}."
     gap = f"{_number(reading.cycles)} cycles are {_number(reading.cycles - before[-1])} after the run before"
     usual = history.pace.usual_gap
     return f"{gap}." if usual is None else f"{gap}, whose like were about {_number(usual)} apart."
@@ -112,7 +113,8 @@ def _of_cof(reading: Reading, history: History) -> Notice:
     log_off = abs(math.log(max(cof or 1e-9, 1e-9) / criteria.COF)) / criteria.LOG_COF_SD
     beyond = log_off > 2.5
     cause = "Is a sensor or a unit wrong?" if beyond else "Is it another clutch's test?"
-    message = f"mean COF is {cof:.3g}, {_expected(reading, history)} at {_number(reading.cycles)} cycles. {cause} Withdraw the run, or confirm it."
+    expected = f"{_expected(reading, history)} at {_number(reading.cycles)} cycles"
+    message = f"mean COF is {cof:.3g}, {expected}. {cause} Withdraw the run, or confirm it."
     return Notice(code=BEYOND_PHYSICS if beyond else OFF_COURSE, message=message)
 
 

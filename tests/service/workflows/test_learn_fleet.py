@@ -1,15 +1,18 @@
 """A fleet's prior: learned from others only, named in every answer, refreshed by a command."""
 
 import math
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from service import records
 from service.app import create_app
 from service.settings import Settings
 from service.workflows import learn_fleet
+from service.workflows.replay import replay_clutch
 from storage.engine.database import open_database
 from tests.support import stationary
 

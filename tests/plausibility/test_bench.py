@@ -1,0 +1,65 @@
+"""The bench on which trials are made sees the same history as the service, and a coin does not pass its demand."""
+
+import json
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from service import records
+from service.run_files.json_run import read_run
+from service.schemas.clutch import ClutchIn
+from service.workflows.ingest_run import ingest
+from service.workflows.register_clutch import register
+from storage.engine.database import open_database
+from tests.plausibility import slips, trials
+from tests.plausibility.bench import RECEIVED, Bench
+from tests.support import stationary
+
+
+def test_the_history_on_the_bench_is_that_of_the_service(tmp_path: Path) -> None:
+    bodies = [stationary(cycles, run_id=f"s{cycles}", pressures=(4.0, 5.0)) for cycles in (500, 0, 1000)]
+    bodies.append(
+        {"kind": "duty_cycles", "run_id": "d", "cycles": 1000, "duty": {"cycles": 500, "initial_speed_rpm": 2000}}
+    )
+    bodies.append({"kind": "maintenance", "run_id": "m", "cycles": 700, "event": "rest"})
+    bodies = [body | {"started_at": "2026-11-01T08:00:00+00:00"} if k % 2 else body for k, body in enumerate(bodies)]
+    bench = Bench({})
+    with closing(open_database(f"sqlite:///{tmp_path / 'a.db'}")) as database:
+        register(database, ClutchIn(clutch_id="bench"), created_at=RECEIVED)
+        for body in bodies:
+            bench.accept(body)
+            ingest(database, "bench", read_run(json.dumps(body).encode()), received_at=RECEIVED)
+        with database.reading() as connection:
+            events = records.state(connection, "bench").events
+    assert {event.run_id for event in events if event.dated} == {"s0", "d"}
+    for mine, theirs in zip(bench.events, events, strict=True):
+        assert mine.cofs.keys() == theirs.cofs.keys()
+        for level, value in mine.cofs.items():
+            assert value == pytest.approx(theirs.cofs[level], rel=1e-12)
+        assert (mine.run_id, mine.cycles, mine.moment, mine.duty, mine.shift, mine.dated) == (
+            theirs.run_id,
+            theirs.cycles,
+            theirs.moment,
+            theirs.duty,
+            theirs.shift,
+            theirs.dated,
+        )
+
+
+def test_a_slip_changes_the_run_or_is_none() -> None:
+    rng, honest = np.random.default_rng(3), stationary(7000, run_id="a")
+    honest["channels"]["oil_temperature_c"] = [85.0] * len(honest["channels"]["torque_nm"])
+    for slip in (slips.CYCLES | slips.UNITS | slips.UNPLUGGED | slips.OTHERS).values():
+        wrong = slip(rng, honest)
+        assert wrong is not None
+        assert wrong != honest
+    assert slips.CYCLES["cycles x 10"](rng, honest | {"cycles": 0}) is None
+
+
+def test_each_group_of_slips_is_drawn() -> None:
+    for group in slips.GROUPS:
+        outcome = trials.one_slip(np.random.default_rng([7, 1]), trials.of_simulated, "simulated rig", group)
+        assert outcome.slip
+        assert outcome.answer.without or outcome.held
