@@ -1,5 +1,7 @@
 """The raw channels of runs: each function against a real file."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from sqlalchemy.exc import IntegrityError
@@ -67,3 +69,21 @@ def test_a_damaged_channel_is_named(database: Database) -> None:
         connection.exec_driver_sql("UPDATE channel SET data = substr(data, 1, 50) WHERE name = 'speed_rpm'")
     with database.reading() as connection, pytest.raises(DamagedData, match=f"channel speed_rpm of run {key}"):
         channels.read(connection, key)
+
+
+def test_one_channel_is_read_alone_and_decoded_without_a_connection(database: Database) -> None:
+    sent = {"time_s": np.arange(50_000) / 1000, **columns(1, 50_000)}
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+        key, bare = (runs.insert(connection, new_run(number)) for number in range(2))
+        channels.write(connection, key, channels.encoded(sent))
+    with database.reading() as connection:
+        stored = [channels.stored(connection, key, name) for name in sent]
+        assert channels.lengths(connection, key) == dict.fromkeys(sent, 50_000)
+        assert list(channels.lengths(connection, key)) == list(sent)
+        assert channels.lengths(connection, bare) == {}
+        with pytest.raises(LookupError, match="has no channel torque_nm"):
+            channels.stored(connection, bare, "torque_nm")
+    assert [each.values().tobytes() for each in stored] == [column.tobytes() for column in sent.values()]
+    with pytest.raises(DamagedData, match=f"channel time_s of run {key}"):
+        replace(stored[0], data=stored[0].data[:50]).values()
