@@ -3,7 +3,7 @@
 A workflow reads a `ClutchState`, computes outside any transaction, and stores with `unchanged` and `store`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,11 +20,10 @@ from models.tracking.filters.particle import ParticleState
 from models.tracking.filters.ukf import UkfState
 from service.columns import whole
 from service.errors import NotFoundError
-from service.lives.assumptions import ALL_PRESSURES, FLEET, LearnedPrior, kind_of, severity_under
+from service.lives.assumptions import ALL_PRESSURES, FLEET, LearnedPrior, kind_of, severity_name, severity_under
 from service.lives.history import REBUILD, ByPressure, Event, duty_block, moment_of, order
-from service.lives.incoming_run import IncomingRun
 from service.lives.recomputation import Adoption, ClutchState, Results, Tracking, newest_adoption
-from service.lives.run_analysis import Analysis, LevelFit, Value
+from service.lives.run_analysis import LevelFit, Value
 from service.lives.tracks import CARRIED, States, Tracked
 from service.schemas.clutch import ClutchIn
 from service.settings import CODE_VERSION
@@ -58,24 +57,28 @@ def state(
     also: Extension | None = None,
     edited: ClutchIn | None = None,
     carried: bool = False,
+    newest_prior: bool = False,
 ) -> ClutchState:
     """The clutch's state at its present revision. Raises NotFoundError.
 
     `also`: an extension that may come into force; what fleets taught for its severity is loaded beside the others'.
     `edited`: a record that is about to come into force in place of the stored one.
     `carried`: with the filters after the last run, to be carried on; all else is computed without them.
+    `newest_prior`: under what its fleet knows now; else a clutch stays under the version that it was tracked under last.
     """
     row = clutch(connection, clutch_id)
     own, adoptions = edited or record(row), _adoptions(connection, clutch_id)
     extensions = [also, *(None if adopted is None else adopted.extension for adopted in adoptions)]
     exponents = {None, *(extension.severity_exponent for extension in extensions if extension is not None)}
     severities = {severity_under(own, exponent) for exponent in exponents}
+    last = results.prediction_at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)
+    tracked = {} if last is None or newest_prior or edited is not None else last.payload
     return ClutchState(
         record=own,
         revision=row.revision,
         events=events(connection, clutch_id),
         adoptions=adoptions,
-        priors={severity: _learned_prior(connection, own, severity) for severity in severities},
+        priors={severity: _learned_prior(connection, own, severity, tracked) for severity in severities},
         filters=_filters(connection, clutch_id) if carried else None,
     )
 
@@ -148,12 +151,6 @@ def answers(connection: Connection, clutch_id: str) -> list[Any]:
     """Receipts and predictions as they are stored of a clutch: whether they have changed decides on a new revision."""
     tracks = [results.predictions_of(connection, clutch_id, method, ALL_PRESSURES) for method in CARRIED]
     return [receipts(connection, clutch_id), tracks]
-
-
-def details(incoming_run: IncomingRun, analysis: Analysis) -> dict[str, Any]:
-    """What is kept beside a run's channels: what was sent with them, and its range of speeds [rad/s]."""
-    sent = dict(incoming_run.details) | {"origin": incoming_run.origin}
-    return sent | ({} if analysis.speed_range is None else {"speed_range": list(analysis.speed_range)})
 
 
 def unchanged(connection: Connection, clutch_id: str, revision: int) -> bool:
@@ -232,11 +229,14 @@ def _tracked(method: str, row: FilterStateRow) -> Tracked:
     )
 
 
-def _learned_prior(connection: Connection, own: ClutchIn, severity: Severity) -> LearnedPrior:
-    """The newest prior of the clutch's kind that was not learned from it, and its public name."""
-    row = assumptions.current_fleet_prior(connection, kind_of(own, severity))
-    if row is not None and own.clutch_id in row.members:
-        row = assumptions.fleet_prior_without(connection, row, own.clutch_id)
+def _learned_prior(
+    connection: Connection, own: ClutchIn, severity: Severity, tracked: Mapping[str, Any]
+) -> LearnedPrior:
+    """The prior of the clutch's kind not learned from it: the one that the prediction `tracked` names, or the newest."""
+    version = None
+    if tracked.get("severity") == severity_name(severity) and "prior" in tracked:
+        version = tracked["prior"]["version"] or 0
+    row = assumptions.fleet_prior_for(connection, kind_of(own, severity), own.clutch_id, version)
     if row is None:
         return LearnedPrior()
     fleet = FleetPrior.from_dict(row.content)

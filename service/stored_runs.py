@@ -89,7 +89,7 @@ def recomputed(database: Database, state: ClutchState) -> Recomputed:
     for row in rows:
         sent = reader.read(row.run_id)
         analysis = analyse(sent, state.geometry)
-        details[row.run_id] = records.details(sent, analysis)
+        details[row.run_id] = analysis.kept_beside(sent)
         receipts[row.run_id] = _receipt(row, analysis)
         levels[row.run_id] = analysis.fits
         speed_ranges[row.run_id] = analysis.speed_range

@@ -157,10 +157,19 @@ def current_fleet_prior(connection: Connection, fleet: Json) -> FleetPriorRow | 
     return None if row is None else _fleet_row(row)
 
 
-def fleet_prior_without(connection: Connection, prior: FleetPriorRow, clutch_id: str) -> FleetPriorRow | None:
-    """The same version learned from all but one clutch; None where too few were left."""
-    values = {"of_fleet": _fleet_key(prior.fleet), "of_version": prior.version, "wanted": clutch_id}
+def fleet_prior_for(connection: Connection, fleet: Json, clutch_id: str, version: int | None) -> FleetPriorRow | None:
+    """The prior of that version (the newest where it is None or gone, none where it is 0) that a clutch did not teach.
+
+    None where there is none, or where too few other clutches were left.
+    """
+    if version == 0:
+        return None
+    values = {"of_fleet": _fleet_key(fleet), "of_version": version, "wanted": NOBODY}
     row = connection.execute(_fleet_without, values).first()
+    prior = current_fleet_prior(connection, fleet) if row is None else _fleet_row(row)
+    if prior is None or clutch_id not in prior.members:
+        return prior
+    row = connection.execute(_fleet_without, values | {"of_version": prior.version, "wanted": clutch_id}).first()
     return None if row is None else _fleet_row(row)
 
 

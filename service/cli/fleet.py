@@ -1,12 +1,11 @@
 """`clutchlife fleet`: the priors learned from clutches of a kind; works on the database, while the service runs."""
 
-import os
 from datetime import UTC, datetime
 from typing import Annotated, Any
 
 import typer
 
-from service.cli.options import DATABASE, NICE, Database, existing, out
+from service.cli.options import DATABASE, Database, existing, out
 
 app = typer.Typer(help="The priors learned from earlier clutches.")
 
@@ -31,11 +30,7 @@ def refresh(
     database: Database = DATABASE,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print changes only")] = False,
 ) -> None:
-    """Learn every kind's prior anew, and update the predictions of clutches whose prior has changed.
-
-    It yields to a service that runs (nice 10).
-    """
-    os.nice(NICE)
+    """Learn every kind's prior anew, and update the predictions of clutches whose prior has changed."""
     from service.queries.fleet_priors import newest  # start-up time
     from service.workflows.learn_fleet import refresh as learn_priors  # start-up time
 

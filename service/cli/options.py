@@ -22,9 +22,6 @@ EX_DATAERR, EX_TEMPFAIL, EX_USAGE = 65, 75, 64
 out = Console(highlight=False)
 err = Console(stderr=True, highlight=False)
 
-#: By how much commands that recompute much yield to a running service. Chosen: as diagnoses do.
-NICE = 10
-
 Database = Annotated[
     str, typer.Option("--database", envvar="CLUTCHLIFE_DATABASE", help="sqlite:///path, or sqlite:////absolute/path")
 ]

@@ -26,12 +26,13 @@ class Lane(Enum):
     """What waits for what: runs that are taken in, answers that somebody waits for, files and raw records, and answers that
     are made anew while the last ones are given.
 
-    The values are by how much a lane's processes yield to the one that answers [nice]. Chosen by `make load`.
+    The values are by how much a lane's processes yield [nice]; what takes the write lock yields little.
+    Chosen by `make load`.
     """
 
-    RUNS = 1
-    ANSWERS = 3
-    FILES = 5
+    RUNS = 0
+    ANSWERS = 1
+    FILES = 2
     RENEWALS = 10
 
 

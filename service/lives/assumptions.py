@@ -105,8 +105,16 @@ class Assumptions:
 
     def named(self) -> dict[str, Any]:
         """The model, the prior and the severity behind an answer, as it names them."""
-        severity = {"basis": self.severity.basis.value, "exponent": self.severity.exponent}
-        return {"model": dict(self.model.name), "prior": dict(self.prior.name), "severity": severity}
+        return {
+            "model": dict(self.model.name),
+            "prior": dict(self.prior.name),
+            "severity": severity_name(self.severity),
+        }
+
+
+def severity_name(severity: Severity) -> dict[str, Any]:
+    """What ζ counts, as answers name it."""
+    return {"basis": severity.basis.value, "exponent": severity.exponent}
 
 
 def severity_under(record: ClutchIn, exponent: float | None) -> Severity:

@@ -33,7 +33,7 @@ from service.lives.payloads import (
     warned_anew,
 )
 from service.lives.run_analysis import LevelFit, loops_of, mean_cofs
-from service.lives.tracks import CARRIED, Prediction, States, follow, under_other_priors
+from service.lives.tracks import CARRIED, Prediction, States, follow
 from service.schemas.clutch import ClutchIn
 
 #: The levels of stationary tests by run_id.
@@ -280,11 +280,8 @@ def _carried(state: ClutchState, life: Life, assumptions: Assumptions, newest: E
     if (newest is not last and newest.shift) or state.filters is None:
         return None
     index = life.events.index(newest)
-    series = life.pooled(assumptions)
-    before = sum(1 for event in series.events if event != index)
+    before = sum(1 for event in life.pooled(assumptions).events if event != index)
     if state.filters.keys() != (set(CARRIED) if before else set()):
-        return None
-    if under_other_priors(state.filters, series, assumptions):
         return None
     return None if any(tracked.runs != before for tracked in state.filters.values()) else state.filters
 

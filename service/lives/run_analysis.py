@@ -6,6 +6,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -57,6 +58,11 @@ class Analysis:
     warnings: tuple[Notice, ...] = ()
     plateaus: Plateaus | None = None
     times: tuple[float, ...] | None = None
+
+    def kept_beside(self, run: IncomingRun) -> dict[str, Any]:
+        """What is kept beside a run's channels: what was sent with them, and its range of speeds [rad/s]."""
+        sent = dict(run.details) | {"origin": run.origin}
+        return sent | ({} if self.speed_range is None else {"speed_range": list(self.speed_range)})
 
 
 def analyse(run: IncomingRun, geometry: Geometry) -> Analysis:

@@ -133,14 +133,6 @@ def _continues(tracked: Tracked, series: Series, priors: Mapping[str, Prior]) ->
     return True
 
 
-def under_other_priors(states: States, series: Series, assumptions: Assumptions) -> bool:
-    """Whether filters were begun under other priors than those that a series has now, as when a fleet has learned since."""
-    if not series.measurements:
-        return False
-    priors = assumptions.priors(series.quantity, series.measurements[0], series.scale)
-    return any({name: state.prior for name, state in tracked.states.items()} != priors for tracked in states.values())
-
-
 def draws(clutch_id: str, method: str, series: Series, assumptions: Assumptions, tracked: Tracked) -> Posterior:
     """A weighted sample of eq. 6's coefficients after `tracked.runs` measurements; the same each time."""
     tracker = _TRACKERS[method]

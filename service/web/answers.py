@@ -151,6 +151,13 @@ async def _computed(
     return await context.revalidation.answer(key, _revision(context, clutch_id), compute, wait=wait)
 
 
+async def begin_computed(context: Context, clutch_id: str, query: Callable[..., dict[str, Any]]) -> None:
+    """Hold the answer of a clutch that has just been registered, which costs nothing; later ones are made from then on."""
+    revision, body = await run_in_threadpool(revision_and_json, context.database, query, clutch_id, ())
+    if revision == 0:
+        context.revalidation.begin((clutch_id, _name(query)), body)
+
+
 def _computed_again(
     context: Context, clutch_id: str, query: Callable[..., dict[str, Any]], arguments: tuple[Hashable, ...]
 ) -> Again:

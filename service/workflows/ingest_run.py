@@ -216,7 +216,7 @@ def _store(
         started_at=run.started_at,
         received_at=arrival.received_at,
         content_sha256=run.content_sha256,
-        details=records.details(run, arrival.analysis),
+        details=arrival.analysis.kept_beside(run),
         receipt=outcome.receipt,
         code_version=CODE_VERSION,
         state=outcome.state,

@@ -4,7 +4,9 @@ No clutch is tracked under what was learned from itself: for each clutch that ta
 learned from the others.
 """
 
+import os
 from collections.abc import Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 from models.prognosis.criteria import FEWEST_CLUTCHES, FEWEST_TESTS_TO_LEARN
@@ -20,6 +22,9 @@ from storage import assumptions, clutches, results
 from storage.assumptions import NOBODY, FleetPriorRow
 from storage.encoding.json_text import Json, to_text
 from storage.engine.database import Database
+
+#: By how much a thread that tracks anew yields [nice]. Chosen: as diagnoses do.
+_NICE = 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,14 +53,14 @@ def refresh(database: Database, *, now: str) -> Refreshed:
     fleets: dict[str, Fleet] = {}
     with database.reading() as connection:
         names = clutches.all_ids(connection)
-    for clutch_id in names:
-        kind, lessons = _lessons(database, clutch_id)
-        if lessons:
-            fleets.setdefault(to_text(kind), Fleet(kind=kind)).lessons[clutch_id] = lessons
-    fresh = [fleet.kind for fleet in fleets.values() if _stored_anew(database, fleet, now)]
-    return Refreshed(
-        kinds=tuple(fresh), changed=tuple(clutch_id for clutch_id in names if _brought_up(database, clutch_id))
-    )
+    with ThreadPoolExecutor(1, initializer=_yield) as beside:
+        for clutch_id in names:
+            kind, lessons = beside.submit(_lessons, database, clutch_id).result()
+            if lessons:
+                fleets.setdefault(to_text(kind), Fleet(kind=kind)).lessons[clutch_id] = lessons
+        fresh = [fleet.kind for fleet in fleets.values() if _stored_anew(database, fleet, now, beside)]
+        changed = [clutch_id for clutch_id in names if _brought_up(database, clutch_id, beside)]
+    return Refreshed(kinds=tuple(fresh), changed=tuple(changed))
 
 
 def _lessons(database: Database, clutch_id: str) -> tuple[Json, list[Taught]]:
@@ -76,22 +81,22 @@ def _lesson(life: Life, assumptions: Assumptions) -> Taught | None:
     return taught([replace(measurement, progress=measurement.progress * unit) for measurement in series.measurements])
 
 
-def _stored_anew(database: Database, fleet: Fleet, now: str) -> bool:
+def _stored_anew(database: Database, fleet: Fleet, now: str, beside: Executor) -> bool:
     """Store a fleet's prior and what it is without each of its clutches, where it is not what is stored already."""
-    learned = fleet.without()
+    learned = beside.submit(fleet.without).result()
     with database.reading() as connection:
         stored = assumptions.current_fleet_prior(connection, fleet.kind)
     if learned is None or (stored is not None and stored.content == learned.to_dict()):
         return False
     version = 1 if stored is None else stored.version + 1
-    rows = _versions(fleet, version, now)
+    rows = beside.submit(_versions, fleet, version, now).result()
     with database.writing() as connection:
         newest = assumptions.current_fleet_prior(connection, fleet.kind)
         if newest is not None and newest.version >= version:  # another refresh was quicker
             return False
         for row in rows:
             assumptions.insert_fleet_prior(connection, row)
-        assumptions.forget_left_out(connection, fleet.kind, before=version)
+        assumptions.forget_left_out(connection, fleet.kind, before=version - 1)  # clutches are still under the last
     return True
 
 
@@ -114,24 +119,27 @@ def _versions(fleet: Fleet, version: int, now: str) -> Sequence[FleetPriorRow]:
     ]
 
 
-def _brought_up(database: Database, clutch_id: str) -> bool:
-    """Track a clutch anew where its stored predictions were made under another prior; whether its answers have changed."""
+def _brought_up(database: Database, clutch_id: str, beside: Executor) -> bool:
+    """Track a clutch anew where its stored predictions were made under another prior; whether that was so."""
     while True:
         with database.reading() as connection:
-            state = records.state(connection, clutch_id)
+            state = records.state(connection, clutch_id, newest_prior=True)
             last = results.prediction_at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)
         if last is None or last.payload.get("prior") == dict(state.assumptions().prior.name):
             return False
         with database.reading() as connection:
             receipts = records.receipts(connection, clutch_id)
-        tracking = track(state)
+        tracking = beside.submit(track, state).result()
+        if tracking is None:
+            return False
         retracked = Results(tracking=tracking, receipts=warned_anew(state.lives, tracking.warnings, receipts))
         with database.writing() as connection:
-            if not records.unchanged(connection, clutch_id, state.revision):
-                continue
-            before = records.answers(connection, clutch_id)
-            records.store(connection, clutch_id, retracked)
-            if records.answers(connection, clutch_id) == before:
-                return False
-            clutches.bump_revision(connection, clutch_id)
-            return True
+            if records.unchanged(connection, clutch_id, state.revision):
+                records.store(connection, clutch_id, retracked)
+                clutches.bump_revision(connection, clutch_id)
+                return True
+
+
+def _yield() -> None:
+    """This thread yields to a service that runs; what holds the write lock does not, for the service would wait for it."""
+    os.nice(_NICE)

@@ -33,18 +33,25 @@ def test_the_newest_version_of_a_kind_is_current(database: Database) -> None:
         assert assumptions.current_fleet_priors(connection) == [newer, SINTER]
 
 
-def test_what_was_said_without_a_clutch_is_found_and_forgotten(database: Database) -> None:
-    without_a = replace(PAPER, left_out="a", content={"clutches": 2})
+def test_a_clutch_gets_what_it_did_not_teach_of_its_version_or_the_newest(database: Database) -> None:
+    taught = replace(PAPER, members=("a", "b"))
+    without_a = replace(taught, left_out="a", content={"clutches": 2})
+    newer = replace(taught, version=2, members=("b",), content={"mean": []})
     with database.writing() as connection:
-        assumptions.insert_fleet_prior(connection, PAPER)
-        assumptions.insert_fleet_prior(connection, without_a)
-        assert assumptions.fleet_prior_without(connection, PAPER, "a") == without_a
-        assert assumptions.fleet_prior_without(connection, PAPER, "b") is None
+        for row in (taught, without_a, newer):
+            assumptions.insert_fleet_prior(connection, row)
+
+        def of(clutch_id: str, version: int | None) -> assumptions.FleetPriorRow | None:
+            return assumptions.fleet_prior_for(connection, PAPER.fleet, clutch_id, version)
+
+        assert [of("c", version) for version in (None, 0, 1, 2, 7)] == [newer, None, taught, newer, newer]
+        assert [of("a", version) for version in (None, 1)] == [newer, without_a]
+        assert [of("b", version) for version in (None, 1)] == [None, None]
         assumptions.forget_left_out(connection, PAPER.fleet, before=1)
-        assert assumptions.fleet_prior_without(connection, PAPER, "a") == without_a
+        assert of("a", 1) == without_a
         assumptions.forget_left_out(connection, PAPER.fleet, before=2)
-        assert assumptions.fleet_prior_without(connection, PAPER, "a") is None
-        assert assumptions.current_fleet_prior(connection, PAPER.fleet) == PAPER
+        assert of("a", 1) is None
+        assert assumptions.current_fleet_prior(connection, PAPER.fleet) == newer
 
 
 def test_a_version_is_stored_once(database: Database) -> None:

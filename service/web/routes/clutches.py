@@ -12,11 +12,22 @@ from service.jobs.workers import Lane
 from service.lists import from_cursor, page
 from service.queries import clutch_list, runs
 from service.queries.cache import to_json
+from service.queries.degradation import degradation
 from service.run_files.json_run import checked
 from service.schemas.clutch import ClutchEdit, ClutchIn, ClutchOut, ClutchPage
 from service.schemas.parameters import Archived, ClutchId
 from service.schemas.run import ChangePage
-from service.web.answers import JSON_TYPE, answer, clutch_answer, described_body, json_body, kept, now, tagged
+from service.web.answers import (
+    JSON_TYPE,
+    answer,
+    begin_computed,
+    clutch_answer,
+    described_body,
+    json_body,
+    kept,
+    now,
+    tagged,
+)
 from service.web.auth import Ingester, Reader, name_of_caller
 from service.web.context import Context, Cursor, Limit
 from service.web.limits import USUAL_ITEMS
@@ -49,6 +60,8 @@ async def register_clutch(request: Request, context: Ingester) -> Response:
     """Register a clutch. Everything but `clutch_id` has a default: the reference's clutch."""
     body = await json_body(request)
     clutch, new = await run_in_threadpool(_register, context, body)
+    if new:
+        await begin_computed(context, str(clutch["clutch_id"]), degradation)
     headers = {"Location": f"/v1/clutches/{clutch['clutch_id']}"}
     return Response(content=to_json(clutch), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
 

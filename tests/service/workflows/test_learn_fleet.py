@@ -120,7 +120,7 @@ def test_posting_on_and_tracking_anew_agree_under_a_fleets_prior(url: str) -> No
         assert ends[0] == pytest.approx(ends[1], rel=0.1)
 
 
-def test_a_run_that_comes_before_its_clutch_is_brought_up_has_all_of_it_tracked_anew(
+def test_a_run_that_comes_before_its_clutch_is_brought_up_is_tracked_under_the_prior_of_those_before_it(
     url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A fleet has learned, and a run is quicker than the refresh: what is stored is what a replay gives."""
@@ -133,6 +133,8 @@ def test_a_run_that_comes_before_its_clutch_is_brought_up_has_all_of_it_tracked_
             refresh(url)
         body = stationary(4000, wear=wear(4000, 6000.0), speeds=SPEEDS, pressures=(5.0,), run_id="next")
         assert client.post("/v1/clutches/new/runs", json=body).status_code == 201
+        assert client.get(LIFE.format("new")).json()["prior"]["name"] == "weak"
+        assert "new" in refresh(url).changed
         assert client.get(LIFE.format("new")).json()["prior"]["name"] == "fleet"
     with closing(open_database(url)) as database:
         with database.reading() as connection:
