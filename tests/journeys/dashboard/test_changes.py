@@ -6,72 +6,21 @@ After each step every answer of the clutch is that of a clutch which was sent th
 import json
 import re
 from collections.abc import Iterator
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 import httpx2
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Browser, expect
 
 from tests.browser.driving import Watched
 from tests.browser.dropping import drop
-from tests.browser.lives import loops, post
-from tests.support import ONCE, Server, serving, stationary
+from tests.browser.lives import post
+from tests.browser.slips import CLUTCH, LAST, answers, ask, done, fill, opened, right, run_in, settled, trail, typed
+from tests.support import ONCE, Server, serving
 
 pytestmark = pytest.mark.browser
 expect.set_options(timeout=20_000)
-
-CLUTCH = "/v1/clutches/bench"
-#: What the answers are compared in; all else of `/runs` is the trail of what was sent.
-ANSWERS = [
-    "/v1/clutches",
-    CLUTCH,
-    *(f"{CLUTCH}/remaining-useful-life?method={method}" for method in ("particle", "ukf", "grid")),
-    f"{CLUTCH}/remaining-useful-life?at_cycles=5000",
-    f"{CLUTCH}/degradation",
-    *(f"{CLUTCH}/series?limit=1000&quantity={quantity}" for quantity in ("mean_cof", "remaining_cycles")),
-    f"{CLUTCH}/stribeck",
-    f"{CLUTCH}/loops",
-]
-#: When something was stored, and how many changes there were.
-TIMES = {"revision", "created_at", "received_at"}
-LAST = 7000
-#: Of the first test; the others follow as their cycles do, 1,000 an hour.
-FIRST = datetime(2026, 11, 2, 8, tzinfo=UTC)
-
-
-def right(cycles: int) -> dict[str, Any]:
-    """A test as it ought to be sent; its name says nothing of its cycles."""
-    return stationary(cycles, run_id=f"test-{cycles // 1000}") | {"started_at": at(cycles)}
-
-
-def at(cycles: int) -> str:
-    return (FIRST + timedelta(hours=cycles / 1000)).isoformat()
-
-
-def typed() -> dict[str, Any]:
-    """The last test with a zero too many."""
-    return right(LAST) | {"cycles": 10 * LAST}
-
-
-def fill(http: httpx2.Client) -> None:
-    """A life up to the test before the last."""
-    http.post("/v1/clutches", json={"clutch_id": "bench"}).raise_for_status()
-    for cycles in range(0, LAST, 1000):
-        assert post(http, "bench", right(cycles))["state"] == "accepted"
-    post(http, "bench", loops(4000, pressures=(5.0,)) | {"started_at": at(4000)})
-
-
-def plain(value: Any) -> Any:
-    """An answer without times and revisions."""
-    if isinstance(value, dict):
-        return {key: plain(part) for key, part in value.items() if key not in TIMES}
-    return [plain(part) for part in value] if isinstance(value, list) else value
-
-
-def answers(url: str) -> dict[str, Any]:
-    return {path: plain(ONCE.get(f"{url}{path}").raise_for_status().json()) for path in ANSWERS}
 
 
 @pytest.fixture(scope="module")
@@ -99,54 +48,6 @@ def watched(browser: Browser, server: Server) -> Iterator[Watched]:
     found = Watched(browser, server.url)
     yield found
     found.close()
-
-
-def opened(watched: Watched) -> Page:
-    page = watched.open("/clutches/bench")
-    page.locator("#runs .runs details").first.wait_for()
-    return page
-
-
-def run_in(page: Page, run_id: str) -> Locator:
-    """A run in the list, opened."""
-    details = page.locator(f"#runs details[data-run='{run_id}']")
-    if details.get_attribute("open") is None:
-        details.locator("summary").click()
-    return details
-
-
-def ask(place: Locator, button: str, reason: str, *, cycles: int | None = None) -> None:
-    """Press a run's button and answer its question."""
-    place.get_by_role("button", name=button).click()
-    dialog = place.page.get_by_role("dialog")
-    if cycles is not None:
-        dialog.get_by_label("Duty cycles since new").fill(str(cycles))
-    dialog.get_by_label("Reason").fill(reason)
-    place.page.keyboard.press("Enter")
-    expect(dialog).to_have_count(0)
-
-
-def done(page: Page, text: str) -> None:
-    """The page says what was done, and holds the focus there for the next key."""
-    place = page.locator(".done")
-    expect(place).to_contain_text(text)
-    expect(place).to_be_focused()
-
-
-def settled(page: Page, held: int) -> None:
-    """The page shows so many held runs at its top."""
-    if held == 0:
-        expect(page.locator("#held")).to_be_hidden()
-        expect(page.locator("#head .mark-held")).to_have_count(0)
-    else:
-        expect(page.locator("#held")).to_contain_text(f"{held} run is held")
-        expect(page.locator("#head .mark-held")).to_have_text(f"{held} run held")
-
-
-def trail(page: Page) -> list[list[str]]:
-    """What, who and why in the audit trail."""
-    rows = page.locator("#runs .changes tbody tr")
-    return [[row.locator("td").nth(cell).inner_text() for cell in (1, 3, 4)] for row in rows.all()]
 
 
 def test_a_typo_is_seen_corrected_and_undone(watched: Watched, server: Server, references: dict[str, Any]) -> None:
