@@ -122,7 +122,7 @@ class Workers:
             with self._lock:
                 if self._pools.get(task.lane) is pool:
                     del self._pools[task.lane]
-            pool.shutdown(wait=False)
+            # the pool ends by itself, and holds its lock while it says so
             if not task.retried:
                 task.retried = True
                 self._start(task)

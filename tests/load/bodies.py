@@ -18,8 +18,8 @@ from models.rig.truth import SimulatedClutch
 from service.run_files.record_writer import RecordFormat, write_record
 from service.run_files.simulated import simulated_body, simulated_channels, simulated_clutch_body, simulated_head
 
-#: Stationary tests in a life; of these, every tenth has a dynamic test after it, and in the raw variant every fifth is a
-#: recorder's file: about one post in ten, since a duty block stands before most tests.
+#: Stationary tests in a life. In the variant with sampled records every tenth has a dynamic test after it, and every fifth is
+#: a recorder's file: about one post in ten, since a duty block stands before most tests.
 TESTS = 40
 DYNAMIC_EVERY = 10
 RAW_EVERY = 5
@@ -43,6 +43,11 @@ class Post:
     content_type: str = JSON_TYPE
     content: bytes = b""
     path: Path | None = None
+
+    @property
+    def sampled(self) -> bool:
+        """Whether it is a sampled record, a recorder's file or a dynamic test, which takes its time."""
+        return self.raw or self.kind == RunKind.DYNAMIC_STRIBECK.value
 
     def request(self, clutch_id: str) -> bytes:
         """The bytes of the request."""
@@ -89,7 +94,7 @@ def life(seed: int, *, raw: Path | None = None, tests: int = TESTS, samples: int
             posts.append(_file_post(run, clutch, seed, raw, samples, parquet=(count + seed) % (2 * RAW_EVERY) == 0))
         else:
             posts.append(_json_post(run))
-        posts += _after(run, clutch, seed, count)
+        posts += [post for post in _after(run, clutch, seed, count) if raw is not None or not post.sampled]
     return SentLife(seed=seed, posts=tuple(posts))
 
 

@@ -102,7 +102,7 @@ class Field:
             self.on_rigs[number] = clutch_id
             for post in self.life(number, turn).posts:
                 started = loop.time()
-                answer = await self._sent(line, post.request(clutch_id), "raw" if post.raw else "plain")
+                answer = await self._sent(line, post.request(clutch_id), "sampled" if post.sampled else "plain")
                 if answer is None:
                     self.counts.unanswered.add((clutch_id, post.run_id))
                     return

@@ -77,7 +77,7 @@ def demands(loaded: Loaded) -> list[Demand]:
             met=get < MOST_GET_MS,
         ),
         Demand(
-            name=f"POST 99 % < {MOST_POST_MS:.0f} ms, but for raw files",
+            name=f"POST 99 % < {MOST_POST_MS:.0f} ms, but for sampled records",
             found=f"{post:.0f} ms",
             met=post < MOST_POST_MS,
         ),
@@ -103,7 +103,7 @@ def latencies(loaded: Loaded) -> list[str]:
     counts = loaded.counts
     lines = ["| request | asked | 304 | median, ms | 90 % | 99 % | longest |", "|---|---|---|---|---|---|---|"]
     lines += [_row(f"GET {route}", counts.gets[route], str(counts.statuses[route, 304])) for route in (*ROUTES, LIVEZ)]
-    names = {"plain": "POST a run", "raw": "POST a raw file", "registration": "POST a clutch"}
+    names = {"plain": "POST a run", "sampled": "POST a sampled record", "registration": "POST a clutch"}
     lines += [_row(name, counts.posts[what], "") for what, name in names.items() if counts.posts[what]]
     return lines
 
