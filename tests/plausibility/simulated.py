@@ -142,11 +142,13 @@ def _dated(rng: np.random.Generator, runs: list[Body]) -> list[Body]:
 
 
 def shuffled(rng: np.random.Generator, made: Campaign) -> Campaign:
-    """The same runs as they may arrive: in any order, or with one late."""
-    runs = list(made.runs)
+    """The same runs as they may arrive: in any order, or with one late. What follows a rebuild arrives after it."""
+    rebuilt = next((k for k, run in enumerate(made.runs) if run.get("event") == "rebuild"), len(made.runs))
+    first, rest = list(made.runs[:rebuilt]), list(made.runs[rebuilt:])
     if rng.random() < 0.5:
-        runs = [runs[k] for k in rng.permutation(len(runs))]
-        return replace(made, runs=runs, source=f"{made.source}, shuffled")
-    late = runs.pop(int(rng.integers(len(runs))))
-    runs.insert(int(rng.integers(len(runs) + 1)), late)
-    return replace(made, runs=runs, source=f"{made.source}, one late")
+        first = [first[k] for k in rng.permutation(len(first))]
+        rest = [*rest[:1], *(rest[1:][k] for k in rng.permutation(len(rest[1:])))]
+        return replace(made, runs=first + rest, source=f"{made.source}, shuffled")
+    late = first.pop(int(rng.integers(len(first))))
+    first.insert(int(rng.integers(len(first) + 1)), late)
+    return replace(made, runs=first + rest, source=f"{made.source}, one late")

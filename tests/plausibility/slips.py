@@ -113,39 +113,43 @@ OTHERS: dict[str, Slip] = {"cycles / 10": zero_lost, "a wrong digit": wrong_digi
 SIZES = (0.35, 0.5, 0.65, 1.5, 2.0, 3.0)
 
 
-def other_size(rng: np.random.Generator, run: Body, other: Campaign) -> Body | None:
+def other_size(rng: np.random.Generator, run: Body, made: Campaign, other: Campaign) -> Body | None:
     """The test that another, larger or smaller clutch had at about these cycles."""
-    tests = [theirs for theirs in other.runs if theirs["kind"] == run["kind"]]
-    if "channels" not in run or "duty" in run or not tests:
+    tests = _like(other, run)
+    if not tests:
         return None
     theirs = copy.deepcopy(min(tests, key=lambda test: abs(test["cycles"] - run["cycles"])))
     torque = np.array(theirs["channels"]["torque_nm"]) * float(rng.choice(SIZES))
     theirs["channels"]["torque_nm"] = torque.tolist()
-    if not differs(theirs, run):
-        return None
-    return _under(run, theirs, cycles=run["cycles"] if rng.random() < 0.5 else theirs["cycles"])
+    return _noticeable(rng, run, theirs, made)
 
 
-def other_age(rng: np.random.Generator, run: Body, other: Campaign) -> Body | None:
-    """The test of another clutch of the kind, whose COF differs by its age by more than a fifth."""
-    tests = [
-        theirs
-        for theirs in other.runs
-        if theirs["kind"] == run["kind"] and differs(theirs, run)
-    ] if "channels" in run and "duty" not in run else []  # fmt: skip
-    if not tests:
-        return None
-    theirs = tests[int(rng.integers(len(tests)))]
-    return _under(run, theirs, cycles=run["cycles"] if rng.random() < 0.5 else theirs["cycles"])
+def other_age(rng: np.random.Generator, run: Body, made: Campaign, other: Campaign) -> Body | None:
+    """The test of another clutch of the kind at another age."""
+    tests = [theirs for theirs in _like(other, run) if differs(theirs, run)]
+    return _noticeable(rng, run, tests[int(rng.integers(len(tests)))], made) if tests else None
 
 
-def same_age(_: np.random.Generator, run: Body, other: Campaign) -> Body | None:
+def same_age(_: np.random.Generator, run: Body, __: Campaign, other: Campaign) -> Body | None:
     """The test of another clutch of the kind at the same age, which cannot be told from this one's."""
-    tests = [theirs for theirs in other.runs if theirs["kind"] == run["kind"]]
-    if "channels" not in run or "duty" in run or not tests:
+    tests = _like(other, run)
+    if not tests:
         return None
     theirs = min(tests, key=lambda test: abs(np.log(level(test) / level(run))))
     return _under(run, theirs, cycles=run["cycles"])
+
+
+def _like(other: Campaign, run: Body) -> list[Body]:
+    """The other clutch's tests of the run's kind; none where the run is no test."""
+    is_test = "channels" in run and "duty" not in run
+    return [theirs for theirs in other.runs if theirs["kind"] == run["kind"]] if is_test else []
+
+
+def _noticeable(rng: np.random.Generator, run: Body, theirs: Body, made: Campaign) -> Body | None:
+    """Sent with the cycles of `run` or with its own; None where this clutch's own test at those cycles looks alike."""
+    cycles = run["cycles"] if rng.random() < 0.5 else theirs["cycles"]
+    own = min(_like(made, run), key=lambda test: abs(test["cycles"] - cycles))
+    return _under(run, theirs, cycles=cycles) if differs(theirs, own) else None
 
 
 def differs(theirs: Body, run: Body) -> bool:
@@ -169,7 +173,7 @@ def _under(run: Body, theirs: Body, *, cycles: float) -> Body:
     )
 
 
-Swap = Callable[[np.random.Generator, Body, Campaign], Body | None]
+Swap = Callable[[np.random.Generator, Body, Campaign, Campaign], Body | None]
 CLUTCHES: dict[str, Swap] = {"other clutch, another size": other_size, "other clutch, another age": other_age}
 ALIKE: dict[str, Swap] = {"other clutch, same kind and age": same_age}
 GROUPS = ("cycles x 10", "swapped digits", "wrong unit", "wrong clutch", "sensor unplugged")

@@ -15,7 +15,7 @@ Draw = Callable[[np.random.Generator], Campaign]
 #: Another clutch's test is tried once a clutch has a course: after so many tests.
 TESTS_BEFORE = 3
 #: So many honest runs of each source are judged without each mechanism too.
-ABLATED = 150
+ABLATED = 100
 
 
 @dataclass(frozen=True)
@@ -71,8 +71,8 @@ def aside(seed: int, count: int, rig: str) -> list[Outcome]:
 def one_slip(rng: np.random.Generator, draw: Draw, source: str, group: str) -> Outcome:
     """A campaign is sent as it was made until one of its runs slips. The first run is honest."""
     while True:
-        made, other = draw(rng), draw(rng)
-        name, slip = _slip_of(rng, group, other)
+        made = draw(rng)
+        name, slip = _slip_of(rng, group, made, draw)
         first = _after_tests(made, TESTS_BEFORE) if name in slips.CLUTCHES else 1
         for k in (first + rng.permutation(max(len(made.runs) - first, 0))).tolist():
             wrong = slip(rng, made.runs[k])
@@ -86,15 +86,15 @@ def _after_tests(made: Campaign, count: int) -> int:
     return tests[count - 1] + 1 if len(tests) >= count else len(made.runs)
 
 
-def _slip_of(rng: np.random.Generator, group: str, other: Campaign) -> tuple[str, slips.Slip]:
+def _slip_of(rng: np.random.Generator, group: str, made: Campaign, draw: Draw) -> tuple[str, slips.Slip]:
     kinds = {"wrong unit": slips.UNITS, "sensor unplugged": slips.UNPLUGGED}.get(group, slips.CYCLES | slips.OTHERS)
     if group in kinds:
         return group, kinds[group]
     swaps = slips.CLUTCHES if group == "wrong clutch" else slips.ALIKE if group in slips.ALIKE else {}
     if swaps:
         name = group if group in swaps else str(rng.choice(list(swaps)))
-        swap = swaps[name]
-        return name, lambda rng, run: swap(rng, run, other)
+        swap, other = swaps[name], draw(rng)
+        return name, lambda rng, run: swap(rng, run, made, other)
     name = str(rng.choice(list(kinds)))
     return name, kinds[name]
 

@@ -1,6 +1,6 @@
 """The course of mean COF over a life, as a distribution of what a test at any cycles shows.
 
-With y = log COF and s = log(1 + ζ/φ), ζ the cycles since the life began,
+With y = log COF, ζ the cycles since the life began, Z those of its latest test, and s = 2 log(1 + ζ/φ)/log(1 + Z/φ),
 
     y(s) = level + slope · s + ∫∫ bend · dW + steps at maintenance + scatter
 
@@ -45,7 +45,8 @@ class Course:
         """log COF at cycles [m] since the life began, in epochs [m]."""
         near = self._nearest(cycles)
         x, e = np.append(self.cycles[near], cycles), np.append(self.epoch[near], epoch)
-        kernel = self._kernel(x, e)
+        latest = float(self.cycles.max()) if self.cycles.any() else float(cycles.max())
+        kernel = self._kernel(x, e, max(latest, 1.0))
         n = len(near)
         scatter = _GRID[:, 2, None] ** 2
         noise = self.variance[near] + scatter
@@ -71,9 +72,10 @@ class Course:
         apart = np.abs(self.cycles[:, None] - cycles).min(axis=1)
         return sorted(np.argsort(apart, kind="stable")[: criteria.MOST_TESTS].tolist())
 
-    def _kernel(self, cycles: FloatArray, epoch: FloatArray) -> FloatArray:
-        """Covariance [g, k, k] of y at cycles [k] for each of the grid's choices."""
-        s = np.log1p(cycles / _GRID[:, 0, None])
+    def _kernel(self, cycles: FloatArray, epoch: FloatArray, latest: float) -> FloatArray:
+        """Covariance [g, k, k] of y at cycles [k] for each of the grid's choices; `latest`: Z."""
+        scale = _GRID[:, 0, None] * latest
+        s = criteria.SPAN * np.log1p(cycles / scale) / np.log1p(latest / scale)
         a, b = np.minimum(s[:, :, None], s[:, None, :]), np.maximum(s[:, :, None], s[:, None, :])
         bent = _GRID[:, 1, None, None] ** 2 * a**2 * (b / 2 - a / 6)
         steps = criteria.STEP_SD**2 * np.minimum(epoch[:, None], epoch[None, :])

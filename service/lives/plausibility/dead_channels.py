@@ -93,7 +93,7 @@ def _oil(temperature: FloatArray | None) -> list[Notice]:
     if temperature is None:
         return []
     median = float(np.median(temperature))
-    still_at_zero = temperature.size >= criteria.FEWEST_ROWS and bool((temperature == ZERO_CELSIUS).all())
+    still_at_zero = temperature.size >= criteria.FEWEST_ROWS and bool((np.abs(temperature - ZERO_CELSIUS) < 1e-6).all())
     if criteria.COLDEST <= median <= criteria.HOTTEST and not still_at_zero:
         return []
     message = f"oil temperature is {median - ZERO_CELSIUS:.4g} °C, which no oil has in a test: is the sensor connected?"

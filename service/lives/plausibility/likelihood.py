@@ -82,7 +82,7 @@ class History:
         if reading.mean_cof:
             cof = math.fsum(cof for cof, _ in reading.mean_cof.values()) / len(reading.mean_cof)
         else:
-            cof, spread = reading.cof or 0.0, math.hypot(spread, 0.05)
+            cof, spread = reading.cof or 0.0, math.hypot(spread, criteria.ROWS_SD)
         if first is not None and reading.pressure is not None:
             apart = math.log(reading.pressure / max(first.cofs))
             spread = math.hypot(spread, criteria.OTHER_PRESSURE_SD * apart)

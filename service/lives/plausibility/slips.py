@@ -94,9 +94,11 @@ def other_clutches(reading: Reading, history: History) -> Iterator[Slip]:
     if of_cof is None or not any(course.cycles.size for course in history.courses):
         return
     of_cof += history.of_protocol(reading)
-    weight = math.log(0.5 * criteria.OTHER_CLUTCH) + of_cof
-    yield Slip(name="other_clutch", log_weight=weight + log_anywhere(reading.cycles), likely=reading)
-    yield Slip(name="other_test", log_weight=weight + history.of_cycles(reading), likely=reading)
+    for name, weight, of_cycles in (
+        ("other_clutch", criteria.OTHER_CLUTCH, log_anywhere(reading.cycles)),
+        ("other_test", criteria.OTHER_TEST, history.of_cycles(reading)),
+    ):
+        yield Slip(name=name, log_weight=math.log(weight) + of_cof + of_cycles, likely=reading)
 
 
 def dead_pressure(reading: Reading, history: History, geometry: Geometry) -> Iterator[Slip]:
@@ -112,7 +114,7 @@ def dead_pressure(reading: Reading, history: History, geometry: Geometry) -> Ite
     centre, size = 0.5 * math.log(low * high), math.log(reading.torque / pressed)
     dead = normal(size, centre, 0.3 + 0.25 * math.log(high / low))
     drag = normal(size, centre + math.log(criteria.DRAG), criteria.LOG_DRAG_SD)
-    weight = math.log(criteria.OTHER_CLUTCH * dead + 1e-250) - math.log(drag + 1e-250)
+    weight = math.log(criteria.OTHER_TEST * dead + 1e-250) - math.log(drag + 1e-250)
     yield Slip(name="dead_pressure", log_weight=weight + history.log_likelihood(reading), likely=reading)
 
 
