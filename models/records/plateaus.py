@@ -169,5 +169,7 @@ def _rounding(torque: FloatArray, noise: FloatArray) -> float:
     if levels.size < 2:
         return 0.0
     count = float(np.diff(levels).min())
+    if count**2 == 0.0:  # steps of no torque that is measured: their square underflows
+        return 0.0
     before = max(float((noise**2).mean()) / count**2 - 1 / 12, 0.0)  # over many levels, rounding adds q²/12 on average
     return count / math.sqrt(12.0) * math.exp(-2 * math.pi**2 * min(before, 30.0))

@@ -14,7 +14,7 @@ from sqlalchemy import Connection
 from service import records, stored_runs
 from service.columns import whole
 from service.errors import NotPossibleNowError
-from service.lives.history import DYNAMIC, Event, order, stationary_tests_of
+from service.lives.history import STATIONARY, Event, order, stationary_tests_of
 from service.lives.payloads import OF_HISTORY, notice_items
 from service.lives.plausibility.doubts import doubts
 from service.lives.recomputation import (
@@ -157,7 +157,7 @@ def _corrected(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
     event = loaded.event.at(cycles)
     event = replace(event, cofs=cofs_among(others, event, loaded.levels.get(row.run_id, ())))
     analysis = analyse(sent, others.geometry)
-    if "time_s" in sent.channels and sent.kind != DYNAMIC:  # as on arrival: its plateaus stand for a long record
+    if "time_s" in sent.channels and sent.kind == STATIONARY:  # as on arrival: its plateaus stand for a long record
         sent = replace(sent, channels={})
     doubtful = doubts(sent, analysis, event, others)
     return replace(

@@ -16,6 +16,7 @@ from service.errors import ArchivedError, ConflictError
 from service.lives.history import (
     DYNAMIC,
     REBUILD,
+    STATIONARY,
     ByPressure,
     Event,
     duty_block,
@@ -88,7 +89,7 @@ def ingest(
         analysis = analyse(run, records.record(clutch).geometry.to_model())
         columns = encoding.result()
     sampled = "time_s" in run.channels
-    if sampled and run.kind != DYNAMIC:  # loops are yet to be fitted; another long record need not be held twice
+    if sampled and run.kind == STATIONARY:  # loops are yet to be fitted; another long record need not be held twice
         run = replace(run, channels={})
     arrival = Arrival(run=run, sampled=sampled, analysis=analysis, received_at=received_at)
     while True:

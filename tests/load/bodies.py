@@ -18,8 +18,8 @@ from models.rig.truth import SimulatedClutch
 from service.run_files.record_writer import RecordFormat, write_record
 from service.run_files.simulated import simulated_body, simulated_channels, simulated_clutch_body, simulated_head
 
-#: Stationary tests in a life. In the variant with sampled records every tenth has a dynamic test after it, and every fifth is
-#: a recorder's file: about one post in ten, since a duty block stands before most tests.
+#: Stationary tests in a life. In the variant with sampled records every tenth has a dynamic test after it, and every fifth
+#: is a recorder's file: about one post in ten, since a duty block stands before most tests.
 TESTS = 40
 DYNAMIC_EVERY = 10
 RAW_EVERY = 5

@@ -65,7 +65,7 @@ class Bench:
             run, analysis, event = self._read(body)
         except InvalidError as error:
             return Answer(codes=(REFUSED,), message=str(error), without=dict.fromkeys(WITHOUT, True))
-        before = ClutchState(record=self.clutch, revision=0, events=self.events, adoption=None, priors={})
+        before = ClutchState(record=self.clutch, revision=0, events=self.events, adoptions=(), priors={})
         began = process_time()
         notices = doubts(run, analysis, event, before)
         seconds = process_time() - began

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from service.errors import MOST_ERRORS, InvalidError
-from service.run_files.json_run import read_body, read_run
+from service.run_files.json_run import checked, read_run
 from service.schemas.clutch import ClutchIn
 from tests.growth import LINEAR, peak, time_ratio
 from tests.support import stationary
@@ -124,7 +124,7 @@ def test_the_longest_note_of_quotation_marks_is_a_note() -> None:
 def test_other_bodies_know_their_own_fields() -> None:
     body = '{"clutch_id":"a",' + ",".join(f'"channels{number}":1' for number in range(20_000)) + "}"
     with pytest.raises(InvalidError) as raised:
-        read_body(ClutchIn, body.encode())
+        checked(ClutchIn, body.encode())
     assert raised.value.total == 20_000
     assert raised.value.errors[0].pointer == "/channels0"
 
