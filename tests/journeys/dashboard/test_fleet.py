@@ -116,6 +116,8 @@ def test_by_keyboard_alone(watched: Watched) -> None:
     page.keyboard.press("Enter")
     assert page.evaluate("document.activeElement.id") == "main"
     page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.id") == "archived"
+    page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.id") == "find"
     page.keyboard.press("Tab")
     page.keyboard.press("Tab")
