@@ -134,7 +134,7 @@ def test_a_held_run_is_confirmed_and_withdrawn_and_restored(
     settled(page, 0)
     counted = answers(server.url)
     assert counted[f"{CLUTCH}/remaining-useful-life?method=grid"]["as_of_cycles"] == 90_000
-    assert "it was held because" in run_in(page, "far").inner_text().lower()
+    expect(run_in(page, "far")).to_contain_text("It was held because")
 
     ask(run_in(page, "far"), "Withdraw", "another clutch")
     done(page, "is withdrawn")
