@@ -10,9 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from storage import clutches
 from storage.engine.database import Database, open_database
 from storage.engine.errors import DatabaseBusy, StorageUnavailable
 from storage.engine.write_lock import WriteLock
+from tests.storage.samples import clutch_row
 
 IN_TIME = 60.0
 _SPAWN = multiprocessing.get_context("spawn")
@@ -96,7 +98,7 @@ def test_a_commit_waits_for_no_reader_and_no_reader_for_a_commit(database: Datab
     with other.reading() as reader:  # open all the while
         assert reader.exec_driver_sql(count).scalar_one() == 0
         with database.writing() as connection:
-            connection.exec_driver_sql("INSERT INTO clutch VALUES ('a', '{}', '', '', 0, 0.0, '{}')")
+            clutches.insert(connection, clutch_row())
             with other.reading() as second:  # begun while the transaction is
                 assert second.exec_driver_sql(count).scalar_one() == 0
         assert reader.exec_driver_sql(count).scalar_one() == 0
