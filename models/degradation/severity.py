@@ -63,7 +63,7 @@ class Block:
     def __post_init__(self) -> None:
         for name in ("end", "cycles", "energy", "speed", "duration"):
             number = getattr(self, name)
-            if number is not None and not (np.isfinite(number) and number >= 0.0):
+            if number is not None and not (math.isfinite(number) and number >= 0.0):
                 raise ValueError(f"{name} must be finite and not negative, got {number}")
         if self.cycles == 0.0:
             raise ValueError("cycles must be positive, got 0")

@@ -13,14 +13,19 @@ from enum import StrEnum
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.degradation import general_order
 from models.prognosis.criteria import BAND, HORIZON, QUANTILES
+from models.tracking.discrepancy import Discrepancy
 from models.tracking.posterior import Posterior
 
 #: Places of a path: evenly over what was measured, and then in equal ratios up to the horizon.
 _BEHIND, _AHEAD = 40, 240
+#: Of these every so many'th is looked at first. A dip below the threshold and back between two of them is not seen: the
+#: course beside eq. 6 bends some twenty times, and steps are looked at by themselves.
+_STRIDE = 6
 
 #: A given course over ζ [k] that is added to eq. 6, in the quantity's unit [k].
 Offset: TypeAlias = Callable[[FloatArray], FloatArray]
@@ -126,25 +131,39 @@ def bands(
 
 
 def _along_paths(posterior: Posterior, fraction: float, offset: Offset | None, horizon: float) -> FloatArray:
-    """First passages [n], linear between places; a step of the level or of the offset is a crossing where it is."""
-    beside = posterior.discrepancy
+    """First passages [n], linear between places; a step of the level or of the offset is a crossing where it is.
+
+    The draws' paths are taken at every `_STRIDE`-th place and about the steps, and then at the places between the two of
+    these that a draw's passage lies between.
+    """
+    places, steps = _places(posterior.discrepancy, horizon)
+    course = np.zeros(places.size) if offset is None else offset(places)
+    sparse = np.unique(np.concatenate([np.arange(0, places.size, _STRIDE), steps, steps - 1, [places.size - 1]]))
+    above = posterior.values(places[sparse]) + course[sparse, None]
+    level = fraction * above[0]
+    below = above <= level
+    first = below.argmax(axis=0)
+    passed = np.flatnonzero(below.any(axis=0))
+    left = sparse[np.maximum(first[passed] - 1, 0)]
+    index = np.minimum(left + np.arange(_STRIDE + 1)[:, None], sparse[first[passed]])
+    near = posterior.taken(passed, posterior.weight[passed]).values(places[index]) + course[index]
+    passages = np.full(first.size, np.inf)
+    passages[passed] = first_below(near, places[index], level[passed])
+    return passages
+
+
+def _places(beside: Discrepancy | None, horizon: float) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Ascending progress at which paths are looked at, and which of it are the steps after the first place."""
     span = 1.0 if beside is None else beside.span
-    places = np.unique(
-        np.concatenate(
-            [
-                np.linspace(0.0, min(span, horizon), _BEHIND),
-                np.geomspace(min(span, horizon), horizon, _AHEAD),
-                np.zeros(0) if beside is None else beside.at[beside.at <= horizon],
-            ]
-        )
-    )
-    values = paths(posterior, places, offset)
-    return first_below(values - fraction * values[0], places, np.zeros(values.shape[1]))
+    at = np.zeros(0) if beside is None else beside.at[(beside.at > 0.0) & (beside.at <= horizon)]
+    end = min(span, horizon)
+    places = np.unique(np.concatenate([np.linspace(0.0, end, _BEHIND), np.geomspace(end, horizon, _AHEAD), at]))
+    return places, np.searchsorted(places, at)
 
 
 def first_below(paths: FloatArray, progress: FloatArray, level: FloatArray) -> FloatArray:
-    """The ζ [n] at which each path [k, n] over ascending progress [k] first comes down to its level [n], linear between
-    places; inf where it never does."""
+    """The ζ [n] at which each path [k, n] over ascending progress [k] or [k, n] first comes down to its level [n], linear
+    between places; inf where it never does."""
     below = paths <= level
     first = below.argmax(axis=0)
     before = np.maximum(first - 1, 0)
@@ -152,7 +171,8 @@ def first_below(paths: FloatArray, progress: FloatArray, level: FloatArray) -> F
     high, low = paths[before, draws], paths[first, draws]
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.where(first > 0, (high - level) / (high - low), 0.0)
-    crossed = progress[before] + share * (progress[first] - progress[before])
+    places = np.broadcast_to(progress if progress.ndim == 2 else progress[:, None], paths.shape)
+    crossed = places[before, draws] + share * (places[first, draws] - places[before, draws])
     return np.where(below.any(axis=0), crossed, np.inf)
 
 

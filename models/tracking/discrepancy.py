@@ -36,11 +36,11 @@ def log_size_weight(prior: Prior) -> FloatArray:
 
 
 def smooth(progress: FloatArray, span: float, stretches: int = PAST + FUTURE) -> FloatArray:
-    """δ at ζ [k] for curvature of one deviation on each stretch of a course with q · size = 1; [k, stretches].
+    """δ at ζ [...] for curvature of one deviation on each stretch of a course with q · size = 1; [..., stretches].
 
     On a stretch of length h, in units of T, curvature has the deviation √(3/h): the deviation of δ at T is then 1.
     """
-    u = np.minimum(np.asarray(progress)[:, None] / span, LEVELLING)
+    u = np.minimum(np.asarray(progress)[..., None] / span, LEVELLING)
     low, length = _EDGES[:stretches], _LENGTHS[:stretches]
     within = np.clip(u - low, 0.0, length)
     return np.asarray((0.5 * within**2 + length * np.maximum(u - low - length, 0.0)) * np.sqrt(3.0 / length))
@@ -81,9 +81,24 @@ class Discrepancy:
     height: FloatArray
 
     def __call__(self, progress: FloatArray) -> FloatArray:
-        """δ plus the steps so far, at ζ [k]; [k, n]."""
-        course = smooth(progress, self.span) @ self.curvature.T
-        return np.asarray(course + (np.asarray(progress)[:, None] >= self.at) @ self.height.T)
+        """δ plus the steps so far, at ζ [k] or at each draw's own [k, n]; [k, n]."""
+        begun = np.asarray(progress)[..., None] >= self.at
+        if progress.ndim == 1:
+            return np.asarray(smooth(progress, self.span) @ self.curvature.T + begun @ self.height.T)
+        return np.asarray(self._stretchwise(progress) + np.einsum("kne,ne->kn", begun, self.height))
+
+    def _stretchwise(self, progress: FloatArray) -> FloatArray:
+        """δ at each draw's own ζ [k, n], from its level, slope and curvature where the stretch begins."""
+        u = np.minimum(progress / self.span, LEVELLING)
+        stretch = np.minimum(np.searchsorted(_EDGES, u, side="right") - 1, PAST + FUTURE - 1)
+        bend = self.curvature * np.sqrt(3.0 / _LENGTHS)
+        turn = bend * _LENGTHS
+        slope = np.cumsum(turn, axis=1) - turn
+        rise = (slope + 0.5 * turn) * _LENGTHS
+        level = np.cumsum(rise, axis=1) - rise
+        x, draws = u - _EDGES[stretch], np.arange(self.size.size)
+        bent = slope[draws, stretch] + 0.5 * x * bend[draws, stretch]
+        return np.asarray(level[draws, stretch] + x * bent)
 
     @property
     def present(self) -> NDArray[np.bool_]:

@@ -57,13 +57,17 @@ class Points:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Terms:
-    """The further terms of the points `where` [j] after elimination: their prior deviations σ [j, p], L [j, p, p] and N
-    [j, p, 3] of the columns (1, y, b)."""
+    """The further terms of the points `where` [j] after elimination: their prior deviations σ [p, j], and by row Lᵀ (in the
+    upper triangle) with N of the columns (1, y, b) beside it, [p, p + 3, j]."""
 
     where: NDArray[np.intp]
     sd: FloatArray
-    root: FloatArray
-    cross: FloatArray
+    rows: FloatArray
+
+    @property
+    def cross(self) -> FloatArray:
+        """N of the columns (1, y, b); [3, p, j]."""
+        return np.swapaxes(self.rows[:, self.rows.shape[0] :], 0, 1)
 
 
 def evidence(sums: Sums, prior: Prior) -> FloatArray:
@@ -152,12 +156,8 @@ def pointwise(history: History, prior: Prior, points: Points, table: FloatArray 
     sd = column_sds(prior, points.size, history.steps.size)
     where = np.flatnonzero(sd.any(axis=1))
     if where.size == 0:
-        return sums, Terms(where=where, sd=sd[:0], root=np.zeros((0, 0, 0)), cross=np.zeros((0, 0, 3)))
-    r, rb, sd = r[:, where].T, rb[:, where].T, sd[where]
-    squares = (z[:, :, None] * z[:, None, :]).reshape(y.size, z.shape[1] ** 2)
-    gram = (r @ squares).reshape(where.size, sd.shape[1], sd.shape[1])
-    cross = np.stack([r @ z, (r * y) @ z, rb @ z], axis=2)
-    terms = _reduced(gram, cross, sd, where)
+        return sums, Terms(where=where, sd=sd[:0].T, rows=np.zeros((0, 3, 0)))
+    terms = Terms(where=where, sd=sd[where].T, rows=_eliminated(z, y, r[:, where], rb[:, where], sd[where].T))
     return _without(sums, terms), terms
 
 
@@ -249,31 +249,44 @@ def drawn_terms(terms: Terms, off_initial: FloatArray, change: FloatArray, norma
     """
     drawn = np.zeros_like(normals)
     if terms.where.size:
-        at = terms.where
-        n = terms.cross
-        right = n[:, :, 1] - off_initial[at, None] * n[:, :, 0] - change[at, None] * n[:, :, 2] + normals[at]
-        drawn[at] = terms.sd * np.linalg.solve(np.swapaxes(terms.root, 1, 2), right[:, :, None])[:, :, 0]
+        at, (n_1, n_y, n_b) = terms.where, terms.cross
+        right = n_y - off_initial[at] * n_1 - change[at] * n_b + normals[at].T
+        for k in reversed(range(right.shape[0])):
+            right[k] /= terms.rows[k, k]
+            right[:k] -= terms.rows[:k, k] * right[k]
+        drawn[at] = (terms.sd * right).T
     return drawn
 
 
-def _reduced(gram: FloatArray, cross: FloatArray, sd: FloatArray, where: NDArray[np.intp]) -> Terms:
-    root = np.asarray(
-        np.linalg.cholesky(np.eye(sd.shape[1]) + gram * sd[:, :, None] * sd[:, None, :]), dtype=np.float64
-    )
-    left = np.asarray(np.linalg.solve(root, cross * sd[:, :, None]), dtype=np.float64)
-    return Terms(where=where, sd=sd, root=root, cross=left)
+def _eliminated(z: FloatArray, y: FloatArray, r: FloatArray, rb: FloatArray, sd: FloatArray) -> FloatArray:
+    """`Terms.rows` from Z [t, p], y [t], r and r b [t, j], and σ [p, j]: Cholesky's elimination of all points at once, which
+    takes a quarter of the time of a factorisation of each."""
+    terms = z.shape[1]
+    rows = np.empty((terms, terms + 3, sd.shape[1]))
+    sides = (r, r * y[:, None], rb)
+    for k in range(terms):
+        rows[k, k:terms] = (z[:, k:] * z[:, k : k + 1]).T @ r
+        rows[k, k:terms] *= sd[k:]
+        rows[k, terms:] = [z[:, k] @ side for side in sides]
+        rows[k, k:] *= sd[k]
+        rows[k, k] += 1.0
+    for k in range(terms):
+        rows[k, k:] /= np.sqrt(rows[k, k])
+        for below in range(k + 1, terms):
+            rows[below, below:] -= rows[k, below] * rows[k, below:]
+    return rows
 
 
 def _without(sums: Sums, terms: Terms) -> Sums:
-    n_1, n_y, n_b = np.moveaxis(terms.cross, 2, 0)
+    n_1, n_y, n_b = terms.cross
     lost = {
-        "r": np.square(n_1).sum(axis=1),
-        "rb": (n_1 * n_b).sum(axis=1),
-        "rbb": np.square(n_b).sum(axis=1),
-        "ry": (n_1 * n_y).sum(axis=1),
-        "rby": (n_y * n_b).sum(axis=1),
-        "ryy": np.square(n_y).sum(axis=1),
-        "log_r": 2.0 * np.log(np.diagonal(terms.root, axis1=1, axis2=2)).sum(axis=1),
+        "r": np.square(n_1).sum(axis=0),
+        "rb": (n_1 * n_b).sum(axis=0),
+        "rbb": np.square(n_b).sum(axis=0),
+        "ry": (n_1 * n_y).sum(axis=0),
+        "rby": (n_y * n_b).sum(axis=0),
+        "ryy": np.square(n_y).sum(axis=0),
+        "log_r": 2.0 * np.log(np.einsum("kkj->kj", terms.rows[:, : n_1.shape[0]])).sum(axis=0),
     }
     return _less(sums, lost, terms.where)
 

@@ -41,8 +41,8 @@ class Posterior:
         return Degradation(initial=self.initial, change=self.change, scale=self.scale, exponent=self.exponent)
 
     def values(self, progress: FloatArray) -> FloatArray:
-        """ξ at progress ζ >= 0 [k] of every draw, discrepancy and all; [k, n]."""
-        law = value(progress[:, None], self.degradation)
+        """ξ at progress ζ >= 0 [k], or [k, n] where draws differ, discrepancy and all; [k, n]."""
+        law = value(progress if progress.ndim == 2 else progress[:, None], self.degradation)
         return law if self.discrepancy is None else np.asarray(law + self.discrepancy(progress))
 
     def taken(self, index: NDArray[np.intp], weight: FloatArray) -> "Posterior":
