@@ -52,3 +52,8 @@ def paged(items: Sequence[Any], limit: int, after: Place | None) -> dict[str, An
 def page(items: Sequence[Any], after: Place | None) -> dict[str, Any]:
     """The shape of every list."""
     return {"items": items, "next": to_cursor(after)}
+
+
+def page_as_bytes(items: Sequence[bytes], after: Place | None) -> bytes:
+    """The same as JSON, of items that are JSON."""
+    return b'{"items":[' + b",".join(items) + b'],"next":' + json.dumps(to_cursor(after)).encode() + b"}"

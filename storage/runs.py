@@ -44,6 +44,18 @@ class RunRow(NewRun):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ReceiptRow:
+    """What a list shows of a run; `receipt` and `doubts` as JSON text, as they are stored."""
+
+    run_id: str
+    cycles: float
+    receipt: str
+    state: str
+    sent_cycles: float | None
+    doubts: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RunInOrder:
     """As much of a run as tracking needs; a stationary test has the range of its speeds, maintenance its event, a block of
     duty its load (in the units in which it was sent)."""
@@ -66,16 +78,13 @@ class RunInOrder:
 _insert = sa.insert(run)
 _of_clutch = run.c.clutch_id == bindparam("of_clutch")
 _by_id = select(run).where(_of_clutch, run.c.run_id == bindparam("wanted"))
-_ordered = (
-    select(run)
-    .where(
-        _of_clutch,
-        or_(bindparam("of_kind").is_(None), run.c.kind == bindparam("of_kind")),
-        or_(bindparam("of_state").is_(None), run.c.state == bindparam("of_state")),
-    )
-    .order_by(run.c.cycles, run.c.run_id)
-    .limit(bindparam("most"))
+_some = (
+    _of_clutch,
+    or_(bindparam("of_kind").is_(None), run.c.kind == bindparam("of_kind")),
+    or_(bindparam("of_state").is_(None), run.c.state == bindparam("of_state")),
 )
+_ordered = select(run).where(*_some).order_by(run.c.cycles, run.c.run_id).limit(bindparam("most"))
+_receipts = _ordered.with_only_columns(*(run.c[field.name] for field in fields(ReceiptRow)))
 _after = tuple_(run.c.cycles, run.c.run_id) > tuple_(bindparam("after_cycles"), bindparam("after_id"))
 _fitted = exists().where(fit.c.run_key == run.c.run_key)
 _LIGHT = tuple(field.name for field in fields(RunInOrder))
@@ -131,13 +140,29 @@ def page(
 
     Of one kind or all, in one state or any; `fitted`: only runs through which a curve was fitted.
     """
-    values: dict[str, object] = {"of_clutch": clutch_id, "of_kind": kind, "of_state": state}
-    values["most"] = -1 if limit is None else limit
-    query = _ordered.where(_fitted) if fitted else _ordered
-    if after is not None:
-        query = query.where(_after)
-        values |= {"after_cycles": after[0], "after_id": after[1]}
+    query, values = _behind(_ordered.where(_fitted) if fitted else _ordered, after)
+    values |= {"of_clutch": clutch_id, "of_kind": kind, "of_state": state, "most": -1 if limit is None else limit}
     return [_row(row) for row in connection.execute(query, values)]
+
+
+def receipts(
+    connection: Connection,
+    clutch_id: str,
+    *,
+    limit: int,
+    after: tuple[float, str] | None = None,
+    state: str | None = None,
+) -> list[ReceiptRow]:
+    """The same of any kind, as much as a list shows."""
+    query, values = _behind(_receipts, after)
+    values |= {"of_clutch": clutch_id, "of_kind": None, "of_state": state, "most": limit}
+    return [ReceiptRow(**row._asdict()) for row in connection.execute(query, values)]
+
+
+def _behind(query: Select[Any], after: tuple[float, str] | None) -> tuple[Select[Any], dict[str, object]]:
+    if after is None:
+        return query, {}
+    return query.where(_after), {"after_cycles": after[0], "after_id": after[1]}
 
 
 def in_order(connection: Connection, clutch_id: str) -> list[RunInOrder]:

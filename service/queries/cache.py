@@ -44,51 +44,65 @@ def revision_and_json(
 
 
 class AnswerCache:
-    """The last answers; the least lately asked for goes first. `most_bytes` bounds their sizes together."""
+    """The last answers; the least lately asked for goes first. `most_bytes` bounds their sizes together.
+
+    Of each key the answer of one version is held, the last that was made: one that was superseded is not asked for again.
+    """
 
     def __init__(self, most_bytes: int) -> None:
         self._most = most_bytes
         self._held = 0
-        self._answers: OrderedDict[Hashable, Answer] = OrderedDict()
-        self._making: dict[Hashable, Future[Answer]] = {}
+        self._answers: OrderedDict[Hashable, tuple[Hashable, Answer]] = OrderedDict()
+        self._making: dict[tuple[Hashable, Hashable], Future[Answer]] = {}
         self._lock = threading.Lock()
 
-    def held(self, key: Hashable) -> Answer | None:
-        """The answer for `key` where it is there."""
+    def held(self, key: Hashable, version: Hashable) -> Answer | None:
+        """The answer for `key` where it is there and of `version`."""
         with self._lock:
-            if key in self._answers:
-                self._answers.move_to_end(key)
-            return self._answers.get(key)
+            return self._found(key, version)
 
-    def answer(self, key: Hashable, make: Callable[[], bytes]) -> Answer:
-        """The answer for `key`, made by `make` where it is not there. What `make` raises is raised for all who wait."""
+    def answer(self, key: Hashable, version: Hashable, make: Callable[[], bytes]) -> Answer:
+        """The answer for `key`, made by `make` where that of `version` is not there. What `make` raises is raised for all
+        who wait."""
         with self._lock:
-            if key in self._answers:
-                self._answers.move_to_end(key)
-                return self._answers[key]
-            pending = self._making.get(key)
+            found = self._found(key, version)
+            if found is not None:
+                return found
+            pending = self._making.get((key, version))
             if pending is not None:
                 mine = False
             else:
                 mine, pending = True, Future()
-                self._making[key] = pending
+                self._making[key, version] = pending
         if mine:
-            self._make(key, make, pending)
+            self._make(key, version, make, pending)
         return pending.result()
 
-    def _make(self, key: Hashable, make: Callable[[], bytes], pending: "Future[Answer]") -> None:
+    def _found(self, key: Hashable, version: Hashable) -> Answer | None:
+        held, answer = self._answers.get(key, (None, None))
+        if answer is None or held != version:
+            return None
+        self._answers.move_to_end(key)
+        return answer
+
+    def _make(self, key: Hashable, version: Hashable, make: Callable[[], bytes], pending: "Future[Answer]") -> None:
         try:
             answer = Answer.of(make())
         except BaseException as error:  # noqa: BLE001  (raised again for each who asked)
             with self._lock:
-                del self._making[key]
+                del self._making[key, version]
             pending.set_exception(error)
             return  # who asked is told by `pending`, as all who wait are
         with self._lock:
+            self._drop(key)
             if len(answer.body) <= self._most:
                 self._held += len(answer.body)
-                self._answers[key] = answer
+                self._answers[key] = version, answer
             while self._held > self._most:
-                self._held -= len(self._answers.popitem(last=False)[1].body)
-            del self._making[key]
+                self._drop(next(iter(self._answers)))
+            del self._making[key, version]
         pending.set_result(answer)
+
+    def _drop(self, key: Hashable) -> None:
+        if key in self._answers:
+            self._held -= len(self._answers.pop(key)[1].body)

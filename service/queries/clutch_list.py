@@ -7,7 +7,7 @@ from typing import Any
 from sqlalchemy import Connection
 
 from service import records
-from service.lists import Place, to_cursor
+from service.lists import Place, page_as_bytes
 from service.lives.assumptions import BASELINE
 from service.lives.payloads import SUMMARY
 from service.queries.cache import AnswerCache, to_json
@@ -45,11 +45,10 @@ def page_as_json(
         rows = clutches.page(connection, limit=limit + 1, after=after, archived=archived)
         clutches_shown = _shown(connection, rows[:limit])
     items = [
-        cache.answer(("clutch", row.clutch_id, row.revision, to_json(verdict)), partial(_as_json, row, held, verdict))
+        cache.answer(("clutch", row.clutch_id), (row.revision, to_json(verdict)), partial(_as_json, row, held, verdict))
         for row, held, verdict in clutches_shown
     ]
-    following = to_json(to_cursor(_next(rows, limit)))
-    return b'{"items":[' + b",".join(item.body for item in items) + b'],"next":' + following + b"}"
+    return page_as_bytes([item.body for item in items], _next(rows, limit))
 
 
 def _next(rows: Sequence[ClutchRow], limit: int) -> Place | None:

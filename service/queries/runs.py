@@ -1,16 +1,17 @@
 """`/runs` and `/loops`: receipts by cycles, and the friction loops of the dynamic tests."""
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from service import records
 from service.columns import whole
+from service.lists import Place, page_as_bytes
 from service.lives.history import DYNAMIC
 from storage import changes, runs
 from storage.encoding.json_text import to_text
 from storage.engine.database import Database
 
-Place = tuple[float, str]
 COLUMNS = (
     "run_id", "kind", "cycles", "started_at", "received_at", "origin", "content_sha256", "warnings", "fits", "state",
     "sent_cycles",
@@ -18,20 +19,31 @@ COLUMNS = (
 TRAIL_COLUMNS = changes.SHOWN
 
 
-def page(
+def page_as_json(
     database: Database, clutch_id: str, *, limit: int, after: Place | None, state: str | None = None
-) -> tuple[list[dict[str, Any]], Place | None]:
-    """Receipts by cycles, of runs in one state or all, and where the next page starts. Raises NotFoundError."""
+) -> bytes:
+    """Receipts by cycles, of runs in one state or all, as JSON. Raises NotFoundError.
+
+    A receipt's text goes out as it is stored, and what the run is now behind it.
+    """
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
-        rows = runs.page(connection, clutch_id, limit=limit + 1, after=after, state=state)
-    receipts = [records.receipt(row) for row in rows[:limit]]
-    return receipts, (rows[limit - 1].cycles, rows[limit - 1].run_id) if len(rows) > limit else None
+        rows = runs.receipts(connection, clutch_id, limit=limit + 1, after=after, state=state)
+    items = [_as_json(row) for row in rows[:limit]]
+    return page_as_bytes(items, (rows[limit - 1].cycles, rows[limit - 1].run_id) if len(rows) > limit else None)
 
 
-def rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Receipts as rows of a table; warnings and fits are counted."""
-    for item in items:
+def _as_json(row: runs.ReceiptRow) -> bytes:
+    sent_cycles = row.cycles if row.sent_cycles is None else row.sent_cycles
+    present = f'"state":"{row.state}","doubts":{row.doubts},"sent_cycles":{whole(sent_cycles)}'
+    return f"{row.receipt[:-1]},{present}}}".encode()
+
+
+def rows(
+    database: Database, clutch_id: str, *, limit: int, after: Place | None, state: str | None = None
+) -> Iterator[dict[str, Any]]:
+    """The same as rows of a table; warnings and fits are counted."""
+    for item in json.loads(page_as_json(database, clutch_id, limit=limit, after=after, state=state))["items"]:
         yield {name: item[name] for name in COLUMNS} | {
             "warnings": len(item["warnings"]),
             "fits": len(item["fits"]),

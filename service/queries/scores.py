@@ -75,8 +75,8 @@ def of_fleet(database: Database, cache: AnswerCache, *, method: str) -> dict[str
 
 def _items(database: Database, cache: AnswerCache, clutch_id: str, revision: int, method: str) -> list[dict[str, Any]]:
     """A clutch's scored lives, kept by its revision."""
-    key = (clutch_id, revision, "scores", method)
-    answer = cache.answer(key, lambda: to_text(of_clutch(database, clutch_id, method)).encode())
+    key = (clutch_id, "scores", method)
+    answer = cache.answer(key, revision, lambda: to_text(of_clutch(database, clutch_id, method)).encode())
     items: list[dict[str, Any]] = json.loads(answer.body)["items"]
     return items
 

@@ -45,29 +45,30 @@ async def answer(request: Request, make: Callable[[], object]) -> Response:
     return tagged(request, Answer.of(await run_in_threadpool(lambda: to_json(make()))), JSON_TYPE)
 
 
-async def kept(context: Context, key: Hashable, make: Callable[[], bytes]) -> Answer:
-    """What the cache has for `key`; where it has nothing yet, `make` is called in a thread."""
-    answer = context.cache.held(key)
+async def kept(context: Context, key: Hashable, version: Hashable, make: Callable[[], bytes]) -> Answer:
+    """What the cache has for `key` at `version`; where it has nothing yet, `make` is called in a thread."""
+    answer = context.cache.held(key, version)
     if answer is not None:
         return answer
-    return await run_in_threadpool(context.cache.answer, key, make)
+    return await run_in_threadpool(context.cache.answer, key, version, make)
 
 
 async def clutch_answer(
-    request: Request, context: Context, clutch_id: str, name: str, make: Callable[[], object], *arguments: Hashable
+    request: Request, context: Context, clutch_id: str, name: str, make: Callable[[], bytes], *arguments: Hashable
 ) -> Response:
-    """A GET's answer that follows from a clutch's revision, JSON. Raises NotFoundError.
+    """A GET's answer that follows from a clutch's revision, JSON made by `make`. Raises NotFoundError.
 
     `name` and `arguments` tell the clutch's answers apart. Where it was made for this revision already, nothing is read.
     """
     revision = _revision(context, clutch_id)
 
     # the revision before the rest is read: what is committed meanwhile is kept under one that nobody asks for again
-    held = await kept(context, (clutch_id, revision, name, *arguments), lambda: to_json(make()))
+    key = (clutch_id, name, *arguments)
+    held = await kept(context, key, revision, make)
 
     def again(request: Request) -> Response | None:
         revision = context.database.watch.revision(clutch_id)
-        held = context.cache.held((clutch_id, revision, name, *arguments))
+        held = context.cache.held(key, revision)
         return None if held is None else tagged(request, held, JSON_TYPE, revision)
 
     remember(request, again)
@@ -85,8 +86,10 @@ async def clutch_table(
 ) -> Response:
     """The CSV export of an answer that follows from a clutch's revision. Raises NotFoundError."""
     revision = _revision(context, clutch_id)
-    key = (clutch_id, revision, f"{name}.csv", *arguments)
-    return tagged(request, await kept(context, key, lambda: encode_table(columns, make())), CSV_TYPE, revision)
+    key = (clutch_id, f"{name}.csv", *arguments)
+    return tagged(
+        request, await kept(context, key, revision, lambda: encode_table(columns, make())), CSV_TYPE, revision
+    )
 
 
 async def computed_answer(
@@ -112,8 +115,8 @@ async def computed_answer(
         payload = json.loads(whole.body)
         return to_json(payload | sliced(payload["items"], limit, after))
 
-    key = (clutch_id, revision, _name(query), *arguments, limit, after)
-    return tagged(request, await kept(context, key, one_page), JSON_TYPE, revision)
+    key = (clutch_id, _name(query), *arguments, limit, after)
+    return tagged(request, await kept(context, key, revision, one_page), JSON_TYPE, revision)
 
 
 async def computed_table(
@@ -128,8 +131,8 @@ async def computed_table(
 ) -> Response:
     """The CSV export of the same: `rows` of its JSON. Raises NotFoundError."""
     revision, whole = await _computed(context, clutch_id, query, arguments, prefer)
-    key = (clutch_id, revision, f"{_name(query)}.csv", *arguments)
-    exported = await kept(context, key, lambda: encode_table(columns, rows(json.loads(whole.body))))
+    key = (clutch_id, f"{_name(query)}.csv", *arguments)
+    exported = await kept(context, key, revision, lambda: encode_table(columns, rows(json.loads(whole.body))))
     return tagged(request, exported, CSV_TYPE, revision)
 
 

@@ -1,7 +1,6 @@
 """Clutches: register, list worst first, look up, edit and archive, and the audit trail."""
 
 import asyncio
-from collections.abc import Hashable
 from functools import partial
 
 from fastapi import APIRouter, Request
@@ -79,17 +78,17 @@ async def list_clutches(
     """All clutches with current health and remaining life, the fewest remaining cycles first."""
     after = from_cursor(cursor)
 
-    def key() -> Hashable:  # before the rows are read: what is committed meanwhile makes another
-        return "clutches", context.database.watch.version(), archived, limit, after
+    key = ("clutches", archived, limit, after)
 
     def make() -> bytes:
         return clutch_list.page_as_json(context.database, context.cache, limit=limit, after=after, archived=archived)
 
     def again(request: Request) -> Response | None:
-        held = context.cache.held(key())
+        held = context.cache.held(key, context.database.watch.version())
         return None if held is None else tagged(request, held, JSON_TYPE)
 
-    held = await kept(context, key(), make)
+    # the version before the rows are read: what is committed meanwhile makes another
+    held = await kept(context, key, context.database.watch.version(), make)
     remember(request, again)
     return tagged(request, held, JSON_TYPE)
 
@@ -124,7 +123,7 @@ async def list_changes(
     """Who changed what of the clutch and its runs, when and why: the newest first."""
     after = from_cursor(cursor)
 
-    def make() -> object:
-        return page(*runs.trail(context.database, clutch_id, limit=limit, after=after))
+    def make() -> bytes:
+        return to_json(page(*runs.trail(context.database, clutch_id, limit=limit, after=after)))
 
     return await clutch_answer(request, context, clutch_id, "changes", make, limit, after)

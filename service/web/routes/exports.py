@@ -38,8 +38,7 @@ async def list_runs_csv(
     after = from_cursor(cursor)
 
     def make() -> Rows:
-        items, _ = runs.page(context.database, clutch_id, limit=limit, after=after, state=state)
-        return runs.rows(items)
+        return runs.rows(context.database, clutch_id, limit=limit, after=after, state=state)
 
     return await clutch_table(request, context, clutch_id, "runs", make, runs.COLUMNS, state, limit, after)
 

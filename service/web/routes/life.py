@@ -8,6 +8,7 @@ from service.lives.tracks import CARRIED
 from service.queries import runs, scores
 from service.queries import series as series_query
 from service.queries import stribeck as stribeck_query
+from service.queries.cache import to_json
 from service.queries.degradation import degradation as degradation_of
 from service.queries.engagement import engaged
 from service.queries.remaining_life import remaining_life
@@ -42,8 +43,8 @@ async def remaining_useful_life(
             request, context, clutch_id, remaining_life, method, pressure_bar, at_cycles, prefer=prefer
         )
 
-    def make() -> object:
-        return remaining_life(context.database, clutch_id, method, pressure_bar, at_cycles)
+    def make() -> bytes:
+        return to_json(remaining_life(context.database, clutch_id, method, pressure_bar, at_cycles))
 
     return await clutch_answer(request, context, clutch_id, "remaining-useful-life", make, method, at_cycles)
 
@@ -113,8 +114,8 @@ async def loops(
     """Friction loops of the dynamic tests by cycles and pressure."""
     after = from_cursor(cursor)
 
-    def make() -> object:
-        return paged(runs.loops(context.database, clutch_id), limit, after)
+    def make() -> bytes:
+        return to_json(paged(runs.loops(context.database, clutch_id), limit, after))
 
     return await clutch_answer(request, context, clutch_id, "loops", make, limit, after)
 
@@ -131,7 +132,7 @@ async def series(
     """Flat rows for dashboards and spreadsheets: every fitted quantity, then the predictions."""
     after = from_cursor(cursor)
 
-    def make() -> object:
-        return paged(series_query.series(context.database, clutch_id, quantity), limit, after)
+    def make() -> bytes:
+        return to_json(paged(series_query.series(context.database, clutch_id, quantity), limit, after))
 
     return await clutch_answer(request, context, clutch_id, "series", make, quantity, limit, after)

@@ -13,7 +13,7 @@ from fastapi.responses import Response
 
 from service.errors import NotAcceptableError, NotFoundError
 from service.jobs.workers import Lane
-from service.lists import from_cursor, page
+from service.lists import from_cursor
 from service.queries import runs
 from service.queries.raw_run.answer import Kind, entity_tag, write_run
 from service.run_files.json_run import checked, read_run
@@ -82,8 +82,8 @@ async def list_runs(
     """Receipts by cycles."""
     after = from_cursor(cursor)
 
-    def make() -> object:
-        return page(*runs.page(context.database, clutch_id, limit=limit, after=after, state=state))
+    def make() -> bytes:
+        return runs.page_as_json(context.database, clutch_id, limit=limit, after=after, state=state)
 
     return await clutch_answer(request, context, clutch_id, "runs", make, state, limit, after)
 

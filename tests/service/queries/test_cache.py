@@ -18,7 +18,7 @@ def made(cache: AnswerCache, name: str, body: bytes) -> bool:
         calls.append(name)
         return body
 
-    assert cache.answer(name, make).body == body
+    assert cache.answer(name, 1, make).body == body
     return bool(calls)
 
 
@@ -49,13 +49,24 @@ def test_of_several_that_ask_at_once_one_computes() -> None:
         return b"once"
 
     with ThreadPoolExecutor(4) as pool:
-        first = pool.submit(cache.answer, "a", make)
+        first = pool.submit(cache.answer, "a", 1, make)
         assert started.wait(30)
-        others = [pool.submit(cache.answer, "a", make) for _ in range(3)]
-        assert cache.answer("b", lambda: b"not held up").body == b"not held up"
+        others = [pool.submit(cache.answer, "a", 1, make) for _ in range(3)]
+        assert cache.answer("b", 1, lambda: b"not held up").body == b"not held up"
         release.set()
         assert {answer.result(30).body for answer in (first, *others)} == {b"once"}
     assert len(calls) == 1
+
+
+def test_of_a_key_one_version_is_held_and_counted() -> None:
+    cache = AnswerCache(10)
+    for version in range(20):
+        assert cache.held("a", version) is None
+        assert cache.answer("a", version, lambda: b"aaaa").body == b"aaaa"
+        assert cache.held("a", version) is not None
+        assert cache.held("a", version - 1) is None
+    assert made(cache, "b", b"bbbb")
+    assert cache.held("a", 19) is not None  # one answer's bytes are counted, not those of twenty
 
 
 def test_what_fails_fails_for_all_and_is_tried_again() -> None:
@@ -67,8 +78,8 @@ def test_what_fails_fails_for_all_and_is_tried_again() -> None:
     attempts: list[Callable[[], bytes]] = [failing, failing]
     for make in attempts:
         with pytest.raises(LookupError, match="not there"):
-            cache.answer("a", make)
-    assert cache.answer("a", lambda: b"there").body == b"there"
+            cache.answer("a", 1, make)
+    assert cache.answer("a", 1, lambda: b"there").body == b"there"
 
 
 def test_no_number_leaves_that_json_cannot_carry() -> None:

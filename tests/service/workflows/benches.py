@@ -4,6 +4,7 @@ Doubts are stood in for: a run is held where its start carries the mark of a sec
 tested is what happens to held runs, not which are.
 """
 
+import json
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -129,7 +130,8 @@ class Bench:
 
     def receipts(self) -> dict[str, dict[str, Any]]:
         """All receipts by run_id."""
-        return {item["run_id"]: item for item in runs.page(self.database, CLUTCH, limit=1000, after=None)[0]}
+        page = json.loads(runs.page_as_json(self.database, CLUTCH, limit=1000, after=None))
+        return {item["run_id"]: item for item in page["items"]}
 
     def answers(self, *, degradation_too: bool = True) -> dict[str, Any]:
         """Everything that follows from the history, revisions and what only the audit knows apart.
