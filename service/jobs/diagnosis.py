@@ -21,11 +21,10 @@ from service.lives.diagnosis_report import public
 from service.lives.history import STATIONARY, Life, lives_of
 from service.lives.model_correction import corrected_cofs
 from service.lives.tracks import predict_at
+from service.settings import BACKGROUND_NICE
 from storage import channels, results, runs
 from storage.engine.database import Database, open_database
 
-#: By how much this process yields to the one that answers [nice]. Chosen; no table.
-_NICE = 10
 _METHOD = "particle"
 
 
@@ -44,7 +43,7 @@ def main() -> None:
     """Diagnose what the first argument names, JSON."""
     task = Task(**json.loads(sys.argv[1]))
     threading.Thread(target=_end_with_the_service, daemon=True).start()
-    os.nice(_NICE)
+    os.nice(BACKGROUND_NICE)
     resource.setrlimit(resource.RLIMIT_AS, (task.bytes, task.bytes))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:

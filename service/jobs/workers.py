@@ -16,6 +16,7 @@ from typing import Any
 
 from service.errors import BusyError
 from service.jobs import worker
+from service.settings import BACKGROUND_NICE
 from storage.engine.database import Database
 
 #: Calls of a lane that wait or run; more are refused as busy. Chosen: a minute of runs at 15 a second is 900.
@@ -33,7 +34,7 @@ class Lane(Enum):
     RUNS = 0
     ANSWERS = 1
     FILES = 2
-    RENEWALS = 10
+    RENEWALS = BACKGROUND_NICE
 
 
 @dataclass(slots=True)

@@ -17,14 +17,11 @@ from service.lives.history import Life
 from service.lives.payloads import warned_anew
 from service.lives.recomputation import Results, track
 from service.lives.tracks import CARRIED
-from service.settings import CODE_VERSION
+from service.settings import BACKGROUND_NICE, CODE_VERSION
 from storage import assumptions, clutches, results
 from storage.assumptions import NOBODY, FleetPriorRow
 from storage.encoding.json_text import Json, to_text
 from storage.engine.database import Database
-
-#: By how much a thread that tracks anew yields [nice]. Chosen: as diagnoses do.
-_NICE = 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,4 +139,4 @@ def _brought_up(database: Database, clutch_id: str, beside: Executor) -> bool:
 
 def _yield() -> None:
     """This thread yields to a service that runs; what holds the write lock does not, for the service would wait for it."""
-    os.nice(_NICE)
+    os.nice(BACKGROUND_NICE)
