@@ -161,25 +161,33 @@ def pointwise(history: History, prior: Prior, points: Points, table: FloatArray 
     return _without(sums, terms), terms
 
 
-def turned_last(
-    history: History, prior: Prior, points: Points, sums: Sums, last: FloatArray, plain: NDArray[np.intp]
-) -> Sums:
-    """The sums at the points `plain` where the last run, whose b is `last` [n], is taken to be outlying and was not before.
+def last_outlying(history: History, prior: Prior, points: Points, sums: Sums, terms: Terms, last: FloatArray) -> Sums:
+    """The sums and where the last run, whose b is `last` [n], is taken to be outlying and was not before.
 
-    For points without further terms alone: one run's share of each sum is exchanged.
+    It gets a further term of its own with the deviation W, which is eliminated after the others.
     """
-    d = history.variance[-1] + np.exp(2.0 * points.log_scatter[plain])
-    outlying = d + (prior.outlying_size * prior.size) ** 2
-    change, b = 1.0 / outlying - 1.0 / d, last[plain]
-    y = float(history.value[-1]) - prior.initial_mean
+    y, sd = float(history.value[-1]) - prior.initial_mean, prior.outlying_size * prior.size
+    r = 1.0 / (history.variance[-1] + np.exp(2.0 * points.log_scatter))
+    pivot = 1.0 + sd**2 * r
+    own = sd * r * np.stack([np.ones_like(last), np.full_like(last, y), last])
+    if terms.where.size:
+        at, rows = terms.where, terms.rows
+        shared = terms.sd * columns(history)[-1][:, None] * (sd * r[at])
+        for k in range(shared.shape[0]):
+            shared[k] /= rows[k, k]
+            shared[k + 1 :] -= rows[k, k + 1 : shared.shape[0]] * shared[k]
+        pivot[at] -= np.square(shared).sum(axis=0)
+        own[:, at] -= np.einsum("kj,ckj->cj", shared, terms.cross)
+    own /= np.sqrt(pivot)
+    n_1, n_y, n_b = own
     return Sums(
-        r=sums.r[plain] + change,
-        rb=sums.rb[plain] + change * b,
-        rbb=sums.rbb[plain] + change * b**2,
-        ry=sums.ry[plain] + change * y,
-        rby=sums.rby[plain] + change * y * b,
-        ryy=sums.ryy[plain] + change * y**2,
-        log_r=sums.log_r[plain] + np.log(d / outlying),
+        r=sums.r - n_1**2,
+        rb=sums.rb - n_1 * n_b,
+        rbb=sums.rbb - n_b**2,
+        ry=sums.ry - n_1 * n_y,
+        rby=sums.rby - n_y * n_b,
+        ryy=sums.ryy - n_y**2,
+        log_r=sums.log_r - np.log(pivot),
     )
 
 

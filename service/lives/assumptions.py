@@ -80,7 +80,7 @@ class Assumptions:
 
     def scale(self, origin: float, blocks: Sequence[Block]) -> Scale:
         """ζ over cycles since new for a life that began at `origin`, by its blocks of duty."""
-        since = [block.since(origin) for block in blocks if block.end > origin]
+        since = [] if self.counts_cycles else [block.since(origin) for block in blocks if block.end > origin]
         return Scale(origin=origin, severity=severity_map(self.severity, since))
 
     def priors(self, quantity: str, first: Measurement, scale: Scale) -> dict[str, Prior]:

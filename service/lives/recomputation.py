@@ -17,6 +17,7 @@ from service.lives.history import (
     ByPressure,
     Event,
     Life,
+    Series,
     life_with,
     lives_of,
     order,
@@ -239,16 +240,19 @@ def track(state: ClutchState, *, newest: Event | None = None) -> Tracking:
     if not state.events:
         return Tracking()
     assumptions, lives = state.assumptions(), state.lives
-    carried = None if newest is None else _carried(state, lives[-1], assumptions, newest)
-    walks: list[tuple[Life, States, int]] = [(life, {}, 0) for life in lives]
+    last = lives[-1].pooled(assumptions)
+    carried = None if newest is None else _carried(state, lives[-1], last, newest)
+    walks: list[tuple[Life, Series, States, int]]
     if carried is not None:
-        walks = [(lives[-1], carried, len(lives[-1].events) - 1)]
+        walks = [(lives[-1], last, carried, len(lives[-1].events) - 1)]
+    else:
+        walks = [*((life, life.pooled(assumptions), {}, 0) for life in lives[:-1]), (lives[-1], last, {}, 0)]
     predictions: dict[tuple[float, str], Prediction] = {}
     filters: States = {}
     warnings: dict[str, list[dict[str, str]]] = {}
-    for life, start, first_event in walks:
-        measured = set(life.pooled(assumptions).events)
-        walk = follow(state.clutch_id, life, assumptions, state.fraction, start, first_event=first_event)
+    for life, whole, start, first_event in walks:
+        measured = set(whole.events)
+        walk = follow(state.clutch_id, life, whole, assumptions, state.fraction, start, first_event=first_event)
         for index, (after_event, made) in enumerate(walk, start=first_event):
             filters = after_event
             predictions |= {(prediction.cycles, prediction.method): prediction for prediction in made}
@@ -258,7 +262,7 @@ def track(state: ClutchState, *, newest: Event | None = None) -> Tracking:
     summary, rank = summary_of(predictions[state.events[-1].cycles, _SHOWN].payload)
     summary |= {
         "runs": len(state.events),
-        "recent": recent(state.events, lives[-1].pooled(assumptions)),
+        "recent": recent(state.events, last),
         "life": lives[-1].name,
     }
     return Tracking(
@@ -271,7 +275,7 @@ def track(state: ClutchState, *, newest: Event | None = None) -> Tracking:
     )
 
 
-def _carried(state: ClutchState, life: Life, assumptions: Assumptions, newest: Event) -> States | None:
+def _carried(state: ClutchState, life: Life, whole: Series, newest: Event) -> States | None:
     """The stored states from before `newest`, or None where one step on from them would not give the same answer."""
     last = life.events[-1]
     is_test = newest.speed_range is not None
@@ -280,7 +284,7 @@ def _carried(state: ClutchState, life: Life, assumptions: Assumptions, newest: E
     if (newest is not last and newest.shift) or state.filters is None:
         return None
     index = life.events.index(newest)
-    before = sum(1 for event in life.pooled(assumptions).events if event != index)
+    before = sum(1 for event in whole.events if event != index)
     if state.filters.keys() != (set(CARRIED) if before else set()):
         return None
     return None if any(tracked.runs != before for tracked in state.filters.values()) else state.filters

@@ -61,13 +61,20 @@ States = Mapping[str, Tracked]
 
 
 def follow(
-    clutch_id: str, life: Life, assumptions: Assumptions, fraction: float, states: States, *, first_event: int = 0
+    clutch_id: str,
+    life: Life,
+    whole: Series,
+    assumptions: Assumptions,
+    fraction: float,
+    states: States,
+    *,
+    first_event: int = 0,
 ) -> Iterator[tuple[States, list[Prediction]]]:
     """Walk a life's events from `first_event` on; after each, the states by method and the predictions of the series.
 
-    `states` are those before `first_event`. A life with too few tests yields `insufficient_data`.
+    `whole` is the series of all its events, `states` are those before `first_event`. A life with too few tests yields
+    `insufficient_data`.
     """
-    whole = life.pooled(assumptions)
     for index in range(first_event, len(life.events)):
         series = whole if assumptions.counts_cycles else life.until(index).pooled(assumptions)
         runs = series.until(index)

@@ -9,7 +9,7 @@ from models.arrays import FloatArray
 from models.tracking.criteria import SIZES
 from models.tracking.discrepancy import log_size_weight
 from models.tracking.history import History
-from models.tracking.linear_model import Points, basis, evidence, log_outlying, pointwise, turned_last
+from models.tracking.linear_model import Points, basis, evidence, last_outlying, log_outlying, pointwise
 from models.tracking.prior import Prior
 
 
@@ -64,18 +64,12 @@ class Bridge:
         return replace(entered, log_weight=cloud.log_weight + total - cloud.log_target), before, after
 
     def _either_way(self, as_sound: Cloud, as_outlying: Cloud, table: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The log targets with the new run sound and outlying; where there are no further terms, by its share of the sums
-        alone."""
+        """The log targets with the new run sound and outlying."""
         points = as_sound.placed()
         sums, terms = pointwise(self.after, self.prior, points, table)
+        turned = last_outlying(self.after, self.prior, points, sums, terms, table[-1])
         sound = evidence(sums, self.prior) + _log_prior(self.prior, as_sound)
-        outlying, plain = np.empty(sound.size), np.setdiff1d(np.arange(sound.size), terms.where)
-        outlying[plain] = evidence(turned_last(self.after, self.prior, points, sums, table[-1], plain), self.prior)
-        outlying[plain] += _log_prior(self.prior, as_outlying)[plain]
-        if terms.where.size:
-            with_terms = as_outlying.taken(terms.where)
-            outlying[terms.where] = log_target_of(self.after, self.prior, with_terms, table[:, terms.where])
-        return sound, outlying
+        return sound, evidence(turned, self.prior) + _log_prior(self.prior, as_outlying)
 
     def log_before(self, cloud: Cloud, table: FloatArray) -> FloatArray:
         """The target before the new run, with the prior of its flag; `table` is that of the runs after."""

@@ -1,7 +1,7 @@
 """The closed form of ξ0, Δ and the further terms, against the whole normal distribution of the data."""
 
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -93,6 +93,20 @@ def test_the_table_and_the_points_are_one_sum() -> None:
         )
         pointed = linear_model.evidence(linear_model.pointwise(history, PRIOR, points)[0], PRIOR)
         np.testing.assert_allclose(tabled[kind, level], pointed, rtol=1e-9)
+
+
+@pytest.mark.parametrize("measurements", [CAMPAIGN, EPOCHS], ids=["one epoch", "two epochs"])
+def test_the_last_run_turned_outlying_is_that_of_all_sums_anew(measurements: list[Measurement]) -> None:
+    """With one epoch the first point has no further terms, with two all have."""
+    history = History.of(measurements, PRIOR)
+    sound = replace(POINTS, outlying=POINTS.outlying * (np.arange(13) < 12)[:, None])
+    outlying = replace(sound, outlying=sound.outlying + (np.arange(13) == 12)[:, None])
+    sums, terms = linear_model.pointwise(history, PRIOR, sound)
+    last = linear_model.basis(history.progress[-1], POINTS.log_scale, POINTS.log_exponent)
+    turned = linear_model.last_outlying(history, PRIOR, sound, sums, terms, last)
+    anew = linear_model.pointwise(history, PRIOR, outlying)[0]
+    for name, found in asdict(turned).items():
+        np.testing.assert_allclose(found, getattr(anew, name), rtol=1e-9, err_msg=name)
 
 
 def test_drawn_terms_have_the_posterior_of_the_discrepancy() -> None:
