@@ -12,9 +12,6 @@ DEFAULT_URL = "http://127.0.0.1:8000"
 
 #: Processes that take in runs. Chosen: as `make load` has it, on two cores.
 DEFAULT_WORKERS = 2
-#: By how much work in the background yields [nice]: diagnoses, answers made anew, clutches tracked anew under another fleet
-#: prior. Chosen by `make load`: at 10 three of them took a third of two cores that runs were waiting for.
-BACKGROUND_NICE = 19
 #: Limits, in the units of their environment variables.
 DEFAULT_BODY_MB = 64  # MiB of JSON. Chosen; longer records are posted as files
 DEFAULT_DIAGNOSIS_SECONDS = 300  # s. Chosen; docs/benchmarks.md: the longest diagnosis takes 11 s

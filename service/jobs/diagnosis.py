@@ -16,12 +16,12 @@ import numpy as np
 from models.diagnosis.campaign import StationaryRun
 from models.diagnosis.extension import Extension
 from service import records, stored_runs
+from service.background import yield_to_others
 from service.lives.campaign import CampaignRun, DiagnosedLife, records_to_keep, run_of
 from service.lives.diagnosis_report import public
 from service.lives.history import STATIONARY, Life, lives_of
 from service.lives.model_correction import corrected_cofs
 from service.lives.tracks import predict_at
-from service.settings import BACKGROUND_NICE
 from storage import channels, results, runs
 from storage.engine.database import Database, open_database
 
@@ -43,7 +43,7 @@ def main() -> None:
     """Diagnose what the first argument names, JSON."""
     task = Task(**json.loads(sys.argv[1]))
     threading.Thread(target=_end_with_the_service, daemon=True).start()
-    os.nice(BACKGROUND_NICE)
+    yield_to_others()
     resource.setrlimit(resource.RLIMIT_AS, (task.bytes, task.bytes))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:

@@ -11,6 +11,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
+from service.background import yield_to_others
 from storage.engine.database import Database, open_database
 
 #: What nearly every call needs, loaded before the first comes.
@@ -19,11 +20,15 @@ LOADED_EARLY = ("service.workflows.ingest_run", "service.run_files.json_run", "s
 _opened: list[Database] = []
 
 
-def begin(database_url: str, nice: int) -> None:
-    """Prepare this process: it yields by `nice`, ends with the service, and leaves interrupts from a terminal to it."""
+def begin(database_url: str, nice: int | None) -> None:
+    """Prepare this process: it yields by `nice` or, where that is None, to all others; it ends with the service, and leaves
+    interrupts from a terminal to it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_the_service, daemon=True).start()
-    os.nice(nice)
+    if nice is None:
+        yield_to_others()
+    else:
+        os.nice(nice)
     threadpool_limits(limits=1, user_api="blas")
     for name in LOADED_EARLY:
         importlib.import_module(name)

@@ -16,7 +16,6 @@ from typing import Any
 
 from service.errors import BusyError
 from service.jobs import worker
-from service.settings import BACKGROUND_NICE
 from storage.engine.database import Database
 
 #: Calls of a lane that wait or run; more are refused as busy. Chosen: a minute of runs at 15 a second is 900.
@@ -27,14 +26,14 @@ class Lane(Enum):
     """What waits for what: runs that are taken in, answers that somebody waits for, files and raw records, and answers that
     are made anew while the last ones are given.
 
-    The values are by how much a lane's processes yield [nice]; what takes the write lock yields little.
+    The values are by how much a lane's processes yield [nice], None to all others; what takes the write lock yields little.
     Chosen by `make load`.
     """
 
     RUNS = 0
     ANSWERS = 1
     FILES = 2
-    RENEWALS = BACKGROUND_NICE
+    RENEWALS = None
 
 
 @dataclass(slots=True)

@@ -4,7 +4,6 @@ No clutch is tracked under what was learned from itself: for each clutch that ta
 learned from the others.
 """
 
-import os
 from collections.abc import Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -12,12 +11,13 @@ from dataclasses import dataclass, field, replace
 from models.prognosis.criteria import FEWEST_CLUTCHES, FEWEST_TESTS_TO_LEARN
 from models.prognosis.fleet import FleetPrior, Taught, population, taught
 from service import records
+from service.background import yield_to_others
 from service.lives.assumptions import ALL_PRESSURES, Assumptions, kind_of
 from service.lives.history import Life
 from service.lives.payloads import warned_anew
 from service.lives.recomputation import Results, track
 from service.lives.tracks import CARRIED
-from service.settings import BACKGROUND_NICE, CODE_VERSION
+from service.settings import CODE_VERSION
 from storage import assumptions, clutches, results
 from storage.assumptions import NOBODY, FleetPriorRow
 from storage.encoding.json_text import Json, to_text
@@ -50,7 +50,8 @@ def refresh(database: Database, *, now: str) -> Refreshed:
     fleets: dict[str, Fleet] = {}
     with database.reading() as connection:
         names = clutches.all_ids(connection)
-    with ThreadPoolExecutor(1, initializer=_yield) as beside:
+    # what holds the write lock does not yield: the service would wait for it
+    with ThreadPoolExecutor(1, initializer=yield_to_others) as beside:
         for clutch_id in names:
             kind, lessons = beside.submit(_lessons, database, clutch_id).result()
             if lessons:
@@ -135,8 +136,3 @@ def _brought_up(database: Database, clutch_id: str, beside: Executor) -> bool:
                 records.store(connection, clutch_id, retracked)
                 clutches.bump_revision(connection, clutch_id)
                 return True
-
-
-def _yield() -> None:
-    """This thread yields to a service that runs; what holds the write lock does not, for the service would wait for it."""
-    os.nice(BACKGROUND_NICE)

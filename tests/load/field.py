@@ -1,8 +1,9 @@
 """The test field: rigs that post life after life, clients that ask once a second, and what is counted of them.
 
-A rig sends its next run when the last one's receipt has come (closed loop). A client's questions are planned by the clock
-(open loop): each is measured from the moment at which it was to be sent, whether or not its connection was free by then, so
-that a service that stands for a second is charged for all that would have been asked in it.
+A rig begins at a moment of its own, and sends its next run when the last one's receipt has come (closed loop). A client's
+questions are planned by the clock (open loop): each is measured from the moment at which it was to be sent, whether or not
+its connection was free by then, so that a service that stands for a second is charged for all that would have been asked in
+it.
 """
 
 import asyncio
@@ -80,7 +81,7 @@ class Field:
         """Everything that runs until `end`."""
         rng = random.Random(self.seed)  # noqa: S311  (no secret)
         return [
-            *(self._rig(number) for number in range(self.rigs)),
+            *(self._rig(number, rng.random()) for number in range(self.rigs)),
             *(
                 self._client(number, phase, part)
                 for number in range(self.clients)
@@ -92,9 +93,9 @@ class Field:
 
     # --- rigs ---
 
-    async def _rig(self, number: int) -> None:
+    async def _rig(self, number: int, phase: float) -> None:
         line, loop = Line(self.port), asyncio.get_running_loop()
-        await _until(self.begin)
+        await _until(self.begin + phase * self.interval)  # rigs know nothing of each other
         for turn in itertools.count():
             clutch_id = f"load-{number}-{turn:03d}"
             if await self._sent(line, registration(clutch_id, self.fluid(number, turn)), "registration") is None:
