@@ -1,11 +1,15 @@
 """`clutchlife fleet`: the priors learned from clutches of a kind; works on the database, while the service runs."""
 
 from datetime import UTC, datetime
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from service.cli.options import DATABASE, Database, existing, out
+
+if TYPE_CHECKING:
+    from service.background import AtOnce
+    from service.workflows.learn_fleet import Refreshed
 
 app = typer.Typer(help="The priors learned from earlier clutches.")
 
@@ -31,12 +35,18 @@ def refresh(
     quiet: Annotated[bool, typer.Option("--quiet", help="Print changes only")] = False,
 ) -> None:
     """Learn every kind's prior anew, and update the predictions of clutches whose prior has changed."""
-    from service.queries.fleet_priors import newest  # start-up time
-    from service.workflows.learn_fleet import refresh as learn_priors  # start-up time
+    from service.background import in_background  # start-up time
+
+    def learn(at_once: "AtOnce") -> "tuple[Refreshed, list[dict[str, Any]]]":
+        from service.queries.fleet_priors import newest  # start-up time, in the background
+        from service.workflows.learn_fleet import refresh as learn_priors  # start-up time, in the background
+
+        return learn_priors(opened, now=datetime.now(UTC).isoformat(timespec="seconds"), at_once=at_once), newest(
+            opened
+        )
 
     with existing(database) as opened:
-        done = learn_priors(opened, now=datetime.now(UTC).isoformat(timespec="seconds"))
-        priors = newest(opened)
+        done, priors = in_background(learn)
     for item in priors:
         new = item["kind"] in done.kinds
         if new or not quiet:

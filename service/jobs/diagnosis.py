@@ -16,7 +16,6 @@ import numpy as np
 from models.diagnosis.campaign import StationaryRun
 from models.diagnosis.extension import Extension
 from service import records, stored_runs
-from service.background import yield_to_others
 from service.lives.campaign import CampaignRun, DiagnosedLife, records_to_keep, run_of
 from service.lives.diagnosis_report import public
 from service.lives.history import STATIONARY, Life, lives_of
@@ -43,7 +42,6 @@ def main() -> None:
     """Diagnose what the first argument names, JSON."""
     task = Task(**json.loads(sys.argv[1]))
     threading.Thread(target=_end_with_the_service, daemon=True).start()
-    yield_to_others()
     resource.setrlimit(resource.RLIMIT_AS, (task.bytes, task.bytes))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:

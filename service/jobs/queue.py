@@ -151,7 +151,8 @@ class DiagnosisQueue:
             "engine": self._settings.engine,
             "bytes": self._settings.diagnosis_bytes,
         }
-        command = [sys.executable, "-P", "-W", "ignore", "-m", "service.jobs.diagnosis", json.dumps(task)]
+        modules = "service.background", "service.jobs.diagnosis"
+        command = [sys.executable, "-P", "-W", "ignore", "-m", *modules, json.dumps(task)]
         with tempfile.TemporaryFile() as answer, tempfile.TemporaryFile() as errors:
             with self._change:
                 if self._closing:

@@ -5,17 +5,16 @@ learned from the others.
 """
 
 from collections.abc import Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 from models.prognosis.criteria import FEWEST_CLUTCHES, FEWEST_TESTS_TO_LEARN
 from models.prognosis.fleet import FleetPrior, Taught, population, taught
 from service import records
-from service.background import yield_to_others
+from service.background import AtOnce, directly
 from service.lives.assumptions import ALL_PRESSURES, Assumptions, kind_of
 from service.lives.history import Life
 from service.lives.payloads import warned_anew
-from service.lives.recomputation import Results, track
+from service.lives.recomputation import ClutchState, Results, track
 from service.lives.tracks import CARRIED
 from service.settings import CODE_VERSION
 from storage import assumptions, clutches, results
@@ -45,19 +44,17 @@ class Refreshed:
     changed: tuple[str, ...]
 
 
-def refresh(database: Database, *, now: str) -> Refreshed:
-    """Learn every fleet's prior anew; one that differs is a new version, and tracks are made anew."""
+def refresh(database: Database, *, now: str, at_once: AtOnce = directly) -> Refreshed:
+    """Learn every fleet's prior anew; one that differs is a new version, and tracks are made anew. Stored by `at_once`."""
     fleets: dict[str, Fleet] = {}
     with database.reading() as connection:
         names = clutches.all_ids(connection)
-    # what holds the write lock does not yield: the service would wait for it
-    with ThreadPoolExecutor(1, initializer=yield_to_others) as beside:
-        for clutch_id in names:
-            kind, lessons = beside.submit(_lessons, database, clutch_id).result()
-            if lessons:
-                fleets.setdefault(to_text(kind), Fleet(kind=kind)).lessons[clutch_id] = lessons
-        fresh = [fleet.kind for fleet in fleets.values() if _stored_anew(database, fleet, now, beside)]
-        changed = [clutch_id for clutch_id in names if _brought_up(database, clutch_id, beside)]
+    for clutch_id in names:
+        kind, lessons = _lessons(database, clutch_id)
+        if lessons:
+            fleets.setdefault(to_text(kind), Fleet(kind=kind)).lessons[clutch_id] = lessons
+    fresh = [fleet.kind for fleet in fleets.values() if _stored_anew(database, fleet, now, at_once)]
+    changed = [clutch_id for clutch_id in names if _brought_up(database, clutch_id, at_once)]
     return Refreshed(kinds=tuple(fresh), changed=tuple(changed))
 
 
@@ -79,23 +76,27 @@ def _lesson(life: Life, assumptions: Assumptions) -> Taught | None:
     return taught([replace(measurement, progress=measurement.progress * unit) for measurement in series.measurements])
 
 
-def _stored_anew(database: Database, fleet: Fleet, now: str, beside: Executor) -> bool:
+def _stored_anew(database: Database, fleet: Fleet, now: str, at_once: AtOnce) -> bool:
     """Store a fleet's prior and what it is without each of its clutches, where it is not what is stored already."""
-    learned = beside.submit(fleet.without).result()
+    learned = fleet.without()
     with database.reading() as connection:
         stored = assumptions.current_fleet_prior(connection, fleet.kind)
     if learned is None or (stored is not None and stored.content == learned.to_dict()):
         return False
     version = 1 if stored is None else stored.version + 1
-    rows = beside.submit(_versions, fleet, version, now).result()
-    with database.writing() as connection:
-        newest = assumptions.current_fleet_prior(connection, fleet.kind)
-        if newest is not None and newest.version >= version:  # another refresh was quicker
-            return False
-        for row in rows:
-            assumptions.insert_fleet_prior(connection, row)
-        assumptions.forget_left_out(connection, fleet.kind, before=version - 1)  # clutches are still under the last
-    return True
+    rows = _versions(fleet, version, now)
+
+    def store() -> bool:
+        with database.writing() as connection:
+            newest = assumptions.current_fleet_prior(connection, fleet.kind)
+            if newest is not None and newest.version >= version:  # another refresh was quicker
+                return False
+            for row in rows:
+                assumptions.insert_fleet_prior(connection, row)
+            assumptions.forget_left_out(connection, fleet.kind, before=version - 1)  # clutches are still under the last
+        return True
+
+    return at_once(store)
 
 
 def _versions(fleet: Fleet, version: int, now: str) -> Sequence[FleetPriorRow]:
@@ -117,7 +118,7 @@ def _versions(fleet: Fleet, version: int, now: str) -> Sequence[FleetPriorRow]:
     ]
 
 
-def _brought_up(database: Database, clutch_id: str, beside: Executor) -> bool:
+def _brought_up(database: Database, clutch_id: str, at_once: AtOnce) -> bool:
     """Track a clutch anew where its stored predictions were made under another prior; whether that was so."""
     while True:
         with database.reading() as connection:
@@ -127,12 +128,17 @@ def _brought_up(database: Database, clutch_id: str, beside: Executor) -> bool:
             return False
         with database.reading() as connection:
             receipts = records.receipts(connection, clutch_id)
-        tracking = beside.submit(track, state).result()
-        if tracking is None:
-            return False
+        tracking = track(state)
         retracked = Results(tracking=tracking, receipts=warned_anew(state.lives, tracking.warnings, receipts))
-        with database.writing() as connection:
-            if records.unchanged(connection, clutch_id, state.revision):
-                records.store(connection, clutch_id, retracked)
-                clutches.bump_revision(connection, clutch_id)
-                return True
+        if at_once(_replaced, database, state, retracked):
+            return True
+
+
+def _replaced(database: Database, state: ClutchState, results: Results) -> bool:
+    """Store a clutch's results where its revision still is that of the state they follow from; whether it was."""
+    with database.writing() as connection:
+        unchanged = records.unchanged(connection, state.clutch_id, state.revision)
+        if unchanged:
+            records.store(connection, state.clutch_id, results)
+            clutches.bump_revision(connection, state.clutch_id)
+    return unchanged

@@ -1,6 +1,8 @@
 """Results are recomputed from the raw runs, which are never changed."""
 
 from service import records, stored_runs
+from service.background import AtOnce, directly
+from service.lives.recomputation import ClutchState
 from storage import clutches
 from storage.engine.database import Database
 
@@ -11,20 +13,27 @@ def clutch_ids(database: Database) -> list[str]:
         return clutches.all_ids(connection)
 
 
-def replay_clutch(database: Database, clutch_id: str) -> int:
+def replay_clutch(database: Database, clutch_id: str, at_once: AtOnce = directly) -> int:
     """Fit and track all runs of a clutch anew; returns how many. Raises NotFoundError.
 
-    The revision moves on only where a result has changed.
+    The revision moves on only where a result has changed. Stored by `at_once`.
     """
     while True:
         with database.reading() as connection:
             state = records.state(connection, clutch_id)
         replayed = stored_runs.recomputed(database, state)
-        with database.writing() as connection:
-            if not records.unchanged(connection, clutch_id, state.revision):
-                continue
+        if at_once(_replaced, database, state, replayed):
+            return len(replayed.receipts)
+
+
+def _replaced(database: Database, state: ClutchState, replayed: stored_runs.Recomputed) -> bool:
+    """Store a clutch's results where its revision still is that of the state they follow from; whether it was."""
+    clutch_id = state.clutch_id
+    with database.writing() as connection:
+        unchanged = records.unchanged(connection, clutch_id, state.revision)
+        if unchanged:
             before = records.answers(connection, clutch_id)
             stored_runs.store_recomputed(connection, clutch_id, replayed)
             if records.answers(connection, clutch_id) != before:
                 clutches.bump_revision(connection, clutch_id)
-            return len(replayed.receipts)
+    return unchanged
