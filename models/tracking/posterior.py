@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.degradation.general_order import Degradation, value
+from models.degradation.general_order import Degradation
 from models.tracking.discrepancy import Discrepancy
+from models.tracking.linear_model import basis
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
 
@@ -42,7 +43,8 @@ class Posterior:
 
     def values(self, progress: FloatArray) -> FloatArray:
         """ξ at progress ζ >= 0 [k], or [k, n] where draws differ, discrepancy and all; [k, n]."""
-        law = value(progress if progress.ndim == 2 else progress[:, None], self.degradation)
+        share = basis(progress if progress.ndim == 2 else progress[:, None], np.log(self.scale), np.log(self.exponent))
+        law = self.initial + self.change * share
         return law if self.discrepancy is None else np.asarray(law + self.discrepancy(progress))
 
     def taken(self, index: NDArray[np.intp], weight: FloatArray) -> "Posterior":

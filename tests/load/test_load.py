@@ -187,7 +187,7 @@ def test_a_refused_run_is_counted_and_sent_again() -> None:
             return found
 
         server, field.port = await stub(answer)
-        await field._rig(0)
+        await field._rig(0, 0.0)
         server.close()
         return field.counts
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
+from models.degradation.general_order import Number
 from service.lives.history import Event
 from service.lives.plausibility import criteria
 
@@ -90,7 +91,7 @@ class Pace:
         last = float(base[-1]) if base.size else 0.0
         gap = cycles - last
         middle = math.log(float(np.median(gaps)) if gaps.size else max(last, 1_000.0))
-        ways = [(criteria.OTHER_GAP, self._density(gap, middle, criteria.OTHER_GAP_SD))]
+        ways = [(criteria.OTHER_GAP, float(self._density(gap, middle, criteria.OTHER_GAP_SD)))]
         if gaps.size:
             recency = 0.7 ** np.arange(gaps.size)[::-1]
             recency /= recency.sum()
@@ -99,19 +100,16 @@ class Pace:
             if gaps.size > 1:  # gaps that grow by a factor, as in 10, 100, 1000
                 centres = np.append(centres, 2 * centres[-1] - centres[-2])
                 shares = np.append(0.8 * shares, 0.2)
-            like = [
-                share * self._density(gap, centre, criteria.LIKE_GAP_SD)
-                for share, centre in zip(shares.tolist(), centres.tolist(), strict=True)
-            ]
-            ways.append((criteria.LIKE_GAP, math.fsum(like)))
+            ways.append((criteria.LIKE_GAP, float(shares @ self._density(gap, centres, criteria.LIKE_GAP_SD))))
         return ways
 
     @staticmethod
-    def _density(gap: float, centre: float, deviation: float) -> float:
-        """Density a cycle of a gap whose logarithm is normal; 0 for no gap."""
+    def _density(gap: float, centre: Number, deviation: float) -> FloatArray:
+        """Density a cycle of a gap whose logarithm is normal about `centre`, in its shape; 0 for no gap."""
         if gap < 0.5:
-            return 0.0
-        return normal(math.log(gap), centre, deviation) / gap
+            return np.zeros_like(centre)
+        z = (math.log(gap) - np.asarray(centre)) / deviation
+        return np.asarray(np.exp(-0.5 * z * z) / (deviation * math.sqrt(2 * math.pi) * gap))
 
 
 def pace_of(events: Sequence[Event], newest: Event) -> Pace:
