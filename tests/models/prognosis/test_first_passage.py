@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from models.prognosis import first_passage
 from models.prognosis.first_passage import (
     QUANTILES,
     FirstPassage,
@@ -176,6 +177,25 @@ def test_a_bend_by_hand() -> None:
     slope = w * math.sqrt(18.0) / 6.0
     found = ends_of_life(beside(draws, 0.1, [w]), 0.5)[0]
     assert found == pytest.approx(1_000.0 * (-0.5 / slope + 1.0 / 12.0), rel=1e-3)
+
+
+def test_looking_at_every_sixth_place_first_is_looking_at_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 4,000 courses that bend and step as the prior has it, at most a few in a thousand dip and come back between."""
+    rng, count = np.random.default_rng(5), 4_000
+    draws = replace(sample(rng.uniform(-1.0, -0.45, count).tolist()), scale=np.exp(rng.normal(7.0, 1.0, count)))
+    course = Discrepancy(
+        span=1_000.0,
+        size=np.full(count, 0.1),
+        curvature=0.1 * rng.standard_normal((count, PAST + FUTURE)),
+        at=np.array([300.0, 700.0]),
+        height=rng.normal(0.0, 0.05, (count, 2)),
+    )
+    found = ends_of_life(replace(draws, discrepancy=course), 0.5)
+    monkeypatch.setattr(first_passage, "_STRIDE", 1)
+    everywhere = ends_of_life(replace(draws, discrepancy=course), 0.5)
+    assert np.isfinite(everywhere).mean() > 0.5
+    assert (found >= everywhere * (1.0 - 1e-9)).all()
+    assert np.isclose(found, everywhere, rtol=1e-9).mean() >= 0.995
 
 
 def test_an_offset_is_part_of_the_criterion() -> None:
