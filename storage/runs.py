@@ -78,12 +78,12 @@ class RunInOrder:
 _insert = sa.insert(run)
 _of_clutch = run.c.clutch_id == bindparam("of_clutch")
 _by_id = select(run).where(_of_clutch, run.c.run_id == bindparam("wanted"))
-_some = (
+_CHOSEN = (
     _of_clutch,
     or_(bindparam("of_kind").is_(None), run.c.kind == bindparam("of_kind")),
     or_(bindparam("of_state").is_(None), run.c.state == bindparam("of_state")),
 )
-_ordered = select(run).where(*_some).order_by(run.c.cycles, run.c.run_id).limit(bindparam("most"))
+_ordered = select(run).where(*_CHOSEN).order_by(run.c.cycles, run.c.run_id).limit(bindparam("most"))
 _receipts = _ordered.with_only_columns(*(run.c[field.name] for field in fields(ReceiptRow)))
 _after = tuple_(run.c.cycles, run.c.run_id) > tuple_(bindparam("after_cycles"), bindparam("after_id"))
 _fitted = exists().where(fit.c.run_key == run.c.run_key)

@@ -179,16 +179,8 @@ def last_outlying(history: History, prior: Prior, points: Points, sums: Sums, te
         pivot[at] -= np.square(shared).sum(axis=0)
         own[:, at] -= np.einsum("kj,ckj->cj", shared, terms.cross)
     own /= np.sqrt(pivot)
-    n_1, n_y, n_b = own
-    return Sums(
-        r=sums.r - n_1**2,
-        rb=sums.rb - n_1 * n_b,
-        rbb=sums.rbb - n_b**2,
-        ry=sums.ry - n_1 * n_y,
-        rby=sums.rby - n_y * n_b,
-        ryy=sums.ryy - n_y**2,
-        log_r=sums.log_r - np.log(pivot),
-    )
+    lost = _products(own) | {"log_r": np.log(pivot)}
+    return Sums(**{name: getattr(sums, name) - loss for name, loss in lost.items()})
 
 
 def _log_product(d: FloatArray) -> FloatArray:
@@ -286,17 +278,15 @@ def _eliminated(z: FloatArray, y: FloatArray, r: FloatArray, rb: FloatArray, sd:
 
 
 def _without(sums: Sums, terms: Terms) -> Sums:
-    n_1, n_y, n_b = terms.cross
-    lost = {
-        "r": np.square(n_1).sum(axis=0),
-        "rb": (n_1 * n_b).sum(axis=0),
-        "rbb": np.square(n_b).sum(axis=0),
-        "ry": (n_1 * n_y).sum(axis=0),
-        "rby": (n_y * n_b).sum(axis=0),
-        "ryy": np.square(n_y).sum(axis=0),
-        "log_r": 2.0 * np.log(np.einsum("kkj->kj", terms.rows[:, : n_1.shape[0]])).sum(axis=0),
-    }
-    return _less(sums, lost, terms.where)
+    lost = {name: product.sum(axis=0) for name, product in _products(terms.cross).items()}
+    diagonal = np.einsum("kkj->kj", terms.rows[:, : terms.sd.shape[0]])
+    return _less(sums, lost | {"log_r": 2.0 * np.log(diagonal).sum(axis=0)}, terms.where)
+
+
+def _products(n: FloatArray) -> dict[str, FloatArray]:
+    """What the sums lose to terms whose N of the columns (1, y, b) is n [3, ...]."""
+    n_1, n_y, n_b = n
+    return {"r": n_1**2, "rb": n_1 * n_b, "rbb": n_b**2, "ry": n_1 * n_y, "rby": n_y * n_b, "ryy": n_y**2}
 
 
 def _less(sums: Sums, lost: dict[str, FloatArray], where: NDArray[np.intp]) -> Sums:

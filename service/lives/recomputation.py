@@ -25,14 +25,7 @@ from service.lives.history import (
     stationary_tests_of,
 )
 from service.lives.model_correction import RunReader, corrected_cofs, model_in_force
-from service.lives.payloads import (
-    RANK_UNKNOWN,
-    fit_items,
-    loop_items,
-    recent,
-    summary_of,
-    warned_anew,
-)
+from service.lives.payloads import RANK_UNKNOWN, fit_items, loop_items, recent, summary_of, warned_anew
 from service.lives.run_analysis import LevelFit, loops_of, mean_cofs
 from service.lives.tracks import CARRIED, Prediction, States, follow
 from service.schemas.clutch import ClutchIn
@@ -242,11 +235,10 @@ def track(state: ClutchState, *, newest: Event | None = None) -> Tracking:
     assumptions, lives = state.assumptions(), state.lives
     last = lives[-1].pooled(assumptions)
     carried = None if newest is None else _carried(state, lives[-1], last, newest)
-    walks: list[tuple[Life, Series, States, int]]
-    if carried is not None:
-        walks = [(lives[-1], last, carried, len(lives[-1].events) - 1)]
-    else:
-        walks = [*((life, life.pooled(assumptions), {}, 0) for life in lives[:-1]), (lives[-1], last, {}, 0)]
+    first = 0 if carried is None else len(lives[-1].events) - 1
+    walks: list[tuple[Life, Series, States, int]] = [(lives[-1], last, carried or {}, first)]
+    if carried is None:
+        walks[:0] = [(life, life.pooled(assumptions), {}, 0) for life in lives[:-1]]
     predictions: dict[tuple[float, str], Prediction] = {}
     filters: States = {}
     warnings: dict[str, list[dict[str, str]]] = {}

@@ -59,15 +59,15 @@ class AnswerCache:
     def held(self, key: Hashable, version: Hashable) -> Answer | None:
         """The answer for `key` where it is there and of `version`."""
         with self._lock:
-            return self._found(key, version)
+            return self._current(key, version)
 
     def answer(self, key: Hashable, version: Hashable, make: Callable[[], bytes]) -> Answer:
         """The answer for `key`, made by `make` where that of `version` is not there. What `make` raises is raised for all
         who wait."""
         with self._lock:
-            found = self._found(key, version)
-            if found is not None:
-                return found
+            held = self._current(key, version)
+            if held is not None:
+                return held
             pending = self._making.get((key, version))
             if pending is not None:
                 mine = False
@@ -78,7 +78,7 @@ class AnswerCache:
             self._make(key, version, make, pending)
         return pending.result()
 
-    def _found(self, key: Hashable, version: Hashable) -> Answer | None:
+    def _current(self, key: Hashable, version: Hashable) -> Answer | None:
         held, answer = self._answers.get(key, (None, None))
         if answer is None or held != version:
             return None
