@@ -47,7 +47,7 @@ class Options:
     clients: int = 20
     seed: int = 1
     raw: bool = False
-    interval: float = 0.5
+    interval: float = 0.52
     tests: int = TESTS
     samples: int = SAMPLES
     states: int = STATES

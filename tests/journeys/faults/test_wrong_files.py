@@ -159,12 +159,18 @@ def test_units_that_contradict_themselves(service: Watched) -> None:
     assert codes(service.refuse(both + rows)) == {"mixed_units"}
 
 
-@pytest.mark.parametrize("unit", ["furlong", "mPa", "Nm/s", "", "💥", "Nm" * 500])
+@pytest.mark.parametrize("unit", ["furlong", "mPa", "Nm/s", "", "💥", "Nm" * 400])
 def test_units_that_are_not_known(service: Watched, unit: str) -> None:
     columns = record(100)
     rows = text(columns).partition(b"\n")[2]
     head = f"t [s],p [bar],n [rpm],Drehmoment [{unit}],T_oil [°C]\n".encode()
     assert codes(service.refuse(head + rows)) <= {"unknown_unit", "missing_unit"}
+
+
+def test_a_unit_of_a_thousand_letters(service: Watched) -> None:
+    columns = record(100)
+    head = f"t [s],p [bar],n [rpm],Drehmoment [{'Nm' * 500}],T_oil [°C]\n".encode()
+    assert codes(service.refuse(head + text(columns).partition(b"\n")[2])) == {"title_too_long"}
 
 
 @pytest.mark.parametrize(("write", "name"), [(write_tdms, "a.tdms"), (write_mdf, "a.mf4")], ids=["TDMS", "MDF4"])
