@@ -260,7 +260,7 @@ def drawn_terms(terms: Terms, off_initial: FloatArray, change: FloatArray, norma
 
 def _eliminated(z: FloatArray, y: FloatArray, r: FloatArray, rb: FloatArray, sd: FloatArray) -> FloatArray:
     """`Terms.rows` from Z [t, p], y [t], r and r b [t, j], and σ [p, j]: Cholesky's elimination of all points at once, which
-    takes a quarter of the time of a factorisation of each."""
+    is quicker than a factorisation of each."""
     terms = z.shape[1]
     rows = np.empty((terms, terms + 3, sd.shape[1]))
     sides = (r, r * y[:, None], rb)
