@@ -20,7 +20,7 @@ def doubt(slip: Slip, reading: Reading, history: History) -> Notice:
     """The doubt of which `slip` is the most probable explanation."""
     if slip.name in _CYCLES:
         return _of_cycles(slip, reading, history)
-    if slip.unit:
+    if slip.unit and _expected_then(slip.likely, history):
         return _of_unit(slip, reading, history)
     if slip.name == "dead_pressure":
         message = (
@@ -69,14 +69,12 @@ def _gap(reading: Reading, history: History) -> str:
 
 def _cof_there(reading: Reading, history: History) -> str:
     """Where COF is not that of those cycles."""
-    if reading.cof is None or not history.lives or not history.lives[-1].reference:
+    if not history.lives or not history.lives[-1].reference:
         return ""
-    compared = history.comparable(reading, len(history.lives) - 1)
+    compared = _beside_expected(reading, history)
     if compared is None:
         return ""
-    predicted, column = history.predicted(reading.cycles)
-    low, high = predicted.interval(column, compared[1])
-    cof = math.exp(compared[0])
+    cof, low, high = compared
     return (
         "" if low <= cof <= high else f"Its mean COF of {cof:.3g} is not that of those cycles, {low:.3g} to {high:.3g}."
     )
@@ -99,6 +97,21 @@ def _of_unit(slip: Slip, reading: Reading, history: History) -> Notice:
             f"{channel}{size or ' gives'}{' and gives' if size else ''}{cof}, {expected}: was it sent in {slip.unit}?"
         )
     return Notice(code=UNIT, message=f"{message} Withdraw the run and send it in the channel's unit, or confirm it.")
+
+
+def _expected_then(likely: Reading, history: History) -> bool:
+    """Whether COF without the slip is one that is expected: else no unit is asked for, though it explains a part."""
+    compared = _beside_expected(likely, history)
+    return compared is None or compared[1] <= compared[0] <= compared[2]
+
+
+def _beside_expected(reading: Reading, history: History) -> tuple[float, float, float] | None:
+    """COF as the last life's tests show it, and from where to where it is expected; None where a run shows none."""
+    compared = None if reading.cof is None else history.comparable(reading, max(len(history.lives) - 1, 0))
+    if compared is None:
+        return None
+    predicted, column = history.predicted(reading.cycles)
+    return math.exp(compared[0]), *predicted.interval(column, compared[1])
 
 
 def _expected(reading: Reading, history: History) -> str:

@@ -72,6 +72,15 @@ def test_a_cof_beyond_physics_is_doubted_of_a_first_run() -> None:
     assert "sign" in Bench({}).answer(body).message
 
 
+def test_a_unit_is_asked_about_only_where_it_explains_all() -> None:
+    """Sixty times the torque is 8.9 times too large by pounds and inches, and still 6.8 times too large then."""
+    body = next_test()
+    body["channels"]["torque_nm"] = [60.0 * torque for torque in body["channels"]["torque_nm"]]
+    answer = bench_after((0, 1000, 2000)).answer(body | {"cycles": 3000})
+    assert answer.codes == ("cof_beyond_physics",)
+    assert "mean COF is 2." in answer.message
+
+
 def test_order_in_time_counts_where_runs_are_dated() -> None:
     """Maintenance shows no COF: only its date tells that it was not made at 2600 cycles."""
     bench = Bench({})
