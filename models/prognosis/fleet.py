@@ -274,7 +274,12 @@ def _log_evidence_ratio(
     low, high = float(both.min()) - 1.0, float(both.max()) + 1.0
 
     def excess(c: float) -> float:
-        log_first = logsumexp(log_expit(lean_first - c), b=weight_first)
-        return float(log_first - logsumexp(log_expit(c - lean_second), b=weight_second))
+        return _log_mean(log_expit(lean_first - c), weight_first) - _log_mean(log_expit(c - lean_second), weight_second)
 
     return float(brentq(excess, low, high, xtol=1e-6))
+
+
+def _log_mean(log_values: FloatArray, weight: FloatArray) -> float:
+    """log Σ w exp(log values), both [n]: scipy's `logsumexp` takes ten times as long for so few."""
+    top = float(log_values[weight > 0.0].max())
+    return top + math.log(float(weight @ np.exp(np.minimum(log_values - top, 0.0))))

@@ -8,7 +8,7 @@ by their evidence (`models.prognosis.fleet`).
 
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -113,7 +113,7 @@ def advance(
         return Tracked(
             runs=runs, states={name: _GRID.from_history(prior, measurements) for name, prior in priors.items()}
         )
-    tracker = _TRACKERS[method]
+    tracker = _tracker(method, len(priors))
     states = {name: tracker.start(prior) for name, prior in priors.items()} if tracked is None else tracked.states
     for step in range(0 if tracked is None else tracked.runs, runs):
         states = {
@@ -123,6 +123,12 @@ def advance(
             for name, state in states.items()
         }
     return Tracked(runs=runs, states=states)
+
+
+def _tracker(method: str, priors: int) -> Tracker[Any]:
+    """A filter under one of so many priors, among which the particles are shared."""
+    tracker = _TRACKERS[method]
+    return replace(tracker, particles=tracker.particles // priors) if isinstance(tracker, Particle) else tracker
 
 
 def _continues(tracked: Tracked, series: Series, priors: Mapping[str, Prior]) -> bool:
@@ -141,12 +147,15 @@ def _continues(tracked: Tracked, series: Series, priors: Mapping[str, Prior]) ->
 
 
 def draws(clutch_id: str, method: str, series: Series, assumptions: Assumptions, tracked: Tracked) -> Posterior:
-    """A weighted sample of eq. 6's coefficients after `tracked.runs` measurements; the same each time."""
-    tracker = _TRACKERS[method]
+    """A weighted sample of eq. 6's coefficients after `tracked.runs` measurements; the same each time.
+
+    The draws are shared among the priors: so a prediction costs the same whether a fleet has taught or not.
+    """
+    tracker, size = _tracker(method, len(tracked.states)), PREDICTION_DRAWS // len(tracked.states)
     posteriors = {}
     for name, state in tracked.states.items():
         rng = step_rng(clutch_id, f"{_purpose(method, name)}-posterior", series, tracked.runs)
-        posteriors[name] = tracker.posterior(state, PREDICTION_DRAWS, rng)
+        posteriors[name] = tracker.posterior(state, size, rng)
     return assumptions.pooled(posteriors, series.measurements[0], series.scale)
 
 
