@@ -1,6 +1,7 @@
 # make demo    a simulated clutch's life, posted run by run, with its prognosis      (ARGS=--exit to end by itself)
-# make test    all tests but those of `make statistical`
-# make statistical  what estimates and intervals promise, counted over many simulated lives: minutes, and it rarely fails
+# make test    all tests but those of `make slow`
+# make slow    what takes long and rarely fails: what intervals promise, counted over many lives; further ways to the same
+#              answer, files cut off anywhere, charts drawn by the large library                               (20 minutes)
 # make check   formatting, lint, types, layers; of the dashboard's JavaScript and styles too, for which it needs npm
 # make lowest  tests that meet every dependency, on the oldest releases that pyproject.toml allows
 # make score   how good the prognosis is, on simulated lives: the tables of docs/prognosis.md  (SEED= SIZE= PARTS= ARGS=--write)
@@ -23,7 +24,7 @@ JAVASCRIPT := tests/javascript/node_modules
 LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --exclude-newer "7 days" \
 	--custom-compile-command "make lock"
 
-.PHONY: demo test statistical check lowest benchmark load real figures architecture blind plausibility score rivals picture lock clean
+.PHONY: demo test slow check lowest benchmark load real figures architecture blind plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
@@ -31,10 +32,11 @@ demo: $(VENV)/.runs
 
 test: $(VENV)/.tests
 	$(BIN)/python -m tests.browser
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal --ignore tests/statistical $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow" $(ARGS)
 
-statistical: $(VENV)/.tests
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal tests/statistical $(ARGS)
+slow: $(VENV)/.tests
+	$(BIN)/python -m tests.browser
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m slow $(ARGS)
 
 check: $(VENV)/.tests $(JAVASCRIPT)/.package-lock.json
 	$(BIN)/ruff format --check .

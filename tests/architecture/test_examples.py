@@ -11,6 +11,7 @@ from tests.architecture import examples
 from tests.architecture.source import ROOT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", examples.NAMES)
 def test_an_example_works_once_it_is_added(name: str, tmp_path: Path) -> None:
     """The negative control: without the edits, the same check fails."""
@@ -18,6 +19,7 @@ def test_an_example_works_once_it_is_added(name: str, tmp_path: Path) -> None:
     assert run_check(name, tmp_path) == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["filter", "file-format", "criterion"])
 def test_the_check_fails_where_nothing_is_added(name: str) -> None:
     assert "Error" in run_check(name, ROOT)

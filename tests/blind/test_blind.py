@@ -12,7 +12,7 @@ from scipy.stats import binom
 
 from tests.blind.trials import Outcome, Trial, judge
 
-pytestmark = pytest.mark.statistical
+pytestmark = pytest.mark.slow
 
 CHANCE = 1e-3
 SEED = 20261

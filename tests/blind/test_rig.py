@@ -102,6 +102,7 @@ def test_the_noise_is_what_the_sensor_says(seed: int) -> None:
     assert abs(white[1:] @ white[:-1]) / white.size < 5 / np.sqrt(white.size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slug", sorted(ALL))
 def test_an_effect_of_no_size_is_none_and_a_louder_one_is_larger(slug: str) -> None:
     hidden = hide((8, 1), (slug,), 20.0, loops=slug not in STEADY)
@@ -153,6 +154,7 @@ def test_loudness_is_the_likelihood_ratio_left_after_a_refit() -> None:
     assert 0.5 * delta @ inverse @ delta > 1.1 * 0.5 * left  # the refit does take some of it
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("slug", "amplitude"), [("running_in", 0.1), ("accelerated_wear", 0.6), ("pressure_offset", 1.0)]
 )

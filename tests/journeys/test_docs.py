@@ -29,6 +29,7 @@ def test_the_examples_of_the_api_run(server: Server) -> None:
     assert '"status":"insufficient_data"' in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
 def test_commands_that_are_named_are_there(path: Path) -> None:
     text = path.read_text(encoding="utf-8")

@@ -12,7 +12,7 @@ from models.friction.stribeck import PARAMETER_NAMES
 from models.records.runs import Curve
 from tests.models.friction.stribeck_curves import VELOCITY, clutch, curve, eq3, hard_curve
 
-pytestmark = pytest.mark.statistical
+pytestmark = pytest.mark.slow
 
 SEED = 20131107
 #: Residual sums are compared as shares of the sum of squared torques, noise of 1 % being 1e-4. The identification gives

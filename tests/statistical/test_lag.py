@@ -17,7 +17,7 @@ from models.records.periods import fit_cycle
 from models.records.runs import Curve
 from tests.models.loops.dynamic_records import FALLING, GEOMETRY, RISING, SWING, velocity
 
-pytestmark = pytest.mark.statistical
+pytestmark = pytest.mark.slow
 
 SEED = 20130816
 #: 1,000 intervals of 90 % hold the truth in 90 % of cases with a standard deviation of 0.95 %: three of them. A film takes

@@ -17,7 +17,7 @@ from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
 from tests.statistical.laws import LAWS, followed
 
-pytestmark = pytest.mark.statistical
+pytestmark = pytest.mark.slow
 
 LIVES = 30
 

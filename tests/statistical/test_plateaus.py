@@ -11,7 +11,7 @@ from models.records.plateaus import cut_plateaus
 from models.records.runs import Plateaus, Record, curves_by_pressure
 from tests.models.records.raw_records import GEOMETRY, SPEEDS, Made, Sensors, jitter, lose, make, protocol, spike
 
-pytestmark = pytest.mark.statistical
+pytestmark = pytest.mark.slow
 
 SEED = 20131113
 #: 1,000 intervals of 90 % hold the truth in 90 % of cases with a standard deviation of 0.95 %: three of them.

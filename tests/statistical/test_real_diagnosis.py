@@ -6,7 +6,7 @@ from models.diagnosis.attribution.verdict import Verdict
 from tests.real import diagnosis, loaders
 
 pytestmark = [
-    pytest.mark.statistical,
+    pytest.mark.slow,
     pytest.mark.skipif(not loaders.FOLDER.is_dir(), reason=f"the measurements are not at {loaders.FOLDER}"),
 ]
 

@@ -33,7 +33,7 @@ from tests.statistical.lives import (
     typical,
 )
 
-pytestmark = pytest.mark.statistical
+pytestmark = pytest.mark.slow
 
 
 def check_against(reference: Posterior, count: float, found: Posterior) -> None:

@@ -71,6 +71,7 @@ def drawn(page: Page, name: str) -> Locator:
     return chart
 
 
+@pytest.mark.slow
 def test_every_chart_is_drawn(browser: Browser, watched: Watched) -> None:
     page = opened(watched)
     assert page.locator("figure.chart:visible h3").all_inner_texts() == list(CHARTS.values())
@@ -82,6 +83,7 @@ def test_every_chart_is_drawn(browser: Browser, watched: Watched) -> None:
     assert not seen(browser, page.locator("#chart-fan figcaption .note").screenshot()).is_chart
 
 
+@pytest.mark.slow
 def test_dark_and_light_are_chosen_and_the_charts_follow(browser: Browser, watched: Watched) -> None:
     page = opened(watched)
     button = page.locator("#theme")
@@ -211,6 +213,7 @@ def test_the_report_is_one_page_and_light(browser: Browser, life: Server) -> Non
     watched.close()
 
 
+@pytest.mark.slow
 def test_without_webgl_the_page_says_so_and_keeps_the_numbers(browser: Browser, life: Server) -> None:
     other = launched(browser.browser_type, more=("--disable-3d-apis",))
     watched = Watched(other, life.url)

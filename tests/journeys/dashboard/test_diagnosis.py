@@ -90,6 +90,7 @@ def maps_are_drawn(browser: Browser, page: Page) -> None:
         assert seen(browser, chart.locator(".plot").screenshot()).is_chart, name
 
 
+@pytest.mark.slow
 def test_a_rebuild_ends_what_a_diagnosis_said(browser: Browser, url: str) -> None:
     ONCE.post(f"{url}/v1/clutches/bench/diagnoses", json={"adopt": False}, timeout=60).raise_for_status()
     watched = Watched(browser, url)

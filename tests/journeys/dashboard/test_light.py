@@ -49,6 +49,7 @@ def texts(page: Page, chart: str) -> list[str]:
     return sorted({text.replace("\u2212", "-").strip() for text in found if text.strip()})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [390, 1360])
 def test_the_library_takes_the_place_of_the_light_drawing(
@@ -94,6 +95,7 @@ def test_the_library_takes_the_place_of_the_light_drawing(
     watched.close()
 
 
+@pytest.mark.slow
 def test_without_the_library_the_light_charts_stay(browser: Browser, life: Server) -> None:
     watched = Watched(browser, life.url)
     page = watched.page

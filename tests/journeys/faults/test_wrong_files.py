@@ -90,6 +90,7 @@ def text(columns: dict[str, Any], **how: str) -> bytes:
     return csv_text(columns, **how).encode()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("write", "name", "cuts"),
     [(write_tdms, "a.tdms", 24), (write_parquet, "a.parquet", 6), (write_mdf, "a.mf4", 5)],
@@ -108,7 +109,7 @@ def test_a_file_cut_off_anywhere(
     assert service.http.post("/v1/clutches/control/runs/file", params=parameters, content=whole).status_code == 201
 
 
-@pytest.mark.statistical
+@pytest.mark.slow
 @pytest.mark.parametrize(("write", "name"), [(write_tdms, "a.tdms"), (write_mdf, "a.mf4")], ids=["TDMS", "MDF4"])
 def test_a_file_cut_off_at_random_places(
     service: Watched, tmp_path: Path, write: Callable[..., Path], name: str
@@ -133,6 +134,7 @@ def test_two_million_columns(service: Watched) -> None:
     assert codes(service.refuse(narrow.encode())) == {"too_wide"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["CSV", "TDMS", "Parquet"])
 def test_a_gzip_bomb(service: Watched, kind: str, tmp_path: Path) -> None:
     """Half a gigabyte out of half a megabyte."""

@@ -108,6 +108,7 @@ def test_a_bump_in_speed_is_unexplained_and_on_speed() -> None:
     assert report.baseline.where[0].axis == "speed_rpm"
 
 
+@pytest.mark.slow
 def test_without_oil_temperature_no_sensor_drift_is_named() -> None:
     for slug in ("oil_temperature", "torque_zero_shift"):
         report = look(campaign(7, PLANTED[slug], temperature=False))
@@ -147,6 +148,7 @@ def test_too_little_data_says_what_is_missing() -> None:
     assert "speeds" in report.summary
 
 
+@pytest.mark.slow
 def test_a_logged_oil_change_is_preferred_to_an_unlogged_one() -> None:
     given = campaign(7, PLANTED["oil_change"])
     logged = replace(given, maintenance=(MaintenanceEvent(run_id="oil", cycles=4500.0, event=Event.OIL_CHANGE),))

@@ -118,6 +118,7 @@ def test_a_single_plateau_and_a_deviation_do(client: TestClient) -> None:
     assert client.post(RUNS, json=sweep(0, "one", **one)).status_code == 201
 
 
+@pytest.mark.slow
 def test_while_there_is_nothing_else_all_is_answered_as_without_tests(client: TestClient) -> None:
     bare = {name: client.get(f"{CLUTCH}/{name}").status_code for name in TOLD}
     csv = {name: client.get(f"{CLUTCH}/{name}.csv").status_code for name in TWINS}
@@ -138,6 +139,7 @@ def test_while_there_is_nothing_else_all_is_answered_as_without_tests(client: Te
     assert (answer["status"], answer["verdict"]) == ("finished", "insufficient_data")
 
 
+@pytest.mark.slow
 def test_no_track_sees_an_open_test_at_a_state(client: TestClient, database_url: str) -> None:
     """Not to the last bit, whether it comes last or late, nor after all was made anew."""
     post(client, *life())

@@ -127,6 +127,7 @@ def test_what_is_adopted_moves_every_answer_and_back_again(client: TestClient) -
     assert said(client) == before
 
 
+@pytest.mark.slow
 def test_the_order_of_arrival_does_not_matter_under_a_model_and_replay_gives_the_same(tmp_path: Path) -> None:
     oil = {"kind": "maintenance", "event": "oil_change", "cycles": 2500, "run_id": "oil"}
     answers = []

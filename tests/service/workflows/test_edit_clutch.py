@@ -49,6 +49,7 @@ EDITS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fields", "adopted"), EDITS)
 def test_an_edited_clutch_answers_as_one_that_was_registered_so(
     tmp_path: Path, fields: dict[str, Any], adopted: bool

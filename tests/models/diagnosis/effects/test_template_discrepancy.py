@@ -63,6 +63,7 @@ def test_a_discrepancy_absorbs_what_a_template_misses_as_far_as_its_prior_allows
     assert left(fitted, 10.0) - nothing > 50.0
 
 
+@pytest.mark.slow
 def test_a_bump_in_speed_is_no_drag():
     """Friction is higher in a band of speeds: the drag that fits it best has less evidence than structure over speed."""
     bump = campaign(5, lambda at: 1.2 * np.exp(-0.5 * ((at.velocity - 6.0) / 1.5) ** 2))

@@ -109,6 +109,7 @@ def scattered(given: Campaign, scatter: float) -> Campaign:
     return replace(given, stationary=tuple(stationary), dynamic=tuple(dynamic))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scatter", "least", "most"), [(0.0, 0.0, 4e-4), (0.001, 4e-4, 2.5e-3), (0.004, 2.5e-3, 6e-3)])
 def test_gains_that_scatter_from_pressure_to_pressure_are_no_structure(
     scatter: float, least: float, most: float

@@ -1,4 +1,4 @@
-"""What each of the three filters must do on any series, and where they must agree. Large comparisons are statistical."""
+"""What each of the three filters must do on any series, and where they must agree. Large comparisons: tests/statistical."""
 
 from typing import Any
 

@@ -31,6 +31,7 @@ def other_encoder(at: Where) -> np.ndarray:
     return torque(factor * at.velocity, at.parameters) - torque(at.velocity, at.parameters)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("planted", "slug"),
     [
