@@ -134,11 +134,12 @@ def _along_paths(posterior: Posterior, fraction: float, offset: Offset | None, h
     """First passages [n], linear between places; a step of the level or of the offset is a crossing where it is.
 
     The draws' paths are taken at every `_STRIDE`-th place and about the steps, and then at the places between the two of
-    these that a draw's passage lies between.
+    these that a draw's passage lies between. An offset may dip anywhere: beside one all places are taken.
     """
     places, steps = _places(posterior.discrepancy, horizon)
     course = np.zeros(places.size) if offset is None else offset(places)
-    sparse = np.unique(np.concatenate([np.arange(0, places.size, _STRIDE), steps, steps - 1, [places.size - 1]]))
+    stride = _STRIDE if offset is None else 1
+    sparse = np.unique(np.concatenate([np.arange(0, places.size, stride), steps, steps - 1, [places.size - 1]]))
     above = posterior.values(places[sparse]) + course[sparse, None]
     level = fraction * above[0]
     below = above <= level

@@ -20,7 +20,7 @@ def doubt(slip: Slip, reading: Reading, history: History) -> Notice:
     """The doubt of which `slip` is the most probable explanation."""
     if slip.name in _CYCLES:
         return _of_cycles(slip, reading, history)
-    if slip.unit and _expected_then(slip.likely, history):
+    if slip.unit and (slip.name in ("oil", "speed") or _expected_then(slip.likely, history)):
         return _of_unit(slip, reading, history)
     if slip.name == "dead_pressure":
         message = (
@@ -100,7 +100,8 @@ def _of_unit(slip: Slip, reading: Reading, history: History) -> Notice:
 
 
 def _expected_then(likely: Reading, history: History) -> bool:
-    """Whether COF without the slip is one that is expected: else no unit is asked for, though it explains a part."""
+    """Whether COF without the slip is one that is expected: else no unit of torque or pressure is asked for, though it
+    explains a part."""
     compared = _beside_expected(likely, history)
     return compared is None or compared[1] <= compared[0] <= compared[2]
 

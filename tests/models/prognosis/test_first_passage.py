@@ -198,6 +198,14 @@ def test_looking_at_every_sixth_place_first_is_looking_at_all(monkeypatch: pytes
     assert np.isclose(found, everywhere, rtol=1e-9).mean() >= 0.995
 
 
+def test_a_short_dip_of_an_offset_is_a_crossing() -> None:
+    """-0.35 for 300 cycles takes 0.8 below the threshold of half of it, long before the course itself gets there."""
+    dip = predict_first_passage(
+        sample([-0.6]), fraction=0.5, as_of=0.0, offset=lambda z: -0.35 * ((z > 5_200.0) & (z < 5_500.0))
+    )
+    assert dip.end_of_life[0.5] == pytest.approx(5_200.0, rel=0.05)
+
+
 def test_an_offset_is_part_of_the_criterion() -> None:
     """ξ + offset <= half of (ξ0 + offset(0)): 1/(1 + u) + 0.2 = 0.6 at u = 1.5; a step from 0 to 0.2 at 100: 7/3."""
     draws = sample([-1.0])

@@ -81,6 +81,16 @@ def test_a_unit_is_asked_about_only_where_it_explains_all() -> None:
     assert "mean COF is 2." in answer.message
 
 
+def test_a_unit_that_does_not_touch_cof_is_asked_about_whatever_cof_is() -> None:
+    """Oil in kelvin, and a COF that is a tenth off besides."""
+    body = next_test()
+    body["channels"]["oil_temperature_c"] = [358.1] * len(body["channels"]["torque_nm"])
+    body["channels"]["torque_nm"] = [1.1 * torque for torque in body["channels"]["torque_nm"]]
+    answer = bench_after().answer(body)
+    assert answer.codes == ("unit",)
+    assert "was it sent in K?" in answer.message
+
+
 def test_order_in_time_counts_where_runs_are_dated() -> None:
     """Maintenance shows no COF: only its date tells that it was not made at 2600 cycles."""
     bench = Bench({})
