@@ -38,6 +38,12 @@ def path_of(url: str) -> Path:
     return Path(path)
 
 
+def wanted_journal_mode(path: Path, lock_timeout: float) -> str | None:
+    """JOURNAL_MODE where the file is in it already, None where it is not. Read without changing it."""
+    with closing(sqlite3.connect(path, timeout=lock_timeout, isolation_level=None)) as connection:
+        return JOURNAL_MODE if _mode(connection) == JOURNAL_MODE else None
+
+
 def set_journal_mode(path: Path, lock_timeout: float) -> str:
     """Put the file into JOURNAL_MODE; returns the mode in force.
 
@@ -60,10 +66,14 @@ def set_journal_mode(path: Path, lock_timeout: float) -> str:
 
 def _try_journal_mode(path: Path) -> str:
     with closing(sqlite3.connect(path, timeout=0.0, isolation_level=None)) as connection:
-        mode = str(connection.execute("PRAGMA journal_mode").fetchone()[0])
+        mode = _mode(connection)
         if mode != JOURNAL_MODE:
             mode = str(connection.execute(f"PRAGMA journal_mode={JOURNAL_MODE}").fetchone()[0])
     return mode
+
+
+def _mode(connection: sqlite3.Connection) -> str:
+    return str(connection.execute("PRAGMA journal_mode").fetchone()[0])
 
 
 def make_engine(path: Path, lock_timeout: float, *, foreign_keys: bool = True, pooled: bool = True) -> Engine:

@@ -1,10 +1,13 @@
 """The open database: what the rest of the program holds, and how it comes to be."""
 
+import sqlite3
 from contextlib import closing
 from pathlib import Path
 
+from sqlalchemy.exc import OperationalError
+
 from storage.engine.backup import copy
-from storage.engine.connect import make_engine, path_of, set_journal_mode
+from storage.engine.connect import make_engine, path_of, set_journal_mode, wanted_journal_mode
 from storage.engine.errors import DatabaseTooNew, StorageUnavailable
 from storage.engine.health import is_ready
 from storage.engine.limits import LOCK_TIMEOUT
@@ -36,13 +39,32 @@ def open_database(url: str, *, lock_timeout: float = LOCK_TIMEOUT) -> Database:
 
     Raises ValueError on another scheme or a database in memory, DatabaseTooNew on the file of a newer release,
     StorageUnavailable where the file cannot be used, DatabaseBusy where others hold it for `lock_timeout` [s].
+
+    A file that has its log and lacks no migration is only read, without the write lock: a process that yields to all
+    others would hold it for as long as they are busy.
     """
     path = path_of(url)
-    lock = WriteLock(path, lock_timeout)
-    with translated(path), closing(lock), lock.held():
-        journal_mode = set_journal_mode(path, lock_timeout)
-        _migrate(path, lock_timeout)
+    with translated(path):
+        journal_mode = _mode_if_up_to_date(path, lock_timeout)
+        if journal_mode is None:
+            with closing(WriteLock(path, lock_timeout)) as lock, lock.held():
+                journal_mode = set_journal_mode(path, lock_timeout)
+                _migrate(path, lock_timeout)
     return Database(path, journal_mode=journal_mode, lock_timeout=lock_timeout)
+
+
+def _mode_if_up_to_date(path: Path, lock_timeout: float) -> str | None:
+    """The journal mode of a file that needs no change; None where it needs one, is not there, or cannot be read."""
+    if not path.is_file():
+        return None
+    try:
+        journal_mode = wanted_journal_mode(path, lock_timeout)
+        if journal_mode is None:
+            return None
+        with transaction(make_engine(path, lock_timeout, pooled=False), "BEGIN") as connection:
+            return journal_mode if current(connection) == head() else None
+    except (sqlite3.OperationalError, OperationalError):  # under the lock it is found out why
+        return None
 
 
 def _migrate(path: Path, lock_timeout: float) -> None:

@@ -4,8 +4,10 @@ import multiprocessing
 import multiprocessing.connection
 import os
 import signal
+import sqlite3
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -90,6 +92,20 @@ def test_an_exception_inside_frees_it(tmp_path: Path) -> None:
     lock.close()
     with lock.held():  # a file that was closed is opened again
         pass
+
+
+def test_a_file_that_is_up_to_date_is_opened_while_another_writes(tmp_path: Path) -> None:
+    url, lock = f"sqlite:///{tmp_path / 'a.db'}", WriteLock(tmp_path / "a.db", IN_TIME)
+    with lock.held(), pytest.raises(DatabaseBusy):  # a file that is to be made waits
+        open_database(url, lock_timeout=0.05)
+    open_database(url).close()
+    with lock.held(), closing(open_database(url, lock_timeout=0.05)) as database, database.reading() as connection:
+        assert database.journal_mode == "wal"
+        assert clutches.all_ids(connection) == []
+    with closing(sqlite3.connect(tmp_path / "a.db")) as old, old:
+        old.execute("UPDATE alembic_version SET version_num = 'earlier'")
+    with lock.held(), pytest.raises(DatabaseBusy):  # a file whose revision differs waits, to be migrated or refused
+        open_database(url, lock_timeout=0.05)
 
 
 def test_a_commit_waits_for_no_reader_and_no_reader_for_a_commit(database: Database) -> None:
