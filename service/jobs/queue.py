@@ -25,11 +25,9 @@ from storage.engine.errors import StorageError
 INTERRUPTED = "the service ended while the diagnosis ran: ask again"
 UNSTORED = "its report could not be stored: see the service's log"
 _TAIL = 2000
-#: One thread; and memory that arrays gave back is kept for the next ones: having it mapped anew each time takes as long as
-#: what is computed in it.
-_NUMERICS = {
-    "OPENBLAS_NUM_THREADS": "1",
-    "OMP_NUM_THREADS": "1",
+#: Memory that arrays gave back is kept for the next ones: having it mapped anew each time takes as long as what is
+#: computed in it.
+_MEMORY = {
     "MALLOC_MMAP_THRESHOLD_": str(32 << 20),
     "MALLOC_TRIM_THRESHOLD_": str(1 << 30),
 }
@@ -163,7 +161,7 @@ class DiagnosisQueue:
                     stdin=subprocess.PIPE,
                     stdout=answer,
                     stderr=errors,
-                    env=os.environ | _NUMERICS,
+                    env=os.environ | _MEMORY,
                 )
             code = self._ended(self._process)
             if code != 0:

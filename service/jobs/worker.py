@@ -9,9 +9,7 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from threadpoolctl import threadpool_limits
-
-from service.background import yield_to_others
+from service.background import use_one_blas_thread, yield_to_others
 from storage.engine.database import Database, open_database
 
 #: What nearly every call needs, loaded before the first comes.
@@ -29,7 +27,7 @@ def begin(database_url: str, nice: int | None) -> None:
         yield_to_others()
     else:
         os.nice(nice)
-    threadpool_limits(limits=1, user_api="blas")
+    use_one_blas_thread()
     for name in LOADED_EARLY:
         importlib.import_module(name)
     gc.freeze()  # what is loaded stays: the collector need not walk through it
