@@ -24,11 +24,15 @@ _log = logging.getLogger("clutchlife")
 
 @dataclass(slots=True)
 class _Entry:
-    """The last answer and the revision that it is of; the making of the next."""
+    """The last answer and the revision that it is of; the making of the next, for those who wait and for later (`renewing`).
+
+    Both may run at once: who waits does not wait for a renewal, which yields to all others.
+    """
 
     revision: int = -1
     answer: Answer | None = None
     making: "asyncio.Task[None] | None" = None
+    renewing: "asyncio.Task[None] | None" = None
 
 
 class Revalidation:
@@ -59,29 +63,38 @@ class Revalidation:
             answer = entry.answer
             if answer is not None and entry.revision >= revision:
                 break
+            if answer is None:
+                await asyncio.shield(entry.making or self._begin(key, entry, compute, waits=True))
+                continue
             making = entry.making
-            if making is None:
+            if making is None and (wait > 0 or entry.renewing is None):
                 try:
-                    computing = compute(answer is None or wait > 0)
+                    making = self._begin(key, entry, compute, waits=wait > 0)
                 except BusyError:
-                    if answer is None or wait > 0:
+                    if wait > 0:
                         raise
                     break
-                self._entries[key] = entry
-                making = entry.making = asyncio.create_task(self._make(key, entry, computing))
-                making.add_done_callback(_logged)
             left = deadline - asyncio.get_running_loop().time()
-            if answer is None:
-                await asyncio.shield(making)
-            elif left <= 0 or not (await asyncio.wait([making], timeout=left))[0]:
+            if making is None or left <= 0 or not await _one_ends(making, entry.renewing, left):
                 break
-            else:
+            if making.done():
                 making.result()
         self._entries[key] = entry
         self._entries.move_to_end(key)
         return entry.revision, answer
 
-    async def _make(self, key: Hashable, entry: _Entry, computing: "Future[Made]") -> None:
+    def _begin(self, key: Hashable, entry: _Entry, compute: Compute, *, waits: bool) -> "asyncio.Task[None]":
+        """Have the next answer made, for one who waits or for later. Raises BusyError."""
+        making = asyncio.create_task(self._make(key, entry, compute(waits), waits=waits))
+        making.add_done_callback(_logged)
+        self._entries[key] = entry
+        if waits:
+            entry.making = making
+        else:
+            entry.renewing = making
+        return making
+
+    async def _make(self, key: Hashable, entry: _Entry, computing: "Future[Made]", *, waits: bool) -> None:
         try:
             revision, body = await asyncio.wrap_future(computing)
         except BaseException:
@@ -89,13 +102,25 @@ class Revalidation:
                 self._entries.pop(key, None)
             raise
         finally:
-            entry.making = None
+            if waits:
+                entry.making = None
+            else:
+                entry.renewing = None
+        if revision < entry.revision:  # a later one was quicker
+            return
         entry.revision, entry.answer = revision, Answer.of(body)
         while len(self._entries) > 1 and self._held() > self._most:
             self._entries.popitem(last=False)
 
     def _held(self) -> int:
         return sum(len(entry.answer.body) for entry in self._entries.values() if entry.answer is not None)
+
+
+async def _one_ends(making: "asyncio.Task[None]", renewing: "asyncio.Task[None] | None", seconds: float) -> bool:
+    """Wait until one of them ends, at most so long; whether one has."""
+    running = [making] if renewing is None else [making, renewing]
+    ended, _ = await asyncio.wait(running, timeout=seconds, return_when=asyncio.FIRST_COMPLETED)
+    return bool(ended)
 
 
 def _logged(made: "asyncio.Task[None]") -> None:

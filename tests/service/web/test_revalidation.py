@@ -57,22 +57,64 @@ def test_the_first_answer_is_waited_for_and_made_once() -> None:
     run(scenario)
 
 
+async def _held_at_one(kept: Revalidation, worker: Worker) -> None:
+    """An answer of revision 1 is there."""
+    first = asyncio.create_task(kept.answer("a", 1, worker.compute, wait=0))
+    await _settled()
+    await worker.gives(1, b"one")
+    assert (await first)[0] == 1
+
+
 def test_who_does_not_wait_gets_the_last_one_while_the_next_is_made() -> None:
     async def scenario(kept: Revalidation, worker: Worker) -> None:
-        first = asyncio.create_task(kept.answer("a", 1, worker.compute, wait=0))
-        await _settled()
-        await worker.gives(1, b"one")
-        assert (await first)[0] == 1
-        assert await kept.answer("a", 2, worker.compute, wait=0) == (1, Answer.of(b"one"))
-        assert await kept.answer("a", 3, worker.compute, wait=0.01) == (1, Answer.of(b"one"))
-        patient = asyncio.create_task(kept.answer("a", 3, worker.compute, wait=20))
-        await _settled()
-        assert len(worker.asked) == 2  # for all of them
+        await _held_at_one(kept, worker)
+        for revision in (2, 3):
+            assert await kept.answer("a", revision, worker.compute, wait=0) == (1, Answer.of(b"one"))
+        assert worker.waited_for == [True, False]  # one renewal for both
         await worker.gives(2, b"two")
-        assert not patient.done()  # a revision came while it was made
+        assert await kept.answer("a", 2, worker.compute, wait=0) == (2, Answer.of(b"two"))
+
+    run(scenario)
+
+
+def test_who_waits_does_not_wait_for_a_renewal_that_yields_to_all_others() -> None:
+    async def scenario(kept: Revalidation, worker: Worker) -> None:
+        await _held_at_one(kept, worker)
+        assert await kept.answer("a", 2, worker.compute, wait=0) == (1, Answer.of(b"one"))
+        renewal = worker.asked[-1]
+        assert await kept.answer("a", 3, worker.compute, wait=0.01) == (1, Answer.of(b"one"))
+        patient = [asyncio.create_task(kept.answer("a", 3, worker.compute, wait=20)) for _ in range(3)]
+        await _settled()
+        assert worker.waited_for == [True, False, True]  # one for all who wait
+        await worker.gives(2, b"two")
+        assert not any(task.done() for task in patient)  # a revision came while it was made
+        assert worker.waited_for == [True, False, True, True]
         await worker.gives(3, b"3rd")
-        assert await patient == (3, Answer.of(b"3rd"))
-        assert worker.waited_for == [True, False, True]
+        assert {await task for task in patient} == {(3, Answer.of(b"3rd"))}
+        renewal.set_result((2, b"old"))
+        await _settled()
+        assert kept.held("a", 3) == Answer.of(b"3rd")  # the slower and older one replaces nothing
+
+    run(scenario)
+
+
+def test_who_waits_takes_the_renewal_where_that_is_quicker_and_does_not_hear_of_its_failure() -> None:
+    async def scenario(kept: Revalidation, worker: Worker) -> None:
+        await _held_at_one(kept, worker)
+        for revision, error in ((2, None), (3, LookupError("not there"))):
+            await kept.answer("a", revision, worker.compute, wait=0)
+            renewal = worker.asked[-1]
+            patient = asyncio.create_task(kept.answer("a", revision, worker.compute, wait=20))
+            await _settled()
+            if error is None:
+                renewal.set_result((revision, b"idle"))
+                assert await patient == (revision, Answer.of(b"idle"))
+            else:
+                renewal.set_exception(error)
+                await _settled()
+                assert not patient.done()
+            await worker.gives(revision, b"busy")
+            assert (await patient)[0] == revision
 
     run(scenario)
 
