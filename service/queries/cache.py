@@ -46,13 +46,15 @@ def revision_and_json(
 class AnswerCache:
     """The last answers; the least lately asked for goes first. `most_bytes` bounds their sizes together.
 
-    Of each key the answer of one version is held, the last that was made: one that was superseded is not asked for again.
+    Of each key the answer of one version is held, that whose making began last: one that was superseded is not asked for
+    again.
     """
 
     def __init__(self, most_bytes: int) -> None:
         self._most = most_bytes
         self._held = 0
-        self._answers: OrderedDict[Hashable, tuple[Hashable, Answer]] = OrderedDict()
+        self._begun = 0
+        self._answers: OrderedDict[Hashable, tuple[Hashable, Answer, int]] = OrderedDict()  # and which begin it was
         self._making: dict[tuple[Hashable, Hashable], Future[Answer]] = {}
         self._lock = threading.Lock()
 
@@ -74,18 +76,22 @@ class AnswerCache:
             else:
                 mine, pending = True, Future()
                 self._making[key, version] = pending
+                self._begun += 1
+            begun = self._begun
         if mine:
-            self._make(key, version, make, pending)
+            self._make(key, version, make, pending, begun)
         return pending.result()
 
     def _current(self, key: Hashable, version: Hashable) -> Answer | None:
-        held, answer = self._answers.get(key, (None, None))
+        held, answer, _ = self._answers.get(key, (None, None, 0))
         if answer is None or held != version:
             return None
         self._answers.move_to_end(key)
         return answer
 
-    def _make(self, key: Hashable, version: Hashable, make: Callable[[], bytes], pending: "Future[Answer]") -> None:
+    def _make(
+        self, key: Hashable, version: Hashable, make: Callable[[], bytes], pending: "Future[Answer]", begun: int
+    ) -> None:
         try:
             answer = Answer.of(make())
         except BaseException as error:  # noqa: BLE001  (raised again for each who asked)
@@ -94,14 +100,18 @@ class AnswerCache:
             pending.set_exception(error)
             return  # who asked is told by `pending`, as all who wait are
         with self._lock:
-            self._drop(key)
-            if len(answer.body) <= self._most:
-                self._held += len(answer.body)
-                self._answers[key] = version, answer
-            while self._held > self._most:
-                self._drop(next(iter(self._answers)))
+            if key not in self._answers or self._answers[key][2] < begun:  # else a later version was quicker
+                self._hold(key, version, answer, begun)
             del self._making[key, version]
         pending.set_result(answer)
+
+    def _hold(self, key: Hashable, version: Hashable, answer: Answer, begun: int) -> None:
+        self._drop(key)
+        if len(answer.body) <= self._most:
+            self._held += len(answer.body)
+            self._answers[key] = version, answer, begun
+        while self._held > self._most:
+            self._drop(next(iter(self._answers)))
 
     def _drop(self, key: Hashable) -> None:
         if key in self._answers:

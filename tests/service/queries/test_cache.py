@@ -69,6 +69,24 @@ def test_of_a_key_one_version_is_held_and_counted() -> None:
     assert cache.held("a", 19) is not None  # one answer's bytes are counted, not those of twenty
 
 
+def test_a_slow_old_version_does_not_replace_a_newer_one() -> None:
+    cache, started, release = AnswerCache(100), threading.Event(), threading.Event()
+
+    def make_slowly() -> bytes:
+        started.set()
+        assert release.wait(30)
+        return b"old"
+
+    with ThreadPoolExecutor(1) as pool:
+        slow = pool.submit(cache.answer, "a", 1, make_slowly)
+        assert started.wait(30)
+        new = cache.answer("a", 2, lambda: b"new")
+        release.set()
+        assert slow.result(30).body == b"old"
+    assert cache.held("a", 2) == new
+    assert cache.answer("a", 3, lambda: b"newer") == cache.held("a", 3)
+
+
 def test_what_fails_fails_for_all_and_is_tried_again() -> None:
     cache = AnswerCache(100)
 
