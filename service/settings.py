@@ -14,7 +14,7 @@ DEFAULT_URL = "http://127.0.0.1:8000"
 DEFAULT_WORKERS = 2
 #: Limits, in the units of their environment variables.
 DEFAULT_BODY_MB = 64  # MiB of JSON. Chosen; longer records are posted as files
-DEFAULT_DIAGNOSIS_SECONDS = 300  # s. Chosen; docs/benchmarks.md: the longest diagnosis takes 11 s
+DEFAULT_DIAGNOSIS_SECONDS = 300  # s of processor time. Chosen; docs/benchmarks.md: the longest diagnosis takes 11 s
 DEFAULT_DIAGNOSIS_MEMORY_MB = 4096  # MiB of address space. Chosen; no table
 
 
@@ -35,7 +35,7 @@ class Settings:
     most_body_bytes: int = DEFAULT_BODY_MB * 2**20
     most_file_bytes: int = 2**30
 
-    #: Seconds and bytes of address space of one diagnosis; diagnoses that wait or run (chosen; no table).
+    #: Seconds of processor time and bytes of address space of one diagnosis; diagnoses that wait or run (chosen; no table).
     diagnosis_seconds: int = DEFAULT_DIAGNOSIS_SECONDS
     diagnosis_bytes: int = DEFAULT_DIAGNOSIS_MEMORY_MB * 2**20
     most_diagnoses: int = 16

@@ -29,13 +29,14 @@ _METHOD = "particle"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Task:
-    """What is to be diagnosed: a clutch's runs up to `last_run_key`, by `engine` (module:function), in so many bytes."""
+    """What is to be diagnosed, by `engine` (module:function): a clutch's runs up to `last_run_key`; and what it may take."""
 
     database: str
     clutch_id: str
     last_run_key: int
     engine: str
     bytes: int
+    processor_seconds: int
 
 
 def main() -> None:
@@ -44,6 +45,8 @@ def main() -> None:
     threading.Thread(target=_end_with_the_service, daemon=True).start()
     resource.setrlimit(resource.RLIMIT_AS, (task.bytes, task.bytes))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    # at the first of the two this process ends by SIGXCPU, which says why, at the second by SIGKILL
+    resource.setrlimit(resource.RLIMIT_CPU, (task.processor_seconds, task.processor_seconds + 1))
     try:
         ended = diagnosed(task)
     except MemoryError:

@@ -143,6 +143,12 @@ def endless(campaign: Campaign, *, rng: np.random.Generator) -> Report:  # noqa:
         time.sleep(0.1)
 
 
+def computing(campaign: Campaign, *, rng: np.random.Generator) -> Report:  # noqa: ARG001
+    """Never, and it needs a processor all the time."""
+    while True:
+        pass
+
+
 def greedy(campaign: Campaign, *, rng: np.random.Generator) -> Report:  # noqa: ARG001
     """More memory than there may be."""
     return _report(campaign, Extension(effects=(), content={"x": np.ones(2**33).sum()}))

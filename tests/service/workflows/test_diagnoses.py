@@ -240,10 +240,20 @@ def test_who_may_read_may_not_ask_or_adopt(client: TestClient, tmp_path: Path) -
 
 @pytest.mark.parametrize(
     ("engine", "problem"),
-    [("killed", "SIGKILL"), ("raising", "status 1"), ("greedy", "memory"), ("endless", "longer than 2 s")],
+    [
+        ("killed", "SIGKILL"),
+        ("raising", "status 1"),
+        ("greedy", "memory"),
+        ("computing", "longer than 4 s of processor time"),
+        ("endless", "longer than 6 s by the clock"),
+    ],
 )
-def test_a_diagnosis_that_breaks_is_told(tmp_path: Path, engine: str, problem: str) -> None:
-    with service(tmp_path, engine, diagnosis_seconds=2 if engine == "endless" else 120) as client:
+def test_a_diagnosis_that_breaks_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, engine: str, problem: str
+) -> None:
+    if engine == "endless":
+        monkeypatch.setattr("service.jobs.queue.CLOCK_PER_PROCESSOR_SECOND", 0.05)
+    with service(tmp_path, engine, diagnosis_seconds=4 if engine == "computing" else 120) as client:
         answer = client.post(f"{BASE}/diagnoses", json={"adopt": True}, headers={"Prefer": "wait=120"})
         DiagnosisOut.model_validate(answer.json())
         assert (answer.status_code, answer.json()["status"], answer.json()["verdict"]) == (201, "failed", None)
