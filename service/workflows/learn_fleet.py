@@ -6,6 +6,7 @@ learned from the others.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from enum import Enum
 
 from models.prognosis.criteria import FEWEST_CLUTCHES, FEWEST_TESTS_TO_LEARN
 from models.prognosis.fleet import FleetPrior, Taught, population, taught
@@ -21,6 +22,9 @@ from storage import assumptions, clutches, results
 from storage.assumptions import NOBODY, FleetPriorRow
 from storage.encoding.json_text import Json, to_text
 from storage.engine.database import Database
+
+#: How often a clutch is tracked anew where runs come meanwhile. Chosen: at a run each time it could go on for ever.
+_ATTEMPTS = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,10 +42,20 @@ class Fleet:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Refreshed:
-    """What a refresh did: the kinds of which a new version was stored, and the clutches whose answers have changed."""
+    """What a refresh did: the kinds of which a new version was stored, the clutches whose answers have changed, and those
+    left to the next refresh, because runs came while they were tracked anew."""
 
     kinds: tuple[Json, ...]
     changed: tuple[str, ...]
+    left: tuple[str, ...]
+
+
+class _Outcome(Enum):
+    """How a clutch stands after a refresh."""
+
+    UP_TO_DATE = "its predictions are by the newest prior"
+    CHANGED = "they have been made anew"
+    LEFT = "they are to be made anew: runs came while they were"
 
 
 def refresh(database: Database, *, now: str, at_once: AtOnce = directly) -> Refreshed:
@@ -54,8 +68,12 @@ def refresh(database: Database, *, now: str, at_once: AtOnce = directly) -> Refr
         if lessons:
             fleets.setdefault(to_text(kind), Fleet(kind=kind)).lessons[clutch_id] = lessons
     fresh = [fleet.kind for fleet in fleets.values() if _stored_anew(database, fleet, now, at_once)]
-    changed = [clutch_id for clutch_id in names if _brought_up(database, clutch_id, at_once)]
-    return Refreshed(kinds=tuple(fresh), changed=tuple(changed))
+    brought_up = {clutch_id: _brought_up(database, clutch_id, at_once) for clutch_id in names}
+    return Refreshed(
+        kinds=tuple(fresh),
+        changed=tuple(clutch_id for clutch_id, outcome in brought_up.items() if outcome is _Outcome.CHANGED),
+        left=tuple(clutch_id for clutch_id, outcome in brought_up.items() if outcome is _Outcome.LEFT),
+    )
 
 
 def _lessons(database: Database, clutch_id: str) -> tuple[Json, list[Taught]]:
@@ -118,20 +136,21 @@ def _versions(fleet: Fleet, version: int, now: str) -> Sequence[FleetPriorRow]:
     ]
 
 
-def _brought_up(database: Database, clutch_id: str, at_once: AtOnce) -> bool:
-    """Track a clutch anew where its stored predictions were made under another prior; whether that was so."""
-    while True:
+def _brought_up(database: Database, clutch_id: str, at_once: AtOnce) -> _Outcome:
+    """Track a clutch anew where its stored predictions were made under another prior."""
+    for _ in range(_ATTEMPTS):
         with database.reading() as connection:
             state = records.state(connection, clutch_id, newest_prior=True)
             last = results.prediction_at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)
         if last is None or last.payload.get("prior") == dict(state.assumptions().prior.name):
-            return False
+            return _Outcome.UP_TO_DATE
         with database.reading() as connection:
             receipts = records.receipts(connection, clutch_id)
         tracking = track(state)
         retracked = Results(tracking=tracking, receipts=warned_anew(state.lives, tracking.warnings, receipts))
         if at_once(_replaced, database, state, retracked):
-            return True
+            return _Outcome.CHANGED
+    return _Outcome.LEFT
 
 
 def _replaced(database: Database, state: ClutchState, results: Results) -> bool:

@@ -7,9 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
+from typer.testing import CliRunner
 
 from service import records
 from service.app import create_app
+from service.cli.main import app
+from service.lives.recomputation import ClutchState, Tracking
 from service.settings import Settings
 from service.workflows import learn_fleet
 from service.workflows.replay import replay_clutch
@@ -129,8 +132,8 @@ def test_a_run_that_comes_before_its_clutch_is_brought_up_is_tracked_under_the_p
             post(client, f"old-{number}", scale, last=6000)
         post(client, "new", 6000.0, last=3000)
         with monkeypatch.context() as slow:
-            slow.setattr(learn_fleet, "_brought_up", lambda *_: False)
-            refresh(url)
+            slow.setattr(learn_fleet, "_replaced", lambda *_: False)
+            assert "new" in refresh(url).left
         body = stationary(4000, wear=wear(4000, 6000.0), speeds=SPEEDS, pressures=(5.0,), run_id="next")
         assert client.post("/v1/clutches/new/runs", json=body).status_code == 201
         assert client.get(LIFE.format("new")).json()["prior"]["name"] == "weak"
@@ -142,3 +145,31 @@ def test_a_run_that_comes_before_its_clutch_is_brought_up_is_tracked_under_the_p
         replay_clutch(database, "new")
         with database.reading() as connection:
             assert records.answers(connection, "new") == before
+
+
+def test_a_clutch_that_gets_a_run_whenever_it_is_tracked_anew_is_left_to_the_next_refresh(
+    url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with client_of(url) as client:
+        for number, scale in enumerate((5000.0, 6000.0, 7000.0)):
+            post(client, f"old-{number}", scale, last=5000)
+        post(client, "live", 6000.0, last=1000)
+        attempts = []
+        track = learn_fleet.track
+
+        def track_while_a_run_comes(state: ClutchState) -> Tracking:
+            if state.clutch_id == "live":
+                attempts.append(state.revision)
+                body = stationary(1000 + 100 * len(attempts), speeds=SPEEDS, run_id=f"r{len(attempts)}")
+                assert client.post("/v1/clutches/live/runs", json=body).status_code == 201
+                assert len(attempts) < 10
+            return track(state)
+
+        with monkeypatch.context() as busy:
+            busy.setattr(learn_fleet, "track", track_while_a_run_comes)
+            printed = CliRunner().invoke(app, ["fleet", "refresh", "--database", url]).stdout
+        assert len(attempts) == 3
+        assert "live: left to the next refresh" in printed
+        assert "live: predictions updated" not in printed
+        done = refresh(url)
+        assert ("live" in done.changed, done.left) == (True, ())
