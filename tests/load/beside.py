@@ -6,6 +6,7 @@ import os
 import resource
 import sys
 from collections import Counter
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -38,25 +39,26 @@ def fleet_refresh(database: Path) -> list[str]:
 
 async def diagnose(port: int, clutch_id: str, end: float, beside: Beside) -> None:
     """Have a clutch diagnosed, again and again, until the end."""
-    line, loop = Line(port), asyncio.get_running_loop()
-    question = posted(f"/v1/clutches/{clutch_id}/diagnoses", b"{}", JSON_TYPE, "Prefer: wait=0")
-    while loop.time() < end:
-        started = loop.time()
-        answer = await noted(lambda: line.ask(question), "POST diagnoses", beside.problems)
-        if answer is None or answer.status not in (201, 202):
-            await asyncio.sleep(LOOK_EVERY)
-            continue
-        report = json.loads(answer.body)
-        look = asked(f"/v1/clutches/{clutch_id}/diagnoses/{report['diagnosis_id']}")
-        while report["status"] == "running" and loop.time() < end:
-            await asyncio.sleep(LOOK_EVERY)
-            answer = await noted(lambda look=look: line.ask(look), "GET diagnoses", beside.problems)  # type: ignore[misc]
-            if answer is not None and answer.status == 200:
-                report = json.loads(answer.body)
-        if report["status"] == "finished":
-            beside.diagnoses.append(loop.time() - started)
-        elif report["status"] == "failed":
-            beside.problems[f"diagnosis failed: {report.get('problem') or report.get('summary')}"] += 1
+    loop = asyncio.get_running_loop()
+    with closing(Line(port)) as line:
+        question = posted(f"/v1/clutches/{clutch_id}/diagnoses", b"{}", JSON_TYPE, "Prefer: wait=0")
+        while loop.time() < end:
+            started = loop.time()
+            answer = await noted(lambda: line.ask(question), "POST diagnoses", beside.problems)
+            if answer is None or answer.status not in (201, 202):
+                await asyncio.sleep(LOOK_EVERY)
+                continue
+            report = json.loads(answer.body)
+            look = asked(f"/v1/clutches/{clutch_id}/diagnoses/{report['diagnosis_id']}")
+            while report["status"] == "running" and loop.time() < end:
+                await asyncio.sleep(LOOK_EVERY)
+                answer = await noted(lambda look=look: line.ask(look), "GET diagnoses", beside.problems)  # type: ignore[misc]
+                if answer is not None and answer.status == 200:
+                    report = json.loads(answer.body)
+            if report["status"] == "finished":
+                beside.diagnoses.append(loop.time() - started)
+            elif report["status"] == "failed":
+                beside.problems[f"diagnosis failed: {report.get('problem') or report.get('summary')}"] += 1
 
 
 async def refresh_fleets(database: Path, begin: float, end: float, beside: Beside) -> None:

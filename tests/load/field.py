@@ -12,6 +12,7 @@ import json
 import random
 from collections import Counter, defaultdict
 from collections.abc import Awaitable, Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 
 from tests.load.bodies import Post, SentLife, asked, registration
@@ -94,21 +95,22 @@ class Field:
     # --- rigs ---
 
     async def _rig(self, number: int, phase: float) -> None:
-        line, loop = Line(self.port), asyncio.get_running_loop()
-        await _until(self.begin + phase * self.interval)  # rigs know nothing of each other
-        for turn in itertools.count():
-            clutch_id = f"load-{number}-{turn:03d}"
-            if await self._sent(line, registration(clutch_id, self.fluid(number, turn)), "registration") is None:
-                return
-            self.on_rigs[number] = clutch_id
-            for post in self.life(number, turn).posts:
-                started = loop.time()
-                answer = await self._sent(line, post.request(clutch_id), "sampled" if post.sampled else "plain")
-                if answer is None:
-                    self.counts.unanswered.add((clutch_id, post.run_id))
+        loop = asyncio.get_running_loop()
+        with closing(Line(self.port)) as line:
+            await _until(self.begin + phase * self.interval)  # rigs know nothing of each other
+            for turn in itertools.count():
+                clutch_id = f"load-{number}-{turn:03d}"
+                if await self._sent(line, registration(clutch_id, self.fluid(number, turn)), "registration") is None:
                     return
-                self._acknowledge(clutch_id, post, answer)
-                await _until(started + self.interval)
+                self.on_rigs[number] = clutch_id
+                for post in self.life(number, turn).posts:
+                    started = loop.time()
+                    answer = await self._sent(line, post.request(clutch_id), "sampled" if post.sampled else "plain")
+                    if answer is None:
+                        self.counts.unanswered.add((clutch_id, post.run_id))
+                        return
+                    self._acknowledge(clutch_id, post, answer)
+                    await _until(started + self.interval)
 
     def life(self, number: int, turn: int) -> SentLife:
         """The life that a rig posts at its so many-th turn."""
@@ -144,32 +146,33 @@ class Field:
 
         A dashboard names the answer that it has, a script does not.
         """
-        line, tags, route = Line(self.port), dict[str, str](), ROUTES[part]
-        dashboard = number % 2 == 0
-        for tick in itertools.count():
-            planned = self.begin + phase + tick + part / len(ROUTES)
-            if planned >= self.end:
-                return
-            if not await self._due(planned, route):
-                continue
-            clutch_id = self.on_rigs[(number + tick) % self.rigs]
-            if clutch_id is None:
-                continue
-            address = "/v1/clutches" if route == LIST else f"/v1/clutches/{clutch_id}/{route}"
-            known = tags.get(address) if dashboard else None
-            request = asked(address) if known is None else asked(address, f"If-None-Match: {known}")
-            answer = await self._timed(line, request, route, planned)
-            if answer is not None and answer.etag is not None:
-                tags[address] = answer.etag
+        tags, route, dashboard = dict[str, str](), ROUTES[part], number % 2 == 0
+        with closing(Line(self.port)) as line:
+            for tick in itertools.count():
+                planned = self.begin + phase + tick + part / len(ROUTES)
+                if planned >= self.end:
+                    return
+                if not await self._due(planned, route):
+                    continue
+                clutch_id = self.on_rigs[(number + tick) % self.rigs]
+                if clutch_id is None:
+                    continue
+                address = "/v1/clutches" if route == LIST else f"/v1/clutches/{clutch_id}/{route}"
+                known = tags.get(address) if dashboard else None
+                request = asked(address) if known is None else asked(address, f"If-None-Match: {known}")
+                answer = await self._timed(line, request, route, planned)
+                if answer is not None and answer.etag is not None:
+                    tags[address] = answer.etag
 
     async def _livez(self) -> None:
-        line, request = Line(self.port), asked("/livez")
-        for number in itertools.count():
-            planned = self.begin + number * LIVEZ_EVERY
-            if planned >= self.end:
-                return
-            if await self._due(planned, LIVEZ):
-                await self._timed(line, request, LIVEZ, planned)
+        request = asked("/livez")
+        with closing(Line(self.port)) as line:
+            for number in itertools.count():
+                planned = self.begin + number * LIVEZ_EVERY
+                if planned >= self.end:
+                    return
+                if await self._due(planned, LIVEZ):
+                    await self._timed(line, request, LIVEZ, planned)
 
     async def _due(self, planned: float, route: str) -> bool:
         """Wait for the planned moment; False where the grace is over, the time so far then counts."""

@@ -31,7 +31,7 @@ async def stub(answer: Handler) -> tuple[asyncio.Server, int]:
                 if sent is None:
                     return
                 writer.write(sent)
-        except asyncio.IncompleteReadError:
+        except (asyncio.IncompleteReadError, ConnectionResetError):
             return
         finally:
             writer.close()

@@ -1,10 +1,7 @@
 """The diagnosis through the service: asked for, stored, adopted, refused; with an engine that stands in for the real one."""
 
-import os
-import sqlite3
-import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -13,17 +10,14 @@ import pytest
 from fastapi.testclient import TestClient
 
 from models.diagnosis.extension import Extension
-from service.app import create_app
 from service.schemas.diagnosis import DiagnosisListed, DiagnosisOut, ModelOut
-from service.settings import Settings
 from service.web.auth import SCOPES, Scope, make_key
 from service.workflows.replay import replay_clutch
 from storage import keys
 from storage.engine.database import open_database
 from tests.service.workflows import stand_in_engine
-from tests.support import stationary
+from tests.service.workflows.diagnosing import BASE, diagnosed, post_tests, service
 
-BASE = "/v1/clutches/c1"
 RUL = f"{BASE}/remaining-useful-life"
 EFFECTS = ["torque_zero_shift", "running_in"]
 EXTENDED = {"name": "extended", "effects": EFFECTS}
@@ -37,32 +31,10 @@ def _stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
 
 
-@contextmanager
-def service(folder: Path, engine: str = "diagnose", **settings: Any) -> Iterator[TestClient]:
-    """A service in this process, whose diagnoses the stand-in makes."""
-    named = Settings(database=f"sqlite:///{folder / 'a.db'}", engine=f"{stand_in_engine.__name__}:{engine}", **settings)
-    with TestClient(create_app(named), base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
-        client.post("/v1/clutches", json={"clutch_id": "c1"})
-        yield client
-
-
 @pytest.fixture
 def client(tmp_path: Path) -> Iterator[TestClient]:
     with service(tmp_path) as found:
         yield found
-
-
-def post_tests(client: TestClient, *cycles: float) -> None:
-    for each in cycles:
-        assert client.post(f"{BASE}/runs", json=stationary(each, run_id=f"r{each:g}")).status_code == 201
-
-
-def diagnosed(client: TestClient, **body: Any) -> dict[str, Any]:
-    answer = client.post(f"{BASE}/diagnoses", json=body, headers={"Prefer": "wait=120"})
-    assert answer.status_code == 201, answer.text
-    found: dict[str, Any] = answer.json()
-    assert found["status"] == "finished", found["problem"]
-    return found
 
 
 def said(client: TestClient) -> list[Any]:
@@ -236,76 +208,3 @@ def test_who_may_read_may_not_ask_or_adopt(client: TestClient, tmp_path: Path) -
     assert [ask("POST", "diagnoses", "read"), ask("PUT", "model", "read")] == [403, 403]
     assert [ask("POST", "diagnoses", "ingest"), ask("PUT", "model", "ingest")] == [202, 200]
     assert ask("PUT", "model", "admin") == 200
-
-
-@pytest.mark.parametrize(
-    ("engine", "problem"),
-    [
-        ("killed", "SIGKILL"),
-        ("raising", "status 1"),
-        ("greedy", "memory"),
-        ("computing", "longer than 4 s of processor time"),
-        ("endless", "longer than 6 s by the clock"),
-    ],
-)
-def test_a_diagnosis_that_breaks_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, engine: str, problem: str
-) -> None:
-    if engine == "endless":
-        monkeypatch.setattr("service.jobs.queue.CLOCK_PER_PROCESSOR_SECOND", 0.05)
-    with service(tmp_path, engine, diagnosis_seconds=4 if engine == "computing" else 120) as client:
-        answer = client.post(f"{BASE}/diagnoses", json={"adopt": True}, headers={"Prefer": "wait=120"})
-        DiagnosisOut.model_validate(answer.json())
-        assert (answer.status_code, answer.json()["status"], answer.json()["verdict"]) == (201, "failed", None)
-        assert problem in answer.json()["problem"]
-        assert client.get(f"{BASE}/model").json()["version"] == 0
-
-
-def test_one_runs_at_a_time_others_join_or_wait_or_are_sent_away(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("STAND_IN_PID", str(tmp_path / "pid"))
-    with service(tmp_path, "endless", most_diagnoses=2) as client:
-        first = client.post(f"{BASE}/diagnoses", json={}, headers={"Prefer": "wait=0"})
-        assert (first.status_code, first.json()["status"], first.headers["Preference-Applied"]) == (
-            202,
-            "running",
-            "wait=0",
-        )
-        again = client.post(f"{BASE}/diagnoses", json={"adopt": True}, headers={"Prefer": 'wait="0"'})
-        assert (again.status_code, again.headers["Location"]) == (202, first.headers["Location"])
-        post_tests(client, 0)
-        other = client.post(f"{BASE}/diagnoses", json={}, headers={"Prefer": "wait=0"})
-        assert (other.status_code, other.json()["revision"]) == (202, 1)
-        client.post("/v1/clutches", json={"clutch_id": "c2"})
-        away = client.post("/v1/clutches/c2/diagnoses", json={}, headers={"Prefer": "wait=0"})
-        assert (away.status_code, away.headers["Retry-After"]) == (503, "1")
-        assert client.get("/v1/clutches/c2/diagnoses").json()["items"] == []
-        pages = client.get(f"{BASE}/diagnoses", params={"limit": 1}).json()
-        rest = client.get(f"{BASE}/diagnoses", params={"limit": 1, "cursor": pages["next"]}).json()
-        assert [page["items"][0]["diagnosis_id"] for page in (pages, rest)] == [
-            other.json()["diagnosis_id"],
-            first.json()["diagnosis_id"],
-        ]
-        assert rest["next"] is None
-        deadline = time.monotonic() + 60
-        while not (tmp_path / "pid").exists():
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
-        process = int((tmp_path / "pid").read_text())
-    with pytest.raises(ProcessLookupError):
-        os.kill(process, 0)
-    with service(tmp_path) as client:
-        found = client.get(f"{BASE}/diagnoses").json()["items"]
-        assert [(each["status"], "ask again" in each["problem"]) for each in found] == [("failed", True)] * 2
-
-
-def test_what_a_dead_service_left_running_is_told_at_the_next_start(tmp_path: Path) -> None:
-    with service(tmp_path) as client:
-        report = diagnosed(client)
-    with closing(sqlite3.connect(tmp_path / "a.db")) as connection, connection:
-        connection.execute("UPDATE diagnosis SET status = 'running', report = NULL, finished_at = NULL")
-    with service(tmp_path) as client:
-        found = client.get(f"{BASE}/diagnoses/{report['diagnosis_id']}").json()
-        assert (found["status"], "ask again" in found["problem"]) == ("failed", True)
-        assert diagnosed(client)["diagnosis_id"] != report["diagnosis_id"]
