@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sqlalchemy import Connection
 
 from models.degradation.severity import Severity
@@ -15,9 +14,8 @@ from models.diagnosis.extension import Extension
 from models.friction.criteria import ACCEPTABLE_MSE
 from models.friction.identification import FitStatus, StribeckFit
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
+from models.prognosis.ended_lives import EndedLife
 from models.prognosis.fleet import FleetPrior
-from models.tracking.filters.particle import ParticleState
-from models.tracking.filters.ukf import UkfState
 from service.columns import whole
 from service.errors import NotFoundError
 from service.lives.assumptions import ALL_PRESSURES, FLEET, LearnedPrior, kind_of, severity_name, severity_under
@@ -32,7 +30,6 @@ from storage.clutches import ClutchRow
 from storage.results import FilterStateRow, FitRow, PredictionRow
 from storage.runs import NewRun, RunInOrder
 
-_STATES: dict[str, type[ParticleState] | type[UkfState]] = {"particle": ParticleState, "ukf": UkfState}
 #: Columns of a stored fit that are a fit's own.
 _FIT_COLUMNS = ("pressure", "undetermined", "noise", "mse_percent", "rmse", "points", "message")
 
@@ -194,17 +191,12 @@ def _store_tracking(connection: Connection, clutch_id: str, tracking: Tracking) 
 
 
 def _filter_rows(filters: States) -> list[FilterStateRow]:
-    """The arrays of each state are named after the prior that it started from, as in `weak/mean`."""
     return [
         FilterStateRow(
             method=method,
             pressure=ALL_PRESSURES,
             runs=tracked.runs,
-            arrays={
-                f"{prior}/{name}": array
-                for prior, filter_state in tracked.states.items()
-                for name, array in filter_state.to_arrays().items()
-            },
+            arrays=tracked.to_arrays(),
             code_version=CODE_VERSION,
         )
         for method, tracked in filters.items()
@@ -216,17 +208,7 @@ def _filters(connection: Connection, clutch_id: str) -> States | None:
     rows = {method: row for (method, _), row in results.filter_states_of(connection, clutch_id).items()}
     if any(row.code_version != CODE_VERSION for row in rows.values()):
         return None
-    return {method: _tracked(method, row) for method, row in rows.items()}
-
-
-def _tracked(method: str, row: FilterStateRow) -> Tracked:
-    by_prior: dict[str, dict[str, NDArray[np.float64]]] = {}
-    for name, array in row.arrays.items():
-        prior, _, part = name.partition("/")
-        by_prior.setdefault(prior, {})[part] = array
-    return Tracked(
-        runs=row.runs, states={prior: _STATES[method].from_arrays(arrays) for prior, arrays in by_prior.items()}
-    )
+    return {method: Tracked.from_arrays(method, row.runs, row.arrays) for method, row in rows.items()}
 
 
 def _learned_prior(
@@ -240,7 +222,10 @@ def _learned_prior(
     if row is None:
         return LearnedPrior()
     fleet = FleetPrior.from_dict(row.content)
-    return LearnedPrior(fleet=fleet, name={"name": FLEET, "version": row.version, "clutches": fleet.clutches})
+    ended = tuple(EndedLife.from_dict(life) for life in row.content.get("ended", ()))
+    return LearnedPrior(
+        fleet=fleet, ended=ended, name={"name": FLEET, "version": row.version, "clutches": fleet.clutches}
+    )
 
 
 def _event(row: RunInOrder, cofs: ByPressure) -> Event:

@@ -27,11 +27,20 @@ def integrated(progress: np.ndarray) -> np.ndarray:
 def normal(prior: Prior, measurements: list[Measurement], points: Points) -> tuple[np.ndarray, np.ndarray]:
     """Mean [n, t] and covariance [n, t, t] of the measurements at n points, all linear terms integrated out."""
     progress, variance, epoch = (np.array([getattr(m, name) for m in measurements], dtype=float) for name in NAMES)
-    growth = 1.0 + progress * np.exp(-points.log_scale)[:, None]
-    b = 1.0 - growth ** -np.exp(points.log_exponent)[:, None]
+    signs = np.array([(1, 1), (-1, -1), (1, -1), (-1, 1), (1, 1), (1, 1)], dtype=float)[points.course]
+    growth = np.maximum(1.0 + progress * signs[:, :1] * np.exp(-points.log_scale)[:, None], 1e-12)
+    grown = np.minimum(-signs[:, 1:] * np.exp(points.log_exponent)[:, None] * np.log(growth), math.log(1e3))
+    b = signs.prod(axis=1)[:, None] * (1.0 - np.exp(grown))
+    exponential = 1.0 - np.exp(-progress * np.exp(-points.log_scale)[:, None])
+    b = np.where((points.course == 4)[:, None], exponential, b)
+    b = np.where((points.course == 5)[:, None], np.log1p(progress * np.exp(-points.log_scale)[:, None]), b)
     size = max(abs(prior.initial_mean), prior.initial_sd)
     noise = variance + (1e-6 * math.hypot(prior.initial_sd, prior.change_sd)) ** 2
-    noise = noise + np.exp(2 * points.log_scatter)[:, None] + points.outlying.T * (prior.outlying_size * size) ** 2
+    value = np.array([m.value for m in measurements])
+    growth = np.where((points.form >= 24)[:, None], np.maximum(np.square(value / size), 0.01), 1.0)
+    noise = (
+        noise + growth * np.exp(2 * points.log_scatter)[:, None] + points.outlying.T * (prior.outlying_size * size) ** 2
+    )
     covariance = prior.initial_sd**2 + prior.change_sd**2 * b[:, :, None] * b[:, None, :]
     covariance += noise[:, :, None] * np.eye(progress.size)
     covariance += (points.size * size)[:, None, None] ** 2 * integrated(progress)

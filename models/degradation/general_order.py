@@ -10,6 +10,7 @@ Given (φ, ε) the law is linear in ξ0 and Δ. It saturates at ξ0 + Δ: a leve
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, eq. 6.
 """
 
+import math
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -18,14 +19,17 @@ import numpy as np
 from models.arrays import FloatArray
 
 Number: TypeAlias = float | FloatArray
+#: What is left of 1 + ζ/φ where a course has ended, and the logarithm of the most that a growing share becomes.
+ENDED, LOG_MOST = 1e-12, math.log(1e3)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Degradation:
     """The coefficients of eq. 6, floats or arrays that broadcast against each other.
 
-    `initial` ξ0 and `change` Δ are in the unit of the quantity, `scale` φ > 0 in that of ζ (cycles), `exponent` ε > 0
-    [-]. Raises ValueError where one is not finite or scale or exponent is not positive.
+    `initial` ξ0 and `change` Δ are in the unit of the quantity, `scale` φ in that of ζ (cycles), `exponent` ε [-]. Both are
+    positive in eq. 6; with other signs it is another course (`models.tracking.courses`). Raises ValueError where one is not
+    finite, or scale or exponent is 0.
     """
 
     initial: Number
@@ -38,19 +42,23 @@ class Degradation:
             if not np.isfinite(getattr(self, name)).all():
                 raise ValueError(f"{name} must be finite")
         for name in ("scale", "exponent"):
-            if not np.greater(getattr(self, name), 0.0).all():
-                raise ValueError(f"{name} must be positive, got a minimum of {np.min(getattr(self, name))}")
+            if not np.all(getattr(self, name)):
+                raise ValueError(f"{name} must not be 0")
 
 
 def progress_fraction(zeta: Number, scale: Number, exponent: Number) -> FloatArray:
-    """Share of the whole change that has happened, 1 - (1 + ζ/φ)^-ε, in [0, 1); ζ >= 0, φ > 0, ε > 0, broadcast.
+    """Share of the change that has happened, σ [1 - (1 + ζ/φ)^-ε], σ the product of the signs of φ and ε; broadcast.
 
-    Accurate to rounding for the smallest ζ/φ: the power is taken by log1p and expm1.
+    Not negative; below 1 in eq. 6. ζ >= 0; beyond the end of a course that ends it stays as it was there. Accurate
+    to rounding for the smallest ζ/φ: the power is taken by log1p and expm1.
 
     >>> float(progress_fraction(15_000.0, 5_000.0, 0.5))
     0.5
     """
-    return np.asarray(-np.expm1(-np.asarray(exponent) * np.log1p(np.asarray(zeta) / scale)))
+    left = np.log1p(np.maximum(np.asarray(zeta) / scale, ENDED - 1.0))
+    return np.asarray(
+        -np.expm1(np.minimum(-np.asarray(exponent) * left, LOG_MOST)) * np.sign(scale) * np.sign(exponent)
+    )
 
 
 def value(zeta: Number, degradation: Degradation) -> FloatArray:
@@ -62,7 +70,7 @@ def value(zeta: Number, degradation: Degradation) -> FloatArray:
 def sensitivities(zeta: Number, degradation: Degradation) -> FloatArray:
     """∂ξ/∂(ξ0, Δ, log φ, log ε) [..., 4] at ζ >= 0, broadcast.
 
-    With x = ζ/φ and D = (1 + x)^-ε: 1, 1 - D, -Δ ε D x/(1 + x), Δ ε D log(1 + x).
+    Of eq. 6, φ > 0 and ε > 0. With x = ζ/φ and D = (1 + x)^-ε: 1, 1 - D, -Δ ε D x/(1 + x), Δ ε D log(1 + x).
     """
     d = degradation
     ratio = np.asarray(zeta) / d.scale
@@ -83,7 +91,7 @@ def first_passage(level: Number, degradation: Degradation) -> FloatArray:
     gap = np.asarray(level, dtype=np.float64) - d.initial
     change = np.asarray(d.change, dtype=np.float64)
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        share = np.where(gap == 0.0, 0.0, gap / change)
+        share = np.where(gap == 0.0, 0.0, gap / change) * np.sign(d.scale) * np.sign(d.exponent)
         inside = reaches(level, degradation)
         growth = np.expm1(-np.log1p(-np.where(inside, share, 0.0)) / d.exponent)
         return np.where(inside, d.scale * growth, np.inf)
@@ -95,7 +103,9 @@ def reaches(level: Number, degradation: Degradation) -> np.ndarray[tuple[int, ..
     d = degradation
     gap = np.asarray(level, dtype=np.float64) - d.initial
     towards = np.where(np.asarray(d.change) < 0.0, -gap, gap)
-    return np.asarray((gap == 0.0) | ((towards > 0.0) & (towards < np.abs(d.change))))
+    return np.asarray(
+        (gap == 0.0) | ((towards > 0.0) & ((towards < np.abs(d.change)) | (np.sign(d.scale) * np.sign(d.exponent) < 0)))
+    )
 
 
 def kinetics(degradation: Degradation) -> tuple[FloatArray, FloatArray]:

@@ -100,13 +100,15 @@ class Severity:
 class SeverityMap:
     """ζ over cycles: knots (cycles [k], zeta [k]), both ascending from 0, straight between, `rate` dζ/dN beyond.
 
-    A cycle of ζ is worth `unit` cycles of standard work: by it the ζ of clutches can be compared.
+    A cycle of ζ is worth `unit` cycles of standard work: by it the ζ of clutches can be compared. `reference` is the work of
+    a cycle [J] or [rad] that counts as one, None where ζ is the count of cycles.
     """
 
     cycles: FloatArray
     zeta: FloatArray
     rate: float
     unit: float = 1.0
+    reference: float | None = None
 
     def progress(self, cycles: Number) -> FloatArray:
         """ζ at cycles >= 0, any shape."""
@@ -137,10 +139,7 @@ def severity_map(severity: Severity, blocks: Sequence[Block]) -> SeverityMap:
     reference = next((work for _, work in pieces if work), None)
     if reference is None:
         return IDENTITY
-    rates = [
-        None if work is None else min(max((work / reference) ** severity.exponent, MILDEST), HARSHEST)
-        for _, work in pieces
-    ]
+    rates = [None if work is None else float(counted(work, reference, severity.exponent)) for _, work in pieces]
     lengths = np.array([length for length, _ in pieces])
     stated = np.array([rate is not None for rate in rates])
     filled = np.array([math.nan if rate is None else rate for rate in rates])
@@ -150,7 +149,13 @@ def severity_map(severity: Severity, blocks: Sequence[Block]) -> SeverityMap:
         zeta=np.concatenate([[0.0], np.cumsum(lengths * filled)]),
         rate=_recent(lengths, filled),
         unit=(reference / _STANDARD[severity.basis]) ** severity.exponent,
+        reference=reference,
     )
+
+
+def counted(work: Number, reference: float, exponent: float) -> FloatArray:
+    """How often a cycle of so much work >= 0 counts beside one of the reference's > 0, any shape."""
+    return np.clip((np.asarray(work, dtype=np.float64) / reference) ** exponent, MILDEST, HARSHEST)
 
 
 def _pieces(ordered: Sequence[Block], works: Sequence[float | None]) -> list[tuple[float, float | None]]:

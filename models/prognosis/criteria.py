@@ -11,6 +11,18 @@ HORIZON = 1_000_000.0
 #: Nothing is predicted from fewer tests at different progress. Chosen; no table: eq. 6 has four coefficients.
 FEWEST_TESTS = 3
 
+# What earlier forecasts said about the tests since (`back_cast`)
+
+#: Multiples of its progress at which a forecast is kept, and the share of a test's progress until which it must have been
+#: made. Chosen; no table.
+AHEAD, UNTIL = (1.0, 1.25, 1.5, 2.0, 3.0), 0.8
+#: A test counts as missed by so many half widths at most: it may be outlying. Chosen; no table.
+MOST_MISSED = 3.0
+#: The share of the tests that intervals are to hold. Fixed: they are those of 90 %.
+COVERAGE = 0.9
+#: Earlier forecasts fared badly where so few tests were within, with a smaller probability than this. Chosen; no table.
+SURPRISING = 0.05
+
 # Mean COF from the parameters' tracks (`joint_draws`, `from_parameters`)
 
 #: Prior deviations of ξ0 and Δ, in sizes of the quantity. Chosen: as weak as the prior of a single track.
@@ -41,3 +53,18 @@ WIDER = 1.5
 #: A learned population has converged where its mean changes by less than this in a round, in its deviations. Chosen; no
 #: table: it decides no number.
 SETTLED = 1e-3
+
+# What ended lives say of one that has not (`ended_lives`): table in docs/prognosis.md
+
+#: Fewer ended lives than this that were alive at the same ζ say nothing. Chosen; no table.
+FEWEST_ALIVE = 3
+#: Forecasts beyond this multiple of the latest end among them are all alike. Chosen; no table.
+FAR_BEYOND = 10.0
+#: The least deviation of a forecast's logarithm. Chosen: 0.003, 0.01 and 0.03 hold and score alike.
+LEAST_DEVIATION = 0.01
+#: How far the mean of the log ends may lie from their median, and the mean error from none, in deviations. Chosen: nothing
+#: is known of the first; of the second 1, 3 and 10 score alike.
+VAGUE, ERROR_VAGUE = 10.0, 1.0
+#: What is known of the variances before: shape and scale of an inverse gamma, for log ends (a tenth of a life apart) and for
+#: errors in units of what the forecast states. Chosen: half and twice of them score alike.
+END_WORTH, ERROR_WORTH = (1.0, 0.01), (1.0, 1.0)

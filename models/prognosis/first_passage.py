@@ -65,11 +65,13 @@ def predict_first_passage(
     horizon: float = HORIZON,
     quantiles: Sequence[float] = QUANTILES,
     offset: Offset | None = None,
+    stated: tuple[FloatArray, FloatArray] | None = None,
 ) -> FirstPassage:
     """The end of life of a weighted sample of coefficients; 0 < fraction < 1, as_of >= 0 and horizon > 0 in cycles.
 
-    With an `offset` the criterion is ξ(ζ) + offset(ζ) <= fraction · (ξ0 + offset(0)). A horizon before `as_of` is taken
-    to be `as_of`. Raises ValueError where an argument is out of its range.
+    With an `offset` the criterion is ξ(ζ) + offset(ζ) <= fraction · (ξ0 + offset(0)). A sample of the end of life with its
+    weights that is `stated` counts in place of the coefficients' own. A horizon before `as_of` is taken to be `as_of`.
+    Raises ValueError where an argument is out of its range.
     """
     if not 0.0 < fraction < 1.0:
         raise ValueError(f"fraction must lie between 0 and 1, got {fraction}")
@@ -78,8 +80,10 @@ def predict_first_passage(
     if not (np.isfinite(horizon) and horizon > 0.0):
         raise ValueError(f"horizon must be finite and positive, got {horizon}")
     horizon = max(horizon, as_of)
-    passages = ends_of_life(posterior, fraction, offset=offset, horizon=horizon)
-    values = weighted_quantiles(np.minimum(passages, 10.0 * horizon), posterior.weight, quantiles)
+    if stated is None:
+        stated = ends_of_life(posterior, fraction, offset=offset, horizon=horizon), posterior.weight
+    passages, weight = stated
+    values = weighted_quantiles(np.minimum(passages, 10.0 * horizon), weight, quantiles)
     end = {q: float(x) if x <= horizon else None for q, x in zip(quantiles, values, strict=True)}
     fresh, now = (paths(posterior, np.array([zeta]), offset)[0] for zeta in (0.0, as_of))
     initial = float(posterior.weight @ fresh)
@@ -87,8 +91,8 @@ def predict_first_passage(
         as_of=as_of,
         end_of_life=end,
         remaining={q: None if x is None else max(0.0, x - as_of) for q, x in end.items()},
-        probability_of_reaching=_probability(passages <= horizon, posterior.weight),
-        status=_status(end, _probability(passages <= as_of, posterior.weight)),
+        probability_of_reaching=_probability(passages <= horizon, weight),
+        status=_status(end, _probability(passages <= as_of, weight)),
         initial=initial,
         threshold=fraction * initial,
         current=posterior.moments(now),
@@ -98,7 +102,8 @@ def predict_first_passage(
 def ends_of_life(
     posterior: Posterior, fraction: float, *, offset: Offset | None = None, horizon: float = HORIZON
 ) -> FloatArray:
-    """The ζ [n] at which each draw first has ξ(ζ) <= fraction · ξ0; inf where it never has.
+    """The ζ [n] at which each draw first has ξ(ζ) <= fraction · ξ0; inf where it never has. A draw whose rate grows without
+    bounds has passed every threshold there.
 
     Of a draw that has a discrepancy, or with an offset, only passages up to the horizon are computed.
     """
@@ -107,13 +112,25 @@ def ends_of_life(
     passages = np.where(posterior.initial <= threshold, 0.0, crossing)
     beside = posterior.discrepancy
     if offset is None and beside is None:
-        return passages
+        return np.minimum(passages, posterior.course_end)
     walked = np.ones(passages.size, dtype=bool) if offset is not None or beside is None else beside.present
     index = np.flatnonzero(walked)
     if index.size:
         walked_draws = posterior.taken(index, posterior.weight[index])
         passages[index] = _along_paths(walked_draws, fraction, offset, horizon)
-    return passages
+    return np.minimum(passages, posterior.course_end)
+
+
+def widened(passages: FloatArray, weight: FloatArray, *, as_of: float, horizon: float, power: float) -> FloatArray:
+    """Passages [n] whose remaining life is raised to a power >= 1 as a multiple of its median, or of the horizon where the
+    median lies beyond it. A life that has ended, more likely than not, stays as it is."""
+    remaining = passages - as_of
+    middle = float(weighted_quantiles(np.minimum(remaining, horizon - as_of), weight, (0.5,))[0])
+    if power == 1.0 or middle <= 0.0:
+        return passages
+    with np.errstate(over="ignore"):
+        raised = middle * (np.maximum(remaining, 0.0) / middle) ** power
+    return np.where(remaining > 0.0, as_of + raised, passages)
 
 
 def paths(posterior: Posterior, progress: FloatArray, offset: Offset | None = None) -> FloatArray:

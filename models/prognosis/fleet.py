@@ -37,6 +37,7 @@ from models.prognosis.criteria import (
     TRUST,
     WIDER,
 )
+from models.tracking.courses import WITHOUT_EXPONENT, Course, unit_of_change
 from models.tracking.criteria import REACH
 from models.tracking.discrepancy import Discrepancy
 from models.tracking.filters.grid import Grid
@@ -107,6 +108,7 @@ class FleetPrior:
         split = under_weak.weight.size
         ratio = _log_evidence_ratio(lean[:split], under_weak.weight, lean[split:], under_fleet.weight)
         learned = self.log_density(_coordinates(drawn)) - np.log(np.abs(drawn.initial)) - log_weak
+        learned = np.where(drawn.course == Course.EQ_6, learned, 0.0)  # of the other courses it has learned nothing
         mixture = np.logaddexp(math.log1p(-self.share), math.log(self.share) + learned)
         with np.errstate(divide="ignore"):
             log_weight = np.log(drawn.weight) + mixture - np.logaddexp(0.0, lean - ratio)
@@ -134,22 +136,25 @@ class FleetPrior:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Taught:
-    """What one clutch says about x: a sample [n, 4] of its posterior, with the weak prior divided out of the weights."""
+    """What one clutch says about x: a sample [n, 4] of its posterior, with the weak prior divided out of the weights; and
+    the mean of its ξ0."""
 
     x: FloatArray
     log_weight: FloatArray
+    initial: float
 
 
 def taught(history: Sequence[Measurement], seed: int = 0) -> Taught:
     """What a clutch's measurements of mean COF say about x. Raises ValueError below FEWEST_TESTS_TO_LEARN of them."""
     if len(history) < FEWEST_TESTS_TO_LEARN:
         raise ValueError(f"a clutch needs {FEWEST_TESTS_TO_LEARN} tests to teach a fleet's prior, got {len(history)}")
-    prior = weak(history[0], falling=True)
+    prior = replace(weak(history[0], falling=True), eq_6_share=1.0)
     drawn = _GRID.posterior(_GRID.from_history(prior, history), _DRAWS, np.random.default_rng(seed))
     sound = drawn.initial > 0.0
     with np.errstate(divide="ignore"):
         log_weight = np.log(drawn.weight) - np.log(np.abs(drawn.initial)) - _log_prior(drawn, prior)
-    return Taught(x=_coordinates(drawn)[sound], log_weight=log_weight[sound])
+    initial = float(drawn.weight @ drawn.initial)
+    return Taught(x=_coordinates(drawn)[sound], log_weight=log_weight[sound], initial=initial)
 
 
 def learn(histories: Sequence[Sequence[Measurement]]) -> FleetPrior:
@@ -205,6 +210,8 @@ def pooled(first: Posterior, second: Posterior) -> Posterior:
 
 def _joined(first: Any, second: Any) -> Any:
     """Columns one after the other, of discrepancies those that have a row a draw; what they share stays."""
+    if isinstance(first, bool):
+        return first or second
     if isinstance(first, Discrepancy):
         names = ("size", "curvature", "height")
         rows = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in names}
@@ -239,27 +246,31 @@ def _learnt(population: FleetPrior, fleet: Sequence[Taught], believed: FloatArra
 def _coordinates(drawn: Posterior) -> FloatArray:
     """x [n, 4] of a sample."""
     size = np.abs(drawn.initial)
-    return np.stack(
-        [drawn.change / drawn.initial, np.log(drawn.scale), np.log(drawn.exponent), np.log(drawn.scatter / size)],
-        axis=1,
-    )
+    log_scale, log_exponent = drawn.coordinates
+    return np.stack([drawn.change / drawn.initial, log_scale, log_exponent, np.log(drawn.scatter / size)], axis=1)
 
 
 def _log_prior(drawn: Posterior, prior: Prior) -> FloatArray:
     """Log density of (Δ, log φ, log ε, log s) [n] under a prior; ξ0 has the same under all."""
     spread = math.log(prior.change_sd * prior.log_scale_sd * prior.log_exponent_sd * prior.log_scatter_sd)
-    off = (drawn.change - prior.change_mean) / prior.change_sd
-    rest = prior.log_density(np.log(drawn.scale), np.log(drawn.exponent), np.log(drawn.scatter))
-    return np.asarray(rest - 0.5 * off**2 - spread - 2.0 * math.log(2.0 * math.pi))
+    off = (drawn.change * unit_of_change(drawn.course) - prior.change_mean) / prior.change_sd
+    rest = prior.log_density(*drawn.coordinates, np.log(drawn.scatter))
+    density = rest - 0.5 * off**2 - spread - 2.0 * math.log(2.0 * math.pi)
+    no_exponent = WITHOUT_EXPONENT[drawn.course]
+    of_exponent = -0.5 * (drawn.coordinates[1] - prior.log_exponent_mean) ** 2 / prior.log_exponent_sd**2
+    of_exponent -= math.log(prior.log_exponent_sd) + 0.5 * math.log(2.0 * math.pi)
+    return np.asarray(density - np.where(no_exponent, of_exponent, 0.0))
 
 
 def _within(drawn: Posterior, prior: Prior) -> NDArray[np.bool_]:
     """Which draws a grid under a prior can have [n]."""
+    log_scale, log_exponent = drawn.coordinates
     off = [
-        (np.log(drawn.scale) - prior.log_scale_mean) / prior.log_scale_sd,
-        (np.log(drawn.exponent) - prior.log_exponent_mean) / prior.log_exponent_sd,
+        (log_scale - prior.log_scale_mean) / prior.log_scale_sd,
+        (log_exponent - prior.log_exponent_mean) / prior.log_exponent_sd,
         (np.log(drawn.scatter) - prior.log_scatter_mean) / prior.log_scatter_sd,
     ]
+    off[1] = np.where(WITHOUT_EXPONENT[drawn.course], 0.0, off[1])
     return np.asarray((np.abs(off) <= REACH).all(axis=0))
 
 

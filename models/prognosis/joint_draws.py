@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.prognosis.criteria import CHANGE_SD, INITIAL_SD, NONE_WORTH
-from models.tracking.linear_model import basis
+from models.tracking.courses import Course, basis
 from models.tracking.posterior import Posterior
 from models.tracking.sampling import systematic
 
@@ -48,7 +48,7 @@ def draw_jointly(
     index = np.take_along_axis(index, np.argsort(rng.random(index.shape), axis=0), axis=0)
     scale = np.stack([np.log(track.scale[i]) for track, i in zip(own, index.T, strict=True)])
     exponent = np.stack([np.log(track.exponent[i]) for track, i in zip(own, index.T, strict=True)])
-    b = basis(progress[:, None, None], scale, exponent)  # [t, q, n]
+    b = basis(progress[:, None, None], scale, exponent, np.array(Course.EQ_6))  # [t, q, n]
     typical = np.maximum(np.abs(values).max(axis=0), 1e-300)
     scaled, spread = values / typical, covariance / np.outer(typical, typical)
     mean, root, evidence = _solved(b, scaled, np.asarray(np.linalg.inv(spread), dtype=np.float64))

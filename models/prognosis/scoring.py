@@ -111,3 +111,14 @@ def prognostic_horizon(
             break
         horizon = end - progress
     return horizon
+
+
+def measured_end(progress: FloatArray, values: FloatArray, threshold: float) -> float | None:
+    """Where straight lines between values [n] at ascending progress [n] first pass the threshold; None where they never do,
+    or begin below it."""
+    below = np.flatnonzero(values <= threshold)
+    if below.size == 0 or below[0] == 0:
+        return None
+    first = int(below[0])
+    share = (values[first - 1] - threshold) / (values[first - 1] - values[first])
+    return float(progress[first - 1] + share * (progress[first] - progress[first - 1]))

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.tracking.criteria import LEVELLING, SHARES
+from models.tracking.criteria import LEVELLING
 from models.tracking.history import History
 from models.tracking.prior import Prior
 
@@ -27,12 +27,6 @@ from models.tracking.prior import Prior
 PAST, FUTURE = 6, 16
 _EDGES = np.concatenate([np.arange(PAST) / PAST, np.geomspace(1.0, LEVELLING, FUTURE + 1)])
 _LENGTHS = np.diff(_EDGES)
-
-
-def log_size_weight(prior: Prior) -> FloatArray:
-    """Log prior probability of each of SIZES; all but the first are -inf where the prior is sure of eq. 6."""
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.log(np.concatenate([[prior.law_share], (1.0 - prior.law_share) * SHARES])))
 
 
 def smooth(progress: FloatArray, span: float, stretches: int = PAST + FUTURE) -> FloatArray:
@@ -80,12 +74,10 @@ class Discrepancy:
     at: FloatArray
     height: FloatArray
 
-    def __call__(self, progress: FloatArray) -> FloatArray:
-        """δ plus the steps so far, at ζ [k] or at each draw's own [k, n]; [k, n]."""
-        begun = np.asarray(progress)[..., None] >= self.at
-        if progress.ndim == 1:
-            return np.asarray(smooth(progress, self.span) @ self.curvature.T + begun @ self.height.T)
-        return np.asarray(self._stretchwise(progress) + np.einsum("kne,ne->kn", begun, self.height))
+    def __call__(self, own: FloatArray, progress: FloatArray) -> FloatArray:
+        """δ at each draw's own time [k, n], plus the steps up to ζ, [k, n] or [k, 1]; [k, n]."""
+        begun = np.broadcast_to(progress[..., None] >= self.at, (*own.shape, self.at.size))
+        return np.asarray(self._stretchwise(own) + np.einsum("kne,ne->kn", begun, self.height))
 
     def _stretchwise(self, progress: FloatArray) -> FloatArray:
         """δ at each draw's own ζ [k, n], from its level, slope and curvature where the stretch begins."""

@@ -51,6 +51,13 @@ class History:
         later = np.unique(self.epoch)[1:]
         return np.array([self.progress[self.epoch >= epoch].min() for epoch in later], dtype=np.float64)
 
+    def relative(self, prior: Prior) -> FloatArray:
+        """The square of every value over the quantity's size [t]: what scatter that is a share of the value grows with.
+
+        The measured value stands for the true one, which is off by scatter squared.
+        """
+        return np.asarray(prior.relative(self.value))
+
     def to_arrays(self) -> dict[str, FloatArray]:
         """The columns by name."""
         return {field.name: getattr(self, field.name) for field in fields(self)}

@@ -55,7 +55,7 @@ def innovation(posterior: Posterior, last: Measurement, prior: Prior) -> float:
     `posterior` is conditioned on all of them; `prior` says how often a run is outlying and by how much.
     """
     off = last.value - posterior.values(np.array([last.progress]))[0]
-    variance = posterior.scatter**2 + last.variance
+    variance = posterior.scatter_variance(last.value, prior) + last.variance
     log_density = math.log1p(-prior.outlying_share) + _log_normal(off, variance)
     if prior.outlying_share > 0.0:
         outlying = _log_normal(off, variance + (prior.outlying_size * prior.size) ** 2)

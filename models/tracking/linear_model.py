@@ -1,6 +1,6 @@
 """The closed form that the filters share: the model is linear once φ, ε, the scatter s and the size q are given.
 
-With y_t = ξ0 + Δ b_t + Σ_k w_k Z_tk + e_t, b_t = 1 - (1 + ζ_t/φ)^-ε and e_t ~ N(0, d_t), d_t = v_t + s², normal priors
+With y_t = ξ0 + Δ b_t + Σ_k w_k Z_tk + e_t, b by the course (`courses`) and e_t ~ N(0, d_t), d_t = v_t + s², normal priors
 on ξ0, Δ and w (the discrepancy and the steps, `models.tracking.discrepancy`) lead to a normal posterior and to the
 probability of the data with all of them integrated out. For an outlying run d_t has a further W². A few weighted sums
 over the measurements are all that is needed, with weights r_t = 1/d_t and y_t taken from the prior mean of ξ0. The
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
+from models.tracking.courses import FORM_COURSE, FORM_SIZE, basis, scatter_growth
 from models.tracking.discrepancy import column_sds, columns
 from models.tracking.history import History
 from models.tracking.prior import Prior
@@ -46,13 +47,27 @@ class Conditional:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Points:
-    """Where the closed form is taken: log φ, log ε, log s and q, each [n], and which runs are outlying [t, n] (0, 1)."""
+    """Where the closed form is taken: log |φ|, log |ε|, log s, the form (`courses`) [n]; which runs are outlying [t, n]."""
 
     log_scale: FloatArray
     log_exponent: FloatArray
     log_scatter: FloatArray
-    size: FloatArray
+    form: NDArray[np.intp]
     outlying: FloatArray
+
+    @property
+    def course(self) -> NDArray[np.intp]:
+        """The course of every point [n]."""
+        return FORM_COURSE[self.form]
+
+    @property
+    def size(self) -> FloatArray:
+        """The size q of the discrepancy of every point [n]."""
+        return FORM_SIZE[self.form]
+
+    def basis(self, progress: FloatArray) -> FloatArray:
+        """b at progress [t] of every point, [t, n]."""
+        return basis(progress[:, None], self.log_scale, self.log_exponent, self.course)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,20 +125,6 @@ def _eliminate(sums: Sums, prior: Prior) -> tuple[FloatArray, FloatArray, FloatA
     return a00, sums.rb, c0, pivot, c1 - slope * c0
 
 
-def basis(progress: FloatArray, log_scale: FloatArray, log_exponent: FloatArray) -> FloatArray:
-    """b = 1 - (1 + ζ/φ)^-ε, in the shape of ζ/φ, to which ε is broadcast: `general_order.progress_fraction`, three times
-    as quick.
-
-    Accurate to 2e-16 absolute, not relative: here b is only compared with measurement noise.
-    """
-    power = np.asarray(progress * np.exp(-log_scale))
-    power += 1.0
-    np.log(power, out=power)
-    power *= -np.exp(log_exponent)
-    np.exp(power, out=power)
-    return np.asarray(np.subtract(1.0, power, out=power))
-
-
 def log_outlying(prior: Prior, outlying: FloatArray) -> FloatArray:
     """Log prior probability of which runs are outlying, along the first axis of [t, ...]."""
     count = outlying.sum(axis=0)
@@ -135,10 +136,10 @@ def log_outlying(prior: Prior, outlying: FloatArray) -> FloatArray:
 
 def pointwise(history: History, prior: Prior, points: Points, table: FloatArray | None = None) -> tuple[Sums, Terms]:
     """The sums at n points, each [n], and the further terms after elimination; `table` may hold their b [t, n]."""
-    b = basis(history.progress[:, None], points.log_scale, points.log_exponent) if table is None else table
+    b = points.basis(history.progress) if table is None else table
     d = np.multiply(points.outlying, (prior.outlying_size * prior.size) ** 2, out=np.empty(b.shape))
     d += history.variance[:, None]
-    d += np.exp(2.0 * points.log_scatter)
+    d += scatter_growth(points.form, history.relative(prior)).T * np.exp(2.0 * points.log_scatter)
     log_r = -_log_product(d) - b.shape[0] * math.log(2.0 * math.pi)
     r = np.divide(1.0, d, out=d)
     y = history.value - prior.initial_mean
@@ -167,7 +168,8 @@ def last_outlying(history: History, prior: Prior, points: Points, sums: Sums, te
     It gets a further term of its own with the deviation W, which is eliminated after the others.
     """
     y, sd = float(history.value[-1]) - prior.initial_mean, prior.outlying_size * prior.size
-    r = 1.0 / (history.variance[-1] + np.exp(2.0 * points.log_scatter))
+    growth = scatter_growth(points.form, history.relative(prior)[-1:])[:, 0]
+    r = 1.0 / (history.variance[-1] + growth * np.exp(2.0 * points.log_scatter))
     pivot = 1.0 + sd**2 * r
     own = sd * r * np.stack([np.ones_like(last), np.full_like(last, y), last])
     if terms.where.size:
@@ -195,18 +197,18 @@ def tabulated(
     prior: Prior,
     table: FloatArray,
     log_scatter: FloatArray,
-    size: FloatArray,
+    form: NDArray[np.intp],
     outlying: FloatArray,
     blur: FloatArray | float = 0.0,
 ) -> Sums:
     """The sums of k kinds by scatter levels by cells, by matrix products; [k, l, g], those without b [k, l, 1].
 
-    `table` holds b, [t, g] or [k, t, g]; a kind has its own levels log_scatter [k, l], size q [k] and outlying runs
+    `table` holds b, [t, g] or [k, t, g]; a kind has its own levels log_scatter [k, l], a form [k] and outlying runs
     [t, k]. `blur` is a further deviation of every measurement, one or [k].
     """
-    further = (prior.outlying_size * prior.size) ** 2
-    fixed = history.variance + further * outlying.T + (np.zeros(size.size) + blur)[:, None] ** 2
-    r = 1.0 / (fixed[:, None, :] + np.exp(2.0 * log_scatter)[:, :, None])
+    further, growth = (prior.outlying_size * prior.size) ** 2, scatter_growth(form, history.relative(prior))
+    fixed = history.variance + further * outlying.T + (np.zeros(form.size) + blur)[:, None] ** 2
+    r = 1.0 / (fixed[:, None, :] + growth[:, None, :] * np.exp(2.0 * log_scatter)[:, :, None])
     y = history.value - prior.initial_mean
     rb, rby = np.split(np.concatenate([r, r * y], axis=1) @ table, 2, axis=1)
     sums = Sums(
@@ -219,7 +221,7 @@ def tabulated(
         log_r=(np.log(r).sum(axis=2) - y.size * math.log(2.0 * math.pi))[:, :, None],
     )
     z = columns(history)
-    sd = column_sds(prior, size, history.steps.size)
+    sd = column_sds(prior, FORM_SIZE[form], history.steps.size)
     where = np.flatnonzero(sd.any(axis=1))
     if where.size == 0:
         return sums
@@ -290,9 +292,6 @@ def _products(n: FloatArray) -> dict[str, FloatArray]:
 
 
 def _less(sums: Sums, lost: dict[str, FloatArray], where: NDArray[np.intp]) -> Sums:
-    reduced = {}
     for name, loss in lost.items():
-        column = getattr(sums, name)
-        column[where] -= loss
-        reduced[name] = column
-    return Sums(**reduced)
+        getattr(sums, name)[where] -= loss
+    return Sums(**{name: getattr(sums, name) for name in lost})

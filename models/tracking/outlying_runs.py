@@ -26,8 +26,8 @@ _ROUNDS = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Nodes:
-    """Nodes that stand for the posterior's mass: b [n, t], s² + blur² [n], q [n], and the logarithm of the share of the
-    mass that each stands for [n]."""
+    """Nodes that stand for the posterior's mass: b [n, t], the variance of scatter and blur [n, t], q [n], and the logarithm
+    of the share of the mass that each stands for [n]."""
 
     b: FloatArray
     noise: FloatArray
@@ -51,7 +51,7 @@ def verdicts(prior: Prior, history: History, outlying: FloatArray, nodes: Nodes)
     the others by e/(1 - h), e being its residual, with the variance d/(1 - h).
     """
     further = (prior.outlying_size * prior.size) ** 2
-    d = history.variance + further * outlying + nodes.noise[:, None]
+    d = history.variance + further * outlying + nodes.noise
     sd = column_sds(prior, nodes.size, history.steps.size)
     needed = np.flatnonzero(sd.any(axis=0))
     sd, terms = sd[:, needed], columns(history)[:, needed]

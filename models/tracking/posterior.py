@@ -7,6 +7,7 @@ scatter between runs is added, which the filter estimates.
 
 import math
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -14,18 +15,28 @@ from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.degradation.general_order import Degradation
+from models.tracking.courses import basis, coordinates_of, course_of, unit_of_change
+from models.tracking.criteria import FEWEST_EFFECTIVE
 from models.tracking.discrepancy import Discrepancy
-from models.tracking.linear_model import basis
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior
+
+
+class SampleStatus(StrEnum):
+    """Whether a sample stands for the posterior: it does, it is worth few draws, or a test was forced upon it."""
+
+    SOUND = "sound"
+    FEW_DRAWS = "few_draws"
+    FORCED = "forced"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Posterior:
     """A weighted sample of eq. 6's coefficients, all arrays [n]; weight >= 0 sums to one.
 
-    `scatter` is the deviation from run to run, in the unit of the quantity; `discrepancy` the deviation of
-    each draw from eq. 6, if there is one.
+    `scatter` is the deviation from run to run, in the unit of the quantity; where it is `proportional` (None: nowhere), that
+    of a value of the prior's size. `discrepancy` is the deviation of each draw from its course, if there is one; `forced`
+    whether the filter took in a test at once that it could not take in by degrees.
     """
 
     weight: FloatArray
@@ -34,7 +45,21 @@ class Posterior:
     scale: FloatArray
     exponent: FloatArray
     scatter: FloatArray
+    proportional: NDArray[np.bool_] | None = None
     discrepancy: Discrepancy | None = None
+    forced: bool = False
+
+    @property
+    def effective_draws(self) -> float:
+        """How many draws of equal weight would be worth as much, 1/Σ w²."""
+        return 1.0 / float(np.square(self.weight).sum())
+
+    @property
+    def status(self) -> SampleStatus:
+        """Whether the sample stands for the posterior."""
+        if self.forced:
+            return SampleStatus.FORCED
+        return SampleStatus.SOUND if self.effective_draws >= FEWEST_EFFECTIVE else SampleStatus.FEW_DRAWS
 
     @property
     def degradation(self) -> Degradation:
@@ -43,9 +68,40 @@ class Posterior:
 
     def values(self, progress: FloatArray) -> FloatArray:
         """ξ at progress ζ >= 0 [k], or [k, n] where draws differ, discrepancy and all; [k, n]."""
-        share = basis(progress if progress.ndim == 2 else progress[:, None], np.log(self.scale), np.log(self.exponent))
+        zeta = progress if progress.ndim == 2 else progress[:, None]
+        share = self._share(zeta)
         law = self.initial + self.change * share
-        return law if self.discrepancy is None else np.asarray(law + self.discrepancy(progress))
+        if self.discrepancy is None:
+            return law
+        span = self.discrepancy.span
+        own = np.maximum(zeta, span * share / self._share(np.full((1, 1), span)))
+        return np.asarray(law + self.discrepancy(np.where(zeta > span, own, zeta), zeta))
+
+    def _share(self, progress: FloatArray) -> FloatArray:
+        """b at progress [k, n] or [k, 1]; [k, n]."""
+        return np.asarray(basis(progress, *self.coordinates, self.course) * unit_of_change(self.course))
+
+    @property
+    def coordinates(self) -> tuple[FloatArray, FloatArray]:
+        """log φ and log ε of every draw [n] as the priors know them (`courses.coordinates_of`)."""
+        return coordinates_of(self.scale, self.exponent, self.course)
+
+    @property
+    def course(self) -> NDArray[np.intp]:
+        """The course of every draw (`courses.Course`) [n]."""
+        return course_of(self.scale, self.exponent)
+
+    @property
+    def course_end(self) -> FloatArray:
+        """The ζ [n] at which a draw falls without bounds; inf where it does not."""
+        cliff = (self.scale < 0.0) & (self.exponent > -1.0) & (self.change < 0.0)
+        return np.where(cliff, np.abs(self.scale), np.inf)
+
+    def scatter_variance(self, value: float, prior: Prior) -> FloatArray:
+        """The variance of the scatter from run to run at a value, by draw [n]."""
+        if self.proportional is None:
+            return np.square(self.scatter)
+        return np.asarray(np.square(self.scatter) * np.where(self.proportional, prior.relative(value), 1.0))
 
     def taken(self, index: NDArray[np.intp], weight: FloatArray) -> "Posterior":
         """The draws at `index`, with new weights."""
@@ -56,7 +112,9 @@ class Posterior:
             scale=self.scale[index],
             exponent=self.exponent[index],
             scatter=self.scatter[index],
+            proportional=None if self.proportional is None else self.proportional[index],
             discrepancy=None if self.discrepancy is None else self.discrepancy.taken(index),
+            forced=self.forced,
         )
 
     def moments(self, sample: FloatArray) -> tuple[float, float]:

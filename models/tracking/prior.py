@@ -14,15 +14,18 @@ import numpy as np
 from models.arrays import FloatArray
 from models.tracking.criteria import (
     EITHER_CHANGE,
+    EQ_6_SHARE,
     EXPONENT_MEDIAN,
     FALLING_CHANGE,
     INITIAL_SD,
     LAW_SHARE,
+    LEAST_RELATIVE,
     LOG_EXPONENT_SD,
     LOG_SCALE_SD,
     LOG_SCATTER_SD,
     OUTLYING_SHARE,
     OUTLYING_SIZE,
+    PROPORTIONAL_SHARE,
     SCALE_MEDIAN,
     SCATTER_MEDIAN,
     STEP_SIZE,
@@ -35,9 +38,10 @@ class Prior:
     """Means and deviations; ξ0, Δ and the scatter in the unit of the quantity, φ in cycles.
 
     `outlying_share` of the runs are off by a further normal of deviation `outlying_size`, `law_share` is the probability
-    that there is no discrepancy beside eq. 6, `step_size` the deviation of the level's shift at an event; both sizes
-    are shares of `size`. Raises ValueError where a number is not finite, a deviation or size not positive or a share
-    not within [0, 1).
+    that there is no discrepancy beside eq. 6, `eq_6_share` that the course is that of eq. 6, `proportional_share` that the
+    scatter is a share of the value (s then is that of a value of `size`), `step_size` the deviation of the level's shift at
+    an event; both sizes are shares of `size`. Raises ValueError where a number is not finite, a deviation or size not
+    positive or a share not within [0, 1).
     """
 
     initial_mean: float
@@ -54,6 +58,8 @@ class Prior:
     outlying_size: float = OUTLYING_SIZE
     law_share: float = LAW_SHARE
     step_size: float = STEP_SIZE
+    eq_6_share: float = 1.0
+    proportional_share: float = 0.0
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -62,24 +68,30 @@ class Prior:
                 raise ValueError(f"{field.name} must be finite, got {number}")
             if field.name.endswith(("_sd", "_size")) and number <= 0:
                 raise ValueError(f"{field.name} must be positive, got {number}")
-        if not 0.0 <= self.outlying_share < 1.0:
-            raise ValueError(f"outlying_share must lie within [0, 1), got {self.outlying_share}")
-        if not 0.0 < self.law_share <= 1.0:
-            raise ValueError(f"law_share must lie within (0, 1], got {self.law_share}")
+        for name in ("outlying_share", "proportional_share"):
+            if not 0.0 <= getattr(self, name) < 1.0:
+                raise ValueError(f"{name} must lie within [0, 1), got {getattr(self, name)}")
+        for name in ("law_share", "eq_6_share"):
+            if not 0.0 < getattr(self, name) <= 1.0:
+                raise ValueError(f"{name} must lie within (0, 1], got {getattr(self, name)}")
 
     @property
     def size(self) -> float:
         """How large the quantity is, in its unit."""
         return max(abs(self.initial_mean), self.initial_sd)
 
+    def relative(self, value: FloatArray | float) -> FloatArray:
+        """The square of a value over the size, any shape: what the variance of scatter that is a share of it grows with."""
+        return np.maximum(np.square(np.asarray(value) / self.size), LEAST_RELATIVE)
+
     def to_array(self) -> FloatArray:
-        """The numbers in the order of the fields [14]."""
+        """The numbers in the order of the fields [16]."""
         return np.array(astuple(self), dtype=np.float64)
 
     @classmethod
     def from_array(cls, numbers: FloatArray) -> "Prior":
-        """The inverse of `to_array`."""
-        return cls(**{field.name: float(x) for field, x in zip(fields(cls), numbers, strict=True)})
+        """The inverse of `to_array`; of earlier versions too, which knew eq. 6 and constant scatter alone [14]."""
+        return cls(**{field.name: float(x) for field, x in zip(fields(cls), numbers, strict=False)})
 
     def log_density(self, log_scale: FloatArray, log_exponent: FloatArray, log_scatter: FloatArray) -> FloatArray:
         """Log density of (log φ, log ε, log s), broadcast, without its constant."""
@@ -115,4 +127,6 @@ def weak(first: Measurement, *, falling: bool) -> Prior:
         log_exponent_sd=LOG_EXPONENT_SD,
         log_scatter_mean=math.log(SCATTER_MEDIAN * size),
         log_scatter_sd=LOG_SCATTER_SD,
+        eq_6_share=EQ_6_SHARE if falling else 1.0,
+        proportional_share=PROPORTIONAL_SHARE if falling else 0.0,
     )

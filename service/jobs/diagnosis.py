@@ -16,11 +16,11 @@ import numpy as np
 from models.diagnosis.campaign import StationaryRun
 from models.diagnosis.extension import Extension
 from service import records, stored_runs
-from service.lives.campaign import CampaignRun, DiagnosedLife, records_to_keep, run_of
-from service.lives.diagnosis_report import public
+from service.lives.diagnosis.campaign import CampaignRun, DiagnosedLife, records_to_keep, run_of
+from service.lives.diagnosis.report import public
 from service.lives.history import STATIONARY, Life, lives_of
 from service.lives.model_correction import corrected_cofs
-from service.lives.tracks import predict_at
+from service.lives.prediction_at import predict_at
 from storage import channels, results, runs
 from storage.engine.database import Database, open_database
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.degradation.severity import IDENTITY, Block, Severity, SeverityBasis, SeverityMap, severity_map
+from models.prognosis.ended_lives import EndedLife
 from models.prognosis.fleet import FleetPrior
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
@@ -40,9 +41,10 @@ class ModelInForce:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LearnedPrior:
-    """The prior that a fleet has taught (None: the weak one alone), and its public name."""
+    """The prior that a fleet has taught (None: the weak one alone), its lives that have ended, and its public name."""
 
     fleet: FleetPrior | None = None
+    ended: tuple[EndedLife, ...] = ()
     name: Mapping[str, Any] = field(default_factory=lambda: {"name": WEAK, "version": None, "clutches": 0})
 
 
@@ -96,6 +98,12 @@ class Assumptions:
         if fleet is None or FLEET not in posteriors:
             return posteriors[WEAK]
         return fleet.in_unit(scale.severity.unit).together(posteriors[WEAK], posteriors[FLEET], first)
+
+    def ended(self, series_of: tuple[str, float], fraction: float, scale: Scale) -> list[EndedLife]:
+        """The fleet's ended lives by the same criterion: of mean COF over all pressures, none of another quantity."""
+        if series_of != (MEAN_COF, ALL_PRESSURES):
+            return []
+        return [life.in_unit(scale.severity.unit) for life in self.prior.ended if life.fraction == fraction]
 
     def offset(self, quantity: str, pressure: float, cycles: FloatArray) -> FloatArray:
         """What the model in force adds to a quantity at cycles since new [m]; [m]."""

@@ -18,6 +18,8 @@ LEAST_TORQUE_SD = 1e-4
 MOST_LEVELS = 100
 #: Weighted draws of eq. 6's coefficients behind a stored prediction [-]. Chosen: `make score PARTS=exact`.
 PREDICTION_DRAWS = 1000
+#: A prediction warns where the probability of eq. 6 is below this [-]. Chosen: odds of ten to one.
+EQ_6_DOUBTED = 0.1
 #: Draws behind a trajectory's band [-], and the lattice of the exact filter behind it (nodes, rows, levels).
 #: Chosen; no table.
 TRAJECTORY_DRAWS, TRAJECTORY_LATTICE = 400, (13, 13, 7)

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from models.diagnosis.campaign import StationaryRun
-from service.lives.campaign import tested
+from service.lives.diagnosis.campaign import tested
 from service.lives.history import (
     STATIONARY,
     Life,

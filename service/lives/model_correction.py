@@ -20,8 +20,8 @@ from models.diagnosis.extension import Extension
 from models.prognosis.criteria import HORIZON
 from models.records.runs import loaded
 from service.lives.assumptions import ALL_PRESSURES, Course, ModelInForce
-from service.lives.campaign import CampaignRun, campaign_of, run_of, without_record
 from service.lives.criteria import COURSE_PROBES
+from service.lives.diagnosis.campaign import CampaignRun, campaign_of, run_of, without_record
 from service.lives.history import STATIONARY, ByPressure, Event, Life, reference_velocities
 from service.lives.incoming_run import IncomingRun
 from service.lives.run_analysis import levels_of, mean_cofs

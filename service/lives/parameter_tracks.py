@@ -7,6 +7,7 @@ import numpy as np
 
 from models.friction.stribeck import PARAMETER_NAMES
 from models.prognosis.first_passage import weighted_quantiles
+from models.tracking.courses import Course
 from models.tracking.filters.grid import Grid
 from models.tracking.posterior import Posterior
 from service.columns import bar, whole
@@ -88,20 +89,13 @@ def track_item(series: Series, posterior: Posterior, assumptions: Assumptions) -
     band = np.array([weighted_quantiles(row, posterior.weight, _BAND) for row in values])
     tested = series.scale.cycles(np.array([measurement.progress for measurement in series.measurements]))
     off = assumptions.offset(series.quantity, series.pressure, tested)
-    samples = {
-        "initial": posterior.initial,
-        "change": posterior.change,
-        "scale_cycles": posterior.scale,
-        "exponent": posterior.exponent,
-    }
     measured = zip(series.measurements, off.tolist(), strict=True)
     return {
         "quantity": public,
         "unit": unit,
         "pressure_bar": None if series.pressure == ALL_PRESSURES else bar(series.pressure),
-        "coefficients": {
-            name: dict(zip(("value", "sd"), posterior.moments(sample), strict=True)) for name, sample in samples.items()
-        },
+        "coefficients": _coefficients(posterior),
+        "eq6_probability": float(posterior.weight[posterior.course == Course.EQ_6].sum()),
         "measured": {
             "cycles": [whole(count) for count in tested.tolist()],
             "value": [measurement.value + added for measurement, added in measured],
@@ -114,3 +108,19 @@ def track_item(series: Series, posterior: Posterior, assumptions: Assumptions) -
             "upper": band[:, 2].tolist(),
         },
     }
+
+
+def _coefficients(posterior: Posterior) -> dict[str, dict[str, float]] | None:
+    """Mean and deviation of eq. 6's coefficients among the draws that follow it; None where none does."""
+    home = np.flatnonzero(posterior.course == Course.EQ_6)
+    share = float(posterior.weight[home].sum())
+    if share == 0.0:
+        return None
+    draws = posterior.taken(home, posterior.weight[home] / share)
+    samples = {
+        "initial": draws.initial,
+        "change": draws.change,
+        "scale_cycles": draws.scale,
+        "exponent": draws.exponent,
+    }
+    return {name: dict(zip(("value", "sd"), draws.moments(sample), strict=True)) for name, sample in samples.items()}

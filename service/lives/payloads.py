@@ -1,12 +1,13 @@
 """What goes out of runs and lives, in the public names and units: receipts, predictions, a list's summary, warnings."""
 
-import math
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
 from models.friction.identification import StribeckFit
 from models.loops.loops import Loop
+from models.prognosis.back_cast import BackCast
+from models.prognosis.course_shares import CourseShare
 from models.prognosis.criteria import HORIZON, QUANTILES
 from models.prognosis.first_passage import FirstPassage
 from service.columns import bar, whole
@@ -14,6 +15,7 @@ from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions
 from service.lives.criteria import MOST_LINE_POINTS
 from service.lives.history import ByPressure, Event, Life, Series, latest_before, nearest
 from service.lives.incoming_run import IncomingRun
+from service.lives.prediction_notices import OFF_TRACK, missed, not_eq_6
 from service.lives.run_analysis import LevelFit, Notice, Value
 from service.settings import CODE_VERSION
 
@@ -27,7 +29,8 @@ PARAMETER_UNITS = {
 INSUFFICIENT = "insufficient_data"
 #: Warnings of a run in its clutch's history, written anew where the history changes: it arrived after a run of more cycles,
 #: its pressures are not those of the first test, its mean COF is not what the tests before it predict.
-OF_HISTORY = LATE, OTHER_PRESSURES, OFF_TRACK = "late_arrival", "other_pressures", "off_track"
+LATE, OTHER_PRESSURES = "late_arrival", "other_pressures"
+OF_HISTORY = LATE, OTHER_PRESSURES, OFF_TRACK
 #: What a list shows of a clutch, out of the particle filter's prediction.
 SUMMARY = ("status", "as_of_cycles", "current", "remaining_cycles", "model")
 #: A clutch without a prediction comes after all others in a list.
@@ -125,9 +128,13 @@ def insufficient(assumptions: Assumptions, cycles: float | None, pressure: float
         "status": INSUFFICIENT,
         "criterion": _criterion(fraction, pressure, None, None),
         "current": {"mean_cof": None, "mean_cof_sd": None, "fraction_of_initial": None, "health": None},
-        "remaining_cycles": _quantiles({}),
-        "end_of_life_cycles": _quantiles({}),
+        "remaining_cycles": by_quantile({}),
+        "end_of_life_cycles": by_quantile({}),
         "probability_of_reaching": None,
+        "course": None,
+        "back_cast": {"held": 0, "of": 0, "widening": 1.0},
+        "ended_lives": 0,
+        "sample": None,
         "horizon_cycles": whole(HORIZON),
         "warnings": [],
     } | assumptions.named()
@@ -142,6 +149,10 @@ def predicted(
     *,
     runs: int,
     enough: bool,
+    courses: Sequence[CourseShare],
+    back_cast: BackCast,
+    ended_lives: int,
+    sample: Mapping[str, Any],
     warnings: Sequence[Notice],
 ) -> dict[str, Any]:
     """A first passage in ζ, led back to cycles; without `enough` tests only where the clutch stands."""
@@ -156,27 +167,26 @@ def predicted(
             "fraction_of_initial": left,
             "health": None if left is None else min(1.0, max(0.0, (left - fraction) / (1 - fraction))),
         },
-        "warnings": notice_items(warnings),
+        "warnings": notice_items([*warnings, *((*not_eq_6(courses), *missed(back_cast)) if enough else ())]),
     }
     ends = {q: None if zeta is None else float(series.scale.cycles(zeta)) for q, zeta in passage.end_of_life.items()}
     future = {
         "status": passage.status.value,
-        "remaining_cycles": _quantiles({q: None if end is None else max(0.0, end - cycles) for q, end in ends.items()}),
-        "end_of_life_cycles": _quantiles(ends),
+        "remaining_cycles": by_quantile(
+            {q: None if end is None else max(0.0, end - cycles) for q, end in ends.items()}
+        ),
+        "end_of_life_cycles": by_quantile(ends),
         "probability_of_reaching": passage.probability_of_reaching,
+        "back_cast": {"held": back_cast.held, "of": back_cast.misses.size, "widening": back_cast.widening},
+        "ended_lives": ended_lives,
+        "sample": sample,
+        "course": _course_item(courses[0]) | {"alternatives": [_course_item(share) for share in courses[1:]]},
     }
     return insufficient(assumptions, cycles, series.pressure, fraction) | present | (future if enough else {})
 
 
-def off_track(value: float, deviations: float) -> Notice:
-    """The warning of a last test whose mean COF lies so many deviations off what the tests before it predict."""
-    side = "below" if deviations < 0 else "above"
-    size = f"{abs(deviations):.1f}" if math.isfinite(deviations) else "very many"
-    message = (
-        f"the last test's mean COF of {value:.4g} lies {size} deviations {side} what the tests before it predict: "
-        "an outlying run, or the clutch has left its course"
-    )
-    return Notice(code=OFF_TRACK, message=message)
+def _course_item(share: CourseShare) -> dict[str, Any]:
+    return {"name": share.name.value, "probability": share.probability, "order": share.order}
 
 
 def history_warnings(
@@ -262,5 +272,6 @@ def _criterion(fraction: float, pressure: float, initial: float | None, threshol
     }
 
 
-def _quantiles(values: dict[float, float | None]) -> dict[str, float | None]:
+def by_quantile(values: Mapping[float, float | None]) -> dict[str, float | None]:
+    """A number by quantile, in the public shape; null where there is none."""
     return {f"{quantile:g}": values.get(quantile) for quantile in QUANTILES}

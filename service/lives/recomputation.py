@@ -26,6 +26,7 @@ from service.lives.history import (
 )
 from service.lives.model_correction import RunReader, corrected_cofs, model_in_force
 from service.lives.payloads import RANK_UNKNOWN, fit_items, loop_items, recent, summary_of, warned_anew
+from service.lives.prediction_notices import OFF_TRACK
 from service.lives.run_analysis import LevelFit, loops_of, mean_cofs
 from service.lives.tracks import CARRIED, Prediction, States, follow
 from service.schemas.clutch import ClutchIn
@@ -250,7 +251,8 @@ def track(state: ClutchState, *, newest: Event | None = None) -> Tracking:
             predictions |= {(prediction.cycles, prediction.method): prediction for prediction in made}
             if index in measured:
                 shown = predictions[life.events[index].cycles, _SHOWN].payload
-                warnings[life.events[index].run_id] = list(shown["warnings"])
+                odd = [warning for warning in shown["warnings"] if warning["code"] == OFF_TRACK]
+                warnings[life.events[index].run_id] = odd
     summary, rank = summary_of(predictions[state.events[-1].cycles, _SHOWN].payload)
     summary |= {
         "runs": len(state.events),

@@ -7,28 +7,28 @@ by their evidence (`models.prognosis.fleet`).
 """
 
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from models.arrays import FloatArray
+from models.prognosis.back_cast import BackCast, kept_after
+from models.prognosis.course_shares import course_shares
 from models.prognosis.criteria import FEWEST_TESTS, HORIZON
 from models.prognosis.first_passage import Offset, predict_first_passage
+from models.prognosis.stated_end import StatedEnd, stated_end
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.filters.particle import Particle, ParticleState
 from models.tracking.filters.ukf import Ukf, UkfState
-from models.tracking.innovation import last_innovation
-from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior, Tracker
 from models.tracking.prior import Prior
-from service.columns import PASCALS_PER_BAR, bar
-from service.errors import NotFoundError
-from service.lives.assumptions import ALL_PRESSURES, WEAK, Assumptions
+from service.lives.assumptions import WEAK, Assumptions
 from service.lives.criteria import PREDICTION_DRAWS
-from service.lives.history import Event, Life, Series, lives_of, nearest_pressure
-from service.lives.payloads import insufficient, off_track, predicted
-from service.lives.run_analysis import Notice
+from service.lives.history import Life, Series
+from service.lives.payloads import insufficient, predicted
+from service.lives.prediction_notices import off_track
 
 FilterState = ParticleState | UkfState | GridState
 
@@ -38,6 +38,10 @@ METHODS = tuple(_TRACKERS)
 #: The exact filter is laid anew over the whole history at each step, and computed when it is asked for: these carry a
 #: state from run to run, and their predictions are stored with each.
 CARRIED = tuple(method for method in METHODS if method != _GRID.name)
+
+_STATES: Mapping[str, type[FilterState]] = {"particle": ParticleState, "ukf": UkfState}
+#: What the arrays of a back-cast are named after, among the names of priors.
+_BACK_CAST = "back_cast"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,10 +55,35 @@ class Prediction:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tracked:
-    """A filter's states after `runs` measurements of a series, by the name of the prior that they started from."""
+    """A filter's states after `runs` measurements of a series, by the name of the prior that they started from; what its
+    forecasts along the way said about the tests since; and the sample that was drawn of them, if one was: it is not stored.
+    """
 
     runs: int
     states: Mapping[str, FilterState]
+    back_cast: BackCast
+    sample: Posterior | None = None
+
+    def to_arrays(self) -> dict[str, FloatArray]:
+        """Named arrays: those of a state after the prior that it started from, as in `weak/mean`."""
+        named = {
+            f"{prior}/{name}": array
+            for prior, state in self.states.items()
+            for name, array in state.to_arrays().items()
+        }
+        back_cast = {"forecasts": self.back_cast.forecasts, "misses": self.back_cast.misses}
+        return named | {f"{_BACK_CAST}/{name}": array for name, array in back_cast.items()}
+
+    @classmethod
+    def from_arrays(cls, method: str, runs: int, arrays: Mapping[str, FloatArray]) -> "Tracked":
+        """The inverse of `to_arrays`."""
+        parts: dict[str, dict[str, FloatArray]] = {}
+        for name, array in arrays.items():
+            owner, _, part = name.partition("/")
+            parts.setdefault(owner, {})[part] = array
+        back_cast = BackCast(**parts.pop(_BACK_CAST))
+        states = {prior: _STATES[method].from_arrays(own) for prior, own in parts.items()}
+        return cls(runs=runs, states=states, back_cast=back_cast)
 
 
 States = Mapping[str, Tracked]
@@ -97,32 +126,42 @@ def follow(
 
 
 def advance(
-    clutch_id: str, method: str, series: Series, assumptions: Assumptions, tracked: Tracked | None, runs: int
+    clutch_id: str,
+    method: str,
+    series: Series,
+    assumptions: Assumptions,
+    tracked: Tracked | None,
+    runs: int,
+    *,
+    back_cast: BackCast | None = None,
 ) -> Tracked:
     """Carry one filter on until it has taken in the first `runs` measurements of the series.
 
-    States that were made of other measurements or under other priors are not carried on: then the filter starts anew.
+    A `back_cast` that is known from another filter takes the place of its own. States that were made of other measurements
+    or under other priors are not carried on: then the filter starts anew.
     """
     priors = assumptions.priors(series.quantity, series.measurements[0], series.scale)
     if tracked is not None and not _continues(tracked, series, priors):
         tracked = None
     if tracked is not None and tracked.runs == runs:
         return tracked
-    if method == _GRID.name:
-        measurements = series.measurements[:runs]
-        return Tracked(
-            runs=runs, states={name: _GRID.from_history(prior, measurements) for name, prior in priors.items()}
-        )
     tracker = _tracker(method, len(priors))
-    states = {name: tracker.start(prior) for name, prior in priors.items()} if tracked is None else tracked.states
-    for step in range(0 if tracked is None else tracked.runs, runs):
+    if tracked is None:
+        start = {name: tracker.start(prior) for name, prior in priors.items()}
+        tracked = Tracked(runs=0, states=start, back_cast=BackCast.nothing())
+    for step in range(tracked.runs, runs):
+        measurement = series.measurements[step]
         states = {
-            name: tracker.update(
-                state, series.measurements[step], step_rng(clutch_id, _purpose(method, name), series, step)
-            )
-            for name, state in states.items()
+            name: tracker.update(state, measurement, step_rng(clutch_id, _purpose(method, name), series, step))
+            for name, state in tracked.states.items()
         }
-    return Tracked(runs=runs, states=states)
+        judged = tracked.back_cast.judged(measurement) if back_cast is None else back_cast
+        tracked = Tracked(runs=step + 1, states=states, back_cast=judged)
+        if back_cast is None and kept_after(step + 1):
+            sample = drawn(clutch_id, method, series, assumptions, tracked)
+            forecast = tracked.back_cast.forecast(sample, measurement, priors[WEAK])
+            tracked = replace(tracked, back_cast=forecast, sample=sample)
+    return tracked
 
 
 def _tracker(method: str, priors: int) -> Tracker[Any]:
@@ -146,11 +185,13 @@ def _continues(tracked: Tracked, series: Series, priors: Mapping[str, Prior]) ->
     return True
 
 
-def draws(clutch_id: str, method: str, series: Series, assumptions: Assumptions, tracked: Tracked) -> Posterior:
-    """A weighted sample of eq. 6's coefficients after `tracked.runs` measurements; the same each time.
+def drawn(clutch_id: str, method: str, series: Series, assumptions: Assumptions, tracked: Tracked) -> Posterior:
+    """A weighted sample of the coefficients after `tracked.runs` measurements; the same each time, and drawn once.
 
     The draws are shared among the priors: so a prediction costs the same whether a fleet has taught or not.
     """
+    if tracked.sample is not None:
+        return tracked.sample
     tracker, size = _tracker(method, len(tracked.states)), PREDICTION_DRAWS // len(tracked.states)
     posteriors = {}
     for name, state in tracked.states.items():
@@ -182,15 +223,19 @@ def predict(
     """The prediction at `cycles` of a series, in the public shape."""
     if tracked is None:
         return insufficient(assumptions, cycles, series.pressure, fraction)
-    posterior = draws(clutch_id, method, series, assumptions, tracked)
+    sample = drawn(clutch_id, method, series, assumptions, tracked)
+    horizon = float(series.scale.progress(series.scale.origin + HORIZON))
+    end = end_of_life(sample, series, assumptions, tracked, cycles, fraction, horizon)
     passage = predict_first_passage(
-        posterior,
+        sample,
         fraction=fraction,
         as_of=float(series.scale.progress(cycles)),
-        horizon=float(series.scale.progress(series.scale.origin + HORIZON)),
+        horizon=horizon,
         offset=offset_of(series, assumptions),
+        stated=(end.ends, end.weight),
     )
     measurements = series.measurements[: tracked.runs]
+    priors = assumptions.priors(series.quantity, measurements[0], series.scale)
     return predicted(
         passage,
         assumptions,
@@ -199,19 +244,37 @@ def predict(
         fraction,
         runs=tracked.runs,
         enough=len({measurement.progress for measurement in measurements}) >= FEWEST_TESTS,
-        warnings=_off_track(posterior, measurements, series, assumptions),
+        courses=course_shares(sample),
+        back_cast=tracked.back_cast,
+        ended_lives=end.lives,
+        sample={
+            "effective_draws": sample.effective_draws,
+            "status": sample.status.value,
+        },
+        warnings=off_track(sample, measurements, priors[WEAK]),
     )
 
 
-def _off_track(
-    posterior: Posterior, measurements: Sequence[Measurement], series: Series, assumptions: Assumptions
-) -> list[Notice]:
-    """A warning where the last test is far off what the tests before it predict, and no event lies between."""
-    prior = assumptions.priors(series.quantity, measurements[0], series.scale)[WEAK]
-    innovation = last_innovation(posterior, measurements, prior)
-    if innovation is None or not innovation.off_track:
-        return []
-    return [off_track(measurements[-1].value, innovation.value)]
+def end_of_life(
+    sample: Posterior,
+    series: Series,
+    assumptions: Assumptions,
+    tracked: Tracked,
+    cycles: float,
+    fraction: float,
+    horizon: float,
+) -> StatedEnd:
+    """The end of life ζ as it is stated at `cycles`, up to a horizon in ζ."""
+    as_of = float(series.scale.progress(cycles))
+    return stated_end(
+        sample,
+        fraction=fraction,
+        as_of=as_of,
+        horizon=max(horizon, as_of),
+        offset=offset_of(series, assumptions),
+        power=tracked.back_cast.widening,
+        ended=assumptions.ended((series.quantity, series.pressure), fraction, series.scale),
+    )
 
 
 def offset_of(series: Series, assumptions: Assumptions) -> Offset | None:
@@ -219,40 +282,3 @@ def offset_of(series: Series, assumptions: Assumptions) -> Offset | None:
     if assumptions.model.course is None:
         return None
     return lambda progress: assumptions.offset(series.quantity, series.pressure, series.scale.cycles(progress))
-
-
-def predict_at(
-    clutch_id: str,
-    events: Sequence[Event],
-    assumptions: Assumptions,
-    fraction: float,
-    *,
-    method: str,
-    pressure_bar: float | None = None,
-    at_cycles: float | None = None,
-) -> dict[str, Any]:
-    """The prediction at one pressure of the reference test, or over all, as it would have been made at `at_cycles`.
-
-    Raises NotFoundError where the reference test did not measure that pressure.
-    """
-    lives = lives_of(events)
-    level = ALL_PRESSURES if pressure_bar is None else _level(lives[-1] if lives else None, pressure_bar)
-    happened = [event for event in events if at_cycles is None or event.cycles <= at_cycles]
-    if not happened:
-        return insufficient(assumptions, None, level, fraction)
-    life = lives_of(happened)[-1]
-    cycles = happened[-1].cycles
-    series = life.pooled(assumptions) if pressure_bar is None else life.at(assumptions, level)
-    if not series.measurements:
-        return insufficient(assumptions, cycles, level, fraction)
-    tracked = advance(clutch_id, method, series, assumptions, None, len(series.measurements))
-    return predict(clutch_id, method, series, assumptions, tracked, cycles, fraction)
-
-
-def _level(life: Life | None, pressure_bar: float) -> float:
-    levels = [] if life is None else sorted(life.reference)
-    level = nearest_pressure(pressure_bar * PASCALS_PER_BAR, levels)
-    if level is None:
-        measured = ", ".join(f"{bar(level):g}" for level in levels) or "none"
-        raise NotFoundError(f"no track at {pressure_bar:g} bar; the pressures of the first stationary test: {measured}")
-    return level

@@ -76,9 +76,15 @@ def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     for item in payload["items"]:
         yield (
             {name: item[name] for name in COLUMNS[:3]}
-            | {name: item["coefficients"][name]["value"] for name in _COEFFICIENTS}
-            | {f"{name}_sd": item["coefficients"][name]["sd"] for name in _COEFFICIENTS}
+            | {name: _part(item, name, "value") for name in _COEFFICIENTS}
+            | {f"{name}_sd": _part(item, name, "sd") for name in _COEFFICIENTS}
         )
+
+
+def _part(item: Mapping[str, Any], name: str, part: str) -> float | None:
+    """A number of a coefficient of eq. 6; None where the quantity does not follow it."""
+    coefficients = item["coefficients"]
+    return None if coefficients is None else coefficients[name][part]
 
 
 def _from_parameters(

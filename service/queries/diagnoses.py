@@ -7,7 +7,7 @@ from sqlalchemy import Connection
 from service import records
 from service.columns import whole
 from service.errors import NotFoundError
-from service.lives.diagnosis_report import empty
+from service.lives.diagnosis.report import empty
 from storage import changes, diagnoses
 from storage.diagnoses import DiagnosisRow
 from storage.engine.database import Database

@@ -4,12 +4,18 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
+from models.degradation.severity import SeverityBasis
+from models.prognosis.criteria import FEWEST_ALIVE
+from models.prognosis.ended_lives import EndedLife, severity_exponent
 from models.prognosis.fleet import FleetPrior
 from storage import assumptions
 from storage.assumptions import FleetPriorRow
 from storage.engine.database import Database
 
-_KINDS, _OWN = ("friction_material", "reaction_plate", "fluid", "origin"), ("version", "created_at", "clutches")
+_KINDS = ("friction_material", "reaction_plate", "fluid", "origin")
+_OWN = ("version", "created_at", "clutches", "ended_lives")
 COLUMNS = (*_KINDS, "severity", *_OWN)
 
 
@@ -26,6 +32,7 @@ def rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
             {name: item["kind"][name] for name in _KINDS}
             | {"severity": item["kind"]["severity"]["basis"]}
             | {name: item[name] for name in _OWN}
+            | {"severity_exponent": (item["severity_exponent"] or {}).get("value")}
             | {f"{name}_median": spread["median"] for name, spread in item["population"].items()}
             | {f"{name}_sd": spread.get("sd", spread.get("log_sd")) for name, spread in item["population"].items()}
         )
@@ -40,7 +47,21 @@ def _item(row: FleetPriorRow) -> dict[str, Any]:
         "clutches": len(row.members),
         "members": list(row.members),
         "population": _population(FleetPrior.from_dict(row.content)),
+        "ended_lives": len(row.content.get("ended", ())),
+        "severity_exponent": _severity_exponent(row),
     }
+
+
+def _severity_exponent(row: FleetPriorRow) -> dict[str, float] | None:
+    """By which power of a cycle's energy the ended lives were shorter; None where they cannot tell it."""
+    lives = [EndedLife.from_dict(stored) for stored in row.content.get("ended", ())]
+    by_energy = [(life.end, life.energy) for life in lives if life.energy]
+    if len(by_energy) < FEWEST_ALIVE or len({energy for _, energy in by_energy}) == 1:
+        return None
+    value, deviation = severity_exponent(*np.array(by_energy).T)
+    severity = row.fleet["severity"]
+    counted = severity["exponent"] if severity["basis"] == SeverityBasis.DISSIPATED_ENERGY else 0.0
+    return {"value": value + counted, "sd": deviation}
 
 
 def _population(prior: FleetPrior) -> Mapping[str, Any]:

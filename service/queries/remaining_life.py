@@ -6,7 +6,8 @@ from typing import Any
 from service import records
 from service.errors import NotFoundError
 from service.lives.assumptions import ALL_PRESSURES
-from service.lives.tracks import predict_at
+from service.lives.prediction_at import predict_at
+from service.lives.tracks import CARRIED
 from storage import clutches, results
 from storage.engine.database import Database
 
@@ -28,7 +29,8 @@ def remaining_life(
             if pressure_bar is None
             else None
         )
-        state = records.state(connection, clutch_id) if stored is None else None
+        now = pressure_bar is None and at_cycles is None
+        state = records.state(connection, clutch_id, carried=now) if stored is None else None
     head = {
         "clutch_id": clutch_id,
         "method": method,
@@ -39,6 +41,7 @@ def remaining_life(
         return head | stored.payload
     if state is None:
         raise AssertionError("a prediction is stored, or the state was loaded")
+    carried = (state.filters or {}).get(CARRIED[0])
     return head | predict_at(
         clutch_id,
         state.events,
@@ -47,6 +50,7 @@ def remaining_life(
         method=method,
         pressure_bar=pressure_bar,
         at_cycles=at_cycles,
+        back_cast=None if carried is None else carried.back_cast,
     )
 
 

@@ -13,13 +13,15 @@ from typing import Any
 import numpy as np
 
 from models.prognosis import scoring
+from models.prognosis.back_cast import BackCast
 from models.prognosis.criteria import HORIZON, QUANTILES
 from service import records
 from service.columns import whole
 from service.lives.assumptions import ALL_PRESSURES, Assumptions
 from service.lives.history import Event, Life
 from service.lives.payloads import INSUFFICIENT
-from service.lives.tracks import CARRIED, predict_at
+from service.lives.prediction_at import predict_at
+from service.lives.tracks import CARRIED
 from service.queries.cache import AnswerCache
 from storage import clutches, results
 from storage.encoding.json_text import to_text
@@ -86,19 +88,14 @@ def end_of_life(clutch_id: str, life: Life, assumptions: Assumptions, fraction: 
     series = life.pooled(assumptions)
     if not series.measurements:
         return None
-    prediction = predict_at(clutch_id, life.events, assumptions, fraction, method="grid")
+    prediction = predict_at(clutch_id, life.events, assumptions, fraction, method="grid", back_cast=BackCast.nothing())
     threshold = prediction["criterion"]["threshold_mean_cof"]
     if prediction["status"] == INSUFFICIENT or threshold is None:
         return None
     cycles = np.array([life.events[index].cycles for index in series.events])
     values = np.array([measurement.value for measurement in series.measurements])
     values = values + assumptions.offset(series.quantity, series.pressure, cycles)
-    below = np.flatnonzero(values <= threshold)
-    if below.size == 0 or below[0] == 0:
-        return None
-    last, first = int(below[0]) - 1, int(below[0])
-    share = (values[last] - threshold) / (values[last] - values[first])
-    return float(cycles[last] + share * (cycles[first] - cycles[last]))
+    return scoring.measured_end(cycles, values, threshold)
 
 
 def _predictions(

@@ -46,9 +46,12 @@ class DegradationItem(Answer):
     quantity: str = Field(description="A Stribeck parameter, or `mean_cof`")
     unit: str = Field(description="Its unit")
     pressure_bar: float | None = Field(description="Line pressure, bar; null: the mean over the reference pressures")
-    coefficients: Coefficients = Field(description="The coefficients of eq. 6")
+    coefficients: Coefficients | None = Field(
+        description="The coefficients of eq. 6, where the quantity follows it; null where it surely does not"
+    )
+    eq6_probability: float = Field(description="How probable it is that the quantity follows eq. 6")
     measured: Measured = Field(description="The fitted values of the tests")
-    trajectory: Trajectory = Field(description="Eq. 6 with its 90 % band")
+    trajectory: Trajectory = Field(description="The course as tracked, with its 90 % band")
 
 
 class Disagreement(Answer):

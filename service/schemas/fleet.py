@@ -39,6 +39,13 @@ class Population(Answer):
     scatter: Factor = Field(description="Scatter from run to run as a share of ξ0")
 
 
+class SeverityEstimate(Answer):
+    """The exponent of a duty cycle's energy, estimated from ended lives."""
+
+    value: float = Field(description="Estimate")
+    sd: float = Field(description="Its standard deviation")
+
+
 class FleetPriorOut(Answer):
     """The prior learned from clutches of one kind; each of its members is tracked under what the others have in common."""
 
@@ -48,6 +55,10 @@ class FleetPriorOut(Answer):
     clutches: int = Field(description="Number of clutches that it was learned from")
     members: list[str] = Field(description="Their names")
     population: Population = Field(description="The coefficients among them")
+    ended_lives: int = Field(description="Lives of theirs that have ended: they calibrate what is stated of the next")
+    severity_exponent: SeverityEstimate | None = Field(
+        description="By which power of a duty cycle's energy these lives were shorter; null where they cannot tell"
+    )
 
 
 class FleetPriorPage(Answer):

@@ -66,6 +66,41 @@ Prior = Annotated[PriorName, Field(description="The prior that the answer was co
 SeverityUsed = Annotated[SeverityName, Field(description="The argument of eq. 6")]
 
 
+class CourseShare(Answer):
+    """A kind of course that mean COF may take, by the order n of its kinetics dD/dζ = ∓k Dⁿ."""
+
+    name: Literal["eq6", "slowing", "accelerating"] = Field(
+        description="As eq. 6, whose order is above 1; slowing down otherwise; accelerating"
+    )
+    probability: float = Field(description="Its probability")
+    order: float | None = Field(description="The median of its order n; null for a logarithm alone")
+
+
+class BackCastCount(Answer):
+    """How earlier forecasts of a clutch fared with the tests since, and what follows for this one."""
+
+    held: int = Field(description="Tests that lay within the 90 % interval forecast for them")
+    of: int = Field(description="Tests that a forecast was kept for")
+    widening: float = Field(
+        description="The power to which remaining life was raised, as a multiple of its median; 1: not widened"
+    )
+
+
+class SampleQuality(Answer):
+    """The weighted draws that a prediction is made of."""
+
+    effective_draws: float = Field(description="How many draws of equal weight would be worth as much")
+    status: Literal["sound", "few_draws", "forced"] = Field(
+        description="`forced`: the last test came as more of a surprise than the particles could follow; ask `grid`"
+    )
+
+
+class Course(CourseShare):
+    """The most probable kind of course, and the others."""
+
+    alternatives: list[CourseShare] = Field(description="The other kinds, the more probable first")
+
+
 class RemainingLife(Answer):
     """The duty cycles that remain until mean COF has fallen to the criterion's fraction of its initial value."""
 
@@ -83,6 +118,19 @@ class RemainingLife(Answer):
     end_of_life_cycles: Quantiles = Field(description="Quantiles of the duty cycles since new at the end of life")
     probability_of_reaching: float | None = Field(
         description="Probability that the threshold is reached by the horizon"
+    )
+    course: Course | None = Field(
+        default=None, description="The course that the tests speak for; null where nothing is predicted"
+    )
+    back_cast: BackCastCount | None = Field(
+        default=None, description="What earlier forecasts of this clutch said about the tests since"
+    )
+    ended_lives: int = Field(
+        default=0,
+        description="Lives of the same kind that ended, and later than this one is old, by which the end was calibrated",
+    )
+    sample: SampleQuality | None = Field(
+        default=None, description="The draws behind the prediction; null where nothing is predicted"
     )
     horizon_cycles: float = Field(description="The prediction goes no further than this many duty cycles")
     model: Model

@@ -30,3 +30,7 @@ IDENTIFIER_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._:@+-]{0,127}$"
 MOST_MARKS = 10_000
 #: Samples of a channel that a plot may ask for: more than any screen has pixels; all samples need no argument.
 MOST_POINTS = 1_000_000
+#: Blocks of a programme of planned duty.
+MOST_BLOCKS = 1000
+#: The fewest cycles of a planned block, and its least energy a cycle, kJ: less is mistyped.
+LEAST_BLOCK_CYCLES, LEAST_PLANNED_KJ = 1, 1e-6

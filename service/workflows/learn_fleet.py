@@ -8,15 +8,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
-from models.prognosis.criteria import FEWEST_CLUTCHES, FEWEST_TESTS_TO_LEARN
-from models.prognosis.fleet import FleetPrior, Taught, population, taught
+import numpy as np
+
+from models.prognosis.criteria import FEWEST_CLUTCHES, FEWEST_TESTS_TO_LEARN, HORIZON
+from models.prognosis.ended_lives import EndedLife, ended_life
+from models.prognosis.fleet import Taught, population, taught
+from models.prognosis.scoring import measured_end
 from service import records
 from service.background import AtOnce, directly
 from service.lives.assumptions import ALL_PRESSURES, Assumptions, kind_of
 from service.lives.history import Life
 from service.lives.payloads import warned_anew
 from service.lives.recomputation import ClutchState, Results, track
-from service.lives.tracks import CARRIED
+from service.lives.tracks import CARRIED, offset_of
 from service.settings import CODE_VERSION
 from storage import assumptions, clutches, results
 from storage.assumptions import NOBODY, FleetPriorRow
@@ -28,16 +32,28 @@ _ATTEMPTS = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Lesson:
+    """What a life has taught: of eq. 6's coefficients, and, where it has ended, of its end; ζ in standard cycles."""
+
+    taught: Taught
+    ended: EndedLife | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Fleet:
     """Clutches of a kind, and what the lives of each have taught."""
 
     kind: Json
-    lessons: dict[str, list[Taught]] = field(default_factory=dict)
+    lessons: dict[str, list[Lesson]] = field(default_factory=dict)
 
-    def without(self, clutch_id: str = NOBODY) -> FleetPrior | None:
-        """What all clutches but one have taught; None where too few are left."""
+    def without(self, clutch_id: str = NOBODY) -> Json | None:
+        """What all clutches but one have taught, as it is stored; None where too few are left."""
         left = [lessons for name, lessons in sorted(self.lessons.items()) if name != clutch_id]
-        return population([lesson for lessons in left for lesson in lessons]) if len(left) >= FEWEST_CLUTCHES else None
+        if len(left) < FEWEST_CLUTCHES:
+            return None
+        lessons = [lesson for own in left for lesson in own]
+        ended = [lesson.ended.to_dict() for lesson in lessons if lesson.ended is not None]
+        return population([lesson.taught for lesson in lessons]).to_dict() | {"ended": ended}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,22 +92,39 @@ def refresh(database: Database, *, now: str, at_once: AtOnce = directly) -> Refr
     )
 
 
-def _lessons(database: Database, clutch_id: str) -> tuple[Json, list[Taught]]:
+def _lessons(database: Database, clutch_id: str) -> tuple[Json, list[Lesson]]:
     with database.reading() as connection:
         state = records.state(connection, clutch_id)
     assumptions = state.assumptions()
-    lessons = [_lesson(life, assumptions) for life in state.lives]
+    lessons = [_lesson(life, assumptions, state.fraction) for life in state.lives]
     kind = kind_of(state.record, assumptions.severity)
     return kind, [lesson for lesson in lessons if lesson is not None]
 
 
-def _lesson(life: Life, assumptions: Assumptions) -> Taught | None:
-    """What a life teaches, its ζ counted in standard cycles; None where it was tested too little."""
+def _lesson(life: Life, assumptions: Assumptions, fraction: float) -> Lesson | None:
+    """What a life teaches; None where it was tested too little."""
     series = life.pooled(assumptions)
-    if len(series.measurements) < FEWEST_TESTS_TO_LEARN:
+    measurements, unit = series.measurements, series.scale.severity.unit
+    if len(measurements) < FEWEST_TESTS_TO_LEARN:
         return None
-    unit = series.scale.severity.unit
-    return taught([replace(measurement, progress=measurement.progress * unit) for measurement in series.measurements])
+    lesson = taught([replace(measurement, progress=measurement.progress * unit) for measurement in measurements])
+    offset = offset_of(series, assumptions)
+    progress = np.array([measurement.progress for measurement in measurements])
+    values = np.array([measurement.value for measurement in measurements])
+    initial = lesson.initial
+    if offset is not None:
+        values = values + offset(progress)
+        initial += float(offset(np.zeros(1))[0])
+    end = measured_end(progress, values, fraction * initial)
+    if end is None:
+        return Lesson(taught=lesson, ended=None)
+    horizon = float(series.scale.progress(series.scale.origin + HORIZON))
+    ended = ended_life(measurements, end, fraction=fraction, horizon=horizon, offset=offset)
+    if ended is None:
+        return Lesson(taught=lesson, ended=None)
+    duty = [event.duty for event in life.events if event.duty is not None and event.duty.energy is not None]
+    worked, done = sum(block.cycles for block in duty), sum(block.cycles * (block.energy or 0.0) for block in duty)
+    return Lesson(taught=lesson, ended=replace(ended.in_unit(1.0 / unit), energy=done / worked if worked else None))
 
 
 def _stored_anew(database: Database, fleet: Fleet, now: str, at_once: AtOnce) -> bool:
@@ -99,7 +132,7 @@ def _stored_anew(database: Database, fleet: Fleet, now: str, at_once: AtOnce) ->
     learned = fleet.without()
     with database.reading() as connection:
         stored = assumptions.current_fleet_prior(connection, fleet.kind)
-    if learned is None or (stored is not None and stored.content == learned.to_dict()):
+    if learned is None or (stored is not None and stored.content == learned):
         return False
     version = 1 if stored is None else stored.version + 1
     rows = _versions(fleet, version, now)
@@ -128,7 +161,7 @@ def _versions(fleet: Fleet, version: int, now: str) -> Sequence[FleetPriorRow]:
             left_out=left_out,
             created_at=now,
             members=members,
-            content=prior.to_dict(),
+            content=prior,
             code_version=CODE_VERSION,
         )
         for left_out, prior in priors.items()

@@ -10,8 +10,9 @@ from tests.architecture.source import ROOT
 #: An errand by its part of docs/architecture.md, and the most files of service and storage that it may enter.
 ERRANDS = [
     pytest.param("get", rooms.of_get, 10, id="GET remaining-useful-life"),
-    # 24 before plausibility (7), workers, the watch and the lock beside the file; see docs/architecture.md
-    pytest.param("post", rooms.of_post, 33, id="POST a stationary run"),
+    # 24 before plausibility (7), workers, the watch and the lock beside the file, a prediction's warnings; see
+    # docs/architecture.md
+    pytest.param("post", rooms.of_post, 34, id="POST a stationary run"),
 ]
 
 

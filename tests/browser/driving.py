@@ -48,6 +48,7 @@ def chromium() -> Iterator[Browser]:
 
 def pointed_at(page: Page, chart: str = "fan") -> None:
     """Point at a chart and away again, as who wants to zoom: from then on the plotting library draws all of them."""
+    page.locator(f"#chart-{chart}").scroll_into_view_if_needed()  # on a phone it begins below what is drawn ahead
     page.locator(f"#chart-{chart}[data-sketched]").wait_for()
     page.locator(f"#chart-{chart} .plot").hover(position={"x": 3, "y": 3})
     page.mouse.move(0, 0)

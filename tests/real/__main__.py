@@ -8,7 +8,7 @@ from typing import Any
 
 import httpx2
 
-from tests.real import diagnosis, lag, loaders, prognosis
+from tests.real import diagnosis, fleets, lag, lives, loaders, prognosis
 from tests.support import serving
 
 
@@ -89,6 +89,9 @@ def main() -> int:
     diagnosis.main()
     print("\n## The prognosis\n")
     prognosis.main()
+    lives.main()
+    print()
+    fleets.main()
     return 0
 
 

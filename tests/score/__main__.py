@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 
 from tests.score import off_prior, on_prior
+from tests.score.after_end import after_end
 from tests.score.belief import belief
 from tests.score.fleets import fleets
 from tests.score.table import written
@@ -35,6 +36,7 @@ def main() -> None:
         "never": lambda: off_prior.never(lives(1_000), seed + 4),
         "events": lambda: off_prior.after_event(lives(100), seed + 5),
         "fleets": lambda: fleets(lives(40), seed + 6),
+        "after": lambda: after_end(lives(100), seed + 8),
     }
     for name in chosen.parts or parts:
         start = time.monotonic()

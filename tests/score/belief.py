@@ -1,4 +1,4 @@
-"""How much doubt of eq. 6 to keep: what each belief costs on lives that follow it, and gains on lives that do not.
+"""How much to believe in eq. 6: what each belief costs on lives that follow it, and gains on lives that take another course.
 
 Every life is laid once, under much doubt; the draws, weighted by belief over belief, tell what each belief would have said.
 """
@@ -9,8 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.tracking.criteria import SIZES
-from models.tracking.discrepancy import log_size_weight
+from models.tracking.courses import form_of, log_form_weight
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.prior import Prior, weak
@@ -18,28 +17,36 @@ from tests.score.table import Score, percents, score
 from tests.statistical.laws import LAWS, observed
 from tests.statistical.lives import PRIOR, STAGES, lives
 
-DOUBT, DRAWS = 0.3, 2_000
-BELIEFS = (0.9, 0.95, 0.97, 0.99, 1.0)
+LAID, DRAWS = 0.4, 2_000
+BELIEFS = (0.3, 0.5, 0.55, 0.6, 0.7, 0.8, 0.9, 1.0)
 
 
 def belief(count: int, seed: int) -> str:
-    """By belief in eq. 6: how often the interval holds the truth, and CRPS of the end's logarithm over that of the sure."""
+    """By belief in eq. 6: how often the interval holds the truth, how wide it is and CRPS of the end's logarithm, both over
+    those of the sure."""
     eq_6 = _told(_from_prior(count, seed))
     sure = np.mean([each.log_crps for stage in eq_6[1.0] for each in stage])
+    narrow = [np.median([each.width for each in stage]) for stage in eq_6[1.0]]
     others = {name: _told(_off(name, max(8, count // 15), seed)) for name in LAWS if not name.startswith("one eq. 6")}
     lines = [
         f"{count} lives of eq. 6, {max(8, count // 15)} of each other law, seed {seed}; held at 20/40/60/80 % of life\n",
-        f"| belief in eq. 6 | its lives, % | CRPS over that of the sure | {' | '.join(f'{each}, %' for each in others)} |",
-        "|---" * (3 + len(others)) + "|",
+        "| belief in eq. 6 | its lives, % | width over that of the sure | CRPS over that of the sure | "
+        + " | ".join(f"{each}, %" for each in others)
+        + " |",
+        "|---" * (4 + len(others)) + "|",
     ]
     for share in BELIEFS:
         held = "/".join(f"{100 * np.mean([each.held for each in stage]):.1f}" for stage in eq_6[share])
         crps = np.mean([each.log_crps for stage in eq_6[share] for each in stage]) / sure
+        wide = "/".join(
+            f"{np.median([each.width for each in stage]) / least:.2f}"
+            for stage, least in zip(eq_6[share], narrow, strict=True)
+        )
         rest = [
             percents([float(np.mean([e.held for e in stage])) for stage in outcomes[share]])
             for outcomes in others.values()
         ]
-        lines.append(f"| {100 * share:.0f} % | {held} | {crps:.3f} | " + " | ".join(rest) + " |")
+        lines.append(f"| {100 * share:.0f} % | {held} | {wide} | {crps:.3f} | " + " | ".join(rest) + " |")
     return "\n".join(lines)
 
 
@@ -49,15 +56,16 @@ def _told(
     """By belief and stage the scores of all lives."""
     grid, found = Grid(), defaultdict(lambda: [[] for _ in STAGES])
     for prior, stages, end, rng in cases:
-        doubtful = replace(prior, law_share=1.0 - DOUBT)
+        doubtful = replace(prior, eq_6_share=LAID)
         for index, seen in enumerate(stages):
             drawn = grid.posterior(grid.from_history(doubtful, seen), DRAWS, rng)
             beside = drawn.discrepancy
             assert beside is not None
-            kind = np.abs(beside.size[:, None] - SIZES).argmin(axis=1)
+            assert drawn.proportional is not None
+            form = form_of(drawn.course, beside.size, drawn.proportional)
             for share in BELIEFS:
-                lean = np.exp(log_size_weight(replace(prior, law_share=share)) - log_size_weight(doubtful))
-                weight = drawn.weight * lean[kind]
+                lean = np.exp(log_form_weight(replace(prior, eq_6_share=share)) - log_form_weight(doubtful))
+                weight = drawn.weight * lean[form]
                 # where the data leave no draw of eq. 6 the sure are as wrong as can be
                 weight = weight / weight.sum() if weight.any() else np.full(weight.size, 1.0 / weight.size)
                 found[share][index].append(score(replace(drawn, weight=weight), end))

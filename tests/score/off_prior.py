@@ -9,8 +9,8 @@ import numpy as np
 
 from models.prognosis.first_passage import ends_of_life, predict_first_passage
 from models.rig.truth import draw
-from models.tracking.criteria import SIZES
-from models.tracking.discrepancy import FUTURE, PAST, Discrepancy, log_size_weight
+from models.tracking.courses import FORM_COURSE, FORM_PROPORTIONAL, FORM_SIZE, coefficients_at, log_form_weight
+from models.tracking.discrepancy import FUTURE, PAST, Discrepancy
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
@@ -96,12 +96,19 @@ def stated(count: int, seed: int, *, whole: bool) -> tuple[np.ndarray, np.ndarra
             continue
         noise = truth.scatter * rng.standard_normal(runs)
         if whole:
-            size = rng.choice(SIZES, p=np.exp(log_size_weight(PRIOR)))
+            form = rng.choice(FORM_SIZE.size, p=np.exp(log_form_weight(PRIOR)))
+            size, course = FORM_SIZE[form], FORM_COURSE[[form]]
+            scale, exponent = coefficients_at(np.log(truth.scale), np.log(truth.exponent), course)
+            if scale[0] < 0.0 and -scale[0] <= last:  # ended before it was measured
+                continue
+            truth = replace(truth, scale=scale, exponent=exponent)
             course = size * PRIOR.size * rng.standard_normal((1, PAST + FUTURE))
             beside = Discrepancy(
                 span=last, size=np.full(1, size), curvature=course, at=np.zeros(0), height=np.zeros((1, 0))
             )
             truth = replace(truth, discrepancy=beside)
+            if FORM_PROPORTIONAL[form]:
+                noise *= np.abs(truth.values(np.linspace(0.0, last, runs))[:, 0]) / PRIOR.size
             outlying = rng.random(runs) < PRIOR.outlying_share
             noise += outlying * PRIOR.outlying_size * PRIOR.size * rng.standard_normal(runs)
         zeta = np.linspace(0.0, last, runs)

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from models.prognosis.first_passage import weighted_quantiles
 from models.prognosis.scoring import crps_of_sample, pit_histogram, pit_of_sample
 from models.tracking.posterior import Posterior
-from tests.statistical.lives import ends, interval
+from tests.statistical.lives import ends
 
 DOCS = Path(__file__).parents[2] / "docs" / "prognosis.md"
 
@@ -28,15 +29,15 @@ class Score:
     pit: float
 
 
-def score(posterior: Posterior, end: float) -> Score:
-    sample, (low, high) = ends(posterior), interval(posterior)
+def score(sample: np.ndarray, weight: np.ndarray, end: float) -> Score:
+    low, high = weighted_quantiles(sample, weight, (0.05, 0.95)).tolist()
     return Score(
-        crps=crps_of_sample(sample, posterior.weight, end) / end,
-        log_crps=crps_of_sample(np.log(np.maximum(sample, 1.0)), posterior.weight, math.log(end)),
+        crps=crps_of_sample(sample, weight, end) / end,
+        log_crps=crps_of_sample(np.log(np.maximum(sample, 1.0)), weight, math.log(end)),
         width=(high - low) / end,
         held=low <= end <= high,
         late=low > end,
-        pit=pit_of_sample(sample, posterior.weight, end),
+        pit=pit_of_sample(sample, weight, end),
     )
 
 
@@ -47,7 +48,10 @@ class Scores:
     kept: dict[tuple[str, float], list[Score]] = field(default_factory=lambda: defaultdict(list))
 
     def add(self, name: str, stage: float, posterior: Posterior, end: float) -> None:
-        self.kept[name, stage].append(score(posterior, end))
+        self.add_sample(name, stage, ends(posterior), posterior.weight, end)
+
+    def add_sample(self, name: str, stage: float, sample: np.ndarray, weight: np.ndarray, end: float) -> None:
+        self.kept[name, stage].append(score(sample, weight, end))
 
     def column(self, name: str, stage: float, what: str) -> np.ndarray:
         return np.array([getattr(each, what) for each in self.kept[name, stage]], dtype=float)

@@ -19,6 +19,8 @@ LAWS: dict[str, Callable[[float], float]] = {
     "exponential to a floor": lambda x: 1 - 0.6 * (1 - math.exp(-1.792 * x)),
     "logarithm": lambda x: 1 - 0.5 * math.log1p(20 * x) / math.log(21),
     "straight line": lambda x: 1 - 0.5 * x,
+    "accelerating (n = -1)": lambda x: 1 - 0.75 * (1 - math.sqrt(1 - x / 1.125)),
+    "exponential growth": lambda x: 1 - 0.5 * math.expm1(3 * x) / math.expm1(3),
     "two stages": lambda x: 1 - 0.25 * (1 - math.exp(-8 * x)) - 0.25 * max(0.0, x - 0.3) / 0.7,
 }
 

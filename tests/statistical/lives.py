@@ -11,8 +11,8 @@ from models.degradation.general_order import Degradation, first_passage, value
 from models.prognosis.first_passage import ends_of_life, weighted_quantiles
 from models.prognosis.scoring import crps_of_sample
 from models.tracking import linear_model, sampling
-from models.tracking.criteria import SIZES
-from models.tracking.discrepancy import PAST, drawn, log_size_weight
+from models.tracking.courses import FORM_PROPORTIONAL, FORM_SIZE, coefficients_at, log_form_weight, unit_of_change
+from models.tracking.discrepancy import PAST, drawn
 from models.tracking.filters.particle import ParticleState
 from models.tracking.history import History
 from models.tracking.linear_model import Points
@@ -126,13 +126,15 @@ def sampled(
     initial, change = given.initial + pair[:, 0], given.change + pair[:, 1]
     normals = rng.standard_normal((count, PAST + history.steps.size))
     further = linear_model.drawn_terms(terms, initial - prior.initial_mean, change, normals)
+    scale, exponent = coefficients_at(kept.log_scale, kept.log_exponent, kept.course)
     return Posterior(
         weight=np.full(count, 1.0 / count),
         initial=initial,
-        change=change,
-        scale=np.exp(kept.log_scale),
-        exponent=np.exp(kept.log_exponent),
+        change=change / unit_of_change(kept.course),
+        scale=scale,
+        exponent=exponent,
         scatter=np.exp(kept.log_scatter),
+        proportional=FORM_PROPORTIONAL[kept.form],
         discrepancy=drawn(history, prior, kept.size, further, rng),
     )
 
@@ -158,8 +160,8 @@ def log_prior(prior: Prior, points: Points) -> np.ndarray:
     """Log prior density of points [n], without the constant of the normals."""
     count, share = points.outlying.sum(axis=0), max(prior.outlying_share, 1e-300)
     chance = count * math.log(share) + (points.outlying.shape[0] - count) * math.log1p(-prior.outlying_share)
-    size = log_size_weight(prior)[np.abs(points.size[:, None] - SIZES).argmin(axis=1)]
-    return prior.log_density(points.log_scale, points.log_exponent, points.log_scatter) + size + chance
+    flat = prior.log_density(points.log_scale, points.log_exponent, points.log_scatter)
+    return np.asarray(flat + log_form_weight(prior)[points.form] + chance)
 
 
 def from_prior(
@@ -173,7 +175,7 @@ def from_prior(
         log_scale=normals[:, 0],
         log_exponent=normals[:, 1],
         log_scatter=normals[:, 2],
-        size=rng.choice(SIZES, size=count, p=np.exp(log_size_weight(prior))),
+        form=rng.choice(FORM_SIZE.size, size=count, p=np.exp(log_form_weight(prior))),
         outlying=(rng.random((len(measurements), count)) < prior.outlying_share).astype(float),
     )
     log_weight, effective_count = weighted(prior, measurements, points, log_prior(prior, points))
@@ -204,21 +206,21 @@ def exact(
         apart = np.square(here[chunk]).sum(axis=1)[:, None] + np.square(there).sum(axis=1) - 2.0 * here[chunk] @ there.T
         tails = 1.0 + np.maximum(apart, 0.0) / 4.0
         near[chunk] = np.log((1.0 / (tails * tails * tails * np.sqrt(tails))) @ share)
-    sizes = 0.9 * np.bincount(cloud.size.astype(int), weights=share, minlength=SIZES.size) + 0.1 / SIZES.size
+    forms = 0.9 * np.bincount(cloud.form.astype(int), weights=share, minlength=FORM_SIZE.size) + 0.1 / FORM_SIZE.size
     sets, which = np.unique(cloud.outlying, axis=0, return_inverse=True)
     chances = np.bincount(which.ravel(), weights=share)
     chances = 0.9 * chances + 0.1 / chances.size
-    size, group = rng.choice(SIZES.size, size=count, p=sizes), rng.choice(chances.size, size=count, p=chances)
+    form, group = rng.choice(FORM_SIZE.size, size=count, p=forms), rng.choice(chances.size, size=count, p=chances)
     back = proposed @ np.linalg.inv(TURN)
     points = Points(
         log_scale=back[:, 0],
         log_exponent=back[:, 1],
         log_scatter=back[:, 2],
-        size=SIZES[size],
+        form=form,
         outlying=sets[group].T,
     )
     log_weight, effective_count = weighted(
-        prior, measurements, points, near + np.log(sizes)[size] + np.log(chances)[group]
+        prior, measurements, points, near + np.log(forms)[form] + np.log(chances)[group]
     )
     return sampled(prior, measurements, points, log_weight, 4_000), effective_count
 

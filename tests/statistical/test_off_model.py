@@ -52,7 +52,7 @@ def test_a_filter_sure_of_eq_6_is_wrong_about_a_line() -> None:
             )
             for x in np.linspace(0.0, 0.6, 19).tolist()
         ]
-        prior = replace(weak(seen[0], falling=True), law_share=1.0)
+        prior = replace(weak(seen[0], falling=True), law_share=1.0, eq_6_share=1.0)
         posterior = Grid().posterior(Grid().from_history(prior, seen), 1_000, rng)
         found = predict_first_passage(posterior, fraction=0.5, as_of=6_000.0).end_of_life
         held.append((found[0.05] or math.inf) <= 10_000.0)

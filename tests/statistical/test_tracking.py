@@ -198,6 +198,7 @@ def test_a_filter_sure_of_too_little_scatter_is_found_out() -> None:
         log_scatter_mean=PRIOR.log_scatter_mean - math.log(5.0),
         log_scatter_sd=0.01,
         law_share=1.0,
+        eq_6_share=1.0,
         outlying_share=0.0,
     )
     found = coverage(60, 601, belief)

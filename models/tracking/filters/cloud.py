@@ -1,25 +1,28 @@
 """A cloud of particles, the target that they stand for, and the bridge from one history's posterior to the next one's."""
 
+import math
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.tracking.criteria import SIZES
-from models.tracking.discrepancy import log_size_weight
+from models.tracking.courses import FORM_COURSE, SCALE_SIGN, basis, log_form_weight
 from models.tracking.history import History
-from models.tracking.linear_model import Points, basis, evidence, last_outlying, log_outlying, pointwise
+from models.tracking.linear_model import Points, evidence, last_outlying, log_outlying, pointwise
 from models.tracking.prior import Prior
+
+#: The log prior of a course that ended before the last measurement.
+_NEVER = -1e6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cloud:
-    """n particles: points [n, 3] of (log φ, log ε, log s), size [n] an index into SIZES, outlying [n, t] (0, 1),
-    log_weight [n] and log_target [n] (log prior plus evidence)."""
+    """n particles: points [n, 3] of (log |φ|, log |ε|, log s), form [n] (`courses`), outlying [n, t] (0, 1), log_weight [n]
+    and log_target [n] (log prior plus evidence)."""
 
     points: FloatArray
-    size: FloatArray
+    form: FloatArray
     outlying: FloatArray
     log_weight: FloatArray
     log_target: FloatArray
@@ -29,13 +32,18 @@ class Cloud:
         cloud = Cloud(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
         return replace(cloud, log_weight=np.zeros(index.size))
 
+    @property
+    def course(self) -> NDArray[np.intp]:
+        """The course of every particle [n]."""
+        return FORM_COURSE[self.form.astype(np.intp)]
+
     def placed(self) -> Points:
         """The particles as points of the closed form."""
         return Points(
             log_scale=self.points[:, 0],
             log_exponent=self.points[:, 1],
             log_scatter=self.points[:, 2],
-            size=SIZES[self.size.astype(np.intp)],
+            form=self.form.astype(np.intp),
             outlying=self.outlying.T,
         )
 
@@ -51,7 +59,7 @@ class Bridge:
     def entered(self, cloud: Cloud, rng: np.random.Generator) -> tuple[Cloud, FloatArray, FloatArray]:
         """The particles with a flag for the new run, drawn from its posterior given the rest of each; and their log targets
         before (with the prior of that flag) and after."""
-        count = cloud.size.size
+        count = cloud.form.size
         as_sound = replace(cloud, outlying=np.column_stack([cloud.outlying, np.zeros(count)]))
         as_outlying = replace(cloud, outlying=np.column_stack([cloud.outlying, np.ones(count)]))
         table = table_of(self.after, cloud)
@@ -68,8 +76,8 @@ class Bridge:
         points = as_sound.placed()
         sums, terms = pointwise(self.after, self.prior, points, table)
         turned = last_outlying(self.after, self.prior, points, sums, terms, table[-1])
-        sound = evidence(sums, self.prior) + _log_prior(self.prior, as_sound)
-        return sound, evidence(turned, self.prior) + _log_prior(self.prior, as_outlying)
+        sound = evidence(sums, self.prior) + _log_prior(self.after, self.prior, as_sound)
+        return sound, evidence(turned, self.prior) + _log_prior(self.after, self.prior, as_outlying)
 
     def log_before(self, cloud: Cloud, table: FloatArray) -> FloatArray:
         """The target before the new run, with the prior of its flag; `table` is that of the runs after."""
@@ -83,17 +91,18 @@ def _log_prior_of_last(prior: Prior, cloud: Cloud) -> FloatArray:
 
 def table_of(history: History, cloud: Cloud) -> FloatArray:
     """b of every run and particle, [t, n]."""
-    return basis(history.progress[:, None], cloud.points[:, 0], cloud.points[:, 1])
+    return basis(history.progress[:, None], cloud.points[:, 0], cloud.points[:, 1], cloud.course)
 
 
 def log_target_of(history: History, prior: Prior, cloud: Cloud, table: FloatArray) -> FloatArray:
     """Log posterior density of every particle, up to a constant."""
-    return evidence(pointwise(history, prior, cloud.placed(), table)[0], prior) + _log_prior(prior, cloud)
+    return evidence(pointwise(history, prior, cloud.placed(), table)[0], prior) + _log_prior(history, prior, cloud)
 
 
-def _log_prior(prior: Prior, cloud: Cloud) -> FloatArray:
-    flat = prior.log_density(*cloud.points.T) + log_size_weight(prior)[cloud.size.astype(np.intp)]
-    return np.asarray(flat + log_outlying(prior, cloud.outlying.T))
+def _log_prior(history: History, prior: Prior, cloud: Cloud) -> FloatArray:
+    flat = prior.log_density(*cloud.points.T) + log_form_weight(prior)[cloud.form.astype(np.intp)]
+    ended = (SCALE_SIGN[cloud.course] < 0.0) & (cloud.points[:, 0] <= math.log(history.span))
+    return np.asarray(flat + log_outlying(prior, cloud.outlying.T) + np.where(ended, _NEVER, 0.0))
 
 
 def merged(old: Cloud, new: Cloud, accepted: NDArray[np.bool_]) -> Cloud:

@@ -1,4 +1,4 @@
-"""The exact posterior of eq. 6 on a grid: the reference of the other filters, and quick enough to be one itself.
+"""The exact posterior of eq. 6's family on a grid: the reference of the other filters, and quick enough to be one itself.
 
 ξ0, Δ, the discrepancy and the steps are integrated out in closed form at every node (`tracking.linear_model`), for all
 scatter levels at once by matrix products; the grid lies where the mass is (`tracking.filters.lattice`). The integrand is
@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from models.arrays import FloatArray
+from models.tracking.courses import FORM_PROPORTIONAL, coefficients_at, log_scale_at, unit_of_change
 from models.tracking.discrepancy import PAST, drawn
 from models.tracking.filters import lattice
-from models.tracking.filters.lattice import Frame, Kinds
+from models.tracking.filters.kinds import Kinds
+from models.tracking.filters.lattice import Frame
 from models.tracking.filters.outlying_refinement import completed
 from models.tracking.history import History
 from models.tracking.linear_model import Points, conditional, drawn_terms, evidence, pointwise
@@ -95,7 +97,7 @@ class Grid:
         prior, history = state.prior, state.history
         kinds, frame = completed(prior, history, *lattice.closed_in(prior, history))
         frame = frame.resized(self.rows, self.levels)
-        table = lattice.tabled(frame, self.nodes, history.progress)
+        table = lattice.tabled(frame, self.nodes, history, kinds.course)
         density = lattice.log_density(prior, history, kinds, frame, table)
         mass = np.exp(density - density.max()) * frame.cells(self.nodes)[:, None, :, None]
         return Laid(kinds=kinds, frame=frame, mass=mass / mass.sum())
@@ -108,7 +110,7 @@ class Grid:
         uniform = spread_points(count, offset[:5])
         chance = _blended(laid.mass)
         cell = np.unravel_index(systematic(chance.ravel(), count, float(offset[5])), chance.shape)
-        points, volume = _placed(laid, cell, uniform[:, :3])
+        points, volume = _placed(laid, cell, uniform[:, :3], history.span)
         sums, terms = pointwise(history, prior, points)
         density = evidence(sums, prior) + prior.log_density(points.log_scale, points.log_exponent, points.log_scatter)
         density += laid.kinds.log_weight[cell[0]]
@@ -118,13 +120,15 @@ class Grid:
         initial, change = given.initial + pair[:, 0], given.change + pair[:, 1]
         normals = rng.standard_normal((count, PAST + history.steps.size))
         further = drawn_terms(terms, initial - prior.initial_mean, change, normals)
+        scale, exponent = coefficients_at(points.log_scale, points.log_exponent, points.course)
         sample = Posterior(
             weight=weight / weight.sum(),
             initial=initial,
-            change=change,
-            scale=np.exp(points.log_scale),
-            exponent=np.exp(points.log_exponent),
+            change=change / unit_of_change(points.course),
+            scale=scale,
+            exponent=exponent,
             scatter=np.exp(points.log_scatter),
+            proportional=FORM_PROPORTIONAL[points.form],
             discrepancy=drawn(history, prior, points.size, further, rng),
         )
         return sample if count == size else thinned(sample, size, float(offset[6]))
@@ -146,8 +150,11 @@ def _blended(mass: FloatArray) -> FloatArray:
     return np.ascontiguousarray(blended)
 
 
-def _placed(laid: Laid, cell: tuple[NDArray[np.intp], ...], uniform: FloatArray) -> tuple[Points, FloatArray]:
-    """Points placed within their cells by uniform numbers [n, 3], and the volume that each stands for [n]."""
+def _placed(
+    laid: Laid, cell: tuple[NDArray[np.intp], ...], uniform: FloatArray, span: float
+) -> tuple[Points, FloatArray]:
+    """Points placed within their cells by uniform numbers [n, 3], and the volume of (log φ, log ε, log s) that each stands
+    for [n]."""
     frame, (kind, level, row, node) = laid.frame, cell
     log_scatter = _within(frame.log_scatter, kind, level, uniform[:, 0])
     log_exponent = _within(frame.log_exponent, kind, row, uniform[:, 1])
@@ -159,14 +166,15 @@ def _placed(laid: Laid, cell: tuple[NDArray[np.intp], ...], uniform: FloatArray)
     nodes = laid.mass.shape[3]
     steps = np.ptp(frame.log_exponent, axis=1) * np.ptp(frame.log_scatter, axis=1)
     log_rate = lower + (upper - lower) * (node + uniform[:, 2] - 0.5) / (nodes - 1)
+    log_scale, stretch = log_scale_at(log_rate + log_exponent, laid.kinds.course[kind], span)
     points = Points(
-        log_scale=log_rate + log_exponent,
+        log_scale=log_scale,
         log_exponent=log_exponent,
         log_scatter=log_scatter,
-        size=laid.kinds.size[kind],
+        form=laid.kinds.form[kind],
         outlying=laid.kinds.outlying[kind].T,
     )
-    return points, (upper - lower) * steps[kind]
+    return points, (upper - lower) * steps[kind] * np.exp(stretch)
 
 
 def _within(axis: FloatArray, kind: NDArray[np.intp], index: NDArray[np.intp], place: FloatArray) -> FloatArray:

@@ -2,7 +2,9 @@
 
 The axes are log τ = log φ - log ε, log ε and log s. The data determine the initial rate Δ/τ long before they
 distinguish φ from ε, so along these axes the ridge of the posterior is nearly straight; the prior stays independent in
-log φ and log ε. There is one such lattice for each kind of history: a size q of the discrepancy and a set of outlying runs.
+log φ and log ε. There is one such lattice for each kind of history: a form (a course and a size q of the discrepancy,
+`courses`) and a set of outlying runs. Where a course ends, at |φ|, the first axis is log(|φ| - T) - log ε with T
+the progress measured so far: what is left until then is what matters.
 
 Each row of a lattice (one ε) spans its own interval of log τ, so that the lattice follows the curved ridge. As
 the posterior shrinks a hundredfold over a life the lattice closes in on it: a coarse one over the prior's range finds
@@ -17,10 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.tracking.criteria import DEPTH, NEGLIGIBLE, REACH, SIZES, SLIGHT
-from models.tracking.discrepancy import log_size_weight
+from models.tracking.courses import FORM_COURSE, FORM_SIZE, Course, basis, log_form_weight, log_scale_at, scatter_growth
+from models.tracking.criteria import DEPTH, NEGLIGIBLE, REACH, SLIGHT
+from models.tracking.filters.kinds import LAID_FIRST, Kinds, represented
 from models.tracking.history import History
-from models.tracking.linear_model import basis, evidence, log_outlying, tabulated
+from models.tracking.linear_model import evidence, log_outlying, tabulated
 from models.tracking.outlying_runs import NODES, TEMPER, Nodes, Search
 from models.tracking.prior import Prior
 
@@ -32,32 +35,6 @@ _BLUR = 0.03
 _FIRST, COARSE = 65, (11, 8, 7)
 _CLOSINGS = 8
 _WORTHWHILE = 0.7
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Kinds:
-    """k kinds of history: the discrepancy's q [k], which runs are outlying [k, t] (0, 1), log prior probability [k]."""
-
-    size: FloatArray
-    outlying: FloatArray
-    log_weight: FloatArray
-
-    @classmethod
-    def of(cls, prior: Prior, outlying: FloatArray) -> "Kinds":
-        """Every size with each of the sets [c, t]."""
-        weight = log_size_weight(prior)
-        possible = np.flatnonzero(np.isfinite(weight))
-        sets = np.repeat(outlying, possible.size, axis=0)
-        sizes = np.tile(SIZES[possible], outlying.shape[0])
-        return cls(
-            size=sizes,
-            outlying=sets,
-            log_weight=np.tile(weight[possible], outlying.shape[0]) + log_outlying(prior, sets.T),
-        )
-
-    def taken(self, index: NDArray[np.intp]) -> "Kinds":
-        """The kinds at `index`."""
-        return Kinds(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,23 +90,25 @@ def whole(prior: Prior) -> Frame:
     )
 
 
-def tabled(frame: Frame, nodes: int, progress: FloatArray) -> FloatArray:
-    """b at progress [t] on the cells of all rows, [k, t, rows · nodes]."""
-    log_exponent = frame.log_exponent[:, None, :, None]
-    table = basis(progress[:, None, None], frame.log_rate(nodes)[:, None] + log_exponent, log_exponent)
-    return table.reshape(log_exponent.shape[0], progress.size, log_exponent.shape[2] * nodes)
+def tabled(frame: Frame, nodes: int, history: History, course: NDArray[np.intp]) -> FloatArray:
+    """b of courses [k] at every measurement on the cells of all rows, [k, t, rows · nodes]; one frame serves all."""
+    log_exponent, by_kind = frame.log_exponent[:, None, :, None], course[:, None, None, None]
+    log_scale, _ = log_scale_at(frame.log_rate(nodes)[:, None] + log_exponent, by_kind, history.span)
+    table = basis(history.progress[:, None, None], log_scale, log_exponent, by_kind)
+    return table.reshape(course.size, history.progress.size, log_exponent.shape[2] * nodes)
 
 
 def log_density(
     prior: Prior, history: History, kinds: Kinds, frame: Frame, table: FloatArray, blur: FloatArray | float = 0.0
 ) -> FloatArray:
-    """Log posterior density up to a constant, [k, levels, rows, nodes]; a frame and table of one kind serve all."""
-    count, rows = kinds.size.size, frame.log_exponent.shape[1]
+    """Log posterior density up to a constant, [k, levels, rows, nodes]; a frame of one kind serves all."""
+    count, rows = kinds.form.size, frame.log_exponent.shape[1]
     levels = np.broadcast_to(frame.log_scatter, (count, frame.log_scatter.shape[1]))
-    sums = tabulated(history, prior, table, levels, kinds.size, kinds.outlying.T, blur)
+    sums = tabulated(history, prior, table, levels, kinds.form, kinds.outlying.T, blur)
     log_exponent = frame.log_exponent[:, None, :, None]
-    log_scale = frame.log_rate(table.shape[-1] // rows)[:, None] + log_exponent
-    flat = prior.log_density(log_scale, log_exponent, frame.log_scatter[:, :, None, None])
+    place, by_kind = frame.log_rate(table.shape[-1] // rows)[:, None] + log_exponent, kinds.course[:, None, None, None]
+    log_scale, stretch = log_scale_at(place, by_kind, history.span)
+    flat = prior.log_density(log_scale, log_exponent, frame.log_scatter[:, :, None, None]) + stretch
     log_evidence = evidence(sums, prior).reshape(count, levels.shape[1], rows, -1)
     return np.asarray(log_evidence + flat + kinds.log_weight[:, None, None, None])
 
@@ -138,17 +117,19 @@ def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame]:
     """The kinds and regions that hold the posterior's mass, by coarse lattices laid over what the last one left."""
     first = whole(prior)
     if history.value.size == 0:
-        kinds = Kinds.of(prior, np.zeros((1, 0)))
-        return kinds, first.taken(np.zeros(kinds.size.size, dtype=np.intp))
+        kinds = Kinds.of(prior, np.zeros((1, 0)), np.arange(FORM_SIZE.size))
+        return kinds, first.taken(np.zeros(kinds.form.size, dtype=np.intp))
     nodes, rows, levels = COARSE
     share = _BLUR * float(np.ptp(history.value))
-    table = tabled(first, _FIRST, history.progress)[0]
+    table = tabled(first, _FIRST, history, np.array(Course))
     blur = share * float((first.upper - first.lower).max()) / (_FIRST - 1)
     kinds, density = _first(prior, history, first, table, blur)
-    frame = shrunk(first.taken(np.zeros(kinds.size.size, dtype=np.intp)), density)
-    kinds, frame = _weighty(kinds, frame.resized(rows, levels), log_masses(density, first.cells(_FIRST)), NEGLIGIBLE)
-    shares, left = np.full(kinds.size.size, share), np.ones(kinds.size.size, dtype=bool)
-    log_mass = np.zeros(kinds.size.size)
+    frame = shrunk(first.taken(np.zeros(kinds.form.size, dtype=np.intp)), density).resized(rows, levels)
+    log_mass = log_masses(density, first.cells(_FIRST)) - kinds.log_weight
+    kinds, laid = represented(prior, kinds)
+    kinds, frame = _weighty(kinds, frame.taken(laid), log_mass[laid] + kinds.log_weight, NEGLIGIBLE)
+    shares, left = np.full(kinds.form.size, share), np.ones(kinds.form.size, dtype=bool)
+    log_mass = np.zeros(kinds.form.size)
     for _ in range(_CLOSINGS):
         now = np.flatnonzero(left)
         if now.size == 0:
@@ -156,7 +137,9 @@ def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame]:
         wide = frame.taken(now)
         widest = (wide.upper - wide.lower).max(axis=1)
         blurs = shares[now] * widest / (nodes - 1)
-        density = log_density(prior, history, kinds.taken(now), wide, tabled(wide, nodes, history.progress), blurs)
+        density = log_density(
+            prior, history, kinds.taken(now), wide, tabled(wide, nodes, history, kinds.course[now]), blurs
+        )
         closer = shrunk(wide, density)
         log_mass[now] = log_masses(density, wide.cells(nodes))
         settled = _shrinkage(wide, closer) > _WORTHWHILE
@@ -173,19 +156,21 @@ def _first(prior: Prior, history: History, frame: Frame, table: FloatArray, blur
 
     def looked_at(outlying: FloatArray) -> FloatArray:
         if outlying.tobytes() not in densities:
-            kinds = Kinds.of(prior, outlying[None])
-            densities[outlying.tobytes()] = log_density(prior, history, kinds, frame, table, blur)
+            kinds = Kinds.of(prior, outlying[None], LAID_FIRST)
+            densities[outlying.tobytes()] = log_density(prior, history, kinds, frame, table[kinds.course], blur)
         return densities[outlying.tobytes()]
 
     while (outlying := search.next()) is not None:
         plain = looked_at(outlying) - log_outlying(prior, outlying) + np.log(frame.cells(_FIRST))[:, None, :, None]
         total = float(plain.max() + np.log(np.exp(plain - plain.max()).sum()))
-        search.learn(outlying, total, *_chosen(prior, frame, table, plain - total, blur))
+        search.learn(outlying, total, *_chosen(prior, history, frame, table, plain - total, blur))
     sets = search.kept()
-    return Kinds.of(prior, sets), np.concatenate([looked_at(outlying) for outlying in sets])
+    return Kinds.of(prior, sets, LAID_FIRST), np.concatenate([looked_at(outlying) for outlying in sets])
 
 
-def _chosen(prior: Prior, frame: Frame, table: FloatArray, log_mass: FloatArray, blur: float) -> tuple[Nodes, Nodes]:
+def _chosen(
+    prior: Prior, history: History, frame: Frame, table: FloatArray, log_mass: FloatArray, blur: float
+) -> tuple[Nodes, Nodes]:
     """NODES nodes of each level of s, drawn evenly by a power of their mass so that what an outlying run hides is among
     them; and the best one of each level."""
     _, levels, rows, nodes = log_mass.shape
@@ -200,10 +185,12 @@ def _chosen(prior: Prior, frame: Frame, table: FloatArray, log_mass: FloatArray,
     def at(cells: NDArray[np.intp], log_share: FloatArray | float) -> Nodes:
         level = np.repeat(np.arange(levels), cells.shape[1])
         kind, cell = np.divmod(cells.ravel(), rows * nodes)
+        form = LAID_FIRST[np.isfinite(log_form_weight(prior)[LAID_FIRST])][kind]
         return Nodes(
-            b=table[:, cell].T,
-            noise=np.exp(2.0 * frame.log_scatter[0, level]) + blur**2,
-            size=SIZES[np.isfinite(log_size_weight(prior))][kind],
+            b=table[FORM_COURSE[form], :, cell],
+            noise=scatter_growth(form, history.relative(prior)) * np.exp(2.0 * frame.log_scatter[0, level])[:, None]
+            + blur**2,
+            size=FORM_SIZE[form],
             log_weight=(np.take_along_axis(by_level, cells, axis=1) - log_share).ravel(),
         )
 

@@ -11,8 +11,10 @@ to explain the run.
 import numpy as np
 
 from models.arrays import FloatArray
+from models.tracking.courses import scatter_growth
 from models.tracking.criteria import LEADING, MOST, WORTH
-from models.tracking.filters.lattice import COARSE, Frame, Kinds, joined, log_density, log_masses, shrunk, tabled
+from models.tracking.filters.kinds import Kinds
+from models.tracking.filters.lattice import COARSE, Frame, joined, log_density, log_masses, shrunk, tabled
 from models.tracking.history import History
 from models.tracking.linear_model import log_outlying
 from models.tracking.outlying_runs import TEMPER, Nodes, gains
@@ -26,18 +28,19 @@ def completed(prior: Prior, history: History, kinds: Kinds, frame: Frame) -> tup
     """The kinds and their lattices, with those of the sets that were overlooked."""
     if prior.outlying_share == 0.0 or history.value.size < 2:
         return kinds, frame
-    table = tabled(frame, COARSE[0], history.progress)
+    table = tabled(frame, COARSE[0], history, kinds.course)
     density = log_density(prior, history, kinds, frame, table)
     mass = density + np.log(frame.cells(COARSE[0]))[:, None, :, None]
     mass -= log_masses(density, frame.cells(COARSE[0])).max()
-    laid = {_name(size, outlying) for size, outlying in zip(kinds.size, kinds.outlying, strict=True)}
+    laid = {_name(form, outlying) for form, outlying in zip(kinds.form, kinds.outlying, strict=True)}
+    relative = history.relative(prior)
     overlooked: dict[bytes, tuple[float, int, FloatArray]] = {}
     for leader in np.argsort(-mass.max(axis=(1, 2, 3)))[:LEADING].tolist():
-        gain = gains(prior, history, kinds.outlying[leader], _nodes(kinds, frame, table, mass, leader))
+        gain = gains(prior, history, kinds.outlying[leader], _nodes(kinds, frame, table, mass, leader, relative))
         for run in np.flatnonzero(gain > -WORTH).tolist():
             outlying = kinds.outlying[leader].copy()
             outlying[run] = 1.0 - outlying[run]
-            name = _name(kinds.size[leader], outlying)
+            name = _name(kinds.form[leader], outlying)
             if name not in laid and gain[run] > overlooked.get(name, (-np.inf,))[0]:
                 overlooked[name] = (float(gain[run]), leader, outlying)
     if not overlooked:
@@ -47,12 +50,12 @@ def completed(prior: Prior, history: History, kinds: Kinds, frame: Frame) -> tup
     weight = (
         kinds.log_weight[leaders] - log_outlying(prior, kinds.outlying[leaders].T) + log_outlying(prior, outlying.T)
     )
-    more, there = Kinds(size=kinds.size[leaders], outlying=outlying, log_weight=weight), frame.taken(leaders)
+    more, there = Kinds(form=kinds.form[leaders], outlying=outlying, log_weight=weight), frame.taken(leaders)
     closer = shrunk(there, log_density(prior, history, more, there, table[leaders]))
     return joined(kinds, more), joined(frame, closer)
 
 
-def _nodes(kinds: Kinds, frame: Frame, table: FloatArray, mass: FloatArray, kind: int) -> Nodes:
+def _nodes(kinds: Kinds, frame: Frame, table: FloatArray, mass: FloatArray, kind: int, relative: FloatArray) -> Nodes:
     """NODES nodes of one kind, drawn evenly by a power of their log mass so that what an
     outlying run hides is among them."""
     cells = mass.shape[2] * mass.shape[3]
@@ -63,11 +66,11 @@ def _nodes(kinds: Kinds, frame: Frame, table: FloatArray, mass: FloatArray, kind
     level, cell = np.divmod(drawn, cells)
     return Nodes(
         b=table[kind][:, cell].T,
-        noise=np.exp(2.0 * frame.log_scatter[kind, level]),
+        noise=np.exp(2.0 * frame.log_scatter[kind, level])[:, None] * scatter_growth(kinds.form[[kind]], relative),
         size=np.full(_NODES, kinds.size[kind]),
         log_weight=flat[drawn] - log_share,
     )
 
 
-def _name(size: float, outlying: FloatArray) -> bytes:
-    return np.append(outlying, size).tobytes()
+def _name(form: int, outlying: FloatArray) -> bytes:
+    return np.append(outlying, form).tobytes()

@@ -1,6 +1,6 @@
 """A particle filter for eq. 6 that marginalises what is linear and keeps its particles apart.
 
-Particles carry (log φ, log ε, log s), the size q of the discrepancy and, of every run, whether it was outlying; given
+Particles carry (log φ, log ε, log s), the form (`courses`) and, of every run, whether it was outlying; given
 these, all else is linear and integrated out in closed form (Rao-Blackwell). The coefficients do not move, so
 resampling alone would soon leave copies of one particle. After it every particle takes Metropolis-Hastings steps that
 leave the exact marginal posterior over the whole history as it is (iterated batch importance sampling), until nine in
@@ -17,11 +17,22 @@ A. Doucet, A. Jasra, "Sequential Monte Carlo samplers", J. R. Statist. Soc. B 68
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from models.arrays import FloatArray
-from models.tracking.criteria import HEALTHY, MOVED, MOVES, SIZES, STARVED
-from models.tracking.discrepancy import PAST, drawn, log_size_weight
+from models.tracking.courses import (
+    FORM_COURSE,
+    FORM_PROPORTIONAL,
+    Course,
+    coefficients_at,
+    log_form_weight,
+    log_scale_at,
+    place_of,
+    unit_of_change,
+)
+from models.tracking.criteria import HEALTHY, KEPT, MOVED, MOVES, STARVED
+from models.tracking.discrepancy import PAST, drawn
 from models.tracking.filters.cloud import Bridge, Cloud, effective, log_target_of, merged, table_of, weights
 from models.tracking.history import History
 from models.tracking.linear_model import conditional, drawn_terms, pointwise
@@ -32,7 +43,7 @@ from models.tracking.sampling import correlated_pair, spread_normals, spread_poi
 
 #: Where a smaller share of steps than the first is accepted, the next are shorter by the second.
 _TIMID, _SHORTER = 0.2, 0.5
-#: In a step, how often another size is tried, and how often the flag of one run is turned.
+#: In a step, how often another size is tried, and how often the flag of one run, or the law of the scatter, is turned.
 _RESIZED, _TURNED = 0.25, 0.1
 #: Degrees by which a measurement may be introduced, and halvings in the search for each.
 _DEGREES, _HALVINGS = 30, 20
@@ -43,16 +54,19 @@ _STORED = {"outlying": "spoiled"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParticleState:
-    """Everything measured and the particles that stand for it."""
+    """Everything measured and the particles that stand for it; whether the last measurement was `forced` upon them, more
+    at once than they could follow."""
 
     prior: Prior
     history: History
     cloud: Cloud
+    forced: bool = False
 
     def to_arrays(self) -> dict[str, FloatArray]:
         """The state as named arrays; `from_arrays` gives it back exactly."""
         cloud = {_STORED.get(field.name, field.name): getattr(self.cloud, field.name) for field in fields(self.cloud)}
-        return {"prior": self.prior.to_array()} | self.history.to_arrays() | cloud
+        lone = {"prior": self.prior.to_array(), "forced": np.array([self.forced], dtype=np.float64)}
+        return lone | self.history.to_arrays() | cloud
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, FloatArray]) -> "ParticleState":
@@ -60,6 +74,7 @@ class ParticleState:
         return cls(
             prior=Prior.from_array(arrays["prior"]),
             history=History.from_arrays(arrays),
+            forced=bool(arrays["forced"][0]),
             cloud=Cloud(**{field.name: arrays[_STORED.get(field.name, field.name)] for field in fields(Cloud)}),
         )
 
@@ -81,10 +96,10 @@ class Particle:
         centre = np.array([prior.log_scale_mean, prior.log_exponent_mean, prior.log_scatter_mean])
         spread = np.array([prior.log_scale_sd, prior.log_exponent_sd, prior.log_scatter_sd])
         even = spread_points(self.particles, np.full(4, 0.5))
-        sizes = np.searchsorted(np.cumsum(np.exp(log_size_weight(prior)))[:-1], even[:, 3], side="right")
+        forms = np.searchsorted(np.cumsum(np.exp(log_form_weight(prior)))[:-1], even[:, 3], side="right")
         cloud = Cloud(
             points=centre + spread * ndtri(even[:, :3]),
-            size=sizes.astype(np.float64),
+            form=forms.astype(np.float64),
             outlying=np.zeros((self.particles, 0)),
             log_weight=np.zeros(self.particles),
             log_target=np.zeros(self.particles),
@@ -97,11 +112,13 @@ class Particle:
         """The posterior with one more measurement."""
         bridge = Bridge(state.prior, state.history, state.history.append(measurement, state.prior))
         cloud, before, after = bridge.entered(state.cloud, rng)
-        held, degree = 1.0, 0.0
+        held, degree, forced = 1.0, 0.0, False
         for attempt in range(_DEGREES):
             gap = after - before
             start = cloud.log_weight - held * gap
-            degree = 1.0 if attempt == _DEGREES - 1 else _next_degree(start, gap, degree)
+            degree = _next_degree(start, gap, degree)
+            if attempt == _DEGREES - 1 and degree < 1.0:
+                degree, forced = 1.0, True
             log_weight = start + degree * gap
             cloud = replace(cloud, log_weight=log_weight - log_weight.max())
             if degree < 1.0 or effective(cloud.log_weight) < HEALTHY * self.particles:
@@ -109,7 +126,9 @@ class Particle:
             if degree == 1.0:
                 break
             held = degree
-        return ParticleState(prior=state.prior, history=bridge.after, cloud=replace(cloud, log_target=after))
+        return ParticleState(
+            prior=state.prior, history=bridge.after, cloud=replace(cloud, log_target=after), forced=forced
+        )
 
     def _renewed(
         self,
@@ -121,20 +140,21 @@ class Particle:
         rng: np.random.Generator,
     ) -> tuple[Cloud, FloatArray, FloatArray]:
         """Resampled, and moved by steps of a random walk shaped like the cloud; with both targets of each particle."""
-        weight = weights(cloud.log_weight)
-        off = cloud.points - weight @ cloud.points
-        shape = _root((weight * off.T) @ off)
-        index = systematic(weight, weight.size, float(rng.random()))
-        cloud, before, after = cloud.taken(index), before[index], after[index]
+        weight, span = weights(cloud.log_weight), bridge.after.span
+        shapes = _shapes(cloud, weight, span)
+        chance, log_weight = _kept(cloud.course, weight)
+        index = systematic(chance, weight.size, float(rng.random()))
+        cloud, before, after = replace(cloud.taken(index), log_weight=log_weight[index]), before[index], after[index]
         moved, reach = np.zeros(weight.size, dtype=bool), 1.0
         for _ in range(self.moves):
-            proposed = _proposed(cloud, reach * shape, rng)
+            proposed, stretch = _proposed(cloud, reach * shapes, span, rng)
             table = table_of(bridge.after, proposed)
             offered_after = log_target_of(bridge.after, bridge.prior, proposed, table)
             offered_before = before if degree == 1.0 else bridge.log_before(proposed, table)
             gain = degree * (offered_after - after)
             if degree < 1.0:
                 gain += (1.0 - degree) * (offered_before - before)
+            gain += stretch
             accepted = np.log(rng.random(weight.size)) < gain
             cloud = merged(cloud, proposed, accepted)
             after = np.where(accepted, offered_after, after)
@@ -158,31 +178,67 @@ class Particle:
         initial, change = given.initial + pair[:, 0], given.change + pair[:, 1]
         normals = rng.standard_normal((size, PAST + state.history.steps.size))
         further = drawn_terms(terms, initial - state.prior.initial_mean, change, normals)
+        scale, exponent = coefficients_at(points.log_scale, points.log_exponent, points.course)
         return Posterior(
             weight=np.full(size, 1.0 / size),
             initial=initial,
-            change=change,
-            scale=np.exp(points.log_scale),
-            exponent=np.exp(points.log_exponent),
+            change=change / unit_of_change(points.course),
+            scale=scale,
+            exponent=exponent,
             scatter=np.exp(points.log_scatter),
+            proportional=FORM_PROPORTIONAL[points.form],
             discrepancy=drawn(state.history, state.prior, points.size, further, rng),
+            forced=state.forced,
         )
 
 
-def _proposed(cloud: Cloud, shape: FloatArray, rng: np.random.Generator) -> Cloud:
-    """A step of every particle, as likely as the step back: always in its points, at times in its size and its
-    flags."""
-    count, runs = cloud.outlying.shape
+def _places(cloud: Cloud, span: float) -> FloatArray:
+    """The points with log(|φ| - span) in place of log |φ| where a course ends [n, 3]."""
+    return np.column_stack([place_of(cloud.points[:, 0], cloud.course, span), cloud.points[:, 1:]])
+
+
+def _shapes(cloud: Cloud, weight: FloatArray, span: float) -> FloatArray:
+    """A square root of the covariance of the places of each course's particles [6, 3, 3]."""
+    shapes, places = np.zeros((len(Course), 3, 3)), _places(cloud, span)
+    for course in np.unique(cloud.course):
+        here = cloud.course == course
+        share = weight[here] / max(float(weight[here].sum()), 1e-300)
+        off = places[here] - share @ places[here]
+        shapes[course] = _root((share * off.T) @ off)
+    return shapes
+
+
+def _kept(course: NDArray[np.intp], weight: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """How often to take each particle, so that every course keeps a share of KEPT, and the log weight that makes up for it
+    [n]: what the data do not speak for today they may speak for later."""
+    share = np.bincount(course, weights=weight, minlength=len(Course))
+    kept = np.where(share > 0.0, np.maximum(share, KEPT), 0.0)
+    kept /= kept.sum()
+    more = np.divide(kept, share, out=np.ones(len(Course)), where=share > 0.0)[course]
+    return weight * more, -np.log(more)
+
+
+def _proposed(cloud: Cloud, shapes: FloatArray, span: float, rng: np.random.Generator) -> tuple[Cloud, FloatArray]:
+    """A step of every particle, as likely as the step back but for a log factor [n]: always in its points, at times in its
+    form and its flags."""
+    (count, runs), course = cloud.outlying.shape, cloud.course
     stride = rng.uniform(0.2, 1.6, size=(count, 1))
-    points = cloud.points + stride * rng.standard_normal(cloud.points.shape) @ shape.T
+    steps = np.einsum("nij,nj->ni", shapes[course], rng.standard_normal(cloud.points.shape))
+    places = _places(cloud, span)
+    moved = places + stride * steps
+    (log_scale, stretch), (_, before) = (log_scale_at(place, course, span) for place in (moved[:, 0], places[:, 0]))
+    points = np.column_stack([log_scale, moved[:, 1:]])
     step = np.where(rng.random(count) < _RESIZED, rng.choice([-1.0, 1.0], size=count), 0.0)
-    size = cloud.size + step
+    form = np.clip(cloud.form + step, 0, FORM_COURSE.size - 1)
     outlying = cloud.outlying.copy()
     turned = np.flatnonzero(rng.random(count) < _TURNED)
     run = rng.integers(runs, size=turned.size)
     outlying[turned, run] = 1.0 - outlying[turned, run]
-    inside = (size >= 0) & (size < SIZES.size)
-    return replace(cloud, points=points, size=np.where(inside, size, cloud.size), outlying=outlying)
+    same = FORM_COURSE[form.astype(np.intp)] == course
+    form = np.where(same, form, cloud.form)
+    form = np.where(rng.random(count) < _TURNED, (form + FORM_COURSE.size / 2) % FORM_COURSE.size, form)
+    stepped = replace(cloud, points=points, form=form, outlying=outlying)
+    return stepped, stretch - before
 
 
 def _next_degree(start: FloatArray, gap: FloatArray, degree: float) -> float:

@@ -1,12 +1,13 @@
-"""Unscented Kalman filters for eq. 6, filterpy's, one for each size q of the discrepancy, weighed by their innovations.
+"""Unscented Kalman filters, filterpy's, one for each probable form (`courses`), weighed by their innovations.
 
-The state is (ξ0, ξ at a reference progress, log τ, log ε, δ, T δ', step): in logarithms φ = τε and ε cannot leave their
-domain, and with ξ at the reference in place of Δ the ridge of the posterior is nearly straight. All are in deviations
-from the prior mean, in units of the prior's deviations, so that the numbers are near 1 whatever the quantity's unit.
-The law does not move between runs; δ is an integrated random walk, and an event lets the level step.
+The state is (ξ0, ξ at a reference progress, log τ, log ε, δ, T δ', and the step of each event): in logarithms φ = τε and
+ε cannot leave their domain, and with ξ at the reference in place of Δ the ridge of the posterior is nearly straight. All
+are in deviations from the prior mean, in units of the prior's deviations, so that the numbers are near 1 whatever the
+quantity's unit. The law does not move between runs; δ is an integrated random walk, and an event adds its step of the
+level to the state: one common step would book the sum of all on the last event.
 
 The prior is far too wide for sigma points: φ spans decades within them, and a filter started there does not recover.
-So the filters start, one for each size, from the means and covariances of the exact posterior of the first measurements
+So the filters start, one for each form, from the means and covariances of the exact posterior of the first measurements
 together. They start anew when their innovations become too large, when progress has doubled (the law is curved, and
 the reference moves along), or when a run comes out of order.
 
@@ -20,27 +21,40 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.degradation.general_order import progress_fraction
-from models.tracking.criteria import DOMAIN, FEW, FORGET, GROWN, LOST, SIZES
+from models.tracking.courses import FORM_COURSE, FORM_PROPORTIONAL, FORM_SIZE, form_of, place_of
+from models.tracking.criteria import DOMAIN, FEW, FORGET, GROWN, LOST
 from models.tracking.discrepancy import PAST, at_end, drawn
 from models.tracking.filters.grid import Grid, GridState
-from models.tracking.filters.sigma_points import DIMENSION, Normal, Way, definite, scaled, stepped, unscaled
+from models.tracking.filters.sigma_points import (
+    Normal,
+    Way,
+    coefficients,
+    definite,
+    scaled,
+    stepped,
+    unscaled,
+)
 from models.tracking.history import History
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
 from models.tracking.sampling import spread_normals, systematic
 
-#: The grid that starts the filter, and the draws from it whose moments are taken.
-_STARTER, _DRAWS = Grid(nodes=13, rows=13, levels=7), 1_000
+#: The grid that starts the filter, and the draws from it whose moments are taken: as many again for every so many events,
+#: each of which has a moment of its own.
+_ARRAYS = ("form", "log_weight", "mean", "covariance", "scatter")
+_STARTER, _DRAWS, _STEPS_WORTH = Grid(nodes=13, rows=13, levels=7), 1_000, 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UkfState:
-    """One filter for each of k sizes q: size [k], log_weight [k], mean [k, 7], covariance [k, 7, 7] in units of the
-    prior, and scatter [k, 2]: its variance in the quantity's unit squared and how many observations it is worth.
+    """One filter for each of k forms (`courses`): form [k], log_weight [k], mean [k, d] and covariance [k, d, d] in units
+    of the prior (d: 6, and one for each event), scatter [k, 2]: its variance in the quantity's unit squared and how many
+    observations it is worth.
 
     `history` is everything measured, `reference` the progress at which the filters started, `squared_innovation` the
     running mean of squared innovations.
@@ -50,7 +64,7 @@ class UkfState:
     history: History
     reference: float
     squared_innovation: float
-    size: FloatArray
+    form: FloatArray
     log_weight: FloatArray
     mean: FloatArray
     covariance: FloatArray
@@ -59,7 +73,7 @@ class UkfState:
     def normal(self, kind: int) -> Normal:
         """One of the filters."""
         return Normal(
-            size=float(self.size[kind]),
+            form=int(self.form[kind]),
             mean=self.mean[kind],
             covariance=self.covariance[kind],
             scatter=self.scatter[kind],
@@ -67,7 +81,7 @@ class UkfState:
 
     def to_arrays(self) -> dict[str, FloatArray]:
         """The state as named arrays; `from_arrays` gives it back exactly."""
-        named = {name: getattr(self, name) for name in ("size", "log_weight", "mean", "covariance", "scatter")}
+        named = {name: getattr(self, name) for name in _ARRAYS}
         lone = {"prior": self.prior.to_array(), "place": np.array([self.reference, self.squared_innovation])}
         return self.history.to_arrays() | lone | named
 
@@ -80,7 +94,7 @@ class UkfState:
             history=History.from_arrays(arrays),
             reference=reference,
             squared_innovation=squared_innovation,
-            **{name: arrays[name] for name in ("size", "log_weight", "mean", "covariance", "scatter")},
+            **{name: arrays[name] for name in _ARRAYS},
         )
 
 
@@ -110,12 +124,13 @@ class Ukf:
             reference=state.reference,
             before=before.span,
             after=history.span,
-            events=history.steps.size - before.steps.size,
+            steps=history.steps.size,
             progress=measurement.progress,
             value=measurement.value,
             variance=float(history.variance[-1]),
+            relative=float(history.relative(prior)[-1]),
         )
-        parts = [stepped(prior, state.normal(kind), way) for kind in range(state.size.size)]
+        parts = [stepped(prior, state.normal(kind), way) for kind in range(state.form.size)]
         log_weight = state.log_weight + np.array([part.log_likelihood for part in parts])
         weight = _weights(log_weight)
         squared_innovation = float(weight @ [part.squared_innovation for part in parts])
@@ -137,17 +152,17 @@ class Ukf:
         prior, history = state.prior, state.history
         kind = systematic(_weights(state.log_weight), size, float(rng.random()))
         normals = spread_normals(size, rng.random(5))
-        normals = np.column_stack([normals, rng.standard_normal((size, DIMENSION - 5))])
+        normals = np.column_stack([normals, rng.standard_normal((size, state.mean.shape[1] - normals.shape[1]))])
         root = np.linalg.cholesky(state.covariance)
         point = state.mean[kind] + np.einsum("nij,nj->ni", root[kind], normals)
-        initial, at_reference, log_scale, log_exponent, *beside = unscaled(prior, point).T
-        scale, exponent = np.exp(log_scale), np.exp(log_exponent)
+        initial, at_reference, place, log_exponent, *beside = unscaled(prior, point).T
+        form = state.form[kind].astype(np.intp)
+        scale, exponent = coefficients(place, log_exponent, FORM_COURSE[form], state.reference)
         change = (at_reference - initial) / progress_fraction(state.reference, scale, exponent)
         ends = np.stack([beside[0], beside[1] * history.span / state.reference])
-        sizes = state.size[kind]
+        sizes = FORM_SIZE[form]
         course = np.where(sizes[:, None] > 0.0, (np.linalg.pinv(at_end()) @ ends).T, 0.0)
-        heights = np.zeros((size, history.steps.size))
-        heights[:, -1:] = beside[2][:, None]
+        heights = np.stack(beside[2:], axis=1) if len(beside) > 2 else np.zeros((size, 0))
         return Posterior(
             weight=np.full(size, 1.0 / size),
             initial=initial,
@@ -155,41 +170,44 @@ class Ukf:
             scale=scale,
             exponent=exponent,
             scatter=np.sqrt(state.scatter[kind, 0]),
+            proportional=FORM_PROPORTIONAL[form],
             discrepancy=drawn(history, prior, sizes, np.concatenate([course, heights], axis=1), rng),
         )
 
 
 def _started(prior: Prior, history: History) -> UkfState:
     """The normals with the moments of the exact posterior, by size, from evenly spread draws."""
-    draws = _STARTER.posterior(GridState(prior=prior, history=history), _DRAWS, np.random.default_rng(0))
+    many = _DRAWS * (1 + history.steps.size // _STEPS_WORTH)
+    draws = _STARTER.posterior(GridState(prior=prior, history=history), many, np.random.default_rng(0))
     reference = history.span
-    size, course, step = _beside(draws)
+    form, course, steps = _beside(draws, history.steps.size)
+    log_scale, log_exponent = draws.coordinates
     points = scaled(
         prior,
         np.column_stack(
             [
                 draws.initial,
                 draws.initial + draws.change * progress_fraction(reference, draws.scale, draws.exponent),
-                np.log(draws.scale),
-                np.log(draws.exponent),
+                place_of(log_scale, draws.course, reference),
+                log_exponent,
                 course,
-                step,
+                steps,
             ]
         ),
     )
-    kinds = np.abs(size[:, None] - SIZES).argmin(axis=1)
-    shares = np.bincount(kinds, weights=draws.weight, minlength=SIZES.size)
-    kept = np.flatnonzero((shares > FEW) & (np.bincount(kinds, minlength=SIZES.size) > 3 * DIMENSION))
-    moments = [_moments(points[kinds == kind], draws.weight[kinds == kind]) for kind in kept]
+    shares = np.bincount(form, weights=draws.weight, minlength=FORM_SIZE.size)
+    enough = np.bincount(form, minlength=FORM_SIZE.size) > 3 * points.shape[1]
+    kept = np.flatnonzero((shares > FEW) & (enough | (shares == shares.max())))
+    moments = [_moments(points[form == kind], draws.weight[form == kind]) for kind in kept]
     log_scatter = np.log(draws.scatter)
-    variance = [math.exp(2.0 * np.average(log_scatter[kinds == k], weights=draws.weight[kinds == k])) for k in kept]
+    variance = [math.exp(2.0 * np.average(log_scatter[form == k], weights=draws.weight[form == k])) for k in kept]
     worth = max(1.0, 0.5 / prior.log_scatter_sd**2) + history.value.size
     return UkfState(
         prior=prior,
         history=history,
         reference=reference,
         squared_innovation=1.0,
-        size=SIZES[kept],
+        form=kept.astype(np.float64),
         log_weight=np.log(shares[kept] / shares[kept].max()),
         mean=np.stack([mean for mean, _ in moments]),
         covariance=np.stack([covariance for _, covariance in moments]),
@@ -197,13 +215,15 @@ def _started(prior: Prior, history: History) -> UkfState:
     )
 
 
-def _beside(draws: Posterior) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Of every draw q [n], (δ, T δ') at the end of what was measured [n, 2], and by how much the level has stepped."""
-    beside = draws.discrepancy
+def _beside(draws: Posterior, steps: int) -> tuple[NDArray[np.intp], FloatArray, FloatArray]:
+    """Of every draw its form [n], (δ, T δ') at the end of what was measured [n, 2], and the level's steps [n, steps]."""
+    beside, proportional = draws.discrepancy, draws.proportional
+    if proportional is None:
+        proportional = np.zeros(draws.weight.size, dtype=bool)
     if beside is None:
         none = np.zeros(draws.weight.size)
-        return none, np.zeros((none.size, 2)), none
-    return beside.size, beside.curvature[:, :PAST] @ at_end().T, beside.height.sum(axis=1)
+        return form_of(draws.course, none, proportional), np.zeros((none.size, 2)), np.zeros((none.size, steps))
+    return form_of(draws.course, beside.size, proportional), beside.curvature[:, :PAST] @ at_end().T, beside.height
 
 
 def _moments(points: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:

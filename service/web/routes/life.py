@@ -1,8 +1,11 @@
 """Remaining useful life, degradation, Stribeck curves, loops and flat series."""
 
+import asyncio
+
 from fastapi import APIRouter, Request
 from fastapi.responses import Response
 
+from service.jobs.workers import Lane
 from service.lists import ALL_ITEMS, from_cursor, paged
 from service.lives.tracks import CARRIED
 from service.queries import runs, scores
@@ -11,18 +14,21 @@ from service.queries import stribeck as stribeck_query
 from service.queries.cache import to_json
 from service.queries.degradation import degradation as degradation_of
 from service.queries.engagement import engaged
+from service.queries.planned_duty import planned_life
 from service.queries.remaining_life import remaining_life
 from service.queries.surfaces import surface
+from service.run_files.json_run import checked
 from service.schemas.curves import EngagementOut, LoopPage, SeriesPage, StribeckPage
 from service.schemas.degradation import Degradation, Surfaces
 from service.schemas.fleet import Scores
 from service.schemas.life import Method, RemainingLife
 from service.schemas.parameters import ClutchId, Quantity
-from service.web.answers import clutch_answer, computed_answer
+from service.schemas.programme import PlannedLife, ProgrammeIn
+from service.web.answers import JSON_TYPE, clutch_answer, computed_answer, described_body, json_body
 from service.web.auth import Reader
 from service.web.context import AtCycles, Cursor, Limit, Prefer, PressureBar, Whole
 from service.web.limits import USUAL_ITEMS
-from service.web.problems import READING
+from service.web.problems import CHANGING, READING
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["remaining life"])
 
@@ -47,6 +53,30 @@ async def remaining_useful_life(
         return to_json(remaining_life(context.database, clutch_id, method, pressure_bar, at_cycles))
 
     return await clutch_answer(request, context, clutch_id, "remaining-useful-life", make, method, at_cycles)
+
+
+@router.post(
+    "/remaining-useful-life/forecast",
+    response_model=PlannedLife,
+    responses=CHANGING,
+    openapi_extra=described_body(
+        ProgrammeIn,
+        {
+            "programme": [
+                {"cycles": 5000, "energy_per_cycle_kj": 25, "sd": 2},
+                {"cycles": 1000, "initial_speed_rpm": 3000, "maximum_pressure_bar": 10},
+            ],
+            "pace_cycles_per_hour": 120,
+        },
+    ),
+)
+async def planned_remaining_life(
+    request: Request, context: Reader, clutch_id: ClutchId, method: Method = "particle"
+) -> Response:
+    """The same under planned duty: blocks that are run one after the other, over and over. Nothing is stored."""
+    planned = checked(ProgrammeIn, await json_body(request))
+    answer = context.workers.submit(Lane.ANSWERS, planned_life, clutch_id, method, planned)
+    return Response(content=to_json(await asyncio.wrap_future(answer)), media_type=JSON_TYPE)
 
 
 @router.get("/degradation", response_model=Degradation, responses=READING)

@@ -31,6 +31,8 @@ def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
             http.post("/v1/clutches/bench/runs/aside/withdraw", json={"reason": "to look at"}).raise_for_status()
             http.post("/v1/clutches", json={"clutch_id": "waiting"})
             http.post("/v1/clutches/bench/diagnoses", json={"adopt": False}).raise_for_status()
+            # what the charts show is made before the page asks: this is not about how long that takes beside a browser
+            http.get("/v1/clutches/bench/degradation", headers={"Prefer": "wait=60"}).raise_for_status()
         yield found
 
 

@@ -18,6 +18,7 @@ from models.prognosis.first_passage import (
     first_below,
     predict_first_passage,
     weighted_quantiles,
+    widened,
 )
 from models.tracking.discrepancy import FUTURE, PAST, Discrepancy
 from models.tracking.posterior import Posterior
@@ -250,3 +251,42 @@ def test_first_below_is_straight_between_places_and_inf_where_never() -> None:
     found = first_below(paths, np.array([0.0, 10.0, 30.0]), np.full(3, 0.5))
     assert found[:2] == pytest.approx([15.0, 0.0])
     assert np.isinf(found[2])
+
+
+WEIGHT = np.full(3, 1.0 / 3.0)
+
+
+@pytest.mark.parametrize(
+    ("passages", "power", "stated"),
+    [
+        ([1_500.0, 2_000.0, 3_000.0], 2.0, [1_250.0, 2_000.0, 5_000.0]),
+        ([1_500.0, 2_000.0, 3_000.0], 1.0, [1_500.0, 2_000.0, 3_000.0]),
+        ([900.0, 2_000.0, math.inf], 2.0, [900.0, 2_000.0, math.inf]),
+        ([10_990.0, math.inf, math.inf], 2.0, [1_000.0 + 9_990.0**2 / 999_000.0, math.inf, math.inf]),
+        ([800.0, 900.0, 3_000.0], 2.0, [800.0, 900.0, 3_000.0]),
+    ],
+    ids=["about its median", "not at all", "what ended stays", "about the horizon", "a life that has ended"],
+)
+def test_remaining_life_is_wider_about_its_median(passages: list[float], power: float, stated: list[float]) -> None:
+    found = widened(np.array(passages), WEIGHT, as_of=1_000.0, horizon=1e6, power=power)
+    assert found.tolist() == pytest.approx(stated)
+
+
+def passage_of(draws: Posterior, as_of: float, power: float) -> FirstPassage:
+    ends = widened(ends_of_life(draws, 0.5), draws.weight, as_of=as_of, horizon=1e6, power=power)
+    return predict_first_passage(draws, fraction=0.5, as_of=as_of, stated=(ends, draws.weight))
+
+
+def test_a_widened_prediction_keeps_its_median() -> None:
+    draws = sample([-1.0, -0.9, -0.8, -0.7, -0.6])
+    plain, wide = (passage_of(draws, 100.0, power) for power in (1.0, 1.5))
+    ends = [(plain.remaining[q], wide.remaining[q]) for q in (0.05, 0.5, 0.95)]
+    (low, lower), (middle, same), (high, higher) = ends
+    assert None not in (low, lower, middle, same, high, higher)
+    assert middle == pytest.approx(same)
+    assert lower < low < middle < high < higher  # type: ignore[operator]
+
+
+def test_what_becomes_wider_than_the_horizon_may_never_end() -> None:
+    wide = passage_of(sample([-1.0, -0.9, -0.505]), 10.0, 20.0)
+    assert (wide.remaining[0.95], wide.status) == (None, PassageStatus.MAY_NEVER_REACH)

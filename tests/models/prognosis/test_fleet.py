@@ -12,7 +12,7 @@ from models.prognosis.criteria import FEWEST_TESTS_TO_LEARN
 from models.prognosis.first_passage import ends_of_life
 from models.prognosis.fleet import FleetPrior, fit_population, learn, pooled, population, taught
 from models.prognosis.scoring import crps_of_sample
-from models.tracking import linear_model
+from models.tracking.courses import Course, basis
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
@@ -134,8 +134,8 @@ def test_the_mixture_is_that_of_importance_sampling() -> None:
     prior = fleet(6, 8)
     truth = life(rng, 5000.0)
     seen = [replace(m, variance=(0.003 * m.value) ** 2) for m in measured(truth, 3000.0, 3, rng)]
-    believed = replace(weak(seen[0], falling=True), outlying_share=0.0, law_share=1.0)
-    learned = replace(prior.prior_for(seen[0]), outlying_share=0.0, law_share=1.0)
+    believed = replace(weak(seen[0], falling=True), outlying_share=0.0, law_share=1.0, eq_6_share=1.0)
+    learned = replace(prior.prior_for(seen[0]), outlying_share=0.0, law_share=1.0, eq_6_share=1.0)
     under = [GRID.posterior(GRID.from_history(each, seen), 4000, rng) for each in (believed, learned)]
     mixed = prior.together(under[0], under[1], seen[0])
     reference = _brute(prior, seen, rng)
@@ -173,7 +173,7 @@ def _brute(prior: FleetPrior, seen: list[Measurement], rng: np.random.Generator)
     log_weight = 0.5 * ((initial - first.initial_mean) / (0.02 * first.initial_mean)) ** 2
     log_weight -= 0.5 * ((initial - first.initial_mean) / first.initial_sd) ** 2
     for each in seen:
-        b = linear_model.basis(np.full(count, each.progress), scale, exponent)
+        b = basis(np.full(count, each.progress), scale, exponent, np.zeros(count, dtype=np.intp))
         variance = each.variance + np.exp(2.0 * scatter)
         log_weight += -0.5 * (np.log(variance) + (each.value - initial - change * b) ** 2 / variance)
     weight = np.exp(log_weight - log_weight.max())
@@ -199,3 +199,26 @@ def test_pooled_draws_have_half_of_the_weight_each() -> None:
     at = np.array([0.0, 5000.0, 20_000.0])
     assert both.values(at)[:, :300] == pytest.approx(one.values(at))
     assert both.values(at)[:, 300:] == pytest.approx(other.values(at))
+
+
+@pytest.mark.parametrize("log_exponent", [-0.2, -0.9, -1.3])
+def test_a_fleet_has_no_say_in_courses_that_it_has_not_learned(log_exponent: float) -> None:
+    """The odds among the other courses stay; eq. 6 loses at most what the fleet is trusted with."""
+    rng = np.random.default_rng(3)
+    progress = np.linspace(0.0, 7e3, 18)
+    values = 0.1 * (1.0 - 0.6 * -np.expm1(-1.792 * progress / 1e4)) * (1.0 + 0.003 * rng.standard_normal(18))
+    seen = [
+        Measurement(progress=x, value=y, variance=1e-8) for x, y in zip(progress.tolist(), values.tolist(), strict=True)
+    ]
+    scale = np.diag([0.15, 0.5, 0.17, 0.4]) ** 2
+    mean = np.array([-0.6, math.log(4_000.0), log_exponent, math.log(0.003)])
+    fleet = FleetPrior(clutches=20, mean=mean, scale=scale, freedom=20.0)
+    alone, taught = (
+        Grid().posterior(Grid().from_history(prior, seen), 2_000, np.random.default_rng(1))
+        for prior in (weak(seen[0], falling=True), fleet.prior_for(seen[0]))
+    )
+    together = fleet.together(alone, taught, seen[0])
+    before, after = (np.bincount(p.course, weights=p.weight, minlength=len(Course)) for p in (alone, together))
+    odds_before, odds_after = before[1:] / before[1:].sum(), after[1:] / after[1:].sum()
+    assert odds_after == pytest.approx(odds_before, abs=0.1)
+    assert after[0] / after[1:].sum() > 0.7 * (1.0 - fleet.share) * before[0] / before[1:].sum()

@@ -38,7 +38,7 @@ def test_a_straight_line_is_no_eq_6_and_the_data_say_so() -> None:
         found = predict_first_passage(posterior, fraction=0.5, as_of=6_000.0).end_of_life
         assert found[0.05] is not None
         assert found[0.05] < 10_000.0 < (found[0.95] or math.inf)
-    sure = Grid().from_history(replace(prior, law_share=1.0), line)
+    sure = Grid().from_history(replace(prior, law_share=1.0, eq_6_share=1.0), line)
     told = predict_first_passage(Grid().posterior(sure, 1_000, np.random.default_rng(2)), fraction=0.5, as_of=6_000.0)
     assert told.end_of_life[0.05] is not None
     assert told.end_of_life[0.05] > 10_000.0

@@ -9,6 +9,7 @@ from scipy.stats import multivariate_normal
 
 from models.degradation.general_order import Degradation, value
 from models.tracking import linear_model, sampling
+from models.tracking.courses import basis
 from models.tracking.discrepancy import smooth
 from models.tracking.history import History
 from models.tracking.measurement import Measurement
@@ -29,13 +30,15 @@ CAMPAIGN = [
 PRIOR = weak(CAMPAIGN[0], falling=True)
 
 
+#: Three of eq. 6, with q of 0, 0.03 and 0.1, and one of every other course; of two the scatter is a share of the value.
 POINTS = linear_model.Points(
-    log_scale=np.array([8.5, 7.0, 10.0]),
-    log_exponent=np.array([-0.3, 0.4, -1.0]),
-    log_scatter=np.array([-8.0, -6.5, -9.0]),
-    size=np.array([0.0, 0.03, 0.1]),
-    outlying=np.eye(13)[:, [4, 4, 12]] * [0.0, 1.0, 1.0],
+    log_scale=np.array([8.5, 7.0, 10.0, 9.6, 8.0, 9.9, 8.5, 7.5]),
+    log_exponent=np.array([-0.3, 0.4, -1.0, -0.7, 0.5, 0.1, 0.0, 0.0]),
+    log_scatter=np.array([-8.0, -6.5, -9.0, -8.0, -7.5, -8.5, -8.0, -8.0]),
+    form=np.array([0, 2, 3, 5, 10 + 24, 12, 19 + 24, 21]),
+    outlying=np.eye(13)[:, [4, 4, 12, 4, 5, 4, 3, 6]] * [0.0, 1.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0],
 )
+COUNT = POINTS.form.size
 
 
 #: The last four runs come after an event.
@@ -63,7 +66,7 @@ def test_conditional_is_that_of_the_whole_normal() -> None:
     """(ξ0, Δ) and the data are jointly normal: condition on the data."""
     history = History.of(EPOCHS, PRIOR)
     given = linear_model.conditional(linear_model.pointwise(history, PRIOR, POINTS)[0], PRIOR)
-    for point in range(3):
+    for point in range(COUNT):
         mean, covariance = normal(point, EPOCHS)
         b = (mean - PRIOR.initial_mean) / PRIOR.change_mean
         prior = np.diag([PRIOR.initial_sd**2, PRIOR.change_sd**2])
@@ -78,20 +81,20 @@ def test_conditional_is_that_of_the_whole_normal() -> None:
 
 def test_the_table_and_the_points_are_one_sum() -> None:
     history = History.of(EPOCHS, PRIOR)
-    table = linear_model.basis(history.progress[:, None], POINTS.log_scale, POINTS.log_exponent)
+    table = basis(history.progress[:, None], POINTS.log_scale, POINTS.log_exponent, POINTS.course)
     levels = np.array([-8.0, -7.0])
-    kinds, outlying = np.array([0.0, 0.03]), np.eye(13)[:, [0, 5]]
+    forms, outlying = np.array([0, 2 + 24]), np.eye(13)[:, [0, 5]]
     tabled = linear_model.evidence(
-        linear_model.tabulated(history, PRIOR, table, np.stack([levels, levels]), kinds, outlying), PRIOR
+        linear_model.tabulated(history, PRIOR, table, np.stack([levels, levels]), forms, outlying), PRIOR
     )
     for kind, level in np.ndindex(2, 2):
         points = replace(
             POINTS,
-            log_scatter=np.full(3, levels[level]),
-            size=np.full(3, kinds[kind]),
-            outlying=np.repeat(outlying[:, kind : kind + 1], 3, axis=1),
+            log_scatter=np.full(COUNT, levels[level]),
+            form=np.full(COUNT, forms[kind]),
+            outlying=np.repeat(outlying[:, kind : kind + 1], COUNT, axis=1),
         )
-        pointed = linear_model.evidence(linear_model.pointwise(history, PRIOR, points)[0], PRIOR)
+        pointed = linear_model.evidence(linear_model.pointwise(history, PRIOR, points, table)[0], PRIOR)
         np.testing.assert_allclose(tabled[kind, level], pointed, rtol=1e-9)
 
 
@@ -102,7 +105,7 @@ def test_the_last_run_turned_outlying_is_that_of_all_sums_anew(measurements: lis
     sound = replace(POINTS, outlying=POINTS.outlying * (np.arange(13) < 12)[:, None])
     outlying = replace(sound, outlying=sound.outlying + (np.arange(13) == 12)[:, None])
     sums, terms = linear_model.pointwise(history, PRIOR, sound)
-    last = linear_model.basis(history.progress[-1], POINTS.log_scale, POINTS.log_exponent)
+    last = basis(history.progress[-1], POINTS.log_scale, POINTS.log_exponent, POINTS.course)
     turned = linear_model.last_outlying(history, PRIOR, sound, sums, terms, last)
     anew = linear_model.pointwise(history, PRIOR, outlying)[0]
     for name, found in asdict(turned).items():
@@ -117,7 +120,7 @@ def test_drawn_terms_have_the_posterior_of_the_discrepancy() -> None:
         log_scale=np.full(count, 7.0),
         log_exponent=np.full(count, 0.4),
         log_scatter=np.full(count, -6.5),
-        size=np.full(count, 0.03),
+        form=np.full(count, 2),
         outlying=np.repeat(POINTS.outlying[:, 1:2], count, axis=1),
     )
     sums, terms = linear_model.pointwise(history, PRIOR, points)

@@ -14,7 +14,7 @@ from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior, weak
 
 FILTERS = [(Grid(), GridState), (Particle(particles=300), ParticleState), (Ukf(), UkfState)]
-COLUMNS = [name for name in Posterior.__slots__ if name != "discrepancy"]
+COLUMNS = [name for name in Posterior.__slots__ if name not in ("discrepancy", "forced")]
 NAMES = [tracker.name for tracker, _ in FILTERS]
 TYPICAL = Degradation(initial=0.134, change=-0.1, scale=5_000.0, exponent=0.7)
 
@@ -45,7 +45,7 @@ def same(a: Any, b: Any) -> bool:
 CAMPAIGN = series(TYPICAL, np.linspace(0.0, 12_000.0, 13), 4e-4)
 PRIOR = weak(CAMPAIGN[0], falling=True)
 #: Eq. 6 for sure, and no run is ever outlying.
-PLAIN = replace(PRIOR, law_share=1.0, outlying_share=0.0)
+PLAIN = replace(PRIOR, law_share=1.0, eq_6_share=1.0, proportional_share=0.0, outlying_share=0.0)
 
 #: Series that no clutch gives, or only seldom.
 WEIRD = {

@@ -7,8 +7,8 @@ import pytest
 from rich.console import Console
 
 from service.cli.diagnosis_view import shown
-from service.lives.diagnosis_report import empty, public
-from tests.service.lives.test_campaign import EMPTY
+from service.lives.diagnosis.report import empty, public
+from tests.service.lives.diagnosis.test_campaign import EMPTY
 from tests.service.workflows.stand_in_engine import diagnose
 
 LIFE = {"status": "predicted", "remaining_cycles": {"0.05": 4000.0, "0.5": 12345.6, "0.95": None}}

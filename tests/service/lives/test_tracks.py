@@ -7,7 +7,7 @@ from models.prognosis.fleet import FleetPrior
 from service.lives.assumptions import FLEET, WEAK, Assumptions, LearnedPrior
 from service.lives.criteria import PREDICTION_DRAWS
 from service.lives.history import lives_of
-from service.lives.tracks import CARRIED, advance, draws
+from service.lives.tracks import CARRIED, advance, drawn
 from tests.plausibility.bench import Bench
 from tests.support import stationary
 
@@ -28,7 +28,7 @@ def test_two_priors_share_particles_and_draws(method: str) -> None:
         series = life.pooled(assumptions)
         tracked = advance("c1", method, series, assumptions, None, 3)
         assert tracked.states.keys() == ({WEAK} if name == "alone" else {WEAK, FLEET})
-        assert draws("c1", method, series, assumptions, tracked).weight.size == PREDICTION_DRAWS
+        assert drawn("c1", method, series, assumptions, tracked).weight.size == PREDICTION_DRAWS
         sizes[name] = {
             key: state.cloud.log_weight.size for key, state in tracked.states.items() if hasattr(state, "cloud")
         }

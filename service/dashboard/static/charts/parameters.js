@@ -62,7 +62,7 @@ function rangeOf({ measured, trajectory }) {
  */
 export function parameter({ items, name, pressure, events }) {
   const item = items.find(({ quantity, pressure_bar: level }) => quantity === name && level === pressure);
-  if (!item) return { empty: "The tests at this pressure do not determine it." };
+  if (!item?.coefficients) return { empty: "The tests at this pressure do not determine it." };
   const { measured, trajectory, coefficients: k } = item;
   const { unit } = PARAMETERS[name];
   const inUnit = unit && ` ${unit.replace("^0.3", "⁰·³")}`;

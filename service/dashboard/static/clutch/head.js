@@ -8,7 +8,7 @@ import { heldText, stateIcon, STATES } from "../shared/state.js";
 
 /** @import { Content } from "../shared/dom.js" */
 /** @import { State } from "../shared/state.js" */
-/** @import { ClutchOut, RemainingLife } from "../shared/types.js" */
+/** @import { ClutchOut, CourseShare, RemainingLife } from "../shared/types.js" */
 
 /**
  * @param {ClutchOut} clutch
@@ -60,7 +60,11 @@ function tiles(clutch, life, state) {
   const effects = model.effects.length > 0 ? model.effects.map(words).join(", ") : "without extension";
   return [
     tile("Health", percent(health), health === null ? null : healthBar(health, state.name)),
-    tile("Remaining cycles", remaining(life), small(quantiles)),
+    tile(
+      "Remaining cycles",
+      remaining(life),
+      small(quantiles + backCast(life.back_cast) + endedLives(life.ended_lives)),
+    ),
     tile("Mean COF", cof, small(`${spread}${percent(current.fraction_of_initial, 1)} of new`)),
     tile("Duty cycles so far", fixed(life.as_of_cycles), small(used)),
     tile(
@@ -68,9 +72,26 @@ function tiles(clutch, life, state) {
       probability(life.probability_of_reaching),
       small(`within ${fixed(life.horizon_cycles)} cycles`),
     ),
+    tile(
+      "Course",
+      life.course ? COURSES[life.course.name] : "–",
+      small(life.course ? course(life.course) : "too few tests"),
+    ),
     tile("Model", words(model.name), small(effects)),
   ];
 }
+
+const COURSES = { eq6: "As eq. 6", slowing: "Slowing down", accelerating: "Accelerating" };
+
+/** @param {CourseShare} share */
+const course = ({ probability: p, order }) => `${percent(p)} sure, order ${fixed(order, 1)}`;
+
+/** @param {RemainingLife["back_cast"]} count */
+const backCast = (count) =>
+  count && count.of > 0 ? `; earlier forecasts held ${count.held} of ${count.of} tests` : "";
+
+/** @param {number} count */
+const endedLives = (count) => (count > 0 ? `; calibrated by ${count} lives that ended` : "");
 
 /** @param {string} text */
 const small = (text) => h("small", {}, text);

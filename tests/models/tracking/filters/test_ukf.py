@@ -1,12 +1,17 @@
 """The unscented filters: domain, scatter, and starting anew."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from models.degradation.general_order import Degradation, value
+from models.prognosis.first_passage import PassageStatus, predict_first_passage
+from models.tracking.filters.grid import Grid
 from models.tracking.filters.sigma_points import scatter_learnt
 from models.tracking.filters.ukf import Ukf
+from models.tracking.history import History
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
 from tests.models.tracking.tracked_series import (
@@ -57,3 +62,41 @@ def test_a_lost_ukf_starts_anew_from_the_whole_history() -> None:
     ]
     assert followed(Ukf(), PRIOR, CAMPAIGN[:11]).reference == CAMPAIGN[7].progress
     assert followed(Ukf(), PRIOR, bent).reference > 1e4
+
+
+def test_the_ukf_books_the_step_of_each_event_on_that_event() -> None:
+    """A life whose level steps up by 0.02 at 12,000 cycles, and an event without effect at 29,000. Booked on the last event,
+    the step was missing between the two, and an end of life was reported that had not come."""
+    progress, rng = np.linspace(0.0, 40_000.0, 31), np.random.default_rng(0)
+    truth = Degradation(initial=0.134, change=-0.1, scale=5_000.0, exponent=0.7)
+    cof = value(progress, truth) + 0.02 * (progress >= 12_000.0) + 0.0004 * rng.standard_normal(31)
+    runs = [
+        Measurement(progress=z, value=y, variance=1e-8, epoch=int(z >= 12_000) + int(z >= 29_000))
+        for z, y in zip(progress.tolist(), cof.tolist(), strict=True)
+    ]
+    prior = weak(runs[0], falling=True)
+    posterior = Ukf().posterior(followed(Ukf(), prior, runs), 1_000, rng)
+    exact = Grid().posterior(Grid().from_history(prior, runs), 1_000, rng)
+    assert posterior.discrepancy is not None
+    assert posterior.discrepancy.height.mean(axis=0) == pytest.approx([0.02, 0.0], abs=0.002)
+    ends = [predict_first_passage(found, fraction=0.5, as_of=40_000.0) for found in (posterior, exact)]
+    assert [end.status for end in ends] == [PassageStatus.PREDICTED] * 2
+    assert ends[0].end_of_life[0.5] == pytest.approx(ends[1].end_of_life[0.5], rel=0.05)
+
+
+def test_the_ukf_bears_more_events_than_anyone_logs() -> None:
+    """A sensor is zeroed before each of 120 tests: each begins an epoch, and has a step of its own."""
+    rng = np.random.default_rng(5)
+    progress = np.linspace(0.0, 20_000.0, 120)
+    cof = value(progress, Degradation(initial=0.134, change=-0.1, scale=5_000.0, exponent=0.7))
+    runs = [
+        Measurement(progress=z, value=y + 0.0004 * rng.standard_normal(), variance=1e-8, epoch=place)
+        for place, (z, y) in enumerate(zip(progress.tolist(), cof.tolist(), strict=True))
+    ]
+    prior = weak(runs[0], falling=True)
+    state = Ukf().update(replace(Ukf().start(prior), history=History.of(runs[:-1], prior)), runs[-1])
+    assert state.mean.shape[1] == 6 + 119
+    posterior = Ukf().posterior(state, 500, rng)
+    now, deviation = posterior.moments(posterior.values(np.array([20_000.0]))[0])
+    assert abs(now - cof[-1]) < 4.0 * deviation + 0.01
+    assert posterior.weight.size == 500

@@ -1,0 +1,100 @@
+"""What earlier forecasts of a clutch said about the tests since, and how much wider its intervals are to be for it.
+
+A forecast is kept after the third, fourth, sixth, eighth … test: the median and the 90 % interval of ξ ahead. A later test
+is judged by the newest forecast that was made at 80 % of its progress or before. Its miss is how far it lies from the
+median, in half widths of the interval on that side, with the scatter from run to run and the variance of its fit; three at
+most, since a run may be outlying.
+
+Where forecasts fared badly a prognosis is wider: remaining life is raised, as a multiple of its median, to the power
+
+    w = max(1, the ⌈0.9 (m + 1)⌉-th smallest of m misses),
+
+the largest where m is below 9: the quantile of split conformal prediction. The misses of one life are no independent
+draws, so it promises nothing here; docs/prognosis.md says what it achieves.
+
+Source: H. Papadopoulos, K. Proedrou, V. Vovk, A. Gammerman, ECML (2002) 345-356, for the quantile.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import ndtri
+from scipy.stats import binom
+
+from models.arrays import FloatArray
+from models.prognosis.criteria import AHEAD, BAND, COVERAGE, MOST_MISSED, SURPRISING, UNTIL
+from models.prognosis.first_passage import bands
+from models.tracking.measurement import Measurement
+from models.tracking.posterior import Posterior
+from models.tracking.prior import Prior
+
+#: Half the width of a normal's 90 % interval, in deviations.
+HALF_WIDTH = float(ndtri(BAND[-1]))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BackCast:
+    """`forecasts` [f, 2 + 3 a]: progress and epoch of each, then at each of AHEAD its lower end, median and upper end;
+    `misses` [m] of the tests that were judged."""
+
+    forecasts: FloatArray
+    misses: FloatArray
+
+    @classmethod
+    def nothing(cls) -> "BackCast":
+        """Before the first test."""
+        return cls(forecasts=np.zeros((0, 2 + 3 * len(AHEAD))), misses=np.zeros(0))
+
+    @property
+    def held(self) -> int:
+        """How many tests lay within the intervals that were forecast for them."""
+        return int(np.count_nonzero(self.misses <= 1.0))
+
+    @property
+    def surprising(self) -> bool:
+        """Whether so few tests are improbable, had each been within with 90 %."""
+        return bool(binom.cdf(self.held, self.misses.size, COVERAGE) < SURPRISING)
+
+    @property
+    def widening(self) -> float:
+        """The power w >= 1."""
+        count = self.misses.size
+        if count == 0:
+            return 1.0
+        rank = min(math.ceil(COVERAGE * (count + 1)), count)
+        return max(1.0, float(np.sort(self.misses)[rank - 1]))
+
+    def judged(self, test: Measurement) -> "BackCast":
+        """With the miss of one more test, if there is a forecast that reaches it, and no event lies between."""
+        progress, epoch = self.forecasts[:, 0], self.forecasts[:, 1]
+        usable = (
+            (progress > 0.0)
+            & (progress <= UNTIL * test.progress)
+            & (epoch == test.epoch)
+            & (test.progress <= AHEAD[-1] * progress)
+        )
+        if not usable.any():
+            return self
+        row = self.forecasts[usable][-1]
+        low, median, high = (
+            float(np.interp(test.progress, row[0] * np.array(AHEAD), ends)) for ends in row[2:].reshape(-1, 3).T
+        )
+        half = math.hypot(median - low if test.value < median else high - median, HALF_WIDTH * math.sqrt(test.variance))
+        miss = abs(test.value - median) / half if half > 0.0 else 0.0
+        return replace(self, misses=np.append(self.misses, min(miss, MOST_MISSED)))
+
+    def forecast(self, posterior: Posterior, newest: Measurement, prior: Prior) -> "BackCast":
+        """With the forecast of a posterior that knows all tests up to the newest."""
+        _, ahead = bands(posterior, newest.progress * np.array(AHEAD))
+        medians = ahead[:, 1]
+        scatter = [math.sqrt(float(posterior.weight @ posterior.scatter_variance(x, prior))) for x in medians.tolist()]
+        half = np.hypot(ahead - medians[:, None], HALF_WIDTH * np.array(scatter)[:, None])
+        ends = medians[:, None] + np.array([-1.0, 0.0, 1.0]) * half
+        row = np.concatenate([[newest.progress, newest.epoch], ends.ravel()])
+        return replace(self, forecasts=np.vstack([self.forecasts, row]))
+
+
+def kept_after(tests: int) -> bool:
+    """Whether a forecast is kept after so many tests: 3, 4, 6, 8, 12, 17, 24, …, each √2 times the one before."""
+    return tests >= 3 and tests == round(3.0 * 2.0 ** (round(2.0 * math.log2(tests / 3.0)) / 2.0))

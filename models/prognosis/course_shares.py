@@ -1,0 +1,56 @@
+"""Which course the data speak for: ageing as eq. 6, slowing down otherwise, or accelerating, each with its probability.
+
+The rate of a course of general order (`models.tracking.courses`) changes as (1 + ζ/φ)^-(ε + 1): it falls where (ε + 1)/φ is
+positive and grows where it is negative.
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.prognosis.first_passage import weighted_quantiles
+from models.tracking.courses import Course
+from models.tracking.posterior import Posterior
+
+
+class CourseName(StrEnum):
+    """What a course is called: that of eq. 6 levels off, of an order above 1."""
+
+    EQ_6 = "eq6"
+    SLOWING = "slowing"
+    ACCELERATING = "accelerating"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CourseShare:
+    """A kind of course, its probability, and the median of its kinetics' order n = 1 + 1/ε [-]; None for a logarithm alone,
+    which has none."""
+
+    name: CourseName
+    probability: float
+    order: float | None
+
+
+def course_shares(posterior: Posterior) -> list[CourseShare]:
+    """The kinds of course that have any probability, the most probable first."""
+    accelerates = (posterior.exponent + 1.0) / posterior.scale < 0.0
+    kinds = {
+        CourseName.EQ_6: posterior.course == Course.EQ_6,
+        CourseName.SLOWING: (posterior.course != Course.EQ_6) & ~accelerates,
+        CourseName.ACCELERATING: (posterior.course != Course.EQ_6) & accelerates,
+    }
+    shares = []
+    for name, here in kinds.items():
+        probability = float(posterior.weight[here].sum())
+        if probability > 0.0:
+            shares.append(CourseShare(name=name, probability=min(probability, 1.0), order=_order(posterior, here)))
+    return sorted(shares, key=lambda share: share.probability, reverse=True)
+
+
+def _order(posterior: Posterior, here: NDArray[np.bool_]) -> float | None:
+    ordered = here & (posterior.course != Course.LOGARITHM)
+    if not posterior.weight[ordered].any():
+        return None
+    return float(weighted_quantiles(1.0 + 1.0 / posterior.exponent[ordered], posterior.weight[ordered], (0.5,))[0])

@@ -1,0 +1,150 @@
+"""The courses that a quantity may take: kinetics of general order with φ and ε of either sign, and a discrepancy beside.
+
+    ξ(ζ) = ξ0 + Δ b(ζ),   b = σ [1 - (1 + ζ/φ)^-ε],   σ the product of the signs of φ and ε
+
+With both positive it is eq. 6, whose order n = 1 + 1/ε lies above 1: it slows down and levels off. With both negative the
+order lies below 1 and the course ends at |φ|: with |ε| < 1 it accelerates towards a cliff, at 1 it is a straight line, above
+it levels off at the end. With one negative, damage feeds on itself: a power of cycles (φ > 0, the root among them), or
+hyperbolic growth without bounds at |φ| (φ < 0). Between them lie, as courses of their own, the exponential to a floor, of
+order 1 (ε → ∞), and the logarithm (ε → 0). Given (φ, ε) each is linear in ξ0 and Δ.
+
+A form is a course with a size q of the discrepancy (`discrepancy`) and a law of the scatter, which is the same at every
+value or a share of the value. Eq. 6 is physics and believed with little beside it;
+the others are shapes only, and believed no further than a discrepancy of some size lets them.
+
+Source: order n of dD/dζ = -k Dⁿ with D = (1 + ζ/φ)^-ε: n = 1 + 1/ε.
+"""
+
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from models.degradation.general_order import ENDED, LOG_MOST
+from models.tracking.criteria import COURSE_SHARES, OTHER_SHARES, OTHER_SIZES, SHARES, SIZES
+from models.tracking.prior import Prior
+
+
+class Course(IntEnum):
+    """Which signs φ and ε have."""
+
+    EQ_6 = 0
+    ENDING = 1
+    POWER = 2
+    HYPERBOLIC = 3
+    EXPONENTIAL = 4
+    LOGARITHM = 5
+
+
+#: Signs of φ and ε by course, and their product σ.
+SCALE_SIGN, EXPONENT_SIGN = np.array([1.0, -1.0, 1.0, -1.0, 1.0, 1.0]), np.array([1.0, -1.0, -1.0, 1.0, 1.0, -1.0])
+SIGN = SCALE_SIGN * EXPONENT_SIGN
+
+#: |ε| of the two courses that have none: of the exponential, whose order is 1 and whose coordinate log φ stands for log τ,
+#: and of the logarithm, whose change is counted in units of |ε|. Chosen: as far from 1 as leaves b its digits; no table.
+_LARGE, _SMALL = 1e4, 1e-4
+#: ε where it is fixed, and φ over exp of its coordinate, by course.
+_EXPONENT = np.array([np.nan, np.nan, np.nan, np.nan, _LARGE, -_SMALL])
+_PLAIN_SCALE = np.array([1.0, -1.0, 1.0, -1.0, _LARGE, 1.0])
+#: Courses whose ε is fixed: their coordinate log ε stands for nothing.
+WITHOUT_EXPONENT = ~np.isnan(_EXPONENT)
+_COURSES = np.concatenate([np.zeros(SIZES.size), np.repeat([1, 2, 3, 4, 5], OTHER_SIZES.size)]).astype(np.intp)
+_SIZES = np.concatenate([SIZES, np.tile(OTHER_SIZES, 5)])
+#: Of every form its course, its size q, and whether its scatter is a share of the value.
+FORM_COURSE: NDArray[np.intp] = np.tile(_COURSES, 2)
+FORM_SIZE = np.tile(_SIZES, 2)
+FORM_PROPORTIONAL: NDArray[np.bool_] = np.repeat([False, True], _SIZES.size)
+
+
+def basis(
+    progress: FloatArray, log_scale: FloatArray, log_exponent: FloatArray, course: NDArray[np.intp]
+) -> FloatArray:
+    """b = σ [1 - (1 + ζ/φ)^-ε], in the shape of ζ/φ and of the course, to which ε is broadcast:
+    `general_order.progress_fraction`, three times as quick.
+
+    Accurate to 2e-16 absolute, not relative: here b is only compared with measurement noise. What grows is cut at LOG_MOST.
+    """
+    others = bool(course.any())
+    power = np.asarray(progress * np.exp(-log_scale))
+    exponent = np.exp(log_exponent)
+    if others:
+        power = power / _PLAIN_SCALE[course]
+        exponent = np.where(np.isnan(_EXPONENT[course]), exponent * EXPONENT_SIGN[course], _EXPONENT[course])
+    power += 1.0
+    if others:
+        np.maximum(power, ENDED, out=power)
+    np.log(power, out=power)
+    power *= -exponent
+    if others:
+        np.minimum(power, LOG_MOST, out=power)
+    np.exp(power, out=power)
+    np.subtract(1.0, power, out=power)
+    if others:
+        power *= SIGN[course] / unit_of_change(course)
+    return power
+
+
+def unit_of_change(course: NDArray[np.intp]) -> FloatArray:
+    """What a Δ of b is to be divided by to be that of σ [1 - (1 + ζ/φ)^-ε]; 1 but for the logarithm."""
+    return np.where(course == Course.LOGARITHM, _SMALL, 1.0)
+
+
+def log_form_weight(prior: Prior) -> FloatArray:
+    """Log prior probability of each form; -inf for those that the prior is sure are not."""
+    home = prior.eq_6_share * np.concatenate([[prior.law_share], (1.0 - prior.law_share) * SHARES])
+    others = (1.0 - prior.eq_6_share) * np.outer(COURSE_SHARES, OTHER_SHARES).ravel()
+    once = np.concatenate([home, others])
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(np.outer([1.0 - prior.proportional_share, prior.proportional_share], once).ravel()))
+
+
+def form_of(course: NDArray[np.intp], size: FloatArray, proportional: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """The form [n] of courses, sizes q and laws of the scatter, each [n]."""
+    off = np.abs(_SIZES - size[:, None]) + (course[:, None] != _COURSES)
+    return np.asarray(off.argmin(axis=1) + np.where(proportional, _SIZES.size, 0), dtype=np.intp)
+
+
+def scatter_growth(form: NDArray[np.intp], relative: FloatArray) -> FloatArray:
+    """By what s² is to be multiplied at values of `relative` size squared [t] under forms [n]; [n, t]."""
+    return np.where(FORM_PROPORTIONAL[form][:, None], relative, 1.0)
+
+
+def course_of(scale: FloatArray, exponent: FloatArray) -> NDArray[np.intp]:
+    """The course [n] of signed φ and ε, each [n]."""
+    course = np.where(scale > 0.0, np.where(exponent > 0.0, 0, 2), np.where(exponent > 0.0, 3, 1))
+    for fixed in (Course.EXPONENTIAL, Course.LOGARITHM):
+        course = np.where(exponent == _EXPONENT[fixed], fixed, course)
+    return course.astype(np.intp)
+
+
+def coefficients_at(
+    log_scale: FloatArray, log_exponent: FloatArray, course: NDArray[np.intp]
+) -> tuple[FloatArray, FloatArray]:
+    """φ and ε, each with its sign, of coordinates; broadcast against the course."""
+    fixed = _EXPONENT[course]
+    return np.exp(log_scale) * _PLAIN_SCALE[course], np.where(
+        np.isnan(fixed), np.exp(log_exponent) * EXPONENT_SIGN[course], fixed
+    )
+
+
+def coordinates_of(scale: FloatArray, exponent: FloatArray, course: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
+    """The coordinates (log φ, log ε) of signed φ and ε; the inverse of `coefficients_at`."""
+    free = np.isnan(_EXPONENT[course])
+    return np.log(scale / _PLAIN_SCALE[course]), np.where(free, np.log(np.abs(exponent)), 0.0)
+
+
+def log_scale_at(place: FloatArray, course: NDArray[np.intp], span: float) -> tuple[FloatArray, FloatArray]:
+    """log |φ| at a place of a lattice, and log |d log φ / d place|; `place` broadcasts against `course`.
+
+    A course that ends does so beyond what was measured, up to the progress `span`: its place is log(|φ| - span).
+    """
+    ends = SCALE_SIGN[course] < 0.0
+    beyond = np.logaddexp(np.log(span), place)
+    return np.where(ends, beyond, place), np.where(ends, place - beyond, 0.0)
+
+
+def place_of(log_scale: FloatArray, course: NDArray[np.intp], span: float) -> FloatArray:
+    """The inverse of `log_scale_at`; just beyond `span` where a course has ended before."""
+    left = log_scale + np.log(-np.expm1(np.minimum(np.log(span) - log_scale, -ENDED)))
+    return np.where(SCALE_SIGN[course] < 0.0, left, log_scale)

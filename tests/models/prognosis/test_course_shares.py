@@ -1,0 +1,80 @@
+"""Which course the data speak for: named where it is clear, and held where the filters would otherwise come too late."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from models.prognosis.course_shares import CourseName, course_shares
+from models.prognosis.first_passage import predict_first_passage
+from models.tracking.courses import Course
+from models.tracking.filters.grid import Grid
+from models.tracking.filters.particle import Particle
+from models.tracking.filters.ukf import Ukf
+from models.tracking.measurement import Measurement
+from models.tracking.posterior import Posterior
+from models.tracking.prior import weak
+from tests.models.tracking.tracked_series import CAMPAIGN, NAMES, PRIOR, followed
+
+TRACKERS = pytest.mark.parametrize("tracker", [Grid(), Particle(), Ukf()], ids=NAMES)
+
+
+def accelerating(share: float) -> list[Measurement]:
+    """A life of 10,000 cycles whose COF falls by 0.75 (1 - √(1 - x/1.125)), 0.3 % scatter, up to a share of it."""
+    rng = np.random.default_rng(8)
+    x = np.linspace(0.0, share, 1 + round(30 * share))
+    values = 0.1 * (1.0 - 0.75 * (1.0 - np.sqrt(1.0 - x / 1.125))) * (1.0 + 0.003 * rng.standard_normal(x.size))
+    return [
+        Measurement(progress=1e4 * a, value=y, variance=1e-8) for a, y in zip(x.tolist(), values.tolist(), strict=True)
+    ]
+
+
+def posterior_of(tracker: Any, seen: list[Measurement]) -> Posterior:
+    found: Posterior = tracker.posterior(
+        followed(tracker, weak(seen[0], falling=True), seen), 1_000, np.random.default_rng(2)
+    )
+    return found
+
+
+@TRACKERS
+def test_a_life_that_accelerates_is_said_to_and_held(tracker: Any) -> None:
+    posterior = posterior_of(tracker, accelerating(0.6))
+    assert course_shares(posterior)[0].name is CourseName.ACCELERATING
+    assert course_shares(posterior)[0].probability > 0.8
+    found = predict_first_passage(posterior, fraction=0.5, as_of=6_000.0).end_of_life
+    assert found[0.05] is not None
+    assert found[0.05] < 10_000.0 < (found[0.95] or math.inf)
+
+
+@TRACKERS
+def test_a_life_of_eq_6_is_said_to_be(tracker: Any) -> None:
+    shares = course_shares(posterior_of(tracker, CAMPAIGN))
+    assert shares[0].name is CourseName.EQ_6
+    assert (shares[0].order or 0.0) > 1.0
+    assert sum(share.probability for share in shares) == pytest.approx(1.0)
+
+
+def test_no_course_is_lost_while_the_data_say_nothing_of_it() -> None:
+    """The particle filter keeps some particles of each, whatever their weight: later tests may speak for them."""
+    state = followed(Particle(), PRIOR, CAMPAIGN)
+    counts = np.bincount(state.cloud.course, minlength=len(Course))
+    assert counts.min() > 0.02 * counts.sum()
+
+
+def test_a_straight_line_is_neither() -> None:
+    seen = [Measurement(progress=1e4 * x, value=0.1 * (1 - 0.5 * x), variance=1e-8) for x in np.linspace(0, 0.6, 19)]
+    shares = {share.name: share for share in course_shares(posterior_of(Grid(), seen))}
+    assert CourseName.EQ_6 not in shares or shares[CourseName.EQ_6].probability < 0.1
+    assert min(shares[CourseName.SLOWING].probability, shares[CourseName.ACCELERATING].probability) > 0.1
+
+
+@TRACKERS
+def test_what_rises_faster_and_faster_is_no_end(tracker: Any) -> None:
+    """The accelerating life upside down: its cliff leads away from the threshold."""
+    fresh, *rest = accelerating(0.8)
+    rising = [fresh, *(replace(each, value=2.0 * fresh.value - each.value) for each in rest)]
+    passage = predict_first_passage(posterior_of(tracker, rising), fraction=0.5, as_of=8_000.0)
+    assert passage.probability_of_reaching < 0.1
+    assert passage.end_of_life[0.5] is None

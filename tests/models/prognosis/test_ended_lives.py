@@ -1,0 +1,98 @@
+"""What ended lives say: where they ended, and how right forecasts of them were."""
+
+import math
+
+import numpy as np
+import pytest
+
+from models.prognosis.ended_lives import EndedLife, calibrated, ended_life
+from models.prognosis.first_passage import weighted_quantiles
+from models.tracking.measurement import Measurement
+
+ENDS = 1_000.0 * np.exp(0.08 * np.array([-1.5, -1.0, -0.6, -0.3, 0.0, 0.1, 0.4, 0.7, 1.1, 1.6]))
+
+
+def ended(end: float, off: float = 1.0, spread: float = 0.05) -> EndedLife:
+    """A life whose forecasts were `off` times its end throughout, with that deviation of the logarithm."""
+    stated = math.log(off * end) + 1.645 * spread * np.array([-1.0, 0.0, 1.0])
+    return EndedLife(end=end, fraction=0.5, progress=np.array([100.0, 500.0]), forecasts=np.array([stated, stated]))
+
+
+def quantiles(own: EndedLife, lives: list[EndedLife], as_of: float = 400.0) -> list[float]:
+    stated = calibrated(own.forecasts[0], as_of, [life for life in lives if life.end > as_of])
+    assert stated is not None
+    ends, weight = stated
+    assert weight.sum() == pytest.approx(1.0)
+    assert ends.min() > as_of
+    return [float(x) for x in weighted_quantiles(ends, weight, (0.05, 0.5, 0.95))]
+
+
+def test_forecasts_that_were_right_decide() -> None:
+    lives = [ended(end, off) for end, off in zip(ENDS, np.exp(0.05 * np.sin(np.arange(10.0))), strict=True)]
+    low, middle, high = quantiles(ended(1_150.0), lives)
+    assert 1_060.0 < middle < 1_160.0
+    assert 0.1 < math.log(high / low) < 0.25
+
+
+def test_forecasts_that_are_late_are_led_back_to_the_ends() -> None:
+    """All 22 times too late, as of a course that accelerates: what is left is where the others ended."""
+    scatter = 22.0 * np.exp(0.9 * np.cos(3.0 * np.arange(10.0)))
+    lives = [ended(end, off, 0.3) for end, off in zip(ENDS, scatter, strict=True)]
+    low, middle, high = quantiles(ended(1_000.0, 15.0, 0.3), lives)
+    assert (low, middle, high) == pytest.approx((860.0, 1_005.0, 1_175.0), rel=0.05)
+
+
+def test_it_is_alive_now() -> None:
+    lives = [ended(end) for end in ENDS]
+    low, _, _ = quantiles(ended(900.0), lives, as_of=1_000.0)
+    assert low > 1_000.0
+    assert calibrated(ended(1_200.0).forecasts[0], 1_100.0, lives[8:]) is None
+
+
+def test_the_sample_is_of_the_density_that_is_stated() -> None:
+    """Against the product of the two predictives, summed up on a fine even grid of T."""
+    lives = [ended(end, off) for end, off in zip(ENDS, np.exp(0.1 * np.sin(np.arange(10.0))), strict=True)]
+    own = ended(1_050.0, 1.0, 0.2)
+    found = quantiles(own, lives)
+    log_ends = np.log(ENDS)
+    deviations = np.array([0.05] * 10 + [0.2])
+    size = np.sqrt(deviations) * math.exp(np.log(np.sqrt(deviations)).mean())
+    errors = -0.1 * np.sin(np.arange(10.0)) / size[:-1]
+    ends = np.linspace(400.0, 10_000.0, 400_001)[1:]
+    log_density = np.zeros(ends.size)
+    for values, shift, unit, vague, (shape, rate) in (
+        (log_ends - np.median(log_ends), np.median(log_ends), 1.0, 10.0, (1.0, 0.01)),
+        (errors, math.log(1_050.0), size[-1], 1.0, (1.0, 1.0)),
+    ):
+        worth = 10 + vague**-2
+        mean = values.sum() / worth
+        a, b = shape + 5.0, rate + 0.5 * ((values**2).sum() - worth * mean**2)
+        x = ((np.log(ends) - shift) / unit - mean) / math.sqrt(b / a * (1 + 1 / worth))
+        log_density -= (a + 0.5) * np.log1p(x**2 / (2 * a))
+    weight = np.exp(log_density - log_density.max()) / ends  # a density of log T
+    expected = weighted_quantiles(ends, weight, (0.05, 0.5, 0.95))
+    assert found == pytest.approx(expected.tolist(), rel=2e-3)
+
+
+def test_a_life_counts_in_other_units_alike() -> None:
+    lives = [ended(end) for end in ENDS]
+    own = ended(1_100.0)
+    found = quantiles(own, lives)
+    halves = quantiles(own.in_unit(2.0), [life.in_unit(2.0) for life in lives], as_of=200.0)
+    assert [2.0 * x for x in halves] == pytest.approx(found)
+    assert EndedLife.from_dict(own.to_dict()).forecasts.tolist() == own.forecasts.tolist()
+
+
+def test_an_ended_life_has_forecasts_of_its_own_end() -> None:
+    """Eq. 6 with ε = 1 and Δ = -1: half is left at ζ = φ = 1,000."""
+    rng = np.random.default_rng(3)
+    history = [
+        Measurement(progress=x, value=0.1 * (1.0 / (1.0 + x / 1_000.0) + 0.003 * rng.standard_normal()), variance=0.0)
+        for x in np.linspace(0.0, 1_200.0, 13)
+    ]
+    life = ended_life(history, 1_000.0, fraction=0.5, horizon=1e6)
+    assert life is not None
+    assert life.progress.tolist() == [200.0, 300.0, 500.0, 700.0]
+    low, _, high = life.forecasts[-1]
+    assert low < math.log(1_000.0) < high
+    assert ended_life(history[:2], 1_000.0, fraction=0.5, horizon=1e6) is None

@@ -1,0 +1,197 @@
+"""Remaining life under planned duty, over HTTP: as severe as recent duty, twice as severe, uncertain, by date."""
+
+from datetime import datetime
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from tests.support import stationary
+
+FORECAST = "/v1/clutches/{}/remaining-useful-life/forecast"
+QUANTILES = ("0.05", "0.5", "0.95")
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_doubted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.workflows.ingest_run.doubts", lambda *_: ())
+
+
+@pytest.fixture
+def aged(client: TestClient) -> TestClient:
+    """A clutch whose severity is its energy, 20 kJ a cycle, tested every 1,000 cycles and ten hours."""
+    record = {"clutch_id": "aged", "severity": {"basis": "dissipated_energy", "exponent": 1.0}}
+    assert client.post("/v1/clutches", json=record).status_code == 201
+    for place in range(8):
+        if place:
+            duty = {
+                "kind": "duty_cycles",
+                "cycles": 1000.0 * place,
+                "duty": {"cycles": 1000, "energy_per_cycle_kj": 20},
+            }
+            assert client.post("/v1/clutches/aged/runs", json=duty).status_code == 201
+        test = stationary(1000.0 * place, pressures=(5.0,), speeds=(20, 120, 520, 1020, 1970))
+        test["started_at"] = f"2026-03-0{1 + place}T08:00:00+00:00"
+        assert client.post("/v1/clutches/aged/runs", json=test).status_code == 201
+    return client
+
+
+def planned(client: TestClient, *blocks: dict[str, float], clutch: str = "aged", **more: Any) -> dict[str, Any]:
+    method = more.pop("method", "particle")
+    answer = client.post(FORECAST.format(clutch), params={"method": method}, json={"programme": blocks} | more)
+    assert answer.status_code == 200, answer.text
+    body: dict[str, Any] = answer.json()
+    return body
+
+
+@pytest.mark.parametrize("method", ["particle", "ukf", "grid"])
+def test_duty_as_before_leaves_what_is_predicted(aged: TestClient, method: str) -> None:
+    usual = aged.get("/v1/clutches/aged/remaining-useful-life", params={"method": method}).json()
+    same = planned(aged, {"cycles": 500, "energy_per_cycle_kj": 20}, method=method)
+    assert same["recent_duty_cycles"] == usual["remaining_cycles"]
+    assert same["block_severity"] == [pytest.approx(1.0)]
+    for quantile in QUANTILES:
+        assert same["remaining_cycles"][quantile] == pytest.approx(usual["remaining_cycles"][quantile], rel=1e-6)
+        assert same["remaining_blocks"][quantile] == pytest.approx(same["remaining_cycles"][quantile] / 500)
+    assert same["status"] == usual["status"] == "predicted"
+
+
+def test_twice_the_energy_halves_the_cycles_and_blocks_take_turns(aged: TestClient) -> None:
+    harsh = planned(aged, {"cycles": 100, "energy_per_cycle_kj": 40})
+    mixed = planned(aged, {"cycles": 100, "energy_per_cycle_kj": 40}, {"cycles": 100})
+    assert (harsh["block_severity"], mixed["block_severity"]) == ([pytest.approx(2.0)], [pytest.approx(2.0), 1.0])
+    for quantile in QUANTILES:
+        recent = harsh["recent_duty_cycles"][quantile]
+        assert harsh["remaining_cycles"][quantile] == pytest.approx(recent / 2, rel=1e-3)
+        assert mixed["remaining_cycles"][quantile] == pytest.approx(recent / 1.5, abs=100)
+        assert harsh["end_of_life_cycles"][quantile] == pytest.approx(7000 + recent / 2, rel=1e-3)
+    codes = [warning["code"] for warning in mixed["warnings"]]
+    assert "severity_not_counted" in codes
+    assert "severity_not_counted" not in [warning["code"] for warning in harsh["warnings"]]
+
+
+def test_an_uncertain_plan_is_a_wider_answer(aged: TestClient) -> None:
+    def width(sd: float) -> float:
+        left = planned(aged, {"cycles": 100, "energy_per_cycle_kj": 40, "sd": sd})["remaining_cycles"]
+        return float(left["0.95"] / left["0.05"])
+
+    assert width(20.0) > 1.3 * width(0.0)
+    sure, open_plan = (planned(aged, {"cycles": 100, "energy_per_cycle_kj": 40, "sd": sd}) for sd in (0.0, 20.0))
+    assert open_plan["remaining_cycles"]["0.5"] == pytest.approx(
+        sure["remaining_cycles"]["0.5"], rel=0.2
+    )  # 1/√1.25 of the mean
+
+
+def test_speed_and_pressure_are_energy(aged: TestClient) -> None:
+    """μ p A r faces ω²/(2 · 200 rad/s²), the disc's 99/133 mm with two faces: 0.13 at 5 bar and 2,000 rpm are some 9 kJ."""
+    cof = aged.get("/v1/clutches/aged/remaining-useful-life").json()["current"]["mean_cof"]
+    torque = cof * 2 * 5e5 * 3.14159265 / 4 * (0.133**2 - 0.099**2) * 0.058
+    energy = torque * (2000 * 2 * 3.14159265 / 60) ** 2 / 400
+    by_speed = planned(aged, {"cycles": 10, "initial_speed_rpm": 2000, "maximum_pressure_bar": 5})
+    assert by_speed["block_severity"][0] == pytest.approx(energy / 20e3, rel=0.02)
+
+
+def test_dates_follow_from_a_pace(aged: TestClient) -> None:
+    dated = planned(aged, {"cycles": 100, "energy_per_cycle_kj": 20}, pace_cycles_per_hour=100)
+    by_runs = planned(aged, {"cycles": 100, "energy_per_cycle_kj": 20})
+    assert (dated["pace_from"], by_runs["pace_from"]) == ("request", "runs")
+    assert by_runs["pace_cycles_per_hour"] == pytest.approx(1000 / 24)
+    newest = datetime.fromisoformat("2026-03-08T08:00:00+00:00")
+    hours = (datetime.fromisoformat(dated["end_of_life_at"]["0.5"]) - newest).total_seconds() / 3600
+    assert hours == pytest.approx(dated["remaining_cycles"]["0.5"] / 100, rel=1e-3)
+
+
+def test_what_cannot_be_counted_is_said(client: TestClient) -> None:
+    nothing = planned(client, {"cycles": 100, "energy_per_cycle_kj": 20}, clutch="c1")
+    assert (nothing["status"], nothing["remaining_blocks"]["0.5"], nothing["block_severity"]) == (
+        "insufficient_data", None, [None],
+    )  # fmt: skip
+    assert (nothing["pace_from"], nothing["end_of_life_at"]) == (None, None)
+    for cycles in (0.0, 1000.0, 2000.0, 3000.0):
+        client.post("/v1/clutches/c1/runs", json=stationary(cycles, pressures=(5.0,)))
+    counted = planned(client, {"cycles": 100, "energy_per_cycle_kj": 20}, clutch="c1")
+    assert "severity_not_counted" in [warning["code"] for warning in counted["warnings"]]
+
+
+def test_a_rebuilt_clutch_has_a_whole_horizon_again(aged: TestClient) -> None:
+    rebuilt = {"kind": "maintenance", "event": "rebuild", "cycles": 999_000}
+    assert aged.post("/v1/clutches/aged/runs", json=rebuilt).status_code == 201
+    for place in range(5):
+        test = stationary(1000.0 * place, pressures=(5.0,), speeds=(20, 120, 520, 1020, 1970))
+        test["cycles"] = 999_000.0 + 1000.0 * place
+        assert aged.post("/v1/clutches/aged/runs", json=test).status_code == 201
+    usual = aged.get("/v1/clutches/aged/remaining-useful-life").json()
+    same = planned(aged, {"cycles": 1000})
+    assert same["status"] == usual["status"]
+    assert same["end_of_life_cycles"]["0.05"] == pytest.approx(usual["end_of_life_cycles"]["0.05"], rel=1e-3)
+    assert same["end_of_life_cycles"]["0.5"] == pytest.approx(usual["end_of_life_cycles"]["0.5"], rel=1e-3)
+
+
+def test_a_life_that_has_ended_did_so_when_it_did(client: TestClient) -> None:
+    for place in range(12):
+        body = stationary(1000.0 * place, pressures=(5.0,), wear=0.08 * place, noise=0.002)
+        assert client.post("/v1/clutches/c1/runs", json=body).status_code == 201
+    usual = client.get("/v1/clutches/c1/remaining-useful-life").json()
+    ended = planned(client, {"cycles": 1000}, clutch="c1", pace_cycles_per_hour=10)
+    assert (usual["status"], ended["status"]) == ("reached", "reached")
+    assert ended["remaining_cycles"]["0.5"] == 0.0
+    assert ended["end_of_life_cycles"] == pytest.approx(usual["end_of_life_cycles"], rel=1e-6)
+
+
+def test_sliding_distance_is_counted_by_speed_and_duration(client: TestClient) -> None:
+    """ω t/2: at 1,500 rpm for 2 s three times as far as at 1,000 rpm for 1 s."""
+    record = {"clutch_id": "slid", "severity": {"basis": "sliding_distance", "exponent": 1.0}}
+    assert client.post("/v1/clutches", json=record).status_code == 201
+    for place in range(5):
+        block = {"cycles": 1000, "initial_speed_rpm": 1000, "engagement_duration_s": 1.0}
+        duty = {"kind": "duty_cycles", "cycles": 1000.0 * place, "duty": block}
+        test = stationary(1000.0 * place, pressures=(5.0,))
+        for run in (duty, test) if place else (test,):
+            assert client.post("/v1/clutches/slid/runs", json=run).status_code == 201
+    far = planned(client, {"cycles": 10, "initial_speed_rpm": 1500, "engagement_duration_s": 2.0}, clutch="slid")
+    assert far["block_severity"] == [pytest.approx(3.0)]
+    assert [w["code"] for w in planned(client, {"cycles": 10}, clutch="slid")["warnings"]][-1] == "severity_not_counted"
+
+
+def test_plans_at_the_edge_of_what_is_taken_are_answered(aged: TestClient) -> None:
+    for block in (
+        {"cycles": 1, "energy_per_cycle_kj": 1e-6, "sd": 1e-6},
+        {"cycles": 1e12, "energy_per_cycle_kj": 1e12, "sd": 1e12},
+        {"cycles": 5, "initial_speed_rpm": 1e-12, "maximum_pressure_bar": 1e-12},
+    ):
+        for pace in (1e-12, 1e12):
+            answer = planned(aged, block, pace_cycles_per_hour=pace)
+            assert 0.0 <= answer["probability_of_reaching"] <= 1.0
+            assert answer["block_severity"][0] > 0.0
+
+
+def test_nothing_is_stored(aged: TestClient) -> None:
+    address = "/v1/clutches/aged/remaining-useful-life"
+    before = aged.get(address)
+    planned(aged, {"cycles": 100, "energy_per_cycle_kj": 40})
+    assert aged.get(address).headers["ETag"] == before.headers["ETag"]
+
+
+@pytest.mark.parametrize(
+    ("body", "pointer"),
+    [
+        ({"programme": []}, "/programme"),
+        ({"programme": [{"cycles": 0}]}, "/programme/0/cycles"),
+        ({"programme": [{"cycles": 1e-310}]}, "/programme/0/cycles"),
+        ({"programme": [{"cycles": 10, "energy_per_cycle_kj": 1e-200}]}, "/programme/0/energy_per_cycle_kj"),
+        ({"programme": [{"cycles": 10, "energy_per_cycle_kj": 20, "sd": 100}]}, "/programme/0"),
+        ({"programme": [{"cycles": 10, "sd": 2}]}, "/programme/0"),
+        ({"programme": [{"cycles": 10, "maximum_pressure_bar": 5}]}, "/programme/0"),
+        ({"programme": [{"cycles": 10}], "pace_cycles_per_hour": -1}, "/pace_cycles_per_hour"),
+        ({"programme": [{"cycles": 10, "energy": 5}]}, "/programme/0/energy"),
+        ({}, "/programme"),
+    ],
+)
+def test_a_programme_that_is_none_is_refused(client: TestClient, body: dict[str, Any], pointer: str) -> None:
+    answer = client.post(FORECAST.format("c1"), json=body)
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["pointer"] == pointer
+
+
+def test_an_unknown_clutch_is_unknown(client: TestClient) -> None:
+    assert client.post(FORECAST.format("nobody"), json={"programme": [{"cycles": 1}]}).status_code == 404
