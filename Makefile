@@ -2,6 +2,8 @@
 # make test    all tests but those of `make slow`
 # make slow    what takes long and rarely fails: what intervals promise, counted over many lives; further ways to the same
 #              answer, files cut off anywhere, charts drawn by the large library                               (20 minutes)
+# make faults  kills the service and its commands hundreds of times, and sends what nobody sends: schemathesis over whole
+#              sequences of requests, and files of every format with bytes changed          (an hour; ARGS="-k kills")
 # make check   formatting, lint, types, layers; of the dashboard's JavaScript and styles too, for which it needs npm
 # make lowest  tests that meet every dependency, on the oldest releases that pyproject.toml allows
 # make score   how good the prognosis is, on simulated lives: the tables of docs/prognosis.md  (SEED= SIZE= PARTS= ARGS=--write)
@@ -24,7 +26,7 @@ JAVASCRIPT := tests/javascript/node_modules
 LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --exclude-newer "7 days" \
 	--custom-compile-command "make lock"
 
-.PHONY: demo test slow check lowest benchmark load real figures architecture blind plausibility score rivals picture lock clean
+.PHONY: demo test slow faults check lowest benchmark load real figures architecture blind plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
@@ -37,6 +39,10 @@ test: $(VENV)/.tests
 slow: $(VENV)/.tests
 	$(BIN)/python -m tests.browser
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m slow $(ARGS)
+
+faults: $(VENV)/.tests
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -m slow tests/journeys/faults tests/journeys/test_openapi.py \
+		tests/service/readers $(ARGS)
 
 check: $(VENV)/.tests $(JAVASCRIPT)/.package-lock.json
 	$(BIN)/ruff format --check .

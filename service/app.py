@@ -14,17 +14,20 @@ from service.jobs.queue import DiagnosisQueue
 from service.jobs.workers import Lane, Workers, in_processes, in_threads
 from service.queries.cache import AnswerCache
 from service.settings import CODE_VERSION, Settings
-from service.web import problems
-from service.web.answers import now
+from service.web import openapi, problems
+from service.web.answers import Encodings, now
 from service.web.context import Context
+from service.web.files import emptied_folder
 from service.web.limits import MOST_CACHED_BYTES, MOST_REVALIDATED_BYTES
 from service.web.metrics import Metrics
-from service.web.middleware import BodyLimit, Counting, Heads, Polls, SafeHeaders
+from service.web.middleware import BodyLimit, Counting, Heads, Polls, SafeHeaders, Shares
 from service.web.revalidation import Revalidation
-from service.web.routes import clutches, diagnoses, exports, files, fleet, health, life, runs
+from service.web.routes import clutches, description, diagnoses, exports, files, fleet, health, life, runs
 from service.workflows import adopt_model, run_diagnosis
 from storage.diagnoses import NewDiagnosis
+from storage.engine.connect import path_of
 from storage.engine.database import Database, open_database
+from storage.engine.service_lock import service_lock
 
 _DESCRIPTION = """Condition monitoring and prognostics of wet friction clutches.
 
@@ -48,11 +51,11 @@ class _Diagnoses:
     def ask(self, clutch_id: str) -> NewDiagnosis:
         return run_diagnosis.ask(self.database, clutch_id, created_at=now())
 
-    def finish(self, asked_for: NewDiagnosis, ended: Mapping[str, Any], *, adopt: bool) -> None:
+    def finish(self, asked_for: NewDiagnosis, ended: Mapping[str, Any], *, adopt_by: str | None) -> None:
         adopted = False
-        if adopt and "report" in ended:
+        if adopt_by is not None and "report" in ended:
             clutch_id = asked_for.clutch_id
-            arguments = (clutch_id, asked_for.diagnosis_id, ended, asked_for.life, now())
+            arguments = (clutch_id, asked_for.diagnosis_id, ended, asked_for.life, now(), adopt_by)
             adopting = self.workers.submit(Lane.ANSWERS, adopt_model.finish_and_adopt, *arguments, turn=clutch_id)
             adopted = adopting.result()
         if not adopted:
@@ -60,13 +63,16 @@ class _Diagnoses:
 
 
 def create_app(settings: Settings) -> FastAPI:
-    """The service on one database, which is opened (and migrated) when it starts and closed when it stops."""
+    """The service on one database, which is opened (and migrated) when it starts and closed when it stops.
+
+    Starting raises ServiceRuns where another service uses the database.
+    """
 
     metrics = Metrics()
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        database = open_database(settings.database)
+        database = open_database(settings.database, serving=True)
         workers = in_processes(database, settings.workers) if settings.workers else in_threads(database)
         queue = DiagnosisQueue(f"sqlite:///{database.path.absolute()}", settings, _Diagnoses(database, workers))
         try:
@@ -79,6 +85,8 @@ def create_app(settings: Settings) -> FastAPI:
                 diagnoses=queue,
                 workers=workers,
                 revalidation=Revalidation(MOST_REVALIDATED_BYTES),
+                insecure_local=settings.insecure_local,
+                folder=emptied_folder(database.path),
             )
             yield
         finally:
@@ -86,22 +94,41 @@ def create_app(settings: Settings) -> FastAPI:
             workers.close()
             database.close()
 
+    @asynccontextmanager
+    async def alone(app: FastAPI) -> AsyncIterator[None]:
+        with service_lock(path_of(settings.database)):
+            async with lifespan(app):
+                yield
+
     app = FastAPIOffline(
         title="Clutchlife",
         version=CODE_VERSION,
         description=_DESCRIPTION,
-        lifespan=lifespan,
+        lifespan=alone,
+        docs_url=None,
         redoc_url=None,
     )
     problems.install(app)
     for part in (health, clutches, files, runs, life, diagnoses, fleet):
         app.include_router(part.router)
-    for exported in (exports.router, exports.fleet_router):
-        app.include_router(exported)
+    for beside in (exports.router, exports.fleet_router, description.router):
+        app.include_router(beside)
     app.include_router(dashboard.router(assets.load()))
+    openapi.install(app)
     app.add_middleware(Polls)
+    app.add_middleware(
+        BodyLimit,
+        most=settings.most_body_bytes,
+        most_file=settings.most_file_bytes,
+        seconds=settings.body_seconds,
+    )
+    app.add_middleware(Encodings)
     app.add_middleware(Heads)
-    app.add_middleware(BodyLimit, most=settings.most_body_bytes, most_file=settings.most_file_bytes)
+    app.add_middleware(
+        Shares,
+        per_second=settings.requests_per_second,
+        at_once=settings.requests_at_once,
+    )
     app.add_middleware(SafeHeaders)
     app.add_middleware(Counting, metrics=metrics)
     return app

@@ -87,6 +87,14 @@ class TooLargeError(ServiceError):
     title = "The request is too large"
 
 
+class NoRoomError(ServiceError):
+    """The disk has no room for what was sent; after room was made, the same request may succeed."""
+
+    status = 507
+    slug = "no-room"
+    title = "There is no room on the disk"
+
+
 class UnsupportedMediaTypeError(ServiceError):
     """The body is not of a type that this address accepts."""
 
@@ -101,6 +109,22 @@ class NotAcceptableError(ServiceError):
     status = 406
     slug = "not-acceptable"
     title = "The answer is not given in this format here"
+
+
+class TooSlowError(ServiceError):
+    """The request's body took too long to arrive."""
+
+    status = 408
+    slug = "too-slow"
+    title = "The request took too long to arrive"
+
+
+class TooManyError(ServiceError):
+    """The caller asks more often, or for more at once, than one caller may."""
+
+    status = 429
+    slug = "too-many-requests"
+    title = "Too many requests"
 
 
 class BusyError(ServiceError):

@@ -11,6 +11,8 @@ from service.errors import FieldError, InvalidError
 
 #: Items of a list that is answered whole where no limit is given.
 ALL_ITEMS = 1_000_000
+#: Characters of a cursor that are read. Derived: a clutch's name has 128, base64 makes a third more of them.
+LONGEST_CURSOR = 600
 #: Where a page ended: a number, and a name where that is not unique.
 Place = tuple[float, str]
 

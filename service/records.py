@@ -131,7 +131,12 @@ def levels(connection: Connection, clutch_id: str) -> dict[str, list[LevelFit]]:
 def receipt(row: NewRun) -> dict[str, Any]:
     """A run's receipt as it is now: as it is stored, and whether the run counts, why not, and the cycles as sent."""
     sent_cycles = row.cycles if row.sent_cycles is None else row.sent_cycles
-    return row.receipt | {"state": row.state, "doubts": list(row.doubts), "sent_cycles": whole(sent_cycles)}
+    return row.receipt | {
+        "state": row.state,
+        "doubts": list(row.doubts),
+        "sent_cycles": whole(sent_cycles),
+        "received_by": row.received_by,
+    }
 
 
 def summary(row: NewRun) -> dict[str, Any]:
@@ -237,6 +242,7 @@ def _event(row: RunInOrder, cofs: ByPressure) -> Event:
         moment=moment_of(row.started_at, row.received_at),
         arrived=row.run_key,
         speed_range=None if low is None or high is None else (low, high),
+        oil_temperature=row.oil_temperature,
         cofs=cofs,
         rebuild=row.event == REBUILD,
         shift=row.event not in (None, REBUILD),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection
 
 from service import records
-from service.errors import NotFoundError
+from service.errors import InvalidError, NotFoundError
 from service.lives.history import ByPressure, order
 from service.lives.incoming_run import IncomingRun
 from service.lives.model_correction import RunReader
@@ -81,25 +81,32 @@ class Recomputed:
 
 
 def recomputed(database: Database, state: ClutchState) -> Recomputed:
-    """Every run of a clutch analysed anew, under the state's record, and all that follows."""
+    """Every run of a clutch analysed anew, under the state's record, and all that follows.
+
+    Raises InvalidError where this code refuses a run that is stored, DamagedData where its channels are damaged.
+    """
     with database.reading() as connection:
         rows, aside = runs.page(connection, state.clutch_id), records.set_aside(connection, state.clutch_id)
     reader = run_reader(database, state.clutch_id)
-    details, receipts, levels, speed_ranges = {}, {}, {}, {}
+    details, receipts, levels = {}, {}, {}
+    measured: dict[str, dict[str, Any]] = {}
     for row in rows:
         sent = reader.read(row.run_id)
-        analysis = analyse(sent, state.geometry)
+        try:
+            analysis = analyse(sent, state.geometry)
+        except InvalidError as error:
+            raise InvalidError(f"run {row.run_id!r} is refused: {error}", errors=error.errors) from error
+        measured[row.run_id] = {"speed_range": analysis.speed_range, "oil_temperature": analysis.oil_temperature}
         details[row.run_id] = analysis.kept_beside(sent)
         receipts[row.run_id] = _receipt(row, analysis)
         levels[row.run_id] = analysis.fits
-        speed_ranges[row.run_id] = analysis.speed_range
-    events = order([replace(event, speed_range=speed_ranges[event.run_id]) for event in state.events])
+    events = order([replace(event, **measured[event.run_id]) for event in state.events])
     state = replace(state, events=events)
     tests = reader.stationary_tests(state.lives[-1]) if events else iter(())
     final, computed = computed_anew(state, levels, receipts, tests, reader, evaluated={})
     cofs = {}
     for run_id, event in aside.items():
-        event = replace(event, speed_range=speed_ranges[run_id])
+        event = replace(event, **measured[run_id])
         cofs[run_id], own = computed_aside(final, event, levels, reader)
         receipts[run_id] |= own
     return Recomputed(
@@ -129,4 +136,5 @@ def _receipt(row: RunRow, analysis: Analysis) -> Receipt:
         levels=analysis.fits,
         cofs={},
         warnings=analysis.warnings,
+        engagement=analysis.engagement,
     )

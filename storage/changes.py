@@ -9,7 +9,7 @@ from storage.encoding.json_text import Json, to_object, to_text
 from storage.tables import change
 
 HOLD, CONFIRM, WITHDRAW, RESTORE, CORRECT = "hold", "confirm", "withdraw", "restore", "correct"
-EDIT, ARCHIVE, UNARCHIVE = "edit", "archive", "unarchive"
+EDIT, ARCHIVE, UNARCHIVE, ADOPT = "edit", "archive", "unarchive", "adopt"
 #: What changes a clutch's history, and with it what a diagnosis was made of.
 OF_HISTORY = (CONFIRM, WITHDRAW, RESTORE, CORRECT, EDIT)
 #: What the trail shows of a change.

@@ -1,9 +1,10 @@
 """Clutches: the record in force and the one that was posted, and the summary that lists show."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Row, bindparam, select, tuple_, update
+from sqlalchemy import Connection, Row, bindparam, func, select, tuple_, update
 
 from storage.encoding.json_text import Json, to_object, to_text
 from storage.tables import clutch
@@ -36,6 +37,7 @@ _worst_first = (
     .order_by(clutch.c.rank, clutch.c.clutch_id)
     .limit(bindparam("most"))
 )
+_only = clutch.c.clutch_id.in_(select(func.json_each(bindparam("of_only")).table_valued("value").c.value))
 _worst_first_after = _worst_first.where(
     tuple_(clutch.c.rank, clutch.c.clutch_id) > tuple_(bindparam("after_rank"), bindparam("after_id"))
 )
@@ -79,16 +81,22 @@ def get(connection: Connection, clutch_id: str) -> ClutchRow | None:
 
 
 def page(
-    connection: Connection, *, limit: int, after: tuple[float, str] | None = None, archived: bool = False
+    connection: Connection,
+    *,
+    limit: int,
+    after: tuple[float, str] | None = None,
+    archived: bool = False,
+    only: Collection[str] | None = None,
 ) -> list[ClutchRow]:
     """At most `limit` clutches that are archived, or are not, worst first; `after` is the (rank, clutch_id) of the last
-    clutch of the page before."""
+    clutch of the page before; of all or of `only` some."""
     values: dict[str, object] = {"most": limit, "of_archived": int(archived)}
-    if after is None:
-        rows = connection.execute(_worst_first, values)
-    else:
-        rows = connection.execute(_worst_first_after, values | {"after_rank": after[0], "after_id": after[1]})
-    return [_row(row) for row in rows]
+    query = _worst_first
+    if after is not None:
+        query, values = _worst_first_after, values | {"after_rank": after[0], "after_id": after[1]}
+    if only is not None:
+        query, values = query.where(_only), values | {"of_only": to_text(sorted(only))}
+    return [_row(row) for row in connection.execute(query, values)]
 
 
 def set_record(

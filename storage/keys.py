@@ -3,14 +3,19 @@
 from dataclasses import asdict, dataclass
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, bindparam, exists, select, update
+from sqlalchemy import Connection, Row, bindparam, exists, or_, select, update
 
+from storage.encoding.json_text import to_list, to_text
 from storage.tables import access_key
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeyRow:
-    """A key: `secret_sha256` in hexadecimal, times ISO 8601, `revoked_at` None while it is active."""
+    """A key: `secret_sha256` in hexadecimal, times ISO 8601 in UTC, `revoked_at` None while it is active.
+
+    `clutches` are those that it is bound to, None where it is bound to none. It grants nothing from `expires_at` on, where
+    that is not None. `last_used_at` is noted once in a while.
+    """
 
     key_id: str
     scope: str
@@ -18,32 +23,54 @@ class KeyRow:
     note: str
     created_at: str
     revoked_at: str | None = None
+    clutches: tuple[str, ...] | None = None
+    expires_at: str | None = None
+    last_used_at: str | None = None
 
 
 _insert = sa.insert(access_key)
 _active = access_key.c.revoked_at.is_(None)
-_any_active = select(exists().where(_active))
-_all = select(access_key).order_by(access_key.c.created_at, access_key.c.key_id)
-_revoke = (
-    update(access_key).where(access_key.c.key_id == bindparam("wanted"), _active).values(revoked_at=bindparam("at"))
+_any = select(exists(select(access_key.c.key_id)))
+_any_active = select(
+    exists().where(_active, or_(access_key.c.expires_at.is_(None), access_key.c.expires_at > bindparam("at")))
 )
+_all = select(access_key).order_by(access_key.c.created_at, access_key.c.key_id)
+_of_wanted = access_key.c.key_id == bindparam("wanted")
+_revoke = update(access_key).where(_of_wanted, _active).values(revoked_at=bindparam("at"))
+_use = update(access_key).where(_of_wanted).values(last_used_at=bindparam("at"))
 
 
 def insert(connection: Connection, row: KeyRow) -> None:
     """Store a new key. Raises IntegrityError where its id or its secret is taken."""
-    connection.execute(_insert, asdict(row))
+    connection.execute(_insert, asdict(row) | {"clutches": None if row.clutches is None else to_text(row.clutches)})
 
 
-def any_active(connection: Connection) -> bool:
-    """Whether any key is active: without one the service binds to the loopback only."""
-    return bool(connection.execute(_any_active).scalar_one())
+def any_ever(connection: Connection) -> bool:
+    """Whether a key was ever made: from then on one is always needed."""
+    return bool(connection.execute(_any).scalar_one())
+
+
+def any_active(connection: Connection, at: str) -> bool:
+    """Whether any key grants something at that time."""
+    return bool(connection.execute(_any_active, {"at": at}).scalar_one())
 
 
 def all_keys(connection: Connection) -> list[KeyRow]:
     """All keys, revoked ones too, oldest first."""
-    return [KeyRow(**row._asdict()) for row in connection.execute(_all)]
+    return [_row(row) for row in connection.execute(_all)]
 
 
 def revoke(connection: Connection, key_id: str, revoked_at: str) -> bool:
     """Revoke a key; False where there is no active key of this id."""
     return connection.execute(_revoke, {"wanted": key_id, "at": revoked_at}).rowcount == 1
+
+
+def note_use(connection: Connection, key_id: str, at: str) -> None:
+    """Note when a key was last used."""
+    connection.execute(_use, {"wanted": key_id, "at": at})
+
+
+def _row(row: Row[tuple[object, ...]]) -> KeyRow:
+    values = row._asdict()
+    values["clutches"] = None if values["clutches"] is None else tuple(to_list(values["clutches"]))
+    return KeyRow(**values)

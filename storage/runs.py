@@ -19,7 +19,8 @@ ACCEPTED, HELD, WITHDRAWN = "accepted", "held", "withdrawn"
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NewRun:
     """A run that is about to be stored. `cycles` since new; `details` holds what only some kinds have; `doubts` are why
-    it is or was held, `sent_cycles` the cycles as they were sent where `cycles` was corrected since, else None."""
+    it is or was held, `sent_cycles` the cycles as they were sent where `cycles` was corrected since, else None;
+    `received_by` is who posted it, None where an earlier release did not note it."""
 
     clutch_id: str
     run_id: str
@@ -34,6 +35,7 @@ class NewRun:
     state: str = ACCEPTED
     sent_cycles: float | None = None
     doubts: Sequence[Any] = ()
+    received_by: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,12 +55,13 @@ class ReceiptRow:
     state: str
     sent_cycles: float | None
     doubts: str
+    received_by: str | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunInOrder:
-    """As much of a run as tracking needs; a stationary test has the range of its speeds, maintenance its event, a block of
-    duty its load (in the units in which it was sent)."""
+    """As much of a run as tracking needs; a stationary test has the range of its speeds and the
+    mean temperature of its oil [K], maintenance its event, a block of duty its load (in the units in which it was sent)."""
 
     run_key: int
     run_id: str
@@ -69,6 +72,7 @@ class RunInOrder:
     lowest_speed: float | None
     highest_speed: float | None
     event: str | None
+    oil_temperature: float | None = None
     duty_cycles: float | None = None
     duty_energy_kj: float | None = None
     duty_speed_rpm: float | None = None
@@ -94,6 +98,7 @@ _light_of_any = (
         func.json_extract(run.c.details, "$.speed_range[0]"),
         func.json_extract(run.c.details, "$.speed_range[1]"),
         func.json_extract(run.c.details, "$.event"),
+        func.json_extract(run.c.details, "$.oil_temperature"),
         func.json_extract(run.c.details, "$.duty.cycles"),
         func.json_extract(run.c.details, "$.duty.energy_per_cycle_kj"),
         func.json_extract(run.c.details, "$.duty.initial_speed_rpm"),

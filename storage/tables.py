@@ -38,7 +38,8 @@ clutch = Table(
 )
 
 #: `details` holds what only some kinds have (duty, event, note, origin); `receipt` is the answer without what is in other
-#: columns: `state` (whether the run counts), `doubts` (why it was held), `sent_cycles` (where `cycles` was corrected since).
+#: columns: `state` (whether the run counts), `doubts` (why it was held), `sent_cycles` (where `cycles` was corrected since),
+#: `received_by` (who posted it; null for runs of earlier releases).
 run = Table(
     "run",
     metadata,
@@ -56,6 +57,7 @@ run = Table(
     Column("state", Text, nullable=False, server_default="accepted"),
     Column("sent_cycles", REAL),
     Column("doubts", Text, nullable=False, server_default="[]"),
+    Column("received_by", Text),
     UniqueConstraint("clutch_id", "run_id", name="run_once_per_clutch"),
     Index("run_in_order", "clutch_id", "cycles", "run_id"),
     Index("run_held", "clutch_id", sqlite_where=text("state = 'held'")),
@@ -193,6 +195,7 @@ change = Table(
     Index("change_in_order", "clutch_id", "change_key"),
 )
 
+#: `clutches` are the clutches that a key is bound to (JSON), null where it is bound to none.
 access_key = Table(
     "access_key",
     metadata,
@@ -202,5 +205,8 @@ access_key = Table(
     Column("note", Text, nullable=False),
     Column("created_at", Text, nullable=False),
     Column("revoked_at", Text),
+    Column("clutches", Text),
+    Column("expires_at", Text),
+    Column("last_used_at", Text),
     UniqueConstraint("secret_sha256", name="access_key_secret"),
 )

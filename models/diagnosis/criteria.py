@@ -18,6 +18,10 @@ DISCREPANCY_SD = 0.25
 FEWEST_ROWS, FEWEST_SPEEDS = 24, 6
 #: Torques [Nm] outside this range are no clutch's (chosen; no table).
 LEAST_TORQUE, MOST_TORQUE = 1e-6, 1e7
+#: Noise of plateaus or of loops [-], a share of the usual torque, below which there is none to weigh anything by. Derived:
+#: with gains of MOST_GAIN over 1,000 rows (2e-2/1e-6)² · 1e3 is 4e11, a ten-thousandth of what 64 bits can tell from 1; a
+#: 16-bit channel rounds at 1.5e-5.
+LEAST_NOISE_SHARE = 1e-6
 #: From so many plateaus on every curve is determined and one start is enough (chosen; no table).
 MANY_PLATEAUS = 8000
 #: Deviation of the difference of the two shares of one law, which are expected to drift alike [-]; the open clutch's
@@ -28,6 +32,9 @@ ALIKE_SD, DRAG_SD = 0.1, 0.3
 #: structure (chosen).
 LEAST_GAIN, MOST_GAIN = 2e-4, 2e-2
 USUAL_GAIN, GAIN_SD_BELOW, GAIN_SD_ABOVE = 2.5e-3, 1.0, 0.6
+#: What the data must say of the runs' scatter beyond its prior [nats] for the estimate to be theirs (derived: a deviation of
+#: ln σ_g half the prior's, about the same mean, is ln 2 - 3/8 = 0.32).
+LEAST_SCATTER_INFORMATION = 0.32
 #: Scatter of the curves' gains within a run, and the size from which its prior falls [-] (chosen; a controller that
 #: comes back to 0.005 bar makes 0.1 %).
 CURVE_GAINS, SMALL_CURVE_GAIN = (0.0, 4e-4, 1e-3, 2.5e-3, 6e-3), 1e-3

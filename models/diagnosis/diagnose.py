@@ -9,13 +9,13 @@ from models.diagnosis.attribution.check import Checks
 from models.diagnosis.attribution.decide import decide, revise
 from models.diagnosis.attribution.investigate import investigate
 from models.diagnosis.campaign import Campaign
-from models.diagnosis.design.design import Design, build_design
+from models.diagnosis.design.design import build_design
 from models.diagnosis.detection.raw_records.evidence import raw_evidence
 from models.diagnosis.effects.catalogue import effects_for
 from models.diagnosis.effects.grid import columns_of
 from models.diagnosis.experiments.rivals import rivals_of
 from models.diagnosis.experiments.test_plan import advise
-from models.diagnosis.pooled_fit.baseline_fit import fit_baseline, missing_for_baseline
+from models.diagnosis.pooled_fit.baseline_fit import IndeterminateError, fit_baseline, missing_for_baseline
 from models.diagnosis.report.assemble import insufficient, report_of
 from models.diagnosis.report.report import Report
 from models.diagnosis.validation.extended_model import validate
@@ -24,23 +24,17 @@ from models.diagnosis.validation.extended_model import validate
 def diagnose(campaign: Campaign, *, rng: np.random.Generator, without: frozenset[str] = frozenset()) -> Report:
     """What the baseline gets wrong in this campaign, why, and what an extension gains. The same rng, the same answer.
 
-    Effects whose slugs are in `without` are taken out of the catalogue.
+    Effects whose slugs are in `without` are taken out of the catalogue. What data lack is a verdict, `insufficient_data`; an
+    exception is a bug.
     """
     design = build_design(campaign)
     missing = missing_for_baseline(design)
     if missing:
         return insufficient(missing, design)
     try:
-        with np.errstate(all="ignore"):
-            return _diagnosed(campaign, design, without, rng)
-    except (np.linalg.LinAlgError, ArithmeticError) as failure:
-        return insufficient(f"the pooled fit broke down on these numbers ({failure}).", design)
-
-
-def _diagnosed(campaign: Campaign, design: Design, without: frozenset[str], rng: np.random.Generator) -> Report:
-    baseline = fit_baseline(design)
-    if not np.isfinite(baseline.fit.cost):
-        return insufficient("no finite torque can be fitted to these numbers.", design)
+        baseline = fit_baseline(design)
+    except IndeterminateError as lacking:
+        return insufficient(str(lacking), design)
     columns = columns_of(effects_for(design.facts, without), design.facts)
     raw = tuple(record for record in raw_evidence(campaign) if record.effect not in without)
     investigation = investigate(baseline, columns, raw, rng)

@@ -29,6 +29,10 @@ from models.diagnosis.pooled_fit.gauss_newton import Fit
 _PART = 2000
 
 
+class NotFiniteError(ArithmeticError):
+    """An extension makes no number of some points; the message says which effect, and of how many."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Extension:
     """An extended model, ready to be stored as JSON and applied to runs that come later.
@@ -40,7 +44,7 @@ class Extension:
     content: Mapping[str, Any]
 
     def artefact(self, run: StationaryRun, campaign: Campaign) -> FloatArray:
-        """Torque [n] Nm that the artefacts add to each plateau of a run; zero where there are none.
+        """Torque [n] Nm that the artefacts add to each plateau of a run; zero where there are none. Raises NotFiniteError.
 
         `campaign` gives what a run alone does not hold (maintenance, moments of the other runs); it need not hold `run`.
         Without oil temperature, its effect cannot be computed and is not taken off.
@@ -61,7 +65,8 @@ class Extension:
         return points.sign * self._mean(points, self._facts(campaign), {Kind.ARTEFACT})[0]
 
     def course(self, cycles: FloatArray, pressure: FloatArray, velocity: FloatArray) -> FloatArray:
-        """Mean torque [m, k] Nm over velocity [v] m/s > 0 that effects of use add at cycles [m] and pressure [k] Pa."""
+        """Mean torque [m, k] Nm over velocity [v] m/s > 0 that effects of use add at cycles [m] and pressure [k] Pa. Raises
+        NotFiniteError."""
         return self._course(cycles, pressure, velocity)[0]
 
     def course_sd(self, cycles: FloatArray, pressure: FloatArray, velocity: FloatArray) -> FloatArray:
@@ -99,7 +104,12 @@ class Extension:
             for stored in alternative["effects"]:
                 effect = BY_SLUG[stored["slug"]]
                 if effect.kind in kinds and not effect.counts_in_severity:
-                    change = _finite(effect.change(scene, stored["amplitude"], tuple(stored["shape"])))
+                    change = effect.change(scene, stored["amplitude"], tuple(stored["shape"]))
+                    if not np.isfinite(change).all():
+                        lost = np.count_nonzero(~np.isfinite(change))
+                        raise NotFiniteError(
+                            f"the change of {effect.slug} is not finite at {lost} of {change.size} points"
+                        )
                     if effect.kind is Kind.COURSE:  # followed far enough, friction ends; it does not reverse
                         change = np.maximum(change, -scene.curve)
                     relative = stored["amplitude_sd"] / max(abs(stored["amplitude"]), 1e-300)
@@ -222,7 +232,3 @@ def _steady_points(cycles: FloatArray, pressure: FloatArray, velocity: FloatArra
         loop=none,
         previous=none,
     )
-
-
-def _finite(change: FloatArray) -> FloatArray:
-    return np.asarray(np.nan_to_num(change, nan=0.0, posinf=0.0, neginf=0.0))

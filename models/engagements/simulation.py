@@ -14,6 +14,7 @@ Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3.1, 2
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -23,6 +24,25 @@ from models.engagements.capacity import Capacity
 
 #: The shaft counts as stopped below this share of the drive's speed.
 _STOPPED = 1e-3
+
+
+class Profile(Protocol):
+    """A course of line pressure: `contact` [s] is when the discs touch, at the pressure `plateau` [Pa]; `maximum` [Pa]."""
+
+    @property
+    def contact(self) -> float:
+        """[s]."""
+
+    @property
+    def plateau(self) -> float:
+        """[Pa]."""
+
+    @property
+    def maximum(self) -> float:
+        """[Pa]."""
+
+    def __call__(self, time: FloatArray) -> FloatArray:
+        """Line pressure [n] Pa at time [n] s."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,7 +116,7 @@ def engage(
     capacity: Capacity,
     mean_radius: float,
     *,
-    profile: PressureProfile | None = None,
+    profile: Profile | None = None,
     drive: Drive | None = None,
     longest: float = 4.0,
     rate: float = 200.0,

@@ -3,7 +3,8 @@
     M_s, V_S, C_v = α + β p          M̄_c = c_∞ + a e^{-p/p_0},   a, c_∞ >= 0,  p_0 > 0
 
 Weighted least squares through the parameters of one test's pressures, each with the variance of its fit. Given p_0 the
-falling law is linear in a and c_∞, so a search over p_0 alone gives the optimum.
+falling law is linear in a and c_∞, so a search over p_0 alone gives the optimum. The covariance of a law's coefficients is
+that of the linearised fit, (JᵀWJ)⁻¹, times χ² over its degrees of freedom where that is above 1.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, fig. 9 and section 3.1.2, which gives the shapes but no
 formula of the falling one.
@@ -22,6 +23,8 @@ from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
 
 #: The decay p_0 is sought between these multiples of the pressures' range.
 _DECAYS = np.geomspace(0.05, 20.0, 41)
+#: Directions of coefficients that are resolved by less than this share of the best are held. Chosen: far above rounding.
+_RESOLVED = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,6 +38,10 @@ class LinearLaw:
         """At pressure [...] Pa."""
         return self.intercept + self.slope * pressure
 
+    def gradient(self, pressure: FloatArray) -> FloatArray:
+        """Derivatives by (intercept, slope) [n, 2] at pressure [n] Pa."""
+        return np.stack([np.ones_like(pressure), pressure], axis=1)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AsymptoticLaw:
@@ -47,6 +54,13 @@ class AsymptoticLaw:
     def __call__(self, pressure: FloatArray) -> FloatArray:
         """At pressure [...] Pa."""
         return self.asymptote + self.excess * np.exp(-pressure / self.decay)
+
+    def gradient(self, pressure: FloatArray) -> FloatArray:
+        """Derivatives by (asymptote, excess, decay) [n, 3] at pressure [n] Pa; 0 by what is held at its bound of 0."""
+        falling = np.exp(-pressure / self.decay)
+        by_asymptote = np.ones_like(pressure) if self.asymptote > 0.0 else np.zeros_like(pressure)
+        by_excess = falling if self.excess > 0.0 else np.zeros_like(pressure)
+        return np.stack([by_asymptote, by_excess, self.excess * falling * pressure / self.decay**2], axis=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,6 +89,35 @@ def fit_pressure_laws(fits: Sequence[StribeckFit]) -> PressureLaws | None:
         stribeck_velocity=fit_linear(*determined[2]),
         viscous_coefficient=fit_linear(*determined[3]),
     )
+
+
+def law_covariances(fits: Sequence[StribeckFit], laws: PressureLaws) -> dict[str, FloatArray]:
+    """The covariance of each law's coefficients by the parameter's name, for the fits that `laws` are through."""
+    return {
+        name: law_covariance(getattr(laws, name), *_determined(fits, index))
+        for index, name in enumerate(PARAMETER_NAMES)
+    }
+
+
+def law_covariance(
+    law: LinearLaw | AsymptoticLaw, pressure: FloatArray, value: FloatArray, deviation: FloatArray
+) -> FloatArray:
+    """(JᵀWJ)⁻¹ max(1, χ²/ν) [k, k] of the k coefficients in their order.
+
+    Of the law through value [n] at pressure [n] Pa with deviation [n] > 0. ν is n less the coefficients that are free:
+    parameters scatter about a law by more than their own errors where the law is not quite theirs. Rows and columns of a
+    coefficient at its bound are 0.
+    """
+    columns = law.gradient(pressure) / deviation[:, None]
+    size = np.linalg.norm(columns, axis=0)
+    size[size == 0.0] = 1.0  # the coefficient is held
+    _, singular, turned = np.linalg.svd(columns / size, full_matrices=False)
+    free = singular > _RESOLVED * singular[0]
+    root = turned[free] / singular[free, None] / size
+    freedom = pressure.size - int(free.sum())
+    misfit = float(np.sum(((value - law(pressure)) / deviation) ** 2))
+    covariance: FloatArray = root.T @ root * (max(1.0, misfit / freedom) if freedom > 0 else 1.0)
+    return covariance
 
 
 def laws_of(levels: FloatArray, columns: FloatArray) -> PressureLaws:

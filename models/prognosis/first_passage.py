@@ -85,7 +85,7 @@ def predict_first_passage(
     passages, weight = stated
     values = weighted_quantiles(np.minimum(passages, 10.0 * horizon), weight, quantiles)
     end = {q: float(x) if x <= horizon else None for q, x in zip(quantiles, values, strict=True)}
-    fresh, now = (paths(posterior, np.array([zeta]), offset)[0] for zeta in (0.0, as_of))
+    fresh, now = paths(posterior, np.array([0.0, as_of]), offset)
     initial = float(posterior.weight @ fresh)
     return FirstPassage(
         as_of=as_of,

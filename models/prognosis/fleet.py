@@ -112,7 +112,7 @@ class FleetPrior:
         mixture = np.logaddexp(math.log1p(-self.share), math.log(self.share) + learned)
         with np.errstate(divide="ignore"):
             log_weight = np.log(drawn.weight) + mixture - np.logaddexp(0.0, lean - ratio)
-        return replace(drawn, weight=np.exp(log_weight - logsumexp(log_weight)))
+        return replace(drawn, weight=np.exp(log_weight - np.logaddexp.reduce(log_weight)))
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON can carry it."""
@@ -204,7 +204,8 @@ def fit_population(fleet: Sequence[Taught], rounds: int = _ROUNDS) -> Population
 
 def pooled(first: Posterior, second: Posterior) -> Posterior:
     """The draws of both, each with half of the weight; discrepancies must be of the same history."""
-    joined = {field.name: _joined(getattr(first, field.name), getattr(second, field.name)) for field in fields(first)}
+    names = [field.name for field in fields(first) if field.init]
+    joined = {name: _joined(getattr(first, name), getattr(second, name)) for name in names}
     return replace(first, **joined | {"weight": 0.5 * joined["weight"]})
 
 
@@ -246,7 +247,7 @@ def _learnt(population: FleetPrior, fleet: Sequence[Taught], believed: FloatArra
 def _coordinates(drawn: Posterior) -> FloatArray:
     """x [n, 4] of a sample."""
     size = np.abs(drawn.initial)
-    log_scale, log_exponent = drawn.coordinates
+    log_scale, log_exponent = drawn.log_scale, drawn.log_exponent
     return np.stack([drawn.change / drawn.initial, log_scale, log_exponent, np.log(drawn.scatter / size)], axis=1)
 
 
@@ -254,17 +255,17 @@ def _log_prior(drawn: Posterior, prior: Prior) -> FloatArray:
     """Log density of (Δ, log φ, log ε, log s) [n] under a prior; ξ0 has the same under all."""
     spread = math.log(prior.change_sd * prior.log_scale_sd * prior.log_exponent_sd * prior.log_scatter_sd)
     off = (drawn.change * unit_of_change(drawn.course) - prior.change_mean) / prior.change_sd
-    rest = prior.log_density(*drawn.coordinates, np.log(drawn.scatter))
+    rest = prior.log_density(drawn.log_scale, drawn.log_exponent, np.log(drawn.scatter))
     density = rest - 0.5 * off**2 - spread - 2.0 * math.log(2.0 * math.pi)
     no_exponent = WITHOUT_EXPONENT[drawn.course]
-    of_exponent = -0.5 * (drawn.coordinates[1] - prior.log_exponent_mean) ** 2 / prior.log_exponent_sd**2
+    of_exponent = -0.5 * (drawn.log_exponent - prior.log_exponent_mean) ** 2 / prior.log_exponent_sd**2
     of_exponent -= math.log(prior.log_exponent_sd) + 0.5 * math.log(2.0 * math.pi)
     return np.asarray(density - np.where(no_exponent, of_exponent, 0.0))
 
 
 def _within(drawn: Posterior, prior: Prior) -> NDArray[np.bool_]:
     """Which draws a grid under a prior can have [n]."""
-    log_scale, log_exponent = drawn.coordinates
+    log_scale, log_exponent = drawn.log_scale, drawn.log_exponent
     off = [
         (log_scale - prior.log_scale_mean) / prior.log_scale_sd,
         (log_exponent - prior.log_exponent_mean) / prior.log_exponent_sd,

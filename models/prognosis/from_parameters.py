@@ -106,7 +106,7 @@ def mean_cof_paths(
     for level in levels:
         if np.unique(level.progress).size >= FEWEST_TESTS:
             parts.append(level)
-            at_levels.append(_mean_torque(_drawn(level, rng), progress, velocities) / level.torque_per_cof)
+            at_levels.append(_mean_torque(parameter_draws(level, rng), progress, velocities) / level.torque_per_cof)
     if not parts:
         return None
     taking_part = math.fsum(level.reference_cof for level in parts) / len(parts)
@@ -150,7 +150,7 @@ def _places(now: float, horizon: float) -> FloatArray:
     return np.concatenate([np.linspace(0.0, now, _BEHIND), np.geomspace(start * 1.02, last, _AHEAD)])
 
 
-def _drawn(level: PressureLevel, rng: np.random.Generator) -> list[Posterior]:
+def parameter_draws(level: PressureLevel, rng: np.random.Generator) -> list[Posterior]:
     """Joint draws of the four parameters at a pressure, under the fits' covariance and the scatter between tests."""
     values, covariance = level.parameters, level.covariance
     scatter = np.array([track.weight @ np.square(track.scatter) for track in level.parameter_tracks])

@@ -23,9 +23,12 @@ def levels_of(pressure: FloatArray) -> FloatArray:
         group = np.arange(distinct.size)
     else:
         group = np.concatenate([[0], np.cumsum(gaps > np.maximum(LEVEL_GAP, LEVEL_GAP_SHARE * distinct[1:]))])
-    member = group[inverse]
-    names = np.array([_rounded_level(float(np.median(pressure[member == g]))) for g in range(group[-1] + 1)])
-    return np.asarray(names[member], dtype=np.float64)
+    ordered = np.repeat(distinct, counts)
+    rows = np.bincount(group, weights=counts).astype(np.intp)
+    first = np.cumsum(rows) - rows
+    medians = 0.5 * (ordered[first + (rows - 1) // 2] + ordered[first + rows // 2])
+    names = np.array([_rounded_level(median) for median in medians.tolist()])
+    return np.asarray(names[group[inverse]], dtype=np.float64)
 
 
 def _rounded_level(median: float) -> float:

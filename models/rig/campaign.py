@@ -120,22 +120,28 @@ class _Rig:
     def _tests(self, cycles: int, wear: float) -> Iterator[SimulatedRun]:
         """The stationary test, and the dynamic one where there is one."""
         rng, raw = _generator(self.seed, _TEST, cycles), self.programme.raw
+        pressures = np.array(self.programme.pressures)
         test = SimulatedRun(
             run_id=f"sim-{self.seed}-stationary-{cycles:05d}",
             kind=RunKind.STATIONARY_STRIBECK,
             cycles=cycles,
-            plateaus=None if raw else stationary_test(self.clutch, wear, rng, self.sensor),
+            plateaus=None if raw else stationary_test(self.clutch, wear, rng, self.sensor, pressures),
             record=sampled_test(self.clutch, wear, raw, rng, self.sensor) if raw else None,
         )
         test = self._aged(test, wear)
         yield test
-        if self.programme.dynamic is not None:
-            yield self._dynamic_run(cycles, test.wear, self.programme.dynamic)
+        wear = test.wear
+        first = () if self.programme.dynamic is None else (self.programme.dynamic,)
+        for number, dynamic in enumerate((*first, *self.programme.further)):
+            loops = self._dynamic_run(cycles, wear, dynamic, number)
+            yield loops
+            wear = loops.wear
 
-    def _dynamic_run(self, cycles: int, wear: float, test: DynamicTest) -> SimulatedRun:
-        rng = _generator(self.seed, _DYNAMIC, cycles)
+    def _dynamic_run(self, cycles: int, wear: float, test: DynamicTest, number: int) -> SimulatedRun:
+        """The dynamic test of that number at a state; those after the first have noise and a name of their own."""
+        rng = _generator(self.seed, _DYNAMIC, cycles, *([number] if number else []))
         run = SimulatedRun(
-            run_id=f"sim-{self.seed}-dynamic-{cycles:05d}",
+            run_id=f"sim-{self.seed}-dynamic-{cycles:05d}" + (f"-{test.frequency:g}hz" if number else ""),
             kind=RunKind.DYNAMIC_STRIBECK,
             cycles=cycles,
             record=sampled_test(self.clutch, wear, test, rng, self.sensor),

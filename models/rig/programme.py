@@ -8,7 +8,7 @@ Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 2.3 and 
 from dataclasses import dataclass
 from enum import StrEnum
 
-from models.rig.sampled import DynamicTest, RawTest
+from models.rig.sampled import PROTOCOL, DynamicTest, RawTest
 
 #: Dissipated energy [J] that ages by as much as one cycle, where energy does: what an engagement of the nominal clutch
 #: dissipates over most of its life.
@@ -24,14 +24,17 @@ class Ageing(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Programme:
-    """`dynamic`: the dynamic test after each stationary one, None: none. `raw`: stationary tests as sampled records,
-    None: as plateaus. `engagements`: integrate one a block, for its energy and its trace.
+    """`dynamic`: the dynamic test after each stationary one, None: none, and `further` ones, at other frequencies. `raw`:
+    stationary tests as sampled records, None: as plateaus, at `pressures` [Pa]. `engagements`: integrate one a block, for
+    its energy and its trace.
 
     Raises ValueError where energy is to age the clutch and no engagement gives it.
     """
 
     dynamic: DynamicTest | None = None
+    further: tuple[DynamicTest, ...] = ()
     raw: RawTest | None = None
+    pressures: tuple[float, ...] = PROTOCOL
     engagements: bool = False
     ageing: Ageing = Ageing.CYCLES
 

@@ -21,12 +21,15 @@ from models.rig.recorder import Recorder
 from models.rig.stationary import PLATEAU_DURATION, Sensor
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
 
+#: The protocol's pressures [Pa].
+PROTOCOL = tuple(PROTOCOL_PRESSURES.tolist())
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DynamicTest:
     """`frequency` [Hz], `offset` and `amplitude` [rad/s] of speed, `duration` at a pressure and `step` to the next [s],
-    `rate` [Hz]; all pressures of the protocol, ascending. Raises ValueError unless all are positive and the speed never
-    falls below zero.
+    `rate` [Hz]; `pressures` [Pa] in their order, the protocol's unless given. Raises ValueError unless all are positive and
+    the speed never falls below zero.
     """
 
     frequency: float = 0.1
@@ -36,6 +39,7 @@ class DynamicTest:
     step: float = 0.1
     rate: float = 100.0
     recorder: Recorder = field(default_factory=Recorder)
+    pressures: tuple[float, ...] = PROTOCOL
 
     def __post_init__(self) -> None:
         for name in ("frequency", "offset", "amplitude", "duration", "step", "rate"):
@@ -45,18 +49,19 @@ class DynamicTest:
 
     def course(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Time [n] s, pressure [n] Pa and speed [n] rad/s as they are commanded."""
-        block, last = self.duration + self.step, PROTOCOL_PRESSURES.size - 1
+        block, last = self.duration + self.step, len(self.pressures) - 1
         time = np.arange(math.floor((block * last + self.duration) * self.rate)) / self.rate
         turn = np.minimum((time / block).astype(np.int64), last)
         passed = np.clip((time - turn * block - self.duration) / self.step, 0.0, 1.0)
-        pressure = np.interp(turn + passed, np.arange(last + 1), PROTOCOL_PRESSURES)
+        pressure = np.interp(turn + passed, np.arange(last + 1), self.pressures)
         return time, pressure, self.offset + self.amplitude * np.sin(2 * math.pi * self.frequency * time)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RawTest:
     """`rate` [Hz] of the raw stationary record; `controller` [s] is the time in which speed and pressure come to 1/e of
-    a step, `dwell` [s] what a plateau lasts. Raises ValueError unless all are positive."""
+    a step, `dwell` [s] what a plateau lasts; `pressures` [Pa] as for the dynamic test. Raises ValueError
+    unless all are positive."""
 
     rate: float = 1000.0
     controller: float = 0.1
@@ -64,6 +69,7 @@ class RawTest:
     recorder: Recorder = field(
         default_factory=lambda: Recorder(torque_noise=0.25, memory=0.02, speed_noise=1.0 * RPM, pressure_noise=1000.0)
     )
+    pressures: tuple[float, ...] = PROTOCOL
 
     def __post_init__(self) -> None:
         for name in ("rate", "controller", "dwell"):
@@ -71,8 +77,8 @@ class RawTest:
 
     def course(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Time [n] s, pressure [n] Pa and speed [n] rad/s as the controllers bring them about."""
-        pressure = np.repeat(PROTOCOL_PRESSURES, REFERENCE_SPEEDS.size)
-        speed = np.tile(REFERENCE_SPEEDS, PROTOCOL_PRESSURES.size)
+        pressure = np.repeat(self.pressures, REFERENCE_SPEEDS.size)
+        speed = np.tile(REFERENCE_SPEEDS, len(self.pressures))
         time = np.arange(math.floor(self.dwell * speed.size * self.rate)) / self.rate
         step = np.minimum((time / self.dwell).astype(np.int64), speed.size - 1)
         left = np.exp(-(time - step * self.dwell) / self.controller)

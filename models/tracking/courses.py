@@ -15,7 +15,9 @@ the others are shapes only, and believed no further than a discrepancy of some s
 Source: order n of dD/dζ = -k Dⁿ with D = (1 + ζ/φ)^-ε: n = 1 + 1/ε.
 """
 
+import math
 from enum import IntEnum
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +42,8 @@ class Course(IntEnum):
 #: Signs of φ and ε by course, and their product σ.
 SCALE_SIGN, EXPONENT_SIGN = np.array([1.0, -1.0, 1.0, -1.0, 1.0, 1.0]), np.array([1.0, -1.0, -1.0, 1.0, 1.0, -1.0])
 SIGN = SCALE_SIGN * EXPONENT_SIGN
+#: The course by twice whether φ is positive, and once more whether ε is.
+_BY_SIGNS: NDArray[np.intp] = np.array([Course.ENDING, Course.HYPERBOLIC, Course.POWER, Course.EQ_6], dtype=np.intp)
 
 #: |ε| of the two courses that have none: of the exponential, whose order is 1 and whose coordinate log φ stands for log τ,
 #: and of the logarithm, whose change is counted in units of |ε|. Chosen: as far from 1 as leaves b its digits; no table.
@@ -47,6 +51,8 @@ _LARGE, _SMALL = 1e4, 1e-4
 #: ε where it is fixed, and φ over exp of its coordinate, by course.
 _EXPONENT = np.array([np.nan, np.nan, np.nan, np.nan, _LARGE, -_SMALL])
 _PLAIN_SCALE = np.array([1.0, -1.0, 1.0, -1.0, _LARGE, 1.0])
+#: σ over the unit in which Δ counts, by course: what 1 - (1 + ζ/φ)^-ε is multiplied by.
+_HEIGHT = SIGN / np.array([1.0, 1.0, 1.0, 1.0, 1.0, _SMALL])
 #: Courses whose ε is fixed: their coordinate log ε stands for nothing.
 WITHOUT_EXPONENT = ~np.isnan(_EXPONENT)
 _COURSES = np.concatenate([np.zeros(SIZES.size), np.repeat([1, 2, 3, 4, 5], OTHER_SIZES.size)]).astype(np.intp)
@@ -65,12 +71,14 @@ def basis(
 
     Accurate to 2e-16 absolute, not relative: here b is only compared with measurement noise. What grows is cut at LOG_MOST.
     """
+    scale_inverse, exponent, height = np.exp(-log_scale), np.exp(log_exponent), np.ones(())
     others = bool(course.any())
-    power = np.asarray(progress * np.exp(-log_scale))
-    exponent = np.exp(log_exponent)
     if others:
-        power = power / _PLAIN_SCALE[course]
-        exponent = np.where(np.isnan(_EXPONENT[course]), exponent * EXPONENT_SIGN[course], _EXPONENT[course])
+        fixed = _EXPONENT[course]
+        scale_inverse = scale_inverse / _PLAIN_SCALE[course]
+        exponent = np.where(np.isnan(fixed), exponent * EXPONENT_SIGN[course], fixed)
+        height = _HEIGHT[course]
+    power = np.asarray(progress * scale_inverse)
     power += 1.0
     if others:
         np.maximum(power, ENDED, out=power)
@@ -79,9 +87,8 @@ def basis(
     if others:
         np.minimum(power, LOG_MOST, out=power)
     np.exp(power, out=power)
-    np.subtract(1.0, power, out=power)
-    if others:
-        power *= SIGN[course] / unit_of_change(course)
+    power *= -height
+    power += height
     return power
 
 
@@ -90,13 +97,17 @@ def unit_of_change(course: NDArray[np.intp]) -> FloatArray:
     return np.where(course == Course.LOGARITHM, _SMALL, 1.0)
 
 
+@lru_cache(maxsize=64)
 def log_form_weight(prior: Prior) -> FloatArray:
     """Log prior probability of each form; -inf for those that the prior is sure are not."""
     home = prior.eq_6_share * np.concatenate([[prior.law_share], (1.0 - prior.law_share) * SHARES])
     others = (1.0 - prior.eq_6_share) * np.outer(COURSE_SHARES, OTHER_SHARES).ravel()
     once = np.concatenate([home, others])
+    weight = np.outer([1.0 - prior.proportional_share, prior.proportional_share], once).ravel()
     with np.errstate(divide="ignore"):
-        return np.asarray(np.log(np.outer([1.0 - prior.proportional_share, prior.proportional_share], once).ravel()))
+        np.log(weight, out=weight)
+    weight.setflags(write=False)
+    return weight
 
 
 def form_of(course: NDArray[np.intp], size: FloatArray, proportional: NDArray[np.bool_]) -> NDArray[np.intp]:
@@ -112,10 +123,10 @@ def scatter_growth(form: NDArray[np.intp], relative: FloatArray) -> FloatArray:
 
 def course_of(scale: FloatArray, exponent: FloatArray) -> NDArray[np.intp]:
     """The course [n] of signed φ and ε, each [n]."""
-    course = np.where(scale > 0.0, np.where(exponent > 0.0, 0, 2), np.where(exponent > 0.0, 3, 1))
+    course = np.asarray(_BY_SIGNS[2 * (scale > 0.0) + (exponent > 0.0)], dtype=np.intp)
     for fixed in (Course.EXPONENTIAL, Course.LOGARITHM):
-        course = np.where(exponent == _EXPONENT[fixed], fixed, course)
-    return course.astype(np.intp)
+        course[exponent == _EXPONENT[fixed]] = fixed
+    return course
 
 
 def coefficients_at(
@@ -140,11 +151,13 @@ def log_scale_at(place: FloatArray, course: NDArray[np.intp], span: float) -> tu
     A course that ends does so beyond what was measured, up to the progress `span`: its place is log(|φ| - span).
     """
     ends = SCALE_SIGN[course] < 0.0
-    beyond = np.logaddexp(np.log(span), place)
-    return np.where(ends, beyond, place), np.where(ends, place - beyond, 0.0)
+    beyond = np.broadcast_to(place, np.broadcast_shapes(place.shape, course.shape)).copy()
+    np.logaddexp(math.log(span), place, out=beyond, where=ends)
+    return beyond, place - beyond
 
 
 def place_of(log_scale: FloatArray, course: NDArray[np.intp], span: float) -> FloatArray:
     """The inverse of `log_scale_at`; just beyond `span` where a course has ended before."""
-    left = log_scale + np.log(-np.expm1(np.minimum(np.log(span) - log_scale, -ENDED)))
-    return np.where(SCALE_SIGN[course] < 0.0, left, log_scale)
+    place, ends = log_scale.copy(), SCALE_SIGN[course] < 0.0
+    place[ends] += np.log(-np.expm1(np.minimum(math.log(span) - log_scale[ends], -ENDED)))
+    return place

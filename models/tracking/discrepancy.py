@@ -14,19 +14,22 @@ a discrepancy beside a law of physics is M. C. Kennedy, A. O'Hagan, J. R. Statis
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.tracking.criteria import LEVELLING
-from models.tracking.history import History
+from models.tracking.history import History, later_epochs, span_of
 from models.tracking.prior import Prior
 
 #: Stretches of constant curvature: equal ones up to T, then growing ones, up to LEVELLING times T; there δ levels off.
 PAST, FUTURE = 6, 16
 _EDGES = np.concatenate([np.arange(PAST) / PAST, np.geomspace(1.0, LEVELLING, FUTURE + 1)])
 _LENGTHS = np.diff(_EDGES)
+#: The deviation of the curvature on each stretch.
+_GAIN = np.sqrt(3.0 / _LENGTHS)
 
 
 def smooth(progress: FloatArray, span: float, stretches: int = PAST + FUTURE) -> FloatArray:
@@ -37,27 +40,43 @@ def smooth(progress: FloatArray, span: float, stretches: int = PAST + FUTURE) ->
     u = np.minimum(np.asarray(progress)[..., None] / span, LEVELLING)
     low, length = _EDGES[:stretches], _LENGTHS[:stretches]
     within = np.clip(u - low, 0.0, length)
-    return np.asarray((0.5 * within**2 + length * np.maximum(u - low - length, 0.0)) * np.sqrt(3.0 / length))
+    return np.asarray((0.5 * within**2 + length * np.maximum(u - low - length, 0.0)) * _GAIN[:stretches])
+
+
+#: The slope and the level of δ where each stretch begins, for curvature of one deviation on each stretch; [22, 2 · 22].
+_BEGUN = np.concatenate(
+    [np.triu(np.outer(_GAIN * _LENGTHS, np.ones(PAST + FUTURE)), 1), smooth(_EDGES[:-1], 1.0).T], axis=1
+)
 
 
 def at_end() -> FloatArray:
     """The contribution of each stretch of the past to δ(T) and to T δ'(T); [2, PAST]."""
-    gain = np.sqrt(3.0 / _LENGTHS[:PAST])
+    gain = _GAIN[:PAST]
     left = 1.0 - _EDGES[:PAST] - 0.5 * _LENGTHS[:PAST]
     return np.asarray(np.stack([gain * _LENGTHS[:PAST] * left, gain * _LENGTHS[:PAST]]))
 
 
 def columns(history: History) -> FloatArray:
     """The further linear terms at every measurement: PAST of δ, then one for each step; [t, PAST + e]."""
-    later = np.unique(history.epoch)[1:]
-    shifted = (history.epoch[:, None] >= later).astype(np.float64)
-    return np.concatenate([smooth(history.progress, history.span, PAST), shifted], axis=1)
+    return _columns(history.progress.tobytes(), history.epoch.tobytes())
+
+
+@lru_cache(maxsize=16)
+def _columns(progress: bytes, epoch: bytes) -> FloatArray:
+    """They depend on the progress and the epochs alone, and the filters ask for them again and again."""
+    history = np.frombuffer(progress), np.frombuffer(epoch)
+    shifted = history[1][:, None] >= np.array(later_epochs(history[1]))
+    terms = np.concatenate([smooth(history[0], span_of(history[0]), PAST), shifted], axis=1)
+    terms.setflags(write=False)
+    return terms
 
 
 def column_sds(prior: Prior, size: FloatArray, steps: int) -> FloatArray:
     """Prior deviations of the further terms [n, PAST + steps] for discrepancies of relative size q [n]."""
-    course = np.repeat((size * prior.size)[:, None], PAST, axis=1)
-    return np.concatenate([course, np.full((size.size, steps), prior.step_size * prior.size)], axis=1)
+    sds = np.empty((size.size, PAST + steps))
+    sds[:, :PAST] = (size * prior.size)[:, None]
+    sds[:, PAST:] = prior.step_size * prior.size
+    return sds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,21 +95,25 @@ class Discrepancy:
 
     def __call__(self, own: FloatArray, progress: FloatArray) -> FloatArray:
         """δ at each draw's own time [k, n], plus the steps up to ζ, [k, n] or [k, 1]; [k, n]."""
+        smooth_part = self._smooth_part(own)
+        if self.at.size == 0:
+            return smooth_part
         begun = np.broadcast_to(progress[..., None] >= self.at, (*own.shape, self.at.size))
-        return np.asarray(self._stretchwise(own) + np.einsum("kne,ne->kn", begun, self.height))
+        return np.asarray(smooth_part + np.einsum("kne,ne->kn", begun, self.height))
 
-    def _stretchwise(self, progress: FloatArray) -> FloatArray:
-        """δ at each draw's own ζ [k, n], from its level, slope and curvature where the stretch begins."""
-        u = np.minimum(progress / self.span, LEVELLING)
-        stretch = np.minimum(np.searchsorted(_EDGES, u, side="right") - 1, PAST + FUTURE - 1)
-        bend = self.curvature * np.sqrt(3.0 / _LENGTHS)
-        turn = bend * _LENGTHS
-        slope = np.cumsum(turn, axis=1) - turn
-        rise = (slope + 0.5 * turn) * _LENGTHS
-        level = np.cumsum(rise, axis=1) - rise
-        x, draws = u - _EDGES[stretch], np.arange(self.size.size)
-        bent = slope[draws, stretch] + 0.5 * x * bend[draws, stretch]
-        return np.asarray(level[draws, stretch] + x * bent)
+    def measured(self, progress: FloatArray) -> FloatArray:
+        """The same at progress [k] of what was measured, up to T, where every draw's own time is ζ; [k, n]."""
+        terms = np.concatenate([smooth(progress, self.span, PAST), progress[:, None] >= self.at], axis=1)
+        return np.asarray(terms @ np.concatenate([self.curvature[:, :PAST], self.height], axis=1).T)
+
+    def _smooth_part(self, own: FloatArray) -> FloatArray:
+        """δ at each draw's own time [k, n]; where q = 0, which is most of the draws of a young clutch, it is 0."""
+        present = self.size > 0.0
+        if present.all():
+            return _stretchwise(self.curvature, own / self.span)
+        smooth_part = np.zeros(own.shape)
+        smooth_part[:, present] = _stretchwise(self.curvature[present], own[:, present] / self.span)
+        return smooth_part
 
     @property
     def present(self) -> NDArray[np.bool_]:
@@ -100,6 +123,18 @@ class Discrepancy:
     def taken(self, index: NDArray[np.intp]) -> "Discrepancy":
         """The courses at `index`."""
         return replace(self, size=self.size[index], curvature=self.curvature[index], height=self.height[index])
+
+
+def _stretchwise(curvature: FloatArray, time: FloatArray) -> FloatArray:
+    """δ at each draw's own time [k, n], in units of T, from its level, slope and curvature where the stretch begins."""
+    u = np.minimum(time, LEVELLING)
+    stretch = np.minimum(np.searchsorted(_EDGES, u, side="right") - 1, PAST + FUTURE - 1)
+    begun, draws = curvature @ _BEGUN, np.arange(curvature.shape[0])
+    slope = stretch + 2 * (PAST + FUTURE) * draws
+    bend = stretch + (PAST + FUTURE) * draws
+    x = u - _EDGES[stretch]
+    bent = begun.take(slope) + 0.5 * x * (curvature * _GAIN).take(bend)
+    return np.asarray(begun.take(slope + PAST + FUTURE) + x * bent)
 
 
 def drawn(history: History, prior: Prior, size: FloatArray, terms: FloatArray, rng: np.random.Generator) -> Discrepancy:

@@ -43,13 +43,13 @@ class History:
     @property
     def span(self) -> float:
         """The largest progress measured, 1 where nothing has been beyond 0."""
-        return float(self.progress.max(initial=0.0)) or 1.0
+        return span_of(self.progress)
 
     @property
     def steps(self) -> FloatArray:
         """The progress at which each epoch after the first begins, as far as it was measured [e]."""
-        later = np.unique(self.epoch)[1:]
-        return np.array([self.progress[self.epoch >= epoch].min() for epoch in later], dtype=np.float64)
+        begun = [self.progress[self.epoch >= epoch].min() for epoch in later_epochs(self.epoch)]
+        return np.array(begun, dtype=np.float64)
 
     def relative(self, prior: Prior) -> FloatArray:
         """The square of every value over the quantity's size [t]: what scatter that is a share of the value grows with.
@@ -66,6 +66,16 @@ class History:
     def from_arrays(cls, arrays: dict[str, FloatArray]) -> "History":
         """The inverse of `to_arrays`."""
         return cls(**{field.name: arrays[field.name] for field in fields(cls)})
+
+
+def span_of(progress: FloatArray) -> float:
+    """The largest progress [t], 1 where nothing has been beyond 0."""
+    return float(progress.max(initial=0.0)) or 1.0
+
+
+def later_epochs(epoch: FloatArray) -> list[float]:
+    """The epochs after the first, ascending."""
+    return sorted(set(epoch.tolist()))[1:]
 
 
 def _row(measurement: Measurement, prior: Prior) -> tuple[float, float, float, int]:

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import log_ndtr, logsumexp, ndtri_exp
+from scipy.special import log_ndtr, ndtri_exp
 
 from models.arrays import FloatArray
 from models.tracking.criteria import FAR, FEWEST_BEFORE
@@ -62,9 +62,9 @@ def innovation(posterior: Posterior, last: Measurement, prior: Prior) -> float:
         log_density = np.logaddexp(log_density, math.log(prior.outlying_share) + outlying)
     with np.errstate(divide="ignore"):
         log_weight = np.log(posterior.weight) - log_density
-    log_weight = log_weight - logsumexp(log_weight)
+    log_weight -= np.logaddexp.reduce(log_weight)
     scaled = off / np.sqrt(variance)
-    below, above = (min(float(logsumexp(log_weight + log_ndtr(sign * scaled))), 0.0) for sign in (1.0, -1.0))
+    below, above = (min(float(np.logaddexp.reduce(log_weight + log_ndtr(sign * scaled))), 0.0) for sign in (1.0, -1.0))
     return float(ndtri_exp(below)) if below < above else -float(ndtri_exp(above))
 
 

@@ -15,10 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.tracking.courses import FORM_COURSE, FORM_SIZE, basis, scatter_growth
-from models.tracking.discrepancy import column_sds, columns
+from models.tracking.courses import FORM_COURSE, FORM_PROPORTIONAL, FORM_SIZE, basis, scatter_growth
+from models.tracking.discrepancy import PAST, column_sds, columns
+from models.tracking.elimination import factor, with_gram
 from models.tracking.history import History
 from models.tracking.prior import Prior
+
+#: Which of N of the columns (1, y, b) each sum loses the product of.
+_PRODUCTS = {"r": (0, 0), "rb": (0, 2), "rbb": (2, 2), "ry": (0, 1), "rby": (1, 2), "ryy": (1, 1)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,41 +92,50 @@ class Terms:
 def evidence(sums: Sums, prior: Prior) -> FloatArray:
     """Log probability of the data given φ, ε, s and q, with ξ0, Δ and the further terms integrated out.
 
-    -½ [Σ log(2π/r) + log|M| + log|A| + log(σ0² σΔ²) + Σ r z² - cᵀ A⁻¹ c], where z = y - E[ξ0] - E[Δ] b, c = (Σrz, Σrbz)
-    and A is the posterior precision. By elimination, so that the nearly singular A of a curve that has saturated keeps
+    -½ [Σ log(2π/r) + log|M| + log|A| + log(σ0² σΔ²) + Σ r y² + E[Δ]²/σΔ² - cᵀ A⁻¹ c], where A is the posterior precision of
+    (ξ0, Δ) and c = (Σry, Σrby + E[Δ]/σΔ²). By elimination, so that the nearly singular A of a curve that has saturated keeps
     its digits.
     """
-    a00, _, c0, pivot, d1 = _eliminate(sums, prior)
-    mean = prior.change_mean
-    misfit = sums.ryy - 2.0 * mean * sums.rby + mean**2 * sums.rbb
-    quadratic = c0**2 / a00 + d1**2 / pivot
-    spread = math.log(prior.initial_sd) + math.log(prior.change_sd)
-    return np.asarray(0.5 * (sums.log_r - np.log(a00 * pivot) - misfit + quadratic) - spread)
+    pivot, pull = _eliminate(sums, prior)
+    a00 = sums.r + prior.initial_sd**-2
+    fixed = sums.log_r - np.log(a00) - sums.ryy + sums.ry**2 / a00
+    fixed -= (prior.change_mean / prior.change_sd) ** 2 + 2.0 * math.log(prior.initial_sd * prior.change_sd)
+    np.square(pull, out=pull)
+    pull /= pivot
+    np.log(pivot, out=pivot)
+    pull -= pivot
+    pull += fixed
+    pull *= 0.5
+    return pull
 
 
 def conditional(sums: Sums, prior: Prior) -> Conditional:
     """The posterior of (ξ0, Δ) given φ, ε, s and q."""
-    a00, a01, c0, pivot, d1 = _eliminate(sums, prior)
+    pivot, pull = _eliminate(sums, prior)
+    a00 = sums.r + prior.initial_sd**-2
     change_variance = 1.0 / pivot
-    slope = a01 / a00
-    shift = d1 * change_variance
+    slope = sums.rb / a00
+    change = pull * change_variance
     return Conditional(
-        initial=prior.initial_mean + c0 / a00 - slope * shift,
-        change=prior.change_mean + shift,
+        initial=prior.initial_mean + sums.ry / a00 - slope * change,
+        change=change,
         initial_variance=1.0 / a00 + slope**2 * change_variance,
         change_variance=change_variance,
         covariance=-slope * change_variance,
     )
 
 
-def _eliminate(sums: Sums, prior: Prior) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    a00 = sums.r + prior.initial_sd**-2
-    c0 = sums.ry - prior.change_mean * sums.rb
-    c1 = sums.rby - prior.change_mean * sums.rbb
-    slope = sums.rb / a00
-    floor = prior.change_sd**-2
-    pivot = floor + np.maximum(sums.rbb - sums.rb * slope, 0.0)
-    return a00, sums.rb, c0, pivot, c1 - slope * c0
+def _eliminate(sums: Sums, prior: Prior) -> tuple[FloatArray, FloatArray]:
+    """The precision of Δ once ξ0 is eliminated, and what pulls at it: Δ is their ratio."""
+    least = prior.change_sd**-2
+    lean = sums.rb / (sums.r + prior.initial_sd**-2)
+    pull = sums.rby - lean * sums.ry
+    pull += prior.change_mean * least
+    lean *= sums.rb
+    pivot = np.subtract(sums.rbb, lean, out=lean)
+    np.maximum(pivot, 0.0, out=pivot)
+    pivot += least
+    return pivot, pull
 
 
 def log_outlying(prior: Prior, outlying: FloatArray) -> FloatArray:
@@ -137,28 +150,26 @@ def log_outlying(prior: Prior, outlying: FloatArray) -> FloatArray:
 def pointwise(history: History, prior: Prior, points: Points, table: FloatArray | None = None) -> tuple[Sums, Terms]:
     """The sums at n points, each [n], and the further terms after elimination; `table` may hold their b [t, n]."""
     b = points.basis(history.progress) if table is None else table
+    scatter = np.ones((3, b.shape[1]))
+    np.exp(2.0 * points.log_scatter, out=scatter[1])
+    np.multiply(scatter[1], FORM_PROPORTIONAL[points.form], out=scatter[2])
+    scatter[1] -= scatter[2]
     d = np.multiply(points.outlying, (prior.outlying_size * prior.size) ** 2, out=np.empty(b.shape))
-    d += history.variance[:, None]
-    d += scatter_growth(points.form, history.relative(prior)).T * np.exp(2.0 * points.log_scatter)
+    d += np.array([history.variance, np.ones(b.shape[0]), history.relative(prior)]).T @ scatter
     log_r = -_log_product(d) - b.shape[0] * math.log(2.0 * math.pi)
     r = np.divide(1.0, d, out=d)
     y = history.value - prior.initial_mean
     rb = r * b
-    sums = Sums(
-        r=r.sum(axis=0),
-        rb=rb.sum(axis=0),
-        rbb=np.einsum("tn,tn->n", rb, b),
-        ry=y @ r,
-        rby=y @ rb,
-        ryy=y**2 @ r,
-        log_r=log_r,
-    )
+    plain = np.array([np.ones(y.size), y, y**2])
+    r_sum, ry, ryy = plain @ r
+    rb_sum, rby = plain[:2] @ rb
+    sums = Sums(r=r_sum, rb=rb_sum, rbb=np.einsum("tn,tn->n", rb, b), ry=ry, rby=rby, ryy=ryy, log_r=log_r)
     z = columns(history)
-    sd = column_sds(prior, points.size, history.steps.size)
-    where = np.flatnonzero(sd.any(axis=1))
+    where, sd = _disturbed(prior, points.size, z.shape[1] - PAST)
     if where.size == 0:
-        return sums, Terms(where=where, sd=sd[:0].T, rows=np.zeros((0, 3, 0)))
-    terms = Terms(where=where, sd=sd[where].T, rows=_eliminated(z, y, r[:, where], rb[:, where], sd[where].T))
+        return sums, Terms(where=where, sd=sd, rows=np.zeros((0, 3, 0)))
+    rows = _eliminated(z, y, r.take(where, axis=1), rb.take(where, axis=1), sd)
+    terms = Terms(where=where, sd=sd, rows=rows)
     return _without(sums, terms), terms
 
 
@@ -181,7 +192,7 @@ def last_outlying(history: History, prior: Prior, points: Points, sums: Sums, te
         pivot[at] -= np.square(shared).sum(axis=0)
         own[:, at] -= np.einsum("kj,ckj->cj", shared, terms.cross)
     own /= np.sqrt(pivot)
-    lost = _products(own) | {"log_r": np.log(pivot)}
+    lost = {name: own[i] * own[j] for name, (i, j) in _PRODUCTS.items()} | {"log_r": np.log(pivot)}
     return Sums(**{name: getattr(sums, name) - loss for name, loss in lost.items()})
 
 
@@ -209,39 +220,34 @@ def tabulated(
     further, growth = (prior.outlying_size * prior.size) ** 2, scatter_growth(form, history.relative(prior))
     fixed = history.variance + further * outlying.T + (np.zeros(form.size) + blur)[:, None] ** 2
     r = 1.0 / (fixed[:, None, :] + growth[:, None, :] * np.exp(2.0 * log_scatter)[:, :, None])
-    y = history.value - prior.initial_mean
-    rb, rby = np.split(np.concatenate([r, r * y], axis=1) @ table, 2, axis=1)
-    sums = Sums(
-        r=r.sum(axis=2)[:, :, None],
-        rb=rb,
-        rbb=r @ np.square(table),
-        ry=(r @ y)[:, :, None],
-        rby=rby,
-        ryy=(r @ y**2)[:, :, None],
-        log_r=(np.log(r).sum(axis=2) - y.size * math.log(2.0 * math.pi))[:, :, None],
-    )
-    z = columns(history)
-    sd = column_sds(prior, FORM_SIZE[form], history.steps.size)
-    where = np.flatnonzero(sd.any(axis=1))
-    if where.size == 0:
-        return sums
-    sd = sd[where, None, :]
-    weighted = (r[where, :, None, :] * z.T) * sd[..., None]
-    root = np.linalg.cholesky(np.eye(z.shape[1]) + (weighted @ z) * sd[:, :, None, :])
-    left = np.linalg.inv(root) @ weighted
-    n_1, n_y = left.sum(axis=3), left @ y
-    flat = left.reshape(where.size, n_y.shape[1] * n_y.shape[2], y.size)
-    n_b = (flat @ (table if table.ndim == 2 else table[where])).reshape(*n_y.shape, -1)
-    lost = {
-        "r": np.square(n_1).sum(axis=2)[:, :, None],
-        "rb": (n_1[:, :, None, :] @ n_b)[:, :, 0],
-        "rbb": np.einsum("klpg,klpg->klg", n_b, n_b),
-        "ry": (n_1 * n_y).sum(axis=2)[:, :, None],
-        "rby": (n_y[:, :, None, :] @ n_b)[:, :, 0],
-        "ryy": np.square(n_y).sum(axis=2)[:, :, None],
-        "log_r": 2.0 * np.log(np.diagonal(root, axis1=2, axis2=3)).sum(axis=2)[:, :, None],
+    y, levels = history.value - prior.initial_mean, r.shape[1]
+    pull, squares = r * y, r @ np.square(table)
+    sums = {
+        "r": r.sum(axis=2),
+        "ry": pull.sum(axis=2),
+        "ryy": pull @ y,
+        "log_r": np.log(r).sum(axis=2) - y.size * math.log(2.0 * math.pi),
     }
-    return _less(sums, lost, where)
+    z = columns(history)
+    terms, (where, sd) = z.shape[1], _disturbed(prior, FORM_SIZE[form], z.shape[1] - PAST)
+    if where.size:
+        sd = sd.T[:, None, :]
+        weighted = (r[where, :, None, :] * z.T) * sd[..., None]
+        gram = (weighted.reshape(where.size * levels * terms, y.size) @ z).reshape(where.size, levels, terms, terms)
+        root = np.linalg.cholesky(np.eye(terms) + gram * sd[:, :, None, :])
+        left = np.linalg.inv(root) @ weighted
+        n_1, n_y = left.sum(axis=3), left @ y
+        n_b = left.reshape(where.size, levels * terms, y.size) @ (table if table.ndim == 2 else table[where])
+        squares[where] -= np.square(n_b, out=n_b).reshape(where.size, levels, terms, -1).sum(axis=2)
+        r[where] -= (n_1[:, :, None] @ left)[:, :, 0]
+        pull[where] -= (n_y[:, :, None] @ left)[:, :, 0]
+        log_diagonal = 2.0 * np.log(np.diagonal(root, axis1=2, axis2=3))
+        lost = {"r": n_1**2, "ry": n_1 * n_y, "ryy": n_y**2, "log_r": log_diagonal}
+        for name, loss in lost.items():
+            sums[name][where] -= loss.sum(axis=2)
+    rb = np.concatenate([r, pull], axis=1) @ table
+    by_level = {name: column[:, :, None] for name, column in sums.items()}
+    return Sums(rb=rb[:, :levels], rby=rb[:, levels:], rbb=squares, **by_level)
 
 
 def drawn_terms(terms: Terms, off_initial: FloatArray, change: FloatArray, normals: FloatArray) -> FloatArray:
@@ -260,35 +266,30 @@ def drawn_terms(terms: Terms, off_initial: FloatArray, change: FloatArray, norma
     return drawn
 
 
+def _disturbed(prior: Prior, size: FloatArray, steps: int) -> tuple[NDArray[np.intp], FloatArray]:
+    """Which of the sizes q [n] have further terms, and the prior deviations σ of these [p, j]."""
+    where = np.flatnonzero(size > 0.0) if steps == 0 else np.arange(size.size)
+    return where, column_sds(prior, size[where], steps).T
+
+
 def _eliminated(z: FloatArray, y: FloatArray, r: FloatArray, rb: FloatArray, sd: FloatArray) -> FloatArray:
-    """`Terms.rows` from Z [t, p], y [t], r and r b [t, j], and σ [p, j]: Cholesky's elimination of all points at once, which
-    is quicker than a factorisation of each."""
+    """`Terms.rows` from Z [t, p], y [t], r and r b [t, j], and σ [p, j]."""
     terms = z.shape[1]
-    rows = np.empty((terms, terms + 3, sd.shape[1]))
-    sides = (r, r * y[:, None], rb)
-    for k in range(terms):
-        rows[k, k:terms] = (z[:, k:] * z[:, k : k + 1]).T @ r
-        rows[k, k:terms] *= sd[k:]
-        rows[k, terms:] = [z[:, k] @ side for side in sides]
-        rows[k, k:] *= sd[k]
-        rows[k, k] += 1.0
-    for k in range(terms):
-        rows[k, k:] /= np.sqrt(rows[k, k])
-        for below in range(k + 1, terms):
-            rows[below, below:] -= rows[k, below] * rows[k, below:]
+    rows = with_gram(z, r, sd, 3)
+    rows[:, terms : terms + 2] = (
+        (np.concatenate([z, z * y[:, None]], axis=1).T @ r).reshape(2, terms, -1).swapaxes(0, 1)
+    )
+    rows[:, terms + 2] = z.T @ rb
+    rows[:, terms:] *= sd[:, None]
+    factor(rows)
     return rows
 
 
 def _without(sums: Sums, terms: Terms) -> Sums:
-    lost = {name: product.sum(axis=0) for name, product in _products(terms.cross).items()}
+    cross = terms.cross
+    lost = {name: np.einsum("pj,pj->j", cross[i], cross[j]) for name, (i, j) in _PRODUCTS.items()}
     diagonal = np.einsum("kkj->kj", terms.rows[:, : terms.sd.shape[0]])
     return _less(sums, lost | {"log_r": 2.0 * np.log(diagonal).sum(axis=0)}, terms.where)
-
-
-def _products(n: FloatArray) -> dict[str, FloatArray]:
-    """What the sums lose to terms whose N of the columns (1, y, b) is n [3, ...]."""
-    n_1, n_y, n_b = n
-    return {"r": n_1**2, "rb": n_1 * n_b, "rbb": n_b**2, "ry": n_1 * n_y, "rby": n_y * n_b, "ryy": n_y**2}
 
 
 def _less(sums: Sums, lost: dict[str, FloatArray], where: NDArray[np.intp]) -> Sums:

@@ -6,7 +6,7 @@ scatter between runs is added, which the filter estimates.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol, TypeVar
 
@@ -36,7 +36,8 @@ class Posterior:
 
     `scatter` is the deviation from run to run, in the unit of the quantity; where it is `proportional` (None: nowhere), that
     of a value of the prior's size. `discrepancy` is the deviation of each draw from its course, if there is one; `forced`
-    whether the filter took in a test at once that it could not take in by degrees.
+    whether the filter took in a test at once that it could not take in by degrees. From these follow, of every draw, the
+    `course` (`courses.Course`), and log φ and log ε as the priors know them (`courses.coordinates_of`), each [n].
     """
 
     weight: FloatArray
@@ -48,6 +49,15 @@ class Posterior:
     proportional: NDArray[np.bool_] | None = None
     discrepancy: Discrepancy | None = None
     forced: bool = False
+    course: NDArray[np.intp] = field(init=False, repr=False, compare=False)
+    log_scale: FloatArray = field(init=False, repr=False, compare=False)
+    log_exponent: FloatArray = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        course = course_of(self.scale, self.exponent)
+        log_scale, log_exponent = coordinates_of(self.scale, self.exponent, course)
+        for name, column in (("course", course), ("log_scale", log_scale), ("log_exponent", log_exponent)):
+            object.__setattr__(self, name, column)
 
     @property
     def effective_draws(self) -> float:
@@ -74,22 +84,14 @@ class Posterior:
         if self.discrepancy is None:
             return law
         span = self.discrepancy.span
+        if progress.ndim == 1 and progress.max(initial=0.0) <= span:
+            return np.asarray(law + self.discrepancy.measured(progress))
         own = np.maximum(zeta, span * share / self._share(np.full((1, 1), span)))
         return np.asarray(law + self.discrepancy(np.where(zeta > span, own, zeta), zeta))
 
     def _share(self, progress: FloatArray) -> FloatArray:
         """b at progress [k, n] or [k, 1]; [k, n]."""
-        return np.asarray(basis(progress, *self.coordinates, self.course) * unit_of_change(self.course))
-
-    @property
-    def coordinates(self) -> tuple[FloatArray, FloatArray]:
-        """log φ and log ε of every draw [n] as the priors know them (`courses.coordinates_of`)."""
-        return coordinates_of(self.scale, self.exponent, self.course)
-
-    @property
-    def course(self) -> NDArray[np.intp]:
-        """The course of every draw (`courses.Course`) [n]."""
-        return course_of(self.scale, self.exponent)
+        return np.asarray(basis(progress, self.log_scale, self.log_exponent, self.course) * unit_of_change(self.course))
 
     @property
     def course_end(self) -> FloatArray:

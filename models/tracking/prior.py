@@ -93,7 +93,9 @@ class Prior:
         """The inverse of `to_array`; of earlier versions too, which knew eq. 6 and constant scatter alone [14]."""
         return cls(**{field.name: float(x) for field, x in zip(fields(cls), numbers, strict=False)})
 
-    def log_density(self, log_scale: FloatArray, log_exponent: FloatArray, log_scatter: FloatArray) -> FloatArray:
+    def log_density(
+        self, log_scale: FloatArray | float, log_exponent: FloatArray | float, log_scatter: FloatArray | float
+    ) -> FloatArray:
         """Log density of (log φ, log ε, log s), broadcast, without its constant."""
         return np.asarray(
             -0.5

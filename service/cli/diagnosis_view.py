@@ -10,6 +10,8 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from service.cli.answers.tables import cycles, number
+
 _Table = list[list[float | None]]
 _VERDICTS = {
     "model_adequate": ("The model is adequate", "green"),
@@ -41,7 +43,7 @@ def shown(report: Mapping[str, Any]) -> Iterator[RenderableType]:
     if report["maps"] is not None:
         yield _maps(report["maps"])
     if report["baseline"]["where"]:
-        axes = [f"{item['axis']} (p = {_number(item['p_value'], 2)})" for item in report["baseline"]["where"]]
+        axes = [f"{item['axis']} (p = {number(item['p_value'], 2)})" for item in report["baseline"]["where"]]
         yield Text(f"The baseline's residuals have structure over: {', '.join(axes)}")
     yield from _gain(report)
     for advice in report["advice"]:
@@ -59,9 +61,9 @@ def _candidates(candidates: Sequence[Mapping[str, Any]]) -> Table:
         table.add_column(name, justify="right" if side == "right" else "left")
     for candidate in candidates:
         estimate = candidate["estimate"]
-        amount = f"{_number(estimate['value'])} ± {_number(estimate['sd'], 2)} {estimate['unit']} {estimate['name']}"
+        amount = f"{number(estimate['value'])} ± {number(estimate['sd'], 2)} {estimate['unit']} {estimate['name']}"
         evidence = _evidence(candidate["log_evidence_gain"])
-        table.add_row(Text(candidate["effect"]), _number(candidate["probability"]), evidence, Text(amount))
+        table.add_row(Text(candidate["effect"]), number(candidate["probability"]), evidence, Text(amount))
     return table
 
 
@@ -87,7 +89,7 @@ def _maps(maps: Mapping[str, Any]) -> Group:
         ]
         drawn.append(Group(*grids))
     legend = Text("Mean residual, share of the baseline's largest ")
-    legend.append(f"({_number(largest[0], 2)} and {_number(largest[1], 2)} deviations): ")
+    legend.append(f"({number(largest[0], 2)} and {number(largest[1], 2)} deviations): ")
     for least, mark, above, below in reversed(_MARKS):
         legend.append(mark, style=f"black on color({above})")
         legend.append(_below(mark), style=f"black on color({below})")
@@ -143,11 +145,11 @@ def _mean(values: Sequence[float | None]) -> float | None:
 def _gain(report: Mapping[str, Any]) -> Iterator[RenderableType]:
     gain = report["gain"]
     if gain["rmse_before_nm"] is not None:
-        spread = "" if gain["reduction_percent_sd"] is None else f" ± {_number(gain['reduction_percent_sd'], 2)}"
+        spread = "" if gain["reduction_percent_sd"] is None else f" ± {number(gain['reduction_percent_sd'], 2)}"
         yield Text(
-            f"Held out ({len(gain['held_out_runs'])} runs): error {_number(gain['rmse_before_nm'])} Nm before, "
-            f"{_number(gain['rmse_after_nm'])} Nm after, {_number(gain['reduction_percent'])}{spread} % less; "
-            f"log score gain {_number(gain['log_score_gain'])} nats"
+            f"Held out ({len(gain['held_out_runs'])} runs): error {number(gain['rmse_before_nm'])} Nm before, "
+            f"{number(gain['rmse_after_nm'])} Nm after, {number(gain['reduction_percent'])}{spread} % less; "
+            f"log score gain {number(gain['log_score_gain'])} nats"
         )
     life = gain["remaining_useful_life"]
     for when, title in (("before", "baseline"), ("after", "extended")):
@@ -163,14 +165,4 @@ def _remaining(life: Mapping[str, Any]) -> str:
     if life["status"] == "insufficient_data":
         return "too few tests for a prediction"
     low, middle, high = (life["remaining_cycles"][quantile] for quantile in ("0.05", "0.5", "0.95"))
-    return f"{_cycles(middle)} cycles (90 %: {_cycles(low)} to {_cycles(high)})"
-
-
-def _cycles(value: float | None) -> str:
-    return "beyond the horizon" if value is None else f"{value:,.0f}"
-
-
-def _number(value: float | None, digits: int = 3) -> str:
-    if value is None:
-        return "-"
-    return f"{value:,.0f}" if 100 <= abs(value) < 1e6 else f"{value:.{digits}g}"
+    return f"{cycles(middle)} cycles (90 %: {cycles(low)} to {cycles(high)})"

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.options import DATABASE, Database, existing, out
+from service.cli.options import DATABASE, Database, existing, out, read_only
 
 if TYPE_CHECKING:
     from service.background import AtOnce
@@ -21,7 +21,7 @@ def show(context: typer.Context, database: Database = DATABASE) -> None:
         return
     from service.queries.fleet_priors import newest  # start-up time
 
-    with existing(database) as opened:
+    with read_only(database) as opened:
         priors = newest(opened)
     for item in priors:
         out.print(_line(item), markup=False, soft_wrap=True)

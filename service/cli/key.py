@@ -2,11 +2,14 @@
 
 from contextlib import closing
 from datetime import UTC, datetime
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.options import DATABASE, EX_USAGE, Database, errors_in_a_line, existing, fail, out
+from service.cli.options import DATABASE, EX_USAGE, Database, errors_in_a_line, existing, fail, out, read_only
+
+if TYPE_CHECKING:
+    from storage.keys import KeyRow
 
 app = typer.Typer(help="Keys for the service.", no_args_is_help=True)
 
@@ -17,8 +20,16 @@ def _now() -> str:
 
 @app.command()
 def create(
-    scope: Annotated[str, typer.Option(help="read, ingest (may post runs too) or admin")],
+    scope: Annotated[
+        str, typer.Option(help="read, ingest (may add too: runs, clutches, diagnoses) or admin (may change)")
+    ],
     note: Annotated[str, typer.Option(help="Who or what it is for")] = "",
+    clutch: Annotated[
+        list[str] | None, typer.Option(help="A clutch that it is bound to; may be repeated. Left out: all")
+    ] = None,
+    expires: Annotated[
+        float | None, typer.Option(min=0, help="Days after which it opens nothing. Left out: never")
+    ] = None,
     database: Database = DATABASE,
 ) -> None:
     """Print a new key, once; only its hash is stored."""
@@ -28,7 +39,7 @@ def create(
 
     if scope not in SCOPES:
         fail(f"scope must be one of {', '.join(SCOPES)}, got {scope!r}", EX_USAGE)
-    secret, row = make_key(scope, note, created_at=_now())
+    secret, row = make_key(scope, note, created_at=_now(), clutches=clutch or None, days=expires)
     with errors_in_a_line(), closing(open_database(database)) as opened, opened.writing() as connection:
         keys.insert(connection, row)
     out.print(secret, markup=False, soft_wrap=True)
@@ -36,14 +47,24 @@ def create(
 
 @app.command(name="list")
 def list_keys(database: Database = DATABASE) -> None:
-    """All keys: name, scope, when made, when revoked."""
+    """All keys: name, scope, when made, whether they open, when they were last used (to the hour), their clutches."""
     from storage import keys  # start-up time
 
-    with existing(database) as opened, opened.reading() as connection:
+    with read_only(database) as opened, opened.reading() as connection:
         rows = keys.all_keys(connection)
     for row in rows:
-        state = f"revoked {row.revoked_at}" if row.revoked_at else "active"
-        out.print(f"{row.key_id}  {row.scope:<6}  {row.created_at}  {state}  {row.note}", markup=False)
+        used = "never used" if row.last_used_at is None else f"used {row.last_used_at}"
+        clutches = "" if row.clutches is None else f"  only {', '.join(row.clutches)}"
+        line = f"{row.key_id}  {row.scope:<6}  {row.created_at}  {_state(row)}  {used}{clutches}  {row.note}"
+        out.print(line, markup=False, soft_wrap=True)
+
+
+def _state(row: "KeyRow") -> str:
+    if row.revoked_at is not None:
+        return f"revoked {row.revoked_at}"
+    if row.expires_at is None:
+        return "active"
+    return f"expired {row.expires_at}" if row.expires_at <= _now() else f"active until {row.expires_at}"
 
 
 @app.command()

@@ -2,9 +2,11 @@
 
 import typer
 
-from service.cli import backup, diagnose, export, fleet, key, model, replay, score, serve, simulate
+from service.cli import diagnose, export, fleet, key, model, score, serve, simulate
+from service.cli.answers import degradation, engagement, life, loops
 from service.cli.changes import clutch_changes, run_changes, trail
 from service.cli.changes import runs as run_list
+from service.cli.database import backup, replay, restore, verify
 from service.cli.demo import demo
 from service.cli.sending import push, spool_commands
 
@@ -19,11 +21,15 @@ app.command()(serve.serve)
 app.command()(demo.demo)
 app.command()(simulate.simulate)
 app.command()(push.push)
+app.command()(life.life)
+app.command()(degradation.degradation)
+app.command()(loops.loops)
+app.command()(engagement.engagement)
 app.command()(diagnose.diagnose)
 app.command()(model.model)
 app.command()(run_list.runs)
 app.command()(run_changes.withdraw)
-app.command()(run_changes.restore)
+app.command()(restore.restore)
 app.command()(run_changes.confirm)
 app.command()(run_changes.correct)
 app.command()(clutch_changes.edit)
@@ -33,6 +39,7 @@ app.command()(export.export)
 app.command()(score.score)
 app.command()(replay.replay)
 app.command()(backup.backup)
+app.command()(verify.verify)
 app.add_typer(spool_commands.app, name="spool")
 app.add_typer(key.app, name="key")
 app.add_typer(fleet.app, name="fleet")

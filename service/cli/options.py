@@ -1,7 +1,7 @@
 """Options that several commands share, and how a command ends on an error."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import httpx2
@@ -51,19 +51,33 @@ def errors_in_a_line() -> Iterator[None]:
 
 @contextmanager
 def existing(url: str) -> Iterator["Opened"]:
-    """An open database that exists already: a mistyped address makes no new one."""
-    from storage.engine.connect import path_of  # start-up time: most commands open no database
+    """An open database that exists already: a mistyped address makes no new one. An older one is migrated."""
     from storage.engine.database import open_database  # start-up time: most commands open no database
 
     with errors_in_a_line():
-        path = path_of(url)
-        if not path.exists():
-            fail(f"there is no database at {path}", EX_USAGE)
-        opened = open_database(url)
-        try:
+        require_database(url)
+        with closing(open_database(url)) as opened:
             yield opened
-        finally:
-            opened.close()
+
+
+@contextmanager
+def read_only(url: str) -> Iterator["Opened"]:
+    """An existing database for a command that only reads it: it stays as it is, at whatever revision."""
+    from storage.engine.database import find_database  # start-up time: most commands open no database
+
+    with errors_in_a_line():
+        require_database(url)
+        with closing(find_database(url)) as opened:
+            yield opened
+
+
+def require_database(url: str) -> None:
+    """End the command where there is no database at the address."""
+    from storage.engine.connect import path_of  # start-up time: most commands open no database
+
+    path = path_of(url)
+    if not path.exists():
+        fail(f"there is no database at {path}", EX_USAGE)
 
 
 def fail(message: str, code: int = 1) -> NoReturn:

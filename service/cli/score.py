@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 import typer
 
-from service.cli.options import DATABASE, EX_USAGE, Database, existing, fail, out
+from service.cli.options import DATABASE, EX_USAGE, Database, fail, out, read_only
 
 
 def score(
@@ -18,7 +18,7 @@ def score(
 
     if method not in METHODS:
         fail(f"method must be one of {', '.join(METHODS)}, got {method!r}", EX_USAGE)
-    with existing(database) as opened:
+    with read_only(database) as opened:
         fleet = scores.of_fleet(opened, AnswerCache(MOST_CACHED_BYTES), method=method)
     for life in fleet["lives"]:
         out.print(f"{life['clutch_id']}: ended at {life['end_of_life_cycles']:.0f} cycles", markup=False)

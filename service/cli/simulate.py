@@ -1,12 +1,13 @@
 """`clutchlife simulate`: a simulated campaign, a file a run."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from service.cli.options import Seed, err, errors_in_a_line, out
+from service.cli.options import EX_USAGE, Seed, err, errors_in_a_line, fail, out
 from service.run_files import manifest
 
 if TYPE_CHECKING:
@@ -28,31 +29,59 @@ def simulate(
     raw_rate: Annotated[float, typer.Option(min=10, max=2000, help="Sampling rate of raw records [Hz]")] = 100.0,
     dynamic: Annotated[bool, typer.Option(help="Simulate dynamic tests too")] = True,
     ageing: Annotated[Literal["cycles", "energy"], typer.Option(help="What ages the clutch")] = "cycles",
+    noise: Annotated[
+        float | None,
+        typer.Option(min=0, max=0.2, help="Deviation of a plateau's torque, a share of it; left out, the reference's"),
+    ] = None,
     tests: Annotated[int, typer.Option(min=1, help="End after so many stationary tests, if not before")] = 40,
+    hide: Annotated[
+        list[str] | None,
+        typer.Option(metavar="EFFECT[:SIZE]", help="Hide an effect, to rehearse a diagnosis; may be repeated"),
+    ] = None,
+    frequency: Annotated[
+        list[float] | None,
+        typer.Option(min=0.01, max=5, help="Frequency of a dynamic test's speed [Hz]; repeated: a test each"),
+    ] = None,
+    pressures: Annotated[
+        list[float] | None, typer.Option(min=4, max=8, help="A pressure of the tests [bar]; repeated: all of them")
+    ] = None,
 ) -> None:
     """Simulate a clutch's life on the rig and write it, a file a run; `clutchlife push` sends it.
 
+    What --hide hides is in answer.json beside the runs, which push does not send; friction lags speed then as in the
+    service's own model, so that nothing else is there to be found. An unknown effect lists all of them.
+
     Run-in and duty blocks are JSON whatever the format. Tests in another format are listed in runs.json, which push reads.
     """
-    from models.rig import campaign  # start-up time
+    from models.rig import campaign, hidden, stationary  # start-up time
+    from models.rig.hysteresis import ATTRACTOR  # start-up time
     from service.run_files import record_writer, simulated  # start-up time
 
     with errors_in_a_line():
         record_format = record_writer.RecordFormat(form)
         record_writer.require_writer(record_format)
-        programme = _programme(raw_rate if raw else None, dynamic, ageing)
+        programme = _programme(raw_rate if raw else None, dynamic, ageing, frequency or [], pressures or [])
+        sizes = _sizes(hide or [])
         out_folder.mkdir(parents=True, exist_ok=True)
         clutch, clutch_id = campaign.simulated_clutch(seed), f"sim-{seed}"
+        if sizes:
+            clutch = hidden.clutch_for(clutch, sizes)
+            manifest.write(out_folder / manifest.ANSWER, {"seed": seed, "hidden": hidden.described(sizes)})
+        else:
+            clutch = replace(clutch, lag=replace(clutch.lag, attractor=ATTRACTOR))
         manifest.write(out_folder / manifest.CLUTCH_FILE, simulated.simulated_clutch_body(clutch_id))
         wear_and_cycles: list[tuple[float, float]] = []
         listed: list[dict[str, Any]] = []
         with _progress() as progress:
             task = progress.add_task("run-in", total=clutch.end_of_life(_STOP))
-            runs = campaign.simulate(seed, clutch=clutch, programme=programme, stop_fraction=_STOP, most_tests=tests)
+            sensor = stationary.SHARP if noise is None else replace(stationary.SHARP, noise=noise)
+            runs = campaign.simulate(
+                seed, clutch=clutch, sensor=sensor, programme=programme, stop_fraction=_STOP, most_tests=tests
+            )
             for run in runs:
                 description = f"{run.kind.value.replace('_', ' ')}, {run.cycles} cycles"
                 progress.update(task, description=description, completed=run.wear)
-                listed += _write(out_folder, run, record_format)
+                listed += _write(out_folder, hidden.hidden_in(run, clutch, sizes), record_format)
                 wear_and_cycles.append((run.wear, run.cycles))
         if listed:
             manifest.write(out_folder / manifest.MANIFEST, listed)
@@ -62,17 +91,41 @@ def simulate(
         out.print(f"the truth: its mean COF {truth}")
 
 
-def _programme(raw_rate: float | None, dynamic: bool, ageing: str) -> "Programme":
-    """The programme of fig. 2 with these options."""
+def _programme(
+    raw_rate: float | None, dynamic: bool, ageing: str, frequencies: list[float], pressures: list[float]
+) -> "Programme":
+    """The programme of fig. 2 with these options; frequencies in Hz and pressures in bar, the reference's without any."""
     from models.rig.programme import Ageing, Programme  # start-up time
-    from models.rig.sampled import DynamicTest, RawTest  # start-up time
+    from models.rig.sampled import PROTOCOL, DynamicTest, RawTest  # start-up time
+    from service.columns import PASCALS_PER_BAR  # start-up time
 
+    levels = tuple(PASCALS_PER_BAR * level for level in sorted(set(pressures))) or PROTOCOL
+    usual = DynamicTest(pressures=levels)
+    swings = [replace(usual, frequency=f, duration=max(usual.duration, 1.5 / f)) for f in dict.fromkeys(frequencies)]
+    loops = (swings or [usual]) if dynamic else []
     return Programme(
-        dynamic=DynamicTest() if dynamic else None,
-        raw=None if raw_rate is None else RawTest(rate=raw_rate),
+        dynamic=loops[0] if loops else None,
+        further=tuple(loops[1:]),
+        raw=None if raw_rate is None else RawTest(rate=raw_rate, pressures=levels),
+        pressures=levels,
         engagements=True,
         ageing=Ageing(ageing),
     )
+
+
+def _sizes(hide: list[str]) -> dict[str, float]:
+    """The effects that are to be hidden by slug, with their sizes; their usual ones where none is given."""
+    from models.rig import hidden  # start-up time
+
+    sizes = {}
+    for text in hide:
+        slug, colon, size = text.partition(":")
+        effect = hidden.effect_of(slug)
+        try:
+            sizes[slug] = float(size) if colon else effect.size
+        except ValueError:
+            fail(f"--hide takes EFFECT[:SIZE], the size in {effect.unit}, got {text!r}", EX_USAGE)
+    return sizes
 
 
 def _write(folder: Path, run: "SimulatedRun", record_format: "RecordFormat") -> list[dict[str, Any]]:

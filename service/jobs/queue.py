@@ -24,7 +24,8 @@ from storage.engine.errors import StorageError
 
 INTERRUPTED = "the service ended while the diagnosis ran: ask again"
 UNSTORED = "its report could not be stored: see the service's log"
-_TAIL = 2000
+#: Of what a diagnosis' process said, so many bytes are logged: its last ones hold the traceback.
+_TAIL = 8000
 #: Seconds by the clock that a diagnosis may take for each second of processor time that it may: it runs on idle processors
 #: only, beside a full load for many times as long as alone. Chosen; no table. It ends a diagnosis that waits for ever.
 CLOCK_PER_PROCESSOR_SECOND = 6.0
@@ -49,16 +50,16 @@ class Store(Protocol):
     def ask(self, clutch_id: str) -> NewDiagnosis:
         """Store a diagnosis that is to be run. Raises NotFoundError."""
 
-    def finish(self, asked_for: NewDiagnosis, ended: Mapping[str, Any], *, adopt: bool) -> None:
-        """Store how one ended (`report` and `extension`, or `problem`), and adopt what it found where that was asked."""
+    def finish(self, asked_for: NewDiagnosis, ended: Mapping[str, Any], *, adopt_by: str | None) -> None:
+        """Store how one ended (`report` and `extension`, or `problem`), and adopt what it found where somebody wants it."""
 
 
 @dataclass(slots=True)
 class Job:
-    """A diagnosis that waits or runs; `done` is set once its end is stored. `adopt`: its extension is to be adopted."""
+    """A diagnosis that waits or runs; `done` is set once its end is stored. `adopt_by`: who wants its extension adopted."""
 
     diagnosis: NewDiagnosis
-    adopt: bool
+    adopt_by: str | None
     done: "Future[None]" = field(default_factory=Future)
 
 
@@ -94,7 +95,7 @@ class DiagnosisQueue:
         if self._thread.is_alive():  # else the service could not start, and what stopped it is to be seen
             self._thread.join()
 
-    def ask(self, clutch_id: str, *, adopt: bool) -> Job:
+    def ask(self, clutch_id: str, *, adopt_by: str | None) -> Job:
         """Have the clutch's runs diagnosed; joins the diagnosis of the very same runs where one waits or runs.
 
         Raises NotFoundError for an unknown clutch, BusyError where as many wait as may.
@@ -102,11 +103,11 @@ class DiagnosisQueue:
         with self._change:
             waiting = self._jobs.get(self._store.running(clutch_id) or "")
             if waiting is not None:
-                waiting.adopt |= adopt
+                waiting.adopt_by = waiting.adopt_by or adopt_by
                 return waiting
             if self._closing or len(self._jobs) >= self._settings.most_diagnoses:
                 raise BusyError(f"{len(self._jobs)} diagnoses wait already: ask again in a little while")
-            job = Job(self._store.ask(clutch_id), adopt)
+            job = Job(self._store.ask(clutch_id), adopt_by)
             self._jobs[job.diagnosis.diagnosis_id] = job
             self._change.notify_all()
             return job
@@ -120,7 +121,7 @@ class DiagnosisQueue:
                 job = next(iter(self._jobs.values()))
             try:
                 ended = self._outcome(job)
-                self._store.finish(job.diagnosis, ended, adopt=job.adopt)
+                self._store.finish(job.diagnosis, ended, adopt_by=job.adopt_by)
             except Exception:  # noqa: BLE001  (the next one is to be made all the same)
                 _log.exception("diagnosis %s of %s", job.diagnosis.diagnosis_id, job.diagnosis.clutch_id)
                 self._give_up(job)
@@ -139,7 +140,7 @@ class DiagnosisQueue:
     def _give_up(self, job: Job) -> None:
         """Its end could not be stored: say at least that it ended, or leave that to the next start."""
         try:
-            self._store.finish(job.diagnosis, {"problem": UNSTORED}, adopt=False)
+            self._store.finish(job.diagnosis, {"problem": UNSTORED}, adopt_by=None)
         except StorageError:
             _log.exception("diagnosis %s stays running until the next start", job.diagnosis.diagnosis_id)
 
@@ -154,7 +155,9 @@ class DiagnosisQueue:
             "processor_seconds": self._settings.diagnosis_seconds,
         }
         modules = "service.background", "service.jobs.diagnosis"
-        command = [sys.executable, "-P", "-W", "ignore", "-m", *modules, json.dumps(task)]
+        # warnings of numerics are logged, those of libraries to their authors are not
+        warned = "-W", "ignore", "-W", "default::RuntimeWarning"
+        command = [sys.executable, "-P", *warned, "-m", *modules, json.dumps(task)]
         with tempfile.TemporaryFile() as answer, tempfile.TemporaryFile() as errors:
             with self._change:
                 if self._closing:
@@ -170,9 +173,12 @@ class DiagnosisQueue:
             code = self._ended(self._process)
             if code == -signal.SIGXCPU:
                 raise FailedError(f"it took longer than {self._settings.diagnosis_seconds} s of processor time")
+            errors.seek(max(0, errors.seek(0, os.SEEK_END) - _TAIL))
+            output = errors.read().decode(errors="replace")
+            if output:
+                level = logging.ERROR if code else logging.WARNING
+                _log.log(level, "diagnosis %s: %s", job.diagnosis.diagnosis_id, output)
             if code != 0:
-                errors.seek(max(0, errors.seek(0, os.SEEK_END) - _TAIL))
-                _log.error("diagnosis %s: %s", job.diagnosis.diagnosis_id, errors.read().decode(errors="replace"))
                 raise FailedError(
                     INTERRUPTED if self._closing else f"its process ended with {_ending(code)}: see the log"
                 )

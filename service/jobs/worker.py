@@ -15,13 +15,18 @@ from storage.engine.database import Database, open_database
 #: What nearly every call needs, loaded before the first comes.
 LOADED_EARLY = ("service.workflows.ingest_run", "service.run_files.json_run", "service.run_files.upload")
 
+#: Seconds after a SIGTERM until which a worker works on. Chosen: longer than the service waits for requests when it stops.
+_LAST_SECONDS = 15.0
+
 _opened: list[Database] = []
 
 
 def begin(database_url: str, nice: int | None) -> None:
     """Prepare this process: it yields by `nice` or, where that is None, to all others; it ends with the service, and leaves
-    interrupts from a terminal to it."""
+    it to the service to stop: what stops all processes at once must not take a run from it that is being stored."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _end_later)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
     threading.Thread(target=_end_with_the_service, daemon=True).start()
     if nice is None:
         yield_to_others()
@@ -41,6 +46,12 @@ def call(function: Callable[..., Any], arguments: Sequence[Any]) -> Any:
 
 def load(_: Database) -> None:
     """Nothing: what nearly every call needs is loaded when a process begins."""
+
+
+def _end_later(*_: object) -> None:
+    last = threading.Timer(_LAST_SECONDS, os._exit, (3,))
+    last.daemon = True
+    last.start()
 
 
 def _end_with_the_service() -> None:

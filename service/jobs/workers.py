@@ -6,25 +6,29 @@ The same calls can run in threads of the process itself (`in_threads`); both giv
 """
 
 import multiprocessing
+import signal
 import threading
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from enum import Enum
+from multiprocessing import forkserver, resource_tracker
 from typing import Any
 
 from service.errors import BusyError
 from service.jobs import worker
 from storage.engine.database import Database
 
-#: Calls of a lane that wait or run; more are refused as busy. Chosen: a minute of runs at 15 a second is 900.
+#: Calls of a lane that wait or run; more are refused as busy. Chosen: a minute of runs at 15 a second is 900. Of what takes
+#: a second or more a call (files that are read, simulations) so few that the last one is answered within a minute.
 _MOST_WAITING = 256
+_MOST_WAITING_LONG = 32
 
 
 class Lane(Enum):
-    """What waits for what: runs that are taken in, answers that somebody waits for, files and raw records, and answers that
-    are made anew while the last ones are given.
+    """What waits for what: runs that are taken in, answers that somebody waits for, simulations, long and raw records,
+    files from outside, and answers that are made anew while the last ones are given.
 
     The values are by how much a lane's processes yield [nice], None to all others; what takes the write lock yields little.
     Chosen by `make load`.
@@ -32,8 +36,14 @@ class Lane(Enum):
 
     RUNS = 1
     ANSWERS = 2
-    FILES = 5
+    SIMULATIONS = 3
+    RECORDS = 5
+    FILES = 6
     RENEWALS = None
+
+
+#: Lanes of which each call takes long, and of which a single caller could have as many made as it likes.
+_LONG = (Lane.SIMULATIONS, Lane.FILES)
 
 
 @dataclass(slots=True)
@@ -71,7 +81,8 @@ class Workers:
         task = _Task(lane, function, arguments, turn)
         task.answer.set_running_or_notify_cancel()  # nobody who stops waiting stops what is stored
         with self._lock:
-            if self._closed or self._calls[lane] >= _MOST_WAITING:
+            most = _MOST_WAITING_LONG if lane in _LONG else _MOST_WAITING
+            if self._closed or self._calls[lane] >= most:
                 raise BusyError(f"{self._calls[lane]} requests of this kind wait already: ask again in a little while")
             self._calls[lane] += 1
             if turn is not None:
@@ -153,6 +164,7 @@ def in_processes(database: Database, processes: int) -> Workers:
     """Workers in processes of their own: `processes` that take in runs, one for each other lane."""
     context = multiprocessing.get_context("forkserver")  # loads the libraries once, for all that are forked off it
     context.set_forkserver_preload([worker.__name__, *worker.LOADED_EARLY])
+    _start_forkserver()
     sizes = dict.fromkeys(Lane, 1) | {Lane.RUNS: processes}
     url = f"sqlite:///{database.path.absolute()}"
 
@@ -162,6 +174,17 @@ def in_processes(database: Database, processes: int) -> Workers:
         )
 
     return Workers(make, worker.call, sizes)
+
+
+def _start_forkserver() -> None:
+    """Start what the workers are forked off, deaf to SIGTERM as it is while this process is: with it all workers would be
+    taken for dead where a whole unit is stopped. It ends when this process does."""
+    resource_tracker.ensure_running()  # which would hear again what is blocked
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
+    try:
+        forkserver.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
 
 
 def in_threads(database: Database) -> Workers:

@@ -24,6 +24,8 @@ ALL_PRESSURES = 0.0
 
 #: The priors of a series, by name: always the first, the second where a fleet has taught one.
 WEAK, FLEET = "weak", "fleet"
+#: The effect whose adoption frees mean COF of the oil's temperature.
+_OIL_TEMPERATURE = "oil_temperature"
 BASELINE: Mapping[str, Any] = {"name": "baseline", "effects": []}
 
 #: Mean COF [m] that an adopted model's effects add at cycles since new [m], at a pressure [Pa] or ALL_PRESSURES.
@@ -104,6 +106,10 @@ class Assumptions:
         if series_of != (MEAN_COF, ALL_PRESSURES):
             return []
         return [life.in_unit(scale.severity.unit) for life in self.prior.ended if life.fraction == fraction]
+
+    def corrects_oil(self, quantity: str) -> bool:
+        """Whether the model in force frees a quantity of the temperature of the oil that it was measured in."""
+        return quantity == MEAN_COF and _OIL_TEMPERATURE in self.model.name["effects"]
 
     def offset(self, quantity: str, pressure: float, cycles: FloatArray) -> FloatArray:
         """What the model in force adds to a quantity at cycles since new [m]; [m]."""

@@ -11,6 +11,10 @@ WIDE_LEVEL = 0.06
 #: RMSE as a share of the static torque [-] below which a fit is not reported as poor, however large eq. 5 makes the
 #: percentage MSE of a flat curve. Chosen; no table.
 POOR_FIT = 0.02
+#: A stationary test whose mean oil temperature is further than this from that of its life's first one [K] is not tracked.
+#: Chosen: by Hersey's similarity the simulated rig's mean COF moves by 0.05 to 0.15 % a kelvin about 85 °C, so by at most
+#: 1.5 % within this span, as a few hundred cycles of use do; the reference's rig, at 80 to 90 °C, never leaves it.
+OTHER_OIL = 10.0
 #: Least deviation of a mean torque, as a share of the torque [-]: a smaller one that was sent counts as this. Chosen; no
 #: table.
 LEAST_TORQUE_SD = 1e-4
@@ -30,3 +34,7 @@ COURSE_PROBES = 40
 MOST_OF_RECORD, MOST_OF_CAMPAIGN = 2_000_000, 6_000_000
 #: Points of mean COF in the short line of a list [-]. Chosen: its width in pixels.
 MOST_LINE_POINTS = 32
+
+#: How often a clutch is computed anew by `replay` or `fleet refresh` where runs come meanwhile. Chosen: at a run each time
+#: it could go on for ever.
+MOST_ATTEMPTS = 3

@@ -10,7 +10,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import datetime
+from datetime import UTC, datetime
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE
 from models.tracking.measurement import Measurement
 from service.columns import RADIANS_PER_SECOND_PER_RPM
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions, Scale
+from service.lives.criteria import OTHER_OIL
 from service.lives.run_analysis import Value
 
 ByPressure = Mapping[float, Value]
@@ -29,6 +30,8 @@ ByPressure = Mapping[float, Value]
 #: Kinds of runs.
 STATIONARY, DYNAMIC, MAINTENANCE = "stationary_stribeck", "dynamic_stribeck", "maintenance"
 REBUILD = "rebuild"
+#: The first and the last moment that have a date [s since 1970].
+_MOMENTS = tuple(moment.replace(tzinfo=UTC).timestamp() for moment in (datetime.min, datetime(9999, 12, 31)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,9 +39,9 @@ class Event:
     """A run as the history sees it.
 
     `moment` is when it was made [s], `dated` whether the rig said so, `arrived` its place in the order of arrival, infinite
-    while it comes in. A stationary test has the range of its speeds [rad/s], and mean COF with its deviation by pressure
-    [Pa] where its curves determine it; `duty` is the block that ends with the run, `shift` an event that may have shifted
-    the level.
+    while it comes in. A stationary test has the range of its speeds [rad/s], its mean oil temperature [K], and mean COF with
+    its deviation by pressure [Pa] where its curves determine it; `duty` is the block that ends with the run, `shift` an
+    event that may have shifted the level.
     """
 
     run_id: str
@@ -47,6 +50,7 @@ class Event:
     moment: float
     arrived: float = math.inf
     speed_range: Value | None = None
+    oil_temperature: float | None = None
     cofs: ByPressure = field(default_factory=dict)
     rebuild: bool = False
     shift: bool = False
@@ -62,7 +66,8 @@ class Event:
 class Series:
     """One quantity at one pressure: measurements by progress ζ, and which event each came from.
 
-    `scale` leads from cycles since new to ζ and back; an adopted model's course is off the measurements.
+    `scale` leads from cycles since new to ζ and back; an adopted model's course is off the measurements. A slope is one at
+    `speed_rpm`, the lag of a loop one at `frequency_hz`.
     """
 
     quantity: str
@@ -70,6 +75,8 @@ class Series:
     measurements: tuple[Measurement, ...]
     events: tuple[int, ...]
     scale: Scale
+    speed_rpm: float | None = None
+    frequency_hz: float | None = None
 
     def until(self, event: int) -> int:
         """How many measurements there were when `event` had happened."""
@@ -98,6 +105,18 @@ class Life:
         """Mean COF by pressure of the first stationary test that has one."""
         return next((event.cofs for event in self.events if event.cofs), {})
 
+    @property
+    def reference_oil(self) -> float | None:
+        """Mean oil temperature [K] of that test; None where it was not measured."""
+        return next((event.oil_temperature for event in self.events if event.cofs), None)
+
+    def in_other_oil(self, event: Event) -> bool:
+        """Whether a test was made at another oil temperature than the reference test: it cannot be compared with it."""
+        reference = self.reference_oil
+        if reference is None or event.oil_temperature is None:
+            return False
+        return abs(event.oil_temperature - reference) > OTHER_OIL
+
     def until(self, event: int) -> "Life":
         """The life as it was when `event` had happened."""
         return Life(origin=self.origin, events=self.events[: event + 1])
@@ -123,8 +142,16 @@ class Life:
     def series(
         self, assumptions: Assumptions, quantity: str, pressure: float, values: Sequence[Value | None]
     ) -> Series:
-        """The series of a quantity from its value at every event, None where it has none."""
-        measured = [(index, value) for index, value in enumerate(values) if value is not None]
+        """The series of a quantity from its value at every event, None where it has none.
+
+        Tests in oil of another temperature are no part of it, unless the model in force corrects for that.
+        """
+        corrected = assumptions.corrects_oil(quantity)
+        measured = [
+            (index, value)
+            for index, (event, value) in enumerate(zip(self.events, values, strict=True))
+            if value is not None and (corrected or not self.in_other_oil(event))
+        ]
         scale = self.scale(assumptions)
         cycles = np.array([self.events[index].cycles for index, _ in measured])
         course = assumptions.offset(quantity, pressure, cycles)
@@ -222,19 +249,23 @@ def duty_block(
 
 
 def moment_of(started_at: str | None, received_at: str) -> float:
-    """When a run was made [s since 1970]: when it was started, or received where the rig did not say."""
-    return datetime.fromisoformat(started_at or received_at).timestamp()
+    """When a run was made [s since 1970]: when it was started, or received where the rig did not say.
+
+    Earlier releases stored times outside of the years 1 to 9999 in UTC: they count as the first and the last moment.
+    """
+    earliest, latest = _MOMENTS
+    return min(max(datetime.fromisoformat(started_at or received_at).timestamp(), earliest), latest)
 
 
 def pooled_value(reference: ByPressure, values: ByPressure) -> Value | None:
     """Mean over the reference pressures; for a pressure that is missing the rest stands, scaled as in the reference."""
     if values.keys() == reference.keys():
-        matched = dict(values)
+        matched, scale = dict(values), 1.0
     else:
         matched = {level: value for level in reference if (value := nearest(level, values)) is not None}
+        scale = _mean(reference, reference) / _mean(reference, matched) if matched else 1.0
     if not matched:
         return None
-    scale = _mean(reference, reference) / _mean(reference, matched)
     mean = _mean(matched, matched) * scale
     deviation = math.hypot(*(sd for _, sd in matched.values())) / len(matched) * scale
     return mean, deviation

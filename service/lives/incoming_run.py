@@ -43,15 +43,11 @@ def name_run(
 ) -> IncomingRun:
     """A run with its content's hash, and its name derived from that where none was given.
 
-    The hash covers everything but the name: kind, cycles, time, origin, details and every bit of every channel.
     Raises InvalidError where a stationary test holds neither a curve that could be fitted nor an open clutch.
     """
-    head = [kind, whole(cycles), started_at, origin, dict(details)]
-    digest = hashlib.sha256(json.dumps(head, sort_keys=True, allow_nan=False).encode())
-    for name in sorted(channels):
-        digest.update(f"\n{name}:{channels[name].size}\n".encode())
-        digest.update(np.ascontiguousarray(channels[name], dtype="<f8").data)
-    content = digest.hexdigest()
+    content = content_hash(
+        kind=kind, cycles=cycles, started_at=started_at, origin=origin, channels=channels, details=details
+    )
     run = IncomingRun(
         kind=kind,
         cycles=cycles,
@@ -65,6 +61,24 @@ def name_run(
     if kind == "stationary_stribeck" and "time_s" not in channels:
         _require_readings(channels)
     return run
+
+
+def content_hash(
+    *,
+    kind: str,
+    cycles: float,
+    started_at: str | None,
+    origin: str,
+    channels: Mapping[str, FloatArray],
+    details: Mapping[str, Any],
+) -> str:
+    """The sha256 of everything but the name: kind, cycles, time, origin, details and every bit of every channel."""
+    head = [kind, whole(cycles), started_at, origin, dict(details)]
+    digest = hashlib.sha256(json.dumps(head, sort_keys=True, allow_nan=False).encode())
+    for name in sorted(channels):
+        digest.update(f"\n{name}:{channels[name].size}\n".encode())
+        digest.update(np.ascontiguousarray(channels[name], dtype="<f8").data)
+    return digest.hexdigest()
 
 
 def sampled_record(channels: Mapping[str, FloatArray]) -> Record:

@@ -16,7 +16,7 @@ import numpy as np
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.diagnosis.campaign import Campaign, StationaryRun
-from models.diagnosis.extension import Extension
+from models.diagnosis.extension import Extension, NotFiniteError
 from models.prognosis.criteria import HORIZON
 from models.records.runs import loaded
 from service.lives.assumptions import ALL_PRESSURES, Course, ModelInForce
@@ -101,17 +101,14 @@ def corrected_cofs(
 def _artefact(extension: Extension, run: StationaryRun, before: Campaign) -> FloatArray | None:
     """Torque [n] Nm to be taken off, None where there is none.
 
-    A test must be taken in whatever an adopted model makes of it: where it makes nonsense, nothing is taken off.
+    A test must be taken in whatever an adopted model makes of it: where it makes no number of it, nothing is taken off.
     """
     try:
         artefact = extension.artefact(run, before)
-        sensible = artefact.shape == run.plateaus.torque.shape and bool(np.isfinite(artefact).all())
     except (ArithmeticError, LookupError, ValueError):
         _log.exception("%s is not corrected", run.run_id)
         return None
-    if not sensible:
-        _log.error("%s is not corrected: its artefact is not finite or of another shape than its torque", run.run_id)
-    return artefact if sensible and artefact.any() else None
+    return artefact if artefact.any() else None
 
 
 def model_in_force(extension: Extension | None, life: Life | None, geometry: Geometry) -> ModelInForce:
@@ -128,7 +125,8 @@ def model_in_force(extension: Extension | None, life: Life | None, geometry: Geo
 def course_of(extension: Extension, life: Life, geometry: Geometry) -> Course | None:
     """Mean COF [m] that the effects of use add at cycles since new [m] at a pressure [Pa], 0 = the reference pressures.
 
-    None where they add nothing at any of many cycles, or no test has set a reference yet.
+    None where they add nothing at any of many cycles, where they make no number of one of them, or no test has set a
+    reference yet.
     """
     if life.speed_range is None or not life.reference:
         return None
@@ -145,6 +143,11 @@ def course_of(extension: Extension, life: Life, geometry: Geometry) -> Course | 
         return np.asarray((course / per_cof).mean(axis=1), dtype=np.float64)
 
     probes = tuple(np.concatenate([[0.0], np.geomspace(1.0, HORIZON, COURSE_PROBES)]).tolist())
-    if not added(probes, ALL_PRESSURES).any():
+    try:
+        adds = added(probes, ALL_PRESSURES).any()
+    except NotFiniteError:
+        _log.exception("no course of %s is followed", ", ".join(extension.effects))
+        return None
+    if not adds:
         return None
     return lambda cycles, pressure: added(tuple(cycles.tolist()), pressure)  # asked for the same cycles at every run

@@ -10,9 +10,10 @@ from models.prognosis.back_cast import BackCast
 from models.prognosis.course_shares import CourseShare
 from models.prognosis.criteria import HORIZON, QUANTILES
 from models.prognosis.first_passage import FirstPassage
-from service.columns import bar, whole
+from service.columns import ZERO_CELSIUS, bar, whole
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions
-from service.lives.criteria import MOST_LINE_POINTS
+from service.lives.criteria import MOST_LINE_POINTS, OTHER_OIL
+from service.lives.engagements.evaluation import Engagement, engagement_item
 from service.lives.history import ByPressure, Event, Life, Series, latest_before, nearest
 from service.lives.incoming_run import IncomingRun
 from service.lives.prediction_notices import OFF_TRACK, missed, not_eq_6
@@ -28,9 +29,9 @@ PARAMETER_UNITS = {
 }
 INSUFFICIENT = "insufficient_data"
 #: Warnings of a run in its clutch's history, written anew where the history changes: it arrived after a run of more cycles,
-#: its pressures are not those of the first test, its mean COF is not what the tests before it predict.
-LATE, OTHER_PRESSURES = "late_arrival", "other_pressures"
-OF_HISTORY = LATE, OTHER_PRESSURES, OFF_TRACK
+#: its pressures or its oil temperature are not those of the first test, its mean COF is not what those before it predict.
+LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE = "late_arrival", "other_pressures", "other_oil_temperature"
+OF_HISTORY = LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE, OFF_TRACK
 #: What a list shows of a clutch, out of the particle filter's prediction.
 SUMMARY = ("status", "as_of_cycles", "current", "remaining_cycles", "model")
 #: A clutch without a prediction comes after all others in a list.
@@ -46,6 +47,7 @@ def receipt(
     cofs: ByPressure,
     loops: Sequence[Loop] = (),
     warnings: Sequence[Notice],
+    engagement: Engagement | None = None,
 ) -> dict[str, Any]:
     """The receipt of a run."""
     return {
@@ -61,6 +63,7 @@ def receipt(
         "warnings": notice_items(warnings),
         "fits": fit_items(levels, cofs),
         "loops": loop_items(loops),
+        "engagement": None if engagement is None else engagement_item(engagement),
         "duty": run.details.get("duty"),
         "event": run.details.get("event"),
         "note": run.details.get("note"),
@@ -190,18 +193,20 @@ def _course_item(share: CourseShare) -> dict[str, Any]:
 
 
 def history_warnings(
-    lives: Sequence[Life], off_track: Mapping[str, list[dict[str, str]]]
+    lives: Sequence[Life], off_track: Mapping[str, list[dict[str, str]]], *, run_id: str | None = None
 ) -> dict[str, list[dict[str, str]]]:
-    """run_id -> the warnings of a run in its history; `off_track` are those of the predictions right after tests."""
+    """run_id -> the warnings of every run in its history, or of one; `off_track` are those of predictions after tests."""
     latest = latest_before([event for life in lives for event in life.events])
     return {
         event.run_id: [
             *notice_items(_late_arrival(event.cycles, latest[event.run_id])),
             *notice_items(_other_pressures(life.reference, event.cofs)),
+            *notice_items(_other_oil(life, event)),
             *off_track.get(event.run_id, ()),
         ]
         for life in lives
         for event in life.events
+        if run_id is None or event.run_id == run_id
     }
 
 
@@ -233,6 +238,18 @@ def _other_pressures(reference: ByPressure, cofs: ByPressure) -> list[Notice]:
     measured = ", ".join(f"{bar(level):g}" for level in sorted(reference))
     message = f"none of its pressures is one of the first stationary test's ({measured} bar): no track uses it"
     return [Notice(code=OTHER_PRESSURES, message=message)]
+
+
+def _other_oil(life: Life, event: Event) -> list[Notice]:
+    """A test in oil that is much warmer or colder than the reference test's."""
+    if not life.in_other_oil(event) or event.oil_temperature is None or life.reference_oil is None:
+        return []
+    oil, reference = (kelvin - ZERO_CELSIUS for kelvin in (event.oil_temperature, life.reference_oil))
+    message = (
+        f"its oil was at {oil:.0f} °C on average, that of the first stationary test at {reference:.0f} °C, more than "
+        f"{OTHER_OIL:g} °C apart: no track uses it but under an adopted model that corrects for oil temperature"
+    )
+    return [Notice(code=OTHER_OIL_TEMPERATURE, message=message)]
 
 
 def summary_of(payload: dict[str, Any]) -> tuple[dict[str, Any], float]:

@@ -22,6 +22,7 @@ from models.records.runs import Plateaus, curves_by_pressure, loaded
 from service.columns import PASCALS_PER_BAR
 from service.errors import FieldError, InvalidError
 from service.lives.criteria import FEWEST_SPEEDS, POOR_FIT, WIDE_LEVEL
+from service.lives.engagements.evaluation import Engagement, course_item, engagement_notes, evaluated
 from service.lives.incoming_run import IncomingRun, SampledChannels, sampled_record, stationary_plateaus
 
 #: A value and its deviation.
@@ -50,29 +51,42 @@ class Analysis:
     """The results of one run by itself.
 
     `speed_range` [rad/s] is None for a run that holds no stationary test under pressure; `plateaus` and the `times` [s] of
-    their middles (None where each row was sent as a plateau) are those of a stationary test.
+    their middles (None where each row was sent as a plateau) are those of a stationary test, and so is
+    `oil_temperature` [K], its mean under pressure (None: not measured); `engagement` is that of a block of duty that carries
+    one.
     """
 
     fits: tuple[LevelFit, ...] = ()
     speed_range: tuple[float, float] | None = None
+    oil_temperature: float | None = None
     warnings: tuple[Notice, ...] = ()
     plateaus: Plateaus | None = None
     times: tuple[float, ...] | None = None
+    engagement: Engagement | None = None
 
     def kept_beside(self, run: IncomingRun) -> dict[str, Any]:
-        """What is kept beside a run's channels: what was sent with them, and its range of speeds [rad/s]."""
-        sent = dict(run.details) | {"origin": run.origin}
-        return sent | ({} if self.speed_range is None else {"speed_range": list(self.speed_range)})
+        """What is kept beside a run's channels: what was sent with them, its range of speeds [rad/s] and its oil [K], the
+        course of an engagement."""
+        kept = dict(run.details) | {"origin": run.origin}
+        if self.engagement is not None:
+            return kept | course_item(self.engagement)
+        if self.speed_range is not None:
+            kept["speed_range"] = list(self.speed_range)
+        if self.oil_temperature is not None:
+            kept["oil_temperature"] = self.oil_temperature
+        return kept
 
 
 def analyse(run: IncomingRun, geometry: Geometry) -> Analysis:
-    """Fit a stationary test's curves, from its plateaus or from its sampled record; other kinds and tests of the open
-    clutch have no curve.
+    """Fit a stationary test's curves, from its plateaus or from its sampled record, and evaluate the engagement of a block
+    of duty; other kinds and tests of the open clutch have neither.
 
     Raises InvalidError where a sampled record holds no steady plateau.
     """
     if run.kind != "stationary_stribeck":
-        return Analysis()
+        engagement = evaluated(run, geometry) if run.channels else None
+        notes = [] if engagement is None else engagement_notes(engagement)
+        return Analysis(engagement=engagement, warnings=tuple(Notice(code=code, message=text) for code, text in notes))
     if "time_s" not in run.channels:
         plateaus = stationary_plateaus(run.channels)
         return _analyse_stationary(plateaus, None, geometry, _row_warnings(run, plateaus))
@@ -132,6 +146,7 @@ def _analyse_stationary(
     return Analysis(
         fits=levels,
         speed_range=(low, high) if has_mean else None,
+        oil_temperature=None if under_load.oil_temperature is None else float(under_load.oil_temperature.mean()),
         warnings=tuple(warnings),
         plateaus=plateaus,
         times=times,

@@ -4,6 +4,7 @@ Where several ask for an answer that is not there yet, one computes it and the o
 """
 
 import hashlib
+import re
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
@@ -11,22 +12,39 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any
 
+from service.lists import LONGEST_CURSOR
 from storage import clutches
 from storage.encoding.json_text import to_text
 from storage.engine.database import Database
 
+#: The end of a list that is answered as JSON and goes on: the cursor of its next page.
+_GOES_ON = re.compile(rb'"next":"([A-Za-z0-9_-]+)"\}$')
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """The bytes of a page whose format has no place for the next one's cursor, and that cursor, None on the last page."""
+
+    body: bytes
+    next: str | None
+
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """An answer's bytes, and the strong entity tag that follows from them."""
+    """An answer's bytes, the strong entity tag that follows from them, and the cursor of the next page where one follows."""
 
     body: bytes
     tag: str
+    next: str | None = None
 
     @classmethod
-    def of(cls, body: bytes) -> "Answer":
-        """The answer with its tag."""
-        return cls(body, f'"{hashlib.sha256(body).hexdigest()[:32]}"')
+    def of(cls, made: bytes | Page) -> "Answer":
+        """The answer with its tag. The tag of a page covers its cursor, which is not in its bytes."""
+        if isinstance(made, Page):
+            digest = hashlib.sha256(made.body + (made.next or "").encode())
+            return cls(made.body, f'"{digest.hexdigest()[:32]}"', made.next)
+        goes_on = _GOES_ON.search(made, max(0, len(made) - LONGEST_CURSOR - 32))
+        return cls(made, f'"{hashlib.sha256(made).hexdigest()[:32]}"', None if goes_on is None else goes_on[1].decode())
 
 
 def to_json(payload: object) -> bytes:
@@ -63,7 +81,7 @@ class AnswerCache:
         with self._lock:
             return self._current(key, version)
 
-    def answer(self, key: Hashable, version: Hashable, make: Callable[[], bytes]) -> Answer:
+    def answer(self, key: Hashable, version: Hashable, make: Callable[[], bytes | Page]) -> Answer:
         """The answer for `key`, made by `make` where that of `version` is not there. What `make` raises is raised for all
         who wait."""
         with self._lock:
@@ -90,7 +108,7 @@ class AnswerCache:
         return answer
 
     def _make(
-        self, key: Hashable, version: Hashable, make: Callable[[], bytes], pending: "Future[Answer]", begun: int
+        self, key: Hashable, version: Hashable, make: Callable[[], bytes | Page], pending: "Future[Answer]", begun: int
     ) -> None:
         try:
             answer = Answer.of(make())

@@ -1,6 +1,6 @@
 """`/v1/clutches`: clutches worst first, with what a list shows of each."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import partial
 from typing import Any
 
@@ -38,11 +38,17 @@ def page(
 
 
 def page_as_json(
-    database: Database, cache: AnswerCache, *, limit: int, after: Place | None, archived: bool = False
+    database: Database,
+    cache: AnswerCache,
+    *,
+    limit: int,
+    after: Place | None,
+    archived: bool = False,
+    only: Collection[str] | None = None,
 ) -> bytes:
-    """The same as JSON; each clutch's item is made once for its revision and verdict."""
+    """The same as JSON, of all clutches or of `only` some; each clutch's item is made once for its revision and verdict."""
     with database.reading() as connection:
-        rows = clutches.page(connection, limit=limit + 1, after=after, archived=archived)
+        rows = clutches.page(connection, limit=limit + 1, after=after, archived=archived, only=only)
         clutches_shown = _shown(connection, rows[:limit])
     items = [
         cache.answer(("clutch", row.clutch_id), (row.revision, to_json(verdict)), partial(_as_json, row, held, verdict))

@@ -1,83 +1,136 @@
-"""`/degradation`: eq. 6 of mean COF and of every Stribeck parameter, and mean COF computed back from the parameters.
+"""`/degradation`: the tracks of mean COF, of every Stribeck parameter and of any other quantity, and mean COF computed back
+from the parameters.
 
 The numerics of the latter are in `models.prognosis.from_parameters`, to which a life hands its tests and tracks by pressure.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
-from models.clutch import Geometry
 from models.friction.stribeck import PARAMETER_NAMES
 from models.prognosis.criteria import FEWEST_TESTS, HORIZON, QUANTILES
 from models.prognosis.first_passage import ends_of_life
 from models.prognosis.first_passage import paths as track_paths
-from models.prognosis.from_parameters import (
-    CofPaths,
-    Disagreement,
-    PressureLevel,
-    disagreement,
-    far_apart,
-    mean_cof_paths,
-)
-from service import records
+from models.prognosis.from_parameters import CofPaths, Disagreement, disagreement, far_apart, mean_cof_paths
+from service import measured_lives, records
 from service.lives.assumptions import ALL_PRESSURES, Assumptions
-from service.lives.history import Life, nearest, nearest_pressure, reference_velocities
-from service.lives.parameter_tracks import Track, parameter_tracks, posterior_of, tests_of, track_item
+from service.lives.history import Series, reference_velocities
 from service.lives.payloads import notice_items
-from service.lives.run_analysis import LevelFit, Notice
+from service.lives.quantities.chosen_life import chosen_life
+from service.lives.quantities.items import COEFFICIENTS, paths_item, track_item, trajectory_cycles
+from service.lives.quantities.levels import ParameterTracks, pressure_level, slopes_along
+from service.lives.quantities.measured import MeasuredLife
+from service.lives.quantities.names import QUANTITIES, Family, Quantity, quantity_named
+from service.lives.quantities.parameters import Track, parameter_tracks, posterior_of
+from service.lives.run_analysis import Notice
 from service.lives.tracks import offset_of, step_rng
 from storage.engine.database import Database
 
-_COEFFICIENTS = ("initial", "change", "scale_cycles", "exponent")
 COLUMNS = (
     "quantity",
     "unit",
     "pressure_bar",
-    *(f"{name}{part}" for name in _COEFFICIENTS for part in ("", "_sd")),
+    "speed_rpm",
+    "frequency_hz",
+    *(f"{name}{part}" for name in COEFFICIENTS for part in ("", "_sd")),
 )
+_MEAN_COF = QUANTITIES["mean_cof"]
 
 
-def degradation(database: Database, clutch_id: str) -> dict[str, Any]:
-    """Eq. 6 over all pressures together and at every reference pressure, in the present life. Raises NotFoundError."""
+def degradation(
+    database: Database,
+    clutch_id: str,
+    method: str = "grid",
+    quantity: str | None = None,
+    at_cycles: float | None = None,
+    life: int | None = None,
+    draws: int = 0,
+) -> dict[str, Any]:
+    """The tracks of a life by a filter: of one quantity wherever it was measured, or of mean COF and every parameter.
+
+    As it was at `at_cycles`, of the present life or of an earlier one by its number; with so many joint `draws` of the
+    coefficients. Raises NotFoundError, and InvalidError for a quantity that is none.
+    """
+    wanted = None if quantity is None else quantity_named(quantity)
     with database.reading() as connection:
         state = records.state(connection, clutch_id)
-        levels = records.levels(connection, clutch_id)
-    assumptions = state.assumptions()
-    head = {"clutch_id": clutch_id, "revision": state.revision}
-    life = state.lives[-1] if state.events else None
-    if life is None or not life.reference:
-        return head | {"items": [], "rebuilt": None, "warnings": []} | assumptions.named() | {"next": None}
-    tests = tests_of(life, levels)
-    direct = [life.pooled(assumptions), *(life.at(assumptions, level) for level in life.reference)]
-    tracked = [(series, posterior_of(clutch_id, series, assumptions)) for series in direct if series.measurements]
-    parameters = parameter_tracks(clutch_id, life, assumptions, tests)
-    by_pressure = {series.pressure: (series, posterior) for series, posterior in tracked}
-    again = _from_parameters(
-        clutch_id, life, assumptions, tests, parameters, by_pressure, state.geometry, state.fraction
-    )
-    return (
-        head
-        | {
-            "items": [
-                track_item(series, posterior, assumptions) for series, posterior in (*tracked, *parameters.values())
-            ],
-            "rebuilt": again,
-            "warnings": notice_items(_disagreements(again)),
-        }
-        | assumptions.named()
-        | {"next": None}
-    )
+        chosen = chosen_life(state, life, at_cycles)
+        measured = measured_lives.measured_life(connection, state, chosen)
+    head = {"clutch_id": clutch_id, "revision": state.revision, "method": method, "life": chosen.item()}
+    if measured is None or (wanted is None and not measured.life.reference):
+        return head | {"items": [], "rebuilt": None, "warnings": []} | chosen.assumptions.named() | {"next": None}
+    if wanted is None:
+        items, again = _all(measured, method, draws)
+    else:
+        items, again = _items(measured, wanted, method, draws), None
+    answered = {"items": items, "rebuilt": again, "warnings": notice_items(_disagreements(again))}
+    return head | answered | chosen.assumptions.named() | {"next": None}
+
+
+def arguments(
+    method: str, quantity: str | None, at_cycles: float | None, life: int | None, draws: int = 0
+) -> tuple[Hashable, ...]:
+    """The arguments of `degradation` behind the clutch; none where all are left out: so the answer is kept under one key."""
+    whole = (method, quantity, at_cycles, life, draws)
+    return () if whole == ("grid", None, None, None, 0) else whole
+
+
+def _all(measured: MeasuredLife, method: str, draws: int) -> tuple[list[dict[str, Any]], dict[str, Any] | None]:
+    """Mean COF, every parameter, and mean COF from the parameters."""
+    direct = _tracked(measured, measured.series(_MEAN_COF), method)
+    tracks = parameter_tracks(measured.clutch_id, measured.life, measured.assumptions, measured.tests, method)
+    again = _from_parameters(measured, tracks, {series.pressure: (series, posterior) for series, posterior in direct})
+    named = {quantity.internal: quantity for quantity in QUANTITIES.values()}
+    items = [
+        track_item(named[series.quantity], series, posterior, measured.assumptions, draws)
+        for series, posterior in (*direct, *tracks.values())
+    ]
+    return items, again
+
+
+def _items(measured: MeasuredLife, quantity: Quantity, method: str, draws: int) -> list[dict[str, Any]]:
+    """One quantity wherever it was measured."""
+    if quantity.family is Family.SLOPE:
+        return _slopes(measured, quantity, method)
+    return [
+        track_item(quantity, series, posterior, measured.assumptions, draws)
+        for series, posterior in _tracked(measured, measured.series(quantity), method)
+    ]
+
+
+def _slopes(measured: MeasuredLife, quantity: Quantity, method: str) -> list[dict[str, Any]]:
+    """Slopes from the joint tracks of the parameters at their pressure."""
+    slopes = measured.series(quantity)
+    tracks = parameter_tracks(measured.clutch_id, measured.life, measured.assumptions, measured.tests, method)
+    direct = {
+        series.pressure: (series, posterior)
+        for series, posterior in _tracked(measured, measured.mean_cofs().values(), method)
+    }
+    items = []
+    for series in slopes:
+        at = series.scale.progress(trajectory_cycles(series))
+        paths = slopes_along(measured, tracks, direct[series.pressure], series.speed_rpm or 0.0, at)
+        items.append(paths_item(quantity, series, paths))
+    return items
+
+
+def _tracked(measured: MeasuredLife, several: Iterable[Series], method: str) -> list[Track]:
+    return [
+        (series, posterior_of(measured.clutch_id, series, measured.assumptions, method))
+        for series in several
+        if series.measurements
+    ]
 
 
 def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """Eq. 6's coefficients as rows of a table, a row a quantity and pressure."""
+    """Eq. 6's coefficients as rows of a table, a row a quantity and place."""
     for item in payload["items"]:
         yield (
-            {name: item[name] for name in COLUMNS[:3]}
-            | {name: _part(item, name, "value") for name in _COEFFICIENTS}
-            | {f"{name}_sd": _part(item, name, "sd") for name in _COEFFICIENTS}
+            {name: item[name] for name in COLUMNS[:5]}
+            | {name: _part(item, name, "value") for name in COEFFICIENTS}
+            | {f"{name}_sd": _part(item, name, "sd") for name in COEFFICIENTS}
         )
 
 
@@ -88,38 +141,30 @@ def _part(item: Mapping[str, Any], name: str, part: str) -> float | None:
 
 
 def _from_parameters(
-    clutch_id: str,
-    life: Life,
-    assumptions: Assumptions,
-    tests: Sequence[Sequence[LevelFit]],
-    tracks: Mapping[tuple[str, float], Track],
-    direct: Mapping[float, Track],
-    geometry: Geometry,
-    fraction: float,
+    measured: MeasuredLife, tracks: ParameterTracks, direct: Mapping[float, Track]
 ) -> dict[str, Any] | None:
     """The trajectory from the parameters with its band, its end of life, and its disagreement with the direct track; None
     where there are too few tests.
 
-    `tests` are the levels of each of the life's events; `tracks` are by parameter and pressure, all four at each pressure
-    that counts; `direct` is mean COF by pressure and over all reference pressures.
+    `tracks` are by parameter and pressure; `direct` is mean COF by pressure and over all reference pressures.
     """
-    series, _ = direct[ALL_PRESSURES]
+    life, (series, _) = measured.life, direct[ALL_PRESSURES]
     tested = {measurement.progress for measurement in series.measurements}
     if life.speed_range is None or len(tested) < FEWEST_TESTS:
         return None
     paths = mean_cof_paths(
         [
-            _level(life, tests, tracks, direct[level], level, geometry)
+            pressure_level(measured, tracks, direct[level], level)
             for level in life.reference
             if level in direct and all((name, level) in tracks for name in PARAMETER_NAMES)
         ],
         now=series.measurements[-1].progress,
         horizon=float(series.scale.progress(series.scale.origin + HORIZON)),
-        velocities=reference_velocities(life.speed_range, geometry),
+        velocities=reference_velocities(life.speed_range, measured.geometry),
         reference_cofs=[cof for cof, _ in life.reference.values()],
-        rng=step_rng(clutch_id, "rebuilt", series, len(series.measurements)),
+        rng=step_rng(measured.clutch_id, "rebuilt", series, len(series.measurements)),
     )
-    return None if paths is None else _payload(paths, direct[ALL_PRESSURES], assumptions, fraction)
+    return None if paths is None else _payload(paths, direct[ALL_PRESSURES], measured.assumptions, measured.fraction)
 
 
 def _disagreements(payload: Mapping[str, Any] | None) -> list[Notice]:
@@ -135,44 +180,6 @@ def _disagreements(payload: Mapping[str, Any] | None) -> list[Notice]:
         for name, value in payload["disagreement"].items()
         if far_apart(value)
     ]
-
-
-def _level(
-    life: Life,
-    tests: Sequence[Sequence[LevelFit]],
-    tracks: Mapping[tuple[str, float], Track],
-    direct: Track,
-    pressure: float,
-    geometry: Geometry,
-) -> PressureLevel:
-    """What is known at a reference pressure [Pa]: its tracks, and the tests whose fit determines all four parameters."""
-    series, posterior = direct
-    progress, fits = [], []
-    for event, levels in zip(life.events, tests, strict=True):
-        determined = {level.fit.pressure: level.fit for level in levels if not level.fit.undetermined}
-        near = nearest_pressure(pressure, list(determined))
-        if near is not None:
-            progress.append(float(series.scale.progress(event.cycles)))
-            fits.append(determined[near])
-    return PressureLevel(
-        progress=np.array(progress),
-        parameters=np.array([fit.parameters.as_array() for fit in fits]),
-        covariance=np.array([fit.covariance for fit in fits]),
-        parameter_tracks=[tracks[name, pressure][1] for name in PARAMETER_NAMES],
-        tests=series.events,
-        cof_progress=np.array([measurement.progress for measurement in series.measurements]),
-        cof=np.array([measurement.value for measurement in series.measurements]),
-        cof_track=posterior,
-        torque_per_cof=_torque_per_cof(life, tests, pressure, geometry),
-        reference_cof=life.reference[pressure][0],
-    )
-
-
-def _torque_per_cof(life: Life, tests: Sequence[Sequence[LevelFit]], pressure: float, geometry: Geometry) -> float:
-    """Torque [Nm] of a COF of one at a level, by the pressure that the reference test measured there."""
-    reference = next((levels for event, levels in zip(life.events, tests, strict=True) if event.cofs and levels), ())
-    measured = {level.fit.pressure: (level.mean_pressure, 0.0) for level in reference}
-    return geometry.torque_per_cof((nearest(pressure, measured) or (pressure, 0.0))[0])
 
 
 def _payload(paths: CofPaths, direct: Track, assumptions: Assumptions, fraction: float) -> dict[str, Any]:

@@ -1,55 +1,69 @@
-"""The engagement that a tracked clutch would give at any state of its degradation."""
+"""`/engagement`: what a tracked clutch would give at any state of its degradation, and the measured ones beside it."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from models.clutch import Geometry
-from models.engagements.capacity import capacity_of
+from models.engagements.capacity import Capacity, capacity_of
+from models.engagements.comparison import bin_means
+from models.engagements.discrepancy import Discrepancy, discrepancy
+from models.engagements.measured import MeasuredEngagement, trace_times
 from models.engagements.simulation import Drive, Engagement, PressureProfile, engage
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
 from models.prognosis.first_passage import weighted_quantiles
-from service import records
-from service.columns import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, whole
+from service import measured_lives, records, stored_runs
+from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, whole
 from service.errors import NotFoundError
 from service.lives.assumptions import Assumptions
-from service.lives.history import Event, Life, Series, lives_of
-from service.lives.parameter_tracks import parameter_series, posterior_of, tests_of
+from service.lives.engagements.evaluation import evaluated, public_channels
+from service.lives.history import Life, Series, lives_of
+from service.lives.incoming_run import IncomingRun
+from service.lives.quantities.parameters import parameter_series, posterior_of, tests_of
 from service.lives.run_analysis import LevelFit
 from storage.engine.database import Database
 
 
-def engaged(database: Database, clutch_id: str, at_cycles: float | None) -> dict[str, Any]:
-    """The engagement that the tracked clutch would give at `at_cycles`, or now. Raises NotFoundError."""
+def engaged(database: Database, clutch_id: str, at_cycles: float | None, run_id: str | None = None) -> dict[str, Any]:
+    """The engagement that the tracked clutch would give at `at_cycles`, or now, and the measured ones.
+
+    `run_id`: the measured engagement that is compared with the model; left out, the newest of that life by then. Raises
+    NotFoundError before the first stationary test with all parameters, and where the named run holds no such engagement.
+    """
     with database.reading() as connection:
         state, levels = records.state(connection, clutch_id), records.levels(connection, clutch_id)
-    trace = engagement(clutch_id, state.events, state.assumptions(), levels, state.geometry, at_cycles=at_cycles)
-    return {"clutch_id": clutch_id, "origin": state.record.origin, "simulated": True} | trace
-
-
-def engagement(
-    clutch_id: str,
-    events: Sequence[Event],
-    assumptions: Assumptions,
-    fits: Mapping[str, Sequence[LevelFit]],
-    geometry: Geometry,
-    *,
-    at_cycles: float | None,
-) -> dict[str, Any]:
-    """The trace in the public shape. Raises NotFoundError before the first stationary test with all parameters."""
-    happened = [event for event in events if at_cycles is None or event.cycles <= at_cycles]
-    history = lives_of(happened)
-    if not history:
+        measured = measured_lives.engagements(connection, clutch_id)
+    happened = [event for event in state.events if at_cycles is None or event.cycles <= at_cycles]
+    if not lives_of(happened):
         raise NotFoundError("there is no stationary test by then, and so no clutch to engage")
-    life = history[-1]
+    tracked = _Tracked(clutch_id=clutch_id, life=lives_of(happened)[-1], assumptions=state.assumptions(), fits=levels)
     cycles = happened[-1].cycles if at_cycles is None else at_cycles
-    parameters = _parameters(clutch_id, life, assumptions, tests_of(life, fits), cycles)
-    profile, drive = PressureProfile(), Drive()
-    trace = engage(capacity_of(parameters), geometry.mean_radius, profile=profile, drive=drive)
+    row = _compared_row(measured, tracked.life, run_id)
+    moments = [cycles] if row is None else [cycles, float(row["cycles"])]
+    capacities = [capacity_of(parameters) for parameters in tracked.parameters(moments)]
+    comparison = None
+    if row is not None:
+        run = stored_runs.run_reader(database, clutch_id).read(row["run_id"])
+        comparison = _comparison(run, row, capacities[-1], state.geometry)
     return {
+        "clutch_id": clutch_id,
+        "origin": state.record.origin,
+        "simulated": True,
         "at_cycles": whole(cycles),
-        "model": dict(assumptions.model.name),
+        "model": dict(tracked.assumptions.model.name),
+        **_simulated(capacities[0], state.geometry),
+        "measured": measured,
+        "compared": comparison,
+    }
+
+
+def _simulated(capacity: Capacity, geometry: Geometry) -> dict[str, Any]:
+    """The life test's engagement in the public shape."""
+    profile, drive = PressureProfile(), Drive()
+    trace = engage(capacity, geometry.mean_radius, profile=profile, drive=drive)
+    return {
         "initial_speed_rpm": drive.speed / RADIANS_PER_SECOND_PER_RPM,
         "maximum_pressure_bar": profile.maximum / PASCALS_PER_BAR,
         "motor_torque_limit_nm": drive.limit,
@@ -60,28 +74,82 @@ def engagement(
     }
 
 
-def _parameters(
-    clutch_id: str, life: Life, assumptions: Assumptions, tests: Sequence[Sequence[LevelFit]], cycles: float
-) -> dict[float, StribeckParameters]:
-    """The tracked Stribeck parameters by pressure [Pa], each the median of its own eq. 6 at `cycles` since new."""
-    at: dict[float, dict[str, float]] = {}
-    for name in PARAMETER_NAMES:
-        for series in parameter_series(life, assumptions, tests, name):
-            if series.measurements:
-                at.setdefault(series.pressure, {})[name] = _median(clutch_id, series, assumptions, cycles)
-    complete = {level: values for level, values in at.items() if len(values) == len(PARAMETER_NAMES)}
-    if not complete:
-        raise NotFoundError("no stationary test determines all four Stribeck parameters by then")
+def _compared_row(measured: Sequence[dict[str, Any]], life: Life, run_id: str | None) -> dict[str, Any] | None:
+    own = {event.run_id for event in life.events}
+    rows = [row for row in measured if row["run_id"] in own]
+    if run_id is None:
+        return rows[-1] if rows else None
+    row = next((row for row in rows if row["run_id"] == run_id), None)
+    if row is None:
+        raise NotFoundError(f"run {run_id!r} holds no engagement that was evaluated, of this life and by then")
+    return row
+
+
+def _comparison(run: IncomingRun, row: dict[str, Any], capacity: Capacity, geometry: Geometry) -> dict[str, Any] | None:
+    """A measured engagement beside the model's; the model's part is null where the record does not show its drive."""
+    engagement = evaluated(run, geometry)
+    if not isinstance(engagement, MeasuredEngagement):
+        return None
+    slip = engagement.slip
+    at = trace_times(slip)
+    columns = {"pressure_bar": slip.pressure, "speed_rpm": slip.speed, "torque_nm": slip.torque}
+    means = {name: bin_means(slip.time, column, at) for name, column in columns.items()}
+    beside = discrepancy(engagement, capacity, geometry.mean_radius)
     return {
-        level: StribeckParameters(**{name: max(value, 0.0) for name, value in values.items()})
-        for level, values in complete.items()
+        "run_id": row["run_id"],
+        "cycles": row["cycles"],
+        "channels": public_channels({"time_s": at - slip.contact} | means),
+        "model": None if beside is None else _beside(beside, slip.contact),
     }
 
 
-def _median(clutch_id: str, series: Series, assumptions: Assumptions, cycles: float) -> float:
-    posterior = posterior_of(clutch_id, series, assumptions)
-    values = posterior.values(np.array([float(series.scale.progress(cycles))]))[0]
-    return float(weighted_quantiles(values, posterior.weight, (0.5,))[0])
+def _beside(beside: Discrepancy, contact: float) -> dict[str, Any]:
+    trace, difference = beside.trace, beside.stop_time_difference
+    columns = {"time_s": trace.time - contact, "pressure_bar": trace.pressure, "speed_rpm": trace.speed}
+    return {
+        "channels": public_channels(columns | {"torque_nm": trace.torque}),
+        "inertia_kg_m2": beside.drive.inertia,
+        "motor_torque_limit_nm": beside.drive.limit,
+        "stop_time_s": beside.simulated_stop_time,
+        "torque_discrepancy": beside.torque_share,
+        "stop_time_difference_s": None if difference is None else difference.value,
+        "stop_time_difference_sd_s": None if difference is None else difference.sd,
+    }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Tracked:
+    """A life as its Stribeck parameters are tracked."""
+
+    clutch_id: str
+    life: Life
+    assumptions: Assumptions
+    fits: Mapping[str, Sequence[LevelFit]]
+
+    def parameters(self, moments: Sequence[float]) -> list[dict[float, StribeckParameters]]:
+        """At each of several cycles since new, the parameters by pressure [Pa], each the median of its own track."""
+        tests = tests_of(self.life, self.fits)
+        at: dict[float, dict[str, list[float]]] = {}
+        for name in PARAMETER_NAMES:
+            for series in parameter_series(self.life, self.assumptions, tests, name):
+                if series.measurements:
+                    at.setdefault(series.pressure, {})[name] = self._medians(series, moments)
+        complete = {level: values for level, values in at.items() if len(values) == len(PARAMETER_NAMES)}
+        if not complete:
+            raise NotFoundError("no stationary test determines all four Stribeck parameters by then")
+        return [
+            {
+                level: StribeckParameters(**{name: max(median[place], 0.0) for name, median in values.items()})
+                for level, values in complete.items()
+            }
+            for place in range(len(moments))
+        ]
+
+    def _medians(self, series: Series, moments: Sequence[float]) -> list[float]:
+        posterior = posterior_of(self.clutch_id, series, self.assumptions)
+        progress = [float(series.scale.progress(cycles)) for cycles in moments]
+        values = (posterior.values(np.array([zeta]))[0] for zeta in progress)
+        return [float(weighted_quantiles(value, posterior.weight, (0.5,))[0]) for value in values]
 
 
 def _channels(trace: Engagement) -> dict[str, list[float]]:
@@ -91,5 +159,4 @@ def _channels(trace: Engagement) -> dict[str, list[float]]:
         "speed_rpm": trace.speed,
         "torque_nm": trace.torque,
     }
-    channels = {name: (column / CHANNELS[name].factor).round(6).tolist() for name, column in columns.items()}
-    return channels | {"motor_torque_nm": trace.motor_torque.round(6).tolist()}
+    return public_channels(columns) | {"motor_torque_nm": trace.motor_torque.round(6).tolist()}

@@ -35,19 +35,21 @@ def page_as_json(
 
 def _as_json(row: runs.ReceiptRow) -> bytes:
     sent_cycles = row.cycles if row.sent_cycles is None else row.sent_cycles
-    present = f'"state":"{row.state}","doubts":{row.doubts},"sent_cycles":{whole(sent_cycles)}'
+    present = f'"state":"{row.state}","doubts":{row.doubts},"sent_cycles":{whole(sent_cycles)},'
+    present += f'"received_by":{to_text(row.received_by)}'
     return f"{row.receipt[:-1]},{present}}}".encode()
 
 
 def rows(
     database: Database, clutch_id: str, *, limit: int, after: Place | None, state: str | None = None
-) -> Iterator[dict[str, Any]]:
-    """The same as rows of a table; warnings and fits are counted."""
-    for item in json.loads(page_as_json(database, clutch_id, limit=limit, after=after, state=state))["items"]:
-        yield {name: item[name] for name in COLUMNS} | {
-            "warnings": len(item["warnings"]),
-            "fits": len(item["fits"]),
-        }
+) -> tuple[list[dict[str, Any]], str | None]:
+    """The same as rows of a table, warnings and fits counted; and the next page's cursor."""
+    page = json.loads(page_as_json(database, clutch_id, limit=limit, after=after, state=state))
+    counted = ("warnings", "fits")
+    items = [
+        {name: item[name] for name in COLUMNS} | {name: len(item[name]) for name in counted} for item in page["items"]
+    ]
+    return items, page["next"]
 
 
 def trail(

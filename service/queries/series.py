@@ -4,9 +4,10 @@ from collections.abc import Iterator
 from typing import Any
 
 from models.friction.criteria import Z90
-from service import records
+from service import measured_lives, records
 from service.columns import whole
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF
+from service.lives.engagements.over_life import ALL_INDICATORS
 from service.lives.history import STATIONARY
 from service.lives.payloads import PARAMETER_UNITS
 from storage import results, runs
@@ -15,17 +16,20 @@ from storage.results import PredictionRow
 
 
 def series(database: Database, clutch_id: str, quantity: str | None) -> list[dict[str, Any]]:
-    """Each quantity of each test by cycles, then the remaining cycles as they were predicted; of one quantity, or of all.
+    """Each quantity of each test by cycles, the indicators of each engagement, then the remaining cycles as they were
+    predicted; of one quantity, or of all.
 
     Raises NotFoundError.
     """
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
         rows = runs.page(connection, clutch_id, kind=STATIONARY, state=runs.ACCEPTED)
+        engaged = measured_lives.engagements(connection, clutch_id)
         predicted = results.predictions_of(connection, clutch_id, "particle", ALL_PRESSURES)
     measured = (item for row in rows for fit in row.receipt["fits"] for item in _measured(row.receipt, fit))
+    indicators = (item for row in engaged for item in _indicators(row))
     ahead = (item for row in predicted for item in _predicted(row))
-    return [item for items in (measured, ahead) for item in items if quantity in (None, item["quantity"])]
+    return [item for items in (measured, indicators, ahead) for item in items if quantity in (None, item["quantity"])]
 
 
 def _measured(receipt: dict[str, Any], fit: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -44,6 +48,23 @@ def _measured(receipt: dict[str, Any], fit: dict[str, Any]) -> Iterator[dict[str
             "lower": None if value is None else value - Z90 * sd,
             "upper": None if value is None else value + Z90 * sd,
         }
+
+
+def _indicators(row: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    for quantity, indicator in ALL_INDICATORS.items():
+        estimate = row["indicators"][quantity]
+        if estimate is not None:
+            yield {
+                "cycles": row["cycles"],
+                "time": row["time"],
+                "run_id": row["run_id"],
+                "quantity": quantity,
+                "unit": indicator.unit,
+                "pressure_bar": None,
+                "value": estimate["value"],
+                "lower": estimate["value"] - Z90 * estimate["sd"],
+                "upper": estimate["value"] + Z90 * estimate["sd"],
+            }
 
 
 def _predicted(row: PredictionRow) -> Iterator[dict[str, Any]]:

@@ -3,7 +3,10 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from models.friction.pressure_laws import LinearLaw, PressureLaws, fit_pressure_laws
+import numpy as np
+
+from models.arrays import FloatArray
+from models.friction.pressure_laws import LinearLaw, PressureLaws, fit_pressure_laws, law_covariances
 from service import records
 from service.columns import PASCALS_PER_BAR, whole
 from service.lists import Place, page
@@ -37,22 +40,26 @@ def rows(items: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
 
 
 def _item(row: RunRow, levels: Sequence[LevelFit]) -> dict[str, Any]:
-    laws = fit_pressure_laws([level.fit for level in levels])
+    fits = [level.fit for level in levels]
+    laws = fit_pressure_laws(fits)
     return {
         "run_id": row.run_id,
         "cycles": whole(row.cycles),
         "fits": row.receipt["fits"],
-        "pressure_laws": None if laws is None else _laws(laws),
+        "pressure_laws": None if laws is None else _laws(laws, law_covariances(fits, laws)),
     }
 
 
-def _laws(laws: PressureLaws) -> dict[str, Any]:
+def _laws(laws: PressureLaws, covariances: Mapping[str, FloatArray]) -> dict[str, Any]:
     """The pressure laws in bar, by public name."""
     items: dict[str, Any] = {}
     for name, (public, _) in PARAMETER_UNITS.items():
         law = getattr(laws, name)
         if isinstance(law, LinearLaw):
             items[public] = {"intercept": law.intercept, "slope_per_bar": law.slope * PASCALS_PER_BAR}
+            in_bar = np.array([1.0, PASCALS_PER_BAR])
         else:
             items[public] = {"asymptote": law.asymptote, "excess": law.excess, "decay_bar": law.decay / PASCALS_PER_BAR}
+            in_bar = np.array([1.0, 1.0, 1.0 / PASCALS_PER_BAR])
+        items[public]["covariance"] = (covariances[name] * np.outer(in_bar, in_bar)).tolist()
     return items

@@ -20,8 +20,8 @@ from service.columns import RADIANS_PER_SECOND_PER_RPM, bar, whole
 from service.errors import NotFoundError
 from service.lives.assumptions import Assumptions
 from service.lives.history import Event, lives_of
-from service.lives.parameter_tracks import Track, parameter_tracks, tests_of
 from service.lives.payloads import PARAMETER_UNITS
+from service.lives.quantities.parameters import Track, parameter_tracks, tests_of
 from service.lives.run_analysis import LevelFit
 from storage.engine.database import Database
 

@@ -12,12 +12,14 @@ from asammdf import MDF
 from asammdf.blocks import v4_constants as v4c
 
 from models.arrays import FloatArray
-from service.errors import FieldError, InvalidError
+from service.errors import MOST_QUOTED, FieldError, InvalidError
 from service.readers.column_names import Header, Taken, choose, parse_map
 from service.readers.limits import Limits
 from service.readers.recorder_columns import numbers, place, recorded_header, require_one_length
 
 _TRUNCATED = "truncated"
+#: Conversions that refer to each other, at most. Chosen: recorders refer once.
+_DEEPEST_CONVERSION = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +41,8 @@ def read(path: Path, mapping: str | None, limits: Limits) -> dict[str, FloatArra
             raise InvalidError(f"a file must not have more than {limits.most_columns} channels, got {len(sources)}")
         headers = [source.header for source in sources]
         taken = choose(headers, mapping)
+        for column in taken:
+            _refuse_formula(file, headers[column.index], sources[column.index])
         require_one_length({place(headers, column): sources[column.index].rows for column in taken}, limits)
         columns = {column.channel: _values(file, column, sources[column.index]) for column in taken}
         if "time_s" not in columns:
@@ -64,6 +68,33 @@ def _sources(file: Any, *, masters: bool) -> list[_Source]:
                 header = recorded_header(channel.name, file.get_channel_unit(group=group, index=index), name)
                 sources.append(_Source(header, group, index, int(file.groups[group].channel_group.cycles_nr)))
     return sources
+
+
+def _refuse_formula(file: Any, header: Header, source: _Source) -> None:
+    """Raise InvalidError where a formula in the file makes the values of a channel that is taken, or of its time.
+
+    asammdf has a formula computed by numexpr, by sympy as Python where that is installed, and gives raw counts where neither
+    can: a file from outside decides neither what is run here nor what passes for a torque.
+    """
+    channels = file.groups[source.group].channels
+    for index in {source.index, file.masters_db.get(source.group, source.index)}:
+        if _has_formula(channels[index].conversion):
+            name = header.shown() if index == source.index else channels[index].name[:MOST_QUOTED]
+            message = (
+                f"{name} is converted by a formula (MDF4 algebraic conversion), which is not computed here: record "
+            )
+            message += "it with a linear, rational or tabular conversion, or export its physical values"
+            raise InvalidError(message, errors=[FieldError(pointer="", code="algebraic_conversion", message=message)])
+
+
+def _has_formula(conversion: Any, depth: int = 0) -> bool:
+    """Whether a conversion, or one that it refers to, is a formula; one that refers too deeply may be."""
+    if conversion is None or isinstance(conversion, bytes):
+        return False
+    referenced = (conversion.referenced_blocks or {}).values()
+    if conversion.conversion_type == v4c.CONVERSION_TYPE_ALG or depth > _DEEPEST_CONVERSION:
+        return True
+    return any(_has_formula(block, depth + 1) for block in referenced)
 
 
 def _values(file: Any, column: Taken, source: _Source) -> FloatArray:

@@ -16,7 +16,7 @@ def read_file(
     """The channels [n] of a CSV, TDMS, MDF4 or Parquet file by public name, in the channels' units.
 
     `filename` is the sender's name for it, `mapping` names columns (`torque_nm:Mz,...`). Raises InvalidError or
-    TooLargeError, and nothing else, whatever the file holds.
+    TooLargeError, and nothing else, whatever the file holds; BusyError where the service is ending.
     """
     kind = sniff(path, filename, limits)
     if kind is not Format.CSV:

@@ -1,8 +1,9 @@
-"""TDMS, MDF4 and Parquet files are read in a process of their own, with limits on its memory, time and output.
+"""TDMS, MDF4 and Parquet files are read in a process of their own, with limits on its memory, time, output and reach.
 
 The libraries that read them are large, and a broken or malicious file may make them loop, exhaust memory or crash: that
-ends the reading process only. It returns one file: a line of JSON (the columns' lengths, or an error), then the columns as
-raw little-endian float64. Nothing that came from the file is ever unpickled or evaluated.
+ends the reading process only. It can open the file, our code and a folder of its own, and no socket (`confinement`). It
+returns one file: a line of JSON (the columns' lengths, or an error), then the columns as raw little-endian float64. Nothing
+that came from the file is ever unpickled or evaluated.
 """
 
 import importlib
@@ -24,7 +25,8 @@ import numpy as np
 
 from models.arrays import FloatArray
 from service.columns import CHANNELS
-from service.errors import FieldError, InvalidError, ServiceError, TooLargeError
+from service.errors import BusyError, FieldError, InvalidError, ServiceError, TooLargeError
+from service.readers.confinement import close_files, close_network_and_processes
 from service.readers.detect import Format, is_packed, opened
 from service.readers.limits import Limits
 
@@ -40,6 +42,8 @@ _LONGEST_ANSWER = 1 << 16
 _BLOCK = 1 << 20
 #: Characters of a foreign library's message that ours quotes, and of a whole message.
 _MOST_QUOTED, _LONGEST_DETAIL = 200, 4000
+#: Files that the reading process has open at once. Chosen: importing the libraries takes a dozen.
+_MOST_OPEN_FILES = 64
 #: Added to the limit on reading, for the interpreter to start and import the library.
 _STARTING_SECONDS = 10
 #: Environment variables that the reading process gets; no others, so no keys.
@@ -48,8 +52,6 @@ _ENVIRONMENT = (
     "PYTHONPATH",
     "LANG",
     "LC_ALL",
-    "HOME",
-    "TMPDIR",
     "LD_LIBRARY_PATH",
     "XDG_CACHE_HOME",
     "MPLCONFIGDIR",
@@ -59,13 +61,15 @@ _ENVIRONMENT = (
 def read_isolated(kind: Format, path: Path, *, mapping: str | None, limits: Limits) -> dict[str, FloatArray]:
     """The channels [n] of a TDMS, MDF4 or Parquet file in their own units, read in a process of its own.
 
+    What is unpacked is kept beside the file meanwhile.
     Raises InvalidError where the file cannot be read, needs an extra that is not installed, or makes its reader crash or
-    take too long; TooLargeError where it needs more memory than is allowed or holds more values.
+    take too long; TooLargeError where it needs more memory than is allowed or holds more values; BusyError where somebody
+    else ended its reader.
     """
     _require(kind)
     if not is_packed(path):
         return _run(kind, path, mapping, limits)
-    with tempfile.NamedTemporaryFile(prefix="clutchlife-") as plain:
+    with tempfile.NamedTemporaryFile(dir=path.parent) as plain:
         with opened(path, limits) as source:
             while block := source.read(_BLOCK):
                 plain.write(block)
@@ -86,7 +90,11 @@ def _run(kind: Format, path: Path, mapping: str | None, limits: Limits) -> dict[
     # Further threads would only reserve memory: the limit is on reserved memory.
     environment |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "NUMEXPR_MAX_THREADS": "1"}
     environment |= {"ARROW_DEFAULT_MEMORY_POOL": "system", "MALLOC_ARENA_MAX": "2", "PYTHONIOENCODING": "utf-8"}
-    with tempfile.TemporaryFile(prefix="clutchlife-") as result:
+    with (
+        tempfile.TemporaryFile(dir=path.parent) as result,
+        tempfile.TemporaryDirectory(prefix="reader-", dir=path.parent) as folder,
+    ):
+        environment |= {"TMPDIR": folder, "HOME": folder}
         arguments = [sys.executable, "-P", "-W", "ignore", "-m", "service.readers.sandbox", str(result.fileno())]
         try:
             ended = subprocess.run(  # noqa: S603 (our own interpreter and module)
@@ -103,6 +111,8 @@ def _run(kind: Format, path: Path, mapping: str | None, limits: Limits) -> dict[
             raise _too_slow(kind, limits) from None
         if ended.returncode == -signal.SIGXCPU:
             raise _too_slow(kind, limits)
+        if ended.returncode == -signal.SIGTERM:
+            raise BusyError("the service is ending: send the file again in a little while")
         if ended.returncode:
             raise _unreadable(kind, f"its reader ended with {_ending(ended.returncode)}")
         result.seek(0)
@@ -158,9 +168,12 @@ def main() -> None:
     kind, limits = Format(request["kind"]), Limits(**request["limits"])
     with os.fdopen(int(sys.argv[1]), "wb") as result:
         _limit(limits)
+        path = Path(request["path"])
+        close_files(readable=[path], writable=[Path(tempfile.gettempdir())])
         try:
-            reader = importlib.import_module(READERS[kind][0])
-            columns: dict[str, FloatArray] = reader.read(Path(request["path"]), request["mapping"], limits)
+            reader = importlib.import_module(READERS[kind][0])  # whose libraries ask programs about the processor
+            close_network_and_processes()
+            columns: dict[str, FloatArray] = reader.read(path, request["mapping"], limits)
             _write(result, {"channels": {name: column.size for name, column in columns.items()}})
             for column in columns.values():
                 result.write(np.ascontiguousarray(column, dtype="<f8").data)
@@ -178,6 +191,7 @@ def _limit(limits: Limits) -> None:
         (resource.RLIMIT_CPU, math.ceil(limits.seconds), 1),  # first SIGXCPU, which names the cause, then SIGKILL
         (resource.RLIMIT_FSIZE, 8 * limits.most_values + _LONGEST_ANSWER, 0),
         (resource.RLIMIT_CORE, 0, 0),
+        (resource.RLIMIT_NOFILE, _MOST_OPEN_FILES, 0),
     ):
         resource.setrlimit(which, (most, most + over))
 

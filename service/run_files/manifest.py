@@ -5,7 +5,8 @@ The manifest, `runs.json`, holds for each record file (CSV, TDMS, MDF4, Parquet)
     [{"file": "a.csv", "kind": "stationary_stribeck", "cycles": 0, "run_id": "a", "origin": "measured",
       "started_at": "2026-11-02T08:00:00+01:00", "map": "torque_nm:Mz"}, ...]
 
-where `file`, `kind` and `cycles` are needed.
+where `file`, `kind` and `cycles` are needed. Nothing outside the folder is read for it: a manifest that came with recordings
+must not name other files of the machine, neither by a path nor by a link.
 """
 
 import json
@@ -17,6 +18,8 @@ from typing import Any
 
 CLUTCH_FILE = "clutch.json"
 MANIFEST = "runs.json"
+#: What was hidden in a simulated campaign: for who rehearses a diagnosis, and no run.
+ANSWER = "answer.json"
 #: Cycles from which a file is not taken for a run. Chosen: far beyond what the service accepts (`schemas.limits`).
 _MOST_CYCLES = 1e15
 _NEEDED, _OPTIONAL = ("file", "kind", "cycles"), ("run_id", "origin", "started_at", "map")
@@ -41,7 +44,8 @@ def write(path: Path, body: Mapping[str, Any] | Sequence[Mapping[str, Any]]) -> 
 def find(paths: Iterable[Path]) -> list[RunFile]:
     """The files at `paths`, and the runs in the folders among them, those of a folder sorted by cycles.
 
-    Raises FileNotFoundError for a path that does not exist, ValueError for a manifest that is wrong.
+    Raises FileNotFoundError for a path that does not exist, ValueError for a manifest that is wrong and for a file of a
+    folder that lies outside it.
     """
     runs: list[RunFile] = []
     for path in paths:
@@ -61,7 +65,9 @@ def _in_folder(folder: Path) -> list[RunFile]:
         (float(parameters["cycles"]), RunFile(path=path, parameters=parameters))
         for path, parameters in _listed(folder).items()
     ]
-    bodies = [path for path in folder.glob("*.json") if path.name not in (CLUTCH_FILE, MANIFEST)]
+    bodies = [path for path in folder.glob("*.json") if path.name not in (CLUTCH_FILE, MANIFEST, ANSWER)]
+    for path in (*bodies, folder / CLUTCH_FILE, folder / MANIFEST):
+        _require_within(folder, path, str(path))
     runs += [(_cycles(path), RunFile(path=path)) for path in bodies]
     return [run for _, run in sorted(runs, key=lambda pair: (pair[0], pair[1].path.name))]
 
@@ -108,10 +114,17 @@ def _entry(manifest: Path, index: int, entry: object) -> tuple[Path, dict[str, s
         if not isinstance(entry[name], str) or not entry[name]:
             raise ValueError(f"{at}: {name} must be a text, got {entry[name]!r}")
     file = manifest.parent / entry["file"]
+    _require_within(manifest.parent, file, at)
     if not file.is_file():
         raise FileNotFoundError(f"{at}: {file} is not there")
     parameters = {name: entry[name] for name in ("kind", *_OPTIONAL) if name in entry}
     return file, parameters | {"cycles": repr(float(cycles)), "filename": file.name}
+
+
+def _require_within(folder: Path, file: Path, at: str) -> None:
+    """Raise ValueError where a file, its links followed, does not lie below the folder."""
+    if not file.resolve().is_relative_to(folder.resolve()):
+        raise ValueError(f"{at}: {file} lies outside the folder {folder} and is not sent")
 
 
 def _cycles(path: Path) -> float:

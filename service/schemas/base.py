@@ -2,10 +2,17 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PlainSerializer, StringConstraints, WithJsonSchema
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, PlainSerializer, StringConstraints, WithJsonSchema
 
 from service.columns import whole
-from service.schemas.limits import IDENTIFIER_PATTERN, LARGEST_NUMBER, LONGEST_REASON, MOST_CYCLES
+from service.schemas.limits import (
+    EARLIEST_START,
+    IDENTIFIER_PATTERN,
+    LARGEST_NUMBER,
+    LATEST_START,
+    LONGEST_REASON,
+    MOST_CYCLES,
+)
 
 
 class Schema(BaseModel):
@@ -28,6 +35,9 @@ Cycles = Annotated[float, Field(ge=0, le=MOST_CYCLES, allow_inf_nan=False, stric
 
 PositiveNumber = Annotated[float, Field(gt=0, le=LARGEST_NUMBER, allow_inf_nan=False, strict=True)]
 NotNegativeNumber = Annotated[float, Field(ge=0, le=LARGEST_NUMBER, allow_inf_nan=False, strict=True)]
+
+#: ISO 8601 with a time zone.
+StartedAt = Annotated[AwareDatetime, Field(ge=EARLIEST_START, le=LATEST_START)]
 
 #: A column is checked by `service.columns`, which names row and value among millions.
 Column = Annotated[

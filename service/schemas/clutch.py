@@ -23,17 +23,19 @@ from service.schemas.base import (
     RunName,
     Schema,
 )
-from service.schemas.life import Current, ModelName, Quantiles
 from service.schemas.limits import (
     LEAST_LENGTH_MM,
     LEAST_PRESSURE_FACTOR,
     LEAST_WIDTH_MM,
     LONGEST_NAME,
+    MOST_CRITERIA,
     MOST_FRICTION_FACES,
     MOST_LENGTH_MM,
     MOST_PRESSURE_FACTOR,
     MOST_SEVERITY_EXPONENT,
 )
+from service.schemas.prognosis.criteria import CriterionIn
+from service.schemas.prognosis.life import Current, ModelName, Quantiles
 
 Name = Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_NAME)]
 Length = Annotated[PositiveNumber, Field(ge=LEAST_LENGTH_MM, le=MOST_LENGTH_MM)]
@@ -94,6 +96,11 @@ class EndOfLifeIn(Schema):
 
     cof_fraction: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False, strict=True)] = Field(
         default=0.5, description="The life ends when mean COF has fallen to this fraction of its initial value"
+    )
+
+    criteria: Annotated[tuple[CriterionIn, ...], Field(max_length=MOST_CRITERIA)] = Field(
+        default=(),
+        description="What ends the life in place of `cof_fraction` alone: several limits, the first to be reached counts",
     )
 
 

@@ -1,11 +1,8 @@
-"""What tests and engagements look like: Stribeck curves, friction loops, a simulated engagement, and flat series."""
-
-from typing import Literal
+"""What tests look like: Stribeck curves, friction loops, and flat series."""
 
 from pydantic import Field
 
-from service.schemas.base import Answer, ClutchName, Next, Origin, RunCycles, RunName
-from service.schemas.life import Model
+from service.schemas.base import Answer, Next, RunCycles, RunName
 from service.schemas.run import Fit, Loop
 
 
@@ -14,6 +11,7 @@ class LinearLaw(Answer):
 
     intercept: float = Field(description="Value at no pressure")
     slope_per_bar: float = Field(description="Change per bar")
+    covariance: list[list[float]] = Field(description="Covariance of `intercept` and `slope_per_bar`, in this order")
 
 
 class AsymptoticLaw(Answer):
@@ -22,6 +20,9 @@ class AsymptoticLaw(Answer):
     asymptote: float = Field(description="Value at high pressure")
     excess: float = Field(description="Value at no pressure less the asymptote")
     decay_bar: float = Field(description="Pressure over which the excess falls to 1/e, bar")
+    covariance: list[list[float]] = Field(
+        description="Covariance of `asymptote`, `excess` and `decay_bar`, in this order; 0 of what is held at 0"
+    )
 
 
 class PressureLawsOut(Answer):
@@ -63,44 +64,19 @@ class LoopPage(Answer):
     next: Next
 
 
-class EngagementChannels(Answer):
-    """The course of an engagement, a column each."""
-
-    time_s: list[float] = Field(description="Time, s")
-    pressure_bar: list[float] = Field(description="Line pressure, bar")
-    speed_rpm: list[float] = Field(description="Sliding speed, rpm")
-    torque_nm: list[float] = Field(description="Friction torque, Nm")
-    motor_torque_nm: list[float] = Field(description="The motor's torque, Nm")
-
-
-class EngagementOut(Answer):
-    """A simulated engagement of the tracked clutch."""
-
-    clutch_id: ClutchName
-    origin: Origin
-    simulated: Literal[True] = Field(
-        description="Always true: the engagement is simulated, whatever the clutch's origin"
-    )
-    at_cycles: float = Field(description="Duty cycles since new of the clutch's state")
-    model: Model
-    initial_speed_rpm: float = Field(description="Sliding speed at the start, rpm")
-    maximum_pressure_bar: float = Field(description="Highest line pressure, bar")
-    motor_torque_limit_nm: float = Field(description="The motor's limit, Nm")
-    engaged: bool = Field(description="Whether the clutch comes to standstill")
-    duration_s: float | None = Field(description="From contact to standstill, s; null while it slips")
-    energy_kj: float = Field(description="Dissipated energy, kJ")
-    channels: EngagementChannels = Field(description="The course of the engagement")
-
-
 class SeriesItem(Answer):
     """One value of one quantity."""
 
     cycles: float = Field(description="Duty cycles since new")
     time: str | None = Field(description="When the run was started, else received, ISO 8601; null for predictions")
     run_id: str | None = Field(description="The run's name; null for predictions")
-    quantity: str = Field(description="A fitted quantity, or one of the prediction at these cycles")
+    quantity: str = Field(
+        description="A fitted quantity, an indicator of an engagement, or one of the prediction at these cycles"
+    )
     unit: str = Field(description="Its unit")
-    pressure_bar: float | None = Field(description="Line pressure, bar; null: the mean over the reference pressures")
+    pressure_bar: float | None = Field(
+        description="Line pressure, bar; null: the mean over the reference pressures, or an engagement"
+    )
     value: float | None = Field(description="The value; the median of a prediction")
     lower: float | None = Field(description="5 % quantile")
     upper: float | None = Field(description="95 % quantile")

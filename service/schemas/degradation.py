@@ -3,7 +3,7 @@
 from pydantic import Field
 
 from service.schemas.base import Answer, ClutchName, Next, Revision
-from service.schemas.life import Model, Prior, Quantiles, SeverityUsed
+from service.schemas.prognosis.life import LifeNumber, MethodName, Model, Prior, Quantiles, SeverityUsed
 from service.schemas.run import Warned
 
 
@@ -12,6 +12,7 @@ class Estimate(Answer):
 
     value: float = Field(description="Posterior mean")
     sd: float = Field(description="Posterior standard deviation")
+    quantiles: Quantiles = Field(description="Posterior quantiles, by probability")
 
 
 class Coefficients(Answer):
@@ -21,6 +22,15 @@ class Coefficients(Answer):
     change: Estimate = Field(description="Change Δ, in the quantity's unit")
     scale_cycles: Estimate = Field(description="Scale φ, duty cycles")
     exponent: Estimate = Field(description="Exponent ε")
+
+
+class CoefficientDraws(Answer):
+    """Joint draws of the coefficients of eq. 6, of equal weight: the same place of all four columns is one draw."""
+
+    initial: list[float] = Field(description="Initial value ξ0, in the quantity's unit")
+    change: list[float] = Field(description="Change Δ, in the quantity's unit")
+    scale_cycles: list[float] = Field(description="Scale φ, duty cycles")
+    exponent: list[float] = Field(description="Exponent ε")
 
 
 class Measured(Answer):
@@ -43,13 +53,22 @@ class Trajectory(Answer):
 class DegradationItem(Answer):
     """The degradation of one quantity at one pressure."""
 
-    quantity: str = Field(description="A Stribeck parameter, or `mean_cof`")
+    quantity: str = Field(description="A Stribeck parameter, `mean_cof`, `slope`, or a quantity of the lag")
     unit: str = Field(description="Its unit")
     pressure_bar: float | None = Field(description="Line pressure, bar; null: the mean over the reference pressures")
+    speed_rpm: float | None = Field(description="Speed of a slope, rpm; null for all else")
+    frequency_hz: float | None = Field(description="Frequency of a friction loop, Hz; null for all else")
     coefficients: Coefficients | None = Field(
-        description="The coefficients of eq. 6, where the quantity follows it; null where it surely does not"
+        description="The coefficients of eq. 6, where the quantity follows it; null where it surely does not, and of a "
+        "slope, which follows from the parameters"
     )
-    eq6_probability: float = Field(description="How probable it is that the quantity follows eq. 6")
+    correlations: list[list[float]] | None = Field(
+        description="Correlations of ξ0, Δ, log φ and log ε, in this order; null where there are no coefficients"
+    )
+    eq6_probability: float | None = Field(
+        description="How probable it is that the quantity follows eq. 6; null of a slope"
+    )
+    draws: CoefficientDraws | None = Field(description="Joint draws of the coefficients, where `draws` asked for them")
     measured: Measured = Field(description="The fitted values of the tests")
     trajectory: Trajectory = Field(description="The course as tracked, with its 90 % band")
 
@@ -70,10 +89,12 @@ class Rebuilt(Answer):
 
 
 class Degradation(Answer):
-    """Eq. 6 for every Stribeck parameter and for mean COF."""
+    """Eq. 6 for every Stribeck parameter and for mean COF, or the track of one quantity."""
 
     clutch_id: ClutchName
     revision: Revision
+    method: MethodName = Field(description="The filter")
+    life: LifeNumber = Field(description="The life that the tracks are of")
     items: list[DegradationItem] = Field(description="The quantities of this page, by pressure")
     rebuilt: Rebuilt | None = Field(description="COF from the parameters; null with too few tests")
     warnings: list[Warned] = Field(description="Warnings, such as tracks that disagree")

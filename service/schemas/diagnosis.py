@@ -5,8 +5,8 @@ from typing import Annotated, Literal
 from pydantic import Field, StringConstraints
 
 from service.schemas.base import Answer, ClutchName, Next, Revision, Schema
-from service.schemas.life import ModelName
 from service.schemas.limits import LONGEST_DIAGNOSIS_ID
+from service.schemas.prognosis.life import ModelName
 
 Number = float | None
 Numbers = list[float | None]
@@ -51,6 +51,11 @@ class CandidateOut(Answer):
         default_factory=list,
         description="Effects fitted together with it; evidence and estimate are of that fit",
     )
+    fit: str | None = Field(
+        default=None,
+        description="How that fit ended: `converged`, `stalled`, `out_of_steps` (not at its end: no cause is named by it), "
+        "`not_finite`, `wrong_sign`; `screened` where it was judged linearly only, null where there is none",
+    )
 
 
 class WhereOut(Answer):
@@ -94,7 +99,7 @@ class GainOut(Answer):
         description="Gain in log score when the last states are predicted from the first ones, nats"
     )
     foretelling_log_score_gain: Number = Field(
-        description="The former name of `prediction_log_score_gain`", deprecated=True
+        description="The former name of `prediction_log_score_gain`", deprecated=True, examples=[4.1]
     )
     remaining_useful_life: BeforeAndAfter = Field(description="Remaining useful life under both models")
 

@@ -1,9 +1,14 @@
 """Bounds on what requests may hold: all chosen to refuse mistyped values and overflow, not unusual clutches; no tables."""
 
+from datetime import UTC, datetime
+
 #: Duty cycles since new, or in one block.
 MOST_CYCLES = 1e12
 #: Any other positive number of a request (energy in kJ, speed in rpm, duration in s, pressure in bar, viscosity in cSt).
 LARGEST_NUMBER = 1e12
+
+#: When a run may have been started. Other years are a clock's or a program's sign for "not set", as year 1 is.
+EARLIEST_START, LATEST_START = datetime(1900, 1, 1, tzinfo=UTC), datetime(9998, 12, 31, tzinfo=UTC)
 
 #: Diameters and radii of the disc, mm.
 LEAST_LENGTH_MM, MOST_LENGTH_MM = 0.1, 1e5
@@ -30,6 +35,10 @@ IDENTIFIER_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._:@+-]{0,127}$"
 MOST_MARKS = 10_000
 #: Samples of a channel that a plot may ask for: more than any screen has pixels; all samples need no argument.
 MOST_POINTS = 1_000_000
+#: The limits of a criterion: its number of either sign, its place, and how many a clutch may have. Chosen: beyond any rig.
+LARGEST_LIMIT, MOST_CRITERION_PRESSURE_BAR, MOST_SPEED_RPM, MOST_CRITERIA = 1e9, 1e4, 1e6, 8
+#: Joint draws of a track's coefficients: beyond what the sample behind it holds they would repeat.
+MOST_DRAWS = 1_000
 #: Blocks of a programme of planned duty.
 MOST_BLOCKS = 1000
 #: The fewest cycles of a planned block, and its least energy a cycle, kJ: less is mistyped.

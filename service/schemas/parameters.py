@@ -2,9 +2,17 @@
 
 from typing import Annotated, Literal
 
-from pydantic import AwareDatetime, Field
+from pydantic import Field
 
-from service.schemas.limits import IDENTIFIER_PATTERN, LONGEST_FILENAME, LONGEST_MAP, MOST_CYCLES, MOST_POINTS
+from service.schemas.base import StartedAt
+from service.schemas.limits import (
+    IDENTIFIER_PATTERN,
+    LONGEST_FILENAME,
+    LONGEST_MAP,
+    MOST_CYCLES,
+    MOST_DRAWS,
+    MOST_POINTS,
+)
 
 ClutchId = Annotated[str, Field(description="The clutch's name")]
 RunId = Annotated[str, Field(description="The run's name")]
@@ -18,7 +26,53 @@ Points = Annotated[
         "lowest or highest within its bin, and the first and the last; left out, all. Plateaus and Parquet are whole",
     ),
 ]
-Quantity = Annotated[str | None, Field(description="Rows of this quantity only")]
+QuantityName = Literal[
+    "mean_cof",
+    "static_torque_nm",
+    "coulomb_ratio",
+    "stribeck_velocity_m_s",
+    "viscous_coefficient",
+    "stop_time_s",
+    "engagement_energy_kj",
+    "peak_power_kw",
+    "initial_cof",
+    "midpoint_cof",
+    "endpoint_cof",
+    "breakaway_cof",
+    "initial_cof_ratio",
+    "endpoint_cof_ratio",
+    "breakaway_cof_ratio",
+    "torque_rise",
+    "normalised_duration",
+    "euclidean_distance",
+    "spectral_angle_rad",
+    "health",
+    "remaining_cycles",
+    "probability_of_reaching",
+]
+Quantity = Annotated[QuantityName | None, Field(description="Rows of this quantity only")]
+EngagementRun = Annotated[
+    str | None,
+    Field(description="The run whose measured engagement is compared with the model; left out, the newest of the life"),
+]
+TrackedQuantity = Annotated[
+    str | None,
+    Field(
+        max_length=LONGEST_FILENAME,
+        description="A quantity that is tracked: `mean_cof`, a Stribeck parameter such as `static_torque_nm`, `slope`, "
+        "`attractor`, `film_time`, `loop_area`, one of engagements such as `stop_time_s`; left out, mean COF (and in "
+        "`/degradation` every parameter)",
+    ),
+]
+LifeNumber = Annotated[
+    int | None,
+    Field(
+        ge=1, description="The life by its number, from 1 on; left out, the present one. A rebuild begins a new life"
+    ),
+]
+Draws = Annotated[
+    int, Field(ge=0, le=MOST_DRAWS, description="Joint draws of the coefficients of eq. 6 for each track")
+]
 State = Annotated[
     Literal["accepted", "held", "withdrawn"] | None, Field(description="Runs in this state only; left out, all")
 ]
@@ -37,6 +91,4 @@ FileName = Annotated[str, Field(max_length=LONGEST_FILENAME, description="The se
 FileRunId = Annotated[
     str | None, Field(pattern=IDENTIFIER_PATTERN, description="The run's name; left out, it derives from the content")
 ]
-FileStartedAt = Annotated[
-    AwareDatetime | None, Field(description="When the run was started: ISO 8601 with a time zone")
-]
+FileStartedAt = Annotated[StartedAt | None, Field(description="When the run was started: ISO 8601 with a time zone")]

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AwareDatetime, Field, StringConstraints, TypeAdapter
+from pydantic import Field, StringConstraints, TypeAdapter
 
 from service.schemas.base import (
     Answer,
@@ -18,7 +18,9 @@ from service.schemas.base import (
     RunCycles,
     RunName,
     Schema,
+    StartedAt,
 )
+from service.schemas.indicators import ReceivedEngagement
 from service.schemas.limits import LONGEST_NOTE, MOST_CYCLES
 
 Pressure = Annotated[Column, Field(description="Line pressure, bar")]
@@ -76,7 +78,7 @@ class RunBase(Schema):
 
     run_id: Identifier | None = Field(default=None, description="The run's name; left out, it derives from the content")
     cycles: Cycles = Field(description="Duty cycles since new when the run is made")
-    started_at: Annotated[AwareDatetime, Field(strict=True)] | None = Field(
+    started_at: Annotated[StartedAt, Field(strict=True)] | None = Field(
         default=None, description="When it was started: ISO 8601 with a time zone"
     )
     origin: Origin = "measured"
@@ -221,6 +223,9 @@ class Receipt(Answer):
     warnings: list[Warned] = Field(description="Warnings")
     fits: list[Fit] = Field(description="The fitted curves of a stationary test, by pressure")
     loops: list[Loop] = Field(description="The friction loops of a dynamic test, by pressure")
+    engagement: ReceivedEngagement | None = Field(
+        default=None, description="The engagement that a block of duty carries; null for a run without one"
+    )
     duty: Duty | None = Field(description="The block of engagements; null for other kinds")
     event: str | None = Field(description="The maintenance event; null for other kinds")
     note: str | None = Field(description="The maintenance note; null for other kinds")
@@ -228,6 +233,9 @@ class Receipt(Answer):
     state: State
     doubts: list[Warned] = Field(description="Why the run is, or was, held; empty where nothing was odd")
     sent_cycles: float = Field(description="Cycles as they were sent; `cycles` is what holds now")
+    received_by: str | None = Field(
+        description="Who posted it: `key:` with the key's id and note, or `local`; null where an earlier release stored it"
+    )
 
 
 class Change(Answer):
@@ -235,8 +243,8 @@ class Change(Answer):
 
     at: str = Field(description="When; UTC, ISO 8601")
     by: str = Field(description="Who: `key:` with the key's id and note, or `local` where no keys are configured")
-    action: Literal["hold", "confirm", "withdraw", "restore", "correct", "edit", "archive", "unarchive"] = Field(
-        description="What was done"
+    action: Literal["hold", "confirm", "withdraw", "restore", "correct", "edit", "archive", "unarchive", "adopt"] = (
+        Field(description="What was done; `adopt`: another model is tracked under")
     )
     run_id: str | None = Field(description="The run; null where the clutch's record was changed")
     reason: str = Field(description="Why")

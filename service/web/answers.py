@@ -4,11 +4,9 @@ What follows from a clutch's revision alone is made once and kept (`clutch_answe
 (`computed_answer`).
 """
 
-import csv
-import io
 import json
 import re
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from concurrent.futures import Future
 from datetime import UTC, datetime
 from typing import Any
@@ -17,22 +15,29 @@ from fastapi import Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 from pydantic import BaseModel
+from starlette.datastructures import MutableHeaders
+from starlette.middleware.gzip import GZipMiddleware
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.errors import NotFoundError, UnsupportedMediaTypeError
 from service.jobs.workers import Lane
 from service.lists import ALL_ITEMS, from_cursor, sliced
-from service.queries.cache import Answer, revision_and_json, to_json
+from service.queries.cache import Answer, Page, revision_and_json, to_json
 from service.web.context import Context
-from service.web.limits import LONGEST_WAIT_SECONDS
+from service.web.files import PARQUET_TYPE
+from service.web.limits import LEAST_PACKED_BYTES, LONGEST_WAIT_SECONDS, PACKING_LEVEL
 from service.web.middleware import Again, remember
+from service.web.problems import problem
 from service.web.revalidation import Made
+from service.web.tables import Rows, RowsAndNext, encode_page, sliced_rows
+from service.web.unpacking import Unpacked
 
 JSON_TYPE = "application/json"
 CSV_TYPE = "text/csv; charset=utf-8"
 
 _WAIT = re.compile(r'(?:^|[,;\s])wait\s*=\s*"?(\d{1,9})"?\s*(?:$|[,;])', re.IGNORECASE)
-
-Rows = Iterable[Mapping[str, Any]]
+#: The end of an entity tag of packed bytes.
+_PACKED = '-gzip"'
 
 
 def now() -> str:
@@ -45,12 +50,17 @@ async def answer(request: Request, make: Callable[[], object]) -> Response:
     return tagged(request, Answer.of(await run_in_threadpool(lambda: to_json(make()))), JSON_TYPE)
 
 
-async def kept(context: Context, key: Hashable, version: Hashable, make: Callable[[], bytes]) -> Answer:
+async def kept(context: Context, key: Hashable, version: Hashable, make: Callable[[], bytes | Page]) -> Answer:
     """What the cache has for `key` at `version`; where it has nothing yet, `make` is called in a thread."""
     answer = context.cache.held(key, version)
     if answer is not None:
         return answer
     return await run_in_threadpool(context.cache.answer, key, version, make)
+
+
+async def clutch_bytes(context: Context, clutch_id: str, name: str, make: Callable[[], bytes]) -> bytes:
+    """What follows from a clutch's revision and is needed to answer, not the answer itself. Raises NotFoundError."""
+    return (await kept(context, (clutch_id, name), _revision(context, clutch_id), make)).body
 
 
 async def clutch_answer(
@@ -80,16 +90,15 @@ async def clutch_table(
     context: Context,
     clutch_id: str,
     name: str,
-    make: Callable[[], Rows],
+    make: Callable[[], RowsAndNext],
     columns: Sequence[str],
     *arguments: Hashable,
 ) -> Response:
-    """The CSV export of an answer that follows from a clutch's revision. Raises NotFoundError."""
+    """The CSV export of an answer that follows from a clutch's revision, a page of it. Raises NotFoundError."""
     revision = _revision(context, clutch_id)
     key = (clutch_id, f"{name}.csv", *arguments)
-    return tagged(
-        request, await kept(context, key, revision, lambda: encode_table(columns, make())), CSV_TYPE, revision
-    )
+    exported = await kept(context, key, revision, lambda: encode_page(columns, *make()))
+    return tagged(request, exported, CSV_TYPE, revision)
 
 
 async def computed_answer(
@@ -101,12 +110,13 @@ async def computed_answer(
     limit: int = ALL_ITEMS,
     cursor: str | None = None,
     prefer: str | None = None,
+    lane: Lane = Lane.ANSWERS,
 ) -> Response:
-    """A GET's answer that takes long: `query(database, clutch_id, *arguments)`, computed by a worker; a page of its items
-    where one was asked for. `prefer` is what the sender prefers. Raises NotFoundError.
+    """A GET's answer that takes long: `query(database, clutch_id, *arguments)`, computed by a worker of that lane; a page of
+    its items where one was asked for. `prefer` is what the sender prefers. Raises NotFoundError.
     """
     after = from_cursor(cursor)
-    revision, whole = await _computed(context, clutch_id, query, arguments, prefer)
+    revision, whole = await _computed(context, clutch_id, query, arguments, prefer, lane)
     if limit == ALL_ITEMS and after is None:
         remember(request, _computed_again(context, clutch_id, query, arguments))
         return tagged(request, whole, JSON_TYPE, revision)
@@ -127,12 +137,20 @@ async def computed_table(
     rows: Callable[[Any], Rows],
     columns: Sequence[str],
     *arguments: Hashable,
+    limit: int = ALL_ITEMS,
+    cursor: str | None = None,
     prefer: str | None = None,
 ) -> Response:
-    """The CSV export of the same: `rows` of its JSON. Raises NotFoundError."""
+    """The CSV export of the same: a page of the `rows` of its JSON, which may be a page itself. Raises NotFoundError."""
+    after = from_cursor(cursor)
     revision, whole = await _computed(context, clutch_id, query, arguments, prefer)
-    key = (clutch_id, f"{_name(query)}.csv", *arguments)
-    exported = await kept(context, key, revision, lambda: encode_table(columns, rows(json.loads(whole.body))))
+
+    def one_page() -> Page:
+        items, following = sliced_rows(rows(json.loads(whole.body)), limit, after)
+        return encode_page(columns, items, following or whole.next)
+
+    key = (clutch_id, f"{_name(query)}.csv", *arguments, limit, after)
+    exported = await kept(context, key, revision, one_page)
     return tagged(request, exported, CSV_TYPE, revision)
 
 
@@ -142,13 +160,14 @@ async def _computed(
     query: Callable[..., dict[str, Any]],
     arguments: tuple[Hashable, ...],
     prefer: str | None,
+    lane: Lane = Lane.ANSWERS,
 ) -> tuple[int, Answer]:
     preferred = preferred_wait(prefer)
     wait = preferred if preferred is not None else LONGEST_WAIT_SECONDS if context.workers.are_idle() else 0
 
     def compute(waited_for: bool) -> "Future[Made]":
-        lane = Lane.ANSWERS if waited_for else Lane.RENEWALS
-        return context.workers.submit(lane, revision_and_json, query, clutch_id, arguments)
+        among = lane if waited_for or lane is not Lane.ANSWERS else Lane.RENEWALS
+        return context.workers.submit(among, revision_and_json, query, clutch_id, arguments)
 
     key = (clutch_id, _name(query), *arguments)
     return await context.revalidation.answer(key, _revision(context, clutch_id), compute, wait=wait)
@@ -191,27 +210,9 @@ def _revision(context: Context, clutch_id: str) -> int:
     return revision
 
 
-async def table(request: Request, columns: Sequence[str], make: Callable[[], Rows]) -> Response:
-    """A GET's answer as CSV that is made anew each time."""
-    return tagged(request, Answer.of(await run_in_threadpool(lambda: encode_table(columns, make()))), CSV_TYPE)
-
-
-def encode_table(columns: Sequence[str], rows: Rows) -> bytes:
-    """CSV after RFC 4180 in UTF-8, a header row first; null is an empty field.
-
-    A first row with other names than `columns` gives the columns.
-    """
-    text = io.StringIO()
-    writer: csv.DictWriter[str] | None = None
-    for row in rows:
-        if writer is None:
-            names = columns if row.keys() == set(columns) else tuple(row)
-            writer = csv.DictWriter(text, fieldnames=names, extrasaction="raise", restval="")
-            writer.writeheader()
-        writer.writerow({name: "" if value is None else value for name, value in row.items()})
-    if writer is None:
-        csv.writer(text).writerow(columns)
-    return text.getvalue().encode()
+async def table(request: Request, columns: Sequence[str], make: Callable[[], RowsAndNext]) -> Response:
+    """A GET's answer as CSV that is made anew each time, a page of it."""
+    return tagged(request, Answer.of(await run_in_threadpool(lambda: encode_page(columns, *make()))), CSV_TYPE)
 
 
 def tagged(request: Request, answer: Answer, media_type: str, revision: int | None = None) -> Response:
@@ -219,7 +220,15 @@ def tagged(request: Request, answer: Answer, media_type: str, revision: int | No
     headers = {"ETag": answer.tag, "Cache-Control": "no-cache"}
     if revision is not None:
         headers["Clutchlife-Revision"] = str(revision)
+    if answer.next is not None:
+        headers["Link"] = f'<{_following(request, answer.next)}>; rel="next"'
     return unchanged(request, headers) or Response(content=answer.body, media_type=media_type, headers=headers)
+
+
+def _following(request: Request, cursor: str) -> str:
+    """The address of the next page, relative to this service: behind a proxy its own name is not known."""
+    url = request.url.include_query_params(cursor=cursor)
+    return f"{url.path}?{url.query}"
 
 
 def unchanged(request: Request, headers: Mapping[str, str]) -> Response | None:
@@ -245,3 +254,46 @@ def described_body(schema: type[BaseModel] | dict[str, Any], example: dict[str, 
     described = schema if isinstance(schema, dict) else schema.model_json_schema()
     content = {"application/json": {"schema": described, "example": example}}
     return {"requestBody": {"required": True, "content": content}}
+
+
+class Encodings:
+    """Bodies packed by gzip, both ways; any other encoding of a request's body is refused with 415.
+
+    An answer's entity tag names its bytes, so the packed ones have a tag of their own: the same with a mark.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+        self.packing = GZipMiddleware(app, LEAST_PACKED_BYTES, PACKING_LEVEL)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        headers = MutableHeaders(scope=scope)
+        encoding = headers.get("content-encoding", "identity").strip().lower()
+        if encoding not in ("identity", "gzip"):
+            detail = f"send the body plain or packed by gzip, not by {encoding[:80]!r}"
+            kind = UnsupportedMediaTypeError
+            response = problem(kind.status, kind.slug, kind.title, detail)
+            response.headers["Accept-Encoding"] = "gzip"
+            await response(scope, receive, send)
+            return
+        if encoding == "gzip":
+            del headers["content-encoding"], headers["content-length"]
+            receive = Unpacked(receive)
+        wanted_tags = headers.get("if-none-match", "")
+        if _PACKED in wanted_tags:
+            headers["if-none-match"] = wanted_tags.replace(_PACKED, '"')
+
+        async def tagged(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                answered = MutableHeaders(scope=message)
+                tag = answered.get("etag", "").removesuffix('"') + _PACKED
+                packed = answered.get("content-encoding") == "gzip"
+                if "etag" in answered and (packed or (message["status"] == 304 and tag in wanted_tags)):
+                    answered["etag"] = tag
+            await send(message)
+
+        app = self.app if PARQUET_TYPE in headers.get("accept", "") else self.packing  # it is packed by itself
+        await app(scope, receive, tagged)

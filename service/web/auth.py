@@ -1,15 +1,17 @@
-"""Who may do what: bearer keys with a scope; without any key, this machine only.
+"""Who may do what: bearer keys with a scope and, where they are bound, the clutches that they are for.
 
-Scopes contain each other: `admin` may do what `ingest` may, `ingest` what `read` may. A key is shown once; only its
-sha256 is stored. Without keys a request must come from a loopback address and name a loopback host, so that no page in a
-browser can reach the service under a name of its own.
+Scopes contain each other: `read` looks; `ingest` also adds (clutches, runs, diagnoses); `admin` also changes what stands
+(edits, withdraws, corrects, adopts). A key is shown once; only its sha256 is stored. Once a key was made one is needed for
+ever. Before that a request must come from a loopback address, not through a proxy, and name a loopback host, so that no page
+in a browser can reach the service under a name of its own.
 """
 
 import hashlib
 import ipaddress
 import secrets
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from functools import lru_cache
 from typing import Annotated, Literal, get_args
 
@@ -17,50 +19,108 @@ from fastapi import Depends, Request
 
 from service.errors import FieldError, ForbiddenError, InvalidError, UnauthorizedError
 from service.web.context import Context
-from storage.engine.watch import Watch
+from storage.engine.watch import GrantedKey, Watch
 from storage.keys import KeyRow
 
 Scope = Literal["read", "ingest", "admin"]
 SCOPES: tuple[Scope, ...] = get_args(Scope)
 #: The caller's name where no keys are configured.
 LOCAL = "local"
+#: Headers by which proxies say that a request is another's; all that begin with the prefix, too.
+_OF_PROXIES = {b"forwarded", b"via", b"x-real-ip", b"x-client-ip", b"true-client-ip", b"cf-connecting-ip"}
+_OF_PROXIES_PREFIX = b"x-forwarded-"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Caller:
-    """What a request tells of its sender."""
+    """What a request tells of its sender; `proxy` is a header that a proxy has added."""
 
     authorization: str | None
     address: str | None
     host: str | None
     origin: str | None
+    proxy: str | None = None
 
 
-def make_key(scope: Scope, note: str, *, created_at: str) -> tuple[str, KeyRow]:
-    """A new secret, and the row that knows only its hash."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Grant:
+    """Who asks, and what they may: `clutches` None where all, `key_id` None where no keys are configured."""
+
+    name: str
+    scope: Scope
+    clutches: frozenset[str] | None = None
+    key_id: str | None = None
+
+
+_LOCAL_GRANT = Grant(name=LOCAL, scope="admin")
+
+
+def make_key(
+    scope: Scope, note: str, *, created_at: str, clutches: Iterable[str] | None = None, days: float | None = None
+) -> tuple[str, KeyRow]:
+    """A new secret, and the row that knows only its hash; bound to `clutches`, and expiring after so many days from now."""
     key_id, secret = secrets.token_hex(4), secrets.token_urlsafe(32)
     text = f"clutchlife_{key_id}_{secret}"
     row = KeyRow(
-        key_id=key_id, scope=scope, secret_sha256=_digest(text), note=note, created_at=created_at, revoked_at=None
+        key_id=key_id,
+        scope=scope,
+        secret_sha256=_digest(text),
+        note=note,
+        created_at=created_at,
+        clutches=None if clutches is None else tuple(sorted(set(clutches))),
+        expires_at=None if days is None else _stamp(datetime.now(UTC) + timedelta(days=days)),
     )
     return text, row
 
 
-def authorise(watch: Watch, caller: Caller, scope: Scope) -> str:
-    """Let the caller pass and return its name, or raise UnauthorizedError or ForbiddenError."""
+def authorise(watch: Watch, caller: Caller, scope: Scope, clutch_id: str | None = None) -> Grant:
+    """Let the caller pass and return what it may, or raise UnauthorizedError or ForbiddenError.
+
+    `clutch_id` is the clutch that is asked about; None where it is all of them.
+    """
+    grant = identify(watch, caller)
+    require_scope(grant, scope)
+    _require_own(grant, clutch_id)
+    return grant
+
+
+def identify(watch: Watch, caller: Caller) -> Grant:
+    """Who asks; raises UnauthorizedError, or ForbiddenError where no keys are configured and the caller is not local."""
     if not watch.keys_are_needed():
         _require_loopback(caller)
-        return LOCAL
+        return _LOCAL_GRANT
     scheme, _, text = (caller.authorization or "").partition(" ")
     if scheme.lower() != "bearer" or not text:
         raise UnauthorizedError("send a key as: Authorization: Bearer KEY")
-    granted = watch.key(_digest(text.strip()))
-    if granted is None:
+    key = watch.key(_digest(text.strip()))
+    if key is None:
         raise UnauthorizedError("the key is not known, or was revoked")
-    key_id, its_scope, note = granted
-    if its_scope not in SCOPES[SCOPES.index(scope) :]:
-        raise ForbiddenError(f"this needs the scope {scope}, the key has {its_scope}")
-    return f"key:{key_id} {note}".rstrip()
+    if key.expires_at is not None and key.expires_at <= _stamp(datetime.now(UTC)):
+        raise UnauthorizedError(f"the key expired at {key.expires_at}")
+    return _grant(key)
+
+
+@lru_cache(maxsize=256)
+def _grant(key: GrantedKey) -> Grant:
+    (scope,) = (scope for scope in SCOPES if scope == key.scope)
+    name = f"key:{key.key_id} {key.note}".rstrip()
+    return Grant(name=name, scope=scope, clutches=key.clutches, key_id=key.key_id)
+
+
+def require_scope(grant: Grant, scope: Scope) -> None:
+    """Raise ForbiddenError where the scope is not among those granted."""
+    if SCOPES.index(grant.scope) < SCOPES.index(scope):
+        raise ForbiddenError(f"this needs the scope {scope}, the key has {grant.scope}")
+
+
+def _require_own(grant: Grant, clutch_id: str | None) -> None:
+    if grant.clutches is not None and clutch_id not in grant.clutches:
+        subject = "all clutches" if clutch_id is None else f"clutch {clutch_id[:80]!r}"
+        raise ForbiddenError(f"the key is bound to some clutches, and this is of {subject}")
+
+
+def _stamp(moment: datetime) -> str:
+    return moment.isoformat(timespec="seconds")
 
 
 def _digest(text: str) -> str:
@@ -68,6 +128,11 @@ def _digest(text: str) -> str:
 
 
 def _require_loopback(caller: Caller) -> None:
+    if caller.proxy is not None:
+        raise ForbiddenError(
+            f"no keys are configured: a request with {caller.proxy} came through a proxy and may be anybody's; make a key, "
+            "or serve with --insecure-local"
+        )
     if caller.address is not None and not is_loopback(caller.address):
         raise ForbiddenError(f"no keys are configured: only this machine may ask, not {caller.address}")
     host = (caller.host or "").strip()
@@ -101,34 +166,76 @@ def context_of(request: Request) -> Context:
 
 def caller_of(request: Request) -> Caller:
     """What the request tells of its sender."""
+    first: dict[bytes, str] = {}
+    proxy = None
+    for name, value in request.scope["headers"]:
+        if name in (b"authorization", b"host", b"origin"):
+            first.setdefault(name, value.decode("latin-1"))
+        elif name in _OF_PROXIES or name.startswith(_OF_PROXIES_PREFIX):
+            proxy = name.decode("latin-1").title()
+    address = None if request.client is None else request.client.host
+    if context_of(request).insecure_local:
+        address = proxy = None
     return Caller(
-        authorization=request.headers.get("authorization"),
-        address=None if request.client is None else request.client.host,
-        host=request.headers.get("host"),
-        origin=request.headers.get("origin"),
+        authorization=first.get(b"authorization"),
+        address=address,
+        host=first.get(b"host"),
+        origin=first.get(b"origin"),
+        proxy=proxy,
     )
 
 
-def allowed(scope: Scope) -> Callable[[Request], Awaitable[Context]]:
-    """A dependency that gives the context to callers with that scope and stops the others."""
+def allowed(scope: Scope, *, narrowed: bool = False) -> Callable[[Request], Awaitable[Context]]:
+    """A dependency that gives the context to callers with that scope and stops the others.
+
+    A key that is bound to clutches passes where the path names one of them; elsewhere only where the route itself keeps to
+    them (`narrowed`).
+    """
 
     async def check(request: Request) -> Context:
         context = context_of(request)
+        grant = identify(context.database.watch, caller_of(request))
+        require_scope(grant, scope)
+        request.state.grant = grant
+        if not narrowed:
+            require_clutch(request, clutch_of(request))
         _refuse_unknown_arguments(request)
-        request.state.caller = authorise(context.database.watch, caller_of(request), scope)
+        if grant.key_id is not None:
+            context.key_uses.note(context.database, grant.key_id)
         return context
 
     return check
 
 
+def clutch_of(request: Request) -> str | None:
+    """The clutch that the path names."""
+    clutch_id: str | None = request.scope["path_params"].get("clutch_id")
+    return clutch_id
+
+
 def name_of_caller(request: Request) -> str:
     """Who sent a request that was allowed, as the audit trail names it: a key's id and note, or `local`."""
-    name: str = request.state.caller
-    return name
+    return _grant_of(request).name
 
 
-#: Tables and short lists are answered whole, and take the arguments of a list.
-_OF_LISTS = {"limit", "cursor"}
+def own_clutches(request: Request) -> frozenset[str] | None:
+    """The clutches that an allowed request is bound to, None where to none."""
+    return _grant_of(request).clutches
+
+
+def require(request: Request, scope: Scope) -> None:
+    """Raise ForbiddenError where an allowed request asks for what needs a wider scope."""
+    require_scope(_grant_of(request), scope)
+
+
+def require_clutch(request: Request, clutch_id: str | None) -> None:
+    """Raise ForbiddenError where an allowed request's key is bound to other clutches; None: it is of all of them."""
+    _require_own(_grant_of(request), clutch_id)
+
+
+def _grant_of(request: Request) -> Grant:
+    grant: Grant = request.state.grant
+    return grant
 
 
 def _refuse_unknown_arguments(request: Request) -> None:
@@ -136,7 +243,7 @@ def _refuse_unknown_arguments(request: Request) -> None:
     if not request.scope["query_string"]:
         return
     route = request.scope["route"]
-    arguments = {field.alias for field in route.dependant.query_params} | _OF_LISTS
+    arguments = {field.alias for field in route.dependant.query_params}
     unknown = [name for name in request.query_params if name not in arguments]
     if unknown:
         errors = [
@@ -153,3 +260,7 @@ def _refuse_unknown_arguments(request: Request) -> None:
 
 Reader = Annotated[Context, Depends(allowed("read"))]
 Ingester = Annotated[Context, Depends(allowed("ingest"))]
+Admin = Annotated[Context, Depends(allowed("admin"))]
+#: For routes that name no clutch in their path and keep to the caller's own themselves.
+OwnReader = Annotated[Context, Depends(allowed("read", narrowed=True))]
+OwnIngester = Annotated[Context, Depends(allowed("ingest", narrowed=True))]

@@ -1,6 +1,7 @@
 """What a route is given: the service's parts, and arguments that many routes take."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated
 
 from fastapi import Header, Query
@@ -8,9 +9,10 @@ from fastapi import Header, Query
 from models.prognosis.criteria import HORIZON
 from service.jobs.queue import DiagnosisQueue
 from service.jobs.workers import Workers
-from service.lists import ALL_ITEMS
+from service.lists import ALL_ITEMS, LONGEST_CURSOR
 from service.queries.cache import AnswerCache
-from service.web.limits import LONGEST_CURSOR, MOST_HORIZONS, MOST_ITEMS, MOST_PRESSURE_BAR
+from service.web.key_uses import KeyUses
+from service.web.limits import MOST_HORIZONS, MOST_ITEMS, MOST_PRESSURE_BAR
 from service.web.metrics import Metrics
 from service.web.revalidation import Revalidation
 from storage.engine.database import Database
@@ -26,6 +28,11 @@ class Context:
     diagnoses: DiagnosisQueue
     workers: Workers
     revalidation: Revalidation
+    #: Where files are kept while they come in and go out.
+    folder: Path
+    key_uses: KeyUses = field(default_factory=KeyUses)
+    #: Without keys, requests that a proxy on this machine passes on are answered too.
+    insecure_local: bool = False
 
 
 Limit = Annotated[int, Query(ge=1, le=MOST_ITEMS, description="Items a page")]

@@ -1,8 +1,10 @@
-"""Answers that are files: chosen by `Accept`, made by a worker, sent piece by piece."""
+"""Files that come in and go out: kept beside the database meanwhile; chosen by `Accept`, sent piece by piece."""
 
 import os
 import re
+import shutil
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import BinaryIO
 
 from fastapi import Request
@@ -11,6 +13,17 @@ from fastapi.responses import Response, StreamingResponse
 PARQUET_TYPE = "application/vnd.apache.parquet"
 #: Bytes of a file that are sent at once. Chosen: a few writes to the socket.
 _PIECE = 1 << 18
+
+
+def emptied_folder(database: Path) -> Path:
+    """The folder `FILE-files` beside a database, for files that come in and go out; what a killed service left is gone.
+
+    Beside the database there is room for what is to be stored in it; the system's folder of temporary files may be memory.
+    """
+    folder = database.with_name(f"{database.name}-files")
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(mode=0o700, exist_ok=True)
+    return folder
 
 
 def preferred(request: Request, media_types: Sequence[str]) -> str:

@@ -9,19 +9,28 @@ LARGE_BODY_BYTES = 1 << 17
 MOST_REVALIDATED_BYTES = 32 << 20
 #: Addresses whose answers are found again before the request is looked at. Chosen: a page asks for some twenty a clutch.
 MOST_POLLED = 4096
+#: Bytes of an answer from which it is packed, and how hard. Chosen: shorter ones fit in two packets of a network anyway; no
+#: table of the level.
+LEAST_PACKED_BYTES, PACKING_LEVEL = 2048, 4
 #: Items a page may hold.
 MOST_ITEMS = 1000
 #: Items of a page where no limit is given.
 USUAL_ITEMS = 100
-#: Characters of a cursor that are read. Derived: a clutch's name has 128, base64 makes a third more of them.
-LONGEST_CURSOR = 600
 #: Pressure [bar] and cycles [-] that an argument may name. Derived: a channel's bound; a million times the horizon.
 MOST_PRESSURE_BAR = 1e4
 MOST_HORIZONS = 1e6
 #: Seconds that a POST of a diagnosis waits for its report where it does not say, and at most. Chosen: the contract's
 #: default; what proxies usually let pass.
 WAIT_SECONDS, LONGEST_WAIT_SECONDS = 30, 600
+#: Bytes a second at which a body must arrive, beyond the seconds that it has in any case. Chosen: a modem's line; 1 GiB may
+#: take 4.5 hours.
+SLOWEST_BODY_BYTES_PER_SECOND = 1 << 16
+#: Callers whose shares are kept, and seconds' worth of requests that one may save up. Chosen: more than there are rigs; a
+#: page loads some hundred files at once.
+MOST_CALLERS, SAVED_SECONDS = 10_000, 2.0
 #: Seconds after which a busy service may be asked again.
 RETRY_AFTER_SECONDS = 1
+#: Seconds between two notes of a key's use. Chosen: each is a commit, and whoever looks for unused keys thinks in days.
+USE_NOTED_SECONDS = 3600
 #: Clutches that the metrics read at once.
 METRICS_PAGE = 1000

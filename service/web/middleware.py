@@ -1,10 +1,12 @@
-"""What stands before every address: counts, a bound on the body, headers that browsers heed, and what polls ask again.
+"""What stands before every address: counts, shares, bounds on bodies, headers that browsers heed, and what polls ask again.
 
 A page asks the same again and again. A route that has answered leaves behind how its answer is found again (`remember`):
 where the same address is asked for with the same arguments, and the answer of the revision as it is now is held, that is
 sent, or 304; in every other case, an unknown caller or a changed clutch, the request takes its usual way.
 """
 
+import asyncio
+import math
 import time
 from collections import OrderedDict
 from collections.abc import Callable
@@ -16,21 +18,112 @@ from fastapi.responses import Response
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.errors import ServiceError, TooLargeError
-from service.web.auth import authorise, caller_of, context_of
-from service.web.limits import MOST_POLLED
+from service.errors import ServiceError, TooLargeError, TooManyError, TooSlowError
+from service.web.auth import authorise, caller_of, clutch_of, context_of
+from service.web.limits import (
+    MOST_CALLERS,
+    MOST_POLLED,
+    RETRY_AFTER_SECONDS,
+    SAVED_SECONDS,
+    SLOWEST_BODY_BYTES_PER_SECOND,
+)
 from service.web.metrics import Metrics
 from service.web.problems import problem
 from storage.engine.errors import StorageError
 
 
-class BodyLimit:
-    """Refuses a body over `most` bytes (a file over `most_file`) with 413, announced or grown so far."""
+class Shares:
+    """Each caller has a share: so many requests a second, and so many at once; more are refused with 429.
 
-    def __init__(self, app: ASGIApp, most: int, most_file: int) -> None:
+    What was not asked for two seconds is saved up. A caller is a key that was let in before, else an address: who tries
+    keys has one share. Whether the service lives may always be asked.
+    """
+
+    def __init__(self, app: ASGIApp, per_second: float, at_once: int) -> None:
+        self.app = app
+        self.per_second = per_second
+        self.at_once = at_once
+        self._shares: OrderedDict[str, _Share] = OrderedDict()
+        self._keys: OrderedDict[bytes, str] = OrderedDict()  # by what was sent as Authorization
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http" or scope["path"] in _UNLIMITED:
+            await self.app(scope, receive, send)
+            return
+        sent = next((value for name, value in scope["headers"] if name == b"authorization"), None)
+        share = self._share_of(sent, scope.get("client"))
+        wait = self._wait(share)
+        if wait > 0:
+            await self._refuse(wait, scope, receive, send)
+            return
+        share.running += 1
+        try:
+            await self.app(scope, receive, send)
+        finally:
+            share.running -= 1
+            if sent is not None:
+                self._know(sent, scope)
+
+    def _share_of(self, sent: bytes | None, client: tuple[str, int] | None) -> "_Share":
+        name = None if sent is None else self._keys.get(sent)
+        if name is None:
+            name = "" if client is None else client[0]
+        share = self._shares.get(name)
+        if share is None:
+            share = self._shares[name] = _Share(SAVED_SECONDS * self.per_second, time.monotonic())
+            while len(self._shares) > MOST_CALLERS:
+                self._shares.popitem(last=False)
+        else:
+            self._shares.move_to_end(name)
+        return share
+
+    def _wait(self, share: "_Share") -> float:
+        """Seconds after which the caller may ask again; 0 where it may ask now, which is then taken off its share."""
+        now = time.monotonic()
+        saved = min(SAVED_SECONDS * self.per_second, share.saved + (now - share.at) * self.per_second)
+        share.saved, share.at = saved, now
+        if share.running >= self.at_once:
+            return RETRY_AFTER_SECONDS
+        if saved < 1:
+            return (1 - saved) / self.per_second
+        share.saved -= 1
+        return 0
+
+    def _know(self, sent: bytes, scope: Scope) -> None:
+        grant = scope.get("state", {}).get("grant")
+        if grant is not None and grant.key_id is not None:
+            self._keys[sent] = f"key {grant.key_id}"
+            while len(self._keys) > MOST_CALLERS:
+                self._keys.popitem(last=False)
+
+    async def _refuse(self, wait: float, scope: Scope, receive: Receive, send: Send) -> None:
+        detail = f"one caller may ask {self.per_second:g} times a second and {self.at_once} at once"
+        response = problem(TooManyError.status, TooManyError.slug, TooManyError.title, detail)
+        response.headers["Retry-After"] = str(math.ceil(wait))
+        await response(scope, receive, send)
+
+
+@dataclass(slots=True)
+class _Share:
+    """Requests that a caller has saved up at a moment [s], and how many of its requests run."""
+
+    saved: float
+    at: float
+    running: int = 0
+
+
+_UNLIMITED = ("/livez", "/readyz")
+
+
+class BodyLimit:
+    """Refuses a body over `most` bytes (a file over `most_file`) with 413, announced or grown so far, and one that takes
+    longer than `seconds`, and the time that its bytes so far may take, with 408."""
+
+    def __init__(self, app: ASGIApp, most: int, most_file: int, seconds: float) -> None:
         self.app = app
         self.most = most
         self.most_file = most_file
+        self.seconds = seconds
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -41,12 +134,21 @@ class BodyLimit:
         if announced.isdigit() and int(announced) > most:
             await self._refuse(most, scope, receive, send)
             return
-        taken = 0
+        taken, whole, clock = 0, False, asyncio.get_running_loop().time
+        begun = clock()
 
         async def counted() -> Message:
-            nonlocal taken
-            message = await receive()
+            nonlocal taken, whole
+            if whole:  # what comes now is that the caller has gone
+                return await receive()
+            left = begun + self.seconds + taken / SLOWEST_BODY_BYTES_PER_SECOND - clock()
+            try:
+                async with asyncio.timeout(left):
+                    message = await receive()
+            except TimeoutError:
+                raise TooSlowError(f"{taken} bytes of the body arrived in {clock() - begun:.0f} s") from None
             taken += len(message.get("body", b""))
+            whole = not message.get("more_body", False)
             if taken > most:
                 raise TooLargeError(_detail(most))
             return message
@@ -55,7 +157,6 @@ class BodyLimit:
 
     async def _refuse(self, most: int, scope: Scope, receive: Receive, send: Send) -> None:
         response = problem(TooLargeError.status, TooLargeError.slug, TooLargeError.title, _detail(most))
-        response.headers["Connection"] = "close"
         await response(scope, receive, send)
 
 
@@ -87,30 +188,25 @@ class Heads:
 class SafeHeaders:
     """Nothing is sniffed, framed or told to other hosts; pages may load from this host only.
 
-    No script runs that is not a file of this service; the API's description alone starts from an inline one. The
-    plotting library sets inline styles, saves a chart by way of `blob:` and draws icons from `data:`.
+    No script runs that is not a file of this service. The plotting library sets inline styles, saves a chart by way of
+    `blob:` and draws icons from `data:`.
     """
 
-    _base = (
+    policy = (
         "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; object-src 'none'; "
-        "frame-ancestors 'none'; base-uri 'none'; form-action 'none'; "
+        "frame-ancestors 'none'; base-uri 'none'; form-action 'none'; script-src 'self'"
     )
-    policy = _base + "script-src 'self'"
-    policy_of_description = _base + "script-src 'self' 'unsafe-inline'"
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        described = scope["type"] == "http" and scope["path"].startswith("/docs")
-        policy = self.policy_of_description if described else self.policy
-
         async def with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
                 headers["X-Content-Type-Options"] = "nosniff"
                 headers["Referrer-Policy"] = "no-referrer"
-                headers["Content-Security-Policy"] = policy
+                headers["Content-Security-Policy"] = self.policy
             await send(message)
 
         await self.app(scope, receive, with_headers)
@@ -158,6 +254,7 @@ def remember(request: Request, again: Again) -> None:
 @dataclass(frozen=True, slots=True)
 class _Poll:
     route: Any
+    clutch_id: str | None
     again: Again
 
 
@@ -181,17 +278,21 @@ class Polls:
         await self.app(scope, receive, send)
         again = scope.get(_REMEMBERED)
         if again is not None:
-            self._polls[address] = _Poll(scope["route"], again)
+            self._polls[address] = _Poll(scope["route"], clutch_of(Request(scope)), again)
             while len(self._polls) > MOST_POLLED:
                 self._polls.popitem(last=False)
 
     def _answered(self, poll: _Poll, scope: Scope) -> Response | None:
         request = Request(scope)
         try:
-            authorise(context_of(request).database.watch, caller_of(request), "read")
+            context = context_of(request)
+            grant = authorise(context.database.watch, caller_of(request), "read", poll.clutch_id)
+            request.state.grant = grant
             response = poll.again(request)
         except (ServiceError, StorageError):  # the usual way says what is wrong
             return None
         if response is not None:
             scope["route"] = poll.route  # by which requests are counted
+            if grant.key_id is not None:
+                context.key_uses.note(context.database, grant.key_id)
         return response

@@ -1,5 +1,6 @@
 """Errors as `application/problem+json` (RFC 9457): the one place where what went wrong becomes HTTP."""
 
+import errno
 import http
 import logging
 from typing import Any
@@ -15,10 +16,13 @@ from service.errors import (
     FieldError,
     ForbiddenError,
     InvalidError,
+    NoRoomError,
     NotFoundError,
     NotPossibleNowError,
     ServiceError,
     TooLargeError,
+    TooManyError,
+    TooSlowError,
     UnauthorizedError,
     UnsupportedMediaTypeError,
 )
@@ -28,6 +32,9 @@ from service.web.limits import RETRY_AFTER_SECONDS
 from storage.engine.errors import DatabaseBusy, StorageError
 
 PROBLEM_TYPE = "application/problem+json"
+
+#: The system's words for a full disk, a quota that is used up, and a file that grew too large.
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 _log = logging.getLogger("clutchlife")
 
@@ -45,10 +52,12 @@ def problem(
         "total_errors": total,
     }
     headers = {"Cache-Control": "no-store"}
-    if status == http.HTTPStatus.SERVICE_UNAVAILABLE:
+    if status in (http.HTTPStatus.SERVICE_UNAVAILABLE, http.HTTPStatus.TOO_MANY_REQUESTS):
         headers["Retry-After"] = str(RETRY_AFTER_SECONDS)
     if status == http.HTTPStatus.UNAUTHORIZED:
         headers["WWW-Authenticate"] = "Bearer"
+    if status in (http.HTTPStatus.REQUEST_TIMEOUT, http.HTTPStatus.REQUEST_ENTITY_TOO_LARGE):
+        headers["Connection"] = "close"  # what is left of the body would be read as the next request
     return Response(content=to_json(body), status_code=status, media_type=PROBLEM_TYPE, headers=headers)
 
 
@@ -72,6 +81,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(StorageError, _storage_error)
     app.add_exception_handler(RequestValidationError, _request_error)
     app.add_exception_handler(HTTPException, _http_error)
+    app.add_exception_handler(OSError, _system_error)
     app.add_exception_handler(Exception, _unexpected)
 
 
@@ -113,6 +123,19 @@ def _http_error(_: Request, error: Exception) -> Response:
     return response
 
 
+def _system_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, OSError)  # noqa: S101  (registered for it)
+    if error.errno not in _NO_ROOM:
+        return _unexpected(request, error)
+    _log.error("%s %s: %s", request.method, request.url.path, error)
+    detail = (
+        f"the service's disk has no room for the file ({error.strerror}): nothing was stored; make room and send it again. "
+        "The parts of a form are kept in the system's folder of temporary files, which may be small: send the file as the "
+        "request's body, which is kept beside the database"
+    )
+    return problem(NoRoomError.status, NoRoomError.slug, NoRoomError.title, detail)
+
+
 def _unexpected(request: Request, error: Exception) -> Response:
     _log.error("%s %s", request.method, request.url.path, exc_info=error)
     return problem(500, ServiceError.slug, ServiceError.title, "the service's log says more")
@@ -121,7 +144,7 @@ def _unexpected(request: Request, error: Exception) -> Response:
 #: For the API's description: which problems an address may answer with.
 def described(*kinds: type[ServiceError]) -> dict[int | str, dict[str, Any]]:
     """OpenAPI responses for these problems and for those that every address has."""
-    always: list[type[ServiceError]] = [UnauthorizedError, ForbiddenError, InvalidError]
+    always: list[type[ServiceError]] = [UnauthorizedError, ForbiddenError, InvalidError, TooManyError]
     answers: dict[int | str, dict[str, Any]] = {kind.status: _described(kind.title) for kind in [*always, *kinds]}
     return answers | {503: _described("Busy, or the database cannot be used; try again after Retry-After")}
 
@@ -131,5 +154,6 @@ def _described(title: str) -> dict[str, Any]:
 
 
 READING = described(NotFoundError)
-CHANGING = described(NotFoundError, NotPossibleNowError, TooLargeError, UnsupportedMediaTypeError)
-SENDING = described(NotFoundError, ConflictError, TooLargeError, UnsupportedMediaTypeError)
+_OF_BODIES = (TooLargeError, TooSlowError, UnsupportedMediaTypeError)
+CHANGING = described(NotFoundError, NotPossibleNowError, *_OF_BODIES)
+SENDING = described(NotFoundError, ConflictError, *_OF_BODIES)

@@ -17,12 +17,13 @@ from service.lives.history import stationary_tests_of
 from service.lives.recomputation import Adoption, ClutchState, Results, computed_anew
 from storage import assumptions, changes, clutches, diagnoses
 from storage.assumptions import AdoptedRow
+from storage.changes import NewChange
 from storage.diagnoses import DiagnosisRow
 from storage.engine.database import Database
 
 
-def adopt(database: Database, clutch_id: str, diagnosis_id: str | None, adopted_at: str) -> None:
-    """Adopt a diagnosis's extension, or return to the baseline; all is tracked anew.
+def adopt(database: Database, clutch_id: str, diagnosis_id: str | None, adopted_at: str, by: str = "local") -> None:
+    """Adopt a diagnosis's extension, or return to the baseline, as `by` asked for; all is tracked anew.
 
     What is in force already stays and makes no version. Raises NotFoundError for an unknown clutch or diagnosis,
     NothingToAdoptError where there is nothing to adopt or another life was diagnosed; then nothing was written.
@@ -34,11 +35,17 @@ def adopt(database: Database, clutch_id: str, diagnosis_id: str | None, adopted_
     adoption = None if diagnosed is None else _adoptable(diagnosed)
     if in_force and (adoption is None or _of_present_life(database, clutch_id, adoption)):
         return
-    _change(database, clutch_id, adoption, adopted_at=adopted_at)
+    _change(database, clutch_id, adoption, adopted_at=adopted_at, by=by)
 
 
 def finish_and_adopt(
-    database: Database, clutch_id: str, diagnosis_id: str, ended: Mapping[str, Any], life: str, at: str
+    database: Database,
+    clutch_id: str,
+    diagnosis_id: str,
+    ended: Mapping[str, Any],
+    life: str,
+    at: str,
+    by: str = "local",
 ) -> bool:
     """Store a finished diagnosis and, in the same transaction, adopt its extension; False where there is nothing to adopt.
 
@@ -56,7 +63,7 @@ def finish_and_adopt(
             raise NothingToAdoptError(f"diagnosis {diagnosis_id!r} was ended meanwhile")
 
     try:
-        _change(database, clutch_id, adoption, adopted_at=at, before=finish)
+        _change(database, clutch_id, adoption, adopted_at=at, by=by, before=finish)
     except (
         NothingToAdoptError
     ):  # a rebuild or a correction came meanwhile, or another service declared the diagnosis failed
@@ -70,6 +77,7 @@ def _change(
     adoption: Adoption | None,
     *,
     adopted_at: str,
+    by: str,
     before: Callable[[Connection], None] | None = None,
 ) -> None:
     """Compute under the new model and store, again where the clutch has changed meanwhile."""
@@ -88,15 +96,19 @@ def _change(
             row = AdoptedRow(version=version, diagnosis_id=diagnosis_id, adopted_at=adopted_at)
             assumptions.insert_adoption(connection, clutch_id, row)
             records.store(connection, clutch_id, results)
-            clutches.bump_revision(connection, clutch_id)
+            change = NewChange(
+                clutch_id=clutch_id,
+                run_id=None,
+                at=adopted_at,
+                by=by,
+                action=changes.ADOPT,
+                reason="",
+                before={"diagnosis_id": None if newest is None else newest.diagnosis_id},
+                after={"diagnosis_id": diagnosis_id},
+                revision=clutches.bump_revision(connection, clutch_id),
+            )
+            changes.insert(connection, change)
             return
-        if before is not None:
-            before(connection)
-        row = AdoptedRow(version=version + 1, diagnosis_id=diagnosis_id, adopted_at=adopted_at)
-        assumptions.insert_adoption(connection, clutch_id, row)
-        records.store(connection, clutch_id, results)
-        clutches.bump_revision(connection, clutch_id)
-        return
 
 
 def _computed(database: Database, clutch_id: str, adoption: Adoption | None) -> tuple[ClutchState, Results]:

@@ -84,11 +84,14 @@ def ingest(
         stored = runs.get(connection, clutch_id, run.run_id)
     if stored is not None:
         return _repeat(stored, run), False
-    with ThreadPoolExecutor(1) as beside:  # deflating a long record lets its cutting run
-        encoding = beside.submit(channels.encoded, run.channels)
-        analysis = analyse(run, records.record(clutch).geometry.to_model())
-        columns = encoding.result()
-    sampled = "time_s" in run.channels
+    geometry, sampled = records.record(clutch).geometry.to_model(), "time_s" in run.channels
+    if sampled:
+        with ThreadPoolExecutor(1) as beside:  # deflating a long record lets its cutting run
+            encoding = beside.submit(channels.encoded, run.channels)
+            analysis = analyse(run, geometry)
+            columns = encoding.result()
+    else:  # a thread takes longer to begin than a few plateaus to deflate
+        analysis, columns = analyse(run, geometry), channels.encoded(run.channels)
     if sampled and run.kind == STATIONARY:  # loops are yet to be fitted; another long record need not be held twice
         run = replace(run, channels={})
     arrival = Arrival(run=run, sampled=sampled, analysis=analysis, received_at=received_at)
@@ -130,6 +133,7 @@ def _computed(database: Database, clutch_id: str, arrival: Arrival) -> _Outcome:
         cofs=event.cofs,
         loops=_own_loops(state, event, levels, arrival.run),
         warnings=arrival.analysis.warnings,
+        engagement=arrival.analysis.engagement,
     )
     doubtful = doubts(arrival.run, arrival.analysis, event, before)
     if doubtful:
@@ -167,8 +171,8 @@ def _among(
             event = replace(event, cofs=cofs)
             corrected, state = {event.run_id: cofs}, replace(state, events=(*state.events[:-1], event))
     tracking = track(state, newest=event)
-    noticed = answer["warnings"] + history_warnings(state.lives, tracking.warnings)[event.run_id]
-    changed = {event.run_id: answer | {"warnings": noticed}}
+    noticed = history_warnings(state.lives, tracking.warnings, run_id=event.run_id)[event.run_id]
+    changed = {event.run_id: answer | {"warnings": answer["warnings"] + noticed}}
     evaluated = _evaluated(before, state, event)
     outdated = evaluated != stationary_tests_of(state.events)
     if tracking.anew or outdated:
@@ -222,6 +226,7 @@ def _store(
         code_version=CODE_VERSION,
         state=outcome.state,
         doubts=notice_items(outcome.doubts),
+        received_by=by,
     )
     run_key = runs.insert(connection, row)
     channels.write(connection, run_key, columns)
@@ -255,6 +260,7 @@ def _event_of(arrival: Arrival) -> Event:
         cycles=run.cycles,
         moment=moment_of(run.started_at, arrival.received_at),
         speed_range=arrival.analysis.speed_range,
+        oil_temperature=arrival.analysis.oil_temperature,
         rebuild=maintenance == REBUILD,
         shift=maintenance not in (None, REBUILD),
         duty=duty_block(run.cycles, *(duty.get(name) for name in names)),

@@ -17,6 +17,7 @@ from models.prognosis.scoring import measured_end
 from service import records
 from service.background import AtOnce, directly
 from service.lives.assumptions import ALL_PRESSURES, Assumptions, kind_of
+from service.lives.criteria import MOST_ATTEMPTS
 from service.lives.history import Life
 from service.lives.payloads import warned_anew
 from service.lives.recomputation import ClutchState, Results, track
@@ -26,9 +27,6 @@ from storage import assumptions, clutches, results
 from storage.assumptions import NOBODY, FleetPriorRow
 from storage.encoding.json_text import Json, to_text
 from storage.engine.database import Database
-
-#: How often a clutch is tracked anew where runs come meanwhile. Chosen: at a run each time it could go on for ever.
-_ATTEMPTS = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,7 +169,7 @@ def _versions(fleet: Fleet, version: int, now: str) -> Sequence[FleetPriorRow]:
 
 def _brought_up(database: Database, clutch_id: str, at_once: AtOnce) -> _Outcome:
     """Track a clutch anew where its stored predictions were made under another prior."""
-    for _ in range(_ATTEMPTS):
+    for _ in range(MOST_ATTEMPTS):
         with database.reading() as connection:
             state = records.state(connection, clutch_id, newest_prior=True)
             last = results.prediction_at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)

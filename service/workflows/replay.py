@@ -2,6 +2,8 @@
 
 from service import records, stored_runs
 from service.background import AtOnce, directly
+from service.errors import BusyError
+from service.lives.criteria import MOST_ATTEMPTS
 from service.lives.recomputation import ClutchState
 from storage import clutches
 from storage.engine.database import Database
@@ -14,16 +16,20 @@ def clutch_ids(database: Database) -> list[str]:
 
 
 def replay_clutch(database: Database, clutch_id: str, at_once: AtOnce = directly) -> int:
-    """Fit and track all runs of a clutch anew; returns how many. Raises NotFoundError.
+    """Fit and track all runs of a clutch anew; returns how many. Raises NotFoundError, and BusyError where runs came at each
+    of MOST_ATTEMPTS.
 
     The revision moves on only where a result has changed. Stored by `at_once`.
     """
-    while True:
+    for _ in range(MOST_ATTEMPTS):
         with database.reading() as connection:
             state = records.state(connection, clutch_id)
         replayed = stored_runs.recomputed(database, state)
         if at_once(_replaced, database, state, replayed):
             return len(replayed.receipts)
+    raise BusyError(
+        f"left as it was: runs came each of the {MOST_ATTEMPTS} times that it was computed anew; replay it when fewer come"
+    )
 
 
 def _replaced(database: Database, state: ClutchState, replayed: stored_runs.Recomputed) -> bool:

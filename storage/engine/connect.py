@@ -10,15 +10,17 @@ import math
 import sqlite3
 import time
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 
-from sqlalchemy import URL, Engine, create_engine, event
+from sqlalchemy import Engine, create_engine, event
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool, QueuePool
 
 from storage.engine.errors import StorageUnavailable
 
 #: Write-ahead logging: readers and a commit do not wait for each other.
 JOURNAL_MODE = "wal"
+_DIALECT = "sqlite+pysqlite://"
 #: Seconds between two attempts to change the journal mode.
 _MODE_RETRY = 0.02
 
@@ -42,6 +44,12 @@ def wanted_journal_mode(path: Path, lock_timeout: float) -> str | None:
     """JOURNAL_MODE where the file is in it already, None where it is not. Read without changing it."""
     with closing(sqlite3.connect(path, timeout=lock_timeout, isolation_level=None)) as connection:
         return JOURNAL_MODE if _mode(connection) == JOURNAL_MODE else None
+
+
+def found_journal_mode(path: Path, lock_timeout: float) -> str:
+    """The journal mode that an existing file is in, read without changing it."""
+    with closing(connect_shared(path, lock_timeout, writable=False)) as connection:
+        return _mode(connection)
 
 
 def set_journal_mode(path: Path, lock_timeout: float) -> str:
@@ -76,19 +84,32 @@ def _mode(connection: sqlite3.Connection) -> str:
     return str(connection.execute("PRAGMA journal_mode").fetchone()[0])
 
 
-def make_engine(path: Path, lock_timeout: float, *, foreign_keys: bool = True, pooled: bool = True) -> Engine:
+def read_only(path: Path) -> str:
+    """The file's URI for connections that only read: they make no file where it is missing, and write back no log."""
+    return f"{path.absolute().as_uri()}?mode=ro"
+
+
+def connect_shared(path: Path, lock_timeout: float, *, writable: bool) -> sqlite3.Connection:
+    """A connection of the driver that threads may share. Its transactions begin by statements alone."""
+    address = str(path) if writable else read_only(path)
+    return sqlite3.connect(
+        address, uri=not writable, timeout=lock_timeout, isolation_level=None, check_same_thread=False
+    )
+
+
+def make_engine(
+    path: Path, lock_timeout: float, *, foreign_keys: bool = True, pooled: bool = True, writable: bool = True
+) -> Engine:
     """An engine on the file, with the settings of every connection. Its user begins each transaction by a statement."""
-    url = URL.create("sqlite+pysqlite", database=str(path))
-    arguments = {"timeout": lock_timeout, "check_same_thread": False}
+    connect = partial(connect_shared, path, lock_timeout, writable=writable)
     if pooled:
         # No upper bound: a connection is cheap, and the threads that use one are bounded elsewhere.
-        engine = create_engine(url, connect_args=arguments, poolclass=QueuePool, pool_size=8, max_overflow=-1)
+        engine = create_engine(_DIALECT, creator=connect, poolclass=QueuePool, pool_size=8, max_overflow=-1)
     else:
-        engine = create_engine(url, connect_args=arguments, poolclass=NullPool)
+        engine = create_engine(_DIALECT, creator=connect, poolclass=NullPool)
 
     @event.listens_for(engine, "connect")
     def prepare(connection: sqlite3.Connection, _: ConnectionPoolEntry) -> None:
-        connection.isolation_level = None
         connection.execute(f"PRAGMA foreign_keys={'ON' if foreign_keys else 'OFF'}")
         connection.execute("PRAGMA synchronous=FULL")
         # A transaction larger than the cache would lock readers out before it commits.

@@ -1,44 +1,93 @@
 """The open database: what the rest of the program holds, and how it comes to be."""
 
 import sqlite3
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, nullcontext
 from pathlib import Path
 
+from sqlalchemy import Connection
 from sqlalchemy.exc import OperationalError
 
-from storage.engine.backup import copy
-from storage.engine.connect import make_engine, path_of, set_journal_mode, wanted_journal_mode
-from storage.engine.errors import DatabaseTooNew, StorageUnavailable
+from storage.engine.backup import copy, copy_beside
+from storage.engine.connect import found_journal_mode, make_engine, path_of, set_journal_mode, wanted_journal_mode
+from storage.engine.errors import DatabaseTooNew, DatabaseTooOld, StorageUnavailable
 from storage.engine.health import is_ready
 from storage.engine.limits import LOCK_TIMEOUT
+from storage.engine.private_files import make_if_missing
+from storage.engine.service_lock import service_lock
 from storage.engine.transactions import Transactions, transaction, translated
 from storage.engine.write_lock import WriteLock
 from storage.migrations.upgrade import current, head, revisions, upgrade
 
 
 class Database(Transactions):
-    """An open database: its transactions, its health and its backups. Made by `open_database`."""
+    """An open database: its transactions and its health. Made by `open_database`."""
 
-    def __init__(self, path: Path, *, journal_mode: str, lock_timeout: float) -> None:
-        super().__init__(path, lock_timeout)
+    def __init__(self, path: Path, *, journal_mode: str, lock_timeout: float, writable: bool = True) -> None:
+        super().__init__(path, lock_timeout, writable=writable)
         self.journal_mode = journal_mode
 
     def ready(self) -> bool:
         """Whether the file is there, answers at the code's revision, and could be written. Leaves nothing written."""
         return is_ready(self)
 
-    def backup(self, path: Path) -> None:
-        """A consistent copy at `path` while others read and write. Raises FileExistsError where `path` exists."""
-        self.refuse_closed()
-        with translated(self.path):
-            copy(self.path, path, lock_timeout=self.lock_timeout)
+
+class FoundDatabase(Database):
+    """A database that is only read, at the revision that it was found at. Made by `find_database`."""
+
+    @contextmanager
+    def reading(self) -> Iterator[Connection]:
+        """As every database's; raises DatabaseTooOld where what is asked for came with a later revision."""
+        with super().reading() as connection:
+            try:
+                yield connection
+            except OperationalError as error:
+                revision = current(connection)
+                if revision == head():
+                    raise
+                raise DatabaseTooOld(
+                    f"{self.path} is at revision {revision}, this needs {head()}: `clutchlife serve` brings it there, "
+                    "and keeps a copy of the file beside it"
+                ) from error
 
 
-def open_database(url: str, *, lock_timeout: float = LOCK_TIMEOUT) -> Database:
+def find_database(url: str, *, lock_timeout: float = LOCK_TIMEOUT) -> FoundDatabase:
+    """Open `sqlite:///path` to read it as it is, whatever its revision up to this code's; nothing is made or migrated.
+
+    Raises ValueError and DatabaseTooNew as `open_database` does, StorageUnavailable where there is no such file.
+    """
+    path = path_of(url)
+    with translated(path):
+        journal_mode = found_journal_mode(path, lock_timeout)
+    database = FoundDatabase(path, journal_mode=journal_mode, lock_timeout=lock_timeout, writable=False)
+    try:
+        with database.reading() as connection:
+            _refuse_newer(current(connection))
+    except BaseException:
+        database.close()
+        raise
+    return database
+
+
+def back_up(url: str, target: Path, *, lock_timeout: float = LOCK_TIMEOUT) -> None:
+    """A consistent copy of the database at `target`, at the revision that it is at, while others read and write.
+
+    Raises FileExistsError where `target` exists, ValueError and StorageUnavailable as `find_database` does.
+    """
+    path = path_of(url)
+    with translated(path):
+        copy(path, target, lock_timeout=lock_timeout)
+
+
+def open_database(url: str, *, lock_timeout: float = LOCK_TIMEOUT, serving: bool = False) -> Database:
     """Open `sqlite:///path` (`sqlite:////path` where it is absolute), make the file and run the migrations it lacks.
 
+    A file is copied before it is migrated, to `FILE-before-REVISION` beside it, and is not migrated under a running service;
+    `serving`: it is the service itself that opens it, and holds `service_lock`.
+
     Raises ValueError on another scheme or a database in memory, DatabaseTooNew on the file of a newer release,
-    StorageUnavailable where the file cannot be used, DatabaseBusy where others hold it for `lock_timeout` [s].
+    StorageUnavailable where the file cannot be used, DatabaseBusy where others hold it for `lock_timeout` [s], ServiceRuns
+    where it is to be migrated and a service uses it.
 
     A file that has its log and lacks no migration is only read, without the write lock: a process that yields to all
     others would hold it for as long as they are busy.
@@ -48,8 +97,9 @@ def open_database(url: str, *, lock_timeout: float = LOCK_TIMEOUT) -> Database:
         journal_mode = _mode_if_up_to_date(path, lock_timeout)
         if journal_mode is None:
             with closing(WriteLock(path, lock_timeout)) as lock, lock.held():
+                make_if_missing(path)
                 journal_mode = set_journal_mode(path, lock_timeout)
-                _migrate(path, lock_timeout)
+                _migrate(path, lock_timeout, serving=serving)
     return Database(path, journal_mode=journal_mode, lock_timeout=lock_timeout)
 
 
@@ -67,20 +117,28 @@ def _mode_if_up_to_date(path: Path, lock_timeout: float) -> str | None:
         return None
 
 
-def _migrate(path: Path, lock_timeout: float) -> None:
-    """Run the missing steps in one immediate transaction: of two processes that start at once, one waits."""
+def _migrate(path: Path, lock_timeout: float, *, serving: bool) -> None:
+    """Run the missing steps in one immediate transaction; the caller holds the write lock, so that one process does."""
     # A step may rebuild a table that others refer to, so keys are checked once at the end.
     engine = make_engine(path, lock_timeout, foreign_keys=False, pooled=False)
     with transaction(engine, "BEGIN") as connection:
-        if current(connection) == head():
-            return
-    with transaction(engine, "BEGIN IMMEDIATE") as connection:
         revision = current(connection)
-        if revision is not None and revision not in revisions():
-            raise DatabaseTooNew(
-                f"the database is at revision {revision}, this release knows up to {head()}: use a newer one"
-            )
-        upgrade(connection)
-        broken = connection.exec_driver_sql("PRAGMA foreign_key_check").fetchall()
-        if broken:
-            raise StorageUnavailable(f"{path} holds rows that refer to missing rows: {broken[:5]}")
+    if revision == head():
+        return
+    _refuse_newer(revision)
+    in_use = revision is not None
+    with service_lock(path) if in_use and not serving else nullcontext():
+        if in_use:
+            copy_beside(path, f"before-{head()}", lock_timeout=lock_timeout)
+        with transaction(engine, "BEGIN IMMEDIATE") as connection:
+            upgrade(connection)
+            broken = connection.exec_driver_sql("PRAGMA foreign_key_check").fetchall()
+            if broken:
+                raise StorageUnavailable(f"{path} holds rows that refer to missing rows: {broken[:5]}")
+
+
+def _refuse_newer(revision: str | None) -> None:
+    if revision is not None and revision not in revisions():
+        raise DatabaseTooNew(
+            f"the database is at revision {revision}, this release knows up to {head()}: use a newer one"
+        )

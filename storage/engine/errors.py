@@ -18,5 +18,13 @@ class DatabaseTooNew(StorageError):
     """The file was written by a newer release of this program."""
 
 
+class DatabaseTooOld(StorageError):
+    """The file is at an earlier revision than what is asked of it, and is only read."""
+
+
+class ServiceRuns(StorageError):
+    """A service uses the file."""
+
+
 class DamagedData(StorageError):
     """A stored array does not decode to what was stored."""

@@ -40,14 +40,14 @@ def transaction(engine: Engine, begin: str) -> Iterator[Connection]:
 class Transactions:
     """The transactions of a database file. Threads share it; `close` it at the end."""
 
-    def __init__(self, path: Path, lock_timeout: float) -> None:
+    def __init__(self, path: Path, lock_timeout: float, *, writable: bool = True) -> None:
         self.path = path
         self.lock_timeout = lock_timeout
         self._write_lock = WriteLock(path, lock_timeout)
         self._closed = False
-        self._engine = make_engine(path, lock_timeout)
+        self._engine = make_engine(path, lock_timeout, writable=writable)
         with translated(path):
-            self.watch = Watch(path, lock_timeout)
+            self.watch = Watch(path, lock_timeout, writable=writable)
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:

@@ -3,28 +3,43 @@
 A row that was read is kept until something is committed.
 """
 
-import sqlite3
+import json
 import threading
+from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from storage.engine.connect import connect_shared
 from storage.engine.driver_errors import DRIVER_ERRORS, store_error
 from storage.engine.errors import StorageUnavailable
 
 #: Rows that are kept at most. Chosen: some clutches and keys; all are forgotten when there are more.
 _MOST_ROWS = 10_000
+_KEY = "SELECT key_id, scope, note, clutches, expires_at FROM access_key WHERE secret_sha256 = ? AND revoked_at IS NULL"
+
+
+@dataclass(frozen=True, slots=True)
+class GrantedKey:
+    """What an active key grants: `clutches` None where it is bound to none, `expires_at` None where it does not expire."""
+
+    key_id: str
+    scope: str
+    note: str
+    clutches: frozenset[str] | None
+    expires_at: str | None
 
 
 class Watch:
     """A connection of its own, shared by threads. With a write-ahead log it waits for nobody."""
 
-    def __init__(self, path: Path, lock_timeout: float) -> None:
+    def __init__(self, path: Path, lock_timeout: float, *, writable: bool = True) -> None:
         self._path = path
         self._lock = threading.Lock()
         self._rows: dict[tuple[str, tuple[object, ...]], tuple[Any, ...] | None] = {}
         self._rows_version = -1
         self._closed = False
-        self._connection = sqlite3.connect(path, timeout=lock_timeout, isolation_level=None, check_same_thread=False)
+        self._connection = connect_shared(path, lock_timeout, writable=writable)
 
     def version(self) -> int:
         """A number that changes with every commit, whichever process made it. Compare it only within this object.
@@ -39,15 +54,15 @@ class Watch:
         row = self._row("SELECT revision FROM clutch WHERE clutch_id = ?", clutch_id)
         return None if row is None else int(row[0])
 
-    def key(self, secret_sha256: str) -> tuple[str, str, str] | None:
-        """The id, scope and note of the active key with this hash; None where there is none."""
-        query = "SELECT key_id, scope, note FROM access_key WHERE secret_sha256 = ? AND revoked_at IS NULL"
-        row = self._row(query, secret_sha256)
-        return None if row is None else (row[0], row[1], row[2])
+    def key(self, secret_sha256: str) -> GrantedKey | None:
+        """What the key with this hash grants; None where there is none or it was revoked. Whether it has expired the caller
+        looks at."""
+        row = self._row(_KEY, secret_sha256)
+        return None if row is None else _granted(row)
 
     def keys_are_needed(self) -> bool:
-        """Whether any key is active."""
-        row = self._row("SELECT EXISTS (SELECT 1 FROM access_key WHERE revoked_at IS NULL)")
+        """Whether a key was ever made: revoking the last one opens nothing."""
+        row = self._row("SELECT EXISTS (SELECT 1 FROM access_key)")
         return row is not None and bool(row[0])
 
     def _row(self, query: str, *values: object) -> tuple[Any, ...] | None:
@@ -84,3 +99,9 @@ class Watch:
                 raise
             raise own from error
         return rows[0] if rows else None
+
+
+@lru_cache(maxsize=256)
+def _granted(row: tuple[Any, ...]) -> GrantedKey:
+    key_id, scope, note, clutches, expires_at = row
+    return GrantedKey(key_id, scope, note, None if clutches is None else frozenset(json.loads(clutches)), expires_at)

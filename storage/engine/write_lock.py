@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from storage.engine.errors import DatabaseBusy, StorageUnavailable
+from storage.engine.private_files import MODE
 
 #: [s] Between two attempts to take the lock from another process: first and longest. Chosen: a commit takes 1 to 5 ms.
 _FIRST_RETRY, _LONGEST_RETRY = 0.0005, 0.005
@@ -57,7 +58,7 @@ class WriteLock:
     def _opened(self) -> int:
         if self._file is None:
             try:
-                self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+                self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, MODE)
             except OSError as error:
                 raise StorageUnavailable(
                     f"{self._path}: the lock of the database cannot be opened ({error})"

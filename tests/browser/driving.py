@@ -93,7 +93,7 @@ class Watched:
         """Close the page; it must have behaved."""
         found = (self.violations(), self.abroad(), self.errors())
         self.context.close()
-        assert found == ([], [], [])
+        assert found == ([], [], []), found
 
 
 _ENGINE = """

@@ -35,3 +35,11 @@ def test_the_api_describes_itself_without_the_internet(server: Server, browser: 
     assert page.get_by_role("heading", name="Clutchlife").is_visible()
     assert [url for url in requested if not url.startswith((server.url, "data:"))] == []
     assert [line for line in logged if line.startswith(("error", "Refused"))] == []
+    ran = page.evaluate("""() => {
+      const script = document.createElement("script");
+      script.textContent = "window.ran = true";
+      document.body.append(script);
+      return window.ran === true;
+    }""")
+    assert not ran, "a script in the page would reach the key that the dashboard keeps"
+    assert any("Content Security Policy" in line for line in logged)

@@ -8,7 +8,7 @@ import argparse
 import time
 from collections.abc import Callable
 
-from tests.score import off_prior, on_prior
+from tests.score import off_prior, on_prior, paper
 from tests.score.after_end import after_end
 from tests.score.belief import belief
 from tests.score.fleets import fleets
@@ -36,6 +36,9 @@ def main() -> None:
         "never": lambda: off_prior.never(lives(1_000), seed + 4),
         "events": lambda: off_prior.after_event(lives(100), seed + 5),
         "fleets": lambda: fleets(lives(40), seed + 6),
+        "slopes": lambda: paper.slopes(lives(200), seed + 9),
+        "shudder": lambda: paper.shudder(lives(500), seed + 10),
+        "lag": lambda: paper.lag(lives(200), seed + 11),
         "after": lambda: after_end(lives(100), seed + 8),
     }
     for name in chosen.parts or parts:

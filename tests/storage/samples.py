@@ -9,13 +9,15 @@ from pathlib import Path
 from typing import IO
 
 import numpy as np
+import pytest
+from alembic import command
 from numpy.typing import NDArray
 from sqlalchemy import Connection
 
 from storage import channels, clutches, diagnoses, runs
 from storage.clutches import ClutchRow
 from storage.diagnoses import NewDiagnosis
-from storage.engine.database import Database
+from storage.engine.database import Database, open_database
 from storage.results import FitRow
 from storage.runs import NewRun
 
@@ -126,6 +128,33 @@ def child(script: str, *arguments: object) -> Iterator[tuple["subprocess.Popen[s
             yield process, process.stdin, process.stdout
         finally:
             process.kill()
+
+
+#: A revision of an earlier release, before runs had states.
+OLD = "s0004_prediction_gain"
+
+
+def old_database(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A file that an earlier release has left, at revision OLD, with a clutch; one file without a log."""
+    path = folder / "old.db"
+    whole = command.upgrade
+    with monkeypatch.context() as earlier:
+        earlier.setattr(command, "upgrade", lambda config, _: whole(config, OLD))
+        open_database(f"sqlite:///{path}").close()
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute("PRAGMA journal_mode=DELETE")
+        connection.execute(
+            "INSERT INTO clutch (clutch_id, record, content_sha256, created_at, revision, rank, summary) "
+            "VALUES ('bench3-017', '{\"clutch_id\": \"bench3-017\"}', '', '', 0, 0, '{}')"
+        )
+    return path
+
+
+def revision(path: Path) -> str:
+    """The revision that a file is at."""
+    with closing(sqlite3.connect(path)) as connection:
+        found: str = connection.execute("SELECT version_num FROM alembic_version").fetchone()[0]
+    return found
 
 
 def integrity(path: Path) -> list[str]:

@@ -1,11 +1,17 @@
 """Access keys: each function against a real file."""
 
+from dataclasses import replace
+
 import pytest
 from sqlalchemy.exc import IntegrityError
 
 from storage import keys
 from storage.engine.database import Database
+from storage.engine.watch import GrantedKey
 from storage.keys import KeyRow
+
+#: When the tests are.
+NOW = "2026-06-01T00:00:00+00:00"
 
 
 def key(key_id: str, secret: str, created_at: str = "2026-01-01T00:00:00Z") -> KeyRow:
@@ -18,20 +24,20 @@ def test_a_key_opens_until_it_is_revoked(database: Database) -> None:
     with database.writing() as connection:
         keys.insert(connection, key("k2", "bb"))
         keys.insert(connection, key("k1", "aa", "2026-02-01T00:00:00Z"))
-        assert keys.any_active(connection)
+        assert keys.any_active(connection, NOW)
     assert watch.keys_are_needed()
-    assert [watch.key(secret) for secret in ("aa", "cc")] == [("k1", "ingest", "bench 3"), None]
+    assert [watch.key(secret) for secret in ("aa", "cc")] == [GrantedKey("k1", "ingest", "bench 3", None, None), None]
     with database.writing() as connection:
         assert keys.revoke(connection, "k2", "2026-03-01T00:00:00Z")
         assert not keys.revoke(connection, "k2", "2026-04-01T00:00:00Z")
         assert not keys.revoke(connection, "unknown", "2026-04-01T00:00:00Z")
-        assert keys.any_active(connection)
+        assert keys.any_active(connection, NOW)
     assert watch.key("bb") is None
     with database.writing() as connection:
         keys.revoke(connection, "k1", "2026-03-02T00:00:00Z")
-        assert not keys.any_active(connection)
+        assert not keys.any_active(connection, NOW)
         listed = keys.all_keys(connection)
-    assert not watch.keys_are_needed()
+    assert watch.keys_are_needed(), "revoking the last key opens nothing"
     assert [(row.key_id, row.revoked_at) for row in listed] == [
         ("k2", "2026-03-01T00:00:00Z"),
         ("k1", "2026-03-02T00:00:00Z"),
@@ -44,3 +50,17 @@ def test_a_key_id_and_a_secret_are_taken_once(database: Database, second: KeyRow
         keys.insert(connection, key("k1", "aa"))
     with pytest.raises(IntegrityError, match="UNIQUE"), database.writing() as connection:
         keys.insert(connection, second)
+
+
+def test_a_key_keeps_its_clutches_and_its_last_use(database: Database) -> None:
+    bound = replace(key("k1", "aa"), clutches=("c1", "c2"), expires_at="2026-05-01T00:00:00+00:00")
+    with database.writing() as connection:
+        assert not keys.any_ever(connection)
+        keys.insert(connection, bound)
+        assert keys.any_ever(connection)
+        assert not keys.any_active(connection, NOW), "it has expired"
+        assert keys.any_active(connection, "2026-04-30T00:00:00+00:00")
+        keys.note_use(connection, "k1", NOW)
+        assert keys.all_keys(connection) == [replace(bound, last_used_at=NOW)]
+    granted = database.watch.key("aa")
+    assert granted == GrantedKey("k1", "ingest", "bench 3", frozenset({"c1", "c2"}), bound.expires_at)

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.diagnosis.attribution.check import Checks
-from models.diagnosis.attribution.evidence import Hypothesis
+from models.diagnosis.attribution.evidence import Hypothesis, HypothesisStatus
 from models.diagnosis.attribution.posterior import (
     PriorOdds,
     kept_share,
@@ -132,12 +132,13 @@ def judge(
         return Judgement(verdict=Verdict.UNEXPLAINED_STRUCTURE)
     best, odds = _best(singles, [hypothesis for hypothesis in usable if len(hypothesis.effects) == 2], checks)
     credible = credible_set(best, usable, odds, checks)
+    leader = credible[0] if credible else best  # the best may have failed its check, and another be promoted
     comparison = Comparison(
-        best_drop=best.drop,
+        best_drop=leader.drop,
         structure=structure,
-        tolerance=best.tolerance,
+        tolerance=leader.tolerance,
         credible=len(credible),
-        check=checks(credible[0] if credible else best),
+        check=checks(leader),
     )
     probabilities = probabilities_of(hypotheses, best, odds, checks.excess, structure)
     causes = tuple(dict.fromkeys(slug for hypothesis in credible for slug in hypothesis.slugs))
@@ -147,7 +148,7 @@ def judge(
         probabilities = with_unmeasured(probabilities, unmeasured, best)
         causes = tuple(dict.fromkeys((temperature, *causes)))
         comparison = replace(comparison, unmeasured=unmeasured)
-    elif not credible or not _leads(best, odds, structure):
+    elif not credible or not _leads(leader, odds, structure):
         share = kept_share(best, checks(best))
         return Judgement(
             verdict=Verdict.UNEXPLAINED_STRUCTURE,
@@ -156,7 +157,8 @@ def judge(
         )
     elif imitable & set(causes):
         imitated, causes = True, (*causes, temperature)
-    doubtful = imitated or len(credible) > 1 or not _remainder_is_noise(best, comparison)
+    unfinished = leader.status is HypothesisStatus.OUT_OF_STEPS
+    doubtful = imitated or unfinished or len(credible) > 1 or not _remainder_is_noise(leader, comparison)
     likely = () if doubtful else _likely(causes, probabilities)
     named = bool(likely) and probabilities[likely[0]] >= LEAST_NAMED
     return Judgement(
@@ -213,16 +215,16 @@ def credible_set(
     return tuple(hypothesis for hypothesis in near if passed and checks(hypothesis).excess <= CREDIBLE_MARGIN)
 
 
-def _leads(best: Hypothesis, odds: PriorOdds, structure: float) -> bool:
-    """Whether the best has evidence over nothing and over structure without a name."""
-    unexplained = structure - AXES_LOG_ODDS - STRUCTURE_SHARE * max(best.drop - STRUCTURE_FROM, 0.0)
-    return best.evidence - odds(best) >= max(LEAST_EVIDENCE, unexplained)
+def _leads(leader: Hypothesis, odds: PriorOdds, structure: float) -> bool:
+    """Whether a hypothesis has evidence over nothing and over structure without a name."""
+    unexplained = structure - AXES_LOG_ODDS - STRUCTURE_SHARE * max(leader.drop - STRUCTURE_FROM, 0.0)
+    return leader.evidence - odds(leader) >= max(LEAST_EVIDENCE, unexplained)
 
 
-def _remainder_is_noise(best: Hypothesis, comparison: Comparison) -> bool:
+def _remainder_is_noise(leader: Hypothesis, comparison: Comparison) -> bool:
     """Whether what is left (of two causes the parts, too) is no oddity, beyond what a right template leaves."""
     check = comparison.check
-    p_value = check.left.p_value if len(best.effects) == 1 else min(check.left.p_value, check.parts.p_value)
+    p_value = check.left.p_value if len(leader.effects) == 1 else min(check.left.p_value, check.parts.p_value)
     return bool(p_value * np.exp(min(comparison.tolerance, MOST_LEFT)) >= LEAST_REMAINDER_P_VALUE)
 
 

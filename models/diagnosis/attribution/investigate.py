@@ -1,11 +1,11 @@
 """The investigation of a baseline: its alarms, and where they call for it a search of hypotheses.
 
-What the baseline had missed may raise an alarm, or hide what did. So where the search finds a better baseline, everything is
-computed once more against that.
+What the baseline had missed may raise an alarm, or hide what did, and passes for noise. So where the search finds a better
+baseline, everything is computed once more against that, its noise first.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from models.diagnosis.detection.structure_axes import Where, axes_of
 from models.diagnosis.effects.catalogued import oil_temperature
 from models.diagnosis.effects.grid import Column
 from models.diagnosis.effects.uncatalogued.catalogue import UNCATALOGUED_BY_SLUG
-from models.diagnosis.pooled_fit.baseline_fit import Baseline
+from models.diagnosis.pooled_fit.baseline_fit import Baseline, from_better
 from models.diagnosis.pooled_fit.problem import FitProblem
 
 
@@ -64,7 +64,7 @@ def investigate(
     first = _investigated(baseline, columns, raw, rng)
     if first.search is None or first.search.better_baseline is None:
         return first
-    return _investigated(replace(baseline, fit=first.search.better_baseline), columns, raw, rng)
+    return _investigated(from_better(baseline, first.search.better_baseline), columns, raw, rng)
 
 
 def _investigated(

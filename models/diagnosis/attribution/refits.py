@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.diagnosis.attribution.evidence import MOST_STEPS, STEPS, Hypothesis, Null, null_of, refitted
+from models.diagnosis.attribution.evidence import STEPS, Hypothesis, Null, null_of, refitted
 from models.diagnosis.attribution.screening import Screened, linear_drop, screen
 from models.diagnosis.baseline.laws import Laws
 from models.diagnosis.criteria import (
@@ -52,7 +52,7 @@ class Refits:
         effects: tuple[FittedEffect, ...],
         shape_evidence: float,
         linear: tuple[float, float],
-        steps: int,
+        steps: int = STEPS,
     ) -> Hypothesis:
         """A hypothesis from laws and effects."""
         return refitted(self.problem, self.null, laws, effects, shape_evidence, linear, steps=steps)
@@ -65,7 +65,7 @@ class Refits:
     def from_screen(self, screened: Screened) -> Hypothesis:
         """A screened candidate refitted from its linear amplitudes and the null's laws."""
         effects, drop = self._linear(screened)
-        return self.refit(self.null.fit.laws, effects, screened.shape_evidence, (screened.evidence, drop), STEPS)
+        return self.refit(self.null.fit.laws, effects, screened.shape_evidence, (screened.evidence, drop))
 
     def _linear(self, screened: Screened) -> tuple[tuple[FittedEffect, ...], float]:
         """A screened candidate's effects at their linear amplitudes, and the drop of the cost [nats]."""
@@ -107,7 +107,7 @@ class Refits:
         if not reached:
             return before
         best, shape_evidence = min(reached, key=lambda trial: trial[0].cost - trial[1])
-        return self.refit(best.laws, best.effects, shape_evidence, (before.evidence, before.drop), MOST_STEPS)
+        return self.refit(best.laws, best.effects, shape_evidence, (before.evidence, before.drop))
 
     def _absorbed(self, screened: Screened) -> float:
         """λ [nats] that a single effect of its linear amplitude would have if the baseline absorbed nothing of it."""
@@ -144,7 +144,7 @@ class Refits:
             added, drop = _added(others, projected, second)
             shape_evidence = first.shape_evidence + second.shape_evidence
             linear = (promised, first.drop + drop)
-            pair = self.refit(first.fit.laws, (*first.fit.effects, added), shape_evidence, linear, STEPS)
+            pair = self.refit(first.fit.laws, (*first.fit.effects, added), shape_evidence, linear)
             if before is None or (pair.usable and pair.evidence > before.usable_evidence):
                 pairs[slugs] = pair
 
@@ -159,7 +159,7 @@ class Refits:
         for candidate in near[:FAULTS_REFITTED]:
             added, drop = _added(columns, projected, candidate)
             linear = (candidate.evidence, drop)
-            faults.append(self.refit(baseline.laws, (added,), candidate.shape_evidence, linear, STEPS))
+            faults.append(self.refit(baseline.laws, (added,), candidate.shape_evidence, linear))
         return [fault.against(float(np.log(len(UNCATALOGUED))), 0.0) for fault in faults]
 
     def from_the_best_pair(
@@ -183,7 +183,7 @@ class Refits:
                 continue
             given = best.fit.laws, (half,), before.shape_evidence, (before.evidence, before.drop)
             if slugs in alone:
-                again = self.refit(*given, MOST_STEPS)
+                again = self.refit(*given)
                 alone[slugs] = again if again.usable and again.evidence > before.evidence else before
             self._add_seconds(self.refit(*given, _STEPS_BESIDE), others)  # before it leaves that valley
         return list(alone.values()), list(others.values())

@@ -79,8 +79,8 @@ def search(baseline: Baseline, projected: ProjectedFit, raw: Sequence[RawEvidenc
     if better is not None:
         off = max(better.evidence - null.evidence, 0.0), max(better.profile - null.profile, 0.0)
     unfitted = [unrefitted(candidate) for candidate in screened if candidate.slugs not in refitted]
-    evidence = {record.effect: record.log_evidence for record in raw}
     hypotheses = [*(hypothesis.against(*off) for hypothesis in (*singles, *pairs)), *unfitted]
+    evidence = added_by_raw(raw, hypotheses)
     return SearchResult(
         problem=problem,
         hypotheses=tuple(
@@ -92,6 +92,13 @@ def search(baseline: Baseline, projected: ProjectedFit, raw: Sequence[RawEvidenc
         fault=best_of([fault.against(*off) for fault in faults]),
         better_baseline=None if better is None or off[0] < BETTER_BASELINE else better.fit,
     )
+
+
+def added_by_raw(raw: Sequence[RawEvidence], hypotheses: Sequence[Hypothesis]) -> dict[str, float]:
+    """Evidence [nats] by slug that raw records have of an effect beyond what it has alone by plateaus and bins: those are
+    means of the same samples, and what both show counts once."""
+    alone = {hypothesis.slugs[0]: hypothesis.evidence for hypothesis in hypotheses if len(hypothesis.effects) == 1}
+    return {record.effect: max(record.log_evidence - max(alone.get(record.effect, 0.0), 0.0), 0.0) for record in raw}
 
 
 def unrefitted(screened: Screened) -> Hypothesis:

@@ -29,9 +29,10 @@ class Proposal(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """The numbers of a comparison of hypotheses [nats]: the drop of the best one's cost, the evidence of structure that no
-    effect explains, what the best template may be wrong by; the size of the credible set; the check of its best member; the
-    evidence of an unmeasured oil temperature where that competes, else None."""
+    """The numbers of a comparison of hypotheses [nats], all of the first member of the credible set (of the best hypothesis
+    where that set is empty): the drop of its cost, what its template may be wrong by, its check; the evidence of structure
+    that no effect explains; the size of the credible set; the evidence of an unmeasured oil temperature where that competes,
+    else None."""
 
     best_drop: float
     structure: float

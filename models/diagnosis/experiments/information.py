@@ -104,7 +104,7 @@ class CandidateDistances:
         silent = replace(
             fit, prediction=prediction, torque=rows.torques[rival], residual=np.zeros(apart.shape[0]), effects=()
         )
-        columns = np.nan_to_num(np.concatenate([*own, apart], axis=1))
+        columns = np.concatenate([*own, apart], axis=1)
         gram = gram_of(rows.problem, silent, columns)
         if rows.problem.priors.rows.size:
             diagonal = gram.base + np.arange(len(precisions))
@@ -114,7 +114,7 @@ class CandidateDistances:
 
 def _torque(design: Design, prediction: Prediction, fit: Fit) -> FloatArray:
     """[N] Nm of a candidate at the rows."""
-    changes = [np.nan_to_num(effect_rows(design, prediction, effect)) for effect in fit.effects]
+    changes = [effect_rows(design, prediction, effect) for effect in fit.effects]
     return np.asarray(prediction.torque + sum(changes, np.zeros_like(prediction.torque)), dtype=np.float64)
 
 

@@ -70,19 +70,18 @@ def advise(
     rivals = [*race, *nearby][: max(len(race), MOST_RIVALS)]
     fits = [rival.fit for rival in rivals]
     evidences = np.array([rival.evidence for rival in rivals], dtype=np.float64)
-    with np.errstate(all="ignore"):
-        distances = CandidateDistances(problem, (*fits, _bare(fits[0])))
-        before = distances.with_freedom(())
-        ranked = []
-        for key, rows in _made(campaign, problem.design, distances).items():
-            chance, other, nats = _brought(before, distances.with_freedom(rows), evidences, len(race))
-            if np.isfinite(chance) and nats > LEAST_ADVISED:
-                effect, rival = _names(fits[0], fits[other] if len(race) > 1 else None)
-                advice = Advice(key=key, test=TRIALS[key].text, effect=effect, other=rival, nats=nats)
-                runs = runs_of(key)
-                alone = (round(chance, 1), nats / runs)
-                ranked.append((alone if len(race) == 1 else (chance - COST_OF_RUN * runs, nats), advice))
-        first = _thermometer(campaign, problem, fits)
+    distances = CandidateDistances(problem, (*fits, _bare(fits[0])))
+    before = distances.with_freedom(())
+    ranked = []
+    for key, rows in _made(campaign, problem.design, distances).items():
+        chance, other, nats = _brought(before, distances.with_freedom(rows), evidences, len(race))
+        if np.isfinite(chance) and nats > LEAST_ADVISED:
+            effect, rival = _names(fits[0], fits[other] if len(race) > 1 else None)
+            advice = Advice(key=key, test=TRIALS[key].text, effect=effect, other=rival, nats=nats)
+            runs = runs_of(key)
+            alone = (round(chance, 1), nats / runs)
+            ranked.append((alone if len(race) == 1 else (chance - COST_OF_RUN * runs, nats), advice))
+    first = _thermometer(campaign, problem, fits)
     ranked.sort(key=lambda trial: trial[0], reverse=True)
     worthy = [advice for i, (_, advice) in enumerate(ranked) if i == 0 or advice.nats >= WORTHWHILE]
     return (*first, *worthy)[:MOST_ADVISED]

@@ -7,7 +7,14 @@ import numpy as np
 
 from models.diagnosis.baseline.laws import Laws
 from models.diagnosis.baseline.prediction import frame_of
-from models.diagnosis.criteria import FEWEST_ROWS, FEWEST_SPEEDS, LEAST_TORQUE, MANY_PLATEAUS, MOST_TORQUE
+from models.diagnosis.criteria import (
+    FEWEST_ROWS,
+    FEWEST_SPEEDS,
+    LEAST_NOISE_SHARE,
+    LEAST_TORQUE,
+    MANY_PLATEAUS,
+    MOST_TORQUE,
+)
 from models.diagnosis.design.design import Design
 from models.diagnosis.noise.estimate import estimate_noise, first_noise
 from models.diagnosis.pooled_fit.gauss_newton import STEPS, Fit, FitStatus, fit
@@ -19,6 +26,10 @@ from models.diagnosis.pooled_fit.starts import cautious_laws, starting_laws
 
 #: Gauss-Newton steps after which starts are compared.
 _ROUGH = 12
+
+
+class IndeterminateError(Exception):
+    """The data determine no baseline, and the message says what they lack: the one expected end without a report."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +57,7 @@ def missing_for_baseline(design: Design) -> str:
 
 
 def fit_baseline(design: Design) -> Baseline:
-    """The pooled fit from several starts, and the noise that its residuals show, in turns."""
+    """The pooled fit from several starts, and the noise that its residuals show, in turns. Raises IndeterminateError."""
     frame = frame_of(design)
     start = starting_laws(design, frame)
     problem = FitProblem(design=design, noise=first_noise(design), priors=priors_of(design, start.theta, frame))
@@ -55,14 +66,39 @@ def fit_baseline(design: Design) -> Baseline:
     problem, _ = _with_estimated_noise(problem, first)
     # with a noise that was only assumed the first fit may have ended in another valley
     second = _best_of(problem, starts, _ROUGH)
-    fitted = _best_of(problem, (first.laws, second.laws), STEPS)
+    return _with_its_noise(start, problem, _best_of(problem, (first.laws, second.laws), STEPS))
+
+
+def from_better(baseline: Baseline, better: Fit) -> Baseline:
+    """The baseline from a fit that does better, with the noise that this one's residuals show. Raises IndeterminateError."""
+    noise = replace(baseline.problem.noise, curve_gain=0.0)  # estimated anew, as all of the noise is
+    return _with_its_noise(baseline.start, baseline.problem.with_noise(noise), better)
+
+
+def _with_its_noise(start: Laws, problem: FitProblem, fitted: Fit) -> Baseline:
+    """A fit followed to its end under the noise that its residuals show."""
     problem, assumed = _with_estimated_noise(problem, fitted)
     fitted = fit(problem, fitted.laws)
+    _require_weights(problem, fitted)
     curve_gain = likely_curve_gain(gram_of(problem, fitted))
     if curve_gain > 0.0:
         problem = problem.with_noise(replace(problem.noise, curve_gain=curve_gain))
         fitted = fit(problem, fitted.laws)
-    return Baseline(start=start, problem=problem, fit=fitted, notes=_notes(design, fitted, assumed))
+    return Baseline(start=start, problem=problem, fit=fitted, notes=_notes(problem.design, fitted, assumed))
+
+
+def _require_weights(problem: FitProblem, fitted: Fit) -> None:
+    """Raise IndeterminateError where there is nothing that models could be weighed by."""
+    if fitted.status is FitStatus.NOT_FINITE:
+        raise IndeterminateError("no finite torque can be fitted to these numbers.")
+    design, deviation = problem.design, problem.noise.deviation
+    parts = [deviation[: design.plateaus], deviation[design.plateaus :]]
+    noise = min(float(np.median(part)) for part in parts if part.size)
+    if not noise >= LEAST_NOISE_SHARE * design.usual_torque:
+        raise IndeterminateError(
+            f"the readings hold no noise ({noise:.1g} Nm about {design.usual_torque:.3g} Nm), as those of a dead channel "
+            "or of a formula do, and nothing can be weighed against it."
+        )
 
 
 def _best_of(problem: FitProblem, starts: Sequence[Laws], steps: int) -> Fit:

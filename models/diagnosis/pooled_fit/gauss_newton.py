@@ -125,7 +125,7 @@ def _inside(state: Fit, priors: Priors, matrix: FloatArray, gradient: FloatArray
 
 def _evaluated(problem: FitProblem, white: Whiten, laws: Laws, effects: tuple[FittedEffect, ...]) -> Fit:
     design, priors = problem.design, problem.priors
-    with np.errstate(all="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):  # a step too far: its cost is infinite, and it is not taken
         prediction = predict(design, laws)
         torque = prediction.torque.copy()
         for effect in effects:

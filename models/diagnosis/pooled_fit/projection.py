@@ -81,10 +81,7 @@ def project(gram: Gram, run_gain: float, curve_gain: float) -> Projected:
     left = full[base:, base:] - half.T @ half
     fitted = float(np.log(np.diag(factor)).sum() - np.log(scale).sum())
     miss = float(left[-1, -1])
-    off = float(np.log(run_gain / USUAL_GAIN))
-    prior = -0.5 * (off / (GAIN_SD_BELOW if off < 0 else GAIN_SD_ABOVE)) ** 2 - float(
-        np.log1p((curve_gain / SMALL_CURVE_GAIN) ** 2)
-    )
+    prior = log_gain_prior(run_gain) - float(np.log1p((curve_gain / SMALL_CURVE_GAIN) ** 2))
     profile = -0.5 * (miss + added) + prior
     return Projected(
         info=left[:-1, :-1],
@@ -96,6 +93,12 @@ def project(gram: Gram, run_gain: float, curve_gain: float) -> Projected:
         run_gain=run_gain,
         curve_gain=curve_gain,
     )
+
+
+def log_gain_prior(run_gain: float) -> float:
+    """ln p_0 of ln σ_g [nats], up to a constant, for the runs' scatter σ_g > 0."""
+    off = float(np.log(run_gain / USUAL_GAIN))
+    return -0.5 * (off / (GAIN_SD_BELOW if off < 0 else GAIN_SD_ABOVE)) ** 2
 
 
 def _factor(correlation: FloatArray) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from models.diagnosis.attribution.evidence import Hypothesis
+from models.diagnosis.attribution.evidence import STEPS, Hypothesis, HypothesisStatus
 from models.diagnosis.attribution.investigate import Investigation
 from models.diagnosis.attribution.verdict import Judgement, Verdict
 from models.diagnosis.design.design import Design
@@ -10,6 +10,7 @@ from models.diagnosis.detection.lack_of_fit import Misfit, misfit_of
 from models.diagnosis.detection.structure_axes import axes_of
 from models.diagnosis.effects.uncatalogued.catalogue import UNCATALOGUED_BY_SLUG
 from models.diagnosis.experiments.test_plan import Advice
+from models.diagnosis.pooled_fit.run_scatter import run_scatter
 from models.diagnosis.report.candidates import candidates_of
 from models.diagnosis.report.maps import loop_traces, residual_maps
 from models.diagnosis.report.outlying_run import outlying_run
@@ -28,6 +29,7 @@ def report_of(
     problem, projected = investigation.problem, investigation.projected
     hypotheses: Sequence[Hypothesis] = () if investigation.search is None else investigation.search.hypotheses
     notes = _notes(investigation, judgement, validation)
+    scatter = run_scatter(projected.projections)
     findings = Findings(
         verdict=judgement.verdict,
         causes=judgement.causes,
@@ -41,7 +43,7 @@ def report_of(
         tests=len(problem.design.runs),
         states=int(problem.design.facts.states.size),
         resembles=UNCATALOGUED_BY_SLUG[judgement.fault].description if judgement.fault is not None else "",
-        scatter=problem.noise.run_gain,
+        scatter=scatter,
     )
     return Report(
         verdict=judgement.verdict,
@@ -57,7 +59,7 @@ def report_of(
         loops=loop_traces(problem.design, projected.fit, validation.extended),
         extension=proposed_extension(problem, judgement),
         notes=notes,
-        statistics=statistics_of(investigation.alarms, judgement.comparison),
+        statistics=statistics_of(investigation.alarms, judgement.comparison, scatter),
     )
 
 
@@ -91,8 +93,14 @@ def _extended_misfit(investigation: Investigation, judgement: Judgement, validat
 
 
 def _notes(investigation: Investigation, judgement: Judgement, validation: Validation) -> tuple[str, ...]:
-    """Of the baseline, of raw records, on an outlying run where the case is open, and on an extension that is withheld."""
+    """Of the baseline, of raw records, of fits that did not end, on an outlying run where the case is open, and on an
+    extension that is withheld."""
     notes = [*investigation.baseline.notes, *(f"{record.effect}: {record.note}." for record in investigation.raw)]
+    notes += [
+        f"The fit of {' and '.join(hypothesis.slugs)} had not converged after {STEPS} steps: no cause is named by it."
+        for hypothesis in judgement.credible
+        if hypothesis.status is HypothesisStatus.OUT_OF_STEPS
+    ]
     if judgement.open:
         notes.append(outlying_run(investigation.problem, investigation.projected.fit))
     notes.append(withheld_note(judgement.proposal, validation.gain))

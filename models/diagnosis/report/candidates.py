@@ -48,6 +48,7 @@ def candidates_of(
                 log_evidence_gain=_finite(evidence),
                 estimate=estimate,
                 beside=beside,
+                fit=None if hypothesis is None else hypothesis.status,
             )
         )
     return tuple(candidates)
@@ -68,4 +69,4 @@ def _finite_estimate(estimate: Estimate) -> Estimate:
 
 
 def _finite(value: float) -> float:
-    return float(np.clip(np.nan_to_num(value), -1e300, 1e300))
+    return float(np.clip(value, -1e300, 1e300))

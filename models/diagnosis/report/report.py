@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from models.arrays import FloatArray
+from models.diagnosis.attribution.evidence import HypothesisStatus
 from models.diagnosis.attribution.verdict import Verdict
 from models.diagnosis.detection.lack_of_fit import Misfit
 from models.diagnosis.effects.estimate import Estimate
@@ -16,7 +17,7 @@ from models.diagnosis.validation.held_out import Gain
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
     """An effect that competed: its slug, probability [0, 1] and gain in log evidence over the baseline [nats], both in the
-    fit that it was part of: with the effects `beside` it."""
+    fit that it was part of: with the effects `beside` it. `fit`: how that fit ended, None where there is none."""
 
     effect: str
     title: str
@@ -24,6 +25,7 @@ class Candidate:
     log_evidence_gain: float
     estimate: Estimate
     beside: tuple[str, ...] = ()
+    fit: HypothesisStatus | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

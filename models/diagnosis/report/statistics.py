@@ -1,15 +1,22 @@
-"""The engine's numbers in a report, by public name: alarm statistics, their thresholds, p-values of the check."""
+"""The engine's numbers in a report, by public name: alarm statistics, their thresholds, p-values of the check,
+the scatter from run to run."""
 
 import numpy as np
 
 from models.diagnosis.attribution.verdict import Comparison
 from models.diagnosis.detection.alarm import Alarms
 from models.diagnosis.effects.catalogued import oil_temperature
+from models.diagnosis.pooled_fit.run_scatter import RunScatter
 
 
-def statistics_of(alarms: Alarms, comparison: Comparison | None) -> dict[str, float]:
-    """All finite numbers [nats, p-values as they are]; those of the comparison where hypotheses were compared."""
-    numbers: dict[str, float] = {}
+def statistics_of(alarms: Alarms, comparison: Comparison | None, scatter: RunScatter) -> dict[str, float]:
+    """All finite numbers [nats; p-values and scatter as they are]; those of a comparison where hypotheses were compared."""
+    numbers: dict[str, float] = {
+        "run_scatter": scatter.median,
+        "run_scatter_lower": scatter.lower,
+        "run_scatter_upper": scatter.upper,
+        "run_scatter_information": scatter.information,
+    }
     for name, alarm in (("effects", alarms.effects), ("contrasts", alarms.contrasts), ("lines", alarms.lines)):
         numbers |= {
             f"{name}_value": alarm.value,

@@ -20,6 +20,7 @@ from models.diagnosis.detection.lack_of_fit import Misfit
 from models.diagnosis.detection.structure_axes import Where
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.experiments.test_plan import BASELINE, Advice
+from models.diagnosis.pooled_fit.run_scatter import RunScatter
 from models.diagnosis.report.report import Candidate, Visible
 from models.diagnosis.report.wording import (
     axis_name,
@@ -41,7 +42,7 @@ _LEAST_PERCENT, _AXES_MENTIONED = 0.1, 2
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Findings:
     """What a report says, before its paragraph; `resembles` is the uncatalogued rig fault that does about as well as the
-    best effect, `scatter` [-] that of the runs' gains."""
+    best effect, `scatter` that of the runs' gains."""
 
     verdict: Verdict
     causes: tuple[str, ...]
@@ -55,7 +56,7 @@ class Findings:
     tests: int
     states: int
     resembles: str = ""
-    scatter: float = 0.0
+    scatter: RunScatter | None = None
 
 
 def summarise(findings: Findings) -> str:
@@ -75,9 +76,9 @@ def summarise(findings: Findings) -> str:
 
 def _adequate(findings: Findings) -> list[str]:
     noise = "" if findings.baseline is None else f" of {number(findings.baseline.noise)} Nm"
-    scatter = f" ({number(100 * findings.scatter)} % of the torque)" if findings.scatter > 0 else ""
     parts = [
-        f"Nothing exceeds the noise{noise} and the scatter from run to run{scatter}: the model is adequate for these data."
+        f"Nothing exceeds the noise{noise} and the scatter from run to run{_scatter(findings.scatter)}: the model is "
+        "adequate for these data."
     ]
     catalogued = [visible for visible in findings.visible if visible.effect in BY_SLUG]
     shown = [visible for visible in catalogued if _within_reach(visible, visible.amplitude)]
@@ -92,6 +93,16 @@ def _adequate(findings: Findings) -> list[str]:
         say = "says" if findings.states == 1 else "say"
         parts.append(f"{count_of(findings.states, 'state')} of use {say} little about a course over life.")
     return parts
+
+
+def _scatter(scatter: RunScatter | None) -> str:
+    """In brackets: the estimate and its interval, or that it is the prior's."""
+    if scatter is None:
+        return ""
+    median, lower, upper = (f"{100 * share:.2g}" for share in (scatter.median, scatter.lower, scatter.upper))
+    if scatter.assumed:
+        return f" (assumed to be {median} % of the torque, {lower} to {upper} %: these data hardly show it)"
+    return f" ({median} % of the torque, estimated; 90 % interval {lower} to {upper} %)"
 
 
 def _within_reach(visible: Visible, amplitude: float) -> bool:

@@ -59,34 +59,26 @@ class Bridge:
     def entered(self, cloud: Cloud, rng: np.random.Generator) -> tuple[Cloud, FloatArray, FloatArray]:
         """The particles with a flag for the new run, drawn from its posterior given the rest of each; and their log targets
         before (with the prior of that flag) and after."""
-        count = cloud.form.size
-        as_sound = replace(cloud, outlying=np.column_stack([cloud.outlying, np.zeros(count)]))
-        as_outlying = replace(cloud, outlying=np.column_stack([cloud.outlying, np.ones(count)]))
-        table = table_of(self.after, cloud)
-        sound, outlying = self._either_way(as_sound, as_outlying, table)
-        total = np.logaddexp(sound, outlying)
-        turned = np.log(rng.random(total.size)) < outlying - total
-        entered = merged(as_sound, as_outlying, turned)
-        after = np.where(turned, outlying, sound)
-        before = cloud.log_target + _log_prior_of_last(self.prior, entered)
-        return replace(entered, log_weight=cloud.log_weight + total - cloud.log_target), before, after
-
-    def _either_way(self, as_sound: Cloud, as_outlying: Cloud, table: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The log targets with the new run sound and outlying."""
-        points = as_sound.placed()
+        as_sound = replace(cloud, outlying=np.column_stack([cloud.outlying, np.zeros(cloud.form.size)]))
+        points, table = as_sound.placed(), table_of(self.after, cloud)
         sums, terms = pointwise(self.after, self.prior, points, table)
         turned = last_outlying(self.after, self.prior, points, sums, terms, table[-1])
-        sound = evidence(sums, self.prior) + _log_prior(self.after, self.prior, as_sound)
-        return sound, evidence(turned, self.prior) + _log_prior(self.after, self.prior, as_outlying)
+        others = _log_prior(self.after, self.prior, cloud)
+        flag_sound, flag_outlying = log_outlying(self.prior, np.array([[0.0, 1.0]]))
+        sound = evidence(sums, self.prior) + others + flag_sound
+        outlying = evidence(turned, self.prior) + others + flag_outlying
+        total = np.logaddexp(sound, outlying)
+        is_outlying = np.log(rng.random(total.size)) < outlying - total
+        as_sound.outlying[:, -1] = is_outlying
+        after = np.where(is_outlying, outlying, sound)
+        before = cloud.log_target + np.where(is_outlying, flag_outlying, flag_sound)
+        return replace(as_sound, log_weight=cloud.log_weight + total - cloud.log_target), before, after
 
     def log_before(self, cloud: Cloud, table: FloatArray) -> FloatArray:
         """The target before the new run, with the prior of its flag; `table` is that of the runs after."""
         without = replace(cloud, outlying=cloud.outlying[:, :-1])
-        return log_target_of(self.before, self.prior, without, table[:-1]) + _log_prior_of_last(self.prior, cloud)
-
-
-def _log_prior_of_last(prior: Prior, cloud: Cloud) -> FloatArray:
-    return log_outlying(prior, cloud.outlying[:, -1:].T)
+        flag = log_outlying(self.prior, cloud.outlying[:, -1:].T)
+        return log_target_of(self.before, self.prior, without, table[:-1]) + flag
 
 
 def table_of(history: History, cloud: Cloud) -> FloatArray:

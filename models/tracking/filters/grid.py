@@ -158,11 +158,8 @@ def _placed(
     frame, (kind, level, row, node) = laid.frame, cell
     log_scatter = _within(frame.log_scatter, kind, level, uniform[:, 0])
     log_exponent = _within(frame.log_exponent, kind, row, uniform[:, 1])
-    lower, upper = np.empty(kind.size), np.empty(kind.size)
-    for k in range(frame.lower.shape[0]):
-        here = kind == k
-        lower[here] = np.interp(log_exponent[here], frame.log_exponent[k], frame.lower[k])
-        upper[here] = np.interp(log_exponent[here], frame.log_exponent[k], frame.upper[k])
+    own = frame.taken(kind)
+    lower, upper = (own.at(log_exponent[:, None], edge)[:, 0] for edge in (own.lower, own.upper))
     nodes = laid.mass.shape[3]
     steps = np.ptp(frame.log_exponent, axis=1) * np.ptp(frame.log_scatter, axis=1)
     log_rate = lower + (upper - lower) * (node + uniform[:, 2] - 0.5) / (nodes - 1)

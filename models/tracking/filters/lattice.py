@@ -35,6 +35,8 @@ _BLUR = 0.03
 _FIRST, COARSE = 65, (11, 8, 7)
 _CLOSINGS = 8
 _WORTHWHILE = 0.7
+#: The blur of a lattice that did not shrink, over that of the one before.
+_LESS = 0.3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +61,12 @@ class Frame:
 
     def at(self, log_exponent: FloatArray, edge: FloatArray) -> FloatArray:
         """An edge [k, r] of the rows' intervals at other rows [k, n], linear between rows."""
-        return np.stack([np.interp(*row) for row in zip(log_exponent, self.log_exponent, edge, strict=True)])
+        last = edge.shape[1] - 1
+        step = (self.log_exponent[:, -1:] - self.log_exponent[:, :1]) / last
+        place = np.clip((log_exponent - self.log_exponent[:, :1]) / step, 0.0, last)
+        row = np.minimum(place.astype(np.intp), last - 1)
+        below = np.take_along_axis(edge, row, axis=1)
+        return np.asarray(below + (place - row) * (np.take_along_axis(edge, row + 1, axis=1) - below))
 
     def log_rate(self, nodes: int) -> FloatArray:
         """Nodes of log τ, [k, rows, nodes]."""
@@ -108,46 +115,56 @@ def log_density(
     log_exponent = frame.log_exponent[:, None, :, None]
     place, by_kind = frame.log_rate(table.shape[-1] // rows)[:, None] + log_exponent, kinds.course[:, None, None, None]
     log_scale, stretch = log_scale_at(place, by_kind, history.span)
-    flat = prior.log_density(log_scale, log_exponent, frame.log_scatter[:, :, None, None]) + stretch
-    log_evidence = evidence(sums, prior).reshape(count, levels.shape[1], rows, -1)
-    return np.asarray(log_evidence + flat + kinds.log_weight[:, None, None, None])
+    density = evidence(sums, prior).reshape(count, levels.shape[1], rows, -1)
+    density += prior.log_density(log_scale, log_exponent, prior.log_scatter_mean) + stretch
+    of_scatter = prior.log_density(prior.log_scale_mean, prior.log_exponent_mean, levels)
+    density += (of_scatter + kinds.log_weight[:, None])[:, :, None, None]
+    return density
 
 
-def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame]:
-    """The kinds and regions that hold the posterior's mass, by coarse lattices laid over what the last one left."""
+def closed_in(prior: Prior, history: History) -> tuple[Kinds, Frame, FloatArray]:
+    """The kinds and regions that hold the posterior's mass, by coarse lattices laid over what the last one left; and the
+    log mass of each kind [k] on the last of these."""
     first = whole(prior)
     if history.value.size == 0:
         kinds = Kinds.of(prior, np.zeros((1, 0)), np.arange(FORM_SIZE.size))
-        return kinds, first.taken(np.zeros(kinds.form.size, dtype=np.intp))
-    nodes, rows, levels = COARSE
+        return kinds, first.taken(np.zeros(kinds.form.size, dtype=np.intp)), kinds.log_weight
     share = _BLUR * float(np.ptp(history.value))
     table = tabled(first, _FIRST, history, np.array(Course))
     blur = share * float((first.upper - first.lower).max()) / (_FIRST - 1)
     kinds, density = _first(prior, history, first, table, blur)
-    frame = shrunk(first.taken(np.zeros(kinds.form.size, dtype=np.intp)), density).resized(rows, levels)
+    frame = shrunk(first.taken(np.zeros(kinds.form.size, dtype=np.intp)), density).resized(*COARSE[1:])
     log_mass = log_masses(density, first.cells(_FIRST)) - kinds.log_weight
     kinds, laid = represented(prior, kinds)
-    kinds, frame = _weighty(kinds, frame.taken(laid), log_mass[laid] + kinds.log_weight, NEGLIGIBLE)
-    shares, left = np.full(kinds.form.size, share), np.ones(kinds.form.size, dtype=bool)
-    log_mass = np.zeros(kinds.form.size)
+    log_mass = log_mass[laid] + kinds.log_weight
+    kept = np.flatnonzero(log_mass > log_mass.max() - NEGLIGIBLE)
+    kinds, frame, log_mass = kinds.taken(kept), frame.taken(laid[kept]), log_mass[kept]
+    shares, left = np.full(kept.size, share), np.ones(kept.size, dtype=bool)
     for _ in range(_CLOSINGS):
         now = np.flatnonzero(left)
         if now.size == 0:
             break
         wide = frame.taken(now)
-        widest = (wide.upper - wide.lower).max(axis=1)
-        blurs = shares[now] * widest / (nodes - 1)
-        density = log_density(
-            prior, history, kinds.taken(now), wide, tabled(wide, nodes, history, kinds.course[now]), blurs
-        )
-        closer = shrunk(wide, density)
-        log_mass[now] = log_masses(density, wide.cells(nodes))
+        closer, log_mass[now], blurs = _closer(prior, history, kinds.taken(now), wide, shares[now])
         settled = _shrinkage(wide, closer) > _WORTHWHILE
         left[now] = ~(settled & (blurs < 0.5 * np.exp(closer.log_scatter.mean(axis=1))))
-        shares[now] *= np.where(settled, 0.3, 1.0)
+        shares[now] *= np.where(settled, _LESS, 1.0)
         for field in fields(Frame):
             getattr(frame, field.name)[now] = getattr(closer, field.name)
-    return _weighty(kinds, frame, np.where(left, log_mass.max(), log_mass), SLIGHT)
+    log_mass[left] = log_mass.max()
+    kept = np.flatnonzero(log_mass > log_mass.max() - SLIGHT)
+    return kinds.taken(kept), frame.taken(kept), log_mass[kept]
+
+
+def _closer(
+    prior: Prior, history: History, kinds: Kinds, frame: Frame, share: FloatArray
+) -> tuple[Frame, FloatArray, FloatArray]:
+    """The frame of what a coarse lattice over a frame holds, its log mass [k], and how much it was blurred [k]: by a `share`
+    [k] for each e-fold of τ."""
+    nodes = COARSE[0]
+    blurs = share * (frame.upper - frame.lower).max(axis=1) / (nodes - 1)
+    density = log_density(prior, history, kinds, frame, tabled(frame, nodes, history, kinds.course), blurs)
+    return shrunk(frame, density), log_masses(density, frame.cells(nodes)), blurs
 
 
 def _first(prior: Prior, history: History, frame: Frame, table: FloatArray, blur: float) -> tuple[Kinds, FloatArray]:
@@ -213,12 +230,6 @@ def joined(first: Part, second: Part) -> Part:
         field.name: np.concatenate([getattr(part, field.name) for part in (first, second)]) for field in fields(first)
     }
     return replace(first, **columns)
-
-
-def _weighty(kinds: Kinds, frame: Frame, log_mass: FloatArray, depth: float) -> tuple[Kinds, Frame]:
-    """The kinds whose log mass [k] is not more than `depth` below the largest."""
-    kept = np.flatnonzero(log_mass > log_mass.max() - depth)
-    return kinds.taken(kept), frame.taken(kept)
 
 
 def shrunk(frame: Frame, density: FloatArray) -> Frame:

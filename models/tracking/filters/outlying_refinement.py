@@ -24,34 +24,34 @@ from models.tracking.prior import Prior
 _NODES = 32
 
 
-def completed(prior: Prior, history: History, kinds: Kinds, frame: Frame) -> tuple[Kinds, Frame]:
-    """The kinds and their lattices, with those of the sets that were overlooked."""
+def completed(prior: Prior, history: History, kinds: Kinds, frame: Frame, log_mass: FloatArray) -> tuple[Kinds, Frame]:
+    """The kinds and their lattices, with those of the sets that were overlooked; `log_mass` [k] says which kinds lead."""
     if prior.outlying_share == 0.0 or history.value.size < 2:
         return kinds, frame
-    table = tabled(frame, COARSE[0], history, kinds.course)
-    density = log_density(prior, history, kinds, frame, table)
-    mass = density + np.log(frame.cells(COARSE[0]))[:, None, :, None]
-    mass -= log_masses(density, frame.cells(COARSE[0])).max()
+    leaders = np.argsort(-log_mass, kind="stable")[:LEADING]
+    leading, where = kinds.taken(leaders), frame.taken(leaders)
+    table = tabled(where, COARSE[0], history, leading.course)
+    density = log_density(prior, history, leading, where, table)
+    mass = density + np.log(where.cells(COARSE[0]))[:, None, :, None]
+    mass -= log_masses(density, where.cells(COARSE[0])).max()
     laid = {_name(form, outlying) for form, outlying in zip(kinds.form, kinds.outlying, strict=True)}
     relative = history.relative(prior)
     overlooked: dict[bytes, tuple[float, int, FloatArray]] = {}
-    for leader in np.argsort(-mass.max(axis=(1, 2, 3)))[:LEADING].tolist():
-        gain = gains(prior, history, kinds.outlying[leader], _nodes(kinds, frame, table, mass, leader, relative))
+    for leader in range(leaders.size):
+        gain = gains(prior, history, leading.outlying[leader], _nodes(leading, where, table, mass, leader, relative))
         for run in np.flatnonzero(gain > -WORTH).tolist():
-            outlying = kinds.outlying[leader].copy()
+            outlying = leading.outlying[leader].copy()
             outlying[run] = 1.0 - outlying[run]
-            name = _name(kinds.form[leader], outlying)
+            name = _name(leading.form[leader], outlying)
             if name not in laid and gain[run] > overlooked.get(name, (-np.inf,))[0]:
                 overlooked[name] = (float(gain[run]), leader, outlying)
     if not overlooked:
         return kinds, frame
     best = sorted(overlooked.values(), key=lambda candidate: candidate[0], reverse=True)[:MOST]
-    leaders, outlying = np.array([leader for _, leader, _ in best]), np.stack([runs for _, _, runs in best])
-    weight = (
-        kinds.log_weight[leaders] - log_outlying(prior, kinds.outlying[leaders].T) + log_outlying(prior, outlying.T)
-    )
-    more, there = Kinds(form=kinds.form[leaders], outlying=outlying, log_weight=weight), frame.taken(leaders)
-    closer = shrunk(there, log_density(prior, history, more, there, table[leaders]))
+    of, outlying = np.array([leader for _, leader, _ in best]), np.stack([runs for _, _, runs in best])
+    weight = leading.log_weight[of] - log_outlying(prior, leading.outlying[of].T) + log_outlying(prior, outlying.T)
+    more, there = Kinds(form=leading.form[of], outlying=outlying, log_weight=weight), where.taken(of)
+    closer = shrunk(there, log_density(prior, history, more, there, table[of]))
     return joined(kinds, more), joined(frame, closer)
 
 

@@ -3,7 +3,7 @@
 Particles carry (log φ, log ε, log s), the form (`courses`) and, of every run, whether it was outlying; given
 these, all else is linear and integrated out in closed form (Rao-Blackwell). The coefficients do not move, so
 resampling alone would soon leave copies of one particle. After it every particle takes Metropolis-Hastings steps that
-leave the exact marginal posterior over the whole history as it is (iterated batch importance sampling), until nine in
+leave the exact marginal posterior over the whole history as it is (iterated batch importance sampling), until eight in
 ten have moved.
 
 A measurement that would starve the cloud at once is introduced by degrees: the cloud passes through targets that lie
@@ -45,6 +45,8 @@ from models.tracking.sampling import correlated_pair, spread_normals, spread_poi
 _TIMID, _SHORTER = 0.2, 0.5
 #: In a step, how often another size is tried, and how often the flag of one run, or the law of the scatter, is turned.
 _RESIZED, _TURNED = 0.25, 0.1
+#: A course with a smaller share of the weight than this is lost. Chosen: what makes up for it must not overflow; no table.
+_LOST = 1e-100
 #: Degrees by which a measurement may be introduced, and halvings in the search for each.
 _DEGREES, _HALVINGS = 30, 20
 
@@ -212,9 +214,10 @@ def _kept(course: NDArray[np.intp], weight: FloatArray) -> tuple[FloatArray, Flo
     """How often to take each particle, so that every course keeps a share of KEPT, and the log weight that makes up for it
     [n]: what the data do not speak for today they may speak for later."""
     share = np.bincount(course, weights=weight, minlength=len(Course))
-    kept = np.where(share > 0.0, np.maximum(share, KEPT), 0.0)
+    alive = share > _LOST
+    kept = np.where(alive, np.maximum(share, KEPT), share)
     kept /= kept.sum()
-    more = np.divide(kept, share, out=np.ones(len(Course)), where=share > 0.0)[course]
+    more = np.divide(kept, share, out=np.ones(len(Course)), where=alive)[course]
     return weight * more, -np.log(more)
 
 
@@ -223,22 +226,20 @@ def _proposed(cloud: Cloud, shapes: FloatArray, span: float, rng: np.random.Gene
     form and its flags."""
     (count, runs), course = cloud.outlying.shape, cloud.course
     stride = rng.uniform(0.2, 1.6, size=(count, 1))
-    steps = np.einsum("nij,nj->ni", shapes[course], rng.standard_normal(cloud.points.shape))
     places = _places(cloud, span)
-    moved = places + stride * steps
-    (log_scale, stretch), (_, before) = (log_scale_at(place, course, span) for place in (moved[:, 0], places[:, 0]))
+    moved = places + stride * np.einsum("nij,nj->ni", shapes[course], rng.standard_normal(places.shape))
+    log_scale, stretch = log_scale_at(moved[:, 0], course, span)
+    stretch -= places[:, 0] - cloud.points[:, 0]
     points = np.column_stack([log_scale, moved[:, 1:]])
-    step = np.where(rng.random(count) < _RESIZED, rng.choice([-1.0, 1.0], size=count), 0.0)
+    chance = rng.random((3, count))
+    step = np.where(chance[0] < _RESIZED, np.where(chance[0] < 0.5 * _RESIZED, -1.0, 1.0), 0.0)
     form = np.clip(cloud.form + step, 0, FORM_COURSE.size - 1)
-    outlying = cloud.outlying.copy()
-    turned = np.flatnonzero(rng.random(count) < _TURNED)
+    form = np.where(FORM_COURSE[form.astype(np.intp)] == course, form, cloud.form)
+    form = np.where(chance[1] < _TURNED, (form + FORM_COURSE.size / 2) % FORM_COURSE.size, form)
+    outlying, turned = cloud.outlying.copy(), np.flatnonzero(chance[2] < _TURNED)
     run = rng.integers(runs, size=turned.size)
     outlying[turned, run] = 1.0 - outlying[turned, run]
-    same = FORM_COURSE[form.astype(np.intp)] == course
-    form = np.where(same, form, cloud.form)
-    form = np.where(rng.random(count) < _TURNED, (form + FORM_COURSE.size / 2) % FORM_COURSE.size, form)
-    stepped = replace(cloud, points=points, form=form, outlying=outlying)
-    return stepped, stretch - before
+    return replace(cloud, points=points, form=form, outlying=outlying), stretch
 
 
 def _next_degree(start: FloatArray, gap: FloatArray, degree: float) -> float:

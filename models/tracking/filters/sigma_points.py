@@ -1,15 +1,22 @@
-"""One step of one unscented Kalman filter, and the coordinates in which it runs.
+"""One step of unscented Kalman filters, all of them at once, and the coordinates in which they run.
 
 The state is (ξ0, ξ at a reference progress, log τ, log ε, δ, T δ', and the step of each event) in deviations from the prior
 mean, in units of the prior's deviations, so that the numbers are near 1 whatever the quantity's unit. Here log τ is the
 place of log |φ| (`courses.log_scale_at`, beyond the reference where a course ends) less log |ε|.
+
+Between runs only δ moves, and linearly: its mean and covariance are led on exactly. What a run measures is not linear: the
+2 d sigma points of a filter of d numbers, filterpy's, lie at ±√d deviations along the columns of the covariance's Cholesky
+root, each with the weight 1/(2 d), none at the centre, so that S and P stay positive definite.
+
+Source: S. J. Julier, J. K. Uhlmann, Proc. IEEE 92 (2004) 401-422, with κ = 0.
 """
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
-from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
+from filterpy.kalman import MerweScaledSigmaPoints
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
@@ -20,17 +27,16 @@ from models.tracking.prior import Prior
 
 #: Process noise of a step, and the least variance along any axis, in units of the prior's variance.
 _PROCESS, _FLOOR = 1e-9, 1e-10
-#: Numbers of a state before its steps. Sigma points of d numbers lie at ±√d deviations with no weight on the centre: all
-#: weights are positive, so S and P stay positive definite.
+#: Numbers of a state before its steps.
 BEFORE_STEPS = 6
-_SIGMA = {"alpha": 1.0, "beta": 0.0, "kappa": 0.0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Normal:
-    """One filter between two runs: its form (`courses`), mean [d], covariance [d, d] and scatter [2] (variance, worth)."""
+class Normals:
+    """k filters between two runs: form [k] (`courses`), mean [k, d], covariance [k, d, d] and scatter [k, 2] (variance,
+    worth)."""
 
-    form: int
+    form: NDArray[np.intp]
     mean: FloatArray
     covariance: FloatArray
     scatter: FloatArray
@@ -53,62 +59,79 @@ class Way:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One filter's step: its state, how probable the measurement was, and the squared innovation in deviations, those of
-    a sound and of an outlying run mixed like the step."""
+    """The step of k filters: their states, how probable the measurement was [k], and the squared innovations [k] in
+    deviations, those of a sound and of an outlying run mixed like the step."""
 
     mean: FloatArray
     covariance: FloatArray
     scatter: FloatArray
-    log_likelihood: float
-    squared_innovation: float
+    log_likelihood: FloatArray
+    squared_innovation: FloatArray
 
 
-def stepped(prior: Prior, normal: Normal, way: Way) -> Step:
-    """One filter advanced to the next run."""
-    unit, course = prior.initial_sd, FORM_COURSE[[normal.form]]
-    mean_before, covariance_before = _widened(prior, normal, way.steps)
-    dimension = mean_before.size
-
-    def moved(point: FloatArray, _: float) -> FloatArray:
-        propagated = point.copy()
-        propagated[4] += propagated[5] * (way.after - way.before) / way.reference
-        return propagated
-
-    def expected(point: FloatArray) -> FloatArray:
-        initial, at_reference, place, log_exponent, beside, _, *steps = unscaled(prior, point)
-        scale, exponent = coefficients(place, log_exponent, course, way.reference)
-        share, whole = progress_fraction(np.array([way.progress, way.reference]), scale, exponent)
-        return np.array([(initial + (at_reference - initial) * share / whole + beside + sum(steps)) / unit])
-
-    further = (prior.outlying_size * prior.size / unit) ** 2
-    growth = way.relative if FORM_PROPORTIONAL[normal.form] else 1.0
-    scatter = float(normal.scatter[0]) * growth
-    ukf = UnscentedKalmanFilter(
-        dim_x=dimension, dim_z=1, dt=1.0, hx=expected, fx=moved, points=MerweScaledSigmaPoints(n=dimension, **_SIGMA)
-    )
-    ukf.x, ukf.P = mean_before, covariance_before
-    ukf.Q = process(prior, float(FORM_SIZE[normal.form]), way)
-    ukf.R = np.array([[(way.variance + scatter) / unit**2]])
-    ukf.predict()
-    ukf.update(np.array([way.value / unit]))
-    off, variance = float(ukf.y[0]), float(ukf.S[0, 0])
+def stepped(prior: Prior, normals: Normals, way: Way) -> Step:
+    """The filters advanced to the next run."""
+    unit = prior.initial_sd
+    mean, covariance = predicted(prior, normals, way)
+    growth = np.where(FORM_PROPORTIONAL[normals.form], way.relative, 1.0)
+    scatter = normals.scatter[:, 0] * growth
+    expected, variance, across = measured(prior, normals.form, mean, covariance, way)
+    variance = variance + (way.variance + scatter) / unit**2
+    off = way.value / unit - expected
     shares = np.array([1.0 - prior.outlying_share, prior.outlying_share])
-    variances = np.array([variance, variance + further])
-    density = shares * np.exp(-0.5 * np.minimum(off**2 / variances, 1400.0)) / np.sqrt(2.0 * np.pi * variances)
-    total = float(density.sum())
-    share = density / total
-    gain = (ukf.K[:, 0] * variance)[:, None] / variances
-    means = ukf.x_prior[:, None] + gain * off
-    mean = means @ share
-    apart = (means - mean[:, None]) * np.sqrt(share)
-    learnt = ukf.P_prior - (gain * variances * share) @ gain.T + apart @ apart.T
+    variances = variance[:, None] + np.array([0.0, (prior.outlying_size * prior.size / unit) ** 2])
+    squared = off[:, None] ** 2 / variances
+    density = shares * np.exp(-0.5 * np.minimum(squared, 1400.0)) / np.sqrt(2.0 * np.pi * variances)
+    total = density.sum(axis=1)
+    share = density / total[:, None]
+    gain = across[:, :, None] / variances[:, None, :]
+    moves = gain * off[:, None, None]
+    middle = (moves * share[:, None, :]).sum(axis=2)
+    apart = (moves - middle[:, :, None]) * np.sqrt(share)[:, None, :]
+    kept = gain * (variances * share)[:, None, :]
+    learnt = covariance - kept @ gain.swapaxes(1, 2) + apart @ apart.swapaxes(1, 2)
     return Step(
-        mean=np.clip(mean, -DOMAIN, DOMAIN),
+        mean=np.clip(mean + middle, -DOMAIN, DOMAIN),
         covariance=definite(learnt),
-        scatter=scatter_learnt(prior, normal.scatter, off**2 / variance, variance, float(share[0]), growth),
-        log_likelihood=math.log(max(total, 1e-300)),
-        squared_innovation=min(float(share @ (off**2 / variances)), OUTLIER**2),
+        scatter=scatter_learnt(prior, normals.scatter, squared[:, 0], variance, share[:, 0], growth),
+        log_likelihood=np.log(np.maximum(total, 1e-300)),
+        squared_innovation=np.minimum((share * squared).sum(axis=1), OUTLIER**2),
     )
+
+
+def predicted(prior: Prior, normals: Normals, way: Way) -> tuple[FloatArray, FloatArray]:
+    """Means and covariances led on to the next run."""
+    mean, covariance = _widened(prior, normals, way.steps)
+    gap = (way.after - way.before) / way.reference
+    mean[:, 4] += gap * mean[:, 5]
+    covariance[:, 4] += gap * covariance[:, 5]
+    covariance[:, :, 4] += gap * covariance[:, :, 5]
+    return mean, covariance + process(prior, FORM_SIZE[normals.form], way)
+
+
+def measured(
+    prior: Prior, form: NDArray[np.intp], mean: FloatArray, covariance: FloatArray, way: Way
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Of what a run would measure without noise, in the prior's unit: mean [k], variance [k], covariance with the state
+    [k, d]; by the sigma points."""
+    dimension = mean.shape[1]
+    points, weight = _standard_points(dimension)
+    away = points @ np.linalg.cholesky(covariance).swapaxes(1, 2)
+    rows = unscaled(prior, mean[:, None] + away)
+    scale, exponent = coefficients(rows[..., 2], rows[..., 3], FORM_COURSE[form][:, None], way.reference)
+    share, whole = progress_fraction(np.array([way.progress, way.reference])[:, None, None], scale, exponent)
+    values = rows[..., 0] + (rows[..., 1] - rows[..., 0]) * share / whole + rows[..., 4] + rows[..., 6:].sum(axis=2)
+    values /= prior.initial_sd
+    expected = values @ weight
+    off = values - expected[:, None]
+    return expected, np.square(off) @ weight, ((off * weight)[:, None, :] @ away)[:, 0]
+
+
+@cache
+def _standard_points(dimension: int) -> tuple[FloatArray, FloatArray]:
+    """filterpy's sigma points of a standard normal [2 d, d] with their weights [2 d], without the centre, which has none."""
+    points = MerweScaledSigmaPoints(dimension, alpha=1.0, beta=0.0, kappa=0.0)
+    return points.sigma_points(np.zeros(dimension), np.eye(dimension))[1:], points.Wm[1:]
 
 
 def coefficients(
@@ -119,22 +142,22 @@ def coefficients(
     return coefficients_at(log_scale, log_exponent, course)
 
 
-def process(prior: Prior, size: float, way: Way) -> FloatArray:
-    """Process noise of δ and its slope over the way to the last measurement."""
-    noise = _PROCESS * np.eye(BEFORE_STEPS + way.steps)
+def process(prior: Prior, size: FloatArray, way: Way) -> FloatArray:
+    """Process noise [k, d, d] of δ and its slope over the way to the last measurement, for discrepancies of sizes q [k]."""
+    noise = np.tile(_PROCESS * np.eye(BEFORE_STEPS + way.steps), (size.size, 1, 1))
     gap = (way.after - way.before) / way.reference
     density = 3.0 * (size * prior.size / prior.initial_sd) ** 2 * (way.reference / way.after) ** 3
-    noise[4:6, 4:6] += density * np.array([[gap**3 / 3.0, gap**2 / 2.0], [gap**2 / 2.0, gap]])
+    noise[:, 4:6, 4:6] += density[:, None, None] * np.array([[gap**3 / 3.0, gap**2 / 2.0], [gap**2 / 2.0, gap]])
     return noise
 
 
-def _widened(prior: Prior, normal: Normal, steps: int) -> tuple[FloatArray, FloatArray]:
-    """Mean and covariance with the steps of all events: those that have none yet are as the prior has them."""
-    before = normal.mean.size
-    mean, covariance = np.zeros(BEFORE_STEPS + steps), np.zeros((BEFORE_STEPS + steps, BEFORE_STEPS + steps))
-    mean[:before], covariance[:before, :before] = normal.mean, normal.covariance
-    new = np.arange(before, mean.size)
-    covariance[new, new] = (prior.step_size * prior.size / prior.initial_sd) ** 2
+def _widened(prior: Prior, normals: Normals, steps: int) -> tuple[FloatArray, FloatArray]:
+    """Means and covariances with the steps of all events: those that have none yet are as the prior has them."""
+    (count, before), dimension = normals.mean.shape, BEFORE_STEPS + steps
+    mean, covariance = np.zeros((count, dimension)), np.zeros((count, dimension, dimension))
+    mean[:, :before], covariance[:, :before, :before] = normals.mean, normals.covariance
+    new = np.arange(before, dimension)
+    covariance[:, new, new] = (prior.step_size * prior.size / prior.initial_sd) ** 2
     return mean, covariance
 
 
@@ -164,22 +187,29 @@ def unscaled(prior: Prior, state: FloatArray) -> FloatArray:
 
 
 def scatter_learnt(
-    prior: Prior, scatter: FloatArray, squared: float, variance: float, sound: float, growth: float = 1.0
+    prior: Prior,
+    scatter: FloatArray,
+    squared: FloatArray | float,
+    variance: FloatArray | float,
+    sound: FloatArray | float,
+    growth: FloatArray | float = 1.0,
 ) -> FloatArray:
-    """Variance and worth of the scatter after a `squared` innovation in its deviations; `variance` in prior's units, the
-    scatter's part of it s² times `growth`."""
-    scatter_variance, worth = scatter.tolist()
+    """Variance and worth of the scatter [..., 2] after `squared` innovations in their deviations; `variance` in prior's
+    units, the scatter's part of it s² times `growth`."""
+    scatter_variance, worth = scatter[..., 0], scatter[..., 1]
     share = growth * scatter_variance / (variance * prior.initial_sd**2)
-    learnt = scatter_variance * (1.0 + sound * share * (min(squared, OUTLIER**2) - 1.0) / (worth + sound))
+    surprise = np.minimum(squared, OUTLIER**2) - 1.0
+    learnt = scatter_variance * (1.0 + sound * share * surprise / (worth + sound))
     low, high = (math.exp(2.0 * (prior.log_scatter_mean + k * prior.log_scatter_sd)) for k in (-DOMAIN, DOMAIN))
-    return np.array([min(max(learnt, low), high), worth + sound])
+    return np.stack([np.clip(learnt, low, high), worth + sound], axis=-1)
 
 
 def definite(covariance: FloatArray) -> FloatArray:
-    """Symmetrised, with no eigenvalue below FLOOR."""
-    symmetric = 0.5 * (covariance + covariance.T)
+    """Covariances [..., d, d] symmetrised, with no eigenvalue below FLOOR."""
+    symmetric = 0.5 * (covariance + covariance.swapaxes(-1, -2))
     values, vectors = np.linalg.eigh(symmetric)
-    if values[0] >= _FLOOR:
+    if values.min() >= _FLOOR:
         return np.asarray(symmetric)
-    lifted = vectors * np.maximum(values, _FLOOR) @ vectors.T
-    return np.asarray(0.5 * (lifted + lifted.T))
+    lifted = (vectors * np.maximum(values, _FLOOR)[..., None, :]) @ vectors.swapaxes(-1, -2)
+    lifted = 0.5 * (lifted + lifted.swapaxes(-1, -2))
+    return np.where((values[..., :1] >= _FLOOR)[..., None], symmetric, lifted)

@@ -1,4 +1,4 @@
-"""Unscented Kalman filters, filterpy's, one for each probable form (`courses`), weighed by their innovations.
+"""Unscented Kalman filters, one for each probable form (`courses`), weighed by their innovations.
 
 The state is (ξ0, ξ at a reference progress, log τ, log ε, δ, T δ', and the step of each event): in logarithms φ = τε and
 ε cannot leave their domain, and with ξ at the reference in place of Δ the ridge of the posterior is nearly straight. All
@@ -30,7 +30,7 @@ from models.tracking.criteria import DOMAIN, FEW, FORGET, GROWN, LOST
 from models.tracking.discrepancy import PAST, at_end, drawn
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.filters.sigma_points import (
-    Normal,
+    Normals,
     Way,
     coefficients,
     definite,
@@ -70,14 +70,10 @@ class UkfState:
     covariance: FloatArray
     scatter: FloatArray
 
-    def normal(self, kind: int) -> Normal:
-        """One of the filters."""
-        return Normal(
-            form=int(self.form[kind]),
-            mean=self.mean[kind],
-            covariance=self.covariance[kind],
-            scatter=self.scatter[kind],
-        )
+    @property
+    def normals(self) -> Normals:
+        """The filters."""
+        return Normals(form=self.form.astype(np.intp), mean=self.mean, covariance=self.covariance, scatter=self.scatter)
 
     def to_arrays(self) -> dict[str, FloatArray]:
         """The state as named arrays; `from_arrays` gives it back exactly."""
@@ -130,10 +126,9 @@ class Ukf:
             variance=float(history.variance[-1]),
             relative=float(history.relative(prior)[-1]),
         )
-        parts = [stepped(prior, state.normal(kind), way) for kind in range(state.form.size)]
-        log_weight = state.log_weight + np.array([part.log_likelihood for part in parts])
-        weight = _weights(log_weight)
-        squared_innovation = float(weight @ [part.squared_innovation for part in parts])
+        step = stepped(prior, state.normals, way)
+        log_weight = state.log_weight + step.log_likelihood
+        squared_innovation = float(_weights(log_weight) @ step.squared_innovation)
         squared_innovation = (1.0 - FORGET) * state.squared_innovation + FORGET * squared_innovation
         if squared_innovation > LOST:
             return _started(prior, history)
@@ -142,9 +137,9 @@ class Ukf:
             history=history,
             squared_innovation=squared_innovation,
             log_weight=log_weight - log_weight.max(),
-            mean=np.stack([part.mean for part in parts]),
-            covariance=np.stack([part.covariance for part in parts]),
-            scatter=np.stack([part.scatter for part in parts]),
+            mean=step.mean,
+            covariance=step.covariance,
+            scatter=step.scatter,
         )
 
     def posterior(self, state: UkfState, size: int, rng: np.random.Generator) -> Posterior:
@@ -181,15 +176,14 @@ def _started(prior: Prior, history: History) -> UkfState:
     draws = _STARTER.posterior(GridState(prior=prior, history=history), many, np.random.default_rng(0))
     reference = history.span
     form, course, steps = _beside(draws, history.steps.size)
-    log_scale, log_exponent = draws.coordinates
     points = scaled(
         prior,
         np.column_stack(
             [
                 draws.initial,
                 draws.initial + draws.change * progress_fraction(reference, draws.scale, draws.exponent),
-                place_of(log_scale, draws.course, reference),
-                log_exponent,
+                place_of(draws.log_scale, draws.course, reference),
+                draws.log_exponent,
                 course,
                 steps,
             ]

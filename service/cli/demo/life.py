@@ -3,21 +3,29 @@
 Dynamic tests are made at few states and pressures, at a quarter of the usual rate, with the plateaus' noise of 1 %: the
 dashboard shows friction loops over the life, and the demo stays short, because the lag of a loop takes the service longest.
 Friction lags speed as in the service's own model, so that only one effect is hidden.
+
+Some blocks of duty carry the record of their last engagement: a flywheel of the energy per cycle that the clutch stops
+under the pressure of fig. 3. (The motor of the life test would keep a worn clutch slipping, and there would be no stop.)
 """
 
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from scipy.interpolate import RectBivariateSpline
 
+from models.engagements.capacity import Capacity
+from models.engagements.simulation import Drive, PressureProfile, engage
+from models.friction.stribeck import torque
 from models.records.runs import Record
 from models.rig import campaign
 from models.rig.hysteresis import FrictionLag
 from models.rig.oil_viscosity import warmed
 from models.rig.recorder import Recorder
 from models.rig.sampled import DynamicTest, sampled_test
-from models.rig.simulated_runs import RunKind, SimulatedRun
+from models.rig.simulated_runs import DutyBlock, RunKind, SimulatedRun
 from models.rig.stationary import Sensor
+from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
 
 #: The demo ends at this share of the mean COF when new. Chosen: a little after the end of life at 0.5.
 _STOP = 0.49
@@ -29,6 +37,11 @@ _TEST = DynamicTest(rate=25.0, recorder=Recorder(torque_noise=0.25, memory=0.02)
 _LAG = FrictionLag(film_time=0.0, attractor=150.0)
 #: The stream of the dynamic tests' noise.
 _STREAM = 0xD7
+#: Duty cycles of the blocks that carry an engagement. Chosen: three for the reference, then as friction changes.
+_ENGAGED_AT = (500, 1000, 2000, 4000, 7000, 11_000)
+#: The engagement's recorder and its rate [Hz], and the longest stop that it waits for [s]. Chosen: 1 % of 50 Nm.
+_RECORDER, _RATE, _LONGEST_STOP = Recorder(torque_noise=0.5, memory=0.0), 100.0, 20.0
+_ENGAGEMENT_STREAM = 0xE6
 
 
 def runs(seed: int) -> Iterator[SimulatedRun]:
@@ -38,7 +51,10 @@ def runs(seed: int) -> Iterator[SimulatedRun]:
     """
     truth = campaign.simulated_clutch(seed)
     for run in campaign.simulate(seed, clutch=truth, stop_fraction=_STOP):
-        yield run if run.plateaus is None else replace(run, plateaus=warmed(run.plateaus, truth, run.wear))
+        if run.duty is not None and run.cycles in _ENGAGED_AT:
+            yield replace(run, record=_engagement(seed, truth, run.duty, run.cycles))
+        else:
+            yield run if run.plateaus is None else replace(run, plateaus=warmed(run.plateaus, truth, run.wear))
 
 
 def loops(seed: int, last: float) -> Iterator[SimulatedRun]:
@@ -56,6 +72,39 @@ def loops(seed: int, last: float) -> Iterator[SimulatedRun]:
             record=warmed(record, truth, cycles),
             wear=cycles,
         )
+
+
+def _engagement(seed: int, truth: SimulatedClutch, block: DutyBlock, cycles: int) -> Record:
+    """The record of a block's last engagement, at the temperature to which the oil is set."""
+    drive = Drive(
+        speed=block.initial_speed, limit=0.0, inertia=2 * block.energy_per_cycle / block.initial_speed**2, drag=0.0
+    )
+    trace = engage(
+        _capacity(truth, cycles, drive.speed),
+        truth.geometry.mean_radius,
+        drive=drive,
+        longest=_LONGEST_STOP,
+        rate=_RATE,
+    )
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_ENGAGEMENT_STREAM, cycles)))
+    return _RECORDER.record(trace.time, trace.pressure, trace.speed, trace.torque, rng, Sensor())
+
+
+def _capacity(truth: SimulatedClutch, cycles: int, fastest: float) -> Capacity:
+    """What the clutch can transfer, from a table up to a speed [rad/s]: an engagement asks thousands of times.
+
+    Below the protocol's lowest pressure torque goes with pressure, as for the clutch itself.
+    """
+    pressure = np.linspace(PROTOCOL_PRESSURES[0], PressureProfile().maximum, 9)
+    velocity = np.linspace(0.0, truth.geometry.mean_radius * fastest, 400)
+    values = torque(velocity, truth.parameters(pressure[:, np.newaxis], cycles))
+    table = RectBivariateSpline(pressure, velocity, values, kx=1, ky=1)
+
+    def transferred(line: float, sliding: float) -> float:
+        level = max(line, float(pressure[0]))
+        return float(table.ev(level, sliding)) * line / level
+
+    return transferred
 
 
 def _recorded(record: Record) -> Record:

@@ -68,8 +68,8 @@ class RefusedError(Exception):
         return self.problem.get("type") == _CONFLICT
 
 
-def passing(response: httpx2.Response, answer: dict[str, Any] | None) -> str | None:
-    """Why the answer, with the JSON object in it, is none of the service's or means "not now"; None where it is final."""
+def passing(response: httpx2.Response, answer: object | None) -> str | None:
+    """Why the answer, with what was read in it, is none of the service's or means "not now"; None where it is final."""
     status = response.status_code
     if status < 300:
         if answer is not None:
@@ -96,6 +96,11 @@ def content(response: httpx2.Response) -> dict[str, Any] | None:
     except (ValueError, RecursionError):
         return None
     return answer if isinstance(answer, dict) else None
+
+
+def csv(response: httpx2.Response) -> str | None:
+    """The rows of an answer that is a table; None where it is none."""
+    return response.text if response.headers.get("Content-Type", "").startswith("text/csv") else None
 
 
 def problem(response: httpx2.Response) -> dict[str, Any]:

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import httpx2
 
@@ -12,11 +12,15 @@ from service.cli.sending.answers import (
     RefusedError,
     ServiceAwayError,
     content,
+    csv,
     passing,
     perhaps_stored,
     problem,
     retry_after,
 )
+
+#: What is read of a response.
+Answer = TypeVar("Answer")
 
 JSON = {"Content-Type": "application/json"}
 #: Seconds between tries: doubled from the first to the last.
@@ -79,15 +83,23 @@ class Service:
         """The answer to a GET; raises as `post` does."""
         return self._answer("GET", path, params=params)
 
-    def _answer(
+    def table(self, path: str, **params: Any) -> str:
+        """The CSV that answers a GET; raises as `post` does."""
+        return self._repeated("GET", path, csv, params=params)
+
+    def _answer(self, method: str, path: str, **request: Any) -> dict[str, Any]:
+        return self._repeated(method, path, content, **request)
+
+    def _repeated(
         self,
         method: str,
         path: str,
+        read: Callable[[httpx2.Response], Answer | None],
         *,
         file: Path | None = None,
         wanted: Callable[[], bool] = lambda: True,
         **request: Any,
-    ) -> dict[str, Any]:
+    ) -> Answer:
         deadline, wait, unsure = time.monotonic() + self.patience, FIRST_WAIT, False
         while True:
             if not wanted():
@@ -100,7 +112,7 @@ class Service:
                 reason = f"no answer ({type(error).__name__})"
                 unsure = unsure or not isinstance(error, _NOT_SENT)
             else:
-                answer = content(response)
+                answer = read(response)
                 reason = passing(response, answer) or ""
                 if not reason and response.status_code >= 400:
                     raise RefusedError(response.status_code, problem(response))

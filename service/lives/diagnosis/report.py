@@ -59,6 +59,7 @@ def public(
                     "unit": candidate.estimate.unit,
                 },
                 "beside": list(candidate.beside),
+                "fit": None if candidate.fit is None else candidate.fit.value,
             }
             for candidate in report.candidates
         ],

@@ -48,6 +48,9 @@ DYNAMIC_SD, ENGAGEMENT_SD = 0.03, 0.35
 ROWS_SD = 0.05
 #: The same where pressures are not the reference's, a unit of their logarithm: torque is not quite in proportion.
 OTHER_PRESSURE_SD = 0.35
+#: The same a kelvin of oil temperature beyond `lives.criteria.OTHER_OIL`. Chosen: some three times what Hersey's similarity
+#: makes of the simulated rig's oil, 0.05 to 0.15 % a kelvin, for linings and additives differ.
+OTHER_OIL_SD = 0.004
 
 # Cycles (`pace`): weights of what the next cycles may be. Chosen; only their orders of magnitude matter.
 

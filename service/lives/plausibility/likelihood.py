@@ -14,6 +14,7 @@ import numpy as np
 
 from models.tracking.measurement import Measurement
 from service.lives.assumptions import Assumptions
+from service.lives.criteria import OTHER_OIL
 from service.lives.history import Event, Life, lives_of, pooled_value
 from service.lives.plausibility import criteria
 from service.lives.plausibility.course import Course, Predicted, course_of
@@ -76,6 +77,9 @@ class History:
         """log COF of a reading as the tests of a life show it, and its deviation; None where COF is not positive."""
         spread = math.hypot(reading.spread, criteria.STEP_SD if self.corrected else 0.0)
         first = next((event for event in self.lives[life].events if event.cofs), None) if self.lives else None
+        if first is not None and first.oil_temperature is not None and reading.oil is not None:
+            beyond = max(abs(reading.oil - first.oil_temperature) - OTHER_OIL, 0.0)
+            spread = math.hypot(spread, criteria.OTHER_OIL_SD * beyond)
         pooled = pooled_value(first.cofs, reading.mean_cof) if reading.mean_cof and first is not None else None
         if pooled is not None and pooled[0] > 0:
             return math.log(pooled[0]), math.hypot(spread, pooled[1] / pooled[0])

@@ -10,6 +10,7 @@ Runs come in any order and gaps of every size are honest: each way has its share
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -21,11 +22,12 @@ from service.lives.plausibility import criteria
 RUN_IN = "run_in"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Pace:
     """The known cycles [n] of a clutch and those [m] of the next run's kind, both ascending and distinct.
 
-    `block` is the duty cycles that the next run says it ran, None for no block.
+    `block` is the duty cycles that the next run says it ran, None for no block. What does not hang on the next run's own
+    cycles is worked out once: a dozen other readings of these are weighed.
     """
 
     cycles: FloatArray
@@ -59,47 +61,61 @@ class Pace:
         """The median of the last gaps between runs of the kind, None where there was none."""
         return float(np.median(self._gaps[-5:])) if self._gaps.size else None
 
-    @property
+    @cached_property
     def _base(self) -> FloatArray:
         """The cycles that the next run's gap is counted from: those of its kind where there are two, else all."""
         return self.of_kind if self.of_kind.size > 1 else self.cycles
 
-    @property
+    @cached_property
     def _gaps(self) -> FloatArray:
         return np.diff(self._base)
+
+    @cached_property
+    def _to_come(self) -> FloatArray:
+        """The known cycles at which a run of the next one's kind is still to come."""
+        return self.cycles[~np.isin(self.cycles, self.of_kind)]
+
+    @cached_property
+    def _ends(self) -> FloatArray:
+        """Where the next run's block would end if it began where another ended, or at the start."""
+        return np.union1d(self.cycles, [0.0]) + (self.block or 0.0)
+
+    @cached_property
+    def _like_gaps(self) -> tuple[float, FloatArray, FloatArray, FloatArray]:
+        """The logarithm of the middle gap; how recent each gap is; the logarithms of gaps like them, and their shares."""
+        gaps, last = self._gaps, float(self._base[-1]) if self._base.size else 0.0
+        middle = math.log(float(np.median(gaps)) if gaps.size else max(last, 1_000.0))
+        recency = np.power(0.7, np.arange(gaps.size, dtype=np.float64)[::-1])
+        recency /= recency.sum() or 1.0
+        centres, shares = np.log(gaps), recency
+        if gaps.size > 1:  # gaps that grow by a factor, as in 10, 100, 1000
+            centres = np.append(centres, 2 * centres[-1] - centres[-2])
+            shares = np.append(0.8 * shares, 0.2)
+        return middle, recency, centres, shares
 
     def _joins(self, cycles: float) -> list[tuple[float, float]]:
         made = _among(cycles, self.of_kind)
         ways = [(criteria.REPEATS_TEST, float(made) / max(self.of_kind.size, 1))]
-        to_come = ~np.isin(self.cycles, self.of_kind)
-        if to_come[-1]:
-            ways.append((criteria.JOINS_LATEST, float(_equal(cycles, float(self.cycles[-1])))))
-        if to_come.any():
-            known_cycles = _among(cycles, self.cycles[to_come])
-            ways.append((criteria.JOINS, float(known_cycles) / float(to_come.sum())))
+        to_come = self._to_come
+        if to_come.size:
+            if to_come[-1] == self.cycles[-1]:
+                ways.append((criteria.JOINS_LATEST, float(_equal(cycles, float(to_come[-1])))))
+            ways.append((criteria.JOINS, float(_among(cycles, to_come)) / to_come.size))
         return ways
 
     def _tiles(self, cycles: float) -> list[tuple[float, float]]:
         if self.block is None:
             return []
         latest = float(_equal(cycles, float(self.cycles[-1]) + self.block))
-        ends = np.union1d(self.cycles, [0.0]) + self.block
-        return [(criteria.TILES, latest), (criteria.TILES_EARLIER, float(_among(cycles, ends)) / ends.size)]
+        earlier = float(_among(cycles, self._ends)) / self._ends.size
+        return [(criteria.TILES, latest), (criteria.TILES_EARLIER, earlier)]
 
     def _after_gap(self, cycles: float) -> list[tuple[float, float]]:
-        base, gaps = self._base, self._gaps
-        last = float(base[-1]) if base.size else 0.0
-        gap = cycles - last
-        middle = math.log(float(np.median(gaps)) if gaps.size else max(last, 1_000.0))
+        gap = cycles - (float(self._base[-1]) if self._base.size else 0.0)
+        middle, recency, centres, shares = self._like_gaps
         ways = [(criteria.OTHER_GAP, float(self._density(gap, middle, criteria.OTHER_GAP_SD)))]
-        if gaps.size:
-            recency = 0.7 ** np.arange(gaps.size)[::-1]
-            recency /= recency.sum()
-            ways.append((criteria.SAME_GAP, float(recency[np.abs(gaps - gap) < 0.5].sum())))
-            centres, shares = np.log(gaps), recency
-            if gaps.size > 1:  # gaps that grow by a factor, as in 10, 100, 1000
-                centres = np.append(centres, 2 * centres[-1] - centres[-2])
-                shares = np.append(0.8 * shares, 0.2)
+        if self._gaps.size:
+            ways.append((criteria.SAME_GAP, float(recency[np.abs(self._gaps - gap) < 0.5].sum())))
             ways.append((criteria.LIKE_GAP, float(shares @ self._density(gap, centres, criteria.LIKE_GAP_SD))))
         return ways
 

@@ -27,7 +27,7 @@ from service.web.answers import (
     now,
     tagged,
 )
-from service.web.auth import Ingester, Reader, name_of_caller
+from service.web.auth import Admin, OwnIngester, OwnReader, Reader, name_of_caller, own_clutches, require_clutch
 from service.web.context import Context, Cursor, Limit
 from service.web.limits import USUAL_ITEMS
 from service.web.middleware import remember
@@ -55,33 +55,35 @@ EXAMPLE = {
     responses=SENDING | {200: {"model": ClutchOut, "description": "Known already, with the same content"}},
     openapi_extra=described_body(ClutchIn, EXAMPLE),
 )
-async def register_clutch(request: Request, context: Ingester) -> Response:
+async def register_clutch(request: Request, context: OwnIngester) -> Response:
     """Register a clutch. Everything but `clutch_id` has a default: the reference's clutch."""
     body = await json_body(request)
-    clutch, new = await run_in_threadpool(_register, context, body)
+    wanted = checked(ClutchIn, body)
+    require_clutch(request, wanted.clutch_id)
+    clutch, new = await run_in_threadpool(_register, context, wanted)
     if new:
         await begin_computed(context, str(clutch["clutch_id"]), degradation)
     headers = {"Location": f"/v1/clutches/{clutch['clutch_id']}"}
     return Response(content=to_json(clutch), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
 
 
-def _register(context: Context, body: bytes) -> tuple[dict[str, object], bool]:
-    clutch = checked(ClutchIn, body)
+def _register(context: Context, clutch: ClutchIn) -> tuple[dict[str, object], bool]:
     new = registration.register(context.database, clutch, created_at=now())
     return clutch_list.look_up(context.database, clutch.clutch_id), new
 
 
 @router.get("", response_model=ClutchPage, responses=READING)
 async def list_clutches(
-    request: Request, context: Reader, archived: Archived = False, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
+    request: Request, context: OwnReader, archived: Archived = False, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
 ) -> Response:
-    """All clutches with current health and remaining life, the fewest remaining cycles first."""
-    after = from_cursor(cursor)
-
-    key = ("clutches", archived, limit, after)
+    """All clutches that the key is for, with current health and remaining life, the fewest remaining cycles first."""
+    after, own = from_cursor(cursor), own_clutches(request)
+    key = ("clutches", archived, limit, after, own)
 
     def make() -> bytes:
-        return clutch_list.page_as_json(context.database, context.cache, limit=limit, after=after, archived=archived)
+        return clutch_list.page_as_json(
+            context.database, context.cache, limit=limit, after=after, archived=archived, only=own
+        )
 
     def again(request: Request) -> Response | None:
         held = context.cache.held(key, context.database.watch.version())
@@ -89,7 +91,8 @@ async def list_clutches(
 
     # the version before the rows are read: what is committed meanwhile makes another
     held = await kept(context, key, context.database.watch.version(), make)
-    remember(request, again)
+    if own is None:
+        remember(request, again)
     return tagged(request, held, JSON_TYPE)
 
 
@@ -107,7 +110,7 @@ async def read_clutch(request: Request, context: Reader, clutch_id: ClutchId) ->
         ClutchEdit, {"reason": "the drawing says so", "geometry": {"inner_diameter_mm": 98, "outer_diameter_mm": 133}}
     ),
 )
-async def edit_clutch(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
+async def edit_clutch(request: Request, context: Admin, clutch_id: ClutchId) -> Response:
     """Edit a clutch's record, each given field as a whole, and archive it or bring it back; results are computed anew."""
     wanted = checked(ClutchEdit, await json_body(request))
     made = partial(edit, archived=wanted.archived, reason=wanted.reason, by=name_of_caller(request), at=now())

@@ -15,7 +15,7 @@ from service.run_files.json_run import checked
 from service.schemas.diagnosis import DiagnosisIn, DiagnosisOut, DiagnosisPage, ModelIn, ModelOut
 from service.schemas.parameters import ClutchId, DiagnosisId
 from service.web.answers import JSON_TYPE, answer, described_body, json_body, now, preferred_wait
-from service.web.auth import Ingester, Reader
+from service.web.auth import Admin, Ingester, Reader, name_of_caller, require
 from service.web.context import Cursor, Limit
 from service.web.limits import USUAL_ITEMS, WAIT_SECONDS
 from service.web.problems import READING, SENDING
@@ -39,7 +39,10 @@ Prefer = Annotated[
 async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchId, prefer: Prefer = None) -> Response:
     """Have all runs of the clutch's present life diagnosed. A question while the same runs are being diagnosed joins in."""
     question = checked(DiagnosisIn, await json_body(request))
-    job = await run_in_threadpool(context.diagnoses.ask, clutch_id, adopt=question.adopt)
+    if question.adopt:
+        require(request, "admin")
+    adopt_by = name_of_caller(request) if question.adopt else None
+    job = await run_in_threadpool(context.diagnoses.ask, clutch_id, adopt_by=adopt_by)
     preferred = preferred_wait(prefer)
     wait = WAIT_SECONDS if preferred is None else preferred
     await asyncio.wait([asyncio.wrap_future(job.done)], timeout=wait)
@@ -76,13 +79,13 @@ async def read_model(request: Request, context: Reader, clutch_id: ClutchId) -> 
     "/model",
     response_model=ModelOut,
     responses=SENDING,
-    openapi_extra=described_body(ModelIn, {"diagnosis_id": None}),
+    openapi_extra=described_body(ModelIn, {"diagnosis_id": "3f9a1c0b7d2e4f56"}),
 )
-async def put_model(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
+async def put_model(request: Request, context: Admin, clutch_id: ClutchId) -> Response:
     """Adopt what a diagnosis found, or return to the baseline; all is tracked anew before this is answered."""
     wanted = checked(ModelIn, await json_body(request))
     adopting = context.workers.submit(
-        Lane.RUNS, adopt_model.adopt, clutch_id, wanted.diagnosis_id, now(), turn=clutch_id
+        Lane.RUNS, adopt_model.adopt, clutch_id, wanted.diagnosis_id, now(), name_of_caller(request), turn=clutch_id
     )
     await asyncio.wrap_future(adopting)
     answered = await run_in_threadpool(model.model, context.database, clutch_id)

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import Response
 from starlette.datastructures import UploadFile
 
-from service.errors import InvalidError
+from service.errors import InvalidError, NoRoomError
 from service.jobs.workers import Lane
 from service.run_files.upload import read_file_run
 from service.schemas.base import Origin
@@ -25,13 +25,14 @@ from service.schemas.parameters import (
 from service.schemas.run import Receipt
 from service.web.answers import JSON_TYPE, now
 from service.web.auth import Ingester, name_of_caller
-from service.web.problems import SENDING
+from service.web.problems import SENDING, described
 from service.workflows.ingest_run import ingest_posted
 from storage.encoding.json_text import to_text
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}/runs", tags=["runs"])
 
 _CHUNK = 1 << 20
+SENDING_FILE = SENDING | described(NoRoomError)
 _BODY = {
     "requestBody": {
         "required": True,
@@ -44,7 +45,7 @@ _BODY = {
     "/file",
     status_code=201,
     response_model=Receipt,
-    responses=SENDING | {200: {"model": Receipt, "description": "The same run again: the same receipt"}},
+    responses=SENDING_FILE | {200: {"model": Receipt, "description": "The same run again: the same receipt"}},
     openapi_extra=_BODY,
 )
 async def post_run_file(
@@ -60,7 +61,7 @@ async def post_run_file(
     origin: Origin = "measured",
 ) -> Response:
     """Post a run as CSV, NI TDMS, ASAM MDF4 or Parquet, plain or gzipped."""
-    with tempfile.TemporaryDirectory(prefix="clutchlife-") as folder:
+    with tempfile.TemporaryDirectory(dir=context.folder) as folder:
         path = Path(folder) / "run"
         filename = await _save(request, path, filename)
         read = partial(
@@ -75,7 +76,8 @@ async def post_run_file(
             origin=origin,
         )
         by = name_of_caller(request)
-        taken_in = context.workers.submit(Lane.FILES, ingest_posted, clutch_id, read, now(), by, turn=clutch_id)
+        # without a turn: a file that takes long to read would have the clutch's other runs wait
+        taken_in = context.workers.submit(Lane.FILES, ingest_posted, clutch_id, read, now(), by)
         receipt, new = await asyncio.wrap_future(taken_in)
     headers = {"Location": f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"}
     return Response(content=to_text(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)

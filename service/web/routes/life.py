@@ -12,19 +12,22 @@ from service.queries import runs, scores
 from service.queries import series as series_query
 from service.queries import stribeck as stribeck_query
 from service.queries.cache import to_json
+from service.queries.degradation import arguments as degradation_arguments
 from service.queries.degradation import degradation as degradation_of
 from service.queries.engagement import engaged
-from service.queries.planned_duty import planned_life
-from service.queries.remaining_life import remaining_life
+from service.queries.life.criteria import life_by_criteria
+from service.queries.life.planned_duty import planned_life
+from service.queries.life.remaining_life import NO_CRITERIA, criteria_of, remaining_life
 from service.queries.surfaces import surface
 from service.run_files.json_run import checked
-from service.schemas.curves import EngagementOut, LoopPage, SeriesPage, StribeckPage
+from service.schemas.curves import LoopPage, SeriesPage, StribeckPage
 from service.schemas.degradation import Degradation, Surfaces
+from service.schemas.engagement import EngagementOut
 from service.schemas.fleet import Scores
-from service.schemas.life import Method, RemainingLife
-from service.schemas.parameters import ClutchId, Quantity
-from service.schemas.programme import PlannedLife, ProgrammeIn
-from service.web.answers import JSON_TYPE, clutch_answer, computed_answer, described_body, json_body
+from service.schemas.parameters import ClutchId, Draws, EngagementRun, LifeNumber, Quantity, TrackedQuantity
+from service.schemas.prognosis.life import Method, RemainingLife
+from service.schemas.prognosis.programme import PlannedLife, ProgrammeIn
+from service.web.answers import JSON_TYPE, clutch_answer, clutch_bytes, computed_answer, described_body, json_body
 from service.web.auth import Reader
 from service.web.context import AtCycles, Cursor, Limit, Prefer, PressureBar, Whole
 from service.web.limits import USUAL_ITEMS
@@ -41,9 +44,19 @@ async def remaining_useful_life(
     method: Method = "particle",
     pressure_bar: PressureBar = None,
     at_cycles: AtCycles = None,
+    quantity: TrackedQuantity = None,
+    criterion: TrackedQuantity = None,
+    life: LifeNumber = None,
     prefer: Prefer = None,
 ) -> Response:
-    """The duty cycles that remain until mean COF has fallen to the criterion's fraction, with their uncertainty."""
+    """The duty cycles that remain until the first of the clutch's criteria is reached, with their uncertainty.
+
+    That is mean COF, which has fallen to a fraction, unless the clutch's record names others.
+    """
+    own = await clutch_bytes(context, clutch_id, "criteria", lambda: criteria_of(context.database, clutch_id))
+    if own != NO_CRITERIA or (quantity, criterion, life) != (None, None, None):
+        arguments = (method, pressure_bar, at_cycles, quantity, criterion, life)
+        return await computed_answer(request, context, clutch_id, life_by_criteria, *arguments, prefer=prefer)
     if method not in CARRIED or pressure_bar is not None:
         return await computed_answer(
             request, context, clutch_id, remaining_life, method, pressure_bar, at_cycles, prefer=prefer
@@ -75,7 +88,7 @@ async def planned_remaining_life(
 ) -> Response:
     """The same under planned duty: blocks that are run one after the other, over and over. Nothing is stored."""
     planned = checked(ProgrammeIn, await json_body(request))
-    answer = context.workers.submit(Lane.ANSWERS, planned_life, clutch_id, method, planned)
+    answer = context.workers.submit(Lane.SIMULATIONS, planned_life, clutch_id, method, planned)
     return Response(content=to_json(await asyncio.wrap_future(answer)), media_type=JSON_TYPE)
 
 
@@ -84,12 +97,23 @@ async def degradation(
     request: Request,
     context: Reader,
     clutch_id: ClutchId,
+    method: Method = "grid",
+    quantity: TrackedQuantity = None,
+    at_cycles: AtCycles = None,
+    life: LifeNumber = None,
+    draws: Draws = 0,
     limit: Whole = ALL_ITEMS,
     cursor: Cursor = None,
     prefer: Prefer = None,
 ) -> Response:
-    """Eq. 6 for every Stribeck parameter and for mean COF: coefficients, measurements, trajectory with its 90 % band."""
-    return await computed_answer(request, context, clutch_id, degradation_of, limit=limit, cursor=cursor, prefer=prefer)
+    """Tracks along a life by any filter: coefficients of eq. 6, measurements, trajectory with its 90 % band.
+
+    Of one quantity wherever it was measured, or of mean COF and every Stribeck parameter.
+    """
+    arguments = degradation_arguments(method, quantity, at_cycles, life, draws)
+    return await computed_answer(
+        request, context, clutch_id, degradation_of, *arguments, limit=limit, cursor=cursor, prefer=prefer
+    )
 
 
 @router.get("/stribeck", response_model=StribeckPage, responses=READING)
@@ -109,10 +133,18 @@ async def stribeck(
 
 @router.get("/engagement", response_model=EngagementOut, responses=READING)
 async def engagement(
-    request: Request, context: Reader, clutch_id: ClutchId, at_cycles: AtCycles = None, prefer: Prefer = None
+    request: Request,
+    context: Reader,
+    clutch_id: ClutchId,
+    at_cycles: AtCycles = None,
+    run_id: EngagementRun = None,
+    prefer: Prefer = None,
 ) -> Response:
-    """A simulated engagement of the tracked clutch: the pressure profile of fig. 3 against the motor's 20 Nm."""
-    return await computed_answer(request, context, clutch_id, engaged, at_cycles, prefer=prefer)
+    """A simulated engagement of the tracked clutch (fig. 3's pressure against the motor's 20 Nm), the indicators of measured
+    ones, and one of these beside what the tracked model gives for its pressure and drive."""
+    return await computed_answer(
+        request, context, clutch_id, engaged, at_cycles, run_id, prefer=prefer, lane=Lane.SIMULATIONS
+    )
 
 
 @router.get("/surfaces", response_model=Surfaces, responses=READING)
@@ -159,7 +191,7 @@ async def series(
     limit: Whole = ALL_ITEMS,
     cursor: Cursor = None,
 ) -> Response:
-    """Flat rows for dashboards and spreadsheets: every fitted quantity, then the predictions."""
+    """Flat rows for dashboards and spreadsheets: fitted quantities, indicators of engagements, then predictions."""
     after = from_cursor(cursor)
 
     def make() -> bytes:

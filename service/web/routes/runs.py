@@ -20,7 +20,7 @@ from service.run_files.json_run import checked, read_run
 from service.schemas.parameters import ClutchId, Points, RunId, State
 from service.schemas.run import RUN_IN, Confirmation, Correction, Receipt, RunOut, RunPage, Withdrawal
 from service.web.answers import JSON_TYPE, clutch_answer, described_body, json_body, now, unchanged
-from service.web.auth import Ingester, Reader, name_of_caller
+from service.web.auth import Admin, Ingester, Reader, name_of_caller
 from service.web.context import Context, Cursor, Limit
 from service.web.files import PARQUET_TYPE, preferred, streamed
 from service.web.limits import LARGE_BODY_BYTES, USUAL_ITEMS
@@ -61,7 +61,7 @@ async def post_run(request: Request, context: Ingester, clutch_id: ClutchId) -> 
     """Post a run, in any order of cycles. The receipt says what was made of it; by then it is stored for good."""
     body = await json_body(request)
     by = name_of_caller(request)
-    lane = Lane.RUNS if len(body) <= LARGE_BODY_BYTES else Lane.FILES
+    lane = Lane.RUNS if len(body) <= LARGE_BODY_BYTES else Lane.RECORDS
     taken_in = context.workers.submit(
         lane, ingest_posted, clutch_id, partial(read_run, body), now(), by, turn=clutch_id
     )
@@ -103,10 +103,10 @@ async def read_run_with_channels(
     )
     if held := unchanged(request, headers):
         return held
-    with tempfile.TemporaryDirectory(prefix="clutchlife-") as folder:
+    with tempfile.TemporaryDirectory(dir=context.folder) as folder:
         path = Path(folder) / "body"
         write = partial(write_run, points=points, kind=kind, path=path, compressed=packed)
-        headers["ETag"] = await asyncio.wrap_future(context.workers.submit(Lane.FILES, write, clutch_id, run_id))
+        headers["ETag"] = await asyncio.wrap_future(context.workers.submit(Lane.RECORDS, write, clutch_id, run_id))
         body = path.open("rb")  # its name goes with the folder, its content when it is closed
     return streamed(body, media_type, headers)
 
@@ -117,7 +117,7 @@ async def read_run_with_channels(
     responses=CHANGING,
     openapi_extra=described_body(Correction, {"cycles": 7000, "reason": "typed a zero too many"}),
 )
-async def correct_run(request: Request, context: Ingester, clutch_id: ClutchId, run_id: RunId) -> Response:
+async def correct_run(request: Request, context: Admin, clutch_id: ClutchId, run_id: RunId) -> Response:
     """Correct a run's cycles; it counts where it is plausible there. What was sent stays stored."""
     wanted = checked(Correction, await json_body(request))
     return await _changed(
@@ -131,7 +131,7 @@ async def correct_run(request: Request, context: Ingester, clutch_id: ClutchId, 
     responses=CHANGING,
     openapi_extra=described_body(Withdrawal, {"reason": "the torque sensor was unplugged"}),
 )
-async def withdraw_run(request: Request, context: Ingester, clutch_id: ClutchId, run_id: RunId) -> Response:
+async def withdraw_run(request: Request, context: Admin, clutch_id: ClutchId, run_id: RunId) -> Response:
     """Take a run out of the clutch's history. It stays stored and listed."""
     wanted = checked(Withdrawal, await json_body(request))
     return await _changed(change_run.withdraw, request, context, clutch_id, run_id, reason=wanted.reason)
@@ -143,7 +143,7 @@ async def withdraw_run(request: Request, context: Ingester, clutch_id: ClutchId,
     responses=CHANGING,
     openapi_extra=described_body(Withdrawal, {"reason": "it was the other sensor"}),
 )
-async def restore_run(request: Request, context: Ingester, clutch_id: ClutchId, run_id: RunId) -> Response:
+async def restore_run(request: Request, context: Admin, clutch_id: ClutchId, run_id: RunId) -> Response:
     """Take a withdrawal back: the run is accepted or held as it was before."""
     wanted = checked(Withdrawal, await json_body(request))
     return await _changed(change_run.restore, request, context, clutch_id, run_id, reason=wanted.reason)
@@ -155,7 +155,7 @@ async def restore_run(request: Request, context: Ingester, clutch_id: ClutchId, 
     responses=CHANGING,
     openapi_extra=described_body(Confirmation, {"reason": "the clutch was run over the weekend"}),
 )
-async def confirm_run(request: Request, context: Ingester, clutch_id: ClutchId, run_id: RunId) -> Response:
+async def confirm_run(request: Request, context: Admin, clutch_id: ClutchId, run_id: RunId) -> Response:
     """Accept a held run as it was sent."""
     wanted = checked(Confirmation, await json_body(request))
     return await _changed(change_run.confirm, request, context, clutch_id, run_id, reason=wanted.reason)

@@ -22,15 +22,20 @@ CHARTS = {
     "fan": "Mean COF against its threshold",
     "predicted": "Remaining cycles, as predicted",
     "cof": "Mean COF by pressure",
-    "stribeck": "Stribeck curves by state",
+    "stribeck": "Stribeck curves",
     "surface": "Stribeck curves in 3D",
     "static-torque-nm": "Static torque Ms",
     "coulomb-ratio": "Coulomb ratio M̄c",
     "stribeck-velocity-m-s": "Stribeck velocity VS",
     "viscous-coefficient": "Viscous coefficient Cv",
     "landscape": "A parameter over cycles and pressure",
+    "pressure-law": "A parameter over pressure",
+    "shudder": "Slope of friction over speed",
     "loop-curves": "Loops: torque over speed",
-    "loop-areas": "Loop area over cycles",
+    "lag-cycles": "Lag over cycles",
+    "lag-pressure": "Lag over pressure",
+    "engagement-indicators": "An indicator over cycles",
+    "engagement-trace": "An engagement against the model",
 }
 
 
@@ -158,7 +163,7 @@ def test_pressure_and_view_are_chosen_by_keyboard(watched: Watched) -> None:
     page = opened(watched)
     chart = page.locator("#chart-stribeck")
     chart.scroll_into_view_if_needed()
-    select = chart.get_by_label("Pressure")
+    select = chart.get_by_label(re.compile(r"^\s*Pressure"))
     select.focus()
     page.keyboard.press("ArrowDown")
     expect(chart.locator(".note")).to_contain_text("At 5.5 bar")
@@ -167,10 +172,10 @@ def test_pressure_and_view_are_chosen_by_keyboard(watched: Watched) -> None:
     surface = page.locator("#chart-surface")
     surface.get_by_label("Torque over speed and").select_option("cycles")
     expect(surface.locator(".note")).to_contain_text("over the life")
-    areas = page.locator("#chart-loop-areas summary")
-    areas.focus()
+    law = page.locator("#chart-pressure-law summary")
+    law.focus()
     page.keyboard.press("Enter")
-    page.locator("#chart-loop-areas table tbody tr").first.wait_for()
+    page.locator("#chart-pressure-law table tbody tr").first.wait_for()
 
 
 def test_a_run_posted_while_the_page_is_open_appears(browser: Browser, tmp_path: Path) -> None:

@@ -101,7 +101,16 @@ def test_without_the_library_the_light_charts_stay(browser: Browser, life: Serve
     page = watched.page
     page.route(LIBRARY, lambda route: route.abort())
     watched.open("/clutches/bench")
-    for name in ("fan", "predicted", "cof", "stribeck", "static-torque-nm", "loop-curves", "loop-areas"):
+    for name in (
+        "fan",
+        "predicted",
+        "cof",
+        "stribeck",
+        "static-torque-nm",
+        "pressure-law",
+        "loop-curves",
+        "lag-cycles",
+    ):
         page.locator(f"#chart-{name}").scroll_into_view_if_needed()
         page.locator(f"#chart-{name}[data-sketched]").wait_for()
         assert seen(browser, page.locator(f"#chart-{name} .plot").screenshot()).is_chart, name

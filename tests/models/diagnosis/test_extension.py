@@ -14,7 +14,7 @@ from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.catalogued.torque_zero_shift import DAYS, STRAIGHT
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.effects.viscosity import log_viscosity_ratio
-from models.diagnosis.extension import Extension, _laws, build_extension, facts_from, facts_to
+from models.diagnosis.extension import Extension, NotFiniteError, _laws, build_extension, facts_from, facts_to
 from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.records.runs import Plateaus
 from tests.models.diagnosis.campaigns import campaign
@@ -99,6 +99,25 @@ def test_without_temperature_nothing_is_taken_off(warm):
     assert np.array_equal(extension_of(warm, TEMPERATURE).artefact(run, warm.campaign), np.zeros(table.torque.size))
     # a course is no artefact
     assert not extension_of(warm, WEAR).artefact(warm.campaign.stationary[5], warm.campaign).any()
+
+
+def test_where_an_effect_makes_no_number_nothing_passes_for_no_correction(warm, monkeypatch):
+    """A NaN was taken for 0 Nm: a test of which nothing was taken off looked like one that needed nothing."""
+    effect = BY_SLUG["torque_zero_shift"]
+    zero = extension_of(warm, (effect.slug, 0.3, (0.0, ONSET, *STRAIGHT)))
+    run = warm.campaign.stationary[4]
+    assert np.isfinite(zero.artefact(run, warm.campaign)).all()
+
+    def broken(scene, amplitude, shape):
+        change = effect.change(scene, amplitude, shape)
+        change[0] = np.nan
+        return change
+
+    monkeypatch.setitem(BY_SLUG, effect.slug, replace(effect, change=broken))
+    with pytest.raises(
+        NotFiniteError, match=f"torque_zero_shift is not finite at 1 of {run.plateaus.torque.size} points"
+    ):
+        zero.artefact(run, warm.campaign)
 
 
 def test_a_huge_run_and_runs_unlike_any_before(warm):

@@ -8,7 +8,15 @@ from scipy.optimize import least_squares
 
 from models.arrays import FloatArray
 from models.friction.identification import StribeckFit, fit_curves
-from models.friction.pressure_laws import fit_asymptotic, fit_linear, fit_pressure_laws, laws_of, over_pressure
+from models.friction.pressure_laws import (
+    AsymptoticLaw,
+    fit_asymptotic,
+    fit_linear,
+    fit_pressure_laws,
+    law_covariance,
+    laws_of,
+    over_pressure,
+)
 from models.friction.stribeck import PARAMETER_NAMES
 from models.records.runs import curves_by_pressure
 from models.rig.campaign import simulated_clutch
@@ -107,3 +115,53 @@ def test_a_parameter_over_pressure_at_several_states_is_its_law_at_each() -> Non
         values = np.stack([getattr(clutch.parameters(PROTOCOL_PRESSURES, state), name) for state in states], axis=1)
         expected = np.stack([getattr(clutch.parameters(pressures, state), name) for state in states], axis=1)
         assert over_pressure(name, PROTOCOL_PRESSURES, values, pressures) == pytest.approx(expected, rel=1e-3)
+
+
+def test_the_band_of_a_line_is_how_far_repeated_tests_scatter() -> None:
+    rng = np.random.default_rng(21)
+    deviation = np.linspace(0.05, 0.2, 7)
+    true = 2.0 + 3e-6 * PROTOCOL_PRESSURES
+    drawn = [fit_linear(PROTOCOL_PRESSURES, true + deviation * rng.standard_normal(7), deviation) for _ in range(2_000)]
+    scatter = np.cov([(law.intercept, law.slope) for law in drawn], rowvar=False)
+    exact = law_covariance(fit_linear(PROTOCOL_PRESSURES, true, deviation), PROTOCOL_PRESSURES, true, deviation)
+    assert scatter == pytest.approx(exact, rel=0.15)  # 1/sqrt(1000) is 3 %, a variance's error
+    equal = np.full(7, deviation.mean())
+    assert law_covariance(drawn[0], PROTOCOL_PRESSURES, drawn[0](PROTOCOL_PRESSURES), equal) != pytest.approx(
+        exact, rel=0.15
+    )
+
+
+def test_the_band_of_the_falling_law_is_how_far_repeated_tests_scatter() -> None:
+    rng = np.random.default_rng(22)
+    law = AsymptoticLaw(asymptote=0.6, excess=4.0, decay=1.6e5)
+    deviation = np.full(7, 2e-3)
+    true = law(PROTOCOL_PRESSURES)
+    drawn = [
+        fit_asymptotic(PROTOCOL_PRESSURES, true + deviation * rng.standard_normal(7), deviation)(PROTOCOL_PRESSURES)
+        for _ in range(200)
+    ]
+    gradient = law.gradient(PROTOCOL_PRESSURES)
+    covariance = law_covariance(law, PROTOCOL_PRESSURES, true, deviation)
+    sd = np.sqrt(np.einsum("ni,ij,nj->n", gradient, covariance, gradient))
+    assert np.std(drawn, axis=0) == pytest.approx(sd, rel=0.2)  # 1/sqrt(400) is 5 %
+    assert np.all(sd < deviation)
+
+
+def test_parameters_off_their_law_widen_it() -> None:
+    value = 2.0 + 3e-6 * PROTOCOL_PRESSURES
+    off = value + 0.1 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0])
+    deviation = np.full(7, 0.01)
+    near, far = (
+        law_covariance(fit_linear(PROTOCOL_PRESSURES, values, deviation), PROTOCOL_PRESSURES, values, deviation)
+        for values in (value, off)
+    )
+    assert far[0, 0] > 50.0 * near[0, 0]
+
+
+def test_what_is_held_at_its_bound_has_no_band() -> None:
+    flat = np.full(7, 0.6)
+    covariance = law_covariance(
+        AsymptoticLaw(asymptote=0.6, excess=0.0, decay=1e5), PROTOCOL_PRESSURES, flat, np.full(7, 0.1)
+    )
+    assert covariance[0, 0] == pytest.approx(0.1**2 / 7)
+    assert np.all(covariance[1:] == 0.0)

@@ -28,12 +28,11 @@ from models.rig.hysteresis import NO_LAG
 from models.rig.programme import Programme
 from models.rig.sampled import DynamicTest
 from models.rig.simulated_runs import RunKind
-from models.rig.stationary import Sensor, stationary_test
+from models.rig.stationary import SHARP, Sensor, stationary_test
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
 from tests.models.tracking.simulated_lives import GEOMETRY, STAGES, Life, areas_of
 
 FIVE_BAR = 2
-SHARP = Sensor(noise=0.002)
 #: The one parameter that grows over life.
 RISING = PARAMETER_NAMES[3]
 

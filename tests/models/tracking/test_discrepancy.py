@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from models.prognosis.first_passage import predict_first_passage
-from models.tracking.discrepancy import smooth
+from models.tracking.discrepancy import Discrepancy, smooth
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from models.tracking.filters.ukf import Ukf
@@ -23,6 +23,22 @@ def test_a_course_has_the_deviation_that_its_size_says() -> None:
     variance = np.square(smooth(np.array([1.0, 4.0, 9.0, 500.0]) * 7e3, 7e3)).sum(axis=1)
     np.testing.assert_allclose(np.sqrt(variance), [1.0, 8.0, 27.0, 10.0**1.5], rtol=0.015)
     assert not smooth(np.array([0.0]), 7e3).any()
+
+
+def test_what_was_measured_bends_as_the_course_beyond_it_does() -> None:
+    """Up to T each draw's own time is ζ, and its δ a sum of terms; beyond, it is led on from stretch to stretch. Where both
+    hold they are the same, on both sides of a step of the level."""
+    rng, progress = np.random.default_rng(1), np.array([0.0, 900.0, 4_000.0, 4_001.0, 7_000.0])
+    beside = Discrepancy(
+        span=7_000.0,
+        size=np.full(50, 0.1),
+        curvature=rng.standard_normal((50, 22)),
+        at=np.array([4_000.5]),
+        height=rng.standard_normal((50, 1)),
+    )
+    own = np.repeat(progress[:, None], 50, axis=1)
+    np.testing.assert_allclose(beside.measured(progress), beside(own, progress[:, None]), rtol=0, atol=1e-13)
+    assert np.abs(beside.measured(progress) - replace(beside, height=-beside.height).measured(progress)).max() > 1.0
 
 
 def test_a_straight_line_is_no_eq_6_and_the_data_say_so() -> None:

@@ -8,13 +8,15 @@ import pytest
 from service.dashboard import assets
 
 #: In reading order: a chapter imports itself and chapters before it; the two pages know nothing of each other.
-CHAPTERS = ("shared", "charts", "sending", "diagnosis", "clutch", "fleet")
+CHAPTERS = ("shared", "charts", "quantities", "sending", "diagnosis", "engagements", "clutch", "fleet")
 #: The file of each chapter to open first; it says what the chapter is in three lines.
 FIRST = {
     "shared": "api.js",
     "charts": "chart.js",
+    "quantities": "quantities.js",
     "sending": "sending.js",
     "diagnosis": "diagnosis.js",
+    "engagements": "engagements.js",
     "clutch": "clutch.js",
     "fleet": "fleet.js",
 }

@@ -18,8 +18,8 @@ GENERIC = {"ListPage"}
 def schemas() -> dict[str, type[BaseModel]]:
     """Every class of service/schemas by its name."""
     modules = [
-        importlib.import_module(f"service.schemas.{info.name}")
-        for info in pkgutil.iter_modules(service.schemas.__path__)
+        importlib.import_module(info.name)
+        for info in pkgutil.walk_packages(service.schemas.__path__, "service.schemas.")
     ]
     return {
         name: value

@@ -8,7 +8,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.lives.criteria import MOST_LINE_POINTS
-from service.lives.history import Event
+from service.lives.history import Event, moment_of
 from service.lives.payloads import recent
 from service.queries import clutch_list
 from storage import clutches, diagnoses
@@ -46,6 +46,14 @@ def test_a_line_is_short_and_ends_with_the_last_value(count: int) -> None:
 def test_without_a_measurement_there_is_no_line() -> None:
     events = [Event(run_id="a", kind="run_in", cycles=0.0, moment=0.0)]
     assert recent(events, SimpleNamespace(measurements=[]))["mean_cof"] == []  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("stored", ["0001-01-01T00:00:00+23:59", "9999-12-31T23:59:59-23:59"])
+def test_a_time_that_an_earlier_release_stored_outside_of_all_dates_is_shown(stored: str) -> None:
+    """Both are no date in UTC, in which the fleet shows when the last run was made."""
+    events = [Event(run_id="a", kind="run_in", cycles=0.0, moment=moment_of(stored, ""))]
+    said = recent(events, SimpleNamespace(measurements=[]))["last_run"]["at"]  # type: ignore[arg-type]
+    assert said[:4] == stored[:4]
 
 
 def test_a_summary_of_an_earlier_release_tells_the_life_all_the_same(client: TestClient, database_url: str) -> None:

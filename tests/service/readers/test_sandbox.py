@@ -1,5 +1,6 @@
 """The reading process: its limits on memory, time and output, and a reader that misbehaves ends alone."""
 
+import os
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -7,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from service.errors import InvalidError, TooLargeError
-from service.readers import sandbox
+from service.readers import confinement, sandbox
 from service.readers.detect import Format
 from service.readers.limits import LIMITS
 from service.readers.read_file import read_file
@@ -60,3 +61,60 @@ def test_a_missing_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 def test_reading_loads_no_foreign_package_here() -> None:
     assert "asammdf" not in sys.modules
+
+
+#: Each tries to reach what it must not, and says how that ended by the error that its reader gives.
+REACHES = {
+    "another file": "open({secret!r})",
+    "the folder of the file": "__import__('os').listdir({folder!r})",
+    "a file to write": "open({folder!r} + '/new', 'w')",
+    "the environment of the service": "open('/proc/{service}/environ')",
+    "a socket": "__import__('socket').socket()",
+    "a pair of sockets": "__import__('socket').socketpair()",
+    "a program": "__import__('subprocess').run(['/bin/true'])",
+    "a further process": "__import__('os').fork()",
+    "the service itself": "__import__('os').kill({service}, 0)",
+}
+#: What a reader may do: read the file, write into its own folder, use threads; and have only so many files open.
+MAY = {
+    "the file": "raise ValueError(open(path).read())",
+    "a temporary file": "raise ValueError(__import__('tempfile').TemporaryFile().write(b'TDSm') and 'TDSm')",
+    "a thread": "t = __import__('threading').Thread(target=print); t.start(); t.join(); raise ValueError('TDSm')",
+}
+
+
+def reading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str) -> str:
+    """What a reader that does this is answered with."""
+    (tmp_path / "nptdms.py").write_text("class TdmsFile: pass\n", encoding="utf-8")
+    (tmp_path / "sitecustomize.py").write_text(
+        "import sys, types, threading, tempfile, socket, subprocess\nfake = types.ModuleType('service.readers.tdms')\n"
+        f"def read(path, mapping, limits):\n    {body}\n"
+        "fake.read = read\nsys.modules['service.readers.tdms'] = fake\n",
+        encoding="utf-8",
+    )
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{Path(__file__).parents[3]}")
+    path = tmp_path / "a.tdms"
+    path.write_bytes(b"TDSm")
+    with pytest.raises(InvalidError) as caught:
+        read_file(path, filename="a.tdms")
+    return caught.value.detail
+
+
+@pytest.mark.skipif(confinement.missing() != [], reason=f"this system leaves open {confinement.missing()}")
+@pytest.mark.parametrize("reach", REACHES)
+def test_a_reader_reaches_nothing_but_its_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reach: str) -> None:
+    secret = tmp_path / "clutchlife.db"
+    secret.write_text("what keys protect", encoding="utf-8")
+    attempt = REACHES[reach].format(secret=str(secret), folder=str(tmp_path), service=os.getpid())
+    assert "PermissionError" in reading(tmp_path, monkeypatch, f"{attempt}; raise ValueError('reached')")
+
+
+@pytest.mark.parametrize("use", MAY)
+def test_a_reader_may_do_what_reading_needs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, use: str) -> None:
+    assert "TDSm" in reading(tmp_path, monkeypatch, MAY[use])
+
+
+def test_a_reader_opens_only_so_many_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "Too many open files" in reading(
+        tmp_path, monkeypatch, "held = [open(path) for _ in range(1000)]; raise ValueError(len(held))"
+    )

@@ -53,3 +53,37 @@ class TestManifest:
         self.write(tmp_path, [self.entry(file="other.csv")])
         with pytest.raises(FileNotFoundError, match=r"runs\.json\[0\]: .*other\.csv is not there"):
             manifest.find([tmp_path])
+
+    @pytest.mark.parametrize("name", ["../secret.csv", "{outside}/secret.csv", "link.csv", "linked/secret.csv"])
+    def test_names_no_file_outside_its_folder(self, tmp_path: Path, name: str) -> None:
+        folder, outside = tmp_path / "recordings", tmp_path / "outside"
+        for path in (folder, outside):
+            path.mkdir()
+        for path in (outside / "secret.csv", tmp_path / "secret.csv"):
+            path.write_text("torque_nm\n1\n", encoding="utf-8")
+        (folder / "link.csv").symlink_to(outside / "secret.csv")
+        (folder / "linked").symlink_to(outside)
+        self.write(folder, [self.entry(file=name.format(outside=outside))])
+        for pushed in (folder, folder / "a.csv"):
+            with pytest.raises(ValueError, match=r"runs\.json\[0\]: .* lies outside the folder"):
+                manifest.find([pushed])
+
+    @pytest.mark.parametrize("name", ["b.json", "clutch.json"])
+    def test_no_body_is_a_link_out_of_the_folder(self, tmp_path: Path, name: str) -> None:
+        folder = tmp_path / "recordings"
+        folder.mkdir()
+        (tmp_path / "secret.json").write_text("{}", encoding="utf-8")
+        (folder / name).symlink_to(tmp_path / "secret.json")
+        with pytest.raises(ValueError, match="lies outside the folder"):
+            manifest.find([folder])
+
+    def test_files_and_links_below_the_folder_are_sent(self, tmp_path: Path) -> None:
+        folder = tmp_path / "recordings"
+        (folder / "day-1").mkdir(parents=True)
+        (folder / "day-1" / "b.csv").write_text("torque_nm\n1\n", encoding="utf-8")
+        (folder / "c.csv").symlink_to(folder / "day-1" / "b.csv")
+        (tmp_path / "by-another-name").symlink_to(folder)
+        entries = [self.entry(), self.entry(file="day-1/b.csv"), self.entry(file="c.csv")]
+        self.write(folder, entries)
+        for pushed in (folder, tmp_path / "by-another-name"):
+            assert [run.path.name for run in manifest.find([pushed])] == ["a.csv", "b.csv", "c.csv"]

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,12 @@ from models.clutch import Geometry
 from models.friction.identification import fit_curves
 from models.loops.loops import evaluate_loops
 from models.records.runs import curves_by_pressure
-from models.rig.campaign import simulate
+from models.rig.campaign import simulate, simulated_clutch
+from models.rig.hysteresis import ATTRACTOR
 from models.rig.programme import Programme
 from models.rig.sampled import DynamicTest, RawTest
 from models.rig.simulated_runs import SimulatedRun
+from models.rig.stationary import SHARP
 from service.lives.incoming_run import sampled_record, stationary_plateaus
 from service.run_files import manifest
 from service.run_files.json_run import read_run
@@ -29,7 +32,11 @@ FORMATS = ("csv", "tdms", "mdf4")
 
 
 def measured(programme: Programme) -> list[SimulatedRun]:
-    return [run for run in simulate(7, programme=programme, most_tests=1) if run.duty is None]
+    """The tests of the same campaign as the command makes them."""
+    clutch = simulated_clutch(7)
+    clutch = replace(clutch, lag=replace(clutch.lag, attractor=ATTRACTOR))
+    runs = simulate(7, clutch=clutch, sensor=SHARP, programme=programme, most_tests=1)
+    return [run for run in runs if run.duty is None]
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,10 @@
 import pytest
 from fastapi.testclient import TestClient
 
+from service.app import create_app
+from service.settings import Settings
 from service.web.auth import is_loopback
+from tests.service.web.routes.granting import granted, revoke_all
 
 
 @pytest.mark.parametrize(
@@ -31,3 +34,29 @@ def test_another_machine_is_refused(client: TestClient) -> None:
 def test_loopback_names() -> None:
     assert all(is_loopback(name) for name in ("127.8.9.1", "::1", "localhost"))
     assert not any(is_loopback(name) for name in ("192.0.2.1", "example", "", "::"))
+
+
+def test_after_the_last_key_is_revoked_the_service_stays_shut(client: TestClient) -> None:
+    assert client.get("/v1/clutches").status_code == 200
+    headers = granted(client, "admin")
+    assert [client.get("/v1/clutches", headers=said).status_code for said in ({}, headers)] == [401, 200]
+    revoke_all(client)
+    assert [client.get("/v1/clutches", headers=said).status_code for said in ({}, headers)] == [401, 401]
+
+
+PROXIED = ["Forwarded", "Via", "X-Forwarded-For", "X-Forwarded-Host", "X-Forwarded-Proto", "X-Real-IP"]
+
+
+@pytest.mark.parametrize("header", PROXIED)
+def test_what_a_proxy_passes_on_is_refused_without_keys(client: TestClient, header: str) -> None:
+    """It comes from this machine and may be anybody's."""
+    answer = client.get("/v1/clutches", headers={header: "127.0.0.1"})
+    assert (answer.status_code, header.lower() in answer.json()["detail"].lower()) == (403, True)
+    assert client.get("/livez", headers={header: "127.0.0.1"}).status_code == 200
+
+
+def test_insecure_local_answers_what_a_proxy_passes_on(database_url: str) -> None:
+    app = create_app(Settings(database=database_url, insecure_local=True))
+    with TestClient(app, base_url="http://127.0.0.1", client=("192.0.2.7", 50000)) as client:
+        assert client.get("/v1/clutches", headers={"X-Forwarded-For": "192.0.2.7"}).status_code == 200
+        assert client.get("/v1/clutches", headers={"Host": "rig.example"}).status_code == 403

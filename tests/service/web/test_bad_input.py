@@ -56,6 +56,8 @@ CASES = [
     (stationary(0) | {"channels": {}}, "/channels/pressure_bar", None, "", "missing"),
     (stationary(0) | {"channels": 5}, "/channels", None, "5", None),
     (stationary(0) | {"started_at": "2026-11-02T08:00:00"}, "/started_at", None, None, "timezone_aware"),
+    (stationary(0) | {"started_at": "0001-01-01T00:00:00Z"}, "/started_at", None, None, "greater_than_equal"),
+    (stationary(0) | {"started_at": "9999-12-31T23:59:59-23:59"}, "/started_at", None, None, "less_than_equal"),
     (stationary(0, pressures=(5.0,), speeds=(500,)), "/channels/torque_nm/0", 1, None, "too_few_points"),
     (stationary(0, speeds=(500,)), "/channels/speed_rpm/0", 1, "500", "speeds_all_equal"),
     (stationary(0, pressures=(0.0, 0.02), speeds=(0,)), "/channels/speed_rpm/0", 1, "0", "open_at_rest"),

@@ -1,5 +1,8 @@
 """Answers that are kept by the clutch's revision: computed once, and never given when they no longer hold."""
 
+import tempfile
+from pathlib import Path
+
 import pytest
 from fastapi.testclient import TestClient
 
@@ -7,7 +10,7 @@ from service.app import create_app
 from service.queries import series
 from service.settings import Settings
 from service.workflows.replay import replay_clutch
-from storage.engine.database import open_database
+from storage.engine.database import back_up, open_database
 from tests.support import stationary
 
 BASE = "/v1/clutches/c1"
@@ -28,9 +31,16 @@ def told(client: TestClient) -> dict[str, tuple[str, bytes]]:
 
 
 def told_by_another(database_url: str) -> dict[str, tuple[str, bytes]]:
-    """The same by a service that remembers nothing yet, on the same database."""
-    other = create_app(Settings(database=database_url))
-    with TestClient(other, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
+    """The same by a service that remembers nothing yet, on a copy: two services never share a database."""
+    with tempfile.TemporaryDirectory() as folder:
+        back_up(database_url, Path(folder) / "copy.db")
+        return told_on(f"sqlite:///{folder}/copy.db")
+
+
+def told_on(database_url: str) -> dict[str, tuple[str, bytes]]:
+    with TestClient(
+        create_app(Settings(database=database_url)), base_url="http://127.0.0.1", client=("127.0.0.1", 50000)
+    ) as client:
         return told(client)
 
 

@@ -58,14 +58,13 @@ def test_states_and_pages_are_asked_for(client: TestClient) -> None:
 
 
 def test_the_trail_names_the_key(client: TestClient, database_url: str) -> None:
-    secrets = {}
+    secrets, named = {}, {}
     database = open_database(database_url)
-    for scope, note in (("ingest", "bench 3"), ("read", "")):
+    for scope, note in (("ingest", "bench 3"), ("read", ""), ("admin", "boss")):
         secrets[scope], row = make_key(scope, note, created_at="2026-01-01")
         with database.writing() as connection:
             keys.insert(connection, row)
-        if scope == "ingest":
-            key_id = row.key_id
+        named[scope] = f"key:{row.key_id} {note}".rstrip()
     database.close()
     headers = {scope: {"Authorization": f"Bearer {secret}"} for scope, secret in secrets.items()}
     post(client, **headers["ingest"])
@@ -73,9 +72,12 @@ def test_the_trail_names_the_key(client: TestClient, database_url: str) -> None:
     assert client.post(f"{RUN}/withdraw", json=reason).status_code == 401
     assert client.post(f"{RUN}/withdraw", json=reason, headers=headers["read"]).status_code == 403
     assert client.patch(BASE, json={"archived": True}, headers=headers["read"]).status_code == 403
-    assert client.post(f"{RUN}/withdraw", json=reason, headers=headers["ingest"]).status_code == 200
+    assert client.post(f"{RUN}/withdraw", json=reason, headers=headers["ingest"]).status_code == 403
+    assert client.post(f"{RUN}/withdraw", json=reason, headers=headers["admin"]).status_code == 200
     (entry,) = client.get(f"{BASE}/changes", headers=headers["read"]).json()["items"]
-    assert entry["by"] == f"key:{key_id} bench 3"
+    assert entry["by"] == named["admin"]
+    (receipt,) = client.get(f"{BASE}/runs", headers=headers["read"]).json()["items"]
+    assert receipt["received_by"] == client.get(RUN, headers=headers["read"]).json()["received_by"] == named["ingest"]
 
 
 @pytest.mark.parametrize(

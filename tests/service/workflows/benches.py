@@ -15,7 +15,8 @@ import pytest
 
 from models.diagnosis.extension import Extension
 from service.lives.run_analysis import Notice
-from service.queries import clutch_list, degradation, remaining_life, runs, scores, series, stribeck
+from service.queries import clutch_list, degradation, runs, scores, series, stribeck
+from service.queries.life import remaining_life
 from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
 from service.web.answers import to_json

@@ -127,6 +127,12 @@ def diagnose(campaign: Campaign, *, rng: np.random.Generator) -> Report:
     return _report(campaign, Extension(effects=("torque_zero_shift", "running_in"), content=content))
 
 
+def overflowing(campaign: Campaign, *, rng: np.random.Generator) -> Report:
+    """The same, and a number runs over on the way."""
+    np.exp(np.array([1e3]))
+    return diagnose(campaign, rng=rng)
+
+
 def slow(campaign: Campaign, *, rng: np.random.Generator) -> Report:
     """The same, after two seconds of work."""
     until = time.monotonic() + 2.0

@@ -64,9 +64,10 @@ def test_a_late_arrival_is_none_once_the_run_that_made_it_late_is_gone(benches: 
     bench.send(body("test", "first", 0.0))
     bench.send(body("test", "slip", 70_000.0, wear=0.05))
     late = bench.send(body("test", "late", 1000.0))
-    assert [warning["code"] for warning in late["warnings"]] == ["late_arrival"]
+    assert "late_arrival" in {warning["code"] for warning in late["warnings"]}
     bench.correct("slip", 700.0)
-    assert [receipt["warnings"] for receipt in bench.receipts().values()] == [[], [], []]
+    codes = {warning["code"] for receipt in bench.receipts().values() for warning in receipt["warnings"]}
+    assert codes <= {"undetermined"}  # what the curves themselves leave open
     bench.correct("slip", 70_000.0)
     assert bench.receipts()["late"]["warnings"] == late["warnings"]
     assert bench.receipts()["slip"]["sent_cycles"] == 70_000

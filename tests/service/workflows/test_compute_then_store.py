@@ -9,10 +9,15 @@ from typing import Any
 
 import pytest
 from sqlalchemy import text
+from typer.testing import CliRunner
 
 from models.diagnosis.extension import Extension
+from service import stored_runs
+from service.cli.main import app
 from service.lives import model_correction, recomputation, run_analysis, tracks
+from service.lives.criteria import MOST_ATTEMPTS
 from service.lives.incoming_run import name_run
+from service.lives.recomputation import ClutchState
 from service.queries import degradation
 from service.queries.cache import to_json
 from service.run_files.json_run import read_run
@@ -186,6 +191,32 @@ def test_the_same_run_of_two_threads_is_stored_once(database: Database) -> None:
     for thread in senders:
         thread.join(120)
     assert sorted(answers) == [False, False, False, True]
+
+
+def test_a_replay_beside_a_rig_that_never_rests_ends_and_says_why(
+    database: Database, url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run comes whenever the clutch is computed anew: it is left as it was, the others are replayed all the same."""
+    register_clutch.register(database, ClutchIn(clutch_id="c2"), created_at=AT)
+    post(database, 0.0)
+    attempts = []
+    recomputed = stored_runs.recomputed
+
+    def overtaken(opened: Database, state: ClutchState) -> stored_runs.Recomputed:
+        made = recomputed(opened, state)
+        if state.clutch_id == "c1":
+            attempts.append(post(database, 1000.0 * (len(attempts) + 1)))
+            assert len(attempts) < 10
+        return made
+
+    with monkeypatch.context() as busy:
+        busy.setattr(stored_runs, "recomputed", overtaken)
+        replayed = CliRunner().invoke(app, ["replay", "--database", url])
+    assert len(attempts) == MOST_ATTEMPTS
+    assert replayed.exit_code == 1
+    assert "runs came each of the 3 times that it was computed anew" in replayed.stderr
+    assert "c2: 0 runs" in replayed.stdout
+    assert replay_clutch(database, "c1") == 1 + MOST_ATTEMPTS
 
 
 @pytest.mark.usefixtures("stand_in")

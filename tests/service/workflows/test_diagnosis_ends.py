@@ -44,6 +44,27 @@ def test_a_diagnosis_that_breaks_is_told(
         assert client.get(f"{BASE}/model").json()["version"] == 0
 
 
+@pytest.mark.parametrize(
+    ("engine", "status", "level", "said"),
+    [
+        ("raising", "failed", "ERROR", "RuntimeError: it broke"),
+        ("overflowing", "finished", "WARNING", "RuntimeWarning: overflow encountered"),
+        ("diagnose", "finished", "", ""),
+    ],
+)
+def test_what_goes_wrong_in_a_diagnosis_is_in_the_log(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, engine: str, status: str, level: str, said: str
+) -> None:
+    """A bug with its traceback, a number that ran over with its line; of one that went well, nothing."""
+    with service(tmp_path, engine) as client:
+        answer = client.post(f"{BASE}/diagnoses", json={}, headers={"Prefer": "wait=120"})
+        assert answer.json()["status"] == status
+    logged = [record for record in caplog.records if record.getMessage().startswith("diagnosis ")]
+    assert [record.levelname for record in logged] == ([level] if level else [])
+    assert all(said in record.getMessage() for record in logged)
+    assert all("stand_in_engine.py" in record.getMessage() for record in logged)
+
+
 def test_one_runs_at_a_time_others_join_or_wait_or_are_sent_away(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

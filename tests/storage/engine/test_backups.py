@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from storage import channels, clutches, runs
-from storage.engine.database import Database, open_database
+from storage.engine.database import Database, back_up, open_database
 from storage.engine.errors import StorageUnavailable
-from tests.storage.samples import clutch_row, integrity, store_run
+from tests.storage.samples import OLD, clutch_row, integrity, old_database, revision, store_run
 
 CLUTCH = "bench3-017"
 
@@ -44,7 +44,7 @@ def test_a_copy_while_the_service_writes_is_one_state(busy: Database, tmp_path: 
     copies = [tmp_path / f"copy-{number}.db" for number in range(5)]
     try:
         for copy in copies:
-            busy.backup(copy)
+            back_up(f"sqlite:///{busy.path}", copy)
     finally:
         done.set()
         writer.join()
@@ -62,13 +62,13 @@ def test_a_copy_while_the_service_writes_is_one_state(busy: Database, tmp_path: 
 def test_a_copy_during_an_open_transaction_is_the_state_before_it(busy: Database, tmp_path: Path) -> None:
     with busy.writing() as connection:
         store_run(connection, 1)
-        busy.backup(tmp_path / "copy.db")
+        back_up(f"sqlite:///{busy.path}", tmp_path / "copy.db")
     with closing(open_database(f"sqlite:///{tmp_path}/copy.db")) as restored, restored.reading() as connection:
         assert len(runs.in_order(connection, CLUTCH)) == 1
 
 
 def test_a_copy_is_one_file_for_any_sqlite(busy: Database, tmp_path: Path) -> None:
-    busy.backup(tmp_path / "copy.db")
+    back_up(f"sqlite:///{busy.path}", tmp_path / "copy.db")
     with closing(sqlite3.connect(tmp_path / "copy.db")) as connection:
         assert connection.execute("PRAGMA journal_mode").fetchone() == ("delete",)
     assert [path.name for path in sorted(tmp_path.glob("copy.db*"))] == ["copy.db"]
@@ -79,15 +79,24 @@ def test_an_existing_file_is_never_replaced(busy: Database, tmp_path: Path) -> N
     for target in (tmp_path / "copy.db", busy.path):
         before = target.read_bytes()
         with pytest.raises(FileExistsError, match="exists already"):
-            busy.backup(target)
+            back_up(f"sqlite:///{busy.path}", target)
         assert target.read_bytes() == before
 
 
 def test_a_copy_that_fails_leaves_nothing(busy: Database, tmp_path: Path) -> None:
     busy.path.rename(tmp_path / "moved.db")
     with pytest.raises(StorageUnavailable, match="cannot be opened"):
-        busy.backup(tmp_path / "copy.db")
+        back_up(f"sqlite:///{busy.path}", tmp_path / "copy.db")
     assert list(tmp_path.glob("copy.db*")) == []
     assert not busy.path.exists()
     with pytest.raises(FileNotFoundError):
-        busy.backup(tmp_path / "no such folder" / "copy.db")
+        back_up(f"sqlite:///{busy.path}", tmp_path / "no such folder" / "copy.db")
+
+
+def test_a_backup_of_an_older_file_is_made_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = old_database(tmp_path, monkeypatch)
+    before = path.read_bytes()
+    back_up(f"sqlite:///{path}", tmp_path / "copy.db")
+    assert path.read_bytes() == before
+    assert [revision(each) for each in (path, tmp_path / "copy.db")] == [OLD, OLD]
+    assert integrity(tmp_path / "copy.db") == ["ok"]

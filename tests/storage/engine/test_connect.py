@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from storage import clutches
-from storage.engine.database import Database, open_database
+from storage.engine.database import Database, back_up, open_database
 from tests.storage.samples import clutch_row
 
 
@@ -64,7 +64,7 @@ def test_relative_paths_and_paths_with_signs(tmp_path: Path, monkeypatch: pytest
     for name in ("plain.db", "50 % of # ü.db"):
         with closing(open_database(f"sqlite:///{name}")) as database:
             assert database.ready()
-            database.backup(tmp_path / f"copy of {name}")
+            back_up(f"sqlite:///{name}", tmp_path / f"copy of {name}")
         assert {(tmp_path / name).exists(), (tmp_path / f"copy of {name}").exists()} == {True}
 
 

@@ -7,10 +7,10 @@ import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import OperationalError
 
-from storage import clutches
-from storage.engine.database import Database, open_database
-from storage.engine.errors import StorageUnavailable
-from tests.storage.samples import clutch_row, store_run
+from storage import changes, clutches
+from storage.engine.database import Database, find_database, open_database
+from storage.engine.errors import DatabaseTooOld, StorageUnavailable
+from tests.storage.samples import OLD, clutch_row, old_database, store_run
 
 
 def test_an_unreachable_file_is_named(tmp_path: Path) -> None:
@@ -72,12 +72,32 @@ def test_a_mistake_in_the_program_is_not_disguised(database: Database) -> None:
         connection.execute(text("SELECT * FROM no_such"))
 
 
-def test_a_closed_database_says_so(database: Database, tmp_path: Path) -> None:
+def test_a_closed_database_says_so(database: Database) -> None:
     database.close()
     database.close()
     with pytest.raises(StorageUnavailable, match="has been closed"), database.reading():
         pass
     with pytest.raises(StorageUnavailable, match="has been closed"), database.writing():
         pass
-    with pytest.raises(StorageUnavailable, match="has been closed"):
-        database.backup(tmp_path / "copy.db")
+
+
+def test_a_found_database_is_read_at_its_own_revision_and_never_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = old_database(tmp_path, monkeypatch)
+    before = path.read_bytes()
+    with closing(find_database(f"sqlite:///{path}")) as found:
+        with found.reading() as connection:
+            assert connection.exec_driver_sql("SELECT count(*) FROM clutch").scalar() == 1
+        with pytest.raises(DatabaseTooOld, match=rf"is at revision {OLD}, this needs s\d{{4}}_.*clutchlife serve"):  # noqa: SIM117
+            with found.reading() as connection:
+                changes.page(connection, "bench3-017", limit=1)
+        with pytest.raises(StorageUnavailable, match="read-only"), found.writing() as connection:
+            connection.exec_driver_sql("DELETE FROM clutch")
+    assert path.read_bytes() == before
+
+
+def test_nothing_is_found_where_there_is_no_file(tmp_path: Path) -> None:
+    with pytest.raises(StorageUnavailable, match="cannot be opened"):
+        find_database(f"sqlite:///{tmp_path}/none.db")
+    assert not (tmp_path / "none.db").exists()

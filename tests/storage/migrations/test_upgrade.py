@@ -18,7 +18,16 @@ from storage.engine.database import Database, open_database
 from storage.engine.errors import DatabaseTooNew, StorageUnavailable
 from storage.migrations import upgrade as migrations
 from storage.tables import metadata
-from tests.storage.samples import child, clutch_row, integrity, new_diagnosis, new_run
+from tests.storage.samples import (
+    OLD,
+    child,
+    clutch_row,
+    integrity,
+    new_diagnosis,
+    new_run,
+    old_database,
+    revision,
+)
 
 CLUTCH = "bench3-017"
 
@@ -79,7 +88,7 @@ def insert_as_before(connection: Connection) -> None:
     row |= {name: to_text(row[name]) for name in ("record", "summary")}
     connection.execute(insert(tables.clutch), row)
     sent = {field.name: getattr(new_run(1), field.name) for field in fields(new_run(1))}
-    for name in ("state", "sent_cycles", "doubts"):
+    for name in ("state", "sent_cycles", "doubts", "received_by"):
         del sent[name]
     sent |= {name: to_text(sent[name]) for name in ("details", "receipt")}
     connection.execute(insert(tables.run), sent)
@@ -183,3 +192,36 @@ def test_processes_that_start_at_once_all_succeed(tmp_path: Path, journal_mode: 
                 print(f"{tmp_path}/{number}.db", file=hears, flush=True)
             assert [says.readline() for _, _, says in starters] == ["True\n"] * 3
     assert integrity(tmp_path / "0.db") == ["ok"]
+
+
+def test_a_migration_keeps_a_copy_of_the_file_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = old_database(tmp_path, monkeypatch)
+    kept = path.with_name(f"old.db-before-{migrations.head()}")
+    open_database(f"sqlite:///{path}").close()
+    assert (revision(path), revision(kept), integrity(kept)) == (migrations.head(), OLD, ["ok"])
+    with closing(sqlite3.connect(kept)) as connection:
+        assert connection.execute("SELECT clutch_id FROM clutch").fetchall() == [("bench3-017",)]
+    open_database(f"sqlite:///{path}").close()
+    assert [each.name for each in tmp_path.glob("*-before-*")] == [kept.name]
+
+
+def test_a_migration_that_is_tried_again_replaces_no_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same content is kept once; a file that was worked on in between is kept beside it."""
+    path = old_database(tmp_path, monkeypatch)
+    with monkeypatch.context() as failing:
+        failing.setattr("storage.engine.database.upgrade", lambda _: 1 / 0)
+        for _ in range(2):
+            with pytest.raises(ZeroDivisionError):
+                open_database(f"sqlite:///{path}")
+    name = f"old.db-before-{migrations.head()}"
+    first = (tmp_path / name).read_bytes()
+    assert [each.name for each in tmp_path.glob("*-before-*")] == [name]
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute("UPDATE clutch SET created_at = 'later'")
+    open_database(f"sqlite:///{path}").close()
+    assert sorted(each.name for each in tmp_path.glob("*-before-*")) == [name, f"{name}.2"]
+    assert (tmp_path / name).read_bytes() == first
+
+
+def test_a_new_file_needs_no_copy(database: Database) -> None:
+    assert list(database.path.parent.glob("*-before-*")) == []

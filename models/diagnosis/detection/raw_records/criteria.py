@@ -11,12 +11,6 @@ LEAST_EVIDENCE = 4.5
 #: within this distance [Hz] of its frequency.
 FASTER_SHAFT = 2.0
 SAME_LINE = 1.0
-#: A dwell has not settled where its settling time is longer than this share [-] of it.
-SETTLED_SHARE = 0.8
-#: Unsettled dwells count by themselves from this number on and from this share [-] of all dwells on; each adds so many nats.
-FEWEST_UNSETTLED = 4
-LEAST_UNSETTLED_SHARE = 0.25
-NATS_PER_UNSETTLED = 0.5
 
 # ---- pieces of a record that are analysed, pieces.py
 

@@ -21,12 +21,8 @@ import numpy as np
 from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
 from models.diagnosis.detection.raw_records.criteria import (
     FASTER_SHAFT,
-    FEWEST_UNSETTLED,
     LEAST_EVIDENCE,
-    LEAST_UNSETTLED_SHARE,
-    NATS_PER_UNSETTLED,
     SAME_LINE,
-    SETTLED_SHARE,
 )
 from models.diagnosis.detection.raw_records.fixed_frequency import best_line, best_slow_line
 from models.diagnosis.detection.raw_records.limits import FEW_RECORDS, MANY_SAMPLES
@@ -36,7 +32,6 @@ from models.diagnosis.detection.raw_records.shaft_orders import best_order
 from models.diagnosis.detection.raw_records.whitened_torque import WhitenedRecord, whitened_record
 from models.diagnosis.effects.catalogued import shaft_ripple, stick_slip, unsettled_dwell
 from models.diagnosis.effects.estimate import Estimate
-from models.records.criteria import SETTLING
 from models.records.plateaus import PlateauCut, cut_plateaus
 from models.records.runs import Record
 
@@ -121,34 +116,14 @@ def _line_evidence(effect: str, line: Line, name: str, note: str) -> RawEvidence
 
 
 def _unsettled(dwells: list[tuple[Record, PlateauCut]]) -> list[RawEvidence]:
-    """Dwells that ended before torque had settled: by the number of dwells that show it by themselves, or by the evidence of
-    all together."""
-    cuts = [cut for _, cut in dwells]
-    late = [
-        (SETTLING * cut.time_constant > SETTLED_SHARE * (cut.stop - cut.start + cut.settling_time)) | ~cut.settled
-        for cut in cuts
-    ]
-    unsettled = np.concatenate(late) if late else np.zeros(0, dtype=np.bool_)
-    if unsettled.size == 0:
+    """Dwells that ended before torque had settled, by the evidence of all their transients together: one that looks late
+    without it adds nothing."""
+    settling = settling_evidence(dwells)
+    if settling.evidence <= LEAST_EVIDENCE:
         return []
-    count = int(np.count_nonzero(unsettled))
-    constants = np.concatenate([cut.time_constant for cut in cuts])[unsettled]
-    constants = constants[np.isfinite(constants)]
-    many = count >= max(FEWEST_UNSETTLED, LEAST_UNSETTLED_SHARE * unsettled.size)
-    alone = NATS_PER_UNSETTLED * count if many and constants.size >= FEWEST_UNSETTLED else 0.0
-    together, likeliest = settling_evidence(dwells)
-    if max(alone, together) <= LEAST_EVIDENCE:
-        return []
-    note = f"{count} of {unsettled.size} dwells ended before their torque had settled"
-    if together > alone:
-        note = (
-            f"after each step torque settles from the side of the last level, with a time constant of {likeliest:.2g} s"
-        )
-    value, deviation = likeliest, 0.5 * likeliest
-    if alone > 0:
-        value = float(np.median(constants))
-        deviation = float(1.4826 * np.median(np.abs(constants - value))) / np.sqrt(constants.size)
-    estimate = Estimate(name="settling time constant", value=value, sd=deviation, unit="s")
+    seconds = f"{settling.time_constant:.2g} s"
+    note = f"after each step torque settles from the side of the last level, with a time constant of {seconds}"
+    estimate = Estimate(name="settling time constant", value=settling.time_constant, sd=settling.deviation, unit="s")
     return [
-        RawEvidence(effect=unsettled_dwell.EFFECT.slug, log_evidence=max(alone, together), estimate=estimate, note=note)
+        RawEvidence(effect=unsettled_dwell.EFFECT.slug, log_evidence=settling.evidence, estimate=estimate, note=note)
     ]

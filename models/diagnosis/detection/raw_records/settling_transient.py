@@ -10,6 +10,7 @@ a ~ N(0, S²) positive, evidence is
 """
 
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import log_ndtr, logsumexp
@@ -28,8 +29,17 @@ from models.records.plateaus import PlateauCut
 from models.records.runs import Record
 
 
-def settling_evidence(dwells: Iterable[tuple[Record, PlateauCut]]) -> tuple[float, float]:
-    """Evidence [nats] of slow settling transients over none, and their likeliest time constant [s]."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SettlingEvidence:
+    """Evidence [nats] of slow settling transients over none, their time constant τ [s] and its deviation [s]."""
+
+    evidence: float
+    time_constant: float
+    deviation: float
+
+
+def settling_evidence(dwells: Iterable[tuple[Record, PlateauCut]]) -> SettlingEvidence:
+    """Of all dwells together."""
     times = np.array([*FAST_TIMES, *SLOW_TIMES])
     gram, along = np.zeros((times.size, times.size)), np.zeros(times.size)
     for record, cut in dwells:
@@ -53,7 +63,14 @@ def settling_evidence(dwells: Iterable[tuple[Record, PlateauCut]]) -> tuple[floa
     precision = info + USUAL_SHARE**-2.0
     logs = 0.5 * score**2 / precision - 0.5 * np.log(precision * USUAL_SHARE**2)
     logs = logs + np.log(2.0) + log_ndtr(score / np.sqrt(precision))
-    return float(logsumexp(logs) - np.log(len(SLOW_TIMES))), SLOW_TIMES[int(np.argmax(logs))]
+    weights, log_times = np.exp(logs - logsumexp(logs)), np.log(SLOW_TIMES)
+    middle = float(weights @ log_times)
+    within = np.ptp(log_times) / (log_times.size - 1) / np.sqrt(12)  # the grid cannot tell τ closer than its spacing
+    return SettlingEvidence(
+        evidence=float(logsumexp(logs) - np.log(len(SLOW_TIMES))),
+        time_constant=float(np.exp(middle)),
+        deviation=float(np.exp(middle) * np.sqrt(weights @ (log_times - middle) ** 2 + within**2)),
+    )
 
 
 def _transients(record: Record, cut: PlateauCut) -> Iterator[tuple[FloatArray, FloatArray, float]]:

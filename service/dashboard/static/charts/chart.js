@@ -256,3 +256,16 @@ export function choice(label, options, value, changed) {
   select.addEventListener("change", () => changed(select.value));
   return h("label", {}, `${label} `, select);
 }
+
+/**
+ * Replace a chart's controls, keeping the focus on the one that was used.
+ * @param {Chart} chart
+ * @param {HTMLElement[]} controls
+ */
+export function setControls(chart, controls) {
+  const focused = [...chart.controls.querySelectorAll("select")].findIndex(
+    (select) => select === document.activeElement,
+  );
+  chart.controls.replaceChildren(...controls);
+  if (focused >= 0) chart.controls.querySelectorAll("select")[focused]?.focus();
+}

@@ -60,8 +60,11 @@ function noteOf(life) {
       ? "perhaps never"
       : `at about ${cycles(median, end["0.05"], end["0.95"])} cycles (90 %: ${interval(end)})`;
   const reaches = median !== null && life.status === "reached" ? "reached" : "reaches";
+  const value = `Mean COF ${withSd(current.mean_cof, current.mean_cof_sd)}`;
+  if (criterion.threshold_mean_cof === null || criterion.fraction === null)
+    return `${value}; no criterion of the clutch is on it.`;
   const limit = `${fixed(criterion.threshold_mean_cof, 4)}, ${fixed(100 * criterion.fraction)} % of new`;
-  return `Mean COF ${withSd(current.mean_cof, current.mean_cof_sd)}; it ${reaches} ${limit}, ${when}.`;
+  return `${value}; it ${reaches} ${limit}, ${when}.`;
 }
 
 /**

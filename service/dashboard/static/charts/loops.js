@@ -1,14 +1,16 @@
 // @ts-check
-// Friction loops: by state at one pressure (figs. 12, 15), by pressure at one state (fig. 13), their area (figs. 14, 17).
+// Friction loops before the stationary curve of the same state (fig. 12): by state at one pressure (fig. 15), by pressure at
+// one state (fig. 13).
 
 import { fixed } from "../shared/format.js";
-import { column, CYCLES, digitsColumn, distinct, PRESSURE } from "./columns.js";
-import { eventMarks } from "./layout.js";
+import { column, CYCLES, distinct, KIND, PRESSURE } from "./columns.js";
 import { rampOf } from "./palette.js";
-import { linesByPressure, titled } from "./traces.js";
+import { curveOf } from "./stribeck_law.js";
+import { titled } from "./traces.js";
 
-/** @import { Channels, LoopItem, Receipt } from "../shared/types.js" */
-/** @import { Spec } from "./types.js" */
+/** @import { Channels, ClutchOut, LoopItem, StribeckItem } from "../shared/types.js" */
+/** @import { CurvePoint } from "./stribeck_law.js" */
+/** @import { PlainTrace, Spec } from "./types.js" */
 
 /** Most points of a loop that are drawn. */
 const MOST = 1500;
@@ -17,8 +19,6 @@ const NEAR = 0.1;
 
 const NO_LOOPS =
   "No dynamic Stribeck test yet. Send one as kind dynamic_stribeck: speed swept to and fro at constant pressure, sampled.";
-const NO_PERIOD = "None of the records holds a whole closed period (eq. 8).";
-const NO_AREA = "The area is known from the first dynamic Stribeck test on.";
 
 /** @param {LoopItem[]} loops */
 export const loopPressures = (loops) => distinct(loops.map((loop) => loop.pressure_bar));
@@ -39,80 +39,119 @@ function traceOf({ pressure_bar: p, speed_rpm: n, torque_nm: m }, pressure) {
 }
 
 /**
- * Torque over speed of some loops; `over` says whether the colour is the state or the pressure.
+ * The stationary curve of the state that a loop is of: of the test at the same cycles and pressure; empty where there is none.
+ * @param {LoopItem} loop
+ * @param {[number, number][]} trace
+ * @param {StribeckItem[]} tests
+ * @param {ClutchOut} clutch
+ * @returns {CurvePoint[]}
+ */
+function stationaryOf({ cycles, pressure_bar: pressure }, trace, tests, clutch) {
+  const fits = tests.filter((test) => test.cycles === cycles).flatMap((test) => test.fits);
+  const fit = fits.find(({ pressure_bar: level }) => Math.abs(level - pressure) <= NEAR);
+  const fastest = trace.reduce((most, [speed]) => Math.max(most, speed), 0);
+  return fit ? curveOf(fit, clutch, 0, fastest) : [];
+}
+
+/** @type {Record<string, string>} */
+const DIRECTIONS = {
+  higher_accelerating: "higher in acceleration",
+  higher_decelerating: "higher in deceleration",
+  none: "the same either way, within noise",
+};
+
+/** @param {LoopItem} loop */
+function lagText({ direction, better_law: law }) {
+  const better = law === null ? "neither law of lag fits clearly better" : `the ${law} fits better`;
+  return `torque is ${DIRECTIONS[direction] ?? direction}, ${better}`;
+}
+
+/**
+ * The lag of several loops, those of one kind named together.
+ * @param {LoopItem[]} loops
+ * @param {(loop: LoopItem) => string} label
+ */
+function lagNote(loops, label) {
+  const kinds = [...new Set(loops.map(lagText))];
+  if (kinds.length === 1) return `In each loop ${kinds[0]}.`;
+  /** @param {string} kind */
+  const names = (kind) => loops.filter((loop) => lagText(loop) === kind).map(label);
+  return kinds.map((kind) => `${names(kind).join(", ")}: ${kind}.`).join(" ");
+}
+
+/**
+ * Torque over speed of some loops, and behind each the stationary curve; `over` says whether the colour is the state or the
+ * pressure.
  * @param {object} choices
  * @param {LoopItem[]} choices.loops
+ * @param {StribeckItem[]} choices.tests
+ * @param {ClutchOut} choices.clutch
  * @param {Record<string, Channels>} choices.channels by run
  * @param {"state" | "pressure"} choices.over
  * @param {number} choices.pressure where the colour is the state
  * @param {string | undefined} choices.run where the colour is the pressure
  * @returns {Spec}
  */
-export function loopCurves({ loops, channels, over, pressure, run }) {
+export function loopCurves({ loops, tests, clutch, channels, over, pressure, run }) {
   const byState = over === "state";
   const drawn = loops
     .filter((loop) => channels[loop.run_id] && (byState ? loop.pressure_bar === pressure : loop.run_id === run))
     .map((loop) => ({ loop, trace: traceOf(channels[loop.run_id], loop.pressure_bar) }))
-    .filter(({ trace }) => trace.length > 2);
+    .filter(({ trace }) => trace.length > 2)
+    .map(({ loop, trace }) => ({ loop, trace, stationary: stationaryOf(loop, trace, tests, clutch) }));
   if (drawn.length === 0) return { empty: NO_LOOPS };
   /** @param {LoopItem} loop */
   const label = (loop) => (byState ? `${fixed(loop.cycles)} cycles` : `${fixed(loop.pressure_bar, 1)} bar`);
+  const place = byState
+    ? `At ${fixed(pressure, 1)} bar, from the first dynamic test to the last.`
+    : `After ${fixed(drawn[0].loop.cycles)} cycles, at every pressure.`;
   return {
-    note: byState
-      ? `At ${fixed(pressure, 1)} bar, from the first dynamic test to the last.`
-      : `After ${fixed(drawn[0].loop.cycles)} cycles, at every pressure.`,
-    columns: [CYCLES, PRESSURE, column("speed, rpm", 1), column("torque, Nm", 2)],
-    rows: drawn.flatMap(({ loop, trace }) =>
-      trace.map(([speed, torque]) => [loop.cycles, loop.pressure_bar, speed, torque]),
-    ),
-    figure: (c) => ({
-      data: drawn.map(({ loop, trace }, index) => ({
-        name: label(loop),
-        mode: "lines",
-        x: trace.map(([speed]) => speed),
-        y: trace.map(([, torque]) => torque),
-        line: { color: rampOf(c, index, drawn.length), width: 1.3 },
-        hovertemplate: `${label(loop)}<br>%{x:.0f} rpm, %{y:.2f} Nm<extra></extra>`,
-      })),
-      layout: { xaxis: titled("sliding speed, rpm"), yaxis: titled("friction torque, Nm") },
-    }),
+    note: `${place} Dashed: the stationary curve of the same state. ${lagNote(
+      drawn.map(({ loop }) => loop),
+      label,
+    )}`,
+    columns: [KIND, CYCLES, PRESSURE, column("speed, rpm", 1), column("torque, Nm", 2)],
+    rows: drawn.flatMap(({ loop: { cycles, pressure_bar: level }, trace, stationary }) => [
+      ...trace.map(([speed, torque]) => ["loop", cycles, level, speed, torque]),
+      ...stationary.map(({ speed, torque }) => ["stationary curve", cycles, level, speed, torque]),
+    ]),
+    figure: (c) => {
+      const colors = drawn.map((_, index) => rampOf(c, index, drawn.length));
+      return {
+        data: [
+          ...stationaryTraces(drawn, colors),
+          ...drawn.map(({ loop, trace }, index) => ({
+            name: label(loop),
+            mode: "lines",
+            x: trace.map(([speed]) => speed),
+            y: trace.map(([, torque]) => torque),
+            line: { color: colors[index], width: 1.3 },
+            hovertemplate: `${label(loop)}<br>%{x:.0f} rpm, %{y:.2f} Nm<br>${lagText(loop)}<extra></extra>`,
+          })),
+        ],
+        layout: { xaxis: titled("sliding speed, rpm"), yaxis: titled("friction torque, Nm") },
+      };
+    },
   };
 }
 
-const AREA_COLUMNS = [
-  CYCLES,
-  PRESSURE,
-  digitsColumn("frequency, Hz", 3),
-  digitsColumn("loop area, Nm·m/s", 3),
-  digitsColumn("standard deviation", 2),
-  digitsColumn("attractor, Nm·s", 3),
-];
-
 /**
- * The loops' area over cycles, a line a pressure.
- * @param {{ loops: LoopItem[], events: Receipt[] }} answers
- * @returns {Spec}
+ * The stationary curves, named once.
+ * @param {{ stationary: CurvePoint[] }[]} drawn
+ * @param {string[]} colors
+ * @returns {PlainTrace[]}
  */
-export function loopAreas({ loops, events }) {
-  const values = loops.flatMap((loop) => {
-    const { cycles, pressure_bar: pressure, loop_area_nm_m_s: value, loop_area_sd_nm_m_s: sd } = loop;
-    return value === null ? [] : [{ loop, cycles, pressure, value, sd }];
-  });
-  if (values.length === 0) return { empty: loops.length > 0 ? NO_PERIOD : NO_AREA };
-  return {
-    note: "Area of whole closed periods (eq. 8): positive where torque is higher in acceleration. 90 % error bars.",
-    columns: AREA_COLUMNS,
-    rows: values.map(({ loop, cycles, pressure, value, sd }) => {
-      return [cycles, pressure, loop.frequency_hz, value, sd, loop.attractor_nm_s];
-    }),
-    figure: (c) => ({
-      data: linesByPressure(
-        distinct(values.map(({ pressure }) => pressure)),
-        (level) => values.filter(({ pressure }) => pressure === level),
-        { size: 7, bars: 3, text: "%{y:.3g} Nm·m/s" },
-        c,
-      ),
-      layout: { xaxis: titled("duty cycles"), yaxis: titled("loop area, Nm·m/s"), ...eventMarks(events, c) },
-    }),
-  };
+function stationaryTraces(drawn, colors) {
+  const curves = drawn.map(({ stationary }, index) => ({ stationary, color: colors[index] }));
+  return curves
+    .filter(({ stationary }) => stationary.length > 0)
+    .map(({ stationary, color }, index) => ({
+      name: "stationary curve",
+      showlegend: index === 0,
+      mode: "lines",
+      x: stationary.map(({ speed }) => speed),
+      y: stationary.map(({ torque }) => torque),
+      line: { color, width: 2, dash: "dash" },
+      hovertemplate: "stationary curve<br>%{x:.0f} rpm, %{y:.2f} Nm<extra></extra>",
+    }));
 }

@@ -26,7 +26,7 @@ export const PARAMETER_NAMES = /** @type {ParameterName[]} */ (Object.keys(PARAM
  * A parameter's axis, in the plotting library's own small markup.
  * @param {ParameterName} name
  */
-function axisOf(name) {
+export function axisOf(name) {
   const { symbol, unit } = PARAMETERS[name];
   return `${symbol[0]}<sub>${symbol[1]}</sub>${unit && `, ${unit.replace(/\^([\d.]+)/, "<sup>$1</sup>")}`}`;
 }

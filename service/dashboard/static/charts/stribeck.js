@@ -1,5 +1,6 @@
 // @ts-check
-// Stribeck curves: at one pressure by state (fig. 7), and as surfaces over pressure (figs. 6, 8) or over cycles (fig. 7).
+// Stribeck curves: at one pressure by state (fig. 7b) or at one state by pressure (fig. 6a), and as surfaces over pressure of one
+// state (figs. 6b, 8) or of several (fig. 7a), or over cycles.
 
 import { fixed } from "../shared/format.js";
 import { column, CYCLES, distinct, KIND } from "./columns.js";
@@ -80,33 +81,40 @@ const speeds = (points) => points.map(({ speed }) => speed);
 const torques = (points) => points.map(({ torque }) => torque);
 
 /**
- * Torque over speed at one pressure, a colour a state.
- * @param {Answers} answers
+ * Torque over speed: at one pressure, a colour a state, or of one state, a colour a pressure.
+ * @param {Answers & { by: "state" | "pressure", run: string | undefined }} answers `by`: the colour; `run`: the state
  * @returns {Spec}
  */
 export function flat(answers) {
-  const { tests, pressure } = answers;
-  const drawn = drawnOf(answers, spread(tests), (level) => level === pressure);
+  const { tests, by, pressure, run } = answers;
+  const byState = by === "state";
+  const chosen = byState ? spread(tests) : tests.filter((test) => test.run_id === run);
+  const drawn = drawnOf(answers, chosen, (level) => !byState || level === pressure);
   if (drawn.length === 0) return { empty: "No stationary Stribeck test yet at this pressure." };
+  const place = byState
+    ? `At ${fixed(pressure, 1)} bar: points measured, lines fitted (eq. 3), from the first test to the last.`
+    : `After ${fixed(drawn[0].cycles)} cycles, at every pressure: points measured, lines fitted (eq. 3).`;
+  /** @param {Drawn} curve */
+  const label = (curve) => (byState ? `${fixed(curve.cycles)} cycles` : `${fixed(curve.pressure, 1)} bar`);
   return {
-    note: `At ${fixed(pressure, 1)} bar: points measured, lines fitted (eq. 3), from the first test to the last.`,
+    note: place,
     columns: COLUMNS,
     rows: rowsOf(drawn),
     figure: (c) => ({
-      data: drawn.flatMap((state, index) => flatTraces(state, rampOf(c, index, drawn.length), c)),
+      data: drawn.flatMap((curve, index) => flatTraces(curve, label(curve), rampOf(c, index, drawn.length), c)),
       layout: { xaxis: { ...titled("sliding speed, rpm"), rangemode: "tozero" }, yaxis: titled("friction torque, Nm") },
     }),
   };
 }
 
 /**
- * @param {Drawn} state
+ * @param {Drawn} curve
+ * @param {string} name
  * @param {string} color
  * @param {Colours} c
  * @returns {PlainTrace[]}
  */
-function flatTraces({ cycles, measured, fitted }, color, c) {
-  const name = `${fixed(cycles)} cycles`;
+function flatTraces({ measured, fitted }, name, color, c) {
   const hovertemplate = `${name}<br>%{x:.0f} rpm, %{y:.2f} Nm<extra></extra>`;
   const shared = { legendgroup: name, name, hovertemplate };
   const marker = { color: faint(c.panel, 1), size: 5, line: { color, width: 1.4 } };
@@ -116,26 +124,39 @@ function flatTraces({ cycles, measured, fitted }, color, c) {
   ];
 }
 
+/** @typedef {"pressure" | "states" | "cycles"} Depth what a surface is over: pressure of one state or of several, or cycles */
+
 /**
- * The surface of one state over speed and pressure (figs. 6, 8), or of one pressure over speed and cycles (fig. 7).
- * @param {Answers & { over: "pressure" | "cycles", run: string | undefined }} answers `run`: the state
+ * The surface over speed and pressure of one state (figs. 6b, 8) or of several (fig. 7a), or of one pressure over speed and
+ * cycles.
+ * @param {Answers & { over: Depth, run: string | undefined }} answers `run`: the state
  * @returns {Spec}
  */
 export function surface(answers) {
   const { tests, over, pressure, run } = answers;
-  const byPressure = over === "pressure";
-  const chosen = byPressure ? tests.filter((test) => test.run_id === run) : spread(tests, 9);
-  const drawn = drawnOf(answers, chosen, (level) => byPressure || level === pressure);
+  const byPressure = over !== "cycles";
+  const picked = {
+    pressure: tests.filter((test) => test.run_id === run),
+    states: fewOf(tests),
+    cycles: spread(tests, 9),
+  };
+  const drawn = drawnOf(answers, picked[over], (level) => byPressure || level === pressure);
   if (drawn.length < 2) {
     return { empty: `A surface needs ${byPressure ? "a test at two pressures" : "two tests"} or more.` };
   }
-  const place = byPressure ? `After ${fixed(drawn[0].cycles)} cycles` : `At ${fixed(pressure, 1)} bar over the life`;
+  const states = distinct(drawn.map(({ cycles }) => cycles));
+  const after = `After ${states.map((cycles) => fixed(cycles)).join(", ")} cycles`;
+  const place = byPressure ? after : `At ${fixed(pressure, 1)} bar over the life`;
+  const drawing = over === "states" ? "the fitted surface, a colour a state" : "points measured, surface fitted";
   return {
-    note: `${place}: points measured, surface fitted. Drag to turn.`,
+    note: `${place}: ${drawing}. Drag to turn.`,
     columns: COLUMNS,
     rows: rowsOf(drawn),
     figure: (c) => ({
-      data: surfaceTraces(drawn, byPressure, c),
+      data:
+        over === "states"
+          ? states.map((cycles, index) => stateSurface(drawn, cycles, rampOf(c, index, states.length)))
+          : surfaceTraces(drawn, byPressure, c),
       layout: {
         showlegend: false,
         scene: {
@@ -145,6 +166,36 @@ export function surface(answers) {
         },
       },
     }),
+  };
+}
+
+/**
+ * As many states as surfaces can be distinguished: of those whose records are read for the curves.
+ * @param {StribeckItem[]} tests
+ */
+const fewOf = (tests) => spread(spread(tests), 4);
+
+/**
+ * The surface of one of several states, in one colour; points of all of them would hide one another.
+ * @param {Drawn[]} drawn
+ * @param {number} cycles
+ * @param {string} color
+ * @returns {Trace}
+ */
+function stateSurface(drawn, cycles, color) {
+  const own = drawn.filter((curve) => curve.cycles === cycles);
+  return {
+    type: "surface",
+    x: speeds(own[0].fitted),
+    y: own.map(({ pressure }) => pressure),
+    z: own.map(({ fitted }) => torques(fitted)),
+    colorscale: [
+      [0, color],
+      [1, color],
+    ],
+    opacity: 0.8,
+    showscale: false,
+    hovertemplate: `${fixed(cycles)} cycles<br>%{x:.0f} rpm, %{y} bar<br>fit %{z:.2f} Nm<extra></extra>`,
   };
 }
 

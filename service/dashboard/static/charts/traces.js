@@ -21,12 +21,13 @@ export const titled = (text) => ({ title: { text } });
  * @param {{ x: Values, y: Values }} lower
  * @param {{ x: Values, y: Values }} upper
  * @param {Colours} c
+ * @param {string} [color]
  * @returns {PlainTrace[]}
  */
-export function band(name, lower, upper, c) {
+export function band(name, lower, upper, c, color = c.accent) {
   /** @type {Omit<PlainTrace, "x" | "y">} */
   const edge = { mode: "lines", line: { width: 0 }, hoverinfo: "skip", showlegend: false };
-  const fillcolor = faint(c.accent, 0.2);
+  const fillcolor = faint(color, 0.2);
   return [
     { ...edge, ...lower },
     { ...edge, ...upper, fill: "tonexty", fillcolor, name, showlegend: true },
@@ -48,6 +49,29 @@ export const errorBars = (sds, color, look) => ({
 });
 
 /**
+ * A line with points and error bars.
+ * @param {string} name
+ * @param {{ x: number, value: number, sd: number | null }[]} values
+ * @param {{ size: number, bars: number, text: string }} look `text` is shown under the pointer
+ * @param {string} color
+ * @returns {PlainTrace}
+ */
+export const measuredLine = (name, values, { size, bars, text }, color) => ({
+  name,
+  mode: "lines+markers",
+  x: values.map(({ x }) => x),
+  y: values.map(({ value }) => value),
+  line: { color, width: 1.4 },
+  marker: { color, size },
+  error_y: errorBars(
+    values.map(({ sd }) => sd),
+    color,
+    { thickness: 1, width: bars },
+  ),
+  hovertemplate: `${text}<extra></extra>`,
+});
+
+/**
  * A line with points and error bars for each pressure, over cycles.
  * @param {number[]} pressures
  * @param {(pressure: number) => { cycles: number, value: number, sd: number | null }[]} valuesAt
@@ -57,22 +81,9 @@ export const errorBars = (sds, color, look) => ({
  */
 export function linesByPressure(pressures, valuesAt, { size, bars, text }, c) {
   return pressures.map((pressure, index) => {
-    const values = valuesAt(pressure);
-    const color = rampOf(c, index, pressures.length);
+    const values = valuesAt(pressure).map(({ cycles, value, sd }) => ({ x: cycles, value, sd }));
     const name = `${fixed(pressure, 1)} bar`;
-    return {
-      name,
-      mode: "lines+markers",
-      x: values.map((value) => value.cycles),
-      y: values.map(({ value }) => value),
-      line: { color, width: 1.4 },
-      marker: { color, size },
-      error_y: errorBars(
-        values.map(({ sd }) => sd),
-        color,
-        { thickness: 1, width: bars },
-      ),
-      hovertemplate: `%{x:,.0f} cycles, ${name}<br>${text}<extra></extra>`,
-    };
+    const under = `%{x:,.0f} cycles, ${name}<br>${text}`;
+    return measuredLine(name, values, { size, bars, text: under }, rampOf(c, index, pressures.length));
   });
 }

@@ -21,6 +21,7 @@ const ACTIONS = {
   edit: "Clutch edited",
   archive: "Archived",
   unarchive: "Brought back",
+  adopt: "Model adopted",
 };
 
 export class AuditTrail {
@@ -82,7 +83,7 @@ export class AuditTrail {
     this.place.replaceChildren(
       h("h3", {}, "Changes"),
       changes.length === 0
-        ? h("p", { class: "quiet" }, "Nothing was held, corrected, withdrawn or edited.")
+        ? h("p", { class: "quiet" }, "Nothing was held, corrected, withdrawn, edited or adopted.")
         : h(
             "p",
             { class: "quiet" },
@@ -100,6 +101,7 @@ export class AuditTrail {
 function actionText({ action, before, after }) {
   const name = ACTIONS[action] ?? words(action);
   if (action === "correct") return `${name}: ${shown(before.cycles)} to ${shown(after.cycles)}`;
+  if (action === "adopt" && after.diagnosis_id === null) return "Back to the baseline model";
   if (action !== "edit") return name;
   const fields = Object.keys(after).filter((key) => JSON.stringify(after[key]) !== JSON.stringify(before[key]));
   return `${name}: ${fields.map((key) => `${words(key).toLowerCase()} ${shown(before[key])} to ${shown(after[key])}`).join("; ")}`;

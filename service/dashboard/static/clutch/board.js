@@ -1,17 +1,21 @@
 // @ts-check
 // The clutch page's charts and the choices above them.
 
-import { Chart, choice } from "../charts/chart.js";
+import { Chart, choice, setControls } from "../charts/chart.js";
 import { fan } from "../charts/fan.js";
 import { meanCof, remainingCycles } from "../charts/life.js";
-import { loopAreas, loopCurves, loopPressures } from "../charts/loops.js";
+import { loopCurves, loopPressures } from "../charts/loops.js";
 import { landscape, parameter, PARAMETER_NAMES, PARAMETERS } from "../charts/parameters.js";
 import { flat, pressuresOf, spread, surface } from "../charts/stribeck.js";
+import { Engagements } from "../engagements/engagements.js";
+import { byMeanCof } from "../quantities/criteria.js";
+import { levelOptions, stateOptions, usual } from "../quantities/choices.js";
+import { Quantities } from "../quantities/quantities.js";
 import { readDrawn } from "../shared/api.js";
-import { fixed } from "../shared/format.js";
 
 /** @import { Prediction } from "../charts/fan.js" */
 /** @import { ParameterName } from "../charts/parameters.js" */
+/** @import { Depth } from "../charts/stribeck.js" */
 /** @import { Channels, ClutchOut, DegradationItem, LoopItem, Receipt, RemainingLife, StribeckItem } from "../shared/types.js" */
 
 /**
@@ -30,17 +34,27 @@ import { fixed } from "../shared/format.js";
  * @typedef {object} Choices
  * @property {number} [pressure]
  * @property {string} [run]
- * @property {"pressure" | "cycles"} over
+ * @property {"state" | "pressure"} curvesBy
+ * @property {Depth} over
  * @property {ParameterName} parameter
  * @property {"state" | "pressure"} loopsOver
  * @property {number} [loopPressure]
  * @property {string} [loopRun]
  */
 
-/** The pressure that is shown first is the one closest to this, bar. */
-const USUAL_PRESSURE = 5;
 /** Most tests whose records the surface over cycles draws. */
 const MOST_ON_SURFACE = 9;
+/** @type {["state" | "pressure", string][]} */
+const BY = [
+  ["state", "state"],
+  ["pressure", "pressure"],
+];
+/** @type {[Depth, string][]} */
+const DEPTHS = [
+  ["pressure", "pressure"],
+  ["states", "pressure, several states"],
+  ["cycles", "cycles"],
+];
 
 /**
  * The charts, each in its section.
@@ -57,7 +71,7 @@ function makeCharts(name, place) {
   const fan = add("life", { id: "fan", title: "Mean COF against its threshold", wide: true, height: 420 });
   const remaining = add("life", { id: "predicted", title: "Remaining cycles, as predicted" });
   const cof = add("life", { id: "cof", title: "Mean COF by pressure" });
-  const curves = add("stribeck", { id: "stribeck", title: "Stribeck curves by state", height: 440 });
+  const curves = add("stribeck", { id: "stribeck", title: "Stribeck curves", height: 440 });
   const surface = add("stribeck", { id: "surface", title: "Stribeck curves in 3D", spatial: true, height: 440 });
   const parameters = PARAMETER_NAMES.map((key) => {
     const { title, symbol: letter } = PARAMETERS[key];
@@ -65,9 +79,8 @@ function makeCharts(name, place) {
   });
   const overAll = { id: "landscape", title: "A parameter over cycles and pressure", spatial: true, wide: true };
   const landscape = add("parameters", { ...overAll, height: 440 });
-  const loops = add("loops", { id: "loop-curves", title: "Loops: torque over speed", height: 400 });
-  const areas = add("loops", { id: "loop-areas", title: "Loop area over cycles", height: 400 });
-  return { fan, remaining, cof, curves, surface, parameters, landscape, loops, areas };
+  const loops = add("loops", { id: "loop-curves", title: "Loops: torque over speed", wide: true, height: 420 });
+  return { fan, remaining, cof, curves, surface, parameters, landscape, loops };
 }
 
 export class Board {
@@ -79,19 +92,22 @@ export class Board {
   constructor(clutchId, name, place) {
     this.clutchId = clutchId;
     this.charts = makeCharts(name, place);
+    this.engagements = new Engagements(clutchId, name, place("engagements"));
+    this.quantities = new Quantities(clutchId, name, place);
     /** @type {Answers | null} */
     this.answers = null;
     /** @type {Record<string, Channels>} */
     this.channels = {};
     /** @type {Choices} */
-    this.chosen = { over: "pressure", loopsOver: "state", parameter: "static_torque_nm" };
+    this.chosen = { curvesBy: "state", over: "pressure", loopsOver: "state", parameter: "static_torque_nm" };
   }
 
   /**
    * The charts of the remaining life, which come first.
    * @param {Answers & { life: RemainingLife }} answers
    */
-  life({ life, items, predictions, tests, events }) {
+  life({ life: all, items, predictions, tests, events }) {
+    const life = byMeanCof(all);
     const pooled = items.find((item) => item.quantity === "mean_cof" && item.pressure_bar === null);
     this.charts.remaining.show(remainingCycles({ life, predictions, events }));
     if (tests.length > 0) this.charts.cof.show(meanCof({ tests, events }));
@@ -103,10 +119,11 @@ export class Board {
     this.answers = answers;
     this.charts.cof.show(meanCof(answers));
     this.parameters(answers);
-    this.charts.areas.show(loopAreas(answers));
+    this.quantities.show(answers);
     await this.readChannels(answers);
     this.stribeck(answers);
     this.loopCurves(answers);
+    await this.engagements.show(answers.runs, answers.events);
   }
 
   /**
@@ -143,12 +160,7 @@ export class Board {
    * @param {Answers} answers
    */
   pressure({ tests }) {
-    const levels = pressuresOf(tests);
-    const { pressure } = this.chosen;
-    if (pressure !== undefined && levels.includes(pressure)) return pressure;
-    /** @param {number} level */
-    const distance = (level) => Math.abs(level - USUAL_PRESSURE);
-    return levels.length === 0 ? undefined : levels.reduce((a, b) => (distance(b) < distance(a) ? b : a));
+    return usual(pressuresOf(tests), this.chosen.pressure);
   }
 
   /** @param {Answers} answers */
@@ -165,32 +177,31 @@ export class Board {
   /** @param {Answers} answers */
   stribeck(answers) {
     const { tests, clutch } = answers;
-    const { over } = this.chosen;
+    const { over, curvesBy: by } = this.chosen;
     const { curves, surface: spatial } = this.charts;
-    const shared = { tests, clutch, channels: this.channels, pressure: this.pressure(answers) };
     const run = tests.some((test) => test.run_id === this.chosen.run) ? this.chosen.run : tests[0]?.run_id;
-    setControls(curves, tests.length > 0 ? [this.pressureChoice(answers)] : []);
-    curves.show(flat(shared));
-    const axis = choice(
-      "Torque over speed and",
-      [
-        ["pressure", "pressure"],
-        ["cycles", "cycles"],
-      ],
-      over,
-      async (value) => {
-        this.chosen.over = value === "cycles" ? "cycles" : "pressure";
-        if (this.answers) await this.readChannels(this.answers);
-        this.again((latest) => this.stribeck(latest));
-      },
-    );
-    const state = choice("State", stateOptions(tests), run, async (value) => {
-      this.chosen.run = value;
-      await this.readRun(value);
-      this.again((latest) => this.stribeck(latest));
+    const shared = { tests, clutch, channels: this.channels, pressure: this.pressure(answers), run };
+    const redraw = () => this.again((latest) => this.stribeck(latest));
+    const state = () =>
+      choice("State", stateOptions(tests), run, async (value) => {
+        this.chosen.run = value;
+        await this.readRun(value);
+        redraw();
+      });
+    const colour = choice("Colour by", BY, by, (value) => {
+      this.chosen.curvesBy = value === "pressure" ? "pressure" : "state";
+      redraw();
     });
-    setControls(spatial, tests.length > 0 ? [axis, over === "pressure" ? state : this.pressureChoice(answers)] : []);
-    spatial.show(surface({ ...shared, over, run }));
+    setControls(curves, tests.length > 0 ? [colour, by === "state" ? this.pressureChoice(answers) : state()] : []);
+    curves.show(flat({ ...shared, by }));
+    const axis = choice("Torque over speed and", DEPTHS, over, async (value) => {
+      this.chosen.over = DEPTHS.map(([depth]) => depth).find((depth) => depth === value) ?? over;
+      if (this.answers) await this.readChannels(this.answers);
+      redraw();
+    });
+    const more = { pressure: state, states: null, cycles: () => this.pressureChoice(answers) }[over];
+    setControls(spatial, tests.length > 0 ? [axis, ...(more ? [more()] : [])] : []);
+    spatial.show(surface({ ...shared, over }));
   }
 
   /** @param {Answers} answers */
@@ -216,7 +227,7 @@ export class Board {
   }
 
   /** @param {Answers} answers */
-  loopCurves({ loops }) {
+  loopCurves({ loops, tests, clutch }) {
     const { loopsOver: over, loopPressure, loopRun } = this.chosen;
     const levels = loopPressures(loops);
     const runs = [...new Map(loops.map((loop) => [loop.run_id, loop])).values()];
@@ -224,18 +235,10 @@ export class Board {
     const pressure = loopPressure !== undefined && levels.includes(loopPressure) ? loopPressure : middle;
     const run = runs.some((loop) => loop.run_id === loopRun) ? loopRun : runs[0]?.run_id;
     const redraw = () => this.again((latest) => this.loopCurves(latest));
-    const axis = choice(
-      "Colour by",
-      [
-        ["state", "state"],
-        ["pressure", "pressure"],
-      ],
-      over,
-      (value) => {
-        this.chosen.loopsOver = value === "pressure" ? "pressure" : "state";
-        redraw();
-      },
-    );
+    const axis = choice("Colour by", BY, over, (value) => {
+      this.chosen.loopsOver = value === "pressure" ? "pressure" : "state";
+      redraw();
+    });
     const level = choice("Pressure", levelOptions(levels), pressure, (value) => {
       this.chosen.loopPressure = Number(value);
       redraw();
@@ -246,31 +249,6 @@ export class Board {
       redraw();
     });
     setControls(this.charts.loops, loops.length > 0 ? [axis, over === "state" ? level : state] : []);
-    this.charts.loops.show(loopCurves({ loops, channels: this.channels, over, pressure, run }));
+    this.charts.loops.show(loopCurves({ loops, tests, clutch, channels: this.channels, over, pressure, run }));
   }
-}
-
-/**
- * @param {number[]} levels
- * @returns {[number, string][]}
- */
-const levelOptions = (levels) => levels.map((level) => [level, `${fixed(level, 1)} bar`]);
-
-/**
- * @param {{ run_id: string, cycles: number }[]} tests
- * @returns {[string, string][]}
- */
-const stateOptions = (tests) => tests.map((test) => [test.run_id, `${fixed(test.cycles)} cycles`]);
-
-/**
- * Replace a chart's controls, keeping the focus on the one that was used.
- * @param {Chart} chart
- * @param {HTMLElement[]} controls
- */
-function setControls(chart, controls) {
-  const focused = [...chart.controls.querySelectorAll("select")].findIndex(
-    (select) => select === document.activeElement,
-  );
-  chart.controls.replaceChildren(...controls);
-  if (focused >= 0) chart.controls.querySelectorAll("select")[focused]?.focus();
 }

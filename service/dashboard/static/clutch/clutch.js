@@ -1,9 +1,10 @@
 // @ts-check
 // The page of one clutch: its answers of the API are read when they change, and shown in sections that are drawn when seen.
-// Open this file first, then head.js (its state in one look), board.js (its charts and their choices), stored.js (its runs,
+// Open this file first, then head.js (its state in one look), board.js (its charts and their choices), planned_duty.js, stored.js (its runs,
 // warnings and changes) and report.js (the printed page).
 
 import { Diagnosis } from "../diagnosis/diagnosis.js";
+import { criteriaTable } from "../quantities/criteria.js";
 import { sender } from "../sending/sending.js";
 import { clutchPath, Problem, read, readAll } from "../shared/api.js";
 import { byId, h, within } from "../shared/dom.js";
@@ -14,6 +15,7 @@ import { openVerdict, stateOf } from "../shared/state.js";
 import { firstRun } from "../shared/welcome.js";
 import { Board } from "./board.js";
 import { head } from "./head.js";
+import { PlannedDuty } from "./planned_duty.js";
 import { makeReport } from "./report.js";
 import { counts } from "./states.js";
 import { Stored } from "./stored.js";
@@ -24,7 +26,7 @@ import { Stored } from "./stored.js";
 const ID = decodeURIComponent(location.pathname.split("/").at(-1) ?? "");
 const PATH = clutchPath(ID);
 const INTERVAL = 2000; // ms
-const SECTIONS = ["life", "diagnosis", "stribeck", "parameters", "loops", "runs"];
+const SECTIONS = ["life", "diagnosis", "stribeck", "parameters", "shudder", "loops", "lag", "engagements", "runs"];
 const fileName = () => ID.replaceAll(/[^\w.-]+/g, "_");
 
 /**
@@ -112,6 +114,7 @@ async function showLife(clutch) {
   shown = now;
   drawHead();
   diagnosis.setModel(first.life.model);
+  byId("criteria").replaceChildren(...criteriaTable(first.life));
   board.life(now);
   await diagnosis.poll();
   drawHead();
@@ -172,6 +175,7 @@ function begin() {
   if (parts !== null) return parts;
   const board = new Board(ID, fileName, (section) => within(section, ".charts"));
   const diagnosis = new Diagnosis(within("diagnosis", ".body"), ID, fileName, () => live.now());
+  new PlannedDuty(within("life", ".planning"), ID);
   parts = { board, diagnosis };
   return parts;
 }
@@ -180,7 +184,7 @@ function begin() {
 function drawHead() {
   if (shown === null) return;
   const { clutch, life } = shown;
-  const state = stateOf(clutch.summary, openVerdict(parts?.diagnosis.latest));
+  const state = stateOf(life ?? clutch.summary, openVerdict(parts?.diagnosis.latest));
   const text = JSON.stringify([clutch, life, state]);
   const place = byId("head");
   if (place.dataset.shown === text) return;

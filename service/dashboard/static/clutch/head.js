@@ -1,6 +1,7 @@
 // @ts-check
 // The state of a clutch in one look: title, verdict, tiles.
 
+import { limitText, placeText } from "../quantities/criteria.js";
 import { h } from "../shared/dom.js";
 import { cycles, fixed, interval, percent, probability, withSd, words } from "../shared/format.js";
 import { healthBar } from "../shared/sparkline.js";
@@ -41,7 +42,11 @@ export function head(clutch, life, state, archive) {
 function description({ friction_material: material, reaction_plate: plate, fluid, geometry, end_of_life: end }) {
   const { inner_diameter_mm: inner, outer_diameter_mm: outer, friction_faces: faces } = geometry;
   const disc = `${fixed(inner)}/${fixed(outer)} mm, ${faces} ${faces === 1 ? "face" : "faces"}`;
-  const limit = `end of life at ${percent(end.cof_fraction)} of the new mean COF`;
+  const limits = end.criteria.map((criterion) => `${placeText(criterion)} (${limitText(criterion)})`);
+  const limit =
+    limits.length > 0
+      ? `end of life at the first of ${limits.join(" and ")}`
+      : `end of life at ${percent(end.cof_fraction)} of the new mean COF`;
   return `${words(material)} on ${plate}, ${fluid}; ${disc}; ${limit}`;
 }
 

@@ -2,6 +2,7 @@
 // The one-page report: made beside the page whenever it changes, shown in print only, always in the light scheme.
 
 import { sentence } from "../diagnosis/report.js";
+import { byMeanCof } from "../quantities/criteria.js";
 import { h, table } from "../shared/dom.js";
 import { cycles, fixed, interval, moment, percent, probability, withSd, words } from "../shared/format.js";
 import { openVerdict, stateIcon, stateOf, STATES } from "../shared/state.js";
@@ -23,7 +24,7 @@ export function makeReport(place, { clutch, life, tests, events, runs }, board, 
   if (life === null) return;
   const size = { width: 760, height: 255 };
   const drawings = [board.charts.fan, board.charts.remaining].map((chart) => chart.light({ ...size, scheme: "light" }));
-  const state = stateOf(clutch.summary, openVerdict(latest));
+  const state = stateOf(life, openVerdict(latest));
   const simulated = clutch.origin === "simulated" ? ", simulated" : "";
   const kind = `Wet clutch, ${clutch.friction_material} on ${clutch.reaction_plate}, ${clutch.fluid}${simulated}`;
   const values = facts(life, runs).flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]);
@@ -61,7 +62,8 @@ function diagnosisText(latest) {
  * @param {Receipt[]} runs
  */
 function facts(life, runs) {
-  const { current, criterion, model, remaining_cycles: q } = life;
+  const { current, model, remaining_cycles: q } = life;
+  const { criterion } = byMeanCof(life);
   const predicted = `${cycles(q["0.5"], q["0.05"], q["0.95"])} (90 %: ${interval(q)})`;
   const chance = probability(life.probability_of_reaching);
   const cof = withSd(current.mean_cof, current.mean_cof_sd);

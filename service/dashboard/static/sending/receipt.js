@@ -92,7 +92,15 @@ export function fitTable(fits) {
   return scrolling("Fits", table("Fits by pressure", FIT_COLUMNS(), rows));
 }
 
-const LOOP_COLUMNS = ["Pressure, bar", "Frequency, Hz", "Loop area, Nm·m/s", "Attractor, Nm·s", "Periods", "Note"];
+const LOOP_COLUMNS = [
+  "Pressure, bar",
+  "Frequency, Hz",
+  "Loop area, Nm·m/s",
+  "Attractor, Nm/s",
+  "Film time, s",
+  "Periods",
+  "Note",
+];
 
 /** @param {Loop[]} loops */
 export function loopTable(loops) {
@@ -101,6 +109,7 @@ export function loopTable(loops) {
     significant(loop.frequency_hz, 3),
     withSd(loop.loop_area_nm_m_s, loop.loop_area_sd_nm_m_s),
     withSd(loop.attractor_nm_s, loop.attractor_sd_nm_s),
+    withSd(loop.film_time_s, loop.film_time_sd_s),
     String(loop.periods),
     loop.message || words(loop.status),
   ]);

@@ -29,6 +29,7 @@ export interface GeometryIn {
 
 export interface EndOfLifeIn {
   cof_fraction: number;
+  criteria: CriterionIn[];
 }
 
 export interface ClutchSummary {
@@ -71,11 +72,39 @@ export interface ClutchOut {
   diagnosis: LatestDiagnosis | null;
 }
 
+// --- service/schemas/criteria.py
+
+export interface CriterionIn {
+  quantity: string;
+  fraction: number | null;
+  below: number | null;
+  above: number | null;
+  pressure_bar: number | null;
+  speed_rpm: number | null;
+  frequency_hz: number | null;
+}
+
 // --- service/schemas/life.py
 
-export interface Criterion {
-  fraction: number;
+export interface CriterionPlace extends CriterionIn {
+  limit: number | null;
+}
+
+export interface Criterion extends CriterionPlace {
   threshold_mean_cof: number | null;
+}
+
+export interface CriterionValue {
+  value: number | null;
+  sd: number | null;
+}
+
+export interface CriterionOutcome extends CriterionPlace {
+  current: CriterionValue;
+  remaining_cycles: Quantiles;
+  end_of_life_cycles: Quantiles;
+  probability_of_reaching: number | null;
+  probability_first: number;
 }
 
 export interface Current {
@@ -97,6 +126,7 @@ export interface CourseShare {
 }
 
 export interface RemainingLife {
+  revision: number;
   as_of_cycles: number | null;
   runs_used: number;
   status: string;
@@ -105,6 +135,7 @@ export interface RemainingLife {
   remaining_cycles: Quantiles;
   end_of_life_cycles: Quantiles;
   probability_of_reaching: number | null;
+  criteria: CriterionOutcome[];
   course: (CourseShare & { alternatives: CourseShare[] }) | null;
   back_cast: { held: number; of: number; widening: number } | null;
   ended_lives: number;
@@ -112,6 +143,19 @@ export interface RemainingLife {
   model: ModelName;
   warnings: Warned[];
 }
+
+// --- service/schemas/programme.py
+
+export interface PlannedLife {
+  status: string;
+  remaining_cycles: Quantiles;
+  recent_duty_cycles: Quantiles;
+  remaining_blocks: Quantiles;
+  end_of_life_at: Record<string, string | null> | null;
+  warnings: Warned[];
+}
+
+// --- service/schemas/degradation.py
 
 export interface Estimate {
   value: number;
@@ -140,16 +184,39 @@ export interface Trajectory {
 export interface DegradationItem {
   quantity: string;
   pressure_bar: number | null;
+  speed_rpm: number | null;
+  frequency_hz: number | null;
   coefficients: Coefficients | null;
-  eq6_probability: number;
+  eq6_probability: number | null;
   measured: Measured;
   trajectory: Trajectory;
+}
+
+export interface LinearLaw {
+  intercept: number;
+  slope_per_bar: number;
+  covariance: number[][];
+}
+
+export interface AsymptoticLaw {
+  asymptote: number;
+  excess: number;
+  decay_bar: number;
+  covariance: number[][];
+}
+
+export interface PressureLawsOut {
+  static_torque_nm: LinearLaw;
+  coulomb_ratio: AsymptoticLaw;
+  stribeck_velocity_m_s: LinearLaw;
+  viscous_coefficient: LinearLaw;
 }
 
 export interface StribeckItem {
   run_id: string;
   cycles: number;
   fits: Fit[];
+  pressure_laws: PressureLawsOut | null;
 }
 
 export interface LoopItem extends Loop {
@@ -164,6 +231,72 @@ export interface SeriesItem {
   value: number | null;
   lower: number | null;
   upper: number | null;
+}
+
+// --- service/schemas/indicators.py and engagement.py
+
+export interface IndicatorEstimate {
+  value: number;
+  sd: number;
+}
+
+export interface Indicators {
+  stop_time_s: IndicatorEstimate | null;
+  engagement_energy_kj: IndicatorEstimate | null;
+  peak_power_kw: IndicatorEstimate | null;
+  initial_cof: IndicatorEstimate | null;
+  midpoint_cof: IndicatorEstimate | null;
+  endpoint_cof: IndicatorEstimate | null;
+  breakaway_cof: IndicatorEstimate | null;
+  initial_cof_ratio: IndicatorEstimate | null;
+  endpoint_cof_ratio: IndicatorEstimate | null;
+  breakaway_cof_ratio: IndicatorEstimate | null;
+  torque_rise: IndicatorEstimate | null;
+}
+
+export interface AllIndicators extends Indicators {
+  normalised_duration: IndicatorEstimate | null;
+  euclidean_distance: IndicatorEstimate | null;
+  spectral_angle_rad: IndicatorEstimate | null;
+}
+
+export interface ReceivedEngagement {
+  status: string;
+  message: string;
+  indicators: Indicators;
+}
+
+export interface MeasuredEngagement {
+  run_id: string;
+  cycles: number;
+  indicators: AllIndicators;
+}
+
+export interface EngagementTrace {
+  time_s: number[];
+  pressure_bar: number[];
+  speed_rpm: number[];
+  torque_nm: number[];
+}
+
+export interface ModelledEngagement {
+  channels: EngagementTrace;
+  stop_time_s: number | null;
+  torque_discrepancy: number;
+  stop_time_difference_s: number | null;
+  stop_time_difference_sd_s: number | null;
+}
+
+export interface ComparedEngagement {
+  run_id: string;
+  cycles: number;
+  channels: EngagementTrace;
+  model: ModelledEngagement | null;
+}
+
+export interface EngagementOut {
+  measured: MeasuredEngagement[];
+  compared: ComparedEngagement | null;
 }
 
 // --- service/schemas/run.py
@@ -199,7 +332,11 @@ export interface Loop {
   loop_area_sd_nm_m_s: number | null;
   attractor_nm_s: number | null;
   attractor_sd_nm_s: number | null;
+  film_time_s: number | null;
+  film_time_sd_s: number | null;
   frequency_hz: number | null;
+  direction: string;
+  better_law: string | null;
   periods: number;
   status: string;
   message: string;
@@ -226,6 +363,7 @@ export interface Receipt {
   warnings: Warned[];
   fits: Fit[];
   loops: Loop[];
+  engagement: ReceivedEngagement | null;
   duty: Duty | null;
   event: string | null;
   note: string | null;

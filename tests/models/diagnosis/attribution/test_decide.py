@@ -11,7 +11,6 @@ import pytest
 from models.arrays import FloatArray
 from models.diagnosis.attribution.check import Check, Checks
 from models.diagnosis.attribution.decide import (
-    confirmed,
     credible_set,
     judge,
     like_temperature,
@@ -28,14 +27,14 @@ from models.diagnosis.criteria import (
     LEAST_NAMED,
     LEAST_REMAINDER_P_VALUE,
     MOST_WORSE,
+    PAIR_LOG_ODDS,
     STRUCTURE_FROM,
     STRUCTURE_SHARE,
 )
-from models.diagnosis.detection.alarm import Alarms
-from models.diagnosis.detection.likelihood_ratio import AlarmStatistic
 from models.diagnosis.detection.raw_records.evidence import RawEvidence
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.estimate import Estimate
+from models.diagnosis.pooled_fit.gauss_newton import FitStatus
 from models.diagnosis.pooled_fit.gram import gram_of
 from models.diagnosis.pooled_fit.projection import GAINS, project
 from tests.models.diagnosis.campaigns import Where, campaign
@@ -131,6 +130,39 @@ def test_two_causes_must_agree_in_their_parts_to_be_named(
     found = judge(among, 0.0, -np.inf, frozenset(), Odd(given, 0.9, p_value))
     assert found.credible == (several,)
     assert found.verdict is expected
+
+
+class Promoting(Odd):
+    """Checks that single effects fail."""
+
+    def __call__(self, hypothesis: Hypothesis) -> Check:
+        made = super().__call__(hypothesis)
+        return replace(made, excess=20.0) if len(hypothesis.effects) == 1 else made
+
+    def excess(self, hypothesis: Hypothesis) -> float:
+        return max(self(hypothesis).excess, 0.0)
+
+
+@pytest.mark.parametrize(("p_value", "expected"), [(1e-3, Verdict.CAUSE_AMBIGUOUS), (0.5, Verdict.CAUSE_NAMED)])
+def test_a_pair_that_is_promoted_for_the_best_failed_is_held_to_its_parts_as_well(
+    given: Study, best: Hypothesis, p_value: float, expected: Verdict
+) -> None:
+    """It had been held to what holds of the single effect that failed, which says nothing of parts."""
+    pair = replace(
+        best,
+        effects=tuple(BY_SLUG[slug] for slug in ("oil_temperature", "inertia_torque")),
+        evidence=best.evidence + PAIR_LOG_ODDS - 1.0,
+    )
+    found = judge([best, pair], 0.0, -np.inf, frozenset(), Promoting(given, 0.9, p_value))
+    assert found.credible == (pair,)
+    assert found.verdict is expected
+
+
+def test_a_cause_whose_fit_ran_out_of_steps_is_not_named(given: Study, judged: Judge, best: Hypothesis) -> None:
+    assert best.fit is not None
+    cut = replace(best, fit=replace(best.fit, status=FitStatus.OUT_OF_STEPS))
+    assert judged().verdict is Verdict.CAUSE_NAMED
+    assert judge([cut], 0.0, -np.inf, frozenset(), checks_of(given)).verdict is Verdict.CAUSE_AMBIGUOUS
 
 
 @pytest.mark.parametrize(("p_value", "expected"), [(0.01, Verdict.CAUSE_NAMED), (1e-4, Verdict.CAUSE_AMBIGUOUS)])
@@ -265,17 +297,3 @@ def test_structure_without_a_name_beside_a_vibration_counts_by_its_own_evidence(
         found = with_vibrations(judged, (ripple,))
         assert found.verdict is verdict
         assert found.causes == (("shaft_ripple",) if verdict is Verdict.CAUSE_NAMED else ())
-
-
-@pytest.mark.parametrize(
-    ("name", "beyond", "holds"),
-    [("effects", 3.0, False), ("effects", 7.0, True), ("contrasts", 3.0, True), ("contrasts", 1.0, False)],
-)
-def test_an_alarm_that_nothing_confirms_must_be_loud_that_of_the_effects_more_so(
-    name: str, beyond: float, holds: bool
-) -> None:
-    """Where no effect comes to anything once it is refitted, the shape that raised the alarm was one of many."""
-    calm = AlarmStatistic(value=5.0, threshold=10.0, p_value=0.5, index=0)
-    alarms = replace(Alarms(effects=calm, contrasts=calm, lines=calm), **{name: replace(calm, value=10.0 + beyond)})
-    assert confirmed(alarms, [], -np.inf) is holds
-    assert confirmed(alarms, [], 3.5)

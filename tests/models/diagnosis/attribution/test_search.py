@@ -9,9 +9,12 @@ import pytest
 from models.diagnosis.attribution.evidence import Hypothesis, HypothesisStatus, null_of, refitted
 from models.diagnosis.attribution.refits import Refits
 from models.diagnosis.attribution.screening import screen, screen_pairs
-from models.diagnosis.attribution.search import SearchStatus, _better_null, best_of, search
+from models.diagnosis.attribution.search import SearchStatus, _better_null, added_by_raw, best_of, search
+from models.diagnosis.criteria import CREDIBLE_MARGIN
 from models.diagnosis.detection.projected_fit import ProjectedFit, project_fit
+from models.diagnosis.detection.raw_records.evidence import RawEvidence
 from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
+from models.diagnosis.effects.estimate import Estimate
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.effects.grid import columns_of
 from models.diagnosis.noise.estimate import first_noise
@@ -86,6 +89,29 @@ def test_no_effect_is_praised_for_a_valley_that_the_baseline_missed(wandering: S
     assert again is not None
     off = again.evidence - null.evidence, again.profile - null.profile
     assert praised.against(*off).evidence < 0.1 * praised.evidence
+
+
+def test_what_plateaus_and_raw_records_both_show_counts_once() -> None:
+    """Plateaus are means of the raw samples: 12 nats by them and 20 by the samples are 20, not 32; beside another effect the
+    samples add 8; and what they show less of they do not add."""
+    dwell, drag = BY_SLUG["unsettled_dwell"], BY_SLUG["hydrodynamic_drag"]
+    alone = Hypothesis(effects=(dwell,), evidence=12.0, drop=15.0, fit=None)
+    pair = Hypothesis(effects=(dwell, drag), evidence=30.0, drop=40.0, fit=None)
+    estimate = Estimate(name="settling time constant", value=2.0, sd=0.3, unit="s")
+    for nats, single, both in ((20.0, 20.0, 38.0), (5.0, 12.0, 30.0)):
+        raw = RawEvidence(effect="unsettled_dwell", log_evidence=nats, estimate=estimate, note="")
+        added = added_by_raw([raw], [alone, pair])
+        assert (alone.with_raw(added).evidence, pair.with_raw(added).evidence) == (single, both)
+    hidden = replace(alone, evidence=-np.inf)  # of the wrong sign by plateaus
+    assert added_by_raw([raw], [hidden]) == {"unsettled_dwell": 5.0}
+
+
+def test_a_refit_near_the_best_is_followed_to_its_end(wandering: Study) -> None:
+    """Compared with others before its end, an effect that the baseline had absorbed stands far behind what it is."""
+    projected = project_fit(wandering.problem, wandering.baseline.fit, columns_of(CATALOGUE, wandering.design.facts))
+    usable = [each for each in search(wandering.baseline, projected, ()).hypotheses if each.usable]
+    least = usable[0].evidence - CREDIBLE_MARGIN
+    assert all(each.status is not HypothesisStatus.OUT_OF_STEPS for each in usable if each.evidence > least)
 
 
 def test_a_shape_at_its_bound_is_held_while_the_rest_moves(wandering: Study) -> None:

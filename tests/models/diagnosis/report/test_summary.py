@@ -11,6 +11,7 @@ from models.diagnosis.detection.structure_axes import Where
 from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.effects.estimate import Estimate
 from models.diagnosis.experiments.test_plan import Advice
+from models.diagnosis.pooled_fit.run_scatter import RunScatter
 from models.diagnosis.report.report import Candidate, Visible
 from models.diagnosis.report.summary import Findings, summarise
 from models.diagnosis.validation.held_out import Gain
@@ -279,5 +280,9 @@ def test_the_likeliest_comes_first_and_a_correction_that_improves_nothing_is_sai
 
 def test_how_much_runs_scatter_is_told_where_the_model_is_adequate() -> None:
     found = findings(Verdict.MODEL_ADEQUATE)
-    assert "from run to run (2.1 % of the torque)" in summarise(replace(found, scatter=0.021))
+    scatter = RunScatter(median=0.021, lower=0.015, upper=0.0304, information=2.0)
+    estimated = summarise(replace(found, scatter=scatter))
+    assert "from run to run (2.1 % of the torque, estimated; 90 % interval 1.5 to 3 %)" in estimated
+    silent = summarise(replace(found, scatter=replace(scatter, information=0.1)))
+    assert "from run to run (assumed to be 2.1 % of the torque, 1.5 to 3 %: these data hardly show it)" in silent
     assert "from run to run: the model" in summarise(found)

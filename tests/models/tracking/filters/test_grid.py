@@ -47,8 +47,8 @@ def test_the_grid_without_data_is_the_prior() -> None:
     for sample, mean, sd in (
         (posterior.initial, PRIOR.initial_mean, PRIOR.initial_sd),
         (posterior.change, PRIOR.change_mean, PRIOR.change_sd),
-        (posterior.coordinates[0], PRIOR.log_scale_mean, PRIOR.log_scale_sd),
-        (posterior.coordinates[1], PRIOR.log_exponent_mean, PRIOR.log_exponent_sd),
+        (posterior.log_scale, PRIOR.log_scale_mean, PRIOR.log_scale_sd),
+        (posterior.log_exponent, PRIOR.log_exponent_mean, PRIOR.log_exponent_sd),
         (np.log(posterior.scatter), PRIOR.log_scatter_mean, PRIOR.log_scatter_sd),
     ):
         found = posterior.moments(sample)

@@ -43,7 +43,7 @@ def test_a_measurement_let_in_by_degrees_still_counts_once() -> None:
 def test_a_test_that_the_particles_cannot_follow_is_said_to_be_forced(monkeypatch: pytest.MonkeyPatch) -> None:
     """A run far ahead and far off is taken in by two degrees; where only one is allowed the sample says so."""
     state, last = followed(Particle(particles=200), PRIOR, CAMPAIGN), CAMPAIGN[-1]
-    odd = Measurement(progress=3.0 * last.progress, value=1.5 * last.value, variance=0.0)
+    odd = Measurement(progress=3.0 * last.progress, value=2.0 * last.value, variance=0.0)
     statuses = []
     for degrees in (1, 30):
         monkeypatch.setattr("models.tracking.filters.particle._DEGREES", degrees)

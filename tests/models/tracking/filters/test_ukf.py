@@ -5,11 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 
-from models.degradation.general_order import Degradation, value
+from models.arrays import FloatArray
+from models.degradation.general_order import Degradation, progress_fraction, value
 from models.prognosis.first_passage import PassageStatus, predict_first_passage
 from models.tracking.filters.grid import Grid
-from models.tracking.filters.sigma_points import scatter_learnt
+from models.tracking.filters.sigma_points import Way, measured, predicted, scatter_learnt, unscaled
 from models.tracking.filters.ukf import Ukf
 from models.tracking.history import History
 from models.tracking.measurement import Measurement
@@ -100,3 +102,56 @@ def test_the_ukf_bears_more_events_than_anyone_logs() -> None:
     now, deviation = posterior.moments(posterior.values(np.array([20_000.0]))[0])
     assert abs(now - cof[-1]) < 4.0 * deviation + 0.01
     assert posterior.weight.size == 500
+
+
+def test_a_step_of_all_filters_at_once_is_filterpys_step_of_each() -> None:
+    """Two filters of eq. 6, one with a discrepancy beside it, led on a fifth of their progress: means, covariances and
+    the measurement's moments are those of filterpy, filter by filter."""
+    state = followed(Ukf(), PRIOR, CAMPAIGN[:9])
+    of = np.flatnonzero(np.isin(state.form, state.form[:2]))
+    normals = replace(
+        state.normals, form=np.array([0, 2]), **{n: getattr(state, n)[of] for n in ("mean", "covariance", "scatter")}
+    )
+    assert normals.mean.shape == (2, 6)
+    last, reference, unit = CAMPAIGN[8].progress, state.reference, PRIOR.initial_sd
+    way = Way(
+        reference=reference,
+        before=last,
+        after=1.2 * last,
+        steps=0,
+        progress=1.2 * last,
+        value=0.1,
+        variance=0.0,
+        relative=1.0,
+    )
+
+    def moved(x: FloatArray, _: float) -> FloatArray:
+        return x + np.eye(6)[4] * x[5] * 0.2 * last / reference
+
+    def seen(x: FloatArray) -> FloatArray:
+        initial, at_reference, log_scale, log_exponent, beside, _ = unscaled(PRIOR, x)
+        share, whole = progress_fraction(np.array([way.progress, reference]), np.exp(log_scale), np.exp(log_exponent))
+        return np.array([(initial + (at_reference - initial) * share / whole + beside) / unit])
+
+    mean, covariance = predicted(PRIOR, normals, way)
+    noise = covariance - predicted(PRIOR, replace(normals, form=np.zeros(2, dtype=np.intp)), way)[1]
+    assert noise[0].max() == 0.0 < noise[1].max()
+    expected, variance, across = measured(PRIOR, normals.form, mean, covariance, way)
+    for one in range(2):
+        theirs = UnscentedKalmanFilter(
+            dim_x=6,
+            dim_z=1,
+            dt=1.0,
+            hx=seen,
+            fx=moved,
+            points=MerweScaledSigmaPoints(n=6, alpha=1.0, beta=0.0, kappa=0.0),
+        )
+        theirs.x, theirs.P = normals.mean[one], normals.covariance[one]
+        theirs.Q, theirs.R = noise[one] + 1e-9 * np.eye(6), np.array([[0.0]])
+        theirs.predict()
+        theirs.update(np.array([0.1 / unit]))
+        np.testing.assert_allclose(mean[one], theirs.x_prior, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(covariance[one], theirs.P_prior, rtol=0, atol=1e-12)
+        assert expected[one] == pytest.approx(0.1 / unit - theirs.y[0], rel=1e-12)
+        assert variance[one] == pytest.approx(theirs.S[0, 0], rel=1e-9)
+        np.testing.assert_allclose(across[one], theirs.K[:, 0] * theirs.S[0, 0], rtol=0, atol=1e-12)

@@ -74,7 +74,9 @@ def test_all_samples_bit_for_bit_behind_the_receipt(database: Database, tmp_path
         row = runs.get(connection, CLUTCH, "raw")
     assert row is not None
     assert row.receipt.items() <= body.items()
-    assert body.keys() - row.receipt.keys() == {"channels", "samples", "changes", "doubts", "sent_cycles", "state"}
+    assert body.keys() - row.receipt.keys() == {
+        "channels", "samples", "changes", "doubts", "received_by", "sent_cycles", "state",
+    }  # fmt: skip
     assert body["samples"] == SAMPLES
     assert list(body["channels"]) == list(dynamic())
     for name, column in dynamic().items():

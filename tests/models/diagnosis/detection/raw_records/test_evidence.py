@@ -1,6 +1,7 @@
 """Evidence out of raw records: found where it is, named for what it is, and silent where there is only noise."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.detection.raw_records import pieces
 from models.diagnosis.detection.raw_records.evidence import raw_evidence
+from models.records.plateaus import cut_plateaus
 from models.records.runs import Record
 from tests.models.diagnosis.raw_campaigns import (
     RPM,
@@ -134,8 +136,23 @@ def test_ripple_is_found_between_slow_reversals(order: float) -> None:
 def test_dwells_that_end_before_torque_settles() -> None:
     slow = found(campaign([stepped(np.random.default_rng(6), settling=2.0)], []))
     assert slow.keys() == {"unsettled_dwell"}
-    assert slow["unsettled_dwell"][0] == pytest.approx(2.0, rel=0.2)
+    time_constant, deviation = slow["unsettled_dwell"]
+    assert abs(time_constant - 2.0) < 2.0 * deviation < 2.0
     assert found(campaign([stepped(np.random.default_rng(6), settling=0.3)], [])) == {}
+
+
+def test_dwells_that_look_late_but_settle_from_anywhere_are_no_evidence() -> None:
+    """Torque that wanders into each dwell, from above or from below whatever the step: each dwell was given half a nat."""
+    rng = np.random.default_rng(12)
+    calm = stepped(rng)
+    dwells = 40
+    time = calm.time % 5.0
+    side = 2.0 * rng.choice([-1, 1], dwells) * rng.uniform(0.5, 1.5, dwells)
+    wander = np.repeat(side, calm.time.size // dwells) * np.exp(-time / 1.5)
+    wandering = replace(calm, torque=calm.torque + wander)
+    late = cut_plateaus(wandering)
+    assert np.count_nonzero(late.time_constant > 1.0) > 0.5 * dwells
+    assert found(campaign([wandering], [])) == {}
 
 
 def test_records_that_hold_nothing_say_nothing() -> None:

@@ -1,0 +1,145 @@
+"""A measured engagement beside the one that a model gives: the same pressure, the same initial speed, the same drive.
+
+    J = ∫ (T - T_m) dt / (ω_1 - ω_2)     between 90 and 10 % of the initial speed
+
+The drive's torque T_m is what the clutch carries once the shaft stands (none for a flywheel), the inertia J follows from
+what slowed the shaft: so the simulated engagement starts from the measured energy. Pressure counts from that just before
+contact, where the discs only touch. What is left between both is model discrepancy:
+
+    of torque   √(Σ (T - T_model)² / Σ T²) at equal times since contact, while both slip
+    of time     measured less simulated stop time
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.engagements.capacity import Capacity
+from models.engagements.comparison import bin_means
+from models.engagements.criteria import ENDPOINT, INITIAL, LEAD, LONGEST_SLIP, TORQUES, TRACE_SAMPLES
+from models.engagements.local_fit import Estimate
+from models.engagements.measured import MeasuredEngagement
+from models.engagements.refusal import Refusal
+from models.engagements.simulation import Drive, Engagement, engage
+from models.engagements.slip import Slip, slip_of
+from models.records.runs import Record
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordedPressure:
+    """A measured pressure as a profile: values [n] Pa at time [n] s; `contact` [s], `plateau` and `maximum` [Pa]."""
+
+    time: FloatArray
+    values: FloatArray
+    contact: float
+    plateau: float
+    maximum: float
+
+    def __call__(self, time: FloatArray) -> FloatArray:
+        """Line pressure [m] Pa at time [m] s, not below the plateau."""
+        return np.maximum(np.interp(time, self.time, self.values), self.plateau)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Discrepancy:
+    """`trace` is the simulated engagement on the record's clock, `torque_share` [-] the discrepancy of torque;
+    `simulated_stop_time` [s] and `stop_time_difference` [s] are None where the simulated clutch slips on."""
+
+    trace: Engagement
+    drive: Drive
+    torque_share: float
+    simulated_stop_time: float | None
+    stop_time_difference: Estimate | None
+
+
+def discrepancy(engagement: MeasuredEngagement, capacity: Capacity, mean_radius: float) -> Discrepancy | None:
+    """A measured engagement against a clutch of this capacity; None where the record does not show what slowed the shaft."""
+    slip = engagement.slip
+    drive = _drive_of(slip, engagement.initial_speed.value)
+    if drive is None:
+        return None
+    duration = slip.end.value - slip.contact
+    origin = slip.contact - LEAD * duration
+    profile = _profile_of(slip, engagement.maximum_pressure, origin, duration)
+    rate = TRACE_SAMPLES / duration
+    trace = engage(
+        capacity,
+        mean_radius,
+        profile=profile,
+        drive=drive,
+        longest=profile.contact + LONGEST_SLIP * duration,
+        rate=rate,
+    )
+    simulated = slip_of(Record(time=trace.time, pressure=profile(trace.time), speed=trace.speed, torque=trace.torque))
+    stop = None if isinstance(simulated, Refusal) else simulated.duration.value
+    both = duration if trace.duration is None else min(duration, trace.duration)
+    since = np.linspace(0.0, both, TORQUES)
+    measured = bin_means(slip.time, slip.torque, slip.contact + since)
+    modelled = np.interp(profile.contact + since, trace.time, trace.torque)
+    inside = slice(1, -1)  # a bin at an end reaches beyond the slip
+    return Discrepancy(
+        trace=_shifted(trace, origin),
+        drive=drive,
+        torque_share=_relative(measured[inside] - modelled[inside], measured[inside]),
+        simulated_stop_time=stop,
+        stop_time_difference=None
+        if stop is None
+        else Estimate(value=engagement.stop_time.value - stop, sd=engagement.stop_time.sd),
+    )
+
+
+def _relative(error: FloatArray, values: FloatArray) -> float:
+    return math.sqrt(float(error @ error) / float(values @ values))
+
+
+def _shifted(trace: Engagement, origin: float) -> Engagement:
+    return Engagement(
+        time=trace.time + origin,
+        pressure=trace.pressure,
+        speed=trace.speed,
+        torque=trace.torque,
+        motor_torque=trace.motor_torque,
+        duration=trace.duration,
+        energy=trace.energy,
+    )
+
+
+def _drive_of(slip: Slip, speed: float) -> Drive | None:
+    """The drive of a record; None where the shaft was not slowed by the clutch's torque."""
+    until = slip.time[-1] if slip.again is None else slip.again
+    held = slip.torque[slip.between(slip.end.value + 2 * slip.end.sd, float(until))]
+    limit = max(float(np.median(held)), 0.0) if held.size >= 3 else 0.0
+    rows = slip.between(slip.contact, slip.end.value)
+    rows &= (slip.speed <= INITIAL * speed) & (slip.speed >= ENDPOINT * speed)
+    if np.count_nonzero(rows) < 3:
+        return None
+    time, torque = slip.time[rows], slip.torque[rows]
+    slowed = _slowed(time, slip.speed[rows])
+    inertia = float(np.trapezoid(torque - limit, time)) / slowed if slowed > 0 else 0.0
+    return Drive(speed=speed, limit=limit, inertia=inertia, drag=0.0) if inertia > 0 else None
+
+
+def _slowed(time: FloatArray, speed: FloatArray) -> float:
+    """How much a speed falls from its first to its last time, by a parabola through it."""
+    ends: Sequence[float] = np.polynomial.Polynomial.fit(time, speed, 2)(time[[0, -1]]).tolist()
+    return ends[0] - ends[1]
+
+
+def _profile_of(slip: Slip, maximum: float, origin: float, duration: float) -> RecordedPressure:
+    before = slip.pressure[slip.between(origin, slip.contact)]
+    plateau = float(np.median(before)) if before.size else 0.0
+    at = np.linspace(
+        slip.contact, float(slip.time[-1]), max(3, math.ceil(TORQUES * (slip.time[-1] - slip.contact) / duration))
+    )
+    return RecordedPressure(
+        time=at - origin,
+        values=np.interp(at, slip.time, slip.pressure)
+        if at.size > slip.time.size
+        else bin_means(slip.time, slip.pressure, at),
+        contact=slip.contact - origin,
+        plateau=min(plateau, 0.9 * maximum),
+        maximum=maximum,
+    )

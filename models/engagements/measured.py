@@ -1,0 +1,213 @@
+"""The indicators of one measured engagement, each with its standard error.
+
+    stop time        t_s = t_end - t_start                              (`slip`)
+    energy           E = ∫ T ω dt from contact to the end of slip, by the trapezoid
+    peak power       max T ω
+    μ                μ = T / (faces · p · factor · A · r_m): initial, midpoint, endpoint at 90, 50, 10 % of the initial speed
+    breakaway μ      the same where slip begins again after the standstill, under pressure
+    ratios           initial, endpoint and breakaway μ over midpoint μ
+    torque's rise    T(t_end)/T(midpoint) - 1
+
+T, p and ω at a moment are those of a line or parabola through the samples around it (`local_fit`). What a record does not
+determine is None. Valid from 10 Hz on; standard errors count the channels' noise and the open clutch's torque, no gain.
+
+Source: this project's definitions, in the manner of the friction tests of SAE J1646 and J2490, which were not read: no
+conformity is claimed.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from models.clutch import Geometry
+from models.engagements.comparison import COURSE_POINTS, SpeedCourse, bin_means
+from models.engagements.criteria import (
+    ENDPOINT,
+    FEWEST_LOCAL,
+    HALF_WIDTH,
+    HIGHEST,
+    INITIAL,
+    KEPT_PRESSURE,
+    MIDPOINT,
+    POWER_HALF_WIDTH,
+    POWER_MOMENTS,
+    TRACE_AFTER,
+    TRACE_BEFORE,
+    TRACE_POINTS,
+)
+from models.engagements.local_fit import Channel, Estimate, channel_of
+from models.engagements.refusal import Refusal
+from models.engagements.slip import Slip, slip_of
+from models.records.criteria import UNLOADED
+from models.records.runs import Record
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasuredEngagement:
+    """One engagement. Times in s of the record's clock, stop_time s, energy J, peak_power W, speeds rad/s, pressures Pa,
+    all others without a unit; None where the record does not determine it.
+
+    `course` is the slip's speed over time, for comparison with other engagements.
+    """
+
+    slip: Slip
+    initial_speed: Estimate
+    maximum_pressure: float
+    stop_time: Estimate
+    energy: Estimate
+    peak_power: Estimate | None
+    initial_cof: Estimate | None
+    midpoint_cof: Estimate | None
+    endpoint_cof: Estimate | None
+    breakaway_cof: Estimate | None
+    initial_ratio: Estimate | None
+    endpoint_ratio: Estimate | None
+    breakaway_ratio: Estimate | None
+    torque_rise: Estimate | None
+    course: SpeedCourse
+
+
+def measured_engagement(record: Record, geometry: Geometry) -> MeasuredEngagement | Refusal:
+    """The indicators of a record of one engagement, or why it has none."""
+    slip = slip_of(record)
+    if isinstance(slip, Refusal):
+        return slip
+    per_pascal = geometry.torque_per_cof(1.0)
+    channels = _Channels(slip, per_pascal)
+    speed = channels.initial_speed()
+    initial, midpoint, endpoint = (
+        channels.cof(channels.moment(share * speed.value)) for share in (INITIAL, MIDPOINT, ENDPOINT)
+    )
+    breakaway = _breakaway(slip, channels, per_pascal)
+    return MeasuredEngagement(
+        slip=slip,
+        initial_speed=speed,
+        maximum_pressure=float(np.quantile(channels.pressure.values, HIGHEST)),
+        stop_time=slip.duration,
+        energy=_energy(slip, channels),
+        peak_power=_peak_power(slip),
+        initial_cof=initial,
+        midpoint_cof=midpoint,
+        endpoint_cof=endpoint,
+        breakaway_cof=breakaway,
+        initial_ratio=_ratio(initial, midpoint),
+        endpoint_ratio=_ratio(endpoint, midpoint),
+        breakaway_ratio=_ratio(breakaway, midpoint),
+        torque_rise=channels.torque_rise(channels.moment(MIDPOINT * speed.value)),
+        course=_course(slip, channels),
+    )
+
+
+def trace_times(slip: Slip) -> FloatArray:
+    """Equally spaced times [m] s at which a slip's trace is shown: from before contact to after the standstill."""
+    duration = slip.end.value - slip.contact
+    first = max(slip.contact - TRACE_BEFORE * duration, float(slip.time[0]))
+    return np.linspace(first, min(slip.end.value + TRACE_AFTER * duration, float(slip.time[-1])), TRACE_POINTS)
+
+
+class _Channels:
+    """The channels of a slip, from contact to where it surely has not ended yet."""
+
+    def __init__(self, slip: Slip, per_pascal: float) -> None:
+        rows = slip.between(slip.contact, slip.end.value - 2 * slip.end.sd)
+        time = slip.time[rows]
+        self.slip = slip
+        self.width = HALF_WIDTH * (slip.end.value - slip.contact)
+        self.torque, self.pressure, self.speed = (
+            channel_of(time, column[rows]) for column in (slip.torque, slip.pressure, slip.speed)
+        )
+        self.friction = _friction(slip, per_pascal, rows)
+
+    def initial_speed(self) -> Estimate:
+        """The speed at contact: the mean over a quarter of the slip's duration before it, else what the slip begins with."""
+        slip = self.slip
+        before = slip.speed[slip.between(slip.contact - 0.25 * (slip.end.value - slip.contact), slip.contact)]
+        if before.size >= 3:
+            return Estimate(value=float(before.mean()), sd=float(before.std(ddof=1)) / math.sqrt(before.size))
+        first = self.speed.at(self.speed.low, self.width)
+        return Estimate(value=float(self.speed.values.max()), sd=self.noise(self.speed)) if first is None else first
+
+    def moment(self, speed: float) -> float:
+        """When the shaft has come down to a speed [rad/s]: the moment that leaves the fewest samples on the wrong side."""
+        fast = self.speed.values > speed
+        wrong = np.concatenate([[0], np.cumsum(~fast)]) + np.concatenate([np.cumsum(fast[::-1])[::-1], [0]])
+        row = int(np.argmin(wrong))
+        time = self.speed.time
+        return float(time[max(row - 1, 0)] + time[min(row, time.size - 1)]) / 2
+
+    def cof(self, moment: float) -> Estimate | None:
+        """μ at a moment of the slip [s]."""
+        return None if self.friction is None else self.friction.at(moment, self.width)
+
+    def torque_rise(self, midpoint: float) -> Estimate | None:
+        """The torque at the end of slip over that at its midpoint, less 1."""
+        ratio = _ratio(self.torque.at(self.slip.end.value, self.width), self.torque.at(midpoint, self.width))
+        return None if ratio is None else Estimate(value=ratio.value - 1, sd=ratio.sd)
+
+    def noise(self, channel: Channel) -> float:
+        """The deviation of a sample, by differences of second order."""
+        second = np.diff(channel.values, 2)
+        return float(np.sqrt(np.mean(second**2) / 6))
+
+
+def _friction(slip: Slip, per_pascal: float, rows: NDArray[np.bool_]) -> Channel | None:
+    """μ of every sample under load; `per_pascal` [Nm/Pa] is the torque of a unit μ."""
+    loaded = rows & (slip.pressure >= UNLOADED)
+    if not loaded.any():
+        return None
+    return channel_of(slip.time[loaded], slip.torque[loaded] / (per_pascal * slip.pressure[loaded]))
+
+
+def _ratio(value: Estimate | None, reference: Estimate | None) -> Estimate | None:
+    return None if value is None or reference is None else value.over(reference)
+
+
+def _energy(slip: Slip, channels: _Channels) -> Estimate:
+    """The trapezoid of power; from contact to the first sample power is that sample's, at the end of slip it is zero."""
+    rows = slip.between(slip.contact, slip.end.value)
+    torque, speed = slip.torque[rows], slip.speed[rows]
+    steps = np.diff(np.concatenate([[slip.contact], slip.time[rows], [slip.end.value]]))
+    weight = (steps[:-1] + steps[1:]) / 2
+    weight[0] += steps[0] / 2
+    variance = (speed * channels.noise(channels.torque)) ** 2 + (torque * channels.noise(channels.speed)) ** 2
+    factor = max(channels.torque.inflation, channels.speed.inflation)
+    deviations = (
+        math.sqrt(factor * float(np.sum(weight**2 * variance))),
+        slip.open_torque.sd * float(weight @ speed),
+        slip.start.sd * float(torque[0] * speed[0]),
+    )
+    return Estimate(value=float(weight @ (torque * speed)), sd=math.hypot(*deviations))
+
+
+def _peak_power(slip: Slip) -> Estimate | None:
+    rows = slip.between(slip.contact, slip.end.value)
+    power = channel_of(slip.time[rows], (slip.torque * slip.speed)[rows])
+    width = POWER_HALF_WIDTH * (power.high - power.low)
+    values = [power.at(moment, width) for moment in np.linspace(power.low, power.high, POWER_MOMENTS).tolist()]
+    return max((value for value in values if value is not None), key=lambda value: value.value, default=None)
+
+
+def _breakaway(slip: Slip, channels: _Channels, per_pascal: float) -> Estimate | None:
+    """μ at the moment at which slip begins again, by the samples between the standstill and it."""
+    if slip.again is None:
+        return None
+    held = slip.between(slip.end.value, slip.again)
+    friction = _friction(slip, per_pascal, held)
+    kept = np.median(slip.pressure[held][-FEWEST_LOCAL:]) if held.any() else 0.0
+    if friction is None or kept < KEPT_PRESSURE * channels.pressure.values[-1]:
+        return None
+    return friction.at(slip.again, channels.width)
+
+
+def _course(slip: Slip, channels: _Channels) -> SpeedCourse:
+    """Speed at equal steps from contact to the end of slip, each the mean over one step about it."""
+    duration = slip.end.value - slip.contact
+    at_once = max(channels.speed.values.size / COURSE_POINTS, 1.0)
+    return SpeedCourse(
+        duration=Estimate(value=duration, sd=slip.duration.sd),
+        speed=bin_means(slip.time, slip.speed, np.linspace(slip.contact, slip.end.value, COURSE_POINTS)),
+        noise=channels.noise(channels.speed) * math.sqrt(channels.speed.inflation / at_once),
+    )

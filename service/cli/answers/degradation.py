@@ -1,0 +1,50 @@
+"""`clutchlife degradation`: eq. 6's coefficients of every tracked quantity."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import typer
+
+from service.cli.answers.request import Arguments, AtCycles, Csv, Method, answered, arguments_of
+from service.cli.answers.tables import number, pressure, show_table, warn, with_deviation
+from service.cli.options import URL, ClutchId, Json, Key, Patience, Url, out
+
+_COLUMNS = ("quantity", "bar", "initial", "change", "scale, cycles", "exponent", "P(eq. 6)")
+_COEFFICIENTS = ("initial", "change", "scale_cycles", "exponent")
+
+
+def degradation(
+    clutch: ClutchId,
+    quantity: Annotated[str | None, typer.Option(help="Only this quantity, as `slope`")] = None,
+    method: Method = None,
+    at_cycles: AtCycles = None,
+    query: Arguments = None,
+    as_json: Json = False,
+    as_csv: Csv = False,
+    url: Url = URL,
+    key: Key = None,
+    patience: Patience = 10.0,
+) -> None:
+    """Show how mean COF and the Stribeck parameters change along a life: the coefficients of eq. 6."""
+    arguments = arguments_of(query, quantity=quantity, method=method, at_cycles=at_cycles)
+    address = f"/v1/clutches/{clutch}/degradation"
+    answer = answered(address, arguments, as_json=as_json, as_csv=as_csv, url=url, key=key, patience=patience)
+    if answer is None:
+        return
+    if not answer["items"]:
+        out.print(f"{clutch} has no tracked quantity yet", markup=False)
+    else:
+        show_table(_COLUMNS, map(_row, answer["items"]))
+    warn(answer["warnings"])
+
+
+def _row(item: Mapping[str, Any]) -> list[str]:
+    coefficients = item["coefficients"]
+    estimates = [None if coefficients is None else coefficients[name] for name in _COEFFICIENTS]
+    shown = ["-" if part is None else with_deviation(part["value"], part["sd"]) for part in estimates]
+    return [
+        item["quantity"],
+        pressure(item["pressure_bar"]),
+        *shown,
+        number(item["eq6_probability"], 2),
+    ]

@@ -1,0 +1,54 @@
+"""Tables and numbers for a terminal."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from service.cli.options import out
+
+BEYOND_HORIZON = "beyond the horizon"
+
+
+def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], *, left: int = 1) -> None:
+    """Print a table, a line a row however narrow the terminal is: `left` columns of words, then columns of numbers."""
+    lines = [columns, *rows]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    for place, line in enumerate(lines):
+        cells = [
+            cell.ljust(width) if column < left else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(line, widths, strict=True))
+        ]
+        out.print("  ".join(cells).rstrip(), markup=False, soft_wrap=True, style="" if place else "bold")
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A number with so many digits, "-" where there is none."""
+    if value is None:
+        return "-"
+    return f"{value:,.0f}" if 100 <= abs(value) < 1e6 else f"{value:.{digits}g}"
+
+
+def with_deviation(value: float | None, deviation: float | None) -> str:
+    """A value with its standard deviation, to the deviation's second digit; "-" where there is none."""
+    if value is None:
+        return "-"
+    if deviation is None or not deviation > 0.0 or not math.isfinite(deviation):
+        return number(value)
+    decimals = max(0, 1 - math.floor(math.log10(deviation)))
+    return f"{value:,.{decimals}f} ± {deviation:,.{decimals}f}"
+
+
+def cycles(value: float | None) -> str:
+    """Duty cycles in whole numbers; a quantile that is null lies beyond the horizon."""
+    return BEYOND_HORIZON if value is None else f"{value:,.0f}"
+
+
+def pressure(value: float | None) -> str:
+    """A line pressure in bar; null is the mean over the pressures."""
+    return "mean" if value is None else f"{value:g}"
+
+
+def warn(warnings: Iterable[Mapping[str, Any]]) -> None:
+    """The warnings of an answer, a line each."""
+    for notice in warnings:
+        out.print(f"{notice['code']}: {notice['message']}", markup=False, soft_wrap=True)

@@ -1,0 +1,15 @@
+"""`clutchlife backup`: a consistent copy of the database."""
+
+from pathlib import Path
+
+from service.cli.options import DATABASE, Database, errors_in_a_line, out, require_database
+
+
+def backup(path: Path, database: Database = DATABASE) -> None:
+    """A consistent copy of the database at PATH, as it is, while the service runs."""
+    from storage.engine.database import back_up  # start-up time
+
+    with errors_in_a_line():
+        require_database(database)
+        back_up(database, path)
+    out.print(str(path), markup=False, soft_wrap=True)

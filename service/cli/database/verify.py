@@ -1,0 +1,64 @@
+"""`clutchlife verify`: what is stored, held against itself; nothing is changed."""
+
+import random
+from typing import Annotated
+
+import typer
+from rich.progress import Progress
+
+from service.cli.options import DATABASE, Database, err, fail, out, read_only
+
+
+def verify(
+    database: Database = DATABASE,
+    sample: Annotated[
+        int | None, typer.Option(min=0, help="Recompute this many clutches only, drawn anew each time; left out, all")
+    ] = None,
+) -> None:
+    """Check pages, references and schema, every run's content hash, and that all results follow from the runs.
+
+    Prints what is wrong, a line each; ends with 1 where anything is. Also while the service runs, and for a backup.
+    """
+    from service.background import use_one_blas_thread  # start-up time
+    from service.queries.verification.content import check_runs  # start-up time
+    from service.queries.verification.results import check_results  # start-up time
+    from storage import clutches  # start-up time
+    from storage.engine.integrity import damage, other_schema  # start-up time
+
+    use_one_blas_thread()
+    findings = runs = 0
+    earlier: dict[str, int] = {}
+
+    def tell(lines: "list[str] | tuple[str, ...]") -> int:
+        for line in lines:
+            out.print(line, markup=False, soft_wrap=True)
+        return len(lines)
+
+    with read_only(database) as opened, Progress(console=err, transient=True) as progress:
+        with opened.reading() as connection:
+            damaged = tell(damage(connection))
+            if damaged:  # what is read of a damaged file is not to be trusted: neither runs nor what follows from them
+                fail(f"{damaged} findings: the file is damaged. Put a backup back: clutchlife restore BACKUP")
+            findings += tell(other_schema(connection))
+            ids = clutches.all_ids(connection)
+        chosen = set(ids if sample is None else random.sample(ids, min(sample, len(ids))))
+        task = progress.add_task("verifying", total=len(ids))
+        for clutch_id in ids:
+            content = check_runs(opened, clutch_id)
+            runs += content.runs
+            findings += tell(content.findings)
+            if clutch_id in chosen and not content.findings:
+                results = check_results(opened, clutch_id)
+                findings += tell(results.findings)
+                for version, count in results.earlier.items():
+                    earlier[version] = earlier.get(version, 0) + count
+            progress.advance(task)
+    for version, count in sorted(earlier.items()):
+        note = f"{count} results were made by release {version}: they can be computed anew, and may differ (replay)"
+        out.print(note, markup=False, soft_wrap=True)
+    summary = (
+        f"{runs} runs of {len(ids)} clutches are checked, {len(chosen)} clutches computed anew: {findings} findings"
+    )
+    if findings:
+        fail(summary)
+    out.print(summary, markup=False, soft_wrap=True)

@@ -1,0 +1,210 @@
+// @ts-check
+// Planned duty: a form of blocks and a pace, and the remaining life under them. Nothing of it is stored.
+
+import { clutchPath, Problem, sendJson } from "../shared/api.js";
+import { field, h, scrolling, table } from "../shared/dom.js";
+import { fixed, significant } from "../shared/format.js";
+import { problemView } from "../shared/problem_view.js";
+
+/** @import { PlannedLife, ProblemError, Quantiles } from "../shared/types.js" */
+
+/** @typedef {{ name: string, label: string, value?: string }} Entry a number of the form; left empty it is not sent */
+
+/** @type {Entry[]} */
+const OF_BLOCK = [
+  { name: "cycles", label: "Duty cycles", value: "1000" },
+  { name: "energy_per_cycle_kj", label: "Energy per cycle, kJ" },
+  { name: "sd", label: "Its standard deviation, kJ" },
+];
+/** @type {Entry} */
+const PACE = { name: "pace_cycles_per_hour", label: "Pace, duty cycles an hour, idle hours included" };
+/** What is shown of the answer's quantiles. */
+const SHOWN = ["0.05", "0.5", "0.95"];
+
+export class PlannedDuty {
+  /**
+   * @param {HTMLElement} place
+   * @param {string} clutchId
+   */
+  constructor(place, clutchId) {
+    this.address = `${clutchPath(clutchId)}/remaining-useful-life/forecast`;
+    this.blocks = h("div", { class: "blocks" });
+    this.pace = h("div", { class: "fields" }, number(`/${PACE.name}`, PACE));
+    this.answer = h("div", { class: "answer", "aria-live": "polite" });
+    this.go = h("button", { class: "main" }, "Predict");
+    const more = h("button", { type: "button", onclick: () => this.add() }, "Add a block");
+    const buttons = h("div", { class: "buttons" }, more, this.go);
+    this.form = h("form", { novalidate: true, onsubmit: this.submit }, this.blocks, this.pace, buttons, this.answer);
+    const about =
+      "Blocks are run one after the other, over and over until the end of life. An empty field is left open.";
+    place.replaceChildren(
+      h(
+        "details",
+        { class: "planned" },
+        h("summary", {}, "Planned duty"),
+        h("p", { class: "quiet" }, about),
+        this.form,
+      ),
+    );
+    this.append();
+  }
+
+  /** A block at the end, with the focus in it. */
+  add() {
+    this.append();
+    focus(this.blocks, "fieldset:last-child input");
+  }
+
+  append() {
+    const block = h("fieldset", {});
+    const remove = () => {
+      block.remove();
+      this.renumber();
+      focus(this.blocks, "fieldset:last-child input");
+    };
+    block.append(
+      h("legend", {}),
+      h(
+        "div",
+        { class: "fields" },
+        OF_BLOCK.map((entry) => number("", entry)),
+      ),
+      h("p", { class: "wrong", hidden: true }),
+      h("button", { type: "button", class: "remove", onclick: remove }, "Remove"),
+    );
+    this.blocks.append(block);
+    this.renumber();
+  }
+
+  /** Names, places of errors and buttons follow a block's number. */
+  renumber() {
+    const blocks = [...this.blocks.querySelectorAll("fieldset")];
+    for (const [place, block] of blocks.entries()) {
+      const title = `Block ${place + 1}`;
+      const remove = block.querySelector("button");
+      block.dataset.pointer = `/programme/${place}`;
+      block.querySelector("legend")?.replaceChildren(title);
+      remove?.setAttribute("aria-label", `Remove block ${place + 1}`);
+      if (remove) remove.hidden = blocks.length === 1;
+      for (const input of block.querySelectorAll("input")) {
+        input.dataset.pointer = `/programme/${place}/${input.name}`;
+        input.id = idOf(input.dataset.pointer);
+        const label = input.parentElement?.querySelector("label");
+        label?.setAttribute("for", input.id);
+      }
+    }
+  }
+
+  submit = async (/** @type {SubmitEvent} */ event) => {
+    event.preventDefault();
+    this.clear();
+    this.go.disabled = true;
+    this.answer.replaceChildren(h("p", { class: "quiet" }, "Computing …"));
+    try {
+      /** @type {{ body: PlannedLife }} */
+      const { body } = await sendJson("POST", this.address, this.programme());
+      this.answer.replaceChildren(...shown(body));
+    } catch (problem) {
+      if (!(problem instanceof Problem)) throw problem;
+      const elsewhere = problem.errors.filter((error) => !this.mark(error));
+      const all = problem.errors.length > 0 && elsewhere.length === 0;
+      const marked = h("p", { class: "notice bad", role: "alert" }, "The plan is not complete: see the marked fields.");
+      this.answer.replaceChildren(all ? marked : problemView(problem, "No prediction. "));
+      focus(this.form, "[aria-invalid]");
+    } finally {
+      this.go.disabled = false;
+    }
+  };
+
+  programme() {
+    const programme = [...this.blocks.querySelectorAll("fieldset")].map((block) => numbersIn(block));
+    return { programme, ...numbersIn(this.pace) };
+  }
+
+  clear() {
+    for (const input of this.form.querySelectorAll("[aria-invalid]")) {
+      input.removeAttribute("aria-invalid");
+      input.removeAttribute("aria-describedby");
+    }
+    for (const note of this.form.querySelectorAll(".wrong")) {
+      note.replaceChildren();
+      note.toggleAttribute("hidden", true);
+    }
+  }
+
+  /**
+   * An error at the field or the block that it is about; whether there is one.
+   * @param {ProblemError} error
+   */
+  mark({ pointer, message }) {
+    const places = [...this.form.querySelectorAll("[data-pointer]")];
+    const place = places.find((element) => element instanceof HTMLElement && element.dataset.pointer === pointer);
+    if (place === undefined) return false;
+    const note = place instanceof HTMLInputElement ? place.nextElementSibling : place.querySelector(":scope > .wrong");
+    const input = place instanceof HTMLInputElement ? place : place.querySelector("input:last-of-type");
+    if (note === null || input === null) return false;
+    note.id = `${idOf(pointer)}-wrong`;
+    note.replaceChildren(message.replace(/^programme\S*: /, "")); // the field says where it is
+    note.toggleAttribute("hidden", false);
+    input.setAttribute("aria-invalid", "true");
+    input.setAttribute("aria-describedby", note.id);
+    return true;
+  }
+}
+
+/**
+ * @param {HTMLElement} place
+ * @param {string} selector
+ */
+function focus(place, selector) {
+  const element = place.querySelector(selector);
+  if (element instanceof HTMLElement) element.focus();
+}
+
+/** @param {string} pointer */
+const idOf = (pointer) => `planned${pointer.replaceAll("/", "-")}`;
+
+/**
+ * @param {string} pointer "" until the block has its number
+ * @param {Entry} entry
+ */
+function number(pointer, { name, label, value = "" }) {
+  const attributes = { type: "number", step: "any", inputmode: "decimal", autocomplete: "off" };
+  const input = h("input", { id: idOf(pointer), name, value, "data-pointer": pointer, ...attributes });
+  return field(input, label, h("p", { class: "wrong", hidden: true }));
+}
+
+/** @param {HTMLElement} place */
+function numbersIn(place) {
+  const filled = [...place.querySelectorAll("input")].filter((input) => input.value !== "");
+  return Object.fromEntries(filled.map((input) => [input.name, Number(input.value)]));
+}
+
+/** @param {PlannedLife} life */
+function shown(life) {
+  const {
+    remaining_cycles: cycles,
+    remaining_blocks: blocks,
+    end_of_life_at: dates,
+    recent_duty_cycles: recent,
+  } = life;
+  /** @type {(quantiles: Quantiles, decimals: number) => string[]} */
+  const numbers = (quantiles, decimals) =>
+    SHOWN.map((quantile) => {
+      const value = quantiles[quantile] ?? null;
+      return value === null ? "beyond the horizon" : fixed(value, decimals);
+    });
+  if (life.status === "insufficient_data") return [h("p", { class: "notice" }, "Too few tests for a prediction.")];
+  const rows = [
+    ["Remaining cycles", ...numbers(cycles, 0)],
+    ["Remaining blocks", ...numbers(blocks, 1)],
+    ["Cycles under recent duty", ...numbers(recent, 0)],
+  ];
+  if (dates !== null) rows.push(["End of life", ...SHOWN.map((quantile) => dates[quantile]?.slice(0, 10) ?? "–")]);
+  const columns = ["Probability", ...SHOWN.map((quantile) => `${significant(100 * Number(quantile))} %`)];
+  const notes = life.warnings.map(({ message }) => h("p", { class: "quiet" }, message));
+  return [
+    scrolling("Planned duty", table("Remaining life under planned duty, by probability", columns, rows)),
+    ...notes,
+  ];
+}

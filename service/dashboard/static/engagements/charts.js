@@ -1,0 +1,146 @@
+// @ts-check
+// What the charts of the engagements show: an indicator over cycles, and one measured engagement beside the model's.
+
+import { column, CYCLES, digitsColumn, HALF_OF_90, KIND } from "../charts/columns.js";
+import { eventMarks } from "../charts/layout.js";
+import { errorBars, titled } from "../charts/traces.js";
+import { fixed, percent, significant } from "../shared/format.js";
+
+/** @import { ComparedEngagement, EngagementTrace, MeasuredEngagement, Receipt } from "../shared/types.js" */
+/** @import { Colours, PlainTrace, Spec } from "../charts/types.js" */
+
+/** The indicators by name: what it is, and its unit. */
+export const INDICATORS = {
+  stop_time_s: ["Stop time", "s"],
+  midpoint_cof: ["Midpoint COF", ""],
+  initial_cof: ["Initial COF", ""],
+  endpoint_cof: ["Endpoint COF", ""],
+  breakaway_cof: ["Breakaway COF", ""],
+  initial_cof_ratio: ["Initial over midpoint COF", ""],
+  endpoint_cof_ratio: ["Endpoint over midpoint COF", ""],
+  breakaway_cof_ratio: ["Breakaway over midpoint COF", ""],
+  torque_rise: ["Torque's rise at the end", ""],
+  engagement_energy_kj: ["Energy", "kJ"],
+  peak_power_kw: ["Peak power", "kW"],
+  normalised_duration: ["Duration over that of the first", ""],
+  euclidean_distance: ["Distance of speed from the first", ""],
+  spectral_angle_rad: ["Spectral angle from the first", "rad"],
+};
+
+/** The channels of a trace: what it is, and its unit. */
+export const CHANNELS = {
+  torque_nm: ["Friction torque", "Nm"],
+  speed_rpm: ["Sliding speed", "rpm"],
+  pressure_bar: ["Line pressure", "bar"],
+};
+
+/** @typedef {keyof typeof INDICATORS} Indicator */
+/** @typedef {keyof typeof CHANNELS} Channel */
+
+const NO_ENGAGEMENT =
+  "No measured engagement yet. Send one with a block of duty: time_s, pressure_bar, speed_rpm and torque_nm of one engagement.";
+const NO_VALUE = "None of the engagements determines this indicator.";
+const NO_COMPARISON = "A model's engagement needs a stationary test and an engagement of the present life.";
+
+/** @param {[string, string] | string[]} named */
+const titleOf = ([title, unit]) => (unit === "" ? title : `${title}, ${unit}`);
+
+/**
+ * The values of an indicator; engagements that do not determine it are left out.
+ * @param {MeasuredEngagement[]} measured
+ * @param {Indicator} name
+ */
+const valuesOf = (measured, name) =>
+  measured.flatMap(({ cycles, indicators }) => {
+    const estimate = indicators[name];
+    return estimate === null ? [] : [{ cycles, value: estimate.value, sd: estimate.sd }];
+  });
+
+/**
+ * An indicator over cycles.
+ * @param {{ measured: MeasuredEngagement[], events: Receipt[], name: Indicator }} answers
+ * @returns {Spec}
+ */
+export function indicatorOverLife({ measured, events, name }) {
+  if (measured.length === 0) return { empty: NO_ENGAGEMENT };
+  const values = valuesOf(measured, name);
+  if (values.length === 0) return { empty: NO_VALUE };
+  const title = titleOf(INDICATORS[name]);
+  return {
+    note: `Of ${fixed(values.length)} measured engagements, with 90 % error bars of the records' noise.`,
+    columns: [CYCLES, digitsColumn(title, 4), digitsColumn("standard error", 2)],
+    rows: values.map(({ cycles, value, sd }) => [cycles, value, sd]),
+    figure: (c) => ({
+      data: [
+        {
+          name: title,
+          mode: "lines+markers",
+          x: values.map(({ cycles }) => cycles),
+          y: values.map(({ value }) => value),
+          line: { color: c.accent, width: 1.4 },
+          marker: { color: c.accent, size: 7 },
+          error_y: errorBars(
+            values.map(({ sd }) => sd),
+            c.accent,
+            { thickness: 1, width: 3 },
+          ),
+          hovertemplate: `%{x:,.0f} cycles<br>${title} %{y:.4g}<extra></extra>`,
+        },
+      ],
+      layout: { xaxis: titled("duty cycles"), yaxis: titled(title), ...eventMarks(events, c) },
+    }),
+  };
+}
+
+/**
+ * A measured engagement beside the model's.
+ * @param {{ compared: ComparedEngagement | null, name: Channel }} answers
+ * @returns {Spec}
+ */
+export function engagementTrace({ compared, name }) {
+  if (compared === null) return { empty: NO_COMPARISON };
+  const { channels, model, cycles } = compared;
+  const title = titleOf(CHANNELS[name]);
+  const kinds = [{ kind: "measured", trace: channels }, ...(model ? [{ kind: "model", trace: model.channels }] : [])];
+  return {
+    note: `After ${fixed(cycles)} cycles. ${discrepancyOf(compared)}`,
+    columns: [KIND, column("time since contact, s", 3), digitsColumn(title, 4)],
+    rows: kinds.flatMap(({ kind, trace }) => trace.time_s.map((time, index) => [kind, time, trace[name][index]])),
+    figure: (c) => ({
+      data: kinds.map(({ kind, trace }) => lineOf(kind, trace, name, c)),
+      layout: { xaxis: titled("time since contact, s"), yaxis: titled(title) },
+    }),
+  };
+}
+
+/**
+ * @param {string} kind
+ * @param {EngagementTrace} trace
+ * @param {Channel} name
+ * @param {Colours} c
+ * @returns {PlainTrace}
+ */
+function lineOf(kind, trace, name, c) {
+  const measured = kind === "measured";
+  return {
+    name: measured ? "measured" : "tracked model",
+    mode: "lines",
+    x: trace.time_s,
+    y: trace[name],
+    line: measured ? { color: c.accent, width: 1.6 } : { color: c.worn, width: 1.6, dash: "dash" },
+    hovertemplate: `${kind}<br>%{x:.2f} s, %{y:.4g} ${CHANNELS[name][1]}<extra></extra>`,
+  };
+}
+
+/**
+ * Where measurement and model part, in a sentence.
+ * @param {ComparedEngagement} compared
+ */
+function discrepancyOf({ model }) {
+  if (model === null) return "The record does not show what drove the shaft: there is no model's engagement beside it.";
+  const torque = `Model discrepancy: ${percent(model.torque_discrepancy, 1)} of torque (RMS, while both slip)`;
+  const { stop_time_difference_s: difference, stop_time_difference_sd_s: sd } = model;
+  if (difference === null) return `${torque}; the model's clutch does not stop the shaft.`;
+  const half = sd === null ? "" : ` ± ${significant(HALF_OF_90 * sd, 2)}`;
+  return `${torque}; stops ${significant(Math.abs(difference), 3)}${half} s ${difference > 0 ? "later" : "earlier"} than the model.`;
+}

@@ -1,0 +1,127 @@
+// @ts-check
+// What ends a clutch's life: its criteria, when each is reached, and how probably it is the first.
+
+import { h, scrolling, table } from "../shared/dom.js";
+import { cycles, fixed, interval, percent, probability, significant, withSd } from "../shared/format.js";
+
+/** @import { CriterionIn, CriterionOutcome, RemainingLife } from "../shared/types.js" */
+
+/** @type {Record<string, { title: string, unit: string }>} */
+const QUANTITIES = {
+  mean_cof: { title: "Mean COF", unit: "" },
+  static_torque_nm: { title: "Static torque", unit: "Nm" },
+  coulomb_ratio: { title: "Coulomb ratio", unit: "" },
+  stribeck_velocity_m_s: { title: "Stribeck velocity", unit: "m/s" },
+  viscous_coefficient: { title: "Viscous coefficient", unit: "Nm/(m/s)⁰·³" },
+  slope: { title: "Slope dμ/dv", unit: "s/m" },
+  attractor: { title: "Attractor C", unit: "Nm/s" },
+  film_time: { title: "Film time", unit: "s" },
+  loop_area: { title: "Loop area", unit: "Nm·m/s" },
+};
+
+const COLUMNS = [
+  "Criterion",
+  "Now",
+  "Limit",
+  "Reached at, cycles",
+  "90 % interval",
+  "Probability of reaching it",
+  "Probability of being the first",
+];
+
+/**
+ * A quantity and where it is measured.
+ * @param {CriterionIn} criterion
+ */
+export function placeText({ quantity, pressure_bar: pressure, speed_rpm: speed, frequency_hz: frequency }) {
+  const at = [
+    speed === null ? [] : `${fixed(speed)} rpm`,
+    frequency === null ? [] : `${significant(frequency, 2)} Hz`,
+    pressure === null ? [] : `${fixed(pressure, 1)} bar`,
+  ].flat();
+  return [QUANTITIES[quantity].title, ...at].join(", ");
+}
+
+/**
+ * The limit of a criterion in words.
+ * @param {CriterionIn} criterion
+ */
+export function limitText({ quantity, fraction, below, above }) {
+  const { unit } = QUANTITIES[quantity];
+  if (fraction !== null) return `${percent(fraction)} of new`;
+  const [word, value] = below === null ? ["above", above] : ["below", below];
+  return `${word} ${significant(value, 3)}${unit && ` ${unit}`}`;
+}
+
+/**
+ * When a limit is reached, as part of a sentence.
+ * @param {CriterionOutcome} criterion
+ */
+export function reachedText({
+  limit,
+  end_of_life_cycles: end,
+  remaining_cycles: left,
+  probability_of_reaching: chance,
+}) {
+  const level = `the limit ${significant(limit, 3)}`;
+  if (chance === null) return "there are too few tests to predict when it is reached";
+  const reaches = `it is reached with a probability of ${probability(chance)}`;
+  if (end["0.5"] === null) return `${level} may never be reached: ${reaches}`;
+  const at = `reached at about ${cycles(end["0.5"], end["0.05"], end["0.95"])} cycles (90 %: ${interval(end)})`;
+  return left["0.5"] === 0
+    ? `${level} has been ${at}`
+    : `${level} is ${at}, ${cycles(left["0.5"], left["0.05"], left["0.95"])} cycles from now`;
+}
+
+/**
+ * The criteria as a table; nothing where mean COF alone ends the life.
+ * @param {RemainingLife} life
+ */
+export function criteriaTable({ criteria }) {
+  if (criteria.length === 0 || (criteria.length === 1 && criteria[0].quantity === "mean_cof")) return [];
+  const rows = criteria.map((criterion) => {
+    const { current, end_of_life_cycles: end } = criterion;
+    const { unit } = QUANTITIES[criterion.quantity];
+    return [
+      placeText(criterion),
+      `${withSd(current.value, current.sd)}${unit && ` ${unit}`}`,
+      limitText(criterion),
+      end["0.5"] === null ? "–" : cycles(end["0.5"], end["0.05"], end["0.95"]),
+      interval(end),
+      probability(criterion.probability_of_reaching),
+      probability(criterion.probability_first),
+    ];
+  });
+  const style = { "margin-bottom": "16px" };
+  const text = "The first to be reached ends the life. The charts of mean COF below show its own end.";
+  return [
+    h(
+      "div",
+      { class: "panel", style },
+      h("h3", {}, "Criteria"),
+      h("p", { class: "quiet" }, text),
+      scrolling("Criteria: table", table("Criteria", COLUMNS, rows)),
+    ),
+  ];
+}
+
+/**
+ * The remaining life by mean COF over all pressures alone, whatever else ends it: what the charts of mean COF show.
+ * @param {RemainingLife} life
+ * @returns {RemainingLife}
+ */
+export function byMeanCof(life) {
+  const { criteria, criterion } = life;
+  if (criteria.length === 0) return life;
+  const own = criteria.find(({ quantity, pressure_bar: level }) => quantity === "mean_cof" && level === null);
+  if (own) {
+    const { fraction, limit, end_of_life_cycles: end, remaining_cycles: remaining } = own;
+    const place = { ...criterion, fraction, threshold_mean_cof: limit };
+    const ahead = remaining["0.5"] === 0 ? "reached" : "predicted";
+    const status = own.probability_of_reaching === null ? "insufficient_data" : ahead;
+    return { ...life, status, criterion: place, end_of_life_cycles: end, remaining_cycles: remaining };
+  }
+  const never = Object.fromEntries(Object.keys(life.end_of_life_cycles).map((level) => [level, null]));
+  const place = { ...criterion, fraction: null, threshold_mean_cof: null };
+  return { ...life, criterion: place, end_of_life_cycles: never, remaining_cycles: never };
+}

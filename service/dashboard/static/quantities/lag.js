@@ -1,0 +1,155 @@
+// @ts-check
+// The lag of friction behind its stationary curve over life: over cycles (figs. 15 to 17), and over pressure (figs. 13, 14).
+
+import { CYCLES, digitsColumn, distinct, HALF_OF_90, KIND, measuredAndLaw, PRESSURE } from "../charts/columns.js";
+import { eventMarks } from "../charts/layout.js";
+import { rampOf } from "../charts/palette.js";
+import { spread } from "../charts/stribeck.js";
+import { band, linesByPressure, measuredLine, titled } from "../charts/traces.js";
+import { fixed } from "../shared/format.js";
+import { levelsOf } from "./choices.js";
+
+/** @import { DegradationItem, Receipt } from "../shared/types.js" */
+/** @import { Colours, Column, PlainTrace, Spec } from "../charts/types.js" */
+
+/** @typedef {"loop_area" | "attractor" | "film_time"} LagName */
+
+/** @type {Record<LagName, { title: string, axis: string, unit: string, meaning: string }>} */
+export const LAG = {
+  loop_area: {
+    title: "Loop area",
+    axis: "loop area, Nm·m/s",
+    unit: "Nm·m/s",
+    meaning: "Area of whole closed periods (eq. 8), positive where torque is higher in acceleration",
+  },
+  attractor: {
+    title: "Attractor C",
+    axis: "attractor C, Nm/s",
+    unit: "Nm/s",
+    meaning: "The rate at which friction follows its stationary curve: the lower, the more it lags",
+  },
+  film_time: {
+    title: "Film time",
+    axis: "film time, s",
+    unit: "s",
+    meaning: "The time constant of the squeezed film (eq. 7)",
+  },
+};
+
+export const LAG_NAMES = /** @type {LagName[]} */ (Object.keys(LAG));
+
+/**
+ * @param {LagName} name
+ * @returns {Column[]}
+ */
+const columnsOf = (name) => [
+  KIND,
+  PRESSURE,
+  digitsColumn("frequency, Hz", 3),
+  CYCLES,
+  digitsColumn(LAG[name].axis, 3),
+  digitsColumn("lower, 5 %", 3),
+  digitsColumn("upper, 95 %", 3),
+];
+
+/** @param {LagName} name */
+const missing = (name) => `No dynamic Stribeck test determines it yet: ${LAG[name].meaning.toLowerCase()}.`;
+
+/**
+ * The values that were measured at a pressure.
+ * @param {DegradationItem[]} items
+ * @param {number} level bar
+ */
+const measuredAt = (items, level) =>
+  items
+    .filter((item) => item.pressure_bar === level)
+    .flatMap(({ measured: { cycles, value, sd } }) =>
+      cycles.map((at, index) => ({ cycles: at, pressure: level, value: value[index], sd: sd[index] })),
+    );
+
+/**
+ * A quantity of one frequency over cycles, a line a pressure; of one pressure its track with the band.
+ * @param {{ items: DegradationItem[], name: LagName, pressure: number | undefined, events: Receipt[] }} answers
+ * @returns {Spec}
+ */
+export function lagOverCycles({ items, name, pressure, events }) {
+  if (items.length === 0) return { empty: missing(name) };
+  const { axis, unit, meaning } = LAG[name];
+  const chosen = items.find((item) => item.pressure_bar === pressure);
+  const tracked = chosen && chosen.trajectory.cycles.length > 0 ? chosen : undefined;
+  const more = tracked
+    ? `Tracked with its 90 % band at ${fixed(pressure, 1)} bar.`
+    : "From the third dynamic test on it is tracked.";
+  return {
+    note: `${meaning}; at ${items[0].frequency_hz} Hz, with 90 % error bars. ${more}`,
+    columns: columnsOf(name),
+    rows: items.flatMap((item) =>
+      measuredAndLaw(item, { measured: "measured", law: "tracked", before: [item.pressure_bar, item.frequency_hz] }),
+    ),
+    figure: (c) => ({
+      data: [
+        ...(tracked ? track(tracked, unit, c) : []),
+        ...linesByPressure(
+          levelsOf(items),
+          (level) => measuredAt(items, level),
+          { size: 7, bars: 3, text: `%{y:.3g} ${unit}` },
+          c,
+        ),
+      ],
+      layout: { xaxis: titled("duty cycles"), yaxis: titled(axis), ...eventMarks(events, c) },
+    }),
+  };
+}
+
+/**
+ * @param {DegradationItem} item
+ * @param {string} unit
+ * @param {Colours} c
+ * @returns {PlainTrace[]}
+ */
+function track({ pressure_bar: level, trajectory }, unit, c) {
+  const name = `tracked, ${fixed(level, 1)} bar`;
+  const x = trajectory.cycles;
+  return [
+    ...band("90 % band", { x, y: trajectory.lower }, { x, y: trajectory.upper }, c),
+    {
+      name,
+      mode: "lines",
+      x,
+      y: trajectory.median,
+      line: { color: c.accent, width: 2.2, dash: "dash" },
+      hovertemplate: `%{x:,.0f} cycles, ${name}<br>%{y:.3g} ${unit}<extra></extra>`,
+    },
+  ];
+}
+
+/**
+ * A quantity of one frequency over pressure, a line a state.
+ * @param {{ items: DegradationItem[], name: LagName }} answers
+ * @returns {Spec}
+ */
+export function lagOverPressure({ items, name }) {
+  const values = levelsOf(items).flatMap((level) => measuredAt(items, level));
+  if (values.length === 0) return { empty: missing(name) };
+  const { title, axis, unit } = LAG[name];
+  const states = distinct(values.map(({ cycles }) => cycles));
+  const drawn = spread(states);
+  return {
+    note: `${title} at ${items[0].frequency_hz} Hz, from the first dynamic test to the last, with 90 % error bars.`,
+    columns: columnsOf(name),
+    rows: values.map(({ cycles, pressure, value, sd }) => {
+      const half = HALF_OF_90 * sd;
+      return ["measured", pressure, items[0].frequency_hz, cycles, value, value - half, value + half];
+    }),
+    figure: (c) => ({
+      data: drawn.map((state, index) => {
+        const label = `${fixed(state)} cycles`;
+        const own = values.filter(({ cycles }) => cycles === state);
+        const points = own.map(({ pressure, value, sd }) => ({ x: pressure, value, sd }));
+        const text = `%{x:.1f} bar, ${label}<br>%{y:.3g} ${unit}`;
+        return measuredLine(label, points, { size: 7, bars: 3, text }, rampOf(c, index, drawn.length));
+      }),
+      layout: { xaxis: titled("pressure, bar"), yaxis: titled(axis) },
+    }),
+  };
+}

@@ -1,0 +1,111 @@
+// @ts-check
+// A Stribeck parameter of one test over pressure, its law (fig. 9) and how far the test determines it.
+
+import { column, digitsColumn, HALF_OF_90, KIND } from "../charts/columns.js";
+import { axisOf, PARAMETERS } from "../charts/parameters.js";
+import { band, errorBars, titled } from "../charts/traces.js";
+import { fixed } from "../shared/format.js";
+
+/** @import { ParameterName } from "../charts/parameters.js" */
+/** @import { AsymptoticLaw, LinearLaw, StribeckItem } from "../shared/types.js" */
+/** @import { Spec } from "../charts/types.js" */
+
+const POINTS = 60;
+
+const COLUMNS = [
+  KIND,
+  column("pressure, bar", 2),
+  digitsColumn("value", 4),
+  digitsColumn("lower, 5 %", 4),
+  digitsColumn("upper, 95 %", 4),
+];
+
+/**
+ * A law's value at a pressure, bar, and its standard deviation: gᵀ Σ g with the derivatives g by its coefficients.
+ * @param {LinearLaw | AsymptoticLaw} law
+ * @param {number} pressure
+ */
+export function lawAt(law, pressure) {
+  const { value, gradient } = "decay_bar" in law ? falling(law, pressure) : linear(law, pressure);
+  const variance = gradient.reduce(
+    (sum, slope, row) => sum + gradient.reduce((part, other, at) => part + slope * law.covariance[row][at] * other, 0),
+    0,
+  );
+  return { pressure, value, sd: Math.sqrt(Math.max(0, variance)) };
+}
+
+/**
+ * @param {LinearLaw} law
+ * @param {number} pressure
+ */
+const linear = ({ intercept, slope_per_bar: slope }, pressure) => {
+  return { value: intercept + slope * pressure, gradient: [1, pressure] };
+};
+
+/**
+ * @param {AsymptoticLaw} law
+ * @param {number} pressure
+ */
+function falling({ asymptote, excess, decay_bar: decay }, pressure) {
+  const share = Math.exp(-pressure / decay);
+  return { value: asymptote + excess * share, gradient: [1, share, (excess * share * pressure) / decay ** 2] };
+}
+
+/**
+ * @param {{ test: StribeckItem | undefined, name: ParameterName }} answers
+ * @returns {Spec}
+ */
+export function pressureLaw({ test, name }) {
+  const points = (test?.fits ?? [])
+    .filter((fit) => !fit.undetermined.includes(name))
+    .map((fit) => ({ pressure: fit.pressure_bar, value: fit.parameters[name], sd: fit.standard_errors[name] }))
+    .sort((a, b) => a.pressure - b.pressure);
+  const law = test?.pressure_laws?.[name];
+  if (test === undefined || points.length === 0 || !law) {
+    return { empty: "A pressure law needs a stationary test at three pressures or more." };
+  }
+  const [from, to] = [points[0].pressure, points[points.length - 1].pressure];
+  const curve = Array.from({ length: POINTS }, (_, index) => lawAt(law, from + ((to - from) * index) / (POINTS - 1)));
+  const shape = "decay_bar" in law ? "falls to an asymptote" : "is a straight line";
+  const rows = [
+    ...points.map((point) => ["identified", ...interval(point)]),
+    ...curve.map((point) => ["law", ...interval(point)]),
+  ];
+  const x = curve.map(({ pressure }) => pressure);
+  const edge = (/** @type {number} */ sign) => ({ x, y: curve.map(({ value, sd }) => value + sign * HALF_OF_90 * sd) });
+  return {
+    note: `After ${fixed(test.cycles)} cycles: points identified with 90 % error bars; the law ${shape} (fig. 9), with its 90 % band.`,
+    columns: COLUMNS,
+    rows,
+    figure: (c) => ({
+      data: [
+        ...band("90 % band", edge(-1), edge(1), c),
+        {
+          name: "law",
+          mode: "lines",
+          x,
+          y: curve.map(({ value }) => value),
+          line: { color: c.accent, width: 2 },
+          hovertemplate: "%{x:.2f} bar<br>law %{y:.4g}<extra></extra>",
+        },
+        {
+          name: "identified",
+          mode: "markers",
+          x: points.map(({ pressure }) => pressure),
+          y: points.map(({ value }) => value),
+          marker: { color: c.ink, size: 6 },
+          error_y: errorBars(
+            points.map(({ sd }) => sd),
+            c.ink,
+            { thickness: 1.1, width: 3 },
+          ),
+          hovertemplate: `%{x:.2f} bar<br>${PARAMETERS[name].title} %{y:.4g}<extra></extra>`,
+        },
+      ],
+      layout: { xaxis: titled("pressure, bar"), yaxis: titled(axisOf(name)) },
+    }),
+  };
+}
+
+/** @param {{ pressure: number, value: number, sd: number }} point */
+const interval = ({ pressure, value, sd }) => [pressure, value, value - HALF_OF_90 * sd, value + HALF_OF_90 * sd];

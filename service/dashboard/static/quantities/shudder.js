@@ -1,0 +1,99 @@
+// @ts-check
+// The shudder margin: the slope dμ/dv of the fitted curves over cycles. Below zero friction falls with speed.
+
+import { CYCLES, column, digitsColumn, KIND, measuredAndLaw, PRESSURE } from "../charts/columns.js";
+import { eventMarks } from "../charts/layout.js";
+import { rampOf } from "../charts/palette.js";
+import { band, errorBars, titled } from "../charts/traces.js";
+import { fixed } from "../shared/format.js";
+import { reachedText } from "./criteria.js";
+
+/** @import { CriterionOutcome, DegradationItem, Receipt } from "../shared/types.js" */
+/** @import { Colours, PlainTrace, Spec } from "../charts/types.js" */
+
+const COLUMNS = [
+  KIND,
+  PRESSURE,
+  column("speed, rpm"),
+  CYCLES,
+  digitsColumn("dμ/dv, s/m", 3),
+  digitsColumn("lower, 5 %", 3),
+  digitsColumn("upper, 95 %", 3),
+];
+
+const NO_SLOPES = "The slope is known from the first stationary test on whose curves determine all four parameters.";
+
+/**
+ * The slopes at one pressure, a colour a speed.
+ * @param {object} answers
+ * @param {DegradationItem[]} answers.items the slopes at that pressure
+ * @param {CriterionOutcome[] | null} answers.limits when slopes there reach their limit; null while it is computed
+ * @param {Receipt[]} answers.events
+ * @returns {Spec}
+ */
+export function shudderMargin({ items, limits, events }) {
+  if (items.length === 0) return { empty: NO_SLOPES };
+  const when = limits === null ? "When the margin is used up is being computed …" : limits.map(limitText).join(" ");
+  return {
+    note: `At ${fixed(items[0].pressure_bar, 1)} bar. Below the dashed line friction falls with speed, and the driveline may shudder. ${when}`,
+    columns: COLUMNS,
+    rows: items.flatMap((item) =>
+      measuredAndLaw(item, { measured: "measured", law: "tracked", before: [item.pressure_bar, item.speed_rpm] }),
+    ),
+    figure: (c) => ({
+      data: [
+        ...items.flatMap((item, index) => slopeTraces(item, rampOf(c, index, items.length), c)),
+        zeroLine(items, c),
+      ],
+      layout: { xaxis: titled("duty cycles"), yaxis: titled("dμ/dv, s/m"), ...eventMarks(events, c) },
+    }),
+  };
+}
+
+/** @param {CriterionOutcome} limit */
+const limitText = (limit) => `At ${fixed(limit.speed_rpm)} rpm ${reachedText(limit)}.`;
+
+/**
+ * @param {DegradationItem} item
+ * @param {string} color
+ * @param {Colours} c
+ * @returns {PlainTrace[]}
+ */
+function slopeTraces({ speed_rpm: speed, measured, trajectory }, color, c) {
+  const name = `${fixed(speed)} rpm`;
+  const x = trajectory.cycles;
+  const edges = band("", { x, y: trajectory.lower }, { x, y: trajectory.upper }, c, color);
+  return [
+    ...edges.map((edge) => ({ ...edge, showlegend: false })),
+    {
+      name,
+      showlegend: x.length > 0,
+      mode: "lines",
+      x,
+      y: trajectory.median,
+      line: { color, width: 2 },
+      hovertemplate: `%{x:,.0f} cycles, ${name}<br>tracked %{y:.3g} s/m<extra></extra>`,
+    },
+    {
+      name,
+      showlegend: x.length === 0,
+      mode: "markers",
+      x: measured.cycles,
+      y: measured.value,
+      marker: { color, size: 6 },
+      error_y: errorBars(measured.sd, color, { thickness: 1.1, width: 3 }),
+      hovertemplate: `%{x:,.0f} cycles, ${name}<br>measured %{y:.3g} s/m<extra></extra>`,
+    },
+  ];
+}
+
+/**
+ * @param {DegradationItem[]} items
+ * @param {Colours} c
+ * @returns {PlainTrace}
+ */
+function zeroLine(items, c) {
+  const last = Math.max(1, ...items.flatMap(({ measured, trajectory }) => [...measured.cycles, ...trajectory.cycles]));
+  const line = { color: c.ink, width: 1.6, dash: "dash" };
+  return { name: "no margin", mode: "lines", x: [0, last], y: [0, 0], line, hoverinfo: "skip" };
+}

@@ -1,0 +1,131 @@
+"""The engagement of one run: its indicators in the public names and units, and the speed that is kept for comparisons."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.clutch import Geometry
+from models.engagements.comparison import SpeedCourse
+from models.engagements.local_fit import Estimate
+from models.engagements.measured import MeasuredEngagement, measured_engagement
+from models.engagements.refusal import Refusal
+from service.columns import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
+from service.lives.incoming_run import IncomingRun, sampled_record
+
+#: The indicators of a run's engagement, or why it has none.
+Engagement: TypeAlias = MeasuredEngagement | Refusal
+
+#: Kinds of runs that may carry the record of an engagement.
+DUTY_KINDS = ("duty_cycles", "run_in")
+#: Where a run's own comparison course stands among what is kept beside its channels.
+COURSE = "engagement_course"
+DETERMINED = "determined"
+NO_ENGAGEMENT = "no_engagement"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Indicator:
+    """An indicator at the edge: public value = SI value / factor."""
+
+    unit: str
+    factor: float = 1.0
+
+
+#: The indicators of one engagement by public name; `models.engagements.measured` has them under the names beside.
+INDICATORS: Mapping[str, Indicator] = {
+    "stop_time_s": Indicator(unit="s"),
+    "engagement_energy_kj": Indicator(unit="kJ", factor=1000.0),
+    "peak_power_kw": Indicator(unit="kW", factor=1000.0),
+    "initial_cof": Indicator(unit="1"),
+    "midpoint_cof": Indicator(unit="1"),
+    "endpoint_cof": Indicator(unit="1"),
+    "breakaway_cof": Indicator(unit="1"),
+    "initial_cof_ratio": Indicator(unit="1"),
+    "endpoint_cof_ratio": Indicator(unit="1"),
+    "breakaway_cof_ratio": Indicator(unit="1"),
+    "torque_rise": Indicator(unit="1"),
+}
+_FIELDS = (
+    "stop_time", "energy", "peak_power", "initial_cof", "midpoint_cof", "endpoint_cof", "breakaway_cof",
+    "initial_ratio", "endpoint_ratio", "breakaway_ratio", "torque_rise",
+)  # fmt: skip
+
+
+def evaluated(run: IncomingRun, geometry: Geometry) -> Engagement | None:
+    """The engagement that a block of duty carries; None for a run without one."""
+    if run.kind not in DUTY_KINDS or not run.channels:
+        return None
+    return measured_engagement(sampled_record(run.channels), geometry)
+
+
+def engagement_notes(engagement: Engagement) -> list[tuple[str, str]]:
+    """A code and a sentence where a record that was sent holds no engagement."""
+    if not isinstance(engagement, Refusal):
+        return []
+    return [(NO_ENGAGEMENT, f"the record of the engagement is kept and not evaluated: {engagement.message}")]
+
+
+def engagement_item(engagement: Engagement) -> dict[str, Any]:
+    """An engagement as a receipt shows it; null is what the record does not determine."""
+    if isinstance(engagement, Refusal):
+        nothing = ("start_s", "end_s", "initial_speed_rpm", "maximum_pressure_bar")
+        return {
+            "status": engagement.status.value,
+            "message": engagement.message,
+            **dict.fromkeys(nothing),
+            "indicators": dict.fromkeys(INDICATORS),
+        }
+    values = (getattr(engagement, field) for field in _FIELDS)
+    slip = engagement.slip
+    return {
+        "status": DETERMINED,
+        "message": f"The clutch slipped for {engagement.stop_time.value:.3g} s.",
+        "start_s": slip.start.value,
+        "end_s": slip.end.value,
+        "initial_speed_rpm": engagement.initial_speed.value / RADIANS_PER_SECOND_PER_RPM,
+        "maximum_pressure_bar": engagement.maximum_pressure / PASCALS_PER_BAR,
+        "indicators": {
+            name: estimate_item(value, indicator.factor)
+            for (name, indicator), value in zip(INDICATORS.items(), values, strict=True)
+        },
+    }
+
+
+def estimate_item(estimate: Estimate | None, factor: float = 1.0) -> dict[str, float] | None:
+    """A value with its standard error in the public unit."""
+    return None if estimate is None else {"value": estimate.value / factor, "sd": estimate.sd / factor}
+
+
+def course_item(engagement: Engagement | None) -> dict[str, Any]:
+    """What is kept of the sliding speed beside a run's channels; empty for a run without an engagement."""
+    if not isinstance(engagement, MeasuredEngagement):
+        return {}
+    course = engagement.course
+    return {
+        COURSE: {
+            "duration_s": course.duration.value,
+            "duration_sd_s": course.duration.sd,
+            "speed_rpm": (course.speed / RADIANS_PER_SECOND_PER_RPM).round(3).tolist(),
+            "noise_rpm": course.noise / RADIANS_PER_SECOND_PER_RPM,
+        }
+    }
+
+
+def course_of(item: Mapping[str, Any]) -> SpeedCourse:
+    """The kept course as the models take it."""
+    return SpeedCourse(
+        duration=Estimate(value=item["duration_s"], sd=item["duration_sd_s"]),
+        speed=np.array(item["speed_rpm"]) * RADIANS_PER_SECOND_PER_RPM,
+        noise=item["noise_rpm"] * RADIANS_PER_SECOND_PER_RPM,
+    )
+
+
+def public_channels(columns: Mapping[str, FloatArray]) -> dict[str, list[float]]:
+    """Channels of a trace [n] in SI by public name -> in their public units."""
+    return {
+        name: ((column - CHANNELS[name].offset) / CHANNELS[name].factor).round(6).tolist()
+        for name, column in columns.items()
+    }

@@ -1,0 +1,120 @@
+"""A quantity at one place as `/degradation` shows it: what was measured, its course, and the coefficients of eq. 6."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.prognosis.criteria import BAND, QUANTILES
+from models.prognosis.first_passage import weighted_quantiles
+from models.tracking.courses import Course
+from models.tracking.posterior import Posterior
+from models.tracking.sampling import thinned
+from service.columns import whole
+from service.lives.assumptions import Assumptions
+from service.lives.history import Series
+from service.lives.quantities.names import Quantity, place_of
+
+#: The coefficients of eq. 6 by their public names.
+COEFFICIENTS = ("initial", "change", "scale_cycles", "exponent")
+#: Points of a trajectory, and how far past the last test it goes.
+_POINTS, _AHEAD = 40, 1.5
+
+
+def trajectory_cycles(series: Series) -> FloatArray:
+    """The cycles since new [k] at which a trajectory is shown."""
+    origin, last = series.scale.origin, float(series.scale.cycles(series.measurements[-1].progress))
+    return origin + np.linspace(0.0, max(1.0, last - origin) * _AHEAD, _POINTS)
+
+
+def track_item(
+    quantity: Quantity, series: Series, posterior: Posterior, assumptions: Assumptions, draws: int = 0
+) -> dict[str, Any]:
+    """A quantity that has a track of its own; the course of the model in force is put back on. `draws` > 0: with so many
+    joint draws of the coefficients."""
+    cycles = trajectory_cycles(series)
+    course = assumptions.offset(series.quantity, series.pressure, cycles)
+    values = posterior.values(series.scale.progress(cycles)) + course[:, None]
+    band = np.array([weighted_quantiles(row, posterior.weight, BAND) for row in values])
+    home = _following_eq_6(posterior)
+    item = {
+        "coefficients": None if home is None else _coefficients(home),
+        "correlations": None if home is None else _correlations(home),
+        "eq6_probability": float(posterior.weight[posterior.course == Course.EQ_6].sum()),
+        "draws": None if home is None or draws == 0 else _draws(home, draws),
+    }
+    return _head(quantity, series) | item | _measured(series, assumptions) | _trajectory(cycles, band)
+
+
+def paths_item(quantity: Quantity, series: Series, paths: FloatArray | None) -> dict[str, Any]:
+    """A quantity that follows from others' tracks, whose `paths` [k, n] over `trajectory_cycles` are equal draws (None: too
+    few tests): it has no coefficients of its own."""
+    item = {"coefficients": None, "correlations": None, "eq6_probability": None, "draws": None}
+    band = np.zeros((0, len(BAND))) if paths is None else np.quantile(paths, BAND, axis=1).T
+    cycles = trajectory_cycles(series)[: band.shape[0]]
+    return _head(quantity, series) | item | _measured(series, Assumptions()) | _trajectory(cycles, band)
+
+
+def _head(quantity: Quantity, series: Series) -> dict[str, Any]:
+    return {"quantity": quantity.name, "unit": quantity.unit} | place_of(series)
+
+
+def _measured(series: Series, assumptions: Assumptions) -> dict[str, Any]:
+    tested = series.scale.cycles(np.array([measurement.progress for measurement in series.measurements]))
+    off = assumptions.offset(series.quantity, series.pressure, tested)
+    measured = zip(series.measurements, off.tolist(), strict=True)
+    return {
+        "measured": {
+            "cycles": [whole(count) for count in tested.tolist()],
+            "value": [measurement.value + added for measurement, added in measured],
+            "sd": [measurement.variance**0.5 for measurement in series.measurements],
+        }
+    }
+
+
+def _trajectory(cycles: FloatArray, band: FloatArray) -> dict[str, Any]:
+    lower, median, upper = band.T.tolist()
+    return {"trajectory": {"cycles": cycles.tolist(), "lower": lower, "median": median, "upper": upper}}
+
+
+def _following_eq_6(posterior: Posterior) -> Posterior | None:
+    """The draws that follow eq. 6, None where none does."""
+    home = np.flatnonzero(posterior.course == Course.EQ_6)
+    share = float(posterior.weight[home].sum())
+    return None if share == 0.0 else posterior.taken(home, posterior.weight[home] / share)
+
+
+def _samples(draws: Posterior) -> Sequence[FloatArray]:
+    """The coefficients [n] in the order of COEFFICIENTS."""
+    return draws.initial, draws.change, draws.scale, draws.exponent
+
+
+def _coefficients(draws: Posterior) -> dict[str, dict[str, Any]]:
+    """Mean, deviation and quantiles of each coefficient."""
+    coefficients = {}
+    for name, sample in zip(COEFFICIENTS, _samples(draws), strict=True):
+        value, sd = draws.moments(sample)
+        quantiles = weighted_quantiles(sample, draws.weight, QUANTILES).tolist()
+        by_level = {f"{level:g}": number for level, number in zip(QUANTILES, quantiles, strict=True)}
+        coefficients[name] = {"value": value, "sd": sd, "quantiles": by_level}
+    return coefficients
+
+
+def _correlations(draws: Posterior) -> list[list[float]]:
+    """The correlations of ξ0, Δ, log φ and log ε, [4][4]; none with what has no spread."""
+    table = np.stack([draws.initial, draws.change, np.log(draws.scale), np.log(draws.exponent)])
+    off = table - (table @ draws.weight)[:, None]
+    covariance = (off * draws.weight) @ off.T
+    sd = np.sqrt(np.diag(covariance))
+    scale = np.where(sd > 0.0, sd, np.inf)
+    correlation = np.clip(covariance / np.outer(scale, scale), -1.0, 1.0)
+    np.fill_diagonal(correlation, 1.0)
+    rows: list[list[float]] = correlation.tolist()
+    return rows
+
+
+def _draws(draws: Posterior, size: int) -> dict[str, list[float]]:
+    """Joint draws of equal weight, a row of the columns a draw."""
+    equal = thinned(draws, size, 0.5)
+    return {name: sample.tolist() for name, sample in zip(COEFFICIENTS, _samples(equal), strict=True)}

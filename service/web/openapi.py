@@ -1,0 +1,171 @@
+"""The API's description: what FastAPI makes of the routes, completed by what holds for all of them.
+
+Keys, entity tags and 304, the headers of pages and refusals, compression, and an example of every field and parameter
+(`service.schemas.examples`). The schemas of bodies and problems, which routes describe by themselves, are named as all are.
+"""
+
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+from fastapi import FastAPI
+
+from service.schemas.examples import EXAMPLES
+
+Json = dict[str, Any]
+
+_SECURITY = {
+    "type": "http",
+    "scheme": "bearer",
+    "description": "A key, made by `clutchlife key create`. Where no keys are configured none is needed, and only this "
+    "machine may ask.",
+}
+#: Addresses that answer without a key.
+_OPEN = ("/livez", "/readyz")
+_METHODS = ("get", "post", "put", "patch", "delete")
+
+
+def _header(description: str, example: object) -> Json:
+    return {"description": description, "schema": {"type": "string"}, "example": example}
+
+
+_TAG = {"ETag": _header("A strong entity tag: it changes when and only when the answer does", '"9f86d081884c7d65"')}
+_READ = _TAG | {
+    "Cache-Control": _header("Keep it, and ask each time whether it still holds", "no-cache"),
+}
+_REVISION = {"Clutchlife-Revision": _header("The clutch's revision that the answer is of", "17")}
+_LINK = {
+    "Link": _header('The next page, `rel="next"`; absent on the last', '</v1/clutches?cursor=WzEsIiJd>; rel="next"')
+}
+#: Headers by status, of every answer that may have it.
+_OF_STATUS = {
+    "201": {"Location": _header("Where it is from now on", "/v1/clutches/bench3-017")},
+    "202": {"Location": _header("Where its end will be", "/v1/clutches/bench3-017/diagnoses/3f9a1c0b7d2e4f56")},
+    "401": {"WWW-Authenticate": _header("How to send a key", "Bearer")},
+    "415": {"Accept-Encoding": _header("The encodings of a body that are taken", "gzip")},
+    "503": {"Retry-After": _header("Seconds after which to try again", "1")},
+}
+_UNCHANGED = {"description": "`If-None-Match` names the answer as it is: it need not be sent again", "headers": _TAG}
+
+
+def install(app: FastAPI) -> None:
+    """Have the application describe itself so."""
+    plain = app.openapi
+    app.openapi = cache(lambda: completed(plain()))  # type: ignore[method-assign]
+
+
+def completed(api: Json) -> Json:
+    """The description with all that holds for every address, changed in place."""
+    schemas = api.setdefault("components", {}).setdefault("schemas", {})
+    api["components"]["securitySchemes"] = {"key": _SECURITY}
+    api["security"] = [{"key": []}, {}]
+    for path, method, operation in _operations(api):
+        for place in [operation.get("requestBody", {}), *operation["responses"].values()]:
+            for content in place.get("content", {}).values():
+                _name_parts(content.get("schema", {}), schemas)
+        if path in _OPEN:
+            operation["security"] = []
+        _complete(path, method, operation)
+    for name, schema in schemas.items():
+        _exemplify(schema, name)
+    for _, _, operation in _operations(api):
+        for content in operation.get("requestBody", {}).get("content", {}).values():
+            _exemplify(content["schema"], content["schema"].get("title", ""))
+    return api
+
+
+def _operations(api: Json) -> Iterator[tuple[str, str, Json]]:
+    for path, item in api["paths"].items():
+        for method in _METHODS:
+            if method in item:
+                yield path, method, item[method]
+
+
+def _complete(path: str, method: str, operation: Json) -> None:
+    """Headers, 304 and examples of one operation."""
+    names = set()
+    for parameter in operation.get("parameters", ()):
+        names.add(parameter["name"])
+        example = _example(parameter["schema"], "", parameter["name"].lower())
+        if example is not None:
+            parameter.setdefault("example", example)
+    responses = operation["responses"]
+    for status, headers in _OF_STATUS.items():
+        if status in responses:
+            responses[status].setdefault("headers", {}).update(headers)
+    if method == "get" and path.startswith("/v1/"):
+        responses["304"] = _UNCHANGED
+        headers = _READ | (_REVISION if "{clutch_id}/" in path else {}) | (_LINK if "cursor" in names else {})
+        responses["200"].setdefault("headers", {}).update(headers)
+
+
+def _name_parts(schema: Json, schemas: Json) -> None:
+    """Move the definitions inside a schema to those of the whole description: there alone a reference finds them."""
+    parts = schema.pop("$defs", {})
+    names = {name: _free_name(name, part, schemas) for name, part in parts.items()}
+    for part in (schema, *parts.values()):
+        _refer(part, names)
+    for name, part in parts.items():
+        schemas[names[name]] = part
+
+
+def _free_name(name: str, part: Json, schemas: Json) -> str:
+    """The name, unless another schema has it: as a body's and an answer's of one kind, which differ in what is required."""
+    return name if schemas.get(name, part) == part else f"{name}Sent"
+
+
+def _refer(part: Any, names: dict[str, str]) -> None:
+    if isinstance(part, list):
+        for item in part:
+            _refer(item, names)
+    if isinstance(part, dict):
+        for key, value in part.items():
+            inside, _, name = value.rpartition("/") if isinstance(value, str) else ("", "", "")
+            if inside == "#/$defs":
+                part[key] = f"#/components/schemas/{names[name]}"
+            _refer(value, names)
+
+
+def _exemplify(schema: Json, owner: str) -> None:
+    for name, field in schema.get("properties", {}).items():
+        example = _example(field, owner, name)
+        if example is not None and "examples" not in field:
+            field["examples"] = [example]
+
+
+def _example(schema: Json, owner: str, name: str) -> Any:
+    """The field's or parameter's example; None where it consists of fields that have theirs, and where there is none."""
+    if consists_of_fields(schema):
+        return None
+    for kind in _kinds(schema):
+        if "const" in kind or "enum" in kind:
+            return kind["const"] if "const" in kind else kind["enum"][0]
+        if kind.get("type") == "boolean":
+            return False
+    value = EXAMPLES.get(f"{owner}.{name}", EXAMPLES.get(name))
+    return None if value is None else _shaped(schema, value)
+
+
+def consists_of_fields(schema: Json) -> bool:
+    """Whether a schema refers to another one, whose fields are described there."""
+    kinds = _kinds(schema)
+    inside = [kind["items"] for kind in kinds if isinstance(kind.get("items"), dict)]
+    return any("$ref" in kind for kind in kinds) or any(map(consists_of_fields, inside))
+
+
+def _kinds(schema: Json) -> list[Json]:
+    parts = schema.get("anyOf") or schema.get("oneOf") or schema.get("allOf")
+    return [schema] if parts is None else [kind for part in parts for kind in _kinds(part)]
+
+
+def _shaped(schema: Json, value: Any) -> Any:
+    """A value as the schema has it: one of several where it takes one, in lists where it takes those."""
+    types = {kind.get("type"): kind for kind in _kinds(schema)}
+    if "array" in types:
+        items = types["array"].get("items", {})
+        return [_shaped(items, item) for item in (value if isinstance(value, list) else [value])]
+    if isinstance(value, list):
+        value = value[0]
+    if isinstance(value, dict) and "object" not in types:
+        value = next(iter(value.values()))
+    return int(value) if "integer" in types and isinstance(value, float) else value

@@ -1,0 +1,85 @@
+"""Planned duty on a clutch's page: blocks and a pace are typed; cycles, blocks, dates and errors by field come out."""
+
+import re
+from collections.abc import Iterator
+
+import httpx2
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.driving import Watched
+from tests.browser.lives import post
+from tests.journeys.dashboard.test_axe import violations
+from tests.support import ONCE, Server, serving, stationary
+
+pytestmark = pytest.mark.browser
+
+BASE = "/v1/clutches/bench"
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A clutch whose severity is its energy, 18 kJ a cycle, tested at four states and one pressure."""
+    with serving(tmp_path_factory.mktemp("planned") / "clutchlife.db", loaded=True) as server:
+        with httpx2.Client(base_url=server.url, timeout=60) as http:
+            record = {"clutch_id": "bench", "severity": {"basis": "dissipated_energy"}}
+            http.post("/v1/clutches", json=record).raise_for_status()
+            for cycles in range(0, 4000, 1000):
+                post(http, "bench", stationary(cycles, pressures=(5.0,)))
+            duty = {"cycles": 3000, "energy_per_cycle_kj": 18}
+            post(http, "bench", {"kind": "duty_cycles", "cycles": 3000, "duty": duty})
+        yield server
+
+
+@pytest.fixture
+def page(browser: Browser, bench: Server) -> Iterator[Page]:
+    watched = Watched(browser, bench.url)
+    page = watched.open("/clutches/bench")
+    page.get_by_text("Planned duty", exact=True).click()
+    yield page
+    # the browser notes every refusal in its console, and a plan that is refused is one
+    watched.said = [line for line in watched.said if "422" not in line]
+    watched.close()
+
+
+def test_a_plan_is_typed_by_keyboard_and_answered_with_cycles_blocks_and_dates(page: Page, bench: Server) -> None:
+    page.get_by_label("Duty cycles", exact=True).fill("5000")
+    page.keyboard.press("Tab")
+    page.keyboard.type("36")
+    page.keyboard.press("Tab")
+    page.keyboard.type("2")
+    page.keyboard.press("Tab")
+    page.keyboard.type("120")
+    page.keyboard.press("Enter")
+    table = page.get_by_role("table", name="Remaining life under planned duty, by probability")
+    expect(table).to_contain_text("Remaining blocks")
+    plan = {"programme": [{"cycles": 5000, "energy_per_cycle_kj": 36, "sd": 2}], "pace_cycles_per_hour": 120}
+    said = ONCE.post(f"{bench.url}{BASE}/remaining-useful-life/forecast", json=plan).json()
+    median = said["remaining_cycles"]["0.5"]
+    assert median is not None
+    for words in (f"{median:,.0f}", f"{said['remaining_blocks']['0.5']:.1f}", said["end_of_life_at"]["0.5"][:10]):
+        expect(table).to_contain_text(words)
+    assert violations(page) == []
+
+
+def test_what_is_wrong_is_said_at_its_field_and_can_be_mended(page: Page) -> None:
+    page.get_by_role("button", name="Add a block").click()
+    second = page.get_by_role("group", name="Block 2")
+    expect(second.get_by_label("Duty cycles")).to_be_focused()
+    second.get_by_label("Duty cycles").fill("-5")
+    page.get_by_role("button", name="Predict", exact=True).click()
+    wrong = second.get_by_label("Duty cycles")
+    expect(wrong).to_have_attribute("aria-invalid", "true")
+    expect(wrong).to_be_focused()
+    expect(wrong).to_have_accessible_description(re.compile("^Input should be greater than"))
+    expect(page.get_by_role("group", name="Block 1").locator("[aria-invalid]")).to_have_count(0)
+    assert violations(page) == []
+    # a standard deviation without an energy is an error of the block
+    wrong.fill("1000")
+    second.get_by_label("Its standard deviation, kJ").fill("3")
+    page.get_by_role("button", name="Predict", exact=True).click()
+    expect(second).to_contain_text("which is missing")
+    page.get_by_role("button", name="Remove block 2").click()
+    page.get_by_role("button", name="Predict", exact=True).click()
+    expect(page.get_by_role("table", name="Remaining life under planned duty, by probability")).to_be_visible()
+    expect(page.locator(".planned [aria-invalid]")).to_have_count(0)

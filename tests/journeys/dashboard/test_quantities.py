@@ -1,0 +1,113 @@
+"""A clutch that several criteria end: its shudder margin, its lag over life and its pressure laws."""
+
+from collections.abc import Iterator
+
+import httpx2
+import pytest
+from playwright.sync_api import Browser, expect, sync_playwright
+
+from tests.browser.driving import Watched, launched
+from tests.browser.lives import loops, post
+from tests.journeys.dashboard.test_axe import violations
+from tests.support import ONCE, Server, serving, stationary
+
+pytestmark = pytest.mark.browser
+expect.set_options(timeout=20_000)
+
+PRESSURES = (4.0, 5.0, 6.0)
+CRITERIA = [{"quantity": "mean_cof"}, {"quantity": "slope", "pressure_bar": 5, "speed_rpm": 100}]
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """A Chromium without 3D, which is slow to draw and not what is looked at here."""
+    with sync_playwright() as playwright:
+        flat = launched(playwright.chromium, more=("--disable-3d-apis",))
+        yield flat
+        flat.close()
+
+
+@pytest.fixture(scope="module")
+def life(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A clutch with two criteria, three stationary tests and two dynamic ones."""
+    with serving(tmp_path_factory.mktemp("quantities") / "clutchlife.db", loaded=True) as server:
+        with httpx2.Client(base_url=server.url, timeout=60) as http:
+            record = {"clutch_id": "bench", "end_of_life": {"criteria": CRITERIA}}
+            http.post("/v1/clutches", json=record).raise_for_status()
+            for cycles in (0, 2000, 4000):
+                post(http, "bench", stationary(cycles, pressures=PRESSURES))
+            for cycles in (0, 4000):
+                post(http, "bench", loops(cycles, pressures=(4.0, 5.0)))
+        yield server
+
+
+def asked(watched: Watched, text: str) -> int:
+    """How often the page has asked for an address with that text."""
+    return sum(text in url for url in watched.asked)
+
+
+def test_the_margin_and_the_lag_are_read_when_they_are_looked_at_and_again_when_the_clutch_changes(
+    browser: Browser, life: Server
+) -> None:
+    watched = Watched(browser, life.url, color_scheme="dark")
+    page = watched.open("/clutches/bench")
+    rows = page.locator("#criteria tbody tr")
+    expect(rows).to_have_count(2)
+    expect(rows.nth(0)).to_contain_text("Mean COF")
+    expect(rows.nth(1)).to_contain_text("Slope dμ/dv, 100 rpm, 5.0 bar")
+    ends = ONCE.get(f"{life.url}/v1/clutches/bench/remaining-useful-life").json()["criteria"]
+    assert [end["quantity"] for end in ends] == ["mean_cof", "slope"]
+
+    page.locator("#chart-stribeck").scroll_into_view_if_needed()
+    page.locator("#chart-stribeck[data-sketched]").wait_for()
+    assert asked(watched, "degradation?quantity") == 0
+
+    margin = page.locator("#chart-shudder")
+    margin.scroll_into_view_if_needed()
+    expect(margin.locator(".note")).to_contain_text("At 5.0 bar")
+    expect(margin.locator(".note")).to_contain_text("At 100 rpm")
+    assert asked(watched, "remaining-useful-life?quantity=slope") == 0  # the record has that criterion
+    margin.locator("summary").click()
+    items = ONCE.get(f"{life.url}/v1/clutches/bench/degradation", params={"quantity": "slope"}).json()["items"]
+    measured = sum(len(item["measured"]["cycles"]) for item in items if item["pressure_bar"] == 5.0)
+    assert measured >= 6
+    expect(margin.locator("tbody tr").filter(has_text="measured")).to_have_count(measured)
+    margin.get_by_label("Pressure").select_option("4.0 bar")
+    expect(margin.locator(".note")).to_contain_text("At 4.0 bar")
+    expect(margin.locator(".note")).to_contain_text("At 100 rpm")
+    assert asked(watched, "remaining-useful-life?quantity=slope&pressure_bar=4") == 1
+
+    lag = page.locator("#chart-lag-cycles")
+    lag.scroll_into_view_if_needed()
+    expect(lag.locator(".note")).to_contain_text("at 0.1 Hz")
+    lag.get_by_label("Quantity").select_option("Attractor C")
+    expect(page.locator("#chart-lag-pressure .note")).to_contain_text("Attractor C")
+    expect(page.locator("#chart-loop-curves .note")).to_contain_text("stationary curve of the same state")
+    assert violations(page) == []
+
+    before = asked(watched, "degradation?quantity=slope")
+    with httpx2.Client(base_url=life.url, timeout=60) as http:
+        post(http, "bench", {"kind": "maintenance", "cycles": 4000, "event": "oil_change"})
+    expect(page.locator("#runs .runs details")).to_have_count(6)
+    margin.scroll_into_view_if_needed()
+    expect(margin.locator(".plot")).to_contain_text("oil change")
+    assert asked(watched, "degradation?quantity=slope") == before + 1
+    watched.close()
+
+
+def test_curves_of_one_state_and_its_pressure_law(browser: Browser, life: Server) -> None:
+    watched = Watched(browser, life.url)
+    page = watched.open("/clutches/bench")
+    curves = page.locator("#chart-stribeck")
+    curves.scroll_into_view_if_needed()
+    curves.get_by_label("Colour by").select_option("pressure")
+    expect(curves.locator(".note")).to_contain_text("After 0 cycles, at every pressure")
+    curves.locator(".controls select").nth(1).select_option("4,000 cycles")
+    expect(curves.locator(".note")).to_contain_text("After 4,000 cycles")
+    law = page.locator("#chart-pressure-law")
+    law.scroll_into_view_if_needed()
+    law.locator(".controls select").first.select_option("Coulomb ratio")
+    expect(law.locator(".note")).to_contain_text("falls to an asymptote")
+    law.locator("summary").click()
+    expect(law.locator("tbody tr").filter(has_text="identified")).to_have_count(len(PRESSURES))
+    watched.close()

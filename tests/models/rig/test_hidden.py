@@ -1,0 +1,85 @@
+"""What is hidden in a simulated campaign: each effect changes torque by about its size, and a diagnosis names it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
+from models.diagnosis.diagnose import diagnose
+from models.diagnosis.effects.catalogue import CATALOGUE
+from models.rig.campaign import simulate, simulated_clutch
+from models.rig.hidden import EFFECTS, clutch_for, effect_of, hidden_in
+from models.rig.programme import Programme
+from models.rig.sampled import DynamicTest
+from models.rig.simulated_runs import RunKind, SimulatedRun
+from models.rig.stationary import SHARP
+
+LEVELS = (4.0e5, 5.5e5, 7.0e5)
+PROGRAMME = Programme(dynamic=DynamicTest(rate=50.0, pressures=LEVELS), pressures=LEVELS)
+
+
+def runs(sizes: dict[str, float], most_tests: int) -> list[SimulatedRun]:
+    clutch = clutch_for(simulated_clutch(7), sizes)
+    simulated = simulate(7, clutch=clutch, sensor=SHARP, programme=PROGRAMME, most_tests=most_tests)
+    return [hidden_in(run, clutch, sizes) for run in simulated]
+
+
+@pytest.fixture(scope="module")
+def bare() -> list[SimulatedRun]:
+    return runs({}, 2)
+
+
+def change(run: SimulatedRun, plain: SimulatedRun) -> np.ndarray:
+    held, before = run.record or run.plateaus, plain.record or plain.plateaus
+    assert held is not None
+    assert before is not None
+    return held.torque - before.torque
+
+
+@pytest.mark.parametrize("slug", [slug for slug in EFFECTS if slug != "squeeze_film"])
+def test_an_effect_changes_torque_and_no_more_than_it_says(slug: str, bare: list[SimulatedRun]) -> None:
+    clutch = clutch_for(simulated_clutch(7), {slug: 1.0})
+    size = effect_of(slug).size
+    # late wear shows at the end of a life only
+    late = [replace(run, cycles=15_000) for run in bare] if slug == "accelerated_wear" else bare
+    largest = {}
+    for kind in (RunKind.STATIONARY_STRIBECK, RunKind.DYNAMIC_STRIBECK):
+        # the second of each kind: drifts are nothing at 0 cycles
+        run = [run for run in late if run.kind is kind][1]
+        whole, half = (change(hidden_in(run, clutch, {slug: part * size}), run) for part in (1.0, 0.5))
+        largest[kind] = float(np.abs(whole).max())
+        assert largest[kind] < 12
+        assert np.abs(half).max() <= largest[kind]
+    assert largest[RunKind.DYNAMIC_STRIBECK] > 0 or slug == "unsettled_dwell"
+    assert (largest[RunKind.STATIONARY_STRIBECK] == 0) == EFFECTS[slug].loops
+
+
+def test_a_squeezed_film_is_in_the_clutch_only_where_it_is_hidden() -> None:
+    clutch = simulated_clutch(7)
+    assert clutch_for(clutch, {"squeeze_film": 0.2}).lag.film_time == 0.2
+    assert clutch_for(clutch, {"running_in": 5.0}).lag.film_time == 0.0
+
+
+def test_every_hidden_effect_is_of_the_catalogue_and_an_unknown_one_lists_them() -> None:
+    assert EFFECTS.keys() <= {effect.slug for effect in CATALOGUE}
+    with pytest.raises(ValueError, match=r"torque_zero_shift \(1.5 Nm\)"):
+        effect_of("warm_oil")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("slug", ["oil_temperature", "torque_zero_shift"])
+def test_a_diagnosis_names_what_is_hidden(slug: str) -> None:
+    found = runs({slug: effect_of(slug).size}, 9)
+    tests = [
+        StationaryRun(run_id=run.run_id, cycles=run.cycles, plateaus=run.plateaus)
+        for run in found
+        if run.plateaus is not None
+    ]
+    loops = [
+        DynamicRun(run_id=run.run_id, cycles=run.cycles, record=run.record)
+        for run in found
+        if run.kind is RunKind.DYNAMIC_STRIBECK and run.record is not None
+    ]
+    report = diagnose(Campaign(stationary=tuple(tests), dynamic=tuple(loops)), rng=np.random.default_rng(1))
+    assert slug in report.causes, (report.verdict, report.causes, report.summary)

@@ -1,0 +1,94 @@
+"""What an engineer reads in a terminal about a clutch: tables of the service's own answers, which is in this process."""
+
+import csv
+import io
+import json
+from collections.abc import Callable
+from contextlib import nullcontext
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+from typer.testing import CliRunner
+
+from service.cli import connection
+from service.cli.main import app
+from tests.support import stationary
+
+Terminal = Callable[..., str]
+DUTY = {"kind": "duty_cycles", "cycles": 3000, "duty": {"cycles": 3000, "energy_per_cycle_kj": 18}}
+LIFE = "/v1/clutches/c1/remaining-useful-life"
+
+
+@pytest.fixture
+def terminal(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> Terminal:
+    """A terminal whose service has seen a clutch for 3,000 cycles."""
+    monkeypatch.setattr(connection, "connect", lambda *_, **__: nullcontext(client))
+    tests = [stationary(cycles, pressures=(5.0, 6.0)) for cycles in (0, 1000, 2000, 3000)]
+    for number, run in enumerate([*tests, DUTY]):
+        assert client.post("/v1/clutches/c1/runs", json=run | {"run_id": f"r{number}"}).status_code == 201
+
+    def typed(*arguments: str | Path, code: int = 0) -> str:
+        done = CliRunner().invoke(app, list(map(str, arguments)))
+        assert done.exit_code == code, done.output
+        return done.output
+
+    return typed
+
+
+def test_remaining_life_is_a_table_of_quantiles(terminal: Terminal, client: TestClient) -> None:
+    shown, answer = terminal("life", "c1"), client.get(LIFE).json()
+    assert "c1 at 3,000 cycles: " in shown
+    assert "4 tests, method particle, model baseline" in shown
+    row = next(line for line in shown.splitlines() if line.startswith("remaining cycles"))
+    median = answer["remaining_cycles"]["0.5"]
+    assert ("beyond the horizon" if median is None else f"{median:,.0f}") in row
+    assert json.loads(terminal("life", "c1", "--json")) == answer
+    assert "method grid" in terminal("life", "c1", "--method", "grid", "--pressure", "5")
+    rows = list(csv.DictReader(io.StringIO(terminal("life", "c1", "--csv", "--at-cycles", "2000"))))
+    assert {row["as_of_cycles"] for row in rows} == {"2000"}
+
+
+def test_planned_duty_by_block_and_by_file_is_the_same(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
+    by_energy = {"severity": {"basis": "dissipated_energy"}, "reason": "its duty varies"}
+    changed = client.patch("/v1/clutches/c1", json=by_energy)
+    assert changed.status_code == 200, changed.text
+    (tmp_path / "plan.json").write_text('{"programme": [{"cycles": 5000, "energy_per_cycle_kj": 36, "sd": 2}]}')
+    shown = terminal("life", "c1", "--block", "5000:36:2", "--pace", "120")
+    assert shown == terminal("life", "c1", "--plan", tmp_path / "plan.json", "--pace", "120")
+    for words in ("remaining blocks", "under recent duty", "date (UTC)", "120 cycles an hour, as planned"):
+        assert words in shown, words
+    answer = json.loads(terminal("life", "c1", "--block", "5000:36:2", "--json"))
+    # twice the energy of the blocks so far: half the cycles, by the middle of the distribution
+    assert answer["block_severity"][0] == pytest.approx(2.0, rel=0.02)
+    assert answer["pace_cycles_per_hour"] is None
+    assert "date (UTC)" not in terminal("life", "c1", "--block", "5000:36:2")
+
+
+def test_the_tables_hold_every_item_of_the_answer_on_a_line(terminal: Terminal, client: TestClient) -> None:
+    lines = terminal("degradation", "c1").splitlines()
+    items = client.get("/v1/clutches/c1/degradation").json()["items"]
+    assert [line.split()[0] for line in lines[1 : 1 + len(items)]] == [item["quantity"] for item in items]
+    assert next(csv.reader(io.StringIO(terminal("degradation", "c1", "--csv"))))[0] == "quantity"
+    assert "c1 has no loops" in terminal("loops", "c1")
+    course = terminal("engagement", "c1", "--at-cycles", "1000")
+    assert "c1 at 1,000 cycles, simulated: " in course
+    assert "motor_torque_nm" in course
+    assert json.loads(terminal("engagement", "c1", "--json")) == client.get("/v1/clutches/c1/engagement").json()
+
+
+def test_what_cannot_be_answered_is_refused_in_a_line(terminal: Terminal) -> None:
+    refused: list[tuple[tuple[str, ...], int, str]] = [
+        (("life", "nobody"), 65, "no clutch is known"),
+        (("life", "c1", "--query", "quantitty=slope"), 65, "quantitty is no argument here"),
+        (("life", "c1", "--query", "slope"), 64, "--query takes NAME=VALUE"),
+        (("life", "c1", "--json", "--csv"), 64, "use --json or --csv"),
+        (("life", "c1", "--pace", "120"), 64, "--pace goes with"),
+        (("life", "c1", "--block", "5000"), 64, "--block takes CYCLES:KJ[:SD]"),
+        (("life", "c1", "--block", "5000:20:30"), 65, "sd is larger than energy_per_cycle_kj"),
+        (("life", "c1", "--plan", "nowhere.json"), 64, "nowhere.json"),
+        (("life", "c1", "--block", "5000:20", "--csv"), 64, "not as --csv"),
+        (("engagement", "c1", "--query", "points=5"), 65, "points is no argument here"),
+    ]
+    for arguments, code, words in refused:
+        assert words in terminal(*arguments, code=code), arguments

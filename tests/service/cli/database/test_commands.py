@@ -1,0 +1,130 @@
+"""Backup, restore, verify and replay, as an operator sees them; a command that only reads changes nothing."""
+
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+from typer.testing import CliRunner
+
+from service.app import create_app
+from service.cli.main import app
+from service.settings import Settings
+from storage.engine.service_lock import service_lock
+from tests.storage.samples import OLD, integrity, old_database, revision
+from tests.support import stationary
+
+
+def clutchlife(*arguments: str | Path, code: int = 0) -> str:
+    """Run a command in this process and return what it printed."""
+    done = CliRunner().invoke(app, list(map(str, arguments)), catch_exceptions=False)
+    assert done.exit_code == code, done.output
+    return done.output
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A database with the clutches a, b and c, of which b has tests."""
+    path = tmp_path_factory.mktemp("stored") / "clutchlife.db"
+    with TestClient(
+        create_app(Settings(database=f"sqlite:///{path}")),
+        base_url="http://127.0.0.1",
+        client=("127.0.0.1", 50000),
+    ) as client:
+        for clutch_id in "abc":
+            assert client.post("/v1/clutches", json={"clutch_id": clutch_id}).status_code == 201
+            assert client.post(f"/v1/clutches/{clutch_id}/runs", json=stationary(0, run_id="s0")).status_code == 201
+    return path
+
+
+@pytest.fixture
+def path(stored: Path, tmp_path: Path) -> Path:
+    """A copy of it that a test may change."""
+    clutchlife("backup", tmp_path / "a.db", "--database", f"sqlite:///{stored}")
+    return tmp_path / "a.db"
+
+
+def execute(path: Path, statement: str) -> None:
+    with closing(sqlite3.connect(path)) as connection, connection:
+        assert connection.execute(statement).rowcount > 0
+
+
+def test_commands_that_read_leave_an_older_file_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = old_database(tmp_path, monkeypatch)
+    before, url = path.read_bytes(), ("--database", f"sqlite:///{path}")
+    names = sorted(each.name for each in tmp_path.iterdir())
+    clutchlife("backup", tmp_path / "copy.db", *url)
+    assert "clutchlife serve" in clutchlife("key", "list", *url, code=1)  # keys have had bounds since
+    assert "no prior has been learned" in clutchlife("fleet", *url)
+    assert f"is at revision {OLD}: its runs are checked at" in clutchlife("verify", *url, code=1)
+    clutchlife("score", *url, code=1)
+    assert path.read_bytes() == before
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["copy.db", *names]
+    assert revision(tmp_path / "copy.db") == OLD
+    clutchlife("replay", *url)  # it writes, so it migrates, and keeps a copy
+    kept = [each.name for each in tmp_path.glob("old.db-before-*")]
+    assert kept == [f"old.db-before-{revision(path)}"]
+
+
+def test_verify_is_clean_on_what_a_service_stored(path: Path) -> None:
+    url = ("--database", f"sqlite:///{path}")
+    assert "3 runs of 3 clutches are checked, 3 clutches computed anew: 0 findings" in clutchlife("verify", *url)
+    assert "3 clutches are checked, 1 clutches computed anew" in clutchlife("verify", "--sample", "1", *url)
+
+
+@pytest.mark.parametrize(
+    ("tampered", "says"),
+    [
+        ("UPDATE run SET cycles = 1 WHERE clutch_id = 'b'", "b: run s0 is not what was sent"),
+        ("UPDATE fit SET rmse = 2 * rmse WHERE run_key = 3", "c: the fit of run s0"),
+        ("DELETE FROM clutch WHERE clutch_id = 'a'", "refers to a row of clutch that is missing"),
+        ("ALTER TABLE run ADD COLUMN colour TEXT", "the schema differs"),
+    ],
+)
+def test_verify_names_what_is_wrong_and_ends_with_1(path: Path, tampered: str, says: str) -> None:
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute(tampered)
+    output = clutchlife("verify", "--database", f"sqlite:///{path}", code=1)
+    assert says in output
+    assert "findings" in output
+
+
+def test_verify_names_a_damaged_page(path: Path) -> None:
+    whole = path.read_bytes()
+    page = len(whole) // 2 // 4096 * 4096
+    path.write_bytes(whole[:page] + b"\xff" * 4096 + whole[page + 4096 :])
+    assert "damaged" in clutchlife("verify", "--database", f"sqlite:///{path}", code=1)
+
+
+def test_a_backup_is_restored_unless_a_service_runs(path: Path, tmp_path: Path) -> None:
+    url = ("--database", f"sqlite:///{path}")
+    clutchlife("backup", tmp_path / "backup.db", *url)
+    execute(path, "DELETE FROM prediction")
+    with service_lock(path):
+        assert "a service uses this database already" in clutchlife("restore", tmp_path / "backup.db", *url, code=1)
+    output = clutchlife("restore", tmp_path / "backup.db", *url)
+    assert f"kept as {path}-replaced" in output
+    clutchlife("verify", *url)
+    clutchlife("verify", "--database", f"sqlite:///{path}-replaced", code=1)
+    assert integrity(path) == ["ok"]
+    assert "there is no backup at" in clutchlife("restore", tmp_path / "none.db", *url, code=64)
+    assert "give --reason" in clutchlife("restore", "a", "s0", *url, code=64)
+
+
+def test_replay_goes_on_after_a_clutch_that_it_refuses_and_names_it_at_the_end(path: Path) -> None:
+    url = ("--database", f"sqlite:///{path}")
+    execute(path, "UPDATE channel SET data = zeroblob(9) WHERE run_key = 1 AND position = 0")
+    execute(path, "UPDATE fit SET rmse = 2 * rmse WHERE run_key = 3")
+    output = clutchlife("replay", *url, code=1)
+    assert "a: not replayed: channel" in output
+    assert "b: 1 runs" in output
+    assert "c: 1 runs" in output
+    assert output.strip().endswith("1 clutches keep the results that they had: a")
+    assert "c: " not in clutchlife("verify", *url, code=1)
+
+
+def test_a_second_service_on_the_same_database_does_not_start(path: Path) -> None:
+    with TestClient(create_app(Settings(database=f"sqlite:///{path}"))):
+        output = clutchlife("serve", "--port", "0", "--database", f"sqlite:///{path}", code=1)
+    assert "a service uses this database already (process " in output

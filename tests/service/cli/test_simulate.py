@@ -1,0 +1,49 @@
+"""`clutchlife simulate`: a campaign to rehearse a diagnosis on, whose answer lies beside it and is not told."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from service.cli.main import app
+from service.run_files import manifest
+
+QUICK = ("simulate", "--seed", "3", "--tests", "1", "--pressures", "5", "--pressures", "4")
+
+
+def simulated(folder: Path, *arguments: str, code: int = 0) -> str:
+    done = CliRunner().invoke(app, [*QUICK, "--out", str(folder), *arguments])
+    assert done.exit_code == code, done.output
+    return done.output
+
+
+def test_what_is_hidden_is_in_a_file_and_not_on_the_screen(tmp_path: Path) -> None:
+    hide = ("--hide", "torque_zero_shift:1.2", "--hide", "shaft_ripple")
+    shown = simulated(tmp_path, *hide, "--frequency", "0.2", "--frequency", "0.5")
+    assert "torque_zero_shift" not in shown
+    hidden = json.loads((tmp_path / "answer.json").read_bytes())["hidden"]
+    assert [(part["effect"], part["size"], part["unit"]) for part in hidden] == [
+        ("torque_zero_shift", 1.2, "Nm"),
+        ("shaft_ripple", 0.5, "Nm"),
+    ]
+    pushed = [run.path.name for run in manifest.find([tmp_path])]
+    assert "answer.json" not in pushed
+    assert [name for name in pushed if "dynamic" in name] == [
+        "sim-3-dynamic-00000-0.5hz.json",
+        "sim-3-dynamic-00000.json",
+    ]
+    loops = json.loads((tmp_path / "sim-3-dynamic-00000.json").read_bytes())["channels"]
+    assert {round(pressure) for pressure in loops["pressure_bar"][::500]} == {4, 5}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--hide", "warm_oil"), "oil_temperature (1 -), interface_heating (15 %)"),
+        (("--hide", "shaft_ripple:loud"), "the size in Nm"),
+    ],
+)
+def test_what_cannot_be_hidden_is_refused_with_what_can(tmp_path: Path, arguments: tuple[str, ...], words: str) -> None:
+    assert words in " ".join(simulated(tmp_path, *arguments, code=64).split())
+    assert not (tmp_path / "answer.json").exists()

@@ -1,0 +1,131 @@
+"""Lives that end by more than mean COF, and tracks of any quantity, over HTTP."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from models.rig.campaign import simulate
+from models.rig.programme import Programme
+from models.rig.sampled import DynamicTest
+from service.run_files.simulated import simulated_body
+
+WAIT = {"Prefer": "wait=60"}
+SHUDDER = {"quantity": "slope", "pressure_bar": 5, "speed_rpm": 100}
+
+
+@pytest.fixture
+def tested(client: TestClient) -> TestClient:
+    """A simulated clutch whose friction soon falls with speed at 100 rpm, six tests with loops."""
+    record = {"clutch_id": "s", "origin": "simulated", "end_of_life": {"criteria": [{"quantity": "mean_cof"}, SHUDDER]}}
+    assert client.post("/v1/clutches", json=record).status_code == 201
+    for run in simulate(7, most_tests=6, programme=Programme(dynamic=DynamicTest(rate=25.0))):
+        assert client.post("/v1/clutches/s/runs", json=simulated_body(run)).status_code == 201
+    return client
+
+
+def asked(client: TestClient, path: str, **query: Any) -> dict[str, Any]:
+    answer = client.get(f"/v1/clutches/s/{path}", params=query, headers=WAIT)
+    assert answer.status_code == 200, answer.text
+    body: dict[str, Any] = answer.json()
+    return body
+
+
+def test_a_clutch_that_shudders_first_is_said_so(tested: TestClient) -> None:
+    answer = asked(tested, "remaining-useful-life")
+    cof, slope = answer["criteria"]
+    assert (cof["quantity"], slope["quantity"], slope["limit"]) == ("mean_cof", "slope", 0.0)
+    assert cof["probability_first"] + slope["probability_first"] == pytest.approx(1.0, abs=0.01)
+    assert slope["probability_first"] > 0.9
+    assert answer["criterion"]["quantity"] == "slope"
+    assert answer["end_of_life_cycles"]["0.5"] < cof["end_of_life_cycles"]["0.5"]
+    by_cof = asked(tested, "remaining-useful-life", criterion="mean_cof")
+    assert by_cof["criterion"]["quantity"] == "mean_cof"
+    assert by_cof["end_of_life_cycles"] == cof["end_of_life_cycles"]
+
+
+def test_mean_cof_alone_is_one_criterion_and_as_it_was(client: TestClient, tested: TestClient) -> None:
+    edit = {"end_of_life": {"cof_fraction": 0.5}, "reason": "shudder is looked at elsewhere"}
+    assert client.patch("/v1/clutches/s", json=edit).status_code == 200
+    answer = asked(tested, "remaining-useful-life")
+    (only,) = answer["criteria"]
+    assert (only["quantity"], only["probability_first"]) == ("mean_cof", 1.0)
+    for name in ("remaining_cycles", "end_of_life_cycles", "probability_of_reaching"):
+        assert only[name] == answer[name]
+    assert answer["criterion"]["threshold_mean_cof"] == only["limit"]
+
+
+@pytest.mark.parametrize("method", ["particle", "ukf", "grid"])
+@pytest.mark.parametrize("quantity", ["static_torque_nm", "film_time"])
+def test_every_filter_tracks_parameters_and_lag(tested: TestClient, method: str, quantity: str) -> None:
+    answer = asked(tested, "degradation", quantity=quantity, method=method, draws=20)
+    assert answer["method"] == method
+    item = max(answer["items"], key=lambda item: len(item["measured"]["cycles"]))
+    assert item["frequency_hz"] == (0.1 if quantity == "film_time" else None)
+    band = item["trajectory"]
+    assert all(low < high for low, high in zip(band["lower"], band["upper"], strict=True))
+    assert {len(column) for column in item["draws"].values()} == {20}
+    quantiles = list(item["coefficients"]["initial"]["quantiles"].values())
+    assert quantiles == sorted(quantiles)
+    correlations = np.array(item["correlations"])
+    assert correlations == pytest.approx(correlations.T)
+    assert np.diag(correlations).tolist() == [1.0] * 4
+    assert correlations[2, 3] > 0.0  # scale and exponent: the ridge of eq. 6
+
+
+def test_slopes_fall_with_use_and_a_lower_speed_reaches_zero_later(tested: TestClient) -> None:
+    items = asked(tested, "degradation", quantity="slope")["items"]
+    assert {item["speed_rpm"] for item in items} == {50.0, 100.0, 500.0}
+    by_speed = {item["speed_rpm"]: item for item in items if item["pressure_bar"] == 5.0}
+    median = {speed: np.array(item["trajectory"]["median"]) for speed, item in by_speed.items()}
+    below = {speed: int((values < 0.0).sum()) for speed, values in median.items()}
+    assert below[500.0] > below[100.0] > below[50.0]
+    assert median[100.0][-1] < median[100.0][0]
+
+
+def test_an_earlier_life_stays_reachable(tested: TestClient) -> None:
+    before = asked(tested, "degradation", quantity="mean_cof")
+    last = before["items"][0]["measured"]["cycles"][-1]
+    rebuild = {"kind": "maintenance", "event": "rebuild", "cycles": last + 1, "run_id": "new-lining"}
+    assert tested.post("/v1/clutches/s/runs", json=rebuild).status_code == 201
+    now = asked(tested, "degradation", quantity="mean_cof")
+    assert now["life"] == {"number": 2, "of": 2, "from_cycles": last + 1, "rebuild": "new-lining"}
+    assert now["items"] == []
+    earlier = asked(tested, "degradation", quantity="mean_cof", life=1)
+    assert earlier["items"] == before["items"]
+    ended = asked(tested, "remaining-useful-life", life=1)
+    assert ended["life"]["number"] == 1
+    assert ended["status"] != "insufficient_data"
+    assert asked(tested, "remaining-useful-life")["status"] == "insufficient_data"
+    assert tested.get("/v1/clutches/s/degradation", params={"life": 3}, headers=WAIT).status_code == 404
+
+
+def test_what_was_known_then_is_answered_for_then(tested: TestClient) -> None:
+    items = asked(tested, "degradation", quantity="static_torque_nm", at_cycles=2_000)["items"]
+    assert all(item["measured"]["cycles"] == [0, 500, 1_000, 2_000] for item in items)
+
+
+@pytest.mark.parametrize(
+    ("criterion", "said"),
+    [
+        ({"quantity": "slope", "pressure_bar": 5}, "speed_rpm must be given"),
+        ({"quantity": "film_time", "pressure_bar": 5, "below": 0.1}, "frequency_hz must be given"),
+        ({"quantity": "static_torque_nm", "fraction": 0.5}, "pressure_bar must be given"),
+        ({"quantity": "mean_cof", "fraction": 0.5, "below": 0.1}, "exactly one of"),
+        (SHUDDER | {"fraction": 0.5}, "changes sign"),
+        ({"quantity": "noise", "below": 1}, "quantity"),
+    ],
+)
+def test_a_criterion_that_is_none_is_refused(client: TestClient, criterion: dict[str, Any], said: str) -> None:
+    answer = client.post("/v1/clutches", json={"clutch_id": "x", "end_of_life": {"criteria": [criterion]}})
+    assert answer.status_code == 422
+    assert said in answer.text
+
+
+def test_what_is_no_quantity_is_refused_with_those_that_are(tested: TestClient) -> None:
+    answer = tested.get("/v1/clutches/s/degradation", params={"quantity": "nonsense"}, headers=WAIT)
+    assert answer.status_code == 422
+    assert "film_time" in answer.json()["detail"]
+    unmeasured = tested.get("/v1/clutches/s/remaining-useful-life", params={"criterion": "film_time"}, headers=WAIT)
+    assert unmeasured.status_code == 404

@@ -1,0 +1,149 @@
+"""The OWASP API Security Top 10 of 2023, a test each: what an attacker would see first, and where the rest is tested."""
+
+import re
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+from storage import keys
+from tests.architecture.source import ROOT
+from tests.service.cli.sending.stand_in_service import URL
+from tests.service.web.routes.granting import context_of, granted, revoke_all
+from tests.service.web.routes.routes_of import routes_of
+from tests.service.web.routes.test_scopes import OPEN
+from tests.support import stationary
+
+CLUTCHES = "/v1/clutches"
+
+
+def test_api1_an_object_of_others_cannot_be_reached_by_its_name(client: TestClient) -> None:
+    """Every route: test_scopes.py."""
+    bound = granted(client, "admin", clutches=["mine"])
+    assert client.post(CLUTCHES, json={"clutch_id": "mine"}, headers=bound).status_code == 201
+    assert client.get(f"{CLUTCHES}/mine", headers=bound).status_code == 200
+    assert client.get(f"{CLUTCHES}/c1", headers=bound).status_code == 403
+
+
+def test_api2_a_key_is_long_kept_as_a_hash_and_ends(client: TestClient) -> None:
+    """Revoked, expired, tried: test_auth.py, test_scopes.py, test_shares.py."""
+    headers = granted(client)
+    secret = headers["Authorization"].removeprefix("Bearer ")
+    assert len(secret.rpartition("_")[2]) >= 43 or len(secret) >= 60, "256 bits"
+    database = context_of(client).database
+    files = [path for path in database.path.parent.iterdir() if path.is_file()]
+    assert all(secret.encode() not in path.read_bytes() for path in files)
+    assert any(b"secret_sha256" in path.read_bytes() for path in files), "the files were not looked at"
+    assert client.get(f"{CLUTCHES}?key={secret}").status_code == 401, "a key in an address ends in logs"
+    revoke_all(client)
+    assert client.get(CLUTCHES, headers=headers).status_code == 401
+
+
+@pytest.mark.parametrize("field", ["revision", "archived", "created_at", "runs", "registered"])
+def test_api3_properties_that_are_the_services_own_cannot_be_set(client: TestClient, field: str) -> None:
+    """Of runs: test_bad_input.py. What goes out is what the schemas name: test_openapi.py."""
+    assert client.post(CLUTCHES, json={"clutch_id": "c2", field: 1}).status_code == 422
+    if field != "archived":
+        assert client.patch(f"{CLUTCHES}/c1", json={field: 1, "reason": "x"}).status_code == 422
+    run = stationary(0.0) | {field: 1}
+    assert client.post(f"{CLUTCHES}/c1/runs", json=run).status_code == 422
+
+
+def test_api4_a_request_has_bounds(client: TestClient) -> None:
+    """How often, how slowly, how many at once: test_shares.py. Files: tests/service/readers."""
+    assert client.post(CLUTCHES, content=b" " * (2**20 + 1)).status_code == 413
+    assert client.get(f"{CLUTCHES}?limit=1001").status_code == 422
+    assert client.get(f"{CLUTCHES}?cursor={'x' * 700}").status_code == 422
+
+
+def test_api5_a_rig_cannot_do_what_an_engineer_does(client: TestClient) -> None:
+    """Every route: test_scopes.py."""
+    rig = granted(client, "ingest")
+    run = stationary(0.0, run_id="a")
+    assert client.post(f"{CLUTCHES}/c1/runs", json=run, headers=rig).status_code == 201
+    reason = {"reason": "x"}
+    assert client.post(f"{CLUTCHES}/c1/runs/a/withdraw", json=reason, headers=rig).status_code == 403
+    assert client.patch(f"{CLUTCHES}/c1", json={"fluid": "ATF", "reason": "x"}, headers=rig).status_code == 403
+
+
+def test_api6_a_life_is_not_changed_by_asking_often(client: TestClient) -> None:
+    """What would be abused here is history: it is changed by admin alone, who is named, and nothing is deleted."""
+    headers = granted(client, "admin")
+    for number in range(3):
+        run = stationary(0.0, run_id="a")
+        assert client.post(f"{CLUTCHES}/c1/runs", json=run, headers=headers).status_code == (200 if number else 201)
+    for change in ("withdraw", "restore"):
+        client.post(f"{CLUTCHES}/c1/runs/a/{change}", json={"reason": "x"}, headers=headers)
+    items = client.get(f"{CLUTCHES}/c1/changes", headers=headers).json()["items"]
+    with context_of(client).database.reading() as connection:
+        (key,) = keys.all_keys(connection)
+    assert [(item["action"], item["by"]) for item in items] == [
+        ("restore", f"key:{key.key_id} admin"),
+        ("withdraw", f"key:{key.key_id} admin"),
+    ]
+    assert client.delete(f"{CLUTCHES}/c1/runs/a", headers=headers).status_code == 405
+
+
+#: What opens connections to others; the command line alone does.
+_CLIENTS = re.compile(
+    r"^\s*(?:import|from) (httpx2|urllib\.request|http\.client|requests|aiohttp|socket)\b", re.MULTILINE
+)
+
+
+def test_api7_the_service_asks_no_address_that_it_is_sent() -> None:
+    """No part of it but the command line can open a connection; its readers cannot even by force: test_sandbox.py."""
+    sources = [path for path in (ROOT / "service").rglob("*.py") if "cli" not in path.parts]
+    assert len(sources) > 80
+    assert [str(path) for path in sources if _CLIENTS.search(path.read_text(encoding="utf-8"))] == []
+    command_line = (ROOT / "service" / "cli").rglob("*.py")
+    assert any(_CLIENTS.search(path.read_text(encoding="utf-8")) for path in command_line), "nothing would be found"
+
+
+@pytest.mark.parametrize("path", ["/", "/clutches/c1", "/docs", "/docs/start.js", CLUTCHES, "/nowhere", "/livez"])
+def test_api8_every_answer_has_the_headers_that_browsers_heed(client: TestClient, path: str) -> None:
+    """In a browser: tests/journeys/test_pages.py and test_files.py."""
+    answer = client.get(path, headers={"Origin": "http://127.0.0.1"})
+    policy = dict(part.strip().split(" ", 1) for part in answer.headers["content-security-policy"].split(";"))
+    assert (policy["script-src"], policy["frame-ancestors"], policy["object-src"]) == ("'self'", "'none'", "'none'")
+    assert answer.headers["x-content-type-options"] == "nosniff"
+    assert not [name for name in answer.headers if name.startswith("access-control-")], "no other origin may read"
+    if answer.headers["content-type"].startswith("text/html"):
+        assert re.findall(r"<script(?![^>]*\bsrc=)|\son\w+=|javascript:", answer.text) == []
+    assert "server" not in answer.headers
+
+
+def test_api8_an_error_inside_shows_nothing_of_the_inside(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object, **__: object) -> object:
+        raise RuntimeError("the path is /var/lib/secret")
+
+    monkeypatch.setattr("service.queries.clutch_list.look_up", broken)
+    answer = client.get(f"{CLUTCHES}/c1")
+    assert (answer.status_code, "secret" in answer.text) == (500, False)
+
+
+def test_api9_every_address_is_described_or_listed_as_open(client: TestClient) -> None:
+    """Nothing is forgotten behind the description. Who may use what: test_scopes.py."""
+    described = client.get("/openapi.json").json()
+    listed = {(method.upper(), path) for path, methods in described["paths"].items() for method in methods}
+    found = set(routes_of(client.app.routes))  # type: ignore[attr-defined]
+    assert found - listed <= set(OPEN)
+    assert {("POST", f"{CLUTCHES}/{{clutch_id}}/runs"), ("GET", CLUTCHES)} <= listed
+    assert described["info"]["version"] == client.get("/livez").json()["version"]
+
+
+def test_api10_what_others_answer_or_send_is_not_trusted() -> None:
+    """A redirect would carry key and runs elsewhere. Answers: test_answers.py. Files: test_mdf4.py, test_manifest.py."""
+    import httpx2
+
+    from service.cli.sending.answers import passing
+    from service.cli.sending.client import connect
+
+    with connect(URL, key="a-key") as client:
+        assert not client.follow_redirects
+    moved = httpx2.Response(307, headers={"Location": "http://elsewhere.test/v1/clutches"})
+    assert "elsewhere.test" in str(passing(moved, None))
+
+
+def test_all_ten_are_there() -> None:
+    text = Path(__file__).read_text(encoding="utf-8")
+    assert {int(number) for number in re.findall(r"^def test_api(\d+)_", text, re.MULTILINE)} == set(range(1, 11))

@@ -1,0 +1,119 @@
+"""The API's description is valid, and complete enough to write a client from."""
+
+import copy
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import jsonschema_rs
+import pytest
+import schemathesis
+
+from service.app import create_app
+from service.settings import Settings
+from service.web.openapi import consists_of_fields
+
+METHODS = ("get", "post", "put", "patch", "delete")
+#: FastAPI's own shape of a wrong argument, which the service never sends.
+FOREIGN = {"HTTPValidationError", "ValidationError"}
+
+
+@pytest.fixture(scope="module")
+def api() -> dict[str, Any]:
+    """The description at /openapi.json."""
+    return create_app(Settings()).openapi()
+
+
+def operations(api: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    for path, item in api["paths"].items():
+        yield from ((f"{method.upper()} {path}", item[method]) for method in METHODS if method in item)
+
+
+def fields(api: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Every field of every schema and body by its place, and every parameter."""
+    schemas = {name: schema for name, schema in api["components"]["schemas"].items() if name not in FOREIGN}
+    for name, operation in operations(api):
+        for content in operation.get("requestBody", {}).get("content", {}).values():
+            schemas[f"the body of {name}"] = content["schema"]
+    for owner, schema in schemas.items():
+        for name, field in schema.get("properties", {}).items():
+            yield f"{owner}.{name}", field
+
+
+def without_example(api: Mapping[str, Any]) -> list[str]:
+    missing = [place for place, field in fields(api) if "examples" not in field and not consists_of_fields(field)]
+    for name, operation in operations(api):
+        missing += [
+            f"{name}: {parameter['name']}"
+            for parameter in operation.get("parameters", ())
+            if "example" not in parameter and parameter["schema"].get("type") != "boolean"
+        ]
+    return missing
+
+
+def references(part: Any) -> Iterator[str]:
+    if isinstance(part, list):
+        for item in part:
+            yield from references(item)
+    if isinstance(part, dict):
+        if isinstance(part.get("$ref"), str):
+            yield part["$ref"]
+        for item in part.values():
+            yield from references(item)
+
+
+def test_the_description_is_valid_and_every_reference_is_found_in_it(api: dict[str, Any]) -> None:
+    schemathesis.openapi.from_dict(api).validate()
+    for reference in set(references(api)):
+        part: Any = api
+        for name in reference.removeprefix("#/").split("/"):
+            part = part[name]
+    broken = copy.deepcopy(api)
+    broken["info"] = 7
+    with pytest.raises(Exception, match="7 is not of type"):
+        schemathesis.openapi.from_dict(broken).validate()
+
+
+def test_every_field_and_parameter_has_an_example(api: dict[str, Any]) -> None:
+    assert without_example(api) == []
+
+
+def test_a_field_without_an_example_is_noticed(api: dict[str, Any]) -> None:
+    lacking = copy.deepcopy(api)
+    del lacking["components"]["schemas"]["Receipt"]["properties"]["cycles"]["examples"]
+    assert without_example(lacking) == ["Receipt.cycles"]
+
+
+def test_every_example_is_of_its_fields_type(api: dict[str, Any]) -> None:
+    wrong = []
+    for place, field in fields(api):
+        whole = field | {"components": api["components"]}
+        wrong += [
+            f"{place}: {example!r}"
+            for example in field.get("examples", ())
+            if not jsonschema_rs.is_valid(whole, example)
+        ]
+    for name, operation in operations(api):
+        wrong += [
+            f"{name}: {parameter['name']}"
+            for parameter in operation.get("parameters", ())
+            if not jsonschema_rs.is_valid(parameter["schema"], parameter.get("example", False))
+        ]
+        for content in operation.get("requestBody", {}).get("content", {}).values():
+            if "example" in content:
+                whole = content["schema"] | {"components": api["components"]}
+                wrong += [] if jsonschema_rs.is_valid(whole, content["example"]) else [f"the body of {name}"]
+    assert wrong == []
+
+
+def test_keys_tags_pages_and_refusals_are_described(api: dict[str, Any]) -> None:
+    assert api["components"]["securitySchemes"]["key"]["scheme"] == "bearer"
+    assert api["security"] == [{"key": []}, {}]
+    for name, operation in operations(api):
+        answers = operation["responses"]
+        assert ("503" not in answers) or ("Retry-After" in answers["503"]["headers"]), name
+        assert ("201" not in answers) or ("Location" in answers["201"]["headers"]), name
+        if name.startswith("GET /v1/"):
+            assert "ETag" in answers["304"]["headers"], name
+            assert "ETag" in answers["200"]["headers"], name
+            listed = any(parameter["name"] == "cursor" for parameter in operation.get("parameters", ()))
+            assert ("Link" in answers["200"]["headers"]) is listed, name
