@@ -156,8 +156,9 @@ function drawn(trace, before, x, y) {
   const { line = {}, marker, error_y: bars } = trace;
   const parts = [];
   if (trace.fill === "tonexty" && before) {
-    const back = pathOf(placed(before.x, x).reverse(), placed(before.y, y).reverse()).replace("M", "L");
-    parts.push(svg("path", { d: `${pathOf(xs, ys)}${back}Z`, fill: trace.fillcolor }));
+    const [there, back] = [pathOf(xs, ys), pathOf(placed(before.x, x).reverse(), placed(before.y, y).reverse())];
+    // a band without a value is none: a path of "Z" alone is an error
+    if (there && back) parts.push(svg("path", { d: `${there}${back.replace("M", "L")}Z`, fill: trace.fillcolor }));
   }
   if (bars) {
     const strokes = trace.y.map((value, index) => {
