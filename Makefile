@@ -32,7 +32,7 @@ LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --
 demo: $(VENV)/.runs
 	$(BIN)/clutchlife demo $(ARGS)
 
-test: $(VENV)/.tests
+test: $(VENV)/.tests $(VENV)-generator/.ready
 	$(BIN)/python -m tests.browser
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow" $(ARGS)
 
@@ -118,6 +118,11 @@ $(VENV)/.tests: $(VENV)/.runs tests/requirements.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r tests/requirements.txt
 	@touch $@
 
+$(VENV)-generator/.ready: tests/requirements-generator.txt | $(VENV)/.python
+	$(PYTHON) -m venv $(VENV)-generator
+	$(VENV)-generator/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r tests/requirements-generator.txt
+	@touch $@
+
 $(JAVASCRIPT)/.package-lock.json: tests/javascript/package.json tests/javascript/package-lock.json
 	@command -v npm >/dev/null || { echo "make check needs npm (with Node.js 20 or later) for the dashboard's JavaScript; 'npm' is not there. make test and make demo do without it." >&2; exit 1; }
 	cd tests/javascript && npm ci --ignore-scripts --loglevel=error
@@ -126,7 +131,8 @@ $(JAVASCRIPT)/.package-lock.json: tests/javascript/package.json tests/javascript
 lock:
 	uv pip compile $(LOCK) pyproject.toml -o docker/requirements.txt
 	uv pip compile $(LOCK) pyproject.toml --group test -o tests/requirements.txt
+	uv pip compile $(LOCK) --group generator -o tests/requirements-generator.txt
 	uv pip compile $(LOCK) --resolution lowest-direct pyproject.toml --group test -o tests/requirements-lowest.txt
 
 clean:
-	rm -rf $(JAVASCRIPT) $(VENV) $(VENV)-lowest $(VENV)-rivals .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(JAVASCRIPT) $(VENV) $(VENV)-lowest $(VENV)-generator $(VENV)-rivals .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
