@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from multiprocessing.process import BaseProcess
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import httpx2
@@ -86,13 +87,29 @@ _LOADED = multiprocessing.get_context("forkserver")
 _LOADED.set_forkserver_preload(["service.cli.main", "service.app"])
 
 
-def _run(arguments: list[str], environment: dict[str, str]) -> None:
+def _run(arguments: list[str], environment: dict[str, str], output: Path | None = None) -> None:
     """The command in the forked process."""
     from service.cli.main import app
 
+    if output is not None:
+        with output.open("wb") as file:
+            os.dup2(file.fileno(), sys.stdout.fileno())
+            os.dup2(file.fileno(), sys.stderr.fileno())
     os.environ.clear()
     os.environ.update(environment)
     app(arguments)
+
+
+def clutchlife(*arguments: str | Path, code: int = 0, **environment: str) -> str:
+    """Run a command, forked as well, and return what it printed."""
+    with TemporaryDirectory() as folder:
+        output = Path(folder) / "output"
+        child = _LOADED.Process(target=_run, args=([*map(str, arguments)], os.environ | environment, output))
+        child.start()
+        child.join()
+        printed = output.read_text(encoding="utf-8")
+    assert child.exitcode == code, printed
+    return printed
 
 
 class Server:

@@ -4,6 +4,7 @@ Keys, entity tags and 304, the headers of pages and refusals, compression, and a
 (`service.schemas.examples`). The schemas of bodies and problems, which routes describe by themselves, are named as all are.
 """
 
+import json
 from collections.abc import Iterator
 from functools import cache
 from typing import Any
@@ -22,6 +23,8 @@ _SECURITY = {
 }
 #: Addresses that answer without a key.
 _OPEN = ("/livez", "/readyz")
+#: Ends the name of what is sent where what is answered has the name already.
+_SENT = "Sent"
 _METHODS = ("get", "post", "put", "patch", "delete")
 
 
@@ -62,15 +65,12 @@ def completed(api: Json) -> Json:
     for path, method, operation in _operations(api):
         for place in [operation.get("requestBody", {}), *operation["responses"].values()]:
             for content in place.get("content", {}).values():
-                _name_parts(content.get("schema", {}), schemas)
+                content["schema"] = _named(content.get("schema", {}), schemas)
         if path in _OPEN:
             operation["security"] = []
         _complete(path, method, operation)
     for name, schema in schemas.items():
-        _exemplify(schema, name)
-    for _, _, operation in _operations(api):
-        for content in operation.get("requestBody", {}).get("content", {}).values():
-            _exemplify(content["schema"], content["schema"].get("title", ""))
+        _exemplify(schema, name.removesuffix(_SENT))
     return api
 
 
@@ -99,19 +99,32 @@ def _complete(path: str, method: str, operation: Json) -> None:
         responses["200"].setdefault("headers", {}).update(headers)
 
 
-def _name_parts(schema: Json, schemas: Json) -> None:
-    """Move the definitions inside a schema to those of the whole description: there alone a reference finds them."""
+def _named(schema: Json, schemas: Json) -> Json:
+    """The schema with what it is made of moved to the components; where it has fields, a reference to it among them.
+
+    A reference finds its schema there alone, and who writes a client from the description names its types by it.
+    """
     parts = schema.pop("$defs", {})
+    own = schema.get("title") if "properties" in schema else None
+    if own is not None:
+        parts = parts | {own: schema}
     names = {name: _free_name(name, part, schemas) for name, part in parts.items()}
     for part in (schema, *parts.values()):
         _refer(part, names)
     for name, part in parts.items():
-        schemas[names[name]] = part
+        schemas.setdefault(names[name], part | {"title": names[name]})
+    return schema if own is None else {"$ref": f"#/components/schemas/{names[own]}"}
 
 
 def _free_name(name: str, part: Json, schemas: Json) -> str:
     """The name, unless another schema has it: as a body's and an answer's of one kind, which differ in what is required."""
-    return name if schemas.get(name, part) == part else f"{name}Sent"
+    return name if _content(schemas.get(name, part)) == _content(part) else f"{name}{_SENT}"
+
+
+def _content(part: Json) -> str:
+    """What a schema says, wherever its parts stand and whatever suffix they have."""
+    text = json.dumps(part, sort_keys=True)
+    return text.replace("#/$defs/", "#/components/schemas/").replace(f'{_SENT}"', '"')
 
 
 def _refer(part: Any, names: dict[str, str]) -> None:

@@ -9,15 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support import ONCE, Server, serving, stationary
-
-
-def clutchlife(*arguments: str | Path, code: int = 0, **environment: str) -> str:
-    """Run a command and return what it printed."""
-    called = [sys.executable, "-m", "service.cli.main", *map(str, arguments)]
-    done = subprocess.run(called, capture_output=True, text=True, env=os.environ | environment, check=False)
-    assert done.returncode == code, done.stderr + done.stdout
-    return done.stdout + done.stderr
+from tests.support import ONCE, Server, clutchlife, serving, stationary
 
 
 @pytest.fixture(scope="module")

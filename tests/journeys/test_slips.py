@@ -4,8 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from tests.journeys.test_command_line import clutchlife
-from tests.support import ONCE, Server, serving, stationary
+from tests.support import ONCE, Server, clutchlife, serving, stationary
 
 PRESSURES = (4.0, 6.0)
 

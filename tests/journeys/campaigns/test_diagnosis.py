@@ -1,15 +1,13 @@
 """The diagnosis by the real engine over a real socket: asked for by a person, by a script, of a service that dies."""
 
 import json
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import httpx2
 import pytest
 
-from tests.support import Server, serving, stationary
+from tests.support import Server, clutchlife, serving, stationary
 
 BASE = "/v1/clutches/c1"
 
@@ -92,14 +90,6 @@ def commanded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
         assert "not both" in clutchlife("model", "c1", "--baseline", "--adopt", "x", "--url", server.url, code=64)
         assert "no diagnosis" in clutchlife("model", "c1", "--adopt", "x", "--url", server.url, code=65)
     return folder, output
-
-
-def clutchlife(*arguments: str, code: int = 0) -> str:
-    done = subprocess.run(
-        [sys.executable, "-m", "service.cli.main", *arguments], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == code, done.stderr + done.stdout
-    return done.stdout if code == 0 else done.stderr
 
 
 def test_the_command_prints_for_a_person_what_json_holds_for_a_script(commanded: tuple[Path, str]) -> None:

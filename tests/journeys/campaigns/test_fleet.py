@@ -2,21 +2,12 @@
 
 import json
 import math
-import subprocess
-import sys
 
 import httpx2
 
-from tests.support import Server, stationary
+from tests.support import Server, clutchlife, stationary
 
 SPEEDS = tuple(range(20, 1971, 150))
-
-
-def clutchlife(*arguments: str) -> str:
-    command = [sys.executable, "-m", "service.cli.main", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
 
 
 def post(http: httpx2.Client, name: str, scale: float, last: int) -> None:

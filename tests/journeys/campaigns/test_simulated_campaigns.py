@@ -3,8 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from tests.journeys.test_command_line import clutchlife
-from tests.support import ONCE, Server
+from tests.support import ONCE, Server, clutchlife
 
 
 def test_campaigns_of_records_are_pushed_without_a_word_on_kind_and_cycles(server: Server, tmp_path: Path) -> None:

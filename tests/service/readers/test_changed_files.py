@@ -1,0 +1,106 @@
+"""Files of every format with bytes changed: read to checked columns or refused by the contract, and nothing else.
+
+CI changes some; `make faults` changes files for ten minutes.
+"""
+
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from service.columns import check_arrays
+from service.errors import InvalidError, TooLargeError
+from service.readers.limits import LIMITS
+from service.readers.read_file import read_file
+from tests.service.readers.sample_files import UNITS, csv_text, record, write_mdf, write_parquet, write_tdms
+
+#: Little files are read soon; what is wrong with a changed one shows as well in few rows.
+COLUMNS = record(rows=60)
+SOON = replace(LIMITS, seconds=10)
+#: Numbers that lengths, offsets and types are overwritten with.
+EXTREMES = [value.to_bytes(8, "little") for value in (0, 1, 2**31 - 1, 2**31, 2**32 - 1, 2**63 - 1, 2**63, 2**64 - 1)]
+
+
+def write_csv(path: Path, columns: Mapping[str, np.ndarray], **_: object) -> Path:
+    path.write_text(csv_text(columns), encoding="utf-8")
+    return path
+
+
+WRITERS: dict[str, Callable[..., Path]] = {
+    "run.csv": write_csv,
+    "run.tdms": write_tdms,
+    "run.mf4": write_mdf,
+    "run.parquet": write_parquet,
+}
+
+
+def changed(content: bytes, rng: np.random.Generator) -> bytes:
+    """A file with one to four changes: bits flipped, extreme numbers, blocks cut out, doubled or moved, the end cut off."""
+    data = bytearray(content)
+    for _ in range(int(rng.integers(1, 5))):
+        at = int(rng.integers(len(data)))
+        length = int(rng.integers(1, 64))
+        match int(rng.integers(7)):
+            case 0:
+                data[at] ^= 1 << int(rng.integers(8))
+            case 1:
+                width = int(rng.choice([1, 2, 4, 8]))
+                data[at : at + width] = EXTREMES[int(rng.integers(len(EXTREMES)))][:width]
+            case 2:
+                data[at : at + length] = rng.bytes(length)
+            case 3:
+                del data[at : at + length]
+            case 4:
+                data[at:at] = data[at : at + length] * int(rng.integers(1, 50))
+            case 5:
+                other = int(rng.integers(len(data)))
+                data[at : at + length] = data[other : other + length]
+            case _:
+                del data[max(at, 1) :]
+    return bytes(data)
+
+
+def cases(name: str, few: int, many: int) -> list[object]:
+    return [
+        pytest.param(name, few, id=f"{few} of {name}"),
+        pytest.param(name, many, id=f"{many} of {name}", marks=pytest.mark.slow),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "number"),
+    # a reader of CSV is a function, the others are processes of which the one of MDF4 takes longest to start
+    [
+        *cases("run.csv", 400, 10_000),
+        *cases("run.tdms", 8, 200),
+        *cases("run.mf4", 6, 120),
+        *cases("run.parquet", 8, 200),
+    ],
+)
+def test_a_changed_file_is_read_or_refused(
+    name: str, number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    content = WRITERS[name](tmp_path / name, COLUMNS, units=UNITS).read_bytes()
+    rng = np.random.default_rng([number, *name.encode()])
+    path = tmp_path / f"changed-{name}"
+    refused = 0
+    for _ in range(number):
+        path.write_bytes(changed(content, rng))
+        try:
+            check_arrays(read_file(path, filename=name, limits=SOON))
+        except (InvalidError, TooLargeError):
+            refused += 1
+    assert refused > 0
+    assert list((tmp_path / "temporary").iterdir()) == []
+
+
+def test_what_is_not_changed_is_read(tmp_path: Path) -> None:
+    for name, write in WRITERS.items():
+        columns = read_file(write(tmp_path / name, COLUMNS, units=UNITS), filename=name)
+        for channel, values in COLUMNS.items():
+            np.testing.assert_allclose(columns[channel], values, rtol=0, atol=1e-5)
