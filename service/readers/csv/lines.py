@@ -24,8 +24,8 @@ def is_comment(line: str, separator: str) -> bool:
 def cells_of(line: str, separator: str) -> list[str]:
     """The cells of a line, without quotes, without blanks around them."""
     if '"' in line:
-        one = line.replace("\r", " ")  # a carriage return within a line is a blank like others, not a second line
-        return [cell.strip() for cell in next(csv.reader([one], delimiter=separator, skipinitialspace=True))]
+        even = line.replace("\r", " ")  # a carriage return within a line is a blank like others, not a second line
+        return [cell.strip() for cell in next(csv.reader([even], delimiter=separator, skipinitialspace=True))]
     return [cell.strip() for cell in line.split(separator)]
 
 

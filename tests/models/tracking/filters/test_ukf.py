@@ -87,9 +87,9 @@ def test_the_ukf_books_the_step_of_each_event_on_that_event() -> None:
 
 
 def test_the_ukf_bears_more_events_than_anyone_logs() -> None:
-    """A sensor is zeroed before each of 120 tests: each begins an epoch, and has a step of its own."""
+    """A sensor is zeroed before each of 60 tests: each begins an epoch, and has a step of its own."""
     rng = np.random.default_rng(5)
-    progress = np.linspace(0.0, 20_000.0, 120)
+    progress = np.linspace(0.0, 20_000.0, 60)
     cof = value(progress, Degradation(initial=0.134, change=-0.1, scale=5_000.0, exponent=0.7))
     runs = [
         Measurement(progress=z, value=y + 0.0004 * rng.standard_normal(), variance=1e-8, epoch=place)
@@ -97,7 +97,7 @@ def test_the_ukf_bears_more_events_than_anyone_logs() -> None:
     ]
     prior = weak(runs[0], falling=True)
     state = Ukf().update(replace(Ukf().start(prior), history=History.of(runs[:-1], prior)), runs[-1])
-    assert state.mean.shape[1] == 6 + 119
+    assert state.mean.shape[1] == 6 + 59
     posterior = Ukf().posterior(state, 500, rng)
     now, deviation = posterior.moments(posterior.values(np.array([20_000.0]))[0])
     assert abs(now - cof[-1]) < 4.0 * deviation + 0.01
