@@ -1,8 +1,8 @@
 """The slope dμ/dv along a life, from the joint tracks of the four Stribeck parameters of one pressure.
 
 The slope's own course is no eq. 6: it rises a little, passes through 0 and falls steeply, so that a track of the fitted
-slopes alone sees shudder far too late (its 90 % intervals held 2 to 45 % of simulated ends). Each parameter follows its
-eq. 6; drawn jointly (`from_parameters.parameter_draws`) they give the slope at any ζ by eq. 3.
+slopes alone sees shudder far too late. Each parameter follows its eq. 6; drawn jointly (`from_parameters.parameter_draws`)
+they give the slope at any ζ by eq. 3.
 """
 
 import numpy as np

@@ -121,6 +121,17 @@ def test_pressures_are_averaged_and_scaled_to_all_of_the_reference() -> None:
     assert bare.present.mean() < 0.85 * expected
 
 
+def test_a_test_that_happens_to_scatter_little_does_not_count_for_all() -> None:
+    """Its static torque is 5 % off and its residuals by chance small: the others' covariances tell what it is worth."""
+    usual = level()
+    parameters, covariance = usual.parameters.copy(), 1e4 * usual.covariance
+    parameters[-1, 0] *= 1.05
+    covariance[-1] *= 1e-4
+    found = paths([replace(usual, parameters=parameters, covariance=covariance)])
+    assert found is not None
+    assert found.present.mean() == pytest.approx(mean_cofs(AT[-1:])[0], rel=0.01)
+
+
 def test_too_few_tests_give_nothing_and_take_no_part() -> None:
     few = level()
     few = replace(few, progress=AT[[0, 1, 1]], parameters=few.parameters[:3], covariance=few.covariance[:3])
