@@ -13,6 +13,7 @@ from service.schemas.limits import (
     MOST_DRAWS,
     MOST_POINTS,
 )
+from service.schemas.prognosis.quantities import SeriesQuantity
 
 ClutchId = Annotated[str, Field(description="The clutch's name")]
 RunId = Annotated[str, Field(description="The run's name")]
@@ -26,31 +27,7 @@ Points = Annotated[
         "lowest or highest within its bin, and the first and the last; left out, all. Plateaus and Parquet are whole",
     ),
 ]
-QuantityName = Literal[
-    "mean_cof",
-    "static_torque_nm",
-    "coulomb_ratio",
-    "stribeck_velocity_m_s",
-    "viscous_coefficient",
-    "stop_time_s",
-    "engagement_energy_kj",
-    "peak_power_kw",
-    "initial_cof",
-    "midpoint_cof",
-    "endpoint_cof",
-    "breakaway_cof",
-    "initial_cof_ratio",
-    "endpoint_cof_ratio",
-    "breakaway_cof_ratio",
-    "torque_rise",
-    "normalised_duration",
-    "euclidean_distance",
-    "spectral_angle_rad",
-    "health",
-    "remaining_cycles",
-    "probability_of_reaching",
-]
-Quantity = Annotated[QuantityName | None, Field(description="Rows of this quantity only")]
+Quantity = Annotated[SeriesQuantity | None, Field(description="Rows of this quantity only")]
 EngagementRun = Annotated[
     str | None,
     Field(description="The run whose measured engagement is compared with the model; left out, the newest of the life"),

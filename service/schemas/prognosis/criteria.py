@@ -1,59 +1,22 @@
 """What ends a life: criteria as they are given in a clutch's record."""
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self, get_args
 
 from pydantic import Field, model_validator
 
 from service.schemas.base import PositiveNumber, Schema
 from service.schemas.limits import LARGEST_LIMIT, MOST_CRITERION_PRESSURE_BAR, MOST_SPEED_RPM
+from service.schemas.prognosis.quantities import LevelQuantity, LoopQuantity, QuantityName
 
-CriterionQuantity = Literal[
-    "mean_cof",
-    "static_torque_nm",
-    "coulomb_ratio",
-    "stribeck_velocity_m_s",
-    "viscous_coefficient",
-    "slope",
-    "attractor",
-    "film_time",
-    "loop_area",
-    "stop_time_s",
-    "engagement_energy_kj",
-    "peak_power_kw",
-    "initial_cof",
-    "midpoint_cof",
-    "endpoint_cof",
-    "breakaway_cof",
-    "initial_cof_ratio",
-    "endpoint_cof_ratio",
-    "breakaway_cof_ratio",
-    "torque_rise",
-    "normalised_duration",
-    "euclidean_distance",
-    "spectral_angle_rad",
-]
 #: Other names of two of them, as the criteria of a record may have them.
 _ALIASES = {"static_ratio": "breakaway_cof_ratio", "stop_time": "stop_time_s", "energy": "engagement_energy_kj"}
-#: Quantities that are measured at a pressure level.
-_AT_A_PRESSURE = (
-    "static_torque_nm",
-    "coulomb_ratio",
-    "stribeck_velocity_m_s",
-    "viscous_coefficient",
-    "slope",
-    "attractor",
-    "film_time",
-    "loop_area",
-)
-#: Quantities of friction loops, each of one frequency.
-_OF_LOOPS = ("attractor", "film_time", "loop_area")
 _Value = Annotated[float, Field(ge=-LARGEST_LIMIT, le=LARGEST_LIMIT, allow_inf_nan=False, strict=True)]
 
 
 class CriterionIn(Schema):
     """A quantity that ends the life where it reaches a limit: a share of its initial value, or a value."""
 
-    quantity: CriterionQuantity = Field(description="The quantity, as in `/degradation`")
+    quantity: QuantityName = Field(description="The quantity, as in `/degradation`")
     fraction: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False, strict=True)] | None = Field(
         default=None, description="The life ends when the quantity has fallen to this share of its initial value"
     )
@@ -90,10 +53,11 @@ class CriterionIn(Schema):
             )
         if self.quantity == "slope" and self.fraction is not None:
             raise ValueError("a slope changes sign: its limit is below or above a value, not a fraction")
-        if self.quantity != "mean_cof" and (self.pressure_bar is None) is (self.quantity in _AT_A_PRESSURE):
+        if self.quantity != "mean_cof" and (self.pressure_bar is None) is (self.quantity in get_args(LevelQuantity)):
             given = "be given" if self.pressure_bar is None else "not be given"
             raise ValueError(f"pressure_bar must {given} for {self.quantity}")
-        for name, needed in (("speed_rpm", self.quantity == "slope"), ("frequency_hz", self.quantity in _OF_LOOPS)):
+        of_loops = self.quantity in get_args(LoopQuantity)
+        for name, needed in (("speed_rpm", self.quantity == "slope"), ("frequency_hz", of_loops)):
             if (getattr(self, name) is not None) is not needed:
                 raise ValueError(f"{name} must {'' if needed else 'not '}be given for {self.quantity}")
         return self

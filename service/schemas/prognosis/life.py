@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from service.schemas.base import Answer, ClutchName, Origin, Revision
-from service.schemas.prognosis.criteria import CriterionQuantity
+from service.schemas.prognosis.quantities import QuantityName
 from service.schemas.run import Warned
 
 MethodName = Literal["particle", "ukf", "grid"]
@@ -20,7 +20,7 @@ Quantiles = dict[str, float | None]
 class CriterionPlace(Answer):
     """A quantity at a place, and the limit that ends the life."""
 
-    quantity: CriterionQuantity = Field(description="The quantity that is compared with the limit")
+    quantity: QuantityName = Field(description="The quantity that is compared with the limit")
     fraction: float | None = Field(description="Limit over initial value; null where the limit is a value")
     below: float | None = Field(default=None, description="The value below which the life ends")
     above: float | None = Field(default=None, description="The value above which the life ends")
