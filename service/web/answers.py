@@ -24,7 +24,7 @@ from service.jobs.workers import Lane
 from service.lists import ALL_ITEMS, from_cursor, sliced
 from service.queries.cache import Answer, Page, revision_and_json, to_json
 from service.web.context import Context
-from service.web.files import PARQUET_TYPE
+from service.web.files import is_packed_already
 from service.web.limits import LEAST_PACKED_BYTES, LONGEST_WAIT_SECONDS, PACKING_LEVEL
 from service.web.middleware import Again, remember
 from service.web.problems import problem
@@ -257,7 +257,7 @@ def described_body(schema: type[BaseModel] | dict[str, Any], example: dict[str, 
 
 
 class Encodings:
-    """Bodies packed by gzip, both ways; any other encoding of a request's body is refused with 415.
+    """Bodies packed by gzip, both ways, unless they are files that are packed already; any other encoding sent is a 415.
 
     An answer's entity tag names its bytes, so the packed ones have a tag of their own: the same with a mark.
     """
@@ -295,5 +295,5 @@ class Encodings:
                     answered["etag"] = tag
             await send(message)
 
-        app = self.app if PARQUET_TYPE in headers.get("accept", "") else self.packing  # it is packed by itself
+        app = self.app if is_packed_already(scope["path"], headers.get("accept", "")) else self.packing
         await app(scope, receive, tagged)
