@@ -101,7 +101,7 @@ def _loops(service: Service, seed: int, last: float) -> None:
 
 
 def _inspections(service: Service, seed: int, last: float) -> None:
-    """Roughness and skewness of the lining at some states of the same life, for the dashboard; there is nothing to photograph."""
+    """The roughness and skewness of the lining at some states of the same life; a simulated one has no photographs."""
     from service.cli.demo import life  # start-up time
     from service.run_files import simulated  # start-up time
 
