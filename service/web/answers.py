@@ -24,7 +24,7 @@ from service.jobs.workers import Lane
 from service.lists import ALL_ITEMS, from_cursor, sliced
 from service.queries.cache import Answer, Page, revision_and_json, to_json
 from service.web.context import Context
-from service.web.files import is_packed_already
+from service.web.files import PARQUET_TYPE
 from service.web.limits import LEAST_PACKED_BYTES, LONGEST_WAIT_SECONDS, PACKING_LEVEL
 from service.web.middleware import Again, remember
 from service.web.problems import problem
@@ -71,7 +71,6 @@ async def clutch_answer(
     `name` and `arguments` tell the clutch's answers apart. Where it was made for this revision already, nothing is read.
     """
     revision = _revision(context, clutch_id)
-
     # the revision before the rest is read: what is committed meanwhile is kept under one that nobody asks for again
     key = (clutch_id, name, *arguments)
     held = await kept(context, key, revision, make)
@@ -295,5 +294,6 @@ class Encodings:
                     answered["etag"] = tag
             await send(message)
 
-        app = self.app if is_packed_already(scope["path"], headers.get("accept", "")) else self.packing
+        packed_by_itself = PARQUET_TYPE in headers.get("accept", "") or "/photographs/" in scope["path"]
+        app = self.app if packed_by_itself else self.packing
         await app(scope, receive, tagged)

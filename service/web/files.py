@@ -36,11 +36,6 @@ def preferred(request: Request, media_types: Sequence[str]) -> str:
     return max(media_types, key=lambda name: weights.get(name, 0.0))
 
 
-def is_packed_already(path: str, accept: str) -> bool:
-    """Whether what is asked for may be a file that packing makes no smaller: Parquet, or a photograph."""
-    return PARQUET_TYPE in accept or "/photographs/" in path
-
-
 def streamed(body: BinaryIO, media_type: str, headers: Mapping[str, str]) -> Response:
     """An open file as an answer, sent piece by piece and closed at its end."""
     size = {"Content-Length": str(os.fstat(body.fileno()).st_size)}

@@ -178,7 +178,9 @@ export const askUndo = (run) =>
  */
 export function askInspection(inspection) {
   const [action, title] =
-    inspection.state === "withdrawn" ? ["restore", "Restore this inspection"] : ["withdraw", "Withdraw this inspection"];
+    inspection.state === "withdrawn"
+      ? ["restore", "Restore this inspection"]
+      : ["withdraw", "Withdraw this inspection"];
   return ask({
     title,
     lines: [
