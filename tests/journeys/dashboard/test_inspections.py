@@ -1,7 +1,6 @@
 """Inspections on a clutch's page: R_a and R_sk over cycles, photographs by state, and a form that sends them."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import httpx2
 import pytest
@@ -47,7 +46,7 @@ def opened(browser: Browser, server: Server, clutch_id: str, **context: object) 
     ("scheme", "viewport"), [("light", SMALL), ("dark", {"width": 1360, "height": 900})], ids=["phone", "dark"]
 )
 def test_roughness_and_skewness_are_charts_and_photographs_open_larger(
-    browser: Browser, bench: Server, scheme: str, viewport: dict[str, int], tmp_path: Path
+    browser: Browser, bench: Server, scheme: str, viewport: dict[str, int]
 ) -> None:
     watched, page = opened(browser, bench, "bench", color_scheme=scheme, viewport=viewport)
     section = page.locator("#inspections")
@@ -63,7 +62,6 @@ def test_roughness_and_skewness_are_charts_and_photographs_open_larger(
     thumbnails.last.scroll_into_view_if_needed()
     expect(section.locator(".thumbnail img")).to_have_count(2)
     assert violations(page) == []
-    page.screenshot(path=tmp_path / "section.png")
     thumbnails.first.click()
     dialog = page.get_by_role("dialog", name="Photograph 1 of 2 at 11,000 cycles, disc 2, side A")
     image = dialog.get_by_role("img")
@@ -96,7 +94,7 @@ def test_an_inspection_is_sent_by_the_form_withdrawn_and_restored(browser: Brows
     section.get_by_text("give roughness_um, skewness or a note").first.wait_for()
     section.get_by_label("Inspected at").fill("2026-11-02T08:00")
     section.get_by_label("Roughness R_a, µm").fill("2.5")
-    section.get_by_label("Skewness R_sk").fill("-2.75")
+    section.get_by_label("Skewness R_sk", exact=True).fill("-2.75")
     section.get_by_label("Photographs").set_input_files([PICTURE, PICTURE | {"name": "other.png", "buffer": b"none"}])
     assert violations(page) == []
     send.click()
