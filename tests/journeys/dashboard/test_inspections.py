@@ -79,7 +79,7 @@ def test_a_clutch_that_was_never_inspected_has_a_closed_form_and_no_chart(browse
     section = page.locator("#inspections")
     section.get_by_text("No inspection yet.").wait_for()
     expect(section.locator(".chart").first).to_be_hidden()
-    expect(section.get_by_label("Roughness R_a, µm")).to_be_hidden()
+    expect(section.get_by_label("Roughness Ra, µm")).to_be_hidden()
     assert violations(page) == []
     watched.close()
 
@@ -93,8 +93,8 @@ def test_an_inspection_is_sent_by_the_form_withdrawn_and_restored(browser: Brows
     send.click()
     section.get_by_text("give roughness_um, skewness or a note").first.wait_for()
     section.get_by_label("Inspected at").fill("2026-11-02T08:00")
-    section.get_by_label("Roughness R_a, µm").fill("2.5")
-    section.get_by_label("Skewness R_sk", exact=True).fill("-2.75")
+    section.get_by_label("Roughness Ra, µm").fill("2.5")
+    section.get_by_label("Skewness Rsk", exact=True).fill("-2.75")
     section.get_by_label("Photographs").set_input_files([PICTURE, PICTURE | {"name": "other.png", "buffer": b"none"}])
     assert violations(page) == []
     send.click()
@@ -103,7 +103,7 @@ def test_an_inspection_is_sent_by_the_form_withdrawn_and_restored(browser: Brows
     send.click()
     section.get_by_text("The inspection at 7,000 cycles is stored.").wait_for()
     expect(section.get_by_text("is not stored")).to_have_count(0)
-    expect(section.get_by_label("Roughness R_a, µm")).to_have_value("")
+    expect(section.get_by_label("Roughness Ra, µm")).to_have_value("")
     rows = section.get_by_role("table", name="Inspections, by duty cycles").get_by_role("row")
     expect(rows).to_have_count(2)
     expect(rows.nth(1)).to_contain_text("2 Nov 2026")

@@ -45,7 +45,7 @@ export function surfaceOverLife({ inspections, events, quantity }) {
   const states = distinct(measured.map(({ cycles }) => cycles)).length;
   return {
     note: `${meaning} At ${states === 1 ? "one state" : `${fixed(states)} states`}.`,
-    columns: [{ name: "lining" }, CYCLES, digitsColumn(name, 4)],
+    columns: [{ name: "lining" }, CYCLES, digitsColumn(name, 3)],
     rows: measured.map((item) => [item.lining, item.cycles, item[quantity]]),
     figure: (c) => ({
       data: linings.map((lining, index) => {

@@ -3,7 +3,7 @@
 // that a form whose photographs were refused in part is mended and sent once more.
 
 import { clutchPath, Problem, send, sendJson } from "../shared/api.js";
-import { field, h } from "../shared/dom.js";
+import { field, h, symbol } from "../shared/dom.js";
 import { fixed } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 
@@ -48,8 +48,8 @@ export class InspectionForm {
       field(this.cycles, "Duty cycles since new"),
       field(this.moment, "Inspected at"),
       field(this.lining, "Disc, side or place"),
-      field(this.roughness, "Roughness R_a, µm"),
-      field(this.skewness, "Skewness R_sk"),
+      field(this.roughness, ["Roughness ", symbol("R", "a"), ", µm"]),
+      field(this.skewness, ["Skewness ", symbol("R", "sk")]),
       field(this.note, "Note"),
       field(this.files, "Photographs: PNG, JPEG or WebP"),
     );

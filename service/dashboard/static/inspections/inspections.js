@@ -5,7 +5,7 @@
 
 import { Chart } from "../charts/chart.js";
 import { clutchPath, readAll, readText } from "../shared/api.js";
-import { h, saveText, scrolling, table } from "../shared/dom.js";
+import { h, saveText, scrolling, symbol, table } from "../shared/dom.js";
 import { fixed, moment, significant } from "../shared/format.js";
 import { surfaceOverLife } from "./charts.js";
 import { InspectionForm } from "./form.js";
@@ -13,9 +13,8 @@ import { Photographs } from "./photographs.js";
 
 /** @import { InspectionOut, Receipt } from "../shared/types.js" */
 
-const COLUMNS = ["Duty cycles", "Inspected", "Lining", "R_a, µm", "R_sk", "Note", "Photographs", "Change"];
 const ABOUT =
-  "Roughness R_a and skewness R_sk of the lining's surface profile, and photographs of it. They are kept beside the runs: no prediction uses them.";
+  "Roughness and skewness of the lining's surface profile, and photographs of it. They are kept beside the runs: no prediction uses them.";
 
 export class Inspections {
   /**
@@ -27,8 +26,8 @@ export class Inspections {
   constructor(place, clutchId, name, change) {
     this.clutchId = clutchId;
     this.change = change;
-    this.roughness = new Chart({ name, id: "roughness", title: "Roughness R_a", height: 300 });
-    this.skewness = new Chart({ name, id: "skewness", title: "Skewness R_sk", height: 300 });
+    this.roughness = new Chart({ name, id: "roughness", title: "Roughness", letter: ["R", "a"], height: 300 });
+    this.skewness = new Chart({ name, id: "skewness", title: "Skewness", letter: ["R", "sk"], height: 300 });
     this.charts = h("div", { class: "charts", hidden: true }, this.roughness.element, this.skewness.element);
     this.list = h("div", { class: "inspections" });
     this.photographs = new Photographs(clutchId);
@@ -46,10 +45,11 @@ export class Inspections {
    */
   async poll(events) {
     /** @type {{ items: InspectionOut[], changed: boolean }} */
-    const { items, changed } = await readAll(`${clutchPath(this.clutchId)}/inspections?limit=1000`);
+    const { items: read, changed } = await readAll(`${clutchPath(this.clutchId)}/inspections?limit=1000`);
     if (this.drawn && !changed && events === this.events) return;
     this.drawn = true;
     this.events = events;
+    const items = [...read].sort((a, b) => a.cycles - b.cycles || a.lining.localeCompare(b.lining));
     const accepted = items.filter(({ state }) => state === "accepted");
     this.charts.hidden = accepted.every((item) => item.roughness_um === null && item.skewness === null);
     this.roughness.show(surfaceOverLife({ inspections: accepted, events, quantity: "roughness_um" }));
@@ -67,9 +67,12 @@ export class Inspections {
       saveText(`${this.clutchId}-inspections.csv`, await readText(address), "text/csv");
     };
     const rows = items.map((item) => this.row(item));
+    const roughness = h("span", {}, symbol("R", "a"), ", µm");
+    const measured = [roughness, symbol("R", "sk")];
+    const columns = ["Duty cycles", "Inspected", "Lining", ...measured, "Note", "Photographs", "Change"];
     return [
       h("p", { class: "quiet" }, "As a table: ", h("a", { href: address, onclick: save }, "CSV"), "."),
-      h("div", { class: "panel" }, scrolling("Inspections", table("Inspections, by duty cycles", COLUMNS, rows))),
+      h("div", { class: "panel" }, scrolling("Inspections", table("Inspections, by duty cycles", columns, rows))),
     ];
   }
 
@@ -84,8 +87,8 @@ export class Inspections {
       withdrawn ? [h("s", {}, cycles), " ", mark] : cycles,
       item.performed_at === null ? "–" : moment(item.performed_at),
       item.lining || "–",
-      significant(item.roughness_um, 4),
-      significant(item.skewness, 4),
+      significant(item.roughness_um),
+      significant(item.skewness),
       item.note || "–",
       String(item.photographs.length),
       h(
