@@ -1,11 +1,16 @@
 """Inspections on a clutch's page: R_a and R_sk over cycles, photographs by state, and a form that sends them."""
 
 from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
 
 import httpx2
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from service.web.auth import make_key
+from storage import keys
+from storage.engine.database import open_database
 from tests.browser.driving import Watched
 from tests.browser.lives import worn
 from tests.journeys.dashboard.test_axe import violations
@@ -121,3 +126,35 @@ def test_an_inspection_is_sent_by_the_form_withdrawn_and_restored(browser: Brows
     # the browser notes every refusal in its console
     watched.said = [line for line in watched.said if "422" not in line]
     watched.close()
+
+
+def test_with_keys_photographs_are_shown_and_sent_with_the_readers_key(browser: Browser, tmp_path: Path) -> None:
+    with serving(tmp_path / "clutchlife.db", loaded=True) as server:
+        with httpx2.Client(base_url=server.url, timeout=60) as http:
+            http.post("/v1/clutches", json={"clutch_id": "secret"}).raise_for_status()
+            address = http.post("/v1/clutches/secret/inspections", json=WORN).headers["location"]
+            headers = {"Content-Type": "image/png"}
+            http.post(f"{address}/photographs", content=png(size=64), headers=headers).raise_for_status()
+        text, row = make_key("ingest", "bench 3", created_at="2026-01-01T00:00:00Z")
+        with closing(open_database(f"sqlite:///{server.database}")) as database, database.writing() as connection:
+            keys.insert(connection, row)
+        watched = Watched(browser, server.url)
+        page = watched.open("/clutches/secret")
+        page.get_by_role("textbox", name="Key").fill(text)
+        page.keyboard.press("Enter")
+        section = page.locator("#inspections")
+        section.locator(".thumbnail").scroll_into_view_if_needed()
+        expect(section.locator(".thumbnail img")).to_have_count(1)
+        section.get_by_text("Add an inspection").click()
+        section.get_by_label("Duty cycles since new").fill("12000")
+        section.get_by_label("Photographs").set_input_files([PICTURE])
+        section.get_by_role("button", name="Send the inspection").click()
+        expect(section.locator(".thumbnail img")).to_have_count(2)
+        section.get_by_role("button", name="Withdraw the inspection at 12,000 cycles").click()
+        dialog = page.get_by_role("dialog", name="Withdraw this inspection")
+        dialog.get_by_label("Reason").fill("a slip")
+        dialog.get_by_role("button", name="Withdraw").click()
+        dialog.get_by_text("this needs the scope admin").wait_for()
+        assert all(text not in url for url in watched.asked)
+        watched.said = [line for line in watched.said if "401" not in line and "403" not in line]
+        watched.close()
