@@ -22,7 +22,7 @@ from service.web.limits import MOST_CACHED_BYTES, MOST_REVALIDATED_BYTES
 from service.web.metrics import Metrics
 from service.web.middleware import BodyLimit, Counting, Heads, Polls, SafeHeaders, Shares
 from service.web.revalidation import Revalidation
-from service.web.routes import clutches, description, diagnoses, exports, files, fleet, health, life, runs
+from service.web.routes import clutches, description, diagnoses, exports, files, fleet, health, inspections, life, runs
 from service.workflows import adopt_model, run_diagnosis
 from storage.diagnoses import NewDiagnosis
 from storage.engine.connect import path_of
@@ -109,7 +109,7 @@ def create_app(settings: Settings) -> FastAPI:
         redoc_url=None,
     )
     problems.install(app)
-    for part in (health, clutches, files, runs, life, diagnoses, fleet):
+    for part in (health, clutches, files, runs, inspections, life, diagnoses, fleet):
         app.include_router(part.router)
     for beside in (exports.router, exports.fleet_router, description.router):
         app.include_router(beside)

@@ -10,6 +10,7 @@ from storage.tables import change
 
 HOLD, CONFIRM, WITHDRAW, RESTORE, CORRECT = "hold", "confirm", "withdraw", "restore", "correct"
 EDIT, ARCHIVE, UNARCHIVE, ADOPT = "edit", "archive", "unarchive", "adopt"
+WITHDRAW_INSPECTION, RESTORE_INSPECTION = "withdraw_inspection", "restore_inspection"
 #: What changes a clutch's history, and with it what a diagnosis was made of.
 OF_HISTORY = (CONFIRM, WITHDRAW, RESTORE, CORRECT, EDIT)
 #: What the trail shows of a change.

@@ -177,6 +177,45 @@ fleet_prior = Table(
     Column("code_version", Text, nullable=False),
 )
 
+#: What was found where the clutch was taken apart. `content` is what was posted (JSON, in the units of its fields' names),
+#: `content_sha256` its hash, `state` whether it was withdrawn since.
+inspection = Table(
+    "inspection",
+    metadata,
+    Column("inspection_key", Integer, primary_key=True),
+    Column("clutch_id", Text, ForeignKey("clutch.clutch_id"), nullable=False),
+    Column("inspection_id", Text, nullable=False),
+    Column("cycles", REAL, nullable=False),
+    Column("content", Text, nullable=False),
+    Column("content_sha256", Text, nullable=False),
+    Column("received_at", Text, nullable=False),
+    Column("received_by", Text, nullable=False),
+    Column("state", Text, nullable=False),
+    UniqueConstraint("clutch_id", "inspection_id", name="inspection_once_per_clutch"),
+    Index("inspection_in_order", "clutch_id", "cycles", "inspection_id"),
+)
+
+#: Photographs as they were sent, each once whatever shows it: its name is the hash of its `data`.
+photograph = Table(
+    "photograph",
+    metadata,
+    Column("sha256", Text, primary_key=True),
+    Column("media_type", Text, nullable=False),
+    Column("bytes", Integer, nullable=False),
+    Column("data", LargeBinary, nullable=False),
+)
+
+#: The photographs of an inspection, by `position` in the order in which they came.
+inspection_photograph = Table(
+    "inspection_photograph",
+    metadata,
+    Column("inspection_key", Integer, ForeignKey("inspection.inspection_key"), primary_key=True),
+    Column("sha256", Text, ForeignKey("photograph.sha256"), primary_key=True),
+    Column("position", Integer, nullable=False),
+    Column("received_at", Text, nullable=False),
+    Column("received_by", Text, nullable=False),
+)
+
 #: The audit trail: who changed what of a clutch (`run_id` null) or of one of its runs, when and why, and the revision from
 #: then on. `before` and `after` hold what changed.
 change = Table(

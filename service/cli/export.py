@@ -28,7 +28,7 @@ def export(
     key: Key = None,
     patience: Patience = 10.0,
 ) -> None:
-    """Write a clutch's record, its runs with their raw channels, and all results."""
+    """Write a clutch's record, its runs with their raw channels, all results, and its inspections with their photographs."""
     from service.schemas.clutch import ClutchIn  # start-up time
 
     results = out_folder / "results"
@@ -52,6 +52,7 @@ def export(
                 count += 1
                 progress.advance(task)
             _results(service, clutch, results)
+            _inspections(service, clutch, results)
         out.print(f"{count} runs of {clutch} in {out_folder}, results in {results}", markup=False, soft_wrap=True)
 
 
@@ -81,6 +82,19 @@ def _results(service: Service, clutch: str, folder: Path) -> None:
     _write(folder / "runs.json", list(service.pages(f"{base}/runs")))
     _write(folder / "stribeck.json", list(service.pages(f"{base}/stribeck")))
     _write(folder / "changes.json", list(service.pages(f"{base}/changes")))
+
+
+def _inspections(service: Service, clutch: str, folder: Path) -> None:
+    """The inspections, and each photograph once as `photographs/ITS-HASH.png` or what it is."""
+    base = f"/v1/clutches/{clutch}/inspections"
+    inspections = list(service.pages(base))
+    _write(folder / "inspections.json", inspections)
+    for inspection in inspections:
+        for photograph in inspection["photographs"]:
+            name, kind = photograph["photograph_id"], photograph["media_type"].partition("/")[2]
+            (folder / "photographs").mkdir(exist_ok=True)
+            file = service.file(f"{base}/{inspection['inspection_id']}/photographs/{name}")
+            (folder / "photographs" / f"{name}.{kind}").write_bytes(file)
 
 
 def _write(path: Path, content: object) -> None:

@@ -2,7 +2,7 @@
 
 import typer
 
-from service.cli import diagnose, export, fleet, key, model, score, serve, simulate
+from service.cli import diagnose, export, fleet, inspections, key, model, score, serve, simulate
 from service.cli.answers import degradation, engagement, life, loops
 from service.cli.changes import clutch_changes, run_changes, trail
 from service.cli.changes import runs as run_list
@@ -25,6 +25,8 @@ app.command()(life.life)
 app.command()(degradation.degradation)
 app.command()(loops.loops)
 app.command()(engagement.engagement)
+app.command()(inspections.inspect)
+app.command()(inspections.inspections)
 app.command()(diagnose.diagnose)
 app.command()(model.model)
 app.command()(run_list.runs)

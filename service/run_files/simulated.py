@@ -7,10 +7,12 @@ import numpy as np
 from models.arrays import FloatArray
 from models.records.runs import Plateaus, Record
 from models.rig.simulated_runs import DutyBlock, SimulatedRun
+from models.rig.surface import Surface
 from service.columns import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
 
 #: Significant digits of a value. Chosen: more than a rig's recorder writes.
 _DIGITS = 9
+_MICROMETRES_PER_METRE = 1e6
 _POWERS = np.array([float(f"1e{exponent}") for exponent in range(23)])
 
 
@@ -41,6 +43,17 @@ def simulated_body(run: SimulatedRun) -> dict[str, Any]:
     if run.duty is not None:
         body["duty"] = _duty(run.duty)
     return body
+
+
+def simulated_inspection(surface: Surface, cycles: float) -> dict[str, Any]:
+    """The JSON body of an inspection of a simulated clutch after so many cycles, to three digits as a profilometer's."""
+    roughness = float(f"{surface.roughness * _MICROMETRES_PER_METRE:.3g}")
+    return {
+        "cycles": cycles,
+        "roughness_um": roughness,
+        "skewness": float(f"{surface.skewness:.3g}"),
+        "origin": "simulated",
+    }
 
 
 def _columns(data: Plateaus | Record) -> dict[str, FloatArray | None]:

@@ -37,6 +37,11 @@ MOST_MARKS = 10_000
 MOST_POINTS = 1_000_000
 #: The limits of a criterion: its number of either sign, its place, and how many a clutch may have. Chosen: beyond any rig.
 LARGEST_LIMIT, MOST_CRITERION_PRESSURE_BAR, MOST_SPEED_RPM, MOST_CRITERIA = 1e9, 1e4, 1e6, 8
+#: The skewness of a surface profile, of either sign. Derived: of n heights it is at most √n, and no profile has 1e8 of them.
+LARGEST_SKEWNESS = 1e4
+#: Bytes of a photograph, and photographs of one inspection. Chosen: twice what a camera of 24 megapixels writes as JPEG; a
+#: place on each of eight radii of both sides of three discs.
+MOST_PHOTOGRAPH_BYTES, MOST_PHOTOGRAPHS = 16 << 20, 48
 #: Joint draws of a track's coefficients: beyond what the sample behind it holds they would repeat.
 MOST_DRAWS = 1_000
 #: Blocks of a programme of planned duty.

@@ -18,6 +18,8 @@ from service.schemas.prognosis.quantities import SeriesQuantity
 ClutchId = Annotated[str, Field(description="The clutch's name")]
 RunId = Annotated[str, Field(description="The run's name")]
 DiagnosisId = Annotated[str, Field(description="The diagnosis' name")]
+InspectionId = Annotated[str, Field(description="The inspection's name")]
+PhotographId = Annotated[str, Field(description="The photograph's name, the SHA-256 of its bytes")]
 Points = Annotated[
     int | None,
     Field(

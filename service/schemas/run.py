@@ -127,7 +127,7 @@ class Warned(Answer):
 
 
 class Withdrawal(Schema):
-    """Why a run is withdrawn or restored."""
+    """Why a run or an inspection is withdrawn or restored."""
 
     reason: GivenReason = Field(description="Why")
 
@@ -238,15 +238,21 @@ class Receipt(Answer):
     )
 
 
+Action = Literal[
+    "hold", "confirm", "withdraw", "restore", "correct", "edit", "archive", "unarchive", "adopt", "withdraw_inspection",
+    "restore_inspection",
+]  # fmt: skip
+
+
 class Change(Answer):
     """An entry of the audit trail."""
 
     at: str = Field(description="When; UTC, ISO 8601")
     by: str = Field(description="Who: `key:` with the key's id and note, or `local` where no keys are configured")
-    action: Literal["hold", "confirm", "withdraw", "restore", "correct", "edit", "archive", "unarchive", "adopt"] = (
-        Field(description="What was done; `adopt`: another model is tracked under")
+    action: Action = Field(description="What was done; `adopt`: another model is tracked under")
+    run_id: str | None = Field(
+        description="The run; null where the clutch's record was changed, or an inspection, which `after` names"
     )
-    run_id: str | None = Field(description="The run; null where the clutch's record was changed")
     reason: str = Field(description="Why")
     before: dict[str, Any] = Field(description="What changed, as it was")
     after: dict[str, Any] = Field(description="What changed, as it is from then on")

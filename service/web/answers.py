@@ -71,7 +71,6 @@ async def clutch_answer(
     `name` and `arguments` tell the clutch's answers apart. Where it was made for this revision already, nothing is read.
     """
     revision = _revision(context, clutch_id)
-
     # the revision before the rest is read: what is committed meanwhile is kept under one that nobody asks for again
     key = (clutch_id, name, *arguments)
     held = await kept(context, key, revision, make)
@@ -257,7 +256,7 @@ def described_body(schema: type[BaseModel] | dict[str, Any], example: dict[str, 
 
 
 class Encodings:
-    """Bodies packed by gzip, both ways; any other encoding of a request's body is refused with 415.
+    """Bodies packed by gzip, both ways, unless they are files that are packed already; any other encoding sent is a 415.
 
     An answer's entity tag names its bytes, so the packed ones have a tag of their own: the same with a mark.
     """
@@ -295,5 +294,6 @@ class Encodings:
                     answered["etag"] = tag
             await send(message)
 
-        app = self.app if PARQUET_TYPE in headers.get("accept", "") else self.packing  # it is packed by itself
+        packed_by_itself = PARQUET_TYPE in headers.get("accept", "") or "/photographs/" in scope["path"]
+        app = self.app if packed_by_itself else self.packing
         await app(scope, receive, tagged)

@@ -96,7 +96,7 @@ def _complete(path: str, method: str, operation: Json) -> None:
     if method == "get" and path.startswith("/v1/"):
         responses["304"] = _UNCHANGED
         headers = _READ | (_REVISION if "{clutch_id}/" in path else {}) | (_LINK if "cursor" in names else {})
-        responses["200"].setdefault("headers", {}).update(headers)
+        responses["200"]["headers"] = headers | responses["200"].get("headers", {})
 
 
 def _named(schema: Json, schemas: Json) -> Json:

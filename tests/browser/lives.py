@@ -58,4 +58,7 @@ def demo(http: httpx2.Client, seed: int = 1, last: float = math.inf) -> str:
     for run in sorted([*life, *demo_life.loops(seed, life[-1].cycles)], key=lambda run: run.cycles):
         body = json.dumps(simulated.simulated_body(run)).encode()
         http.post(f"/v1/clutches/{clutch_id}/runs", content=body, headers=JSON).raise_for_status()
+    for cycles, surface in demo_life.inspections(seed, life[-1].cycles):
+        inspection = simulated.simulated_inspection(surface, cycles)
+        http.post(f"/v1/clutches/{clutch_id}/inspections", json=inspection).raise_for_status()
     return clutch_id

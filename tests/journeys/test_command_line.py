@@ -170,7 +170,7 @@ def test_keys_open_and_close_the_service(server: Server) -> None:
     assert ask("GET", keys["read"]) == 401
 
 
-def test_the_demo_shows_a_life_and_leaves_its_dashboard_open_with_friction_loops() -> None:
+def test_the_demo_shows_a_life_and_leaves_its_dashboard_open_with_friction_loops_and_inspections() -> None:
     """Until Ctrl-C. That `--exit` ends by itself instead, `.ci/run` sees before the tests."""
     called = [sys.executable, "-u", "-m", "service.cli.main", "demo", "--no-browser"]
     with subprocess.Popen(called, stdout=subprocess.PIPE, text=True, start_new_session=True) as demo:
@@ -183,6 +183,7 @@ def test_the_demo_shows_a_life_and_leaves_its_dashboard_open_with_friction_loops
                     break
             url = line.rpartition("all clutches: ")[2].strip()
             loops = ONCE.get(f"{url}/v1/clutches/sim-1/loops").json()["items"]
+            inspections = ONCE.get(f"{url}/v1/clutches/sim-1/inspections").json()["items"]
         finally:
             os.killpg(demo.pid, signal.SIGINT)
             rest = demo.communicate(timeout=60)[0]
@@ -195,5 +196,9 @@ def test_the_demo_shows_a_life_and_leaves_its_dashboard_open_with_friction_loops
     assert "Hidden was oil_temperature: found." in diagnosis
     assert len({loop["cycles"] for loop in loops}) == len({loop["pressure_bar"] for loop in loops}) == 3
     assert all(loop["loop_area_nm_m_s"] is not None for loop in loops)
+    roughness = [inspection["roughness_um"] for inspection in inspections]
+    assert roughness == sorted(roughness, reverse=True)
+    assert (roughness[0], roughness[-1]) == (9.52, 1.94), "the reference's linings before and after its tests"
+    assert {inspection["origin"] for inspection in inspections} == {"simulated"}
     assert "closing" in rest
     assert demo.returncode == 0

@@ -15,18 +15,19 @@ def verify(
         int | None, typer.Option(min=0, help="Recompute this many clutches only, drawn anew each time; left out, all")
     ] = None,
 ) -> None:
-    """Check pages, references and schema, every run's content hash, and that all results follow from the runs.
+    """Check pages, references and schema, the hashes of every run, inspection and photograph, and that all results follow.
 
     Prints what is wrong, a line each; ends with 1 where anything is. Also while the service runs, and for a backup.
     """
     from service.background import use_one_blas_thread  # start-up time
     from service.queries.verification.content import check_runs  # start-up time
     from service.queries.verification.results import check_results  # start-up time
+    from service.queries.verification.surfaces import check_inspections  # start-up time
     from storage import clutches  # start-up time
     from storage.engine.integrity import damage, other_schema  # start-up time
 
     use_one_blas_thread()
-    findings = runs = 0
+    findings = runs = inspections = photographs = 0
     earlier: dict[str, int] = {}
 
     def tell(lines: "list[str] | tuple[str, ...]") -> int:
@@ -46,7 +47,9 @@ def verify(
         for clutch_id in ids:
             content = check_runs(opened, clutch_id)
             runs += content.runs
-            findings += tell(content.findings)
+            surfaces = check_inspections(opened, clutch_id)
+            inspections, photographs = inspections + surfaces.inspections, photographs + surfaces.photographs
+            findings += tell(content.findings) + tell(surfaces.findings)
             if clutch_id in chosen and not content.findings:
                 results = check_results(opened, clutch_id)
                 findings += tell(results.findings)
@@ -56,6 +59,8 @@ def verify(
     for version, count in sorted(earlier.items()):
         note = f"{count} results were made by release {version}: they can be computed anew, and may differ (replay)"
         out.print(note, markup=False, soft_wrap=True)
+    if inspections:
+        out.print(f"{inspections} inspections with {photographs} photographs are checked", markup=False, soft_wrap=True)
     summary = (
         f"{runs} runs of {len(ids)} clutches are checked, {len(chosen)} clutches computed anew: {findings} findings"
     )

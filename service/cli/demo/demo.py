@@ -44,6 +44,7 @@ def demo(
             if exit_at_end:
                 return
             _loops(Service(http=http), seed, cycles)
+            _inspections(Service(http=http), seed, cycles)
         page = f"{url}/clutches/sim-{seed}"
         with suppress(KeyboardInterrupt):
             out.print(
@@ -97,6 +98,16 @@ def _loops(service: Service, seed: int, last: float) -> None:
     out.print("\nDynamic tests of the same life follow, for the friction loops on the dashboard.")
     for run in life.loops(seed, last):
         service.post(f"/v1/clutches/sim-{seed}/runs", json.dumps(simulated.simulated_body(run)).encode())
+
+
+def _inspections(service: Service, seed: int, last: float) -> None:
+    """The roughness and skewness of the lining at some states of the same life; a simulated one has no photographs."""
+    from service.cli.demo import life  # start-up time
+    from service.run_files import simulated  # start-up time
+
+    for cycles, surface in life.inspections(seed, last):
+        body = json.dumps(simulated.simulated_inspection(surface, cycles)).encode()
+        service.post(f"/v1/clutches/sim-{seed}/inspections", body)
 
 
 def _diagnosed(service: Service, clutch_id: str, end: float | None) -> None:

@@ -25,6 +25,7 @@ from models.rig.recorder import Recorder
 from models.rig.sampled import DynamicTest, sampled_test
 from models.rig.simulated_runs import DutyBlock, RunKind, SimulatedRun
 from models.rig.stationary import Sensor
+from models.rig.surface import Surface, surface
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch
 
 #: The demo ends at this share of the mean COF when new. Chosen: a little after the end of life at 0.5.
@@ -72,6 +73,14 @@ def loops(seed: int, last: float) -> Iterator[SimulatedRun]:
             record=warmed(record, truth, cycles),
             wear=cycles,
         )
+
+
+def inspections(seed: int, last: float) -> Iterator[tuple[int, Surface]]:
+    """Duty cycles up to `last` and the friction surface then, where that life's dynamic tests are made and near its end."""
+    truth = campaign.simulated_clutch(seed)
+    for cycles in sorted({*_LOOPS_AT, int(last)}):
+        if cycles <= last:
+            yield cycles, surface(truth, cycles)
 
 
 def _engagement(seed: int, truth: SimulatedClutch, block: DutyBlock, cycles: int) -> Record:

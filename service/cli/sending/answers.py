@@ -103,6 +103,11 @@ def csv(response: httpx2.Response) -> str | None:
     return response.text if response.headers.get("Content-Type", "").startswith("text/csv") else None
 
 
+def image(response: httpx2.Response) -> bytes | None:
+    """The file of an answer that is a photograph; None where it is none."""
+    return response.content if response.headers.get("Content-Type", "").startswith("image/") else None
+
+
 def problem(response: httpx2.Response) -> dict[str, Any]:
     """The problem report of a refusal, or its text as one."""
     report = content(response)

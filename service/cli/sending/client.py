@@ -13,6 +13,7 @@ from service.cli.sending.answers import (
     ServiceAwayError,
     content,
     csv,
+    image,
     passing,
     perhaps_stored,
     problem,
@@ -78,6 +79,14 @@ class Service:
         if parameters is None:
             return self._answer("POST", path, file=file, wanted=wanted, headers=JSON)
         return self._answer("POST", path, file=file, wanted=wanted, params=dict(parameters))
+
+    def post_photograph(self, path: str, file: Path, media_type: str) -> dict[str, Any]:
+        """The answer to a photograph's file; raises as `post` does."""
+        return self._answer("POST", path, file=file, headers={"Content-Type": media_type})
+
+    def file(self, path: str) -> bytes:
+        """The file that answers a GET; raises as `post` does."""
+        return self._repeated("GET", path, image)
 
     def get(self, path: str, **params: Any) -> dict[str, Any]:
         """The answer to a GET; raises as `post` does."""

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import Response
 
 from service.lists import ALL_ITEMS, from_cursor, to_cursor
-from service.queries import degradation, fleet_priors, runs, scores, series, stribeck, surfaces
+from service.queries import degradation, fleet_priors, inspections, runs, scores, series, stribeck, surfaces
 from service.queries.life import remaining_life
 from service.schemas.curves import LoopItem, SeriesItem
 from service.schemas.parameters import ClutchId, LifeNumber, Quantity, State, TrackedQuantity
@@ -56,6 +56,20 @@ async def list_changes_csv(
         return runs.trail_rows(items), to_cursor(place)
 
     return await clutch_table(request, context, clutch_id, "changes", make, runs.TRAIL_COLUMNS, limit, after)
+
+
+@router.get("/inspections.csv", response_class=Response, responses=READING)
+async def list_inspections_csv(
+    request: Request, context: Reader, clutch_id: ClutchId, limit: Whole = ALL_ITEMS, cursor: Cursor = None
+) -> Response:
+    """Inspections by cycles as CSV; photographs are counted."""
+    after = from_cursor(cursor)
+
+    def make() -> RowsAndNext:
+        items, place = inspections.page(context.database, clutch_id, limit=limit, after=after)
+        return inspections.rows(items), to_cursor(place)
+
+    return await table(request, inspections.COLUMNS, make)
 
 
 @router.get("/remaining-useful-life.csv", response_class=Response, responses=READING)

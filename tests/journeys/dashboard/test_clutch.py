@@ -36,6 +36,8 @@ CHARTS = {
     "lag-pressure": "Lag over pressure",
     "engagement-indicators": "An indicator over cycles",
     "engagement-trace": "An engagement against the model",
+    "roughness": "Roughness Ra",
+    "skewness": "Skewness Rsk",
 }
 
 
@@ -96,8 +98,8 @@ def test_dark_and_light_are_chosen_and_the_charts_follow(browser: Browser, watch
     for theme, dark in (("light", False), ("dark", True), ("system", False)):
         button.click()
         assert button.inner_text() == f"Theme: {theme}"
-        for name in ("fan", "areas") if theme == "dark" else ("fan",):
-            chart = drawn(page, {"areas": "loop-areas"}.get(name, name))
+        for name in ("fan", "roughness") if theme == "dark" else ("fan",):
+            chart = drawn(page, name)
             page.wait_for_timeout(300)
             found = seen(browser, chart.locator(".plot").screenshot())
             assert (found.is_chart, found.is_dark) == (True, dark), (theme, name)

@@ -8,7 +8,7 @@ import pytest
 from service.dashboard import assets
 
 #: In reading order: a chapter imports itself and chapters before it; the two pages know nothing of each other.
-CHAPTERS = ("shared", "charts", "quantities", "sending", "diagnosis", "engagements", "clutch", "fleet")
+CHAPTERS = ("shared", "charts", "quantities", "sending", "diagnosis", "engagements", "inspections", "clutch", "fleet")
 #: The file of each chapter to open first; it says what the chapter is in three lines.
 FIRST = {
     "shared": "api.js",
@@ -17,6 +17,7 @@ FIRST = {
     "sending": "sending.js",
     "diagnosis": "diagnosis.js",
     "engagements": "engagements.js",
+    "inspections": "inspections.js",
     "clutch": "clutch.js",
     "fleet": "fleet.js",
 }

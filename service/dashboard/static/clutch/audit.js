@@ -22,6 +22,8 @@ const ACTIONS = {
   archive: "Archived",
   unarchive: "Brought back",
   adopt: "Model adopted",
+  withdraw_inspection: "Inspection withdrawn",
+  restore_inspection: "Inspection restored",
 };
 
 export class AuditTrail {

@@ -9,7 +9,7 @@ import { fixed, kindName } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { isCorrected } from "./states.js";
 
-/** @import { Receipt } from "../shared/types.js" */
+/** @import { InspectionOut, Receipt } from "../shared/types.js" */
 
 /** @typedef {"confirm" | "correct" | "withdraw" | "restore"} RunAction */
 /** @typedef {{ text: string, undo: (() => Promise<Done>) | null }} Done what was done, in a sentence, and how it is undone */
@@ -170,6 +170,44 @@ export const askUndo = (run) =>
     action: "Undo",
     send: (reason) => correct(run, run.sent_cycles, reason),
   });
+
+/**
+ * Withdraw an inspection, or restore it where it was withdrawn.
+ * @param {InspectionOut} inspection
+ * @returns {Promise<Done | null>}
+ */
+export function askInspection(inspection) {
+  const [action, title] =
+    inspection.state === "withdrawn"
+      ? ["restore", "Restore this inspection"]
+      : ["withdraw", "Withdraw this inspection"];
+  return ask({
+    title,
+    lines: [
+      h("p", {}, h("b", {}, `Inspection at ${fixed(inspection.cycles)} cycles`)),
+      action === "withdraw"
+        ? "It leaves the charts and stays in the table. Nothing is deleted: it can be restored."
+        : "It is in the charts again, with its photographs.",
+    ],
+    action: action === "withdraw" ? "Withdraw" : "Restore",
+    send: (reason) => changeInspection(inspection, action, reason),
+  });
+}
+
+/**
+ * @param {InspectionOut} inspection
+ * @param {string} action `withdraw` or `restore`
+ * @param {string} reason
+ * @returns {Promise<Done>}
+ */
+async function changeInspection(inspection, action, reason) {
+  const address = `${clutchPath(inspection.clutch_id)}/inspections/${inspection.inspection_id}/${action}`;
+  /** @type {{ body: InspectionOut }} */
+  const { body } = await sendJson("POST", address, { reason });
+  const [past, back] = action === "withdraw" ? ["withdrawn", "restore"] : ["restored", "withdraw"];
+  const text = `The inspection at ${fixed(body.cycles)} cycles is ${past}.`;
+  return { text, undo: () => changeInspection(body, back, `that it was ${past} is undone`) };
+}
 
 /**
  * Archive a clutch, or bring it back.

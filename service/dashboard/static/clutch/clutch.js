@@ -4,6 +4,7 @@
 // warnings and changes) and report.js (the printed page).
 
 import { Diagnosis } from "../diagnosis/diagnosis.js";
+import { Inspections } from "../inspections/inspections.js";
 import { criteriaTable } from "../quantities/criteria.js";
 import { sender } from "../sending/sending.js";
 import { clutchPath, Problem, read, readAll } from "../shared/api.js";
@@ -27,6 +28,8 @@ const ID = decodeURIComponent(location.pathname.split("/").at(-1) ?? "");
 const PATH = clutchPath(ID);
 const INTERVAL = 2000; // ms
 const SECTIONS = ["life", "diagnosis", "stribeck", "parameters", "shudder", "loops", "lag", "engagements", "runs"];
+/** @type {Receipt[]} before the runs are read */
+const NO_EVENTS = [];
 const fileName = () => ID.replaceAll(/[^\w.-]+/g, "_");
 
 /**
@@ -59,6 +62,7 @@ async function poll() {
   }
   due ||= answer.body !== latest; // until all of it is read: an error midway is made good at the next poll
   latest = answer.body;
+  byId("inspections").hidden = false;
   if (due) {
     await refresh(answer.body);
     due = false;
@@ -66,6 +70,7 @@ async function poll() {
     await parts.diagnosis.poll();
     drawHead();
   }
+  await inspections.poll(shown?.events ?? NO_EVENTS);
 }
 
 /**
@@ -205,6 +210,7 @@ byId("print").addEventListener("click", () => {
   print();
 });
 const store = new Stored(ID, () => live.now());
+const inspections = new Inspections(within("inspections", ".body"), ID, fileName, store.change);
 const live = new Live(withKey(poll), liveBar(byId("live")), INTERVAL);
 sender(byId("send"), { clutch: ID, clutches: () => [], sent: () => live.now() });
 live.start();

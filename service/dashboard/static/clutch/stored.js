@@ -3,13 +3,13 @@
 
 import { byId, h, within } from "../shared/dom.js";
 import { AuditTrail } from "./audit.js";
-import { askArchive, askRun, askUndo } from "./changes.js";
+import { askArchive, askInspection, askRun, askUndo } from "./changes.js";
 import { showDone } from "./done.js";
 import { heldView } from "./held.js";
 import { RunList } from "./runs.js";
 import { lifeWarnings, warningsView } from "./warnings.js";
 
-/** @import { ClutchOut, Receipt, StribeckItem, Warned } from "../shared/types.js" */
+/** @import { ClutchOut, InspectionOut, Receipt, StribeckItem, Warned } from "../shared/types.js" */
 /** @import { RunAction } from "./changes.js" */
 
 export class Stored {
@@ -30,6 +30,9 @@ export class Stored {
 
   /** @type {(run: Receipt) => Promise<void>} */
   undo = async (run) => showDone(await askUndo(run), this.refresh);
+
+  /** @type {(inspection: InspectionOut) => Promise<void>} */
+  change = async (inspection) => showDone(await askInspection(inspection), this.refresh);
 
   /** @param {boolean} archived what the clutch becomes */
   async archive(archived) {

@@ -151,6 +151,12 @@ export const sendJson = (method, path, value, headers = {}) =>
  */
 export const readText = async (path) => (await request(path)).text();
 
+/**
+ * A file that never changes under its address: the browser keeps it.
+ * @param {string} path
+ */
+export const readFile = async (path) => (await request(path, { cache: "default" })).blob();
+
 /** @param {string} id */
 export const clutchPath = (id) => `/v1/clutches/${encodeURIComponent(id)}`;
 

@@ -395,6 +395,25 @@ export interface StationaryChannels {
 
 export type Channels = StationaryChannels;
 
+// --- service/schemas/inspection.py
+
+export interface PhotographOut {
+  photograph_id: string;
+}
+
+export interface InspectionOut {
+  clutch_id: string;
+  inspection_id: string;
+  cycles: number;
+  performed_at: string | null;
+  lining: string;
+  roughness_um: number | null;
+  skewness: number | null;
+  note: string;
+  state: "accepted" | "withdrawn";
+  photographs: PhotographOut[];
+}
+
 // --- service/schemas/diagnosis.py; null is what is not known, or not yet
 
 export interface Amplitude {

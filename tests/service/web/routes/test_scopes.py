@@ -32,11 +32,14 @@ _READ = (
     "", "/changes", "/changes.csv", "/runs", "/runs.csv", "/runs/{run_id}", "/remaining-useful-life",
     "/remaining-useful-life.csv", "/degradation", "/degradation.csv", "/stribeck", "/stribeck.csv", "/engagement",
     "/surfaces", "/surfaces.csv", "/scores", "/scores.csv", "/loops", "/loops.csv", "/series", "/series.csv", "/diagnoses",
-    "/diagnoses/{diagnosis_id}", "/model",
+    "/diagnoses/{diagnosis_id}", "/model", "/inspections", "/inspections.csv", "/inspections/{inspection_id}",
+    "/inspections/{inspection_id}/photographs/{photograph_id}",
 )  # fmt: skip
 OF_ONE: dict[tuple[str, str], Scope] = {("GET", f"{CLUTCH}{path}"): "read" for path in _READ}
 OF_ONE |= {("POST", f"{CLUTCH}/remaining-useful-life/forecast"): "read"}
-OF_ONE |= {("POST", f"{CLUTCH}/{path}"): "ingest" for path in ("runs", "runs/file", "diagnoses")}
+OF_ONE |= {("POST", f"{CLUTCH}/{path}"): "ingest" for path in ("runs", "runs/file", "diagnoses", "inspections")}
+OF_ONE |= {("POST", f"{CLUTCH}/inspections/{{inspection_id}}/photographs"): "ingest"}
+OF_ONE |= {("POST", f"{CLUTCH}/inspections/{{inspection_id}}/{change}"): "admin" for change in ("withdraw", "restore")}
 OF_ONE |= {("POST", f"{CLUTCH}/runs/{{run_id}}/{change}"): "admin" for change in ("withdraw", "restore", "confirm")}
 OF_ONE |= {
     ("PATCH", CLUTCH): "admin",

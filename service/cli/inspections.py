@@ -1,0 +1,88 @@
+"""`clutchlife inspect`, `inspections`: what was found on a clutch's friction surface, sent and listed."""
+
+import json
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from service.cli.answers.tables import number, show_table
+from service.cli.connection import service_at
+from service.cli.options import EX_USAGE, URL, ClutchId, Json, Key, Patience, Url, fail, out
+
+#: The media type of a photograph by its file's suffix.
+MEDIA_TYPES = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".webp": "image/webp"}
+#: The note of an inspection that has nothing but photographs.
+_PHOTOGRAPHS_ONLY = "photographs"
+_COLUMNS = ("inspection", "lining", "state", "cycles", "R_a, µm", "R_sk", "photographs")
+
+
+def inspect(
+    clutch: ClutchId,
+    cycles: Annotated[float, typer.Option(min=0, help="Duty cycles since new when the surface was inspected")],
+    ra: Annotated[float | None, typer.Option("--ra", help="Roughness R_a of the surface profile [µm]")] = None,
+    rsk: Annotated[float | None, typer.Option("--rsk", help="Skewness R_sk of the surface profile")] = None,
+    lining: Annotated[str, typer.Option(help="The disc, its side, or the place on its lining")] = "",
+    note: Annotated[str, typer.Option(help="A remark")] = "",
+    at: Annotated[datetime | None, typer.Option(help="When it was inspected, on this machine's clock")] = None,
+    photo: Annotated[
+        list[Path] | None, typer.Option("--photo", help="A photograph, PNG, JPEG or WebP; may be repeated")
+    ] = None,
+    url: Url = URL,
+    key: Key = None,
+    patience: Patience = 10.0,
+) -> None:
+    """Send what was found on a clutch's friction surface: roughness, skewness, a note, photographs. Safe to repeat."""
+    photographs = {path: _media_type(path) for path in photo or []}
+    if not note and photographs and ra is None and rsk is None:
+        note = _PHOTOGRAPHS_ONLY
+    body = {"cycles": cycles, "roughness_um": ra, "skewness": rsk, "lining": lining, "note": note}
+    if at is not None:
+        body["performed_at"] = at.astimezone().isoformat()
+    with service_at(url, key, patience) as service:
+        address = f"/v1/clutches/{clutch}/inspections"
+        inspection = service.post(address, json.dumps(body).encode())
+        address = f"{address}/{inspection['inspection_id']}"
+        for path, media_type in photographs.items():
+            service.post_photograph(f"{address}/photographs", path, media_type)
+        _show([service.get(address)])
+
+
+def inspections(
+    clutch: ClutchId, as_json: Json = False, url: Url = URL, key: Key = None, patience: Patience = 10.0
+) -> None:
+    """List a clutch's inspections by cycles."""
+    with service_at(url, key, patience) as service:
+        items = list(service.pages(f"/v1/clutches/{clutch}/inspections"))
+    if as_json:
+        out.print_json(json.dumps(items))
+    elif items:
+        _show(items)
+    else:
+        out.print(f"{clutch} has no inspections", markup=False)
+
+
+def _media_type(path: Path) -> str:
+    if path.suffix.lower() not in MEDIA_TYPES:
+        fail(f"a photograph ends in {', '.join(MEDIA_TYPES)}, got {path.name!r}", EX_USAGE)
+    if not path.is_file():
+        fail(f"the photograph {path} is not there", EX_USAGE)
+    return MEDIA_TYPES[path.suffix.lower()]
+
+
+def _show(items: list[dict[str, Any]]) -> None:
+    show_table(_COLUMNS, map(_row, items), left=3)
+
+
+def _row(item: Mapping[str, Any]) -> list[str]:
+    return [
+        item["inspection_id"],
+        item["lining"] or "-",
+        item["state"],
+        f"{item['cycles']:,.0f}",
+        number(item["roughness_um"]),
+        number(item["skewness"]),
+        str(len(item["photographs"])),
+    ]

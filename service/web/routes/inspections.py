@@ -1,0 +1,174 @@
+"""Inspections of a clutch's friction surface: posted, listed, withdrawn; and photographs as their files."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from fastapi import APIRouter, Request
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import Response
+
+from service.errors import TooLargeError, UnsupportedMediaTypeError
+from service.lists import from_cursor, page
+from service.queries import inspections
+from service.queries.cache import to_json
+from service.run_files.json_run import checked
+from service.schemas.inspection import InspectionIn, InspectionOut, InspectionPage, MediaType, PhotographOut
+from service.schemas.limits import MOST_PHOTOGRAPH_BYTES
+from service.schemas.parameters import ClutchId, InspectionId, PhotographId
+from service.schemas.run import Withdrawal
+from service.web.answers import JSON_TYPE, answer, described_body, json_body, now, unchanged
+from service.web.auth import Admin, Ingester, Reader, name_of_caller
+from service.web.context import Context, Cursor, Limit
+from service.web.limits import USUAL_ITEMS
+from service.web.problems import CHANGING, READING, SENDING
+from service.workflows import inspect_clutch
+
+router = APIRouter(prefix="/v1/clutches/{clutch_id}/inspections", tags=["inspections"])
+
+#: The types of a photograph's file by what a request calls them.
+_MEDIA_TYPES: dict[str, MediaType] = {"image/png": "image/png", "image/jpeg": "image/jpeg", "image/webp": "image/webp"}
+_FILES = {name: {"schema": {"type": "string", "format": "binary"}} for name in _MEDIA_TYPES}
+#: What a photograph is served with: it is never another, and whatever is in it, a browser runs nothing of it.
+_OF_A_FILE = {
+    "Cache-Control": "private, max-age=31536000, immutable",
+    "Content-Security-Policy": "default-src 'none'; sandbox",
+}
+_KEPT = {"description": "Keep it: under this address it is never another", "schema": {"type": "string"}}
+_READING_FILE = READING | {
+    200: {"content": _FILES, "headers": {"Cache-Control": _KEPT}, "description": "The file as it was sent"}
+}
+_SENDING_FILE = CHANGING | {200: {"model": PhotographOut, "description": "The inspection has this photograph already"}}
+
+EXAMPLE = {
+    "cycles": 11000,
+    "performed_at": "2026-11-02T08:00:00+01:00",
+    "lining": "disc 2, side A",
+    "roughness_um": 1.94,
+    "skewness": -3.4,
+    "note": "smooth and flat, pores closed",
+}
+
+
+@router.post(
+    "",
+    status_code=201,
+    response_model=InspectionOut,
+    responses=SENDING | {200: {"model": InspectionOut, "description": "The same inspection again"}},
+    openapi_extra=described_body(InspectionIn, EXAMPLE),
+)
+async def post_inspection(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
+    """Post what was found on the friction surface after so many cycles: roughness R_a, skewness R_sk, a note."""
+    sent = checked(InspectionIn, await json_body(request))
+    store = partial(inspect_clutch.inspect, context.database, clutch_id, sent)
+    inspection, new = await run_in_threadpool(store, by=name_of_caller(request), at=now())
+    address = f"/v1/clutches/{clutch_id}/inspections/{inspection['inspection_id']}"
+    return _stored(inspection, address, new=new)
+
+
+@router.get("", response_model=InspectionPage, responses=READING)
+async def list_inspections(
+    request: Request, context: Reader, clutch_id: ClutchId, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
+) -> Response:
+    """Inspections by cycles."""
+    after = from_cursor(cursor)
+    return await answer(request, lambda: page(*inspections.page(context.database, clutch_id, limit=limit, after=after)))
+
+
+@router.get("/{inspection_id}", response_model=InspectionOut, responses=READING)
+async def read_inspection(
+    request: Request, context: Reader, clutch_id: ClutchId, inspection_id: InspectionId
+) -> Response:
+    """One inspection."""
+    return await answer(request, lambda: inspections.look_up(context.database, clutch_id, inspection_id))
+
+
+@router.post(
+    "/{inspection_id}/withdraw",
+    response_model=InspectionOut,
+    responses=CHANGING,
+    openapi_extra=described_body(Withdrawal, {"reason": "it was the disc of the bench beside it"}),
+)
+async def withdraw_inspection(
+    request: Request, context: Admin, clutch_id: ClutchId, inspection_id: InspectionId
+) -> Response:
+    """Withdraw an inspection. It stays stored and listed, with its photographs."""
+    return await _changed(inspect_clutch.withdraw, request, context, clutch_id, inspection_id)
+
+
+@router.post(
+    "/{inspection_id}/restore",
+    response_model=InspectionOut,
+    responses=CHANGING,
+    openapi_extra=described_body(Withdrawal, {"reason": "it was this disc after all"}),
+)
+async def restore_inspection(
+    request: Request, context: Admin, clutch_id: ClutchId, inspection_id: InspectionId
+) -> Response:
+    """Take a withdrawal back."""
+    return await _changed(inspect_clutch.restore, request, context, clutch_id, inspection_id)
+
+
+@router.post(
+    "/{inspection_id}/photographs",
+    status_code=201,
+    response_model=PhotographOut,
+    responses=_SENDING_FILE,
+    openapi_extra={"requestBody": {"required": True, "content": _FILES}},
+)
+async def post_photograph(
+    request: Request, context: Ingester, clutch_id: ClutchId, inspection_id: InspectionId
+) -> Response:
+    """Add a photograph to an inspection: the file itself as the body, PNG, JPEG or WebP, 16 MiB at most."""
+    media_type = _media_type(request)
+    add = partial(inspect_clutch.add_photograph, context.database, clutch_id, inspection_id, await _file(request))
+    photograph, new = await run_in_threadpool(add, media_type, by=name_of_caller(request), at=now())
+    address = f"/v1/clutches/{clutch_id}/inspections/{inspection_id}/photographs/{photograph['photograph_id']}"
+    return _stored(photograph, address, new=new)
+
+
+@router.get("/{inspection_id}/photographs/{photograph_id}", response_class=Response, responses=_READING_FILE)
+async def read_photograph(
+    request: Request, context: Reader, clutch_id: ClutchId, inspection_id: InspectionId, photograph_id: PhotographId
+) -> Response:
+    """The file of a photograph, as it was sent."""
+    wanted = (context.database, clutch_id, inspection_id, photograph_id)
+    media_type = await run_in_threadpool(inspections.media_type, *wanted)
+    headers = _OF_A_FILE | {"ETag": f'"{photograph_id}"'}
+    if held := unchanged(request, headers):
+        return held
+    content = await run_in_threadpool(inspections.photograph, *wanted)
+    return Response(content=content, media_type=media_type, headers=headers)
+
+
+def _media_type(request: Request) -> MediaType:
+    """The type of the body. Raises UnsupportedMediaTypeError on any but a photograph's."""
+    sent = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if sent not in _MEDIA_TYPES:
+        raise UnsupportedMediaTypeError(f"send a photograph as {', '.join(_MEDIA_TYPES)}, not as {sent[:80]!r}")
+    return _MEDIA_TYPES[sent]
+
+
+async def _file(request: Request) -> bytes:
+    """The body; no more of it is kept than a photograph may have. Raises TooLargeError."""
+    content = bytearray()
+    async for piece in request.stream():
+        content += piece
+        if len(content) > MOST_PHOTOGRAPH_BYTES:
+            raise TooLargeError(f"a photograph may have at most {MOST_PHOTOGRAPH_BYTES} bytes")
+    return bytes(content)
+
+
+def _stored(stored: dict[str, Any], address: str, *, new: bool) -> Response:
+    status = 201 if new else 200
+    return Response(content=to_json(stored), status_code=status, media_type=JSON_TYPE, headers={"Location": address})
+
+
+async def _changed(
+    change: Callable[..., dict[str, Any]], request: Request, context: Context, clutch_id: str, inspection_id: str
+) -> Response:
+    """The inspection after a change."""
+    wanted = checked(Withdrawal, await json_body(request))
+    made = partial(change, reason=wanted.reason, by=name_of_caller(request), at=now())
+    inspection = await run_in_threadpool(made, context.database, clutch_id, inspection_id)
+    return Response(content=to_json(inspection), media_type=JSON_TYPE)

@@ -1,0 +1,134 @@
+"""An inspection of a clutch is stored, photographs are added to it, and it is withdrawn where it was a slip.
+
+No track and no prediction uses inspections: nothing is computed anew. Nothing is deleted either.
+"""
+
+import hashlib
+from typing import Any
+
+from sqlalchemy import Connection
+
+from service import records
+from service.errors import FieldError, InvalidError, NotPossibleNowError
+from service.schemas.clutch import content_of
+from service.schemas.inspection import InspectionIn, MediaType
+from service.schemas.limits import MOST_PHOTOGRAPHS
+from service.stored_inspections import answers, inspection, photograph_answer
+from storage import changes, clutches, inspections
+from storage.changes import NewChange
+from storage.engine.database import Database
+from storage.inspections import InspectionRow, NewInspection, PhotographRow
+from storage.runs import ACCEPTED, WITHDRAWN
+
+#: The first characters of the content's hash that name an inspection. Chosen: as a diagnosis' name.
+_ID_CHARACTERS = 16
+
+
+def inspect(database: Database, clutch_id: str, sent: InspectionIn, *, by: str, at: str) -> tuple[dict[str, Any], bool]:
+    """Store an inspection; returns it as it is answered, and whether it is new: the same content is one inspection.
+
+    Raises NotFoundError. An archived clutch takes inspections too: it may be taken apart when all tests are made.
+    """
+    content = sent.model_dump(mode="json")
+    content_sha256 = content_of(content)
+    with database.writing() as connection:
+        records.clutch(connection, clutch_id)
+        row = NewInspection(
+            clutch_id=clutch_id,
+            inspection_id=content_sha256[:_ID_CHARACTERS],
+            cycles=sent.cycles,
+            content=content,
+            content_sha256=content_sha256,
+            received_at=at,
+            received_by=by,
+        )
+        new = inspections.get(connection, clutch_id, row.inspection_id) is None
+        if new:
+            inspections.insert(connection, row)
+        return _answer(connection, clutch_id, row.inspection_id), new
+
+
+def add_photograph(
+    database: Database, clutch_id: str, inspection_id: str, content: bytes, media_type: MediaType, *, by: str, at: str
+) -> tuple[dict[str, Any], bool]:
+    """Add a photograph to an inspection; returns it as it is answered, and whether the inspection had it not yet.
+
+    Raises NotFoundError, InvalidError where the content is not of that type, NotPossibleNowError where the inspection has
+    as many photographs as it may have.
+    """
+    _require_type(content, media_type)
+    row = PhotographRow(
+        sha256=hashlib.sha256(content).hexdigest(),
+        media_type=media_type,
+        bytes=len(content),
+        received_at=at,
+        received_by=by,
+    )
+    with database.writing() as connection:
+        key = inspection(connection, clutch_id, inspection_id).inspection_key
+        stored = inspections.photographs(connection, [key])[key]
+        for photograph in stored:
+            if photograph.sha256 == row.sha256:
+                return photograph_answer(photograph), False
+        if len(stored) >= MOST_PHOTOGRAPHS:
+            raise NotPossibleNowError(
+                f"inspection {inspection_id!r} has {MOST_PHOTOGRAPHS} photographs, the most it may"
+            )
+        inspections.attach(connection, key, row, content, position=len(stored))
+        return photograph_answer(row), True
+
+
+def _require_type(content: bytes, media_type: MediaType) -> None:
+    """Raise InvalidError where a file does not begin as files of its type do."""
+    begins = {
+        "image/png": content.startswith(b"\x89PNG\r\n\x1a\n"),
+        "image/jpeg": content.startswith(b"\xff\xd8\xff"),
+        "image/webp": content.startswith(b"RIFF") and content[8:12] == b"WEBP",
+    }
+    if not begins[media_type]:
+        shown = content[:12].hex(" ") or "nothing"
+        message = f"the body must begin as a file of type {media_type} does, got {shown}"
+        raise InvalidError(message, errors=[FieldError(pointer="", code="media_type", message=message, value=shown)])
+
+
+def withdraw(
+    database: Database, clutch_id: str, inspection_id: str, *, reason: str, by: str, at: str
+) -> dict[str, Any]:
+    """Withdraw an inspection; returns it as it is answered. Raises NotFoundError."""
+    return _change(database, clutch_id, inspection_id, changes.WITHDRAW_INSPECTION, WITHDRAWN, reason, by, at)
+
+
+def restore(database: Database, clutch_id: str, inspection_id: str, *, reason: str, by: str, at: str) -> dict[str, Any]:
+    """Take a withdrawal back; returns the inspection as it is answered. Raises NotFoundError."""
+    return _change(database, clutch_id, inspection_id, changes.RESTORE_INSPECTION, ACCEPTED, reason, by, at)
+
+
+def _change(
+    database: Database, clutch_id: str, inspection_id: str, action: str, state: str, reason: str, by: str, at: str
+) -> dict[str, Any]:
+    """What is so already is not changed; else the audit trail says it, and the clutch's revision moves on with it."""
+    with database.writing() as connection:
+        row = inspection(connection, clutch_id, inspection_id)
+        if row.state != state:
+            inspections.set_state(connection, row.inspection_key, state)
+            change = NewChange(
+                clutch_id=clutch_id,
+                run_id=None,
+                at=at,
+                by=by,
+                action=action,
+                reason=reason,
+                before=_summary(row, row.state),
+                after=_summary(row, state),
+                revision=clutches.bump_revision(connection, clutch_id),
+            )
+            changes.insert(connection, change)
+        return _answer(connection, clutch_id, inspection_id)
+
+
+def _summary(row: InspectionRow, state: str) -> dict[str, Any]:
+    return {"inspection_id": row.inspection_id, "cycles": row.content["cycles"], "state": state}
+
+
+def _answer(connection: Connection, clutch_id: str, inspection_id: str) -> dict[str, Any]:
+    return answers(connection, [inspection(connection, clutch_id, inspection_id)])[0]

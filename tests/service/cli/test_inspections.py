@@ -1,0 +1,81 @@
+"""Inspections in the terminal: sent with their photographs, listed, exported; the service is in this process."""
+
+import json
+from collections.abc import Callable
+from contextlib import nullcontext
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+from typer.testing import CliRunner
+
+from service.cli import connection
+from service.cli.main import app
+from tests.service.web.routes.surfaces import png, sha256
+from tests.support import stationary
+
+Terminal = Callable[..., str]
+LIST = "/v1/clutches/c1/inspections"
+
+
+@pytest.fixture
+def terminal(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> Terminal:
+    """A terminal whose service knows a clutch."""
+    monkeypatch.setattr(connection, "connect", lambda *_, **__: nullcontext(client))
+
+    def typed(*arguments: str | Path, code: int = 0) -> str:
+        done = CliRunner().invoke(app, list(map(str, arguments)))
+        assert done.exit_code == code, done.output
+        return done.output
+
+    return typed
+
+
+def test_an_inspection_is_sent_with_its_photographs_and_repeated_safely(
+    terminal: Terminal, client: TestClient, tmp_path: Path
+) -> None:
+    (tmp_path / "a.png").write_bytes(png(1))
+    (tmp_path / "b.PNG").write_bytes(png(2))
+    inspect = ("inspect", "c1", "--cycles", 11000, "--ra", 1.94, "--rsk", -3.4, "--lining", "side A")
+    photographs = ("--at", "2026-11-02T08:00:00", "--photo", tmp_path / "a.png", "--photo", tmp_path / "b.PNG")
+    for _ in range(2):
+        shown = terminal(*inspect, *photographs)
+        assert all(words in shown for words in ("11,000", "side A", "1.94", "-3.4", "accepted"))
+        (stored,) = client.get(LIST).json()["items"]
+        assert [photograph["photograph_id"] for photograph in stored["photographs"]] == [sha256(png(1)), sha256(png(2))]
+        assert stored["performed_at"].startswith("2026-11-02T08:00:00")
+    assert stored["inspection_id"] in terminal("inspections", "c1")
+    assert json.loads(terminal("inspections", "c1", "--json")) == [stored]
+
+
+def test_a_photograph_alone_is_an_inspection_too(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
+    assert "c1 has no inspections" in terminal("inspections", "c1")
+    (tmp_path / "a.png").write_bytes(png())
+    terminal("inspect", "c1", "--cycles", 0, "--photo", tmp_path / "a.png")
+    (stored,) = client.get(LIST).json()["items"]
+    assert (stored["note"], len(stored["photographs"])) == ("photographs", 1)
+
+
+def test_what_is_no_photograph_is_said_before_anything_is_sent(
+    terminal: Terminal, client: TestClient, tmp_path: Path
+) -> None:
+    (tmp_path / "a.gif").write_bytes(b"GIF89a")
+    inspect = ("inspect", "c1", "--cycles", 0, "--ra", 9.5, "--photo")
+    assert "a photograph ends in .png" in terminal(*inspect, tmp_path / "a.gif", code=64)
+    assert "is not there" in terminal(*inspect, tmp_path / "b.png", code=64)
+    assert "give roughness_um" in terminal("inspect", "c1", "--cycles", 0, code=65)
+    assert client.get(LIST).json()["items"] == []
+
+
+def test_an_export_holds_inspections_and_each_photograph_as_it_was_sent(
+    terminal: Terminal, client: TestClient, tmp_path: Path
+) -> None:
+    (tmp_path / "a.png").write_bytes(png())
+    for cycles in (0, 1000):
+        terminal("inspect", "c1", "--cycles", cycles, "--ra", 9.5, "--photo", tmp_path / "a.png")
+    assert client.post("/v1/clutches/c1/runs", json=stationary(0)).status_code == 201
+    terminal("export", "c1", "--out", tmp_path / "export")
+    results = tmp_path / "export" / "results"
+    assert json.loads((results / "inspections.json").read_text()) == client.get(LIST).json()["items"]
+    (file,) = (results / "photographs").iterdir()
+    assert (file.name, file.read_bytes()) == (f"{sha256(png())}.png", png())
