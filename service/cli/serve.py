@@ -42,6 +42,7 @@ def serve(
         fail(f"log-level must be one of {', '.join(LOG_LEVELS)}, got {log_level!r}", EX_USAGE)
     # what a stop finds before the server listens for it, and what the server leaves it to once all is finished
     signal.signal(signal.SIGTERM, _end)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})  # whoever has started it may be deaf to it
     from service.settings import Settings  # start-up time
 
     given = {"insecure_local": insecure_local or None, "log_level": log_level}
