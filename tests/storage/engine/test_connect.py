@@ -50,6 +50,7 @@ def test_a_file_of_another_sqlite_is_turned_and_keeps_its_rows(
         ("sqlite://host/a.db", "needs a file"),
         ("sqlite:///:memory:", "needs a file"),
         ("sqlite:///a.db?mode=ro", "without options"),
+        ("sqlite:///a.db?key=secret", "without options"),
         ("sqlite:///file:a.db", "without options"),
     ],
 )
