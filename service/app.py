@@ -20,7 +20,8 @@ from service.web.context import Context
 from service.web.files import emptied_folder
 from service.web.limits import MOST_CACHED_BYTES, MOST_REVALIDATED_BYTES
 from service.web.metrics import Metrics
-from service.web.middleware import BodyLimit, Counting, Heads, Polls, SafeHeaders, Shares
+from service.web.middleware import BodyLimit, Edge, Heads, Polls, Shares
+from service.web.readiness import Needs, Readiness
 from service.web.revalidation import Revalidation
 from service.web.routes import clutches, description, diagnoses, exports, files, fleet, health, inspections, life, runs
 from service.workflows import adopt_model, run_diagnosis
@@ -68,13 +69,15 @@ def create_app(settings: Settings) -> FastAPI:
     Starting raises ServiceRuns where another service uses the database.
     """
 
-    metrics = Metrics()
+    metrics = Metrics(each_clutch=settings.clutch_metrics)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         database = open_database(settings.database, serving=True)
-        workers = in_processes(database, settings.workers) if settings.workers else in_threads(database)
+        log = (settings.log_format, settings.log_level)
+        workers = in_processes(database, settings.workers, log) if settings.workers else in_threads(database)
         queue = DiagnosisQueue(f"sqlite:///{database.path.absolute()}", settings, _Diagnoses(database, workers))
+        readiness = Readiness(database, workers, queue, Needs(disk=settings.least_free, memory=settings.least_memory))
         try:
             workers.warm()
             queue.start()
@@ -85,11 +88,13 @@ def create_app(settings: Settings) -> FastAPI:
                 diagnoses=queue,
                 workers=workers,
                 revalidation=Revalidation(MOST_REVALIDATED_BYTES),
+                readiness=readiness,
                 insecure_local=settings.insecure_local,
                 folder=emptied_folder(database.path),
             )
             yield
         finally:
+            readiness.close()
             queue.close()
             workers.close()
             database.close()
@@ -129,6 +134,5 @@ def create_app(settings: Settings) -> FastAPI:
         per_second=settings.requests_per_second,
         at_once=settings.requests_at_once,
     )
-    app.add_middleware(SafeHeaders)
-    app.add_middleware(Counting, metrics=metrics)
+    app.add_middleware(Edge, metrics=metrics)
     return app

@@ -1,77 +1,138 @@
-"""What an operator may set, by environment or command line."""
+"""What an operator may set, by environment or command line: every field of `Settings` as CLUTCHLIFE_ and its name."""
 
-import os
-from dataclasses import dataclass
+import re
 from importlib.metadata import version
+from typing import Any
+
+from pydantic import Field, ValidationError
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from service.defaults import DEFAULT_DATABASE
+from service.logging import LogFormat, LogLevel
 
 #: Stored beside every result: which code made it.
 CODE_VERSION = version("clutchlife")
 
-DEFAULT_DATABASE = "sqlite:///clutchlife.db"
-DEFAULT_URL = "http://127.0.0.1:8000"
-
-#: Processes that take in runs. Chosen: as `make load` has it, on two cores.
-DEFAULT_WORKERS = 2
-#: Limits, in the units of their environment variables.
-DEFAULT_BODY_MB = 64  # MiB of JSON. Chosen; longer records are posted as files
-DEFAULT_BODY_SECONDS = 30  # s. Chosen: a rig's run arrives within one, over a bad line within ten
-#: Chosen: eight rigs and twenty pages behind one address ask 100 times a second (`make load`), 30 at once.
-DEFAULT_REQUESTS_PER_SECOND = 1000
-DEFAULT_REQUESTS_AT_ONCE = 128
-DEFAULT_DIAGNOSIS_SECONDS = 300  # s of processor time. Chosen; docs/benchmarks.md: the longest diagnosis takes 11 s
-DEFAULT_DIAGNOSIS_MEMORY_MB = 4096  # MiB of address space. Chosen; no table
+PREFIX = "CLUTCHLIFE_"
+_MIB = 2**20
+#: A password in an address, greedy for one that holds an @ itself; and all options, which may hold one.
+_SECRETS = ((re.compile(r"://([^:/@]*):.*@"), r"://\1:***@"), (re.compile(r"\?.*"), "?***"))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
-    """The service's settings; `from_environment` reads CLUTCHLIFE_DATABASE, CLUTCHLIFE_WORKERS,
-    CLUTCHLIFE_MAX_BODY_MB, CLUTCHLIFE_BODY_SECONDS, CLUTCHLIFE_REQUESTS_PER_SECOND, CLUTCHLIFE_REQUESTS_AT_ONCE,
-    CLUTCHLIFE_DIAGNOSIS_SECONDS and CLUTCHLIFE_DIAGNOSIS_MEMORY_MB.
-    """
+class Settings(BaseSettings):
+    """The service's settings, by the environment where they are not given. The defaults are chosen; those of limits have no
+    table unless they name one."""
 
-    database: str = DEFAULT_DATABASE
-    #: The function that makes diagnoses, module:function.
-    engine: str = "models.diagnosis.diagnose:diagnose"
+    model_config = SettingsConfigDict(env_prefix=PREFIX, frozen=True, extra="forbid")
 
-    #: Processes that take in runs, beside one for files and one for answers; 0: threads of the service itself.
-    workers: int = 0
-
-    #: Without keys, answer also what a proxy on this machine passes on: `serve --insecure-local`.
-    insecure_local: bool = False
-
-    #: Bytes of a request's body, and of a posted file (chosen: 1 GiB, as `readers.limits` has it unpacked).
-    most_body_bytes: int = DEFAULT_BODY_MB * 2**20
-    most_file_bytes: int = 2**30
-
-    #: Seconds that a body may take to arrive, and longer the more has arrived.
-    body_seconds: int = DEFAULT_BODY_SECONDS
-
-    #: Requests of one key, or of one address without one: a second, and at once.
-    requests_per_second: int = DEFAULT_REQUESTS_PER_SECOND
-    requests_at_once: int = DEFAULT_REQUESTS_AT_ONCE
-
-    #: Seconds of processor time and bytes of address space of one diagnosis; diagnoses that wait or run (chosen; no table).
-    diagnosis_seconds: int = DEFAULT_DIAGNOSIS_SECONDS
-    diagnosis_bytes: int = DEFAULT_DIAGNOSIS_MEMORY_MB * 2**20
-    most_diagnoses: int = 16
+    database: str = Field(
+        default=DEFAULT_DATABASE, description="`sqlite:///relative/path` or `sqlite:////absolute/path`"
+    )
+    # as `make load` has it, on two cores
+    workers: int = Field(
+        default=2, ge=0, description="processes that take in runs; 0: no workers, all in the service's own process"
+    )
+    max_body_mb: int = Field(
+        default=64, ge=1, description="the largest body that is accepted [MiB]; longer records are posted as files"
+    )
+    max_file_mb: int = Field(default=1024, ge=1, description="the largest file that is accepted [MiB]")
+    # a rig's run arrives within one second, over a bad line within ten
+    body_seconds: int = Field(
+        default=30,
+        ge=1,
+        description="how long a body may take to arrive, and a second longer for every 64 KiB that have arrived; then 408",
+    )
+    # eight rigs and twenty pages behind one address ask 100 times a second (`make load`), 30 at once
+    requests_per_second: int = Field(
+        default=1000,
+        ge=1,
+        description="how often one key may ask, or one address without a key; two seconds' worth may be saved up; then 429",
+    )
+    requests_at_once: int = Field(default=128, ge=1, description="how many of its requests may be on their way at once")
+    # docs/benchmarks.md: the longest diagnosis takes 11 s
+    diagnosis_seconds: int = Field(
+        default=300,
+        ge=1,
+        description="how much processor time a diagnosis may take; by the clock, beside other work, six times as long",
+    )
+    diagnosis_memory_mb: int = Field(
+        default=4096, ge=1, description="how much address space the process of a diagnosis may have [MiB]"
+    )
+    most_diagnoses: int = Field(default=16, ge=1, description="diagnoses that wait or run; further ones get a 503")
+    least_free_mb: int = Field(
+        default=64, ge=0, description="free space on the database's disk [MiB] below which `/readyz` says 503"
+    )
+    least_memory_mb: int = Field(
+        default=64, ge=0, description="memory that is left [MiB] below which `/readyz` says 503"
+    )
+    clutch_metrics: bool = Field(
+        default=False, description="whether `/metrics` has series of every clutch, as Grafana's dashboard needs them"
+    )
+    log_format: LogFormat = Field(
+        default="auto", description="`json`, `text`, or `auto`: text on a terminal and JSON elsewhere"
+    )
+    log_level: LogLevel = Field(
+        default="info", description="the least that is logged: `debug`, `info`, `warning`, `error` or `critical`"
+    )
+    insecure_local: bool = Field(
+        default=False, description="without keys, answer also what a proxy on this machine passes on"
+    )
+    engine: str = Field(
+        default="models.diagnosis.diagnose:diagnose",
+        description="the function that makes diagnoses, `module:function`; for tests",
+    )
 
     @classmethod
-    def from_environment(cls, database: str | None = None) -> "Settings":
-        """Settings from the environment; a database given here wins. Raises ValueError on a limit that is no number."""
-        return cls(
-            database=database or os.environ.get("CLUTCHLIFE_DATABASE", DEFAULT_DATABASE),
-            workers=_whole("CLUTCHLIFE_WORKERS", DEFAULT_WORKERS, "processes", least=0),
-            most_body_bytes=_whole("CLUTCHLIFE_MAX_BODY_MB", DEFAULT_BODY_MB, "megabytes") * 2**20,
-            body_seconds=_whole("CLUTCHLIFE_BODY_SECONDS", DEFAULT_BODY_SECONDS, "seconds"),
-            requests_per_second=_whole("CLUTCHLIFE_REQUESTS_PER_SECOND", DEFAULT_REQUESTS_PER_SECOND, "requests"),
-            requests_at_once=_whole("CLUTCHLIFE_REQUESTS_AT_ONCE", DEFAULT_REQUESTS_AT_ONCE, "requests"),
-            diagnosis_seconds=_whole("CLUTCHLIFE_DIAGNOSIS_SECONDS", DEFAULT_DIAGNOSIS_SECONDS, "seconds"),
-            diagnosis_bytes=_whole("CLUTCHLIFE_DIAGNOSIS_MEMORY_MB", DEFAULT_DIAGNOSIS_MEMORY_MB, "megabytes") * 2**20,
-        )
+    def from_environment(cls, database: str | None = None, **given: Any) -> "Settings":
+        """Settings from the environment; what is given here wins. Raises ValueError, a line that names all wrong ones."""
+        if database is not None:
+            given["database"] = database
+        try:
+            return cls(**given)
+        except ValidationError as error:
+            wrong = [_wrong(details["type"], details) for details in error.errors()]
+        raise ValueError("; ".join(wrong))
+
+    def shown(self) -> dict[str, Any]:
+        """All settings by name, without secrets."""
+        return self.model_dump() | {"database": redacted(self.database)}
+
+    @property
+    def most_body_bytes(self) -> int:
+        """Bytes of a request's body."""
+        return self.max_body_mb * _MIB
+
+    @property
+    def most_file_bytes(self) -> int:
+        """Bytes of a posted file."""
+        return self.max_file_mb * _MIB
+
+    @property
+    def least_free(self) -> int:
+        """Bytes that must be free on the disk."""
+        return self.least_free_mb * _MIB
+
+    @property
+    def least_memory(self) -> int:
+        """Bytes of memory that must be left."""
+        return self.least_memory_mb * _MIB
+
+    @property
+    def diagnosis_bytes(self) -> int:
+        """Bytes of address space of one diagnosis."""
+        return self.diagnosis_memory_mb * _MIB
 
 
-def _whole(name: str, default: int, unit: str, *, least: int = 1) -> int:
-    text = os.environ.get(name, str(default))
-    if not text.isdecimal() or int(text) < least:
-        raise ValueError(f"{name} must be a whole number of {unit}, got {text!r}")
-    return int(text)
+def redacted(address: str) -> str:
+    """An address without its password and its options."""
+    for secret, mark in _SECRETS:
+        address = secret.sub(mark, address)
+    return address
+
+
+def _wrong(kind: str, details: Any) -> str:
+    """One wrong variable, the rule and its value."""
+    least = details.get("ctx", {}).get("ge")
+    rules = {"int_parsing": "a whole number", "greater_than_equal": f"a whole number of at least {least}"}
+    rule = rules.get(kind, details["msg"].removeprefix("Input should be "))
+    return f"{PREFIX}{details['loc'][0].upper()} must be {rule}, got {details['input']!r}"

@@ -130,6 +130,9 @@ _fleet_all_current = (
     .where(fleet_prior.c.left_out == NOBODY)
     .order_by(fleet_prior.c.fleet)
 )
+_fleet_ended_lives = _fleet_all_current.with_only_columns(
+    func.coalesce(func.sum(func.json_array_length(fleet_prior.c.content, "$.ended")), 0)
+).order_by(None)
 _fleet_forget = delete(fleet_prior).where(
     fleet_prior.c.fleet == bindparam("of_fleet"),
     fleet_prior.c.version < bindparam("before"),
@@ -176,6 +179,12 @@ def fleet_prior_for(connection: Connection, fleet: Json, clutch_id: str, version
 def current_fleet_priors(connection: Connection) -> list[FleetPriorRow]:
     """The newest version of every kind of clutch."""
     return [_fleet_row(row) for row in connection.execute(_fleet_all_current)]
+
+
+def count_ended_lives(connection: Connection) -> int:
+    """How many ended lives the newest priors of all kinds know of."""
+    number: int = connection.execute(_fleet_ended_lives).scalar_one()
+    return number
 
 
 def forget_left_out(connection: Connection, fleet: Json, *, before: int) -> None:

@@ -1,6 +1,6 @@
 """Clutches: the record in force and the one that was posted, and the summary that lists show."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import sqlalchemy as sa
@@ -54,6 +54,7 @@ _set_record = (
 )
 _bump = update(clutch).where(_of_wanted).values(revision=clutch.c.revision + 1)
 _revision = select(clutch.c.revision).where(_of_wanted)
+_count = select(func.count()).select_from(clutch)
 _ids = select(clutch.c.clutch_id).order_by(clutch.c.clutch_id)
 _revisions = select(clutch.c.clutch_id, clutch.c.revision).order_by(clutch.c.clutch_id)
 
@@ -140,6 +141,19 @@ def revision(connection: Connection, clutch_id: str) -> int | None:
     """The clutch's revision, or None."""
     number: int | None = connection.execute(_revision, {"wanted": clutch_id}).scalar_one_or_none()
     return number
+
+
+def count(connection: Connection) -> int:
+    """How many clutches there are, archived ones too."""
+    number: int = connection.execute(_count).scalar_one()
+    return number
+
+
+def count_within(connection: Connection, ranks: Sequence[float]) -> dict[float, int]:
+    """How many clutches in use have at most each of these ranks; only those within the greatest are looked at."""
+    counts = [func.coalesce(func.sum(clutch.c.rank <= rank), 0) for rank in ranks]
+    row = connection.execute(select(*counts).where(clutch.c.rank <= max(ranks), clutch.c.archived == 0)).one()
+    return dict(zip(ranks, row, strict=True))
 
 
 def all_ids(connection: Connection) -> list[str]:

@@ -112,6 +112,8 @@ _rebuilds = _light.where(func.json_extract(run.c.details, "$.event") == "rebuild
 _set_aside = _light_of_any.where(run.c.state != ACCEPTED)
 #: The value stands in the text: with a parameter in its place SQLite would not use the index of held runs alone.
 _held = select(run.c.clutch_id, func.count()).where(sa.text("state = 'held'")).group_by(run.c.clutch_id)
+_held_of_all = select(func.count()).select_from(run).where(sa.text("state = 'held'"))
+_greatest_key = select(func.coalesce(func.max(run.c.run_key), 0))
 _keys = select(run.c.run_id, run.c.run_key).where(_of_clutch)
 _set_results = update(run).where(run.c.run_key == bindparam("wanted"))
 
@@ -188,6 +190,18 @@ def set_aside(connection: Connection, clutch_id: str) -> list[RunInOrder]:
 def held(connection: Connection) -> dict[str, int]:
     """clutch_id -> the number of its runs that are held, for those that have any."""
     return {clutch_id: int(count) for clutch_id, count in connection.execute(_held)}
+
+
+def count(connection: Connection) -> int:
+    """How many runs there are in any state: none is ever deleted, so that the greatest key counts them."""
+    number: int = connection.execute(_greatest_key).scalar_one()
+    return number
+
+
+def count_held(connection: Connection) -> int:
+    """How many runs of all clutches are held."""
+    number: int = connection.execute(_held_of_all).scalar_one()
+    return number
 
 
 def keys(connection: Connection, clutch_id: str) -> dict[str, int]:

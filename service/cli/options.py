@@ -9,8 +9,8 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
+from service.defaults import DEFAULT_DATABASE, DEFAULT_URL
 from service.errors import NotFoundError
-from service.settings import DEFAULT_DATABASE, DEFAULT_URL
 from storage.engine.errors import StorageError
 
 if TYPE_CHECKING:

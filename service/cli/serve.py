@@ -1,20 +1,29 @@
 """`clutchlife serve`: the service."""
 
 import gc
+import logging
 import os
+import signal
 from contextlib import closing
-from dataclasses import replace
 from datetime import UTC, datetime
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, NoReturn, get_args
 
 import typer
 import uvicorn
 from threadpoolctl import threadpool_limits
 
-from service.cli.options import DATABASE, EX_USAGE, Database, err, errors_in_a_line, fail
-from service.settings import Settings
+from service.cli.options import DATABASE, EX_USAGE, Database, errors_in_a_line, fail
+from service.logging import LogLevel, configure
+
+if TYPE_CHECKING:
+    from service.settings import Settings
 
 LOOPBACK = "127.0.0.1"
+#: Seconds that requests on their way have once the service is to stop. Chosen: less than `docker stop` waits.
+STOP_SECONDS = 10
+LOG_LEVELS = get_args(LogLevel)
+
+_log = logging.getLogger("clutchlife")
 
 
 def serve(
@@ -24,42 +33,30 @@ def serve(
     insecure_local: Annotated[
         bool, typer.Option("--insecure-local", help="Without keys, answer also what a proxy on this machine passes on")
     ] = False,
-    log_level: Annotated[str, typer.Option(help="critical, error, warning, info or debug")] = "info",
+    log_level: Annotated[
+        str | None, typer.Option(help="critical, error, warning, info or debug; else CLUTCHLIFE_LOG_LEVEL, or info")
+    ] = None,
 ) -> None:
     """Run the service."""
-    if log_level not in uvicorn.config.LOG_LEVELS:
-        fail(f"log-level must be one of {', '.join(uvicorn.config.LOG_LEVELS)}, got {log_level!r}", EX_USAGE)
-    from service.readers.confinement import missing  # start-up time
-    from service.web.auth import is_loopback  # start-up time
-    from storage import keys  # start-up time
-    from storage.engine.connect import path_of  # start-up time
-    from storage.engine.database import open_database  # start-up time
-    from storage.engine.service_lock import service_lock  # start-up time
+    if log_level is not None and log_level not in LOG_LEVELS:
+        fail(f"log-level must be one of {', '.join(LOG_LEVELS)}, got {log_level!r}", EX_USAGE)
+    # what a stop finds before the server listens for it, and what the server leaves it to once all is finished
+    signal.signal(signal.SIGTERM, _end)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})  # whoever has started it may be deaf to it
+    from service.settings import Settings  # start-up time
 
+    given = {"insecure_local": insecure_local or None, "log_level": log_level}
     with errors_in_a_line():
-        settings = Settings.from_environment(database)
-        with service_lock(path_of(settings.database)):
-            pass  # a second service ends here with a line; the application holds the lock from its start to its end
-        with closing(open_database(settings.database)) as opened, opened.reading() as connection:
-            has_keys = keys.any_ever(connection)
-            opens = keys.any_active(connection, datetime.now(UTC).isoformat(timespec="seconds"))
-    make = "make one with: clutchlife key create --scope admin"
-    if has_keys and not opens:
-        _say(f"all keys are revoked or expired, so every request is refused; {make}")
-    elif not has_keys and not is_loopback(host):
-        _say(f"no keys are configured, so the service listens at {LOOPBACK} and not at {host}; {make}")
-        host = LOOPBACK
-    elif not has_keys:
-        passed = "also what a proxy passes on" if insecure_local else "and nothing that a proxy passes on"
-        _say(f"no keys are configured: everybody on this machine may do everything, {passed}; {make}")
-    if open_to_readers := missing():
-        _say(f"this system cannot keep a process that reads a file from outside from {' and '.join(open_to_readers)}")
+        settings = Settings.from_environment(database, **{name: value for name, value in given.items() if value})
+        configure(settings.log_format, settings.log_level)
+        _log.info("settings", extra={"fields": settings.shown()})
+        host = _allowed(host, settings)
     from service.app import create_app  # start-up time
 
     # the arrays are small: BLAS threads that wait for each other cost more than they gain
     threadpool_limits(limits=1, user_api="blas")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    app = create_app(replace(settings, insecure_local=insecure_local))
+    app = create_app(settings)
     # loaded modules stay: the collector's walk through all of them would delay an answer by a tenth of a second
     gc.collect()
     gc.freeze()
@@ -67,12 +64,45 @@ def serve(
         app,
         host=host,
         port=port,
-        log_level=log_level,
-        access_log=log_level == "debug",
+        log_config=None,
+        log_level=settings.log_level,
+        access_log=False,
         server_header=False,
-        timeout_graceful_shutdown=10,
+        timeout_graceful_shutdown=STOP_SECONDS,
     )
 
 
-def _say(message: str) -> None:
-    err.print(f"clutchlife: {message}", soft_wrap=True, markup=False)
+def _allowed(host: str, settings: "Settings") -> str:
+    """The address to listen at, this machine's own where there are no keys; what is odd about the keys is logged.
+
+    Raises ServiceRuns where another service uses the database, and what `open_database` raises.
+    """
+    from service.readers.confinement import missing  # start-up time
+    from service.web.auth import is_loopback  # start-up time
+    from storage import keys  # start-up time
+    from storage.engine.connect import path_of  # start-up time
+    from storage.engine.database import open_database  # start-up time
+    from storage.engine.service_lock import service_lock  # start-up time
+
+    with service_lock(path_of(settings.database)):
+        pass  # a second service ends here with a line; the application holds the lock from its start to its end
+    with closing(open_database(settings.database)) as opened, opened.reading() as connection:
+        has_keys = keys.any_ever(connection)
+        opens = keys.any_active(connection, datetime.now(UTC).isoformat(timespec="seconds"))
+    make = "make one with: clutchlife key create --scope admin"
+    if has_keys and not opens:
+        _log.warning("all keys are revoked or expired, so every request is refused; %s", make)
+    elif not has_keys and not is_loopback(host):
+        _log.warning("no keys are configured, so the service listens at %s and not at %s; %s", LOOPBACK, host, make)
+        host = LOOPBACK
+    elif not has_keys:
+        passed = "also what a proxy passes on" if settings.insecure_local else "and nothing that a proxy passes on"
+        _log.warning("no keys are configured: everybody on this machine may do everything, %s; %s", passed, make)
+    if open_to_readers := missing():
+        unkept = " and ".join(open_to_readers)
+        _log.warning("this system cannot keep a process that reads a file from outside from %s", unkept)
+    return host
+
+
+def _end(*_: object) -> NoReturn:
+    raise SystemExit(0)

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from service.errors import BusyError
+from service.logging import request_id
 from service.settings import Settings
 from storage.diagnoses import NewDiagnosis
 from storage.engine.errors import StorageError
@@ -56,10 +57,12 @@ class Store(Protocol):
 
 @dataclass(slots=True)
 class Job:
-    """A diagnosis that waits or runs; `done` is set once its end is stored. `adopt_by`: who wants its extension adopted."""
+    """A diagnosis that waits or runs; `done` is set once its end is stored. `adopt_by`: who wants its extension adopted;
+    `request`: the id of the request that asked for it."""
 
     diagnosis: NewDiagnosis
     adopt_by: str | None
+    request: str
     done: "Future[None]" = field(default_factory=Future)
 
 
@@ -95,6 +98,15 @@ class DiagnosisQueue:
         if self._thread.is_alive():  # else the service could not start, and what stopped it is to be seen
             self._thread.join()
 
+    def is_working(self) -> bool:
+        """Whether the thread that works on the queue is there."""
+        return self._thread.is_alive()
+
+    def waiting(self) -> int:
+        """How many diagnoses wait or run."""
+        with self._change:
+            return len(self._jobs)
+
     def ask(self, clutch_id: str, *, adopt_by: str | None) -> Job:
         """Have the clutch's runs diagnosed; joins the diagnosis of the very same runs where one waits or runs.
 
@@ -107,7 +119,7 @@ class DiagnosisQueue:
                 return waiting
             if self._closing or len(self._jobs) >= self._settings.most_diagnoses:
                 raise BusyError(f"{len(self._jobs)} diagnoses wait already: ask again in a little while")
-            job = Job(self._store.ask(clutch_id), adopt_by)
+            job = Job(self._store.ask(clutch_id), adopt_by, request_id.get())
             self._jobs[job.diagnosis.diagnosis_id] = job
             self._change.notify_all()
             return job
@@ -119,6 +131,7 @@ class DiagnosisQueue:
                 if not self._jobs:
                     return
                 job = next(iter(self._jobs.values()))
+            request_id.set(job.request)
             try:
                 ended = self._outcome(job)
                 self._store.finish(job.diagnosis, ended, adopt_by=job.adopt_by)

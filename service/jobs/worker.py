@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from service import logging
 from service.background import use_one_blas_thread, yield_to_others
 from storage.engine.database import Database, open_database
 
@@ -21,9 +22,11 @@ _LAST_SECONDS = 15.0
 _opened: list[Database] = []
 
 
-def begin(database_url: str, nice: int | None) -> None:
-    """Prepare this process: it yields by `nice` or, where that is None, to all others; it ends with the service, and leaves
-    it to the service to stop: what stops all processes at once must not take a run from it that is being stored."""
+def begin(database_url: str, nice: int | None, log: tuple[logging.LogFormat, logging.LogLevel]) -> None:
+    """Prepare this process: it logs so; it yields by `nice` or, where that is None, to all others; it ends with the service,
+    and leaves it to the service to stop: what stops all processes at once must not take a run from it that is being stored.
+    """
+    logging.configure(*log)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _end_later)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
@@ -39,8 +42,9 @@ def begin(database_url: str, nice: int | None) -> None:
     _opened.append(open_database(database_url))
 
 
-def call(function: Callable[..., Any], arguments: Sequence[Any]) -> Any:
-    """What `function(database, *arguments)` returns or raises."""
+def call(function: Callable[..., Any], arguments: Sequence[Any], request: str) -> Any:
+    """What `function(database, *arguments)` returns or raises; what it logs is of the `request` with that id."""
+    logging.request_id.set(request)
     return function(_opened[0], *arguments)
 
 

@@ -18,6 +18,7 @@ from typing import Any
 
 from service.errors import BusyError
 from service.jobs import worker
+from service.logging import LogFormat, LogLevel, request_id
 from storage.engine.database import Database
 
 #: Calls of a lane that wait or run; more are refused as busy. Chosen: a minute of runs at 15 a second is 900. Of what takes
@@ -48,12 +49,13 @@ _LONG = (Lane.SIMULATIONS, Lane.FILES)
 
 @dataclass(slots=True)
 class _Task:
-    """A call on its way; `retried` once its process ended without an answer."""
+    """A call on its way, made for the request with that id; `retried` once its process ended without an answer."""
 
     lane: Lane
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
     turn: str | None
+    request: str
     answer: "Future[Any]" = field(default_factory=Future)
     retried: bool = False
 
@@ -68,6 +70,7 @@ class Workers:
         self._pools: dict[Lane, Executor] = {}
         self._calls = dict.fromkeys(Lane, 0)
         self._turns: dict[str, deque[_Task]] = {}
+        self._restarts: dict[Lane, Future[Any]] = {}
         self._lock = threading.Lock()
         self._closed = False
 
@@ -78,7 +81,7 @@ class Workers:
 
         Function, arguments and result must be picklable. Raises BusyError where too many wait.
         """
-        task = _Task(lane, function, arguments, turn)
+        task = _Task(lane, function, arguments, turn, request_id.get())
         task.answer.set_running_or_notify_cancel()  # nobody who stops waiting stops what is stored
         with self._lock:
             most = _MOST_WAITING_LONG if lane in _LONG else _MOST_WAITING
@@ -98,6 +101,26 @@ class Workers:
         """Whether no call waits or runs in any lane."""
         with self._lock:
             return not any(self._calls.values())
+
+    def calls(self) -> dict[Lane, int]:
+        """Calls that wait or run, by lane."""
+        with self._lock:
+            return dict(self._calls)
+
+    def ended(self) -> list[Lane]:
+        """Lanes of which a process has ended while it had nothing to do, and whose next ones are not up yet: asking starts
+        them. A process that ends at work is replaced with its call. One thread may ask at a time."""
+        with self._lock:
+            broken = [lane for lane, pool in self._pools.items() if isinstance(pool, _Processes) and pool.broken]
+            for lane in broken:
+                del self._pools[lane]
+        failed = [lane for lane, restart in self._restarts.items() if restart.done() and restart.exception()]
+        for lane in {*broken, *failed}:
+            self._restarts[lane] = self.submit(lane, worker.load)
+        self._restarts = {
+            lane: restart for lane, restart in self._restarts.items() if not restart.done() or restart.exception()
+        }
+        return list(self._restarts)
 
     def warm(self) -> None:
         """Have the processes that take in runs started and loaded; waits for nothing."""
@@ -121,7 +144,7 @@ class Workers:
             self._ended(task, BusyError("the service is ending"), None)
             return
         try:
-            started = pool.submit(self._wrap, task.function, task.arguments)
+            started = pool.submit(self._wrap, task.function, task.arguments, task.request)
         except RuntimeError as error:  # the pool is broken, or was closed meanwhile
             self._ended(task, error, pool)
         else:
@@ -160,8 +183,17 @@ def _error(ended: "Future[Any]") -> BaseException | None:
     return BusyError("the service is ending") if ended.cancelled() else ended.exception()
 
 
-def in_processes(database: Database, processes: int) -> Workers:
-    """Workers in processes of their own: `processes` that take in runs, one for each other lane."""
+class _Processes(ProcessPoolExecutor):
+    """The processes of a lane."""
+
+    @property
+    def broken(self) -> bool:
+        """Whether one of them has ended: then the others do too, and none takes calls any more."""
+        return bool(self._broken)
+
+
+def in_processes(database: Database, processes: int, log: tuple[LogFormat, LogLevel] = ("auto", "warning")) -> Workers:
+    """Workers in processes of their own, which log so: `processes` that take in runs, one for each other lane."""
     context = multiprocessing.get_context("forkserver")  # loads the libraries once, for all that are forked off it
     context.set_forkserver_preload([worker.__name__, *worker.LOADED_EARLY])
     _start_forkserver()
@@ -169,9 +201,7 @@ def in_processes(database: Database, processes: int) -> Workers:
     url = f"sqlite:///{database.path.absolute()}"
 
     def make(lane: Lane) -> Executor:
-        return ProcessPoolExecutor(
-            sizes[lane], mp_context=context, initializer=worker.begin, initargs=(url, lane.value)
-        )
+        return _Processes(sizes[lane], mp_context=context, initializer=worker.begin, initargs=(url, lane.value, log))
 
     return Workers(make, worker.call, sizes)
 
@@ -194,7 +224,8 @@ def in_threads(database: Database) -> Workers:
     def make(lane: Lane) -> Executor:
         return ThreadPoolExecutor(sizes[lane], thread_name_prefix=lane.name.lower())
 
-    def call(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    def call(function: Callable[..., Any], arguments: tuple[Any, ...], request: str) -> Any:
+        request_id.set(request)
         return function(database, *arguments)
 
     return Workers(make, call, sizes)

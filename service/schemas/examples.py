@@ -26,6 +26,7 @@ EXAMPLES: dict[str, Any] = {
     "created_at": _MOMENT,
     "cursor": _CURSOR,
     "detail": "torque_nm[17] must be finite, got nan",
+    "request_id": "3f9a1c0b7d2e4f56",
     "diagnosis_id": _DIAGNOSIS,
     "event": "oil_change",
     "filename": "test.csv",

@@ -24,3 +24,4 @@ class Problem(Answer):
     detail: str = Field(description="What is wrong in this request")
     errors: list[ProblemError] = Field(description="The wrong places, at most 50")
     total_errors: int = Field(description="How many places are wrong in all")
+    request_id: str = Field(description="The answer's `X-Request-ID`, by which the service's log names the request")

@@ -27,7 +27,7 @@ from service.web.context import Context
 from service.web.files import PARQUET_TYPE
 from service.web.limits import LEAST_PACKED_BYTES, LONGEST_WAIT_SECONDS, PACKING_LEVEL
 from service.web.middleware import Again, remember
-from service.web.problems import problem
+from service.web.problems import refused
 from service.web.revalidation import Made
 from service.web.tables import Rows, RowsAndNext, encode_page, sliced_rows
 from service.web.unpacking import Unpacked
@@ -273,8 +273,7 @@ class Encodings:
         encoding = headers.get("content-encoding", "identity").strip().lower()
         if encoding not in ("identity", "gzip"):
             detail = f"send the body plain or packed by gzip, not by {encoding[:80]!r}"
-            kind = UnsupportedMediaTypeError
-            response = problem(kind.status, kind.slug, kind.title, detail)
+            response = refused(UnsupportedMediaTypeError, detail)
             response.headers["Accept-Encoding"] = "gzip"
             await response(scope, receive, send)
             return

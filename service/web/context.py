@@ -14,6 +14,7 @@ from service.queries.cache import AnswerCache
 from service.web.key_uses import KeyUses
 from service.web.limits import MOST_HORIZONS, MOST_ITEMS, MOST_PRESSURE_BAR
 from service.web.metrics import Metrics
+from service.web.readiness import Readiness
 from service.web.revalidation import Revalidation
 from storage.engine.database import Database
 
@@ -28,6 +29,7 @@ class Context:
     diagnoses: DiagnosisQueue
     workers: Workers
     revalidation: Revalidation
+    readiness: Readiness
     #: Where files are kept while they come in and go out.
     folder: Path
     key_uses: KeyUses = field(default_factory=KeyUses)

@@ -32,5 +32,7 @@ MOST_CALLERS, SAVED_SECONDS = 10_000, 2.0
 RETRY_AFTER_SECONDS = 1
 #: Seconds between two notes of a key's use. Chosen: each is a commit, and whoever looks for unused keys thinks in days.
 USE_NOTED_SECONDS = 3600
+#: Seconds after which a disk that does not answer makes the service not ready. Chosen: probes wait for three and more.
+LONGEST_LOOK_SECONDS = 2.0
 #: Clutches that the metrics read at once.
 METRICS_PAGE = 1000

@@ -1,12 +1,18 @@
-"""Metrics for Prometheus: requests by route, and where every clutch stands."""
+"""Metrics for Prometheus: requests by route, what waits, and how many clutches stand where.
+
+They cost the same however many clutches are stored; series of every clutch are there only where they are asked for.
+"""
 
 from collections.abc import Iterator
 
-from prometheus_client import CollectorRegistry, Counter, Histogram, generate_latest
+from prometheus_client import CollectorRegistry, Counter, Histogram, ProcessCollector, generate_latest
 from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
+from service.jobs.queue import DiagnosisQueue
+from service.jobs.workers import Workers
 from service.queries import clutch_list
+from service.queries.totals import totals
 from service.web.limits import METRICS_PAGE
 from storage.engine.database import Database
 
@@ -14,19 +20,55 @@ MEDIA_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 
 
 class Metrics:
-    """One service's metrics; nothing is shared between services in one process."""
+    """One service's metrics; nothing is shared between services in one process.
 
-    def __init__(self) -> None:
+    `each_clutch`: with series of every clutch.
+    """
+
+    def __init__(self, *, each_clutch: bool = False) -> None:
+        self._each_clutch = each_clutch
         self._registry = CollectorRegistry()
+        ProcessCollector(registry=self._registry)
         labels = ("method", "route", "status")
         self.requests = Counter("clutchlife_requests", "Requests answered", labels, registry=self._registry)
         self.seconds = Histogram("clutchlife_request_seconds", "Time to answer", labels[:2], registry=self._registry)
 
-    def exposition(self, database: Database) -> bytes:
+    def exposition(self, database: Database, workers: Workers, diagnoses: DiagnosisQueue) -> bytes:
         """All metrics as text, the clutches as they stand now."""
-        clutches = CollectorRegistry()
-        clutches.register(Clutches(database))
-        return generate_latest(self._registry) + generate_latest(clutches)
+        present = CollectorRegistry()
+        present.register(Present(database, workers, diagnoses))
+        if self._each_clutch:
+            present.register(Clutches(database))
+        return generate_latest(self._registry) + generate_latest(present)
+
+
+class Present(Collector):
+    """What is there now and what waits, in numbers of all clutches together."""
+
+    def __init__(self, database: Database, workers: Workers, diagnoses: DiagnosisQueue) -> None:
+        self._database = database
+        self._workers = workers
+        self._diagnoses = diagnoses
+
+    def collect(self) -> Iterator[Metric]:
+        """The gauges, from a few statements that give a row each, and from the queues."""
+        numbers = totals(self._database)
+        yield GaugeMetricFamily("clutchlife_clutches", "Clutches, archived ones too", value=numbers.clutches)
+        text = "Clutches in use that have at most so many cycles left (the median); 0: at their end of life"
+        within = GaugeMetricFamily("clutchlife_clutches_within", text, labels=["cycles"])
+        for cycles, count in numbers.within.items():
+            within.add_metric([f"{cycles:g}"], count)
+        yield within
+        yield GaugeMetricFamily("clutchlife_runs", "Runs stored", value=numbers.runs)
+        yield GaugeMetricFamily("clutchlife_runs_held", "Runs that wait to be confirmed", value=numbers.held)
+        text = "Ended lives that the priors of fleets know of"
+        yield GaugeMetricFamily("clutchlife_ended_lives", text, value=numbers.ended_lives)
+        calls = GaugeMetricFamily("clutchlife_worker_calls", "Calls that wait or run", labels=["lane"])
+        for lane, count in self._workers.calls().items():
+            calls.add_metric([lane.name.lower()], count)
+        yield calls
+        text = "Diagnoses that wait or run"
+        yield GaugeMetricFamily("clutchlife_diagnoses_waiting", text, value=self._diagnoses.waiting())
 
 
 class Clutches(Collector):

@@ -1,4 +1,4 @@
-"""What stands before every address: counts, shares, bounds on bodies, headers that browsers heed, and what polls ask again.
+"""What stands before every address: ids, counts, logs, shares, bounds on bodies, safe headers, what polls ask again.
 
 A page asks the same again and again. A route that has answered leaves behind how its answer is found again (`remember`):
 where the same address is asked for with the same arguments, and the answer of the revision as it is now is held, that is
@@ -7,10 +7,12 @@ sent, or 304; in every other case, an unknown caller or a changed clutch, the re
 
 import asyncio
 import math
+import secrets
 import time
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
+from logging import DEBUG, INFO, WARNING
 from typing import Any
 
 from fastapi import Request
@@ -19,6 +21,7 @@ from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.errors import ServiceError, TooLargeError, TooManyError, TooSlowError
+from service.logging import access, log_request, request_id, sane
 from service.web.auth import authorise, caller_of, clutch_of, context_of
 from service.web.limits import (
     MOST_CALLERS,
@@ -28,7 +31,7 @@ from service.web.limits import (
     SLOWEST_BODY_BYTES_PER_SECOND,
 )
 from service.web.metrics import Metrics
-from service.web.problems import problem
+from service.web.problems import refused, unexpected
 from storage.engine.errors import StorageError
 
 
@@ -52,8 +55,7 @@ class Shares:
             return
         sent = next((value for name, value in scope["headers"] if name == b"authorization"), None)
         share = self._share_of(sent, scope.get("client"))
-        wait = self._wait(share)
-        if wait > 0:
+        if (wait := self._wait(share)) > 0:
             await self._refuse(wait, scope, receive, send)
             return
         share.running += 1
@@ -98,7 +100,7 @@ class Shares:
 
     async def _refuse(self, wait: float, scope: Scope, receive: Receive, send: Send) -> None:
         detail = f"one caller may ask {self.per_second:g} times a second and {self.at_once} at once"
-        response = problem(TooManyError.status, TooManyError.slug, TooManyError.title, detail)
+        response = refused(TooManyError, detail)
         response.headers["Retry-After"] = str(math.ceil(wait))
         await response(scope, receive, send)
 
@@ -130,9 +132,10 @@ class BodyLimit:
             await self.app(scope, receive, send)
             return
         most = self.most_file if scope["path"].endswith("/runs/file") else self.most
+        detail = f"a request may hold at most {most} bytes here"
         announced = dict(scope["headers"]).get(b"content-length", b"0")
         if announced.isdigit() and int(announced) > most:
-            await self._refuse(most, scope, receive, send)
+            await refused(TooLargeError, detail)(scope, receive, send)
             return
         taken, whole, clock = 0, False, asyncio.get_running_loop().time
         begun = clock()
@@ -150,18 +153,10 @@ class BodyLimit:
             taken += len(message.get("body", b""))
             whole = not message.get("more_body", False)
             if taken > most:
-                raise TooLargeError(_detail(most))
+                raise TooLargeError(detail)
             return message
 
         await self.app(scope, counted, send)
-
-    async def _refuse(self, most: int, scope: Scope, receive: Receive, send: Send) -> None:
-        response = problem(TooLargeError.status, TooLargeError.slug, TooLargeError.title, _detail(most))
-        await response(scope, receive, send)
-
-
-def _detail(most: int) -> str:
-    return f"a request may hold at most {most} bytes here"
 
 
 class Heads:
@@ -182,38 +177,27 @@ class Heads:
             await send(message)
 
         scope["method"] = "GET"
-        await self.app(scope, receive, without_body)
+        try:
+            await self.app(scope, receive, without_body)
+        finally:
+            scope["method"] = "HEAD"
 
 
-class SafeHeaders:
-    """Nothing is sniffed, framed or told to other hosts; pages may load from this host only.
-
-    No script runs that is not a file of this service. The plotting library sets inline styles, saves a chart by way of
-    `blob:` and draws icons from `data:`.
-    """
-
-    policy = (
-        "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; object-src 'none'; "
-        "frame-ancestors 'none'; base-uri 'none'; form-action 'none'; script-src 'self'"
-    )
-
-    def __init__(self, app: ASGIApp) -> None:
-        self.app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        async def with_headers(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                headers = MutableHeaders(scope=message)
-                headers["X-Content-Type-Options"] = "nosniff"
-                headers["Referrer-Policy"] = "no-referrer"
-                headers.setdefault("Content-Security-Policy", self.policy)
-            await send(message)
-
-        await self.app(scope, receive, with_headers)
+#: Unless a route says otherwise: nothing is sniffed, framed or told to other hosts, and no script runs that is not a file of
+#: this service. The plotting library sets inline styles, saves a chart by way of `blob:` and draws icons from `data:`.
+_SAFE = {
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Content-Security-Policy": "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; "
+    "object-src 'none'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'; script-src 'self'",
+}
+#: Asked again and again by machines: logged from `debug` on, like what is still as it was (304).
+_PROBES = ("/livez", "/readyz", "/metrics")
 
 
-class Counting:
-    """Counts and times every request by its route's template, so that names of clutches do not become labels."""
+class Edge:
+    """What every request has, whatever becomes of it: an id, safe headers, a count and a time by its route's template, so
+    that names of clutches do not become labels, and a line in the log."""
 
     def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
         self.app = app
@@ -223,21 +207,40 @@ class Counting:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        status, started = 500, time.perf_counter()
+        sent = next((value for name, value in scope["headers"] if name == b"x-request-id"), b"")
+        own_id = (sane(sent) if sent else None) or secrets.token_hex(8)
+        request_id.set(own_id)
+        status, size, started = 0, 0, time.perf_counter()
 
         async def noting(message: Message) -> None:
-            nonlocal status
+            nonlocal status, size
             if message["type"] == "http.response.start":
                 status = message["status"]
+                headers = MutableHeaders(scope=message)
+                safe = {name: headers.get(name, usual) for name, usual in _SAFE.items()}
+                headers.update(safe | {"X-Request-ID": own_id})
+            else:
+                size += len(message.get("body", b""))
             await send(message)
 
         try:
             await self.app(scope, receive, noting)
+        except Exception as error:
+            if status:  # too late to say so: the server logs it and ends the connection
+                raise
+            await unexpected(Request(scope), error)(scope, receive, noting)
         finally:
-            route = getattr(scope.get("route"), "path", "unmatched")
-            method = scope["method"] if route != "unmatched" else "any"
-            self.metrics.requests.labels(method, route, str(status)).inc()
-            self.metrics.seconds.labels(method, route).observe(time.perf_counter() - started)
+            self._note(scope, status or 500, size, time.perf_counter() - started)
+
+    def _note(self, scope: Scope, status: int, size: int, seconds: float) -> None:
+        route = getattr(scope.get("route"), "path", "unmatched")
+        method = scope["method"] if route != "unmatched" else "any"
+        self.metrics.requests.labels(method, route, str(status)).inc()
+        self.metrics.seconds.labels(method, route).observe(seconds)
+        level = WARNING if status >= 500 else DEBUG if status == 304 or route in _PROBES else INFO
+        if access.isEnabledFor(level):
+            grant = scope.get("state", {}).get("grant")
+            log_request(level, scope["method"], route, status, seconds, size, None if grant is None else grant.name)
 
 
 _REMEMBERED = "clutchlife.poll"

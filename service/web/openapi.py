@@ -40,6 +40,12 @@ _REVISION = {"Clutchlife-Revision": _header("The clutch's revision that the answ
 _LINK = {
     "Link": _header('The next page, `rel="next"`; absent on the last', '</v1/clutches?cursor=WzEsIiJd>; rel="next"')
 }
+_ID = {
+    "X-Request-ID": _header(
+        "The request's id, as the service's log has it: the one that was sent, where it is 1 to 128 visible characters",
+        "3f9a1c0b7d2e4f56",
+    )
+}
 #: Headers by status, of every answer that may have it.
 _OF_STATUS = {
     "201": {"Location": _header("Where it is from now on", "/v1/clutches/bench3-017")},
@@ -48,7 +54,10 @@ _OF_STATUS = {
     "415": {"Accept-Encoding": _header("The encodings of a body that are taken", "gzip")},
     "503": {"Retry-After": _header("Seconds after which to try again", "1")},
 }
-_UNCHANGED = {"description": "`If-None-Match` names the answer as it is: it need not be sent again", "headers": _TAG}
+_UNCHANGED = {
+    "description": "`If-None-Match` names the answer as it is: it need not be sent again",
+    "headers": _TAG | _ID,
+}
 
 
 def install(app: FastAPI) -> None:
@@ -90,6 +99,8 @@ def _complete(path: str, method: str, operation: Json) -> None:
         if example is not None:
             parameter.setdefault("example", example)
     responses = operation["responses"]
+    for response in responses.values():
+        response.setdefault("headers", {}).update(_ID)
     for status, headers in _OF_STATUS.items():
         if status in responses:
             responses[status].setdefault("headers", {}).update(headers)

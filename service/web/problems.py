@@ -26,6 +26,7 @@ from service.errors import (
     UnauthorizedError,
     UnsupportedMediaTypeError,
 )
+from service.logging import request_id
 from service.queries.cache import to_json
 from service.schemas.problem import Problem
 from service.web.limits import RETRY_AFTER_SECONDS
@@ -50,6 +51,7 @@ def problem(
         "detail": detail,
         "errors": [_shown(error) for error in errors],
         "total_errors": total,
+        "request_id": request_id.get(),
     }
     headers = {"Cache-Control": "no-store"}
     if status in (http.HTTPStatus.SERVICE_UNAVAILABLE, http.HTTPStatus.TOO_MANY_REQUESTS):
@@ -59,6 +61,11 @@ def problem(
     if status in (http.HTTPStatus.REQUEST_TIMEOUT, http.HTTPStatus.REQUEST_ENTITY_TOO_LARGE):
         headers["Connection"] = "close"  # what is left of the body would be read as the next request
     return Response(content=to_json(body), status_code=status, media_type=PROBLEM_TYPE, headers=headers)
+
+
+def refused(kind: type[ServiceError], detail: str) -> Response:
+    """The answer for a problem of that kind."""
+    return problem(kind.status, kind.slug, kind.title, detail)
 
 
 def _shown(error: FieldError) -> dict[str, Any]:
@@ -82,7 +89,6 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(RequestValidationError, _request_error)
     app.add_exception_handler(HTTPException, _http_error)
     app.add_exception_handler(OSError, _system_error)
-    app.add_exception_handler(Exception, _unexpected)
 
 
 def _service_error(_: Request, error: Exception) -> Response:
@@ -126,7 +132,7 @@ def _http_error(_: Request, error: Exception) -> Response:
 def _system_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, OSError)  # noqa: S101  (registered for it)
     if error.errno not in _NO_ROOM:
-        return _unexpected(request, error)
+        return unexpected(request, error)
     _log.error("%s %s: %s", request.method, request.url.path, error)
     detail = (
         f"the service's disk has no room for the file ({error.strerror}): nothing was stored; make room and send it again. "
@@ -136,7 +142,8 @@ def _system_error(request: Request, error: Exception) -> Response:
     return problem(NoRoomError.status, NoRoomError.slug, NoRoomError.title, detail)
 
 
-def _unexpected(request: Request, error: Exception) -> Response:
+def unexpected(request: Request, error: Exception) -> Response:
+    """The answer for an error of the program, which the log says all of and the answer nothing."""
     _log.error("%s %s", request.method, request.url.path, exc_info=error)
     return problem(500, ServiceError.slug, ServiceError.title, "the service's log says more")
 

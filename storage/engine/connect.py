@@ -7,6 +7,7 @@ https://www.sqlite.org/wal.html; why any release of SQLite may use the log here:
 """
 
 import math
+import re
 import sqlite3
 import time
 from contextlib import closing
@@ -36,7 +37,8 @@ def path_of(url: str) -> Path:
     if not rest.startswith("/") or not path or path.startswith(":memory:"):
         raise ValueError(f"a database needs a file, as in sqlite:///clutchlife.db, got {url!r}")
     if "?" in path or path.startswith("file:"):
-        raise ValueError(f"a database is given by its path alone, without options, got {url!r}")
+        shown = re.sub(r"\?.*", "?...", url)  # an option may be a password
+        raise ValueError(f"a database is given by its path alone, without options, got {shown!r}")
     return Path(path)
 
 

@@ -59,7 +59,7 @@ def watched_service() -> Iterator[tuple[TestClient, Watch]]:
     sys.setprofile(watch)
     try:
         with tempfile.TemporaryDirectory() as folder:
-            app = create_app(Settings(database=f"sqlite:///{folder}/rooms.db"))
+            app = create_app(Settings(workers=0, database=f"sqlite:///{folder}/rooms.db"))
             with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as http:
                 for clutch_id in ("warm-up", "watched"):
                     http.post("/v1/clutches", json={"clutch_id": clutch_id}).raise_for_status()

@@ -109,7 +109,7 @@ def mean_cof(hidden: Hidden, cycles: FloatArray) -> FloatArray:
 def _forecasts(hidden: Hidden, fraction: float) -> tuple[str, bool, list[dict[str, Any]]]:
     """The verdict, whether something was adopted, and the forecast of the end of life before and after."""
     with tempfile.TemporaryDirectory() as folder:
-        app = create_app(Settings(database=f"sqlite:///{Path(folder) / 'a.db'}"))
+        app = create_app(Settings(workers=0, database=f"sqlite:///{Path(folder) / 'a.db'}"))
         with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as http:
             base = "/v1/clutches/blind"
             clutch = {"clutch_id": "blind", "origin": "simulated", "end_of_life": {"cof_fraction": fraction}}

@@ -101,7 +101,7 @@ import importlib, sys, uvicorn
 from models.diagnosis.extension import Extension
 from service.app import create_app
 from service.settings import Settings
-settings = Settings(database=sys.argv[1], engine=sys.argv[3])
+settings = Settings(workers=0, database=sys.argv[1], engine=sys.argv[3])
 stand_in = importlib.import_module(sys.argv[3].partition(":")[0])
 for name, method in stand_in.METHODS.items():
     setattr(Extension, name, method)

@@ -19,7 +19,7 @@ def database_url(tmp_path: Path) -> str:
 @pytest.fixture
 def client(database_url: str) -> Iterator[TestClient]:
     """A client on this machine, with one clutch registered."""
-    app = create_app(Settings(database=database_url, most_body_bytes=2**20))
+    app = create_app(Settings(workers=0, database=database_url, max_body_mb=1))
     with TestClient(
         app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000), raise_server_exceptions=False
     ) as found:

@@ -1,7 +1,7 @@
 """`/docs`: the API's description for people, without the internet and without a script in the page.
 
 The dashboard keeps the reader's key in the storage of this origin, so that no page of it may run what is not a file of the
-service (`SafeHeaders`). Swagger UI is that of the package fastapi-offline.
+service (`Edge`). Swagger UI is that of the package fastapi-offline.
 """
 
 from fastapi import APIRouter

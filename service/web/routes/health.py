@@ -7,6 +7,7 @@ from service.settings import CODE_VERSION
 from service.web.auth import Reader, context_of
 from service.web.metrics import MEDIA_TYPE
 from service.web.problems import described
+from service.web.readiness import PARTS
 
 router = APIRouter(tags=["health"])
 
@@ -17,16 +18,21 @@ async def livez() -> dict[str, str]:
     return {"status": "alive", "version": CODE_VERSION}
 
 
-@router.get("/readyz", responses={503: {"description": "The database cannot be used"}})
-def readyz(request: Request) -> Response:
-    """The database answers too."""
-    database = context_of(request).database
-    ready = database.ready()
-    content = {"status": "ready" if ready else "not ready", "journal_mode": database.journal_mode}
-    return JSONResponse(content, status_code=200 if ready else 503)
+@router.get("/readyz", responses={503: {"description": "The service cannot work: `checks` says why"}})
+async def readyz(request: Request) -> Response:
+    """The database can be read and written, its disk and the machine have room, and the workers work."""
+    context = context_of(request)
+    faults = await context.readiness.faults()
+    content = {
+        "status": "not ready" if faults else "ready",
+        "journal_mode": context.database.journal_mode,
+        "checks": dict.fromkeys(PARTS, "ok") | faults,
+    }
+    return JSONResponse(content, status_code=503 if faults else 200, headers={"Cache-Control": "no-store"})
 
 
 @router.get("/metrics", response_class=Response, responses=described())
 def metrics(context: Reader) -> Response:
-    """Metrics for Prometheus: requests by route, and every clutch's runs, health and remaining cycles."""
-    return Response(content=context.metrics.exposition(context.database), media_type=MEDIA_TYPE)
+    """Metrics for Prometheus: requests by route, what waits, and how many clutches stand where."""
+    content = context.metrics.exposition(context.database, context.workers, context.diagnoses)
+    return Response(content=content, media_type=MEDIA_TYPE)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from service.errors import FieldError, InvalidError
+from service.logging import request_id
 from storage import clutches
 from storage.engine.database import Database
 
@@ -33,6 +34,11 @@ def logged(_: Database, log: Path, name: str, gate: Path) -> str:
     with log.open("a") as file:
         file.write(f"-{name} ")
     return name
+
+
+def request(_: Database) -> str:
+    """The id of the request that the call is made for."""
+    return request_id.get()
 
 
 def refused(_: Database) -> NoReturn:

@@ -14,6 +14,7 @@ import pytest
 from service.errors import BusyError, InvalidError
 from service.jobs import workers as module
 from service.jobs.workers import Lane, Workers, in_processes, in_threads
+from service.logging import request_id
 from service.queries.cache import to_json
 from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
@@ -53,6 +54,14 @@ def test_a_call_sees_what_was_committed_before_it(database: Database, workers: W
     assert workers.submit(Lane.RUNS, calls.ids).result(IN_TIME) == ["c1"]
     register_clutch.register(database, ClutchIn(clutch_id="c2"), created_at=AT)
     assert [workers.submit(lane, calls.ids).result(IN_TIME) for lane in Lane] == [["c1", "c2"]] * len(Lane)
+
+
+def test_a_call_is_made_for_the_request_that_asked_for_it(workers: Workers) -> None:
+    for name in ("rig-7", ""):
+        before = request_id.set(name)
+        asked = [workers.submit(Lane.RUNS, calls.request, turn="c1") for _ in range(3)]
+        request_id.reset(before)
+        assert [call.result(IN_TIME) for call in asked] == [name] * 3
 
 
 def test_an_error_of_the_service_comes_back_whole(workers: Workers) -> None:

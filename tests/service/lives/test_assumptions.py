@@ -127,7 +127,7 @@ def test_no_surfaces_before_the_first_test(client: TestClient) -> None:
 
 
 def test_answers_name_model_prior_and_severity(database_url: str) -> None:
-    app = create_app(Settings(database=database_url))
+    app = create_app(Settings(workers=0, database=database_url))
     with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
         client.post("/v1/clutches", json={"clutch_id": "c1"})
         found = said(client, "c1")

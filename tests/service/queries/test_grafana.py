@@ -2,12 +2,15 @@
 
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
+from service.app import create_app
+from service.settings import Settings
 from tests.support import stationary
 
 FOLDER = Path(__file__).parents[3] / "docker" / "grafana"
@@ -16,12 +19,23 @@ TARGETS = [target for panel in DASHBOARD["panels"] for target in panel["targets"
 
 
 @pytest.fixture
-def aged(client: TestClient) -> TestClient:
-    """A service that knows a clutch with three tests."""
-    client.post("/v1/clutches", json={"clutch_id": "bench"})
-    for cycles in (0, 1000, 2000):
-        assert client.post("/v1/clutches/bench/runs", json=stationary(cycles)).status_code == 201
-    return client
+def aged(database_url: str) -> Iterator[TestClient]:
+    """A service that knows a clutch with three tests, and has metrics of every clutch."""
+    app = create_app(Settings(workers=0, database=database_url, clutch_metrics=True))
+    with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
+        client.post("/v1/clutches", json={"clutch_id": "bench"})
+        for cycles in (0, 1000, 2000):
+            assert client.post("/v1/clutches/bench/runs", json=stationary(cycles)).status_code == 201
+        yield client
+
+
+def test_what_starts_grafana_turns_on_the_series_that_it_reads() -> None:
+    compose = (FOLDER.parent / "compose.yaml").read_text(encoding="utf-8")
+    assert "CLUTCHLIFE_CLUTCH_METRICS: ${CLUTCHLIFE_CLUTCH_METRICS:-false}" in compose
+    for name in ("docker/compose.yaml", "docs/dashboard.md"):
+        text = (FOLDER.parents[1] / name).read_text(encoding="utf-8")
+        (command,) = re.findall(r"(CLUTCHLIFE_KEY_FILE=.*?--profile grafana)", text, re.DOTALL)
+        assert "CLUTCHLIFE_CLUTCH_METRICS=true" in command, name
 
 
 def test_every_series_is_there_with_the_columns_that_are_read(aged: TestClient) -> None:

@@ -56,7 +56,7 @@ def test_what_a_proxy_passes_on_is_refused_without_keys(client: TestClient, head
 
 
 def test_insecure_local_answers_what_a_proxy_passes_on(database_url: str) -> None:
-    app = create_app(Settings(database=database_url, insecure_local=True))
+    app = create_app(Settings(workers=0, database=database_url, insecure_local=True))
     with TestClient(app, base_url="http://127.0.0.1", client=("192.0.2.7", 50000)) as client:
         assert client.get("/v1/clutches", headers={"X-Forwarded-For": "192.0.2.7"}).status_code == 200
         assert client.get("/v1/clutches", headers={"Host": "rig.example"}).status_code == 403

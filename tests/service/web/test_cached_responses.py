@@ -39,7 +39,7 @@ def told_by_another(database_url: str) -> dict[str, tuple[str, bytes]]:
 
 def told_on(database_url: str) -> dict[str, tuple[str, bytes]]:
     with TestClient(
-        create_app(Settings(database=database_url)), base_url="http://127.0.0.1", client=("127.0.0.1", 50000)
+        create_app(Settings(workers=0, database=database_url)), base_url="http://127.0.0.1", client=("127.0.0.1", 50000)
     ) as client:
         return told(client)
 

@@ -1,11 +1,13 @@
 """HEAD answers wherever GET does, with the same headers and no body."""
 
+import re
 from pathlib import Path
 
 import httpx2
 import pytest
 from fastapi.testclient import TestClient
 
+from tests.service.web.routes.routes_of import routes_of
 from tests.support import serving, stationary
 
 RUNS = "/v1/clutches/c1/runs"
@@ -32,6 +34,26 @@ def test_the_same_headers_and_no_body(client: TestClient, path: str) -> None:
     assert there.content
     for name in ("content-type", "etag", "content-length", "cache-control"):
         assert head.headers.get(name) == there.headers.get(name), name
+
+
+def test_every_route_that_can_be_read_can_be_headed(client: TestClient) -> None:
+    """All but when and which request it was; of what changes with every request, all but its length."""
+    client.post(RUNS, json=stationary(0, run_id="known"))
+    (asset,) = set(re.findall(r'"(/assets/[^"]*/clutch\.js)"', client.get("/clutches/c1").text))
+    paths = {path for method, path in routes_of(client.app.routes) if method == "GET"}  # type: ignore[attr-defined]
+    assert len(paths) > 30
+    wrong = []
+    for path in sorted(paths):
+        address = path.replace("{clutch_id}", "c1").replace("{run_id}", "known").replace("{diagnosis_id}", "d1")
+        address = asset if path.startswith("/assets/") else address
+        ignored = {"date", "x-request-id"} | ({"content-length"} if path == "/metrics" else set())
+        there, head = client.get(address), client.head(address)
+        headers = [
+            {name: value for name, value in answer.headers.items() if name not in ignored} for answer in (there, head)
+        ]
+        if (head.status_code, head.content, headers[1]) != (there.status_code, b"", headers[0]):
+            wrong.append((address, there.status_code, head.status_code, headers))
+    assert wrong == []
 
 
 def test_what_cannot_be_read_cannot_be_headed(client: TestClient) -> None:

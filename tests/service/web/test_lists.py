@@ -17,7 +17,7 @@ BASE = "/v1/clutches/c1"
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     """A clutch with five tests, one of them corrected twice, and a second clutch."""
-    app = create_app(Settings(database=f"sqlite:///{tmp_path_factory.mktemp('lists')}/clutchlife.db"))
+    app = create_app(Settings(workers=0, database=f"sqlite:///{tmp_path_factory.mktemp('lists')}/clutchlife.db"))
     with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as found:
         for clutch_id in ("c1", "c2"):
             assert found.post("/v1/clutches", json={"clutch_id": clutch_id}).status_code == 201

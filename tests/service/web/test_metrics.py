@@ -1,24 +1,130 @@
-"""Metrics count what happened, by route and not by name."""
+"""Metrics count what happened, by route and not by name; of every clutch they speak only where that is asked for."""
 
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
 from fastapi.testclient import TestClient
+from sqlalchemy import event
 
+from service.app import create_app
+from service.settings import Settings
+from storage import clutches
+from tests.service.web.routes.granting import context_of
 from tests.support import stationary
 
 
-def test_requests_and_clutches_are_counted(client: TestClient) -> None:
+@contextmanager
+def service(database_url: str, *, clutch_metrics: bool) -> Iterator[TestClient]:
+    app = create_app(Settings(workers=0, database=database_url, clutch_metrics=clutch_metrics))
+    with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
+        client.post("/v1/clutches", json={"clutch_id": "c1"})
+        yield client
+
+
+def post_tests(client: TestClient, clutch_id: str = "c1") -> None:
     for cycles in (0, 1000, 2000):
-        assert client.post("/v1/clutches/c1/runs", json=stationary(cycles)).status_code == 201
+        assert client.post(f"/v1/clutches/{clutch_id}/runs", json=stationary(cycles)).status_code == 201
+
+
+def test_requests_are_counted_by_route_and_not_by_name(client: TestClient) -> None:
+    post_tests(client)
     client.get("/v1/clutches/nobody")
     client.get("/no/such/place")
-    said = client.get("/metrics")
-    assert said.headers["content-type"].startswith("text/plain; version=0.0.4")
-    lines = said.text.splitlines()
+    answer = client.get("/metrics")
+    assert answer.headers["content-type"].startswith("text/plain; version=0.0.4")
+    lines = answer.text.splitlines()
     posted = 'clutchlife_requests_total{method="POST",route="/v1/clutches/{clutch_id}/runs",status="201"} 3.0'
     assert posted in lines
     assert 'clutchlife_requests_total{method="GET",route="/v1/clutches/{clutch_id}",status="404"} 1.0' in lines
     assert 'clutchlife_requests_total{method="any",route="unmatched",status="404"} 1.0' in lines
+    assert "nobody" not in answer.text
+
+
+def test_clutches_runs_and_what_waits_are_counted_together(client: TestClient) -> None:
+    post_tests(client)
+    client.post("/v1/clutches", json={"clutch_id": "c2"})
+    database = context_of(client).database
+    with database.writing() as connection:
+        row = clutches.get(connection, "c2")
+        assert row is not None
+        clutches.set_summary(connection, "c2", 0.0, row.summary)
+    lines = client.get("/metrics").text.splitlines()
+    for line in (
+        "clutchlife_clutches 2.0",
+        'clutchlife_clutches_within{cycles="0"} 1.0',
+        'clutchlife_clutches_within{cycles="1000"} 1.0',
+        "clutchlife_runs 3.0",
+        "clutchlife_runs_held 0.0",
+        "clutchlife_ended_lives 0.0",
+        'clutchlife_worker_calls{lane="runs"} 0.0',
+        "clutchlife_diagnoses_waiting 0.0",
+    ):
+        assert line in lines, line
+    client.patch("/v1/clutches/c2", json={"archived": True, "reason": "worn out"})
+    assert 'clutchlife_clutches_within{cycles="0"} 0.0' in client.get("/metrics").text.splitlines()
+    assert any(line.startswith("process_resident_memory_bytes ") for line in lines)
+
+
+def cost(client: TestClient) -> tuple[int, set[str]]:
+    """Statements that a question for the metrics makes, and the series that it gives but for those of requests."""
+    statements: list[str] = []
+    engine = context_of(client).database._engine
+
+    def noted(*arguments: object) -> None:
+        statements.append(str(arguments[2]))
+
+    event.listen(engine, "before_cursor_execute", noted)
+    text = client.get("/metrics").text
+    event.remove(engine, "before_cursor_execute", noted)
+    series = {line.rpartition(" ")[0] for line in text.splitlines() if not line.startswith(("#", "clutchlife_request"))}
+    return len(statements), series
+
+
+@pytest.mark.parametrize("clutch_metrics", [False, True])
+def test_more_clutches_cost_no_more_unless_each_is_asked_for(database_url: str, clutch_metrics: bool) -> None:
+    with service(database_url, clutch_metrics=clutch_metrics) as client:
+        post_tests(client)
+        few, few_series = cost(client)
+        for number in range(2, 40):
+            assert client.post("/v1/clutches", json={"clutch_id": f"c{number}"}).status_code == 201
+        post_tests(client, "c2")
+        many, many_series = cost(client)
+        assert few == many
+        assert 0 < few < 12
+        assert (many_series == few_series) is not clutch_metrics
+        named = {line for line in many_series if re.search(r'clutch="|quantile="', line)}
+        assert bool(named) is clutch_metrics
+
+
+def test_the_numbers_of_all_clutches_are_a_row_a_statement(client: TestClient) -> None:
+    """Rows that grow with the clutches would be as slow as series that do."""
+    for number in range(2, 20):
+        client.post("/v1/clutches", json={"clutch_id": f"c{number}"})
+        post_tests(client, f"c{number}") if number < 5 else None
+    rows: list[int] = []
+    database = context_of(client).database
+
+    def noted(*arguments: object) -> None:
+        with database._engine.connect() as connection:
+            raw = connection.connection.driver_connection
+            assert raw is not None
+            query, values = str(arguments[2]), arguments[3]
+            if query.startswith("SELECT"):
+                rows.append(len(raw.execute(query, values).fetchall()))
+
+    event.listen(database._engine, "before_cursor_execute", noted)
+    client.get("/metrics")
+    event.remove(database._engine, "before_cursor_execute", noted)
+    assert rows == [1] * 5
+
+
+def test_series_of_every_clutch_are_there_where_they_are_asked_for(database_url: str) -> None:
+    with service(database_url, clutch_metrics=True) as client:
+        post_tests(client)
+        lines = client.get("/metrics").text.splitlines()
     assert 'clutchlife_clutch_runs{clutch="c1"} 3.0' in lines
     health = next(line for line in lines if line.startswith('clutchlife_clutch_health{clutch="c1"}'))
     assert 0 < float(health.split()[-1]) <= 1
     assert any(line.startswith('clutchlife_clutch_remaining_cycles{clutch="c1",quantile="0.5"}') for line in lines)
-    assert "nobody" not in said.text

@@ -5,8 +5,10 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import jsonschema_rs
+import openapi_spec_validator
 import pytest
 import schemathesis
+from openapi_spec_validator.validation.exceptions import UnresolvableParameterError
 
 from service.app import create_app
 from service.settings import Settings
@@ -71,6 +73,21 @@ def test_the_description_is_valid_and_every_reference_is_found_in_it(api: dict[s
     broken["info"] = 7
     with pytest.raises(Exception, match="7 is not of type"):
         schemathesis.openapi.from_dict(broken).validate()
+
+
+def test_the_description_keeps_to_the_standard(api: dict[str, Any]) -> None:
+    """By the OpenAPI Initiative's own schema, and what it cannot say: unique ids, parameters of the paths, defaults."""
+    openapi_spec_validator.validate(api)
+    paths = copy.deepcopy(api)
+    del paths["paths"]["/v1/clutches/{clutch_id}"]["get"]["parameters"]
+    with pytest.raises(UnresolvableParameterError, match="clutch_id"):
+        openapi_spec_validator.validate(paths)
+
+
+def test_every_answer_names_its_request(api: dict[str, Any]) -> None:
+    for name, operation in operations(api):
+        for status, answer in operation["responses"].items():
+            assert "X-Request-ID" in answer["headers"], (name, status)
 
 
 def test_every_field_and_parameter_has_an_example(api: dict[str, Any]) -> None:

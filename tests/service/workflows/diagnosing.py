@@ -18,7 +18,9 @@ BASE = "/v1/clutches/c1"
 @contextmanager
 def service(folder: Path, engine: str = "diagnose", **settings: Any) -> Iterator[TestClient]:
     """A service in this process, whose diagnoses the stand-in makes."""
-    named = Settings(database=f"sqlite:///{folder / 'a.db'}", engine=f"{stand_in_engine.__name__}:{engine}", **settings)
+    named = Settings(
+        workers=0, database=f"sqlite:///{folder / 'a.db'}", engine=f"{stand_in_engine.__name__}:{engine}", **settings
+    )
     with TestClient(create_app(named), base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
         client.post("/v1/clutches", json={"clutch_id": "c1"})
         yield client

@@ -44,7 +44,9 @@ def url(tmp_path: Path) -> str:
 
 
 def client_of(url: str) -> TestClient:
-    return TestClient(create_app(Settings(database=url)), base_url="http://127.0.0.1", client=("127.0.0.1", 50000))
+    return TestClient(
+        create_app(Settings(workers=0, database=url)), base_url="http://127.0.0.1", client=("127.0.0.1", 50000)
+    )
 
 
 def width(said: dict[str, dict[str, float | None]]) -> float:

@@ -9,7 +9,7 @@ from service.settings import Settings
 from tests.support import stationary
 
 with tempfile.TemporaryDirectory() as folder:
-    app = create_app(Settings(database=f"sqlite:///{folder}/a.db"))
+    app = create_app(Settings(workers=0, database=f"sqlite:///{folder}/a.db"))
     with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as http:
         http.post("/v1/clutches", json={"clutch_id": "c1"}).raise_for_status()
         for cycles, celsius, expected in ((0.0, 119.0, False), (1000.0, 131.0, True)):

@@ -28,7 +28,7 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A database with the clutches a, b and c, of which b has tests."""
     path = tmp_path_factory.mktemp("stored") / "clutchlife.db"
     with TestClient(
-        create_app(Settings(database=f"sqlite:///{path}")),
+        create_app(Settings(workers=0, database=f"sqlite:///{path}")),
         base_url="http://127.0.0.1",
         client=("127.0.0.1", 50000),
     ) as client:
@@ -125,6 +125,6 @@ def test_replay_goes_on_after_a_clutch_that_it_refuses_and_names_it_at_the_end(p
 
 
 def test_a_second_service_on_the_same_database_does_not_start(path: Path) -> None:
-    with TestClient(create_app(Settings(database=f"sqlite:///{path}"))):
+    with TestClient(create_app(Settings(workers=0, database=f"sqlite:///{path}"))):
         output = clutchlife("serve", "--port", "0", "--database", f"sqlite:///{path}", code=1)
     assert "a service uses this database already (process " in output

@@ -21,7 +21,7 @@ BASE = "/v1/clutches/c1"
 def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A clutch with runs of all kinds, one that is held, one corrected, one that came late and one withdrawn."""
     path = tmp_path_factory.mktemp("stored") / "clutchlife.db"
-    app = create_app(Settings(database=f"sqlite:///{path}"))
+    app = create_app(Settings(workers=0, database=f"sqlite:///{path}"))
     with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
         assert client.post("/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
         fill(client)

@@ -24,7 +24,7 @@ CLUTCHES = "/v1/clutches"
 
 @contextmanager
 def service(database_url: str, **settings: Any) -> Iterator[TestClient]:
-    app = create_app(Settings(database=database_url, **settings))
+    app = create_app(Settings(workers=0, database=database_url, **settings))
     with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
         yield client
 

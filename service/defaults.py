@@ -1,0 +1,4 @@
+"""Where the service and its database are where nothing is said; loads nothing, for every command begins with it."""
+
+DEFAULT_DATABASE = "sqlite:///clutchlife.db"
+DEFAULT_URL = "http://127.0.0.1:8000"

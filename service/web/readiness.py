@@ -1,0 +1,95 @@
+"""Whether the service can work now: its database, its disk, its memory and its workers.
+
+One thread looks, for all who ask at that moment; no lock is taken, so that nobody who holds one makes the service look dead.
+"""
+
+import asyncio
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from service.errors import BusyError
+from service.jobs.queue import DiagnosisQueue
+from service.jobs.workers import Workers
+from service.web.limits import LONGEST_LOOK_SECONDS
+from storage.engine.database import Database
+
+#: What is looked at, in the order of the answer.
+PARTS = ("database", "disk", "memory", "workers")
+_MEMORY = Path("/proc/meminfo")
+_GROUP = Path("/proc/self/cgroup")
+_GROUPS = Path("/sys/fs/cgroup")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Needs:
+    """Bytes that must be left on the disk and of memory."""
+
+    disk: int
+    memory: int
+
+
+class Readiness:
+    """What keeps the service from working. Asked from the event loop; `close` at the end."""
+
+    def __init__(self, database: Database, workers: Workers, diagnoses: DiagnosisQueue, needs: Needs) -> None:
+        self._database = database
+        self._workers = workers
+        self._diagnoses = diagnoses
+        self._needs = needs
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="readiness")
+        self._looking: asyncio.Future[dict[str, str]] | None = None
+
+    async def faults(self) -> dict[str, str]:
+        """What is wrong, in words, by part; empty where the service can work."""
+        if self._looking is None or self._looking.done():
+            self._looking = asyncio.get_running_loop().run_in_executor(self._thread, self._look)
+        try:
+            return await asyncio.wait_for(asyncio.shield(self._looking), LONGEST_LOOK_SECONDS)
+        except TimeoutError:
+            return {"disk": f"the database's disk has not answered for {LONGEST_LOOK_SECONDS:g} s"}
+
+    def close(self) -> None:
+        """End the thread, once it has looked."""
+        self._thread.shutdown(wait=False)
+
+    def _look(self) -> dict[str, str]:
+        wrong = self._database.faults(least_free=self._needs.disk)
+        left = available_memory()
+        if left is not None and left < self._needs.memory:
+            wrong["memory"] = f"{left >> 20} MiB of memory are left, {self._needs.memory >> 20} are needed"
+        workers = self._fault_of_workers()
+        return wrong if workers is None else wrong | {"workers": workers}
+
+    def _fault_of_workers(self) -> str | None:
+        if not self._diagnoses.is_working():
+            return "the thread that has diagnoses made has ended"
+        try:
+            ended = self._workers.ended()
+        except BusyError:
+            return "the service is ending"
+        if not ended:
+            return None
+        lanes = ", ".join(lane.name.lower() for lane in ended)
+        return f"a worker process has ended and is being started again: {lanes}"
+
+
+def available_memory() -> int | None:
+    """Bytes of memory that may still be taken, of the machine and of the process's own control group (version 2); None where
+    the system does not say."""
+    left = []
+    try:
+        lines = (line.split() for line in _MEMORY.read_text(encoding="ascii").splitlines())
+        left += [int(words[1]) << 10 for words in lines if words[0] == "MemAvailable:"]
+    except OSError:
+        pass
+    try:
+        group = _GROUPS / _GROUP.read_text(encoding="utf-8").strip().rpartition("::")[2].lstrip("/")
+        most = int((group / "memory.max").read_text(encoding="ascii"))
+        statistics = dict(line.split() for line in (group / "memory.stat").read_text(encoding="ascii").splitlines())
+        # what files are cached in is given back when it is needed
+        taken = int((group / "memory.current").read_text(encoding="ascii")) - int(statistics["inactive_file"])
+        left.append(most - taken)
+    except (OSError, ValueError, KeyError):  # no such group, or one without a bound ("max")
+        pass
+    return min(left, default=None)

@@ -1,0 +1,58 @@
+"""`clutchlife serve` as an operator sees it: its log, from the settings at the start to the stop."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+
+from tests.support import ONCE, free_port, stationary, wait_until_ready
+
+
+def served(folder: Path, environment: Mapping[str, str], *arguments: str) -> tuple[str, dict[str, httpx2.Response]]:
+    """What a service with two workers says on standard error while a run is posted, and the answers."""
+    port = free_port()
+    command = [sys.executable, "-m", "service.cli.main", "serve", "--port", str(port), *arguments]
+    command += ["--database", f"sqlite:///{folder / 'a.db'}"]
+    process = subprocess.Popen(command, env=os.environ | environment, stderr=subprocess.PIPE, text=True)
+    try:
+        url = f"http://127.0.0.1:{port}"
+        wait_until_ready(url, lambda: process.poll() is not None)
+        headers = {"X-Request-ID": "rig-7"}
+        answers = {
+            "register": ONCE.post(f"{url}/v1/clutches", json={"clutch_id": "c1"}, headers=headers),
+            "post": ONCE.post(f"{url}/v1/clutches/c1/runs", json=stationary(0.0), headers=headers),
+            "absent": ONCE.get(f"{url}/%0aWARNING%20clutchlife:%20forged", headers=headers),
+        }
+    finally:
+        process.terminate()
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 0
+    return said, answers
+
+
+def test_every_line_of_a_service_is_json_from_its_start_to_its_stop(tmp_path: Path) -> None:
+    said, answers = served(tmp_path, {"CLUTCHLIFE_LOG_FORMAT": "json"})
+    lines: list[dict[str, Any]] = [json.loads(line) for line in said.splitlines()]
+    assert lines[0]["message"] == "settings"
+    assert lines[0]["workers"] == 2
+    assert {"clutchlife", "clutchlife.access", "uvicorn.error"} <= {line["logger"] for line in lines}
+    ours = [line for line in lines if line.get("request_id") == "rig-7"]
+    assert [(line["method"], line["status"]) for line in ours] == [("POST", 201), ("POST", 201), ("GET", 404)]
+    assert [answer.headers["X-Request-ID"] for answer in answers.values()] == ["rig-7"] * 3
+    assert not any(line.get("route") == "/readyz" for line in lines), "probes are not logged"
+    assert "forged" not in said
+    assert any("no keys are configured" in line["message"] for line in lines)
+
+
+@pytest.mark.parametrize("arguments", [("--log-level", "warning"), ()])
+def test_the_level_is_that_of_the_option_or_else_of_the_environment(tmp_path: Path, arguments: tuple[str, ...]) -> None:
+    environment = {"CLUTCHLIFE_LOG_FORMAT": "text", "CLUTCHLIFE_LOG_LEVEL": "info" if arguments else "warning"}
+    said, _ = served(tmp_path, environment | {"CLUTCHLIFE_WORKERS": "0"}, *arguments)
+    (line,) = said.splitlines()
+    assert " WARNING clutchlife: no keys are configured" in line

@@ -1,0 +1,141 @@
+"""The log: a line a record, which nobody who is logged can forge."""
+
+import io
+import json
+import logging
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from service.logging import JsonLines, LogFormat, LogLevel, TextLines, configure, log_request, request_id, sane
+
+FORGED = 'x\n2026-01-01T00:00:00.000Z INFO clutchlife: key revoked\r\n{"level": "info"}\x85\u2028\x1b[2Jy'
+
+
+@pytest.fixture(autouse=True)
+def unchanged_loggers() -> Iterator[None]:
+    """What `configure` changes is of the whole process."""
+    root = logging.getLogger()
+    names = (None, "clutchlife", "uvicorn")
+    handlers, levels = list(root.handlers), [logging.getLogger(name).level for name in names]
+    yield
+    logging.captureWarnings(False)
+    root.handlers[:] = handlers
+    for name, level in zip(names, levels, strict=True):
+        logging.getLogger(name).setLevel(level)
+
+
+def record(message: str, *arguments: object, error: BaseException | None = None, **fields: Any) -> logging.LogRecord:
+    info = None if error is None else (type(error), error, error.__traceback__)
+    made = logging.LogRecord("clutchlife", logging.WARNING, "", 0, message, arguments, info)
+    made.fields = fields
+    return made
+
+
+def raised() -> ValueError:
+    """An error with a traceback."""
+    with pytest.raises(ValueError, match="key revoked") as caught:
+        raise ValueError(FORGED)
+    return caught.value
+
+
+def configured(form: LogFormat, level: LogLevel) -> io.StringIO:
+    """What is written from now on."""
+    written = io.StringIO()
+    configure(form, level, written)
+    return written
+
+
+def test_a_record_is_one_line_of_json() -> None:
+    line = JsonLines().format(record("%s: %s", "a", FORGED, key=FORGED))
+    assert len(line.splitlines()) == 1
+    assert line.isascii()
+    read = json.loads(line)
+    assert (read["level"], read["logger"], read["message"], read["key"]) == (
+        "warning",
+        "clutchlife",
+        f"a: {FORGED}",
+        FORGED,
+    )
+    assert read["time"].endswith("Z")
+    assert "request_id" not in read
+
+
+def test_an_error_is_in_the_same_line_with_its_traceback() -> None:
+    line = JsonLines().format(record("it failed", error=raised()))
+    assert len(line.splitlines()) == 1
+    assert json.loads(line)["exception"].startswith("Traceback")
+
+
+def test_no_line_of_text_begins_with_what_is_logged() -> None:
+    text = TextLines().format(record("%s", FORGED, error=raised(), key=FORGED, note="a=b c"))
+    first, *others = text.splitlines()
+    assert " WARNING clutchlife: x " in first
+    assert 'note="a=b c"' in first
+    assert others
+    assert all(line.startswith("    | ") for line in others)
+    assert all(line.isprintable() for line in (first, *others)), "no sign moves a terminal's cursor"
+
+
+@pytest.mark.parametrize("lines", [JsonLines(), TextLines()])
+def test_a_line_names_the_request_that_it_belongs_to(lines: logging.Formatter) -> None:
+    before = request_id.set("rig-7")
+    try:
+        assert "rig-7" in lines.format(record("x"))
+    finally:
+        request_id.reset(before)
+    assert "rig-7" not in lines.format(record("x"))
+
+
+def test_only_visible_characters_make_an_id() -> None:
+    for sent in (b"a", b"3f9a-1c0b:7/2", b"~" * 128):
+        assert sane(sent) == sent.decode()
+    for sent in (b"", b"a b", b"a\n", b"a\tb", b"\xe4", b"a" * 129, b"\x1b[2J", b"\x7f"):
+        assert sane(sent) is None
+
+
+def test_ours_are_heard_from_the_level_on_and_others_from_warning_on() -> None:
+    written = configured("json", "info")
+    for name in ("clutchlife", "clutchlife.access", "uvicorn.error", "alembic.runtime"):
+        for level in (logging.DEBUG, logging.INFO, logging.WARNING):
+            logging.getLogger(name).log(level, "x")
+    heard = [(line["logger"], line["level"]) for line in map(json.loads, written.getvalue().splitlines())]
+    ours = ("clutchlife", "clutchlife.access", "uvicorn.error")
+    assert heard == [*[(name, level) for name in ours for level in ("info", "warning")], ("alembic.runtime", "warning")]
+
+
+def test_auto_is_text_on_a_terminal_and_json_elsewhere() -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    for form, stream, is_json in (
+        ("auto", io.StringIO(), True),
+        ("auto", Terminal(), False),
+        ("text", io.StringIO(), False),
+    ):
+        configure(form, "info", stream)  # type: ignore[arg-type]
+        logging.getLogger("clutchlife").info("x")
+        assert stream.getvalue().startswith("{") is is_json
+    configure("json", "info", stream := Terminal())
+    logging.getLogger("clutchlife").info("x")
+    assert stream.getvalue().startswith("{")
+
+
+def test_a_request_is_a_line_with_numbers() -> None:
+    written = configured("json", "info")
+    log_request(logging.INFO, "GET", "/v1/clutches", 200, 0.0123456, 2048, "key:1a2b bench 3")
+    line = json.loads(written.getvalue())
+    assert line["message"] == "GET /v1/clutches 200"
+    expected = {"method": "GET", "route": "/v1/clutches", "status": 200, "duration_ms": 12.35, "bytes": 2048}
+    assert expected.items() <= line.items()
+    assert line["key"] == "key:1a2b bench 3"
+
+
+def test_standard_error_is_where_lines_go(capsys: pytest.CaptureFixture[str]) -> None:
+    configure("json", "info")
+    assert logging.getLogger().handlers[0].stream is sys.stderr  # type: ignore[attr-defined]
+    logging.getLogger("clutchlife").info("x")
+    assert json.loads(capsys.readouterr().err)["message"] == "x"

@@ -1,0 +1,86 @@
+"""Settings: by the environment, each named where it is wrong, each documented, and shown without secrets."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from service.settings import PREFIX, Settings, redacted
+
+OPERATIONS = Path(__file__).parents[2] / "docs" / "operations.md"
+#: Names of earlier releases, which services are started with.
+EARLIER = {
+    "CLUTCHLIFE_DATABASE": ("sqlite:///other.db", "database", "sqlite:///other.db"),
+    "CLUTCHLIFE_WORKERS": ("0", "workers", 0),
+    "CLUTCHLIFE_MAX_BODY_MB": ("3", "most_body_bytes", 3 << 20),
+    "CLUTCHLIFE_BODY_SECONDS": ("7", "body_seconds", 7),
+    "CLUTCHLIFE_REQUESTS_PER_SECOND": ("8", "requests_per_second", 8),
+    "CLUTCHLIFE_REQUESTS_AT_ONCE": ("9", "requests_at_once", 9),
+    "CLUTCHLIFE_DIAGNOSIS_SECONDS": ("10", "diagnosis_seconds", 10),
+    "CLUTCHLIFE_DIAGNOSIS_MEMORY_MB": ("11", "diagnosis_bytes", 11 << 20),
+}
+
+
+@pytest.mark.parametrize("name", EARLIER)
+def test_the_variables_of_earlier_releases_hold(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    text, attribute, value = EARLIER[name]
+    assert getattr(Settings.from_environment(), attribute) != value
+    monkeypatch.setenv(name, text)
+    assert getattr(Settings.from_environment(), attribute) == value
+
+
+def test_what_is_given_wins(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CLUTCHLIFE_DATABASE", "sqlite:///other.db")
+    assert Settings.from_environment("sqlite:///own.db").database == "sqlite:///own.db"
+
+
+def test_every_wrong_variable_is_named_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, text in (("WORKERS", "-1"), ("MAX_BODY_MB", "many"), ("LOG_FORMAT", "xml"), ("BODY_SECONDS", "")):
+        monkeypatch.setenv(f"CLUTCHLIFE_{name}", text)
+    with pytest.raises(ValueError, match="CLUTCHLIFE_WORKERS must be a whole number of at least 0, got '-1'") as caught:
+        Settings.from_environment()
+    said = str(caught.value)
+    assert "\n" not in said
+    assert "CLUTCHLIFE_MAX_BODY_MB must be a whole number, got 'many'" in said
+    assert "CLUTCHLIFE_LOG_FORMAT must be 'auto', 'json' or 'text', got 'xml'" in said
+    assert "CLUTCHLIFE_BODY_SECONDS must be a whole number, got ''" in said
+
+
+@pytest.mark.parametrize(
+    ("address", "shown"),
+    [
+        ("sqlite:///clutchlife.db", "sqlite:///clutchlife.db"),
+        ("sqlite:////data/a:b@c.db", "sqlite:////data/a:b@c.db"),
+        ("postgresql://rig:s3cr3t@host/db", "postgresql://rig:***@host/db"),
+        ("postgresql://rig:s3/cr@3t@host/db", "postgresql://rig:***@host/db"),
+        ("sqlite:///a.db?key=s3cr3t", "sqlite:///a.db?***"),
+    ],
+)
+def test_passwords_are_not_shown(address: str, shown: str) -> None:
+    assert redacted(address) == shown
+    assert Settings(database=address).shown()["database"] == shown
+
+
+def test_a_start_prints_the_settings_without_the_password() -> None:
+    command = [sys.executable, "-m", "service.cli.main", "serve", "--database", "postgresql://rig:s3cr3t@host/db"]
+    environment = os.environ | {"CLUTCHLIFE_LOG_FORMAT": "json", "CLUTCHLIFE_WORKERS": "1"}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 64
+    line = json.loads(done.stderr.splitlines()[0])
+    assert (line["message"], line["workers"], line["database"]) == ("settings", 1, "postgresql://rig:***@host/db")
+    assert "s3cr3t" not in done.stdout + done.stderr
+
+
+def test_the_table_of_the_documentation_is_that_of_the_settings() -> None:
+    rows = re.findall(
+        r"^\| `(CLUTCHLIFE_\w+)` \| (.*) \| (.*) \|$", OPERATIONS.read_text(encoding="utf-8"), re.MULTILINE
+    )
+    fields = Settings.model_fields
+    assert rows == [
+        (f"{PREFIX}{name.upper()}", f"`{json.dumps(field.default).strip(chr(34))}`", field.description)
+        for name, field in fields.items()
+    ]
