@@ -196,8 +196,7 @@ _PROBES = ("/livez", "/readyz", "/metrics")
 
 
 class Edge:
-    """What every request has, whatever becomes of it: an id, safe headers, a count and a time by its route's template, so
-    that names of clutches do not become labels, and a line in the log."""
+    """What every request has: an id, safe headers, a count and a time by its route's template, a line in the log."""
 
     def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
         self.app = app
@@ -208,7 +207,7 @@ class Edge:
             await self.app(scope, receive, send)
             return
         sent = next((value for name, value in scope["headers"] if name == b"x-request-id"), b"")
-        own_id = (sane(sent) if sent else None) or secrets.token_hex(8)
+        own_id = sane(sent) or secrets.token_hex(8)
         request_id.set(own_id)
         status, size, started = 0, 0, time.perf_counter()
 
