@@ -207,7 +207,7 @@ class Edge:
             await self.app(scope, receive, send)
             return
         sent = next((value for name, value in scope["headers"] if name == b"x-request-id"), b"")
-        own_id = sane(sent) or secrets.token_hex(8)
+        own_id = (sane(sent) if sent else None) or secrets.token_hex(8)
         request_id.set(own_id)
         status, size, started = 0, 0, time.perf_counter()
 
@@ -243,9 +243,7 @@ class Edge:
 
 
 _REMEMBERED = "clutchlife.poll"
-
-#: The held answer as a response to a request, None where there is none for the present revision.
-Again = Callable[[Request], Response | None]
+Again = Callable[[Request], Response | None]  # the held answer, None where there is none for the present revision
 
 
 def remember(request: Request, again: Again) -> None:
