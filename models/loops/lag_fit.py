@@ -5,7 +5,7 @@ in it, so its likelihood is nearly normal, which that of C itself is not. Beside
 are fitted (`models.loops.lag_problem`), none of which has a loop area, so that u follows from how the torque differs
 between accelerating and decelerating. u maximises the likelihood (the others are profiled out); its deviation comes from
 the curvature there, with the noise taken from the residual and raised where that is not white: what no u explains makes
-u less certain.
+u less certain. What an error of the curve would explain of that residual is left out of it, for it is counted by itself.
 
 The curve's own error contributes: the lag is S S' v̇/C, so that C is off by 9 to 18 % with M̄_c 2 % off, by up to 3 %
 with V_S 5 % off, by up to 5 % with C_v 5 % off. u's gradient by the four parameters, each from one Gauss-Newton step at a
@@ -116,9 +116,17 @@ def fit_lag(law: Law, cycle: Cycle, phase: FloatArray, measured: FloatArray, cur
         return _result(posed.problem, torque(posed.problem.speed, curve.parameters), None, estimate, status)
     lag = _refine(posed.problem, posed.course, law.lags, misfits, best)
     middle, change = posed.about(lag)
-    sd, gain = posed.problem.deviation(middle, change, lag, cycle, law.scaled)
+    courses: list[FloatArray] = []
+
+    def stepped(moved: StribeckParameters) -> float:
+        after, course = _posed(law, cycle, phase, measured, moved).stepped(lag)
+        courses.append(course)
+        return after
+
+    slant = _by_curve(stepped, curve)
+    erring = np.stack([course - middle for course in courses[1:]]) if courses else np.zeros((0, middle.size))
+    sd, gain = posed.problem.deviation(middle, change, lag, cycle, scaled=law.scaled, erring=erring)
     share = 1 / gain if law.scaled else 1.0
-    slant = _by_curve(lambda moved: _posed(law, cycle, phase, measured, moved).stepped(lag), curve)
     estimate = _Estimate(lag * share, sd * share, slant)
     status = LagStatus.DETERMINED if estimate.lag > Z90 * estimate.sd else LagStatus.UNRESOLVED
     return _result(posed.problem, middle, estimate.lag if status is LagStatus.DETERMINED else None, estimate, status)
@@ -180,10 +188,11 @@ class _Posed:
         low, middle, high = self.course.at(np.array([lag - step, lag, lag + step]), self.problem.phase)
         return middle, (high - low) / (2 * step)
 
-    def stepped(self, lag: float) -> float:
-        """The lag one Gauss-Newton step on, over its gain where the law is scaled."""
-        after, gain = self.problem.step(*self.about(lag), lag)
-        return after / gain if self.law.scaled else after
+    def stepped(self, lag: float) -> tuple[float, FloatArray]:
+        """The lag one Gauss-Newton step on, over its gain where the law is scaled, and the torque [n] Nm before it."""
+        course, change = self.about(lag)
+        after, gain = self.problem.step(course, change, lag)
+        return after / gain if self.law.scaled else after, course
 
     def near_none(self, little: FloatArray | None = None) -> tuple[float, float]:
         """Deviation and estimate of the lag, linearised about none; `little` [n] Nm is the torque at the least lag."""

@@ -64,12 +64,20 @@ class LagProblem:
         return lag + move, self.gain(base + move * slope)
 
     def deviation(
-        self, course: FloatArray, change: FloatArray, lag: float, cycle: Cycle, scaled: bool
+        self, course: FloatArray, change: FloatArray, lag: float, cycle: Cycle, *, scaled: bool, erring: FloatArray
     ) -> tuple[float, float]:
-        """Deviation of u at the optimum (of gain x u/gain where the lag is `scaled` by the gain), and the gain there."""
+        """Deviation of u at the optimum (of gain x u/gain where the lag is `scaled` by the gain), and the gain there.
+
+        `erring` [k, n] are directions that the torque takes where the curve errs: of the residual they are no noise.
+        """
         base, slope = self.without(course), self.without(change)
         gain = self.gain(base)
-        sd = self._deviation(self.left - gain * base)
+        residual = self.left - gain * base
+        directions = (
+            np.stack([self.without(way) for way in erring], axis=1) if len(erring) else np.zeros((base.size, 0))
+        )
+        residual -= directions @ np.linalg.lstsq(directions, residual, rcond=1e-6)[0]
+        sd = self._deviation(residual, taken=len(erring))
         information = np.array([[base @ base + (self.noise / GAIN_SD) ** 2, gain * (base @ slope)], [0, 0]])
         information[1] = information[0, 1], gain**2 * (slope @ slope)
         variance = sd**2 * np.linalg.inv(information + 1e-12 * np.diag(np.diag(information)))
@@ -89,16 +97,20 @@ class LagProblem:
         lead /= cycle.amplitude**2
         return abs(shift) * math.sqrt(max(float(lead @ cycle.covariance @ lead), 0.0))
 
-    def _deviation(self, residual: FloatArray) -> float:
-        """Of a sample; raised where the means over blocks of phase scatter more than white noise would make them."""
-        free = max(residual.size - self.absorbed.shape[1] - 2, 1)
+    def _deviation(self, residual: FloatArray, taken: int = 0) -> float:
+        """Of a sample; raised where the means over blocks of phase scatter more than white noise would make them.
+
+        `taken` directions were taken out of the residual beside what is absorbed.
+        """
+        taken += self.absorbed.shape[1] + 2
+        free = max(residual.size - taken, 1)
         variance = float(residual @ residual) / free
         turn = np.mod(self.phase, 2 * math.pi)
         block = np.minimum((turn * (_BLOCKS / (2 * math.pi))).astype(np.int64), _BLOCKS - 1)
         count = np.bincount(block, minlength=_BLOCKS)
         total = np.bincount(block, weights=residual, minlength=_BLOCKS)
         filled = count > 0
-        freedom = max(int(filled.sum()) - self.absorbed.shape[1] - 2, 4)
+        freedom = max(int(filled.sum()) - taken, 4)
         ratio = float((total[filled] ** 2 / count[filled]).sum()) / freedom / max(variance, 1e-300)
         return math.sqrt(variance * (ratio if ratio > 1 + NOT_WHITE * math.sqrt(2 / freedom) else 1.0))
 
