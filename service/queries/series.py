@@ -8,63 +8,76 @@ from service import measured_lives, records
 from service.columns import whole
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF
 from service.lives.engagements.over_life import ALL_INDICATORS
-from service.lives.history import STATIONARY
+from service.lives.history import DYNAMIC, STATIONARY
 from service.lives.payloads import PARAMETER_UNITS
+from service.lives.quantities.measured import LOOP_COLUMNS
+from service.lives.quantities.names import QUANTITIES
 from storage import results, runs
 from storage.engine.database import Database
 from storage.results import PredictionRow
 
+#: Over all pressures, and at no frequency.
+_NOWHERE = {"pressure_bar": None, "frequency_hz": None}
+
 
 def series(database: Database, clutch_id: str, quantity: str | None) -> list[dict[str, Any]]:
-    """Each quantity of each test by cycles, the indicators of each engagement, then the remaining cycles as they were
-    predicted; of one quantity, or of all.
+    """Each quantity of each test by cycles, of each friction loop, the indicators of each engagement, then the remaining
+    cycles as they were predicted; of one quantity, or of all.
 
     Raises NotFoundError.
     """
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
         rows = runs.page(connection, clutch_id, kind=STATIONARY, state=runs.ACCEPTED)
+        dynamic = runs.page(connection, clutch_id, kind=DYNAMIC, state=runs.ACCEPTED)
         engaged = measured_lives.engagements(connection, clutch_id)
         predicted = results.predictions_of(connection, clutch_id, "particle", ALL_PRESSURES)
     measured = (item for row in rows for fit in row.receipt["fits"] for item in _measured(row.receipt, fit))
+    lags = (item for row in dynamic for loop in row.receipt["loops"] for item in _of_loop(row.receipt, loop))
     indicators = (item for row in engaged for item in _indicators(row))
     ahead = (item for row in predicted for item in _predicted(row))
-    return [item for items in (measured, indicators, ahead) for item in items if quantity in (None, item["quantity"])]
+    return [
+        item for items in (measured, lags, indicators, ahead) for item in items if quantity in (None, item["quantity"])
+    ]
 
 
 def _measured(receipt: dict[str, Any], fit: dict[str, Any]) -> Iterator[dict[str, Any]]:
     values = [(MEAN_COF, "1", fit["mean_cof"], fit["mean_cof_sd"])]
     for public, unit in PARAMETER_UNITS.values():
         values.append((public, unit, fit["parameters"][public], fit["standard_errors"][public]))
+    of_run = _of_run(receipt) | {"pressure_bar": fit["pressure_bar"]}
     for quantity, unit, value, sd in values:
-        yield {
-            "cycles": receipt["cycles"],
-            "time": receipt["started_at"] or receipt["received_at"],
-            "run_id": receipt["run_id"],
-            "quantity": quantity,
-            "unit": unit,
-            "pressure_bar": fit["pressure_bar"],
-            "value": value,
-            "lower": None if value is None else value - Z90 * sd,
-            "upper": None if value is None else value + Z90 * sd,
-        }
+        yield of_run | _row(quantity, unit, value, sd)
+
+
+def _of_loop(receipt: dict[str, Any], loop: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    place = {"pressure_bar": loop["pressure_bar"], "frequency_hz": loop["frequency_hz"]}
+    for quantity, (value, sd) in LOOP_COLUMNS.items():
+        if loop[value] is not None and loop[sd] is not None:
+            yield _of_run(receipt) | _row(quantity, QUANTITIES[quantity].unit, loop[value], loop[sd]) | place
 
 
 def _indicators(row: dict[str, Any]) -> Iterator[dict[str, Any]]:
     for quantity, indicator in ALL_INDICATORS.items():
         estimate = row["indicators"][quantity]
         if estimate is not None:
-            yield {
-                "cycles": row["cycles"],
-                "time": row["time"],
-                "run_id": row["run_id"],
-                "quantity": quantity,
-                "unit": indicator.unit,
-                "pressure_bar": None,
-                "value": estimate["value"],
-                "lower": estimate["value"] - Z90 * estimate["sd"],
-                "upper": estimate["value"] + Z90 * estimate["sd"],
-            }
+            of_run = {"cycles": row["cycles"], "time": row["time"], "run_id": row["run_id"], **_NOWHERE}
+            yield of_run | _row(quantity, indicator.unit, estimate["value"], estimate["sd"])
+
+
+def _of_run(receipt: dict[str, Any]) -> dict[str, Any]:
+    time = receipt["started_at"] or receipt["received_at"]
+    return {"cycles": receipt["cycles"], "time": time, "run_id": receipt["run_id"], **_NOWHERE}
+
+
+def _row(quantity: str, unit: str, value: float | None, sd: float) -> dict[str, Any]:
+    return {
+        "quantity": quantity,
+        "unit": unit,
+        "value": value,
+        "lower": None if value is None else value - Z90 * sd,
+        "upper": None if value is None else value + Z90 * sd,
+    }
 
 
 def _predicted(row: PredictionRow) -> Iterator[dict[str, Any]]:
@@ -84,7 +97,7 @@ def _predicted(row: PredictionRow) -> Iterator[dict[str, Any]]:
             "run_id": None,
             "quantity": quantity,
             "unit": unit,
-            "pressure_bar": None,
+            **_NOWHERE,
             "value": value,
             "lower": lower,
             "upper": upper,

@@ -71,7 +71,8 @@ class SeriesItem(Answer):
     time: str | None = Field(description="When the run was started, else received, ISO 8601; null for predictions")
     run_id: str | None = Field(description="The run's name; null for predictions")
     quantity: str = Field(
-        description="A fitted quantity, an indicator of an engagement, or one of the prediction at these cycles"
+        description="A fitted quantity, one of a friction loop, an indicator of an engagement, or one of the prediction "
+        "at these cycles"
     )
     unit: str = Field(description="Its unit")
     pressure_bar: float | None = Field(
@@ -80,6 +81,7 @@ class SeriesItem(Answer):
     value: float | None = Field(description="The value; the median of a prediction")
     lower: float | None = Field(description="5 % quantile")
     upper: float | None = Field(description="95 % quantile")
+    frequency_hz: float | None = Field(description="Frequency of a friction loop, Hz; null for all else")
 
 
 class SeriesPage(Answer):

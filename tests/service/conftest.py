@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
-from service.app import create_app
-from service.settings import Settings
+from tests.service.clients import client_on
 
 
 @pytest.fixture
@@ -19,9 +18,6 @@ def database_url(tmp_path: Path) -> str:
 @pytest.fixture
 def client(database_url: str) -> Iterator[TestClient]:
     """A client on this machine, with one clutch registered."""
-    app = create_app(Settings(workers=0, database=database_url, max_body_mb=1))
-    with TestClient(
-        app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000), raise_server_exceptions=False
-    ) as found:
+    with client_on(database_url) as found:
         assert found.post("/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
         yield found

@@ -18,7 +18,7 @@ from service.lives.quantities.parameters import parameter_series, tests_of
 from service.lives.run_analysis import LevelFit, Value
 
 #: What a receipt's loop calls the quantities of the lag and their deviations.
-_OF_LOOPS = {
+LOOP_COLUMNS = {
     "attractor": ("attractor_nm_s", "attractor_sd_nm_s"),
     "film_time": ("film_time_s", "film_time_sd_s"),
     "loop_area": ("loop_area_nm_m_s", "loop_area_sd_nm_m_s"),
@@ -94,7 +94,7 @@ class MeasuredLife:
         ]
         loops = [loop for of_event in by_event for loop in of_event if loop["frequency_hz"] is not None]
         for frequency in sorted({rounded_frequency(loop["frequency_hz"]) for loop in loops}):
-            values = [_values(of_event, _OF_LOOPS[quantity.internal], frequency) for of_event in by_event]
+            values = [_values(of_event, LOOP_COLUMNS[quantity.internal], frequency) for of_event in by_event]
             levels: list[float] = []
             for pressure in sorted(pressure for of_event in values for pressure in of_event):
                 if nearest_pressure(pressure, levels) is None:

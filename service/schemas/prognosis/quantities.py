@@ -26,5 +26,11 @@ LevelQuantity = Literal[ParameterQuantity, "slope", LoopQuantity]
 QuantityName = Literal["mean_cof", LevelQuantity, EngagementQuantity]
 #: Rows of `/series`.
 SeriesQuantity = Literal[
-    "mean_cof", ParameterQuantity, EngagementQuantity, "health", "remaining_cycles", "probability_of_reaching"
+    "mean_cof",
+    ParameterQuantity,
+    LoopQuantity,
+    EngagementQuantity,
+    "health",
+    "remaining_cycles",
+    "probability_of_reaching",
 ]

@@ -1,5 +1,8 @@
 """Lives that end by more than mean COF, and tracks of any quantity, over HTTP."""
 
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,19 +13,30 @@ from models.rig.campaign import simulate
 from models.rig.programme import Programme
 from models.rig.sampled import DynamicTest
 from service.run_files.simulated import simulated_body
+from tests.service.clients import client_on
 
 WAIT = {"Prefer": "wait=60"}
 SHUDDER = {"quantity": "slope", "pressure_bar": 5, "speed_rpm": 100}
 
 
-@pytest.fixture
-def tested(client: TestClient) -> TestClient:
-    """A simulated clutch whose friction soon falls with speed at 100 rpm, six tests with loops."""
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A database with a simulated clutch whose friction soon falls with speed at 100 rpm, six tests with loops."""
+    path = tmp_path_factory.mktemp("criteria") / "filled.db"
     record = {"clutch_id": "s", "origin": "simulated", "end_of_life": {"criteria": [{"quantity": "mean_cof"}, SHUDDER]}}
-    assert client.post("/v1/clutches", json=record).status_code == 201
-    for run in simulate(7, most_tests=6, programme=Programme(dynamic=DynamicTest(rate=25.0))):
-        assert client.post("/v1/clutches/s/runs", json=simulated_body(run)).status_code == 201
-    return client
+    with client_on(f"sqlite:///{path}") as client:
+        assert client.post("/v1/clutches", json=record).status_code == 201
+        for run in simulate(7, most_tests=6, programme=Programme(dynamic=DynamicTest(rate=25.0))):
+            assert client.post("/v1/clutches/s/runs", json=simulated_body(run)).status_code == 201
+    return path
+
+
+@pytest.fixture
+def tested(filled: Path, tmp_path: Path) -> Iterator[TestClient]:
+    """A client of a service on a copy of it."""
+    shutil.copyfile(filled, tmp_path / "copy.db")
+    with client_on(f"sqlite:///{tmp_path / 'copy.db'}") as client:
+        yield client
 
 
 def asked(client: TestClient, path: str, **query: Any) -> dict[str, Any]:
@@ -45,9 +59,9 @@ def test_a_clutch_that_shudders_first_is_said_so(tested: TestClient) -> None:
     assert by_cof["end_of_life_cycles"] == cof["end_of_life_cycles"]
 
 
-def test_mean_cof_alone_is_one_criterion_and_as_it_was(client: TestClient, tested: TestClient) -> None:
+def test_mean_cof_alone_is_one_criterion_and_as_it_was(tested: TestClient) -> None:
     edit = {"end_of_life": {"cof_fraction": 0.5}, "reason": "shudder is looked at elsewhere"}
-    assert client.patch("/v1/clutches/s", json=edit).status_code == 200
+    assert tested.patch("/v1/clutches/s", json=edit).status_code == 200
     answer = asked(tested, "remaining-useful-life")
     (only,) = answer["criteria"]
     assert (only["quantity"], only["probability_first"]) == ("mean_cof", 1.0)
@@ -104,6 +118,19 @@ def test_an_earlier_life_stays_reachable(tested: TestClient) -> None:
 def test_what_was_known_then_is_answered_for_then(tested: TestClient) -> None:
     items = asked(tested, "degradation", quantity="static_torque_nm", at_cycles=2_000)["items"]
     assert all(item["measured"]["cycles"] == [0, 500, 1_000, 2_000] for item in items)
+
+
+def test_the_lag_stands_in_the_rows_for_dashboards_with_its_frequency(tested: TestClient) -> None:
+    loops = asked(tested, "loops")["items"]
+    for quantity, name, unit in (("film_time", "film_time_s", "s"), ("loop_area", "loop_area_nm_m_s", "Nm·m/s")):
+        rows = asked(tested, "series", quantity=quantity)["items"]
+        told = [(row["pressure_bar"], row["frequency_hz"], row["value"]) for row in rows]
+        assert told == [
+            (loop["pressure_bar"], loop["frequency_hz"], loop[name]) for loop in loops if loop[name] is not None
+        ]
+        assert {row["unit"] for row in rows} == {unit}
+        assert all(row["lower"] < row["value"] < row["upper"] for row in rows)
+    assert all(row["frequency_hz"] is None for row in asked(tested, "series", quantity="mean_cof")["items"])
 
 
 @pytest.mark.parametrize(
