@@ -9,9 +9,12 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from models.rig.campaign import simulate
+from models.rig.programme import Programme
+from models.rig.sampled import DynamicTest
 from service.app import create_app
+from service.run_files.simulated import simulated_body
 from service.settings import Settings
-from tests.support import stationary
 
 FOLDER = Path(__file__).parents[3] / "docker" / "grafana"
 DASHBOARD: dict[str, Any] = json.loads((FOLDER / "dashboards" / "clutchlife.json").read_text(encoding="utf-8"))
@@ -20,12 +23,12 @@ TARGETS = [target for panel in DASHBOARD["panels"] for target in panel["targets"
 
 @pytest.fixture
 def aged(database_url: str) -> Iterator[TestClient]:
-    """A service that knows a clutch with three tests, and has metrics of every clutch."""
+    """A service that knows a clutch with three tests of each kind, and has metrics of every clutch."""
     app = create_app(Settings(workers=0, database=database_url, clutch_metrics=True))
     with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
         client.post("/v1/clutches", json={"clutch_id": "bench"})
-        for cycles in (0, 1000, 2000):
-            assert client.post("/v1/clutches/bench/runs", json=stationary(cycles)).status_code == 201
+        for run in simulate(7, most_tests=3, programme=Programme(dynamic=DynamicTest(rate=25.0))):
+            assert client.post("/v1/clutches/bench/runs", json=simulated_body(run)).status_code == 201
         yield client
 
 
