@@ -93,6 +93,7 @@ EXAMPLES: dict[str, Any] = {
     "mean_radius_mm": 58,
     "outer_diameter_mm": 133,
     "pressure_factor": 1.0,
+    "torque_filter_ms": 20.0,
     # a run and its fits
     "channels": {"pressure_bar": [5, 5, 5, 5, 5], "speed_rpm": _SPEEDS, "torque_nm": _TORQUES},
     "coulomb_ratio": 0.6,
@@ -110,6 +111,8 @@ EXAMPLES: dict[str, Any] = {
     "mse_percent": 1.7,
     "noise_nm": 0.17,
     "oil_temperature_c": [84.1, 84.3, 84.9, 85.2, 85.6],
+    "plate_temperature_front_c": [84.3, 86.0, 92.4, 101.8, 117.5],
+    "plate_temperature_rear_c": [84.2, 85.8, 91.9, 100.9, 115.7],
     "periods": 3,
     "points": 40,
     "pressure_bar": 5.0,
