@@ -87,6 +87,15 @@ def _require_columns(columns: Plateaus | Record, names: tuple[str, ...]) -> None
             raise ValueError(f"{name} must be finite")
 
 
+def plate_rise(measured: Plateaus | Record) -> FloatArray | None:
+    """How far the plate is above the oil [n] K; above its own lowest temperature where the oil's was not measured, for then
+    only its changes mean something. None where the plate's was not measured."""
+    plate, oil = measured.plate_temperature, measured.oil_temperature
+    if plate is None:
+        return None
+    return np.asarray(plate - (plate.min() if oil is None else oil), dtype=np.float64)
+
+
 def loaded(plateaus: Plateaus) -> Plateaus | None:
     """The plateaus at a pressure of UNLOADED or more, through which curves go; None where the clutch was open on all."""
     rows = plateaus.pressure >= UNLOADED
