@@ -50,8 +50,13 @@ CHANNELS = {
         Channel(name="torque_nm", unit="Nm", least=-1e7, most=1e7),
         Channel(name="torque_sd_nm", unit="Nm", least=0.0, most=1e7),
         Channel(name="oil_temperature_c", unit="°C", offset=ZERO_CELSIUS, least=-ZERO_CELSIUS, most=1e4),
+        Channel(name="plate_temperature_front_c", unit="°C", offset=ZERO_CELSIUS, least=-ZERO_CELSIUS, most=1e4),
+        Channel(name="plate_temperature_rear_c", unit="°C", offset=ZERO_CELSIUS, least=-ZERO_CELSIUS, most=1e4),
     )
 }
+
+#: The plate's thermometers, front and rear: their mean is the plate's temperature.
+PLATE_TEMPERATURES = ("plate_temperature_front_c", "plate_temperature_rear_c")
 
 #: The least value in a sampled record, which passes zero with its sensors' noise. Pressure: derived, a gauge cannot read
 #: below a vacuum (-1 bar), and a tenth for its zero.

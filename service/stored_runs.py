@@ -45,12 +45,14 @@ def run_reader(database: Database, clutch_id: str) -> RunReader:
             return incoming(row, channels.read(connection, row.run_key))
 
     with database.reading() as connection:
+        record = records.record(records.clutch(connection, clutch_id))
         sampled = channels.samples(connection, clutch_id)
         names = runs.keys(connection, clutch_id)
     return RunReader(
         read=with_channels,
         describe=described,
         sampled=frozenset(run_id for run_id, run_key in names.items() if run_key in sampled),
+        torque_filter=record.torque_filter,
     )
 
 
@@ -87,13 +89,13 @@ def recomputed(database: Database, state: ClutchState) -> Recomputed:
     """
     with database.reading() as connection:
         rows, aside = runs.page(connection, state.clutch_id), records.set_aside(connection, state.clutch_id)
-    reader = run_reader(database, state.clutch_id)
+    reader = replace(run_reader(database, state.clutch_id), torque_filter=state.record.torque_filter)
     details, receipts, levels = {}, {}, {}
     measured: dict[str, dict[str, Any]] = {}
     for row in rows:
         sent = reader.read(row.run_id)
         try:
-            analysis = analyse(sent, state.geometry)
+            analysis = analyse(sent, state.geometry, state.record.torque_filter)
         except InvalidError as error:
             raise InvalidError(f"run {row.run_id!r} is refused: {error}", errors=error.errors) from error
         measured[row.run_id] = {"speed_range": analysis.speed_range, "oil_temperature": analysis.oil_temperature}

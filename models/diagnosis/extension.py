@@ -93,6 +93,7 @@ class Extension:
             last_moment=kept.last_moment,
             usual_torque=kept.usual_torque,
             usual_pressure=kept.usual_pressure,
+            plate_warming=kept.plate_warming,
         )
 
     def _mean(self, points: Points, facts: Facts, kinds: set[Kind]) -> tuple[FloatArray, FloatArray]:
@@ -225,6 +226,7 @@ def _steady_points(cycles: FloatArray, pressure: FloatArray, velocity: FloatArra
         sign=np.ones(count),
         acceleration=zero,
         temperature=nan,
+        plate_rise=nan,
         clock=zero,
         moment=nan,
         angular_frequency=zero,

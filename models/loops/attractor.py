@@ -16,7 +16,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.friction.stribeck import StribeckParameters, slope, torque
-from models.loops.relaxation import relax
+from models.relaxation import relax
 
 _LEAST_TORQUE = 1e-9
 

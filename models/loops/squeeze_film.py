@@ -25,7 +25,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.friction.stribeck import GAMMA, StribeckParameters, torque
-from models.loops.relaxation import relax
+from models.relaxation import relax
 
 #: The exponent n of film thickness over speed [-].
 FILM_EXPONENT = 1 - GAMMA

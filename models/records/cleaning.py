@@ -29,7 +29,7 @@ Note = tuple[str, str]
 
 #: Samples from which a scale is estimated.
 SCALE_SAMPLES = 50_000
-_CHANNELS = ("pressure", "speed", "torque", "oil_temperature")
+_CHANNELS = ("pressure", "speed", "torque", "oil_temperature", "plate_temperature")
 
 
 class Sampled(Protocol):
@@ -45,6 +45,8 @@ class Sampled(Protocol):
     def torque(self) -> FloatArray: ...
     @property
     def oil_temperature(self) -> FloatArray | None: ...
+    @property
+    def plate_temperature(self) -> FloatArray | None: ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,13 +69,14 @@ def clean(record: Record) -> tuple[Record, float, tuple[Note, ...]]:
     """
     kept = plan_cleaning(record)
     if kept.rows is not None:
-        oil = record.oil_temperature
+        oil, plate = record.oil_temperature, record.plate_temperature
         record = Record(
             time=kept.of(record.time),
             pressure=kept.of(record.pressure),
             speed=kept.of(record.speed),
             torque=kept.of(record.torque),
             oil_temperature=None if oil is None else kept.of(oil),
+            plate_temperature=None if plate is None else kept.of(plate),
         )
     return record, kept.period, kept.notes
 

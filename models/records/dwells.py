@@ -38,8 +38,8 @@ from models.records.criteria import (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Blocks:
-    """Means over `size` samples each: time [m] s, pressure, speed, torque, oil_temperature; scatter [m] Nm², the
-    variance of torque within a block; gap [m]: many samples are missing before or in this block.
+    """Means over `size` samples each: time [m] s, pressure, speed, torque, oil_temperature, plate_temperature;
+    scatter [m] Nm², the variance of torque within a block; gap [m]: many samples are missing before or in this block.
     """
 
     size: int
@@ -50,6 +50,7 @@ class Blocks:
     torque: FloatArray
     scatter: FloatArray
     oil_temperature: FloatArray | None
+    plate_temperature: FloatArray | None
     gap: NDArray[np.bool_]
 
 
@@ -82,7 +83,7 @@ def average(record: Sampled, cleaning: Cleaning) -> Blocks:
     late = np.flatnonzero(np.diff(time) > max(GAP_DURATION, GAP_BLOCKS * size * period)) + 1
     gap: NDArray[np.bool_] = np.zeros(count, dtype=np.bool_)
     gap[np.minimum(late // size, count - 1)] = True
-    oil = record.oil_temperature
+    oil, plate = record.oil_temperature, record.plate_temperature
     return Blocks(
         size=size,
         duration=size * period,
@@ -92,6 +93,7 @@ def average(record: Sampled, cleaning: Cleaning) -> Blocks:
         torque=mean(record.torque),
         scatter=scatter(record.torque),
         oil_temperature=None if oil is None else mean(oil),
+        plate_temperature=None if plate is None else mean(plate),
         gap=gap,
     )
 

@@ -18,6 +18,7 @@ from models.records.dwells import Blocks, Dwell, average, find_dwells, listed
 from models.records.mean_deviation import Stretch, deviations
 from models.records.runs import Plateaus
 from models.records.settling import Transients, dropped, fit_transients, mean_decay
+from models.records.torque_filter import filtered
 
 #: Dropping a transient makes the means' deviations smaller, so that more may have to be dropped: so often at most.
 _ROUNDS = 4
@@ -56,15 +57,16 @@ class PlateauCut:
     notes: tuple[Note, ...]
 
 
-def cut_plateaus(record: Sampled) -> PlateauCut:
-    """The steady plateaus of a record of 10 to 2,000 Hz.
+def cut_plateaus(record: Sampled, torque_filter: float = 0.0) -> PlateauCut:
+    """The steady plateaus of a record of 10 to 2,000 Hz; `torque_filter` [s] is the time constant of the torque channel's
+    own low-pass where it is declared, through which pressure and speed are then seen (`records.torque_filter`).
 
     Steps of speed and pressure may come in any order and direction; samples may be missing, their times jitter, single
     samples spike, signals be quantised. Raises ValueError on fewer than 16 samples, a clock that does not advance or
     falls back, and a record without any steady dwell in motion, and under pressure where there is any.
     """
     kept = plan_cleaning(record)
-    blocks = average(record, kept)
+    blocks = _filtered(average(record, kept), torque_filter)
     dwells, left_out = find_dwells(blocks)
     if not dwells:
         reasons = " ".join(sentence for _, sentence in left_out)
@@ -107,6 +109,14 @@ def cut_plateaus(record: Sampled) -> PlateauCut:
     return replace(cut, notes=(*cut.notes, *_notes(cut, drop), *slow))
 
 
+def _filtered(blocks: Blocks, torque_filter: float) -> Blocks:
+    """With pressure and speed as late as torque: means over blocks commute with a filter, and are clean of spikes."""
+    if torque_filter == 0.0:
+        return blocks
+    pressure, speed = (filtered(blocks.time, channel, torque_filter) for channel in (blocks.pressure, blocks.speed))
+    return replace(blocks, pressure=pressure, speed=speed)
+
+
 def _stretches(blocks: Blocks, dwells: list[Dwell]) -> list[Stretch]:
     stretches = []
     for dwell in dwells:
@@ -129,6 +139,7 @@ def _plateaus(blocks: Blocks, used: list[Dwell], torque_sd: FloatArray) -> Plate
         torque=torque,
         torque_sd=np.maximum(torque_sd, _LEAST_SHARE * np.maximum(np.abs(torque), 1e-9)),
         oil_temperature=None if blocks.oil_temperature is None else _mean(blocks.oil_temperature, used),
+        plate_temperature=None if blocks.plate_temperature is None else _mean(blocks.plate_temperature, used),
     )
 
 

@@ -19,8 +19,8 @@ from models.records.pressure_levels import levels_of
 class Plateaus:
     """Steady plateaus, one row each: pressure [n] Pa, speed [n] rad/s, torque [n] Nm.
 
-    `torque_sd` [n] Nm is the deviation of each torque where it is known, `oil_temperature` [n] K where it is measured.
-    Raises ValueError on unequal lengths, no rows or values that are not finite.
+    `torque_sd` [n] Nm is the deviation of each torque where it is known, `oil_temperature` and `plate_temperature` [n] K
+    where they are measured. Raises ValueError on unequal lengths, no rows or values that are not finite.
     """
 
     pressure: FloatArray
@@ -28,9 +28,10 @@ class Plateaus:
     torque: FloatArray
     torque_sd: FloatArray | None = None
     oil_temperature: FloatArray | None = None
+    plate_temperature: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        _require_columns(self, ("pressure", "speed", "torque", "torque_sd", "oil_temperature"))
+        _require_columns(self, ("pressure", "speed", "torque", "torque_sd", "oil_temperature", "plate_temperature"))
 
     def take(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> "Plateaus":
         """The plateaus at `rows`, at least one."""
@@ -40,7 +41,8 @@ class Plateaus:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
-    """A sampled record: time [n] s, pressure [n] Pa, speed [n] rad/s, torque [n] Nm, perhaps oil_temperature [n] K.
+    """A sampled record: time [n] s, pressure [n] Pa, speed [n] rad/s, torque [n] Nm, perhaps oil_temperature and
+    plate_temperature [n] K.
 
     Times are as the recorder gave them: they may jitter, lack samples or repeat; speeds and pressures may swing through
     zero with their sensors' noise. Raises ValueError on unequal lengths, no rows or values that are not finite.
@@ -51,9 +53,10 @@ class Record:
     speed: FloatArray
     torque: FloatArray
     oil_temperature: FloatArray | None = None
+    plate_temperature: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        _require_columns(self, ("time", "pressure", "speed", "torque", "oil_temperature"))
+        _require_columns(self, ("time", "pressure", "speed", "torque", "oil_temperature", "plate_temperature"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,6 +85,15 @@ def _require_columns(columns: Plateaus | Record, names: tuple[str, ...]) -> None
             raise ValueError(f"{name} must have the shape of torque {rows}, got {column.shape}")
         if not np.isfinite(column).all():
             raise ValueError(f"{name} must be finite")
+
+
+def plate_rise(measured: Plateaus | Record) -> FloatArray | None:
+    """How far the plate is above the oil [n] K; above its own lowest temperature where the oil's was not measured, for then
+    only its changes mean something. None where the plate's was not measured."""
+    plate, oil = measured.plate_temperature, measured.oil_temperature
+    if plate is None:
+        return None
+    return np.asarray(plate - (plate.min() if oil is None else oil), dtype=np.float64)
 
 
 def loaded(plateaus: Plateaus) -> Plateaus | None:

@@ -23,6 +23,7 @@ from models.friction.stribeck import GAMMA, StribeckParameters, torque
 from models.records.runs import Plateaus, Record
 from models.rig.hysteresis import ATTRACTOR, NO_LAG
 from models.rig.oil_viscosity import warmed
+from models.rig.plate import REFERENCE_FLUX, heat_flux
 from models.rig.simulated_runs import SimulatedRun
 from models.rig.stationary import PLATEAU_DURATION
 from models.rig.truth import SimulatedClutch
@@ -31,8 +32,8 @@ from models.rig.truth import SimulatedClutch
 _DRIFT, _RUN_IN = 4_000.0, 400.0
 #: Cycles at which late wear begins, and in which it then grows to its size.
 _LATE, _LATE_SPAN = 6_000.0, 9_000.0
-#: Middle of the protocol's velocities [m/s]; power per area [W/m²] at which heating has its size.
-_MIDDLE, _HEATING = 6.0, 0.32e6
+#: Middle of the protocol's velocities [m/s].
+_MIDDLE = 6.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,10 +145,8 @@ def _drift(cycles: float) -> float:
 
 def _interface_heating(size: float, rows: Rows) -> FloatArray:
     """Torque falls as 1/(1 + s P), P the power that the faces turn into heat."""
-    geometry = rows.clutch.geometry
-    area = 0.25 * np.pi * (geometry.outer_diameter**2 - geometry.inner_diameter**2) * geometry.friction_faces
-    power = np.abs(rows.held.torque * rows.held.speed) / area
-    return np.asarray(rows.held.torque * (1 / (1 + 0.01 * size * power / _HEATING) - 1), dtype=np.float64)
+    warmth = heat_flux(rows.held, rows.clutch.geometry) / REFERENCE_FLUX
+    return np.asarray(rows.held.torque * (1 / (1 + 0.01 * size * warmth) - 1), dtype=np.float64)
 
 
 def _viscous_exponent(size: float, rows: Rows) -> FloatArray:

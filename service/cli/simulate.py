@@ -38,6 +38,12 @@ def simulate(
         list[str] | None,
         typer.Option(metavar="EFFECT[:SIZE]", help="Hide an effect, to rehearse a diagnosis; may be repeated"),
     ] = None,
+    plate_rise: Annotated[
+        float | None,
+        typer.Option(
+            min=0, max=500, help="Write the plate's temperature: so many K above the oil at 0.32 W/mm²; left out, none"
+        ),
+    ] = None,
     frequency: Annotated[
         list[float] | None,
         typer.Option(min=0.01, max=5, help="Frequency of a dynamic test's speed [Hz]; repeated: a test each"),
@@ -53,7 +59,7 @@ def simulate(
 
     Run-in and duty blocks are JSON whatever the format. Tests in another format are listed in runs.json, which push reads.
     """
-    from models.rig import campaign, hidden, stationary  # start-up time
+    from models.rig import campaign, hidden, plate, stationary  # start-up time
     from models.rig.hysteresis import ATTRACTOR  # start-up time
     from service.run_files import record_writer, simulated  # start-up time
 
@@ -81,7 +87,10 @@ def simulate(
             for run in runs:
                 description = f"{run.kind.value.replace('_', ' ')}, {run.cycles} cycles"
                 progress.update(task, description=description, completed=run.wear)
-                listed += _write(out_folder, hidden.hidden_in(run, clutch, sizes), record_format)
+                made = hidden.hidden_in(run, clutch, sizes)
+                if plate_rise is not None:
+                    made = plate.with_plate(made, clutch.geometry, plate_rise)
+                listed += _write(out_folder, made, record_format)
                 wear_and_cycles.append((run.wear, run.cycles))
         if listed:
             manifest.write(out_folder / manifest.MANIFEST, listed)

@@ -91,8 +91,8 @@ def read_life(database: Database, clutch_id: str, *, last_run_key: int) -> Diagn
     for event in life.events:
         try:
             sent = replace(reader.read(event.run_id), cycles=event.cycles)  # corrected meanwhile: the history's hold
-            run = run_of(sent, origin=life.origin, keep_record=event.run_id in kept)
-            campaign.append(run)
+            keep = event.run_id in kept
+            campaign.append(run_of(sent, origin=life.origin, torque_filter=record.torque_filter, keep_record=keep))
         except ValueError as error:
             notes.append(f"{event.run_id} is left out: {error}")
     left_out = [event for event in life.events if event.kind == STATIONARY and event.run_id in samples.keys() - kept]

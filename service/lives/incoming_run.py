@@ -12,7 +12,7 @@ from models.arrays import FloatArray
 from models.records.criteria import UNLOADED
 from models.records.pressure_levels import levels_of
 from models.records.runs import Plateaus, Record
-from service.columns import CHANNELS, whole
+from service.columns import CHANNELS, PLATE_TEMPERATURES, whole
 from service.errors import FieldError, InvalidError
 from service.lives.criteria import LEAST_TORQUE_SD, MOST_LEVELS
 
@@ -90,7 +90,14 @@ def sampled_record(channels: Mapping[str, FloatArray]) -> Record:
         speed=si["speed_rpm"],
         torque=si["torque_nm"],
         oil_temperature=si.get("oil_temperature_c"),
+        plate_temperature=_plate_temperature(si),
     )
+
+
+def _plate_temperature(si: Mapping[str, FloatArray]) -> FloatArray | None:
+    """The mean of the plate's thermometers [n] K, of the one where there is one; None without any."""
+    measured = [si[name] for name in PLATE_TEMPERATURES if name in si]
+    return np.asarray(sum(measured) / len(measured), dtype=np.float64) if measured else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +134,11 @@ class SampledChannels:
         """[n] K."""
         return self._si("oil_temperature_c") if "oil_temperature_c" in self.channels else None
 
+    @property
+    def plate_temperature(self) -> FloatArray | None:
+        """[n] K."""
+        return _plate_temperature({name: self._si(name) for name in PLATE_TEMPERATURES if name in self.channels})
+
 
 def stationary_plateaus(channels: Mapping[str, FloatArray]) -> Plateaus:
     """The plateaus of a stationary test in SI units, rows in the order they were sent."""
@@ -142,6 +154,7 @@ def stationary_plateaus(channels: Mapping[str, FloatArray]) -> Plateaus:
         torque=si["torque_nm"],
         torque_sd=deviation if deviation is not None and bool((channels["torque_sd_nm"] > 0).all()) else None,
         oil_temperature=si.get("oil_temperature_c"),
+        plate_temperature=_plate_temperature(si),
     )
 
 

@@ -46,7 +46,8 @@ def tests_with(reader: RunReader, life: Life, arrival: Arrival) -> Iterator[Stat
 def reader_with(stored: RunReader, arrival: Arrival) -> RunReader:
     """The stored runs, and the one that comes in."""
     name = arrival.run.run_id
-    return RunReader(
+    return replace(
+        stored,
         read=lambda run_id: arrival.run if run_id == name else stored.read(run_id),
         describe=lambda run_id: arrival.run if run_id == name else stored.describe(run_id),
         sampled=stored.sampled | ({name} if arrival.sampled else frozenset()),

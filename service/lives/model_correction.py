@@ -34,13 +34,15 @@ _log = logging.getLogger("clutchlife")
 class RunReader:
     """A clutch's runs as they were sent, read when they are asked for.
 
-    `read(run_id)` gives a run with its channels, `describe(run_id)` without; `sampled` are those that are sampled records.
-    A history's runs are at its cycles, whatever was sent.
+    `read(run_id)` gives a run with its channels, `describe(run_id)` without; `sampled` are those that are sampled records,
+    `torque_filter` [s] is the time constant of their torque channel's low-pass. A history's runs are at its cycles, whatever
+    was sent.
     """
 
     read: Callable[[str], IncomingRun]
     describe: Callable[[str], IncomingRun]
     sampled: frozenset[str]
+    torque_filter: float
 
     def campaign_runs(self, events: Sequence[Event], *, origin: float) -> list[CampaignRun]:
         """The runs of a life in order, sampled records left out."""
@@ -57,7 +59,8 @@ class RunReader:
             if event.kind != STATIONARY:
                 continue
             try:
-                run = run_of(_placed(self.read(event.run_id), event), origin=life.origin)
+                sent = _placed(self.read(event.run_id), event)
+                run = run_of(sent, origin=life.origin, torque_filter=self.torque_filter)
             except ValueError as error:  # a record that this release cuts no longer
                 _log.warning("%s: %s", event.run_id, error)
                 continue

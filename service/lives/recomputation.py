@@ -293,5 +293,7 @@ def loops_anew(
     for run_id, test in stationary_tests_of(state.events).items():
         if run_id not in evaluated or evaluated[run_id] != test:
             own = [] if test is None else levels.get(test, [])
-            loops[run_id] = loop_items(loops_of(reader.read(run_id).channels, state.geometry, own))
+            loops[run_id] = loop_items(
+                loops_of(reader.read(run_id).channels, state.geometry, state.record.torque_filter, own)
+            )
     return loops

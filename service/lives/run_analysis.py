@@ -19,6 +19,7 @@ from models.loops.loops import Loop, evaluate_loops
 from models.records.criteria import UNLOADED
 from models.records.plateaus import cut_plateaus
 from models.records.runs import Plateaus, curves_by_pressure, loaded
+from models.records.torque_filter import filtered_as_torque
 from service.columns import PASCALS_PER_BAR
 from service.errors import FieldError, InvalidError
 from service.lives.criteria import FEWEST_SPEEDS, POOR_FIT, WIDE_LEVEL
@@ -77,9 +78,10 @@ class Analysis:
         return kept
 
 
-def analyse(run: IncomingRun, geometry: Geometry) -> Analysis:
+def analyse(run: IncomingRun, geometry: Geometry, torque_filter: float) -> Analysis:
     """Fit a stationary test's curves, from its plateaus or from its sampled record, and evaluate the engagement of a block
-    of duty; other kinds and tests of the open clutch have neither.
+    of duty; other kinds and tests of the open clutch have neither. `torque_filter` [s]: the time constant of the torque
+    channel's own low-pass, taken off a sampled test; an engagement stays as it was recorded.
 
     Raises InvalidError where a sampled record holds no steady plateau.
     """
@@ -91,7 +93,7 @@ def analyse(run: IncomingRun, geometry: Geometry) -> Analysis:
         plateaus = stationary_plateaus(run.channels)
         return _analyse_stationary(plateaus, None, geometry, _row_warnings(run, plateaus))
     try:
-        cut = cut_plateaus(SampledChannels(run.channels))
+        cut = cut_plateaus(SampledChannels(run.channels), torque_filter)
     except ValueError as error:
         message = f"time_s, pressure_bar, speed_rpm, torque_nm: {error}"
         errors = [FieldError(pointer="/channels/torque_nm", code="no_plateau", message=message)]
@@ -110,8 +112,11 @@ def levels_of(plateaus: Plateaus, geometry: Geometry) -> tuple[LevelFit, ...]:
     )
 
 
-def loops_of(channels: Mapping[str, FloatArray], geometry: Geometry, levels: Sequence[LevelFit]) -> tuple[Loop, ...]:
-    """The friction loops of a dynamic test, with the lag behind the curves of its stationary test.
+def loops_of(
+    channels: Mapping[str, FloatArray], geometry: Geometry, torque_filter: float, levels: Sequence[LevelFit]
+) -> tuple[Loop, ...]:
+    """The friction loops of a dynamic test, with the lag behind the curves of its stationary test and beyond the torque
+    channel's own, of `torque_filter` [s].
 
     A curve of which some parameter is undetermined counts all the same: what its covariance leaves open makes the lag less
     certain, or unresolved.
@@ -121,7 +126,7 @@ def loops_of(channels: Mapping[str, FloatArray], geometry: Geometry, levels: Seq
         for level in levels
         if level.speeds >= FEWEST_SPEEDS
     }
-    return evaluate_loops(sampled_record(channels), geometry, curves or None)
+    return evaluate_loops(filtered_as_torque(sampled_record(channels), torque_filter), geometry, curves or None)
 
 
 def _analyse_stationary(

@@ -27,6 +27,13 @@ _WORDS = {
     "drehmoment_standardabweichung standardabweichung_drehmoment",
     "oil_temperature_c": "oil_temperature oil_temp oiltemperature oiltemp öltemperatur öltemp t_oil t_öl toil töl "
     "temperature_oil temperatur_öl theta_oil theta_öl sump_temperature sumpftemperatur oil_sump_temperature",
+    "plate_temperature_front_c": "plate_temperature_front front_plate_temperature plate_temp_front t_plate_front "
+    "temperature_plate_front theta_plate_front plattentemperatur_vorn plattentemperatur_vorne lamellentemperatur_vorn "
+    "lamellentemperatur_vorne t_platte_vorn t_lamelle_vorn plate_temperature plate_temp t_plate plattentemperatur "
+    "lamellentemperatur t_lamelle",
+    "plate_temperature_rear_c": "plate_temperature_rear rear_plate_temperature plate_temp_rear t_plate_rear "
+    "temperature_plate_rear theta_plate_rear plattentemperatur_hinten lamellentemperatur_hinten t_platte_hinten "
+    "t_lamelle_hinten",
 }
 
 #: Columns that one message names.

@@ -62,6 +62,7 @@ def _columns(data: Plateaus | Record) -> dict[str, FloatArray | None]:
         "speed_rpm": data.speed,
         "torque_nm": data.torque,
         "oil_temperature_c": data.oil_temperature,
+        "plate_temperature_front_c": data.plate_temperature,
     }
     if isinstance(data, Record):
         return {"time_s": data.time} | columns

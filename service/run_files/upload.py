@@ -3,6 +3,7 @@
 from datetime import datetime
 from pathlib import Path
 
+from service.columns import PLATE_TEMPERATURES
 from service.errors import FieldError, InvalidError
 from service.lives.incoming_run import IncomingRun, name_run
 from service.readers.read_file import read_file
@@ -13,8 +14,8 @@ _NEEDED = {
     "dynamic_stribeck": ("time_s", "pressure_bar", "speed_rpm", "torque_nm"),
 }
 _ALLOWED = {
-    "stationary_stribeck": ("time_s", "oil_temperature_c", "torque_sd_nm"),
-    "dynamic_stribeck": ("oil_temperature_c",),
+    "stationary_stribeck": ("time_s", "oil_temperature_c", *PLATE_TEMPERATURES, "torque_sd_nm"),
+    "dynamic_stribeck": ("oil_temperature_c", *PLATE_TEMPERATURES),
 }
 
 

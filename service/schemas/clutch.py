@@ -33,11 +33,19 @@ from service.schemas.limits import (
     MOST_LENGTH_MM,
     MOST_PRESSURE_FACTOR,
     MOST_SEVERITY_EXPONENT,
+    MOST_TORQUE_FILTER_MS,
 )
 from service.schemas.prognosis.criteria import CriterionIn
 from service.schemas.prognosis.life import Current, ModelName, Quantiles
 
 Name = Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_NAME)]
+TorqueFilter = Annotated[
+    Annotated[NotNegativeNumber, Field(le=MOST_TORQUE_FILTER_MS)] | None,
+    Field(
+        description="Time constant of the torque channel's own first-order low-pass, ms; null: not declared. Sampled tests "
+        "are evaluated with pressure and speed behind the same filter"
+    ),
+]
 Length = Annotated[PositiveNumber, Field(ge=LEAST_LENGTH_MM, le=MOST_LENGTH_MM)]
 PressureFactor = Annotated[PositiveNumber, Field(ge=LEAST_PRESSURE_FACTOR, le=MOST_PRESSURE_FACTOR)]
 
@@ -130,7 +138,13 @@ class ClutchIn(Schema):
     reaction_plate: Name = Field(default="steel", description="The reaction plate's material")
     fluid: Name = Field(default="ATF", description="The fluid")
     severity: SeverityIn = Field(default=SeverityIn(), description="How much a duty cycle ages the clutch")
+    torque_filter_ms: TorqueFilter = None
     origin: Origin = "measured"
+
+    @property
+    def torque_filter(self) -> float:
+        """Time constant of the torque channel's low-pass [s], 0 where none is declared."""
+        return 0.0 if self.torque_filter_ms is None else self.torque_filter_ms / 1000
 
 
 def content_of(record: Mapping[str, Any]) -> str:
@@ -154,6 +168,7 @@ class ClutchEdit(Schema):
     reaction_plate: Name = Field(default=_STAYS, description="The reaction plate's material")
     fluid: Name = Field(default=_STAYS, description="The fluid")
     severity: SeverityIn = Field(default=_STAYS, description="How much a duty cycle ages the clutch")
+    torque_filter_ms: TorqueFilter = None
     origin: Origin = Field(default=_STAYS)
 
     @model_validator(mode="after")
@@ -215,6 +230,7 @@ class ClutchOut(Answer):
     reaction_plate: str = Field(description="The reaction plate's material")
     fluid: str = Field(description="The fluid")
     severity: SeverityIn = Field(description="How much a duty cycle ages the clutch")
+    torque_filter_ms: TorqueFilter
     origin: Origin
     archived: bool = Field(description="Whether lists leave the clutch out and it takes in no more runs")
     created_at: str = Field(description="When it was registered; UTC, ISO 8601")

@@ -94,6 +94,7 @@ EXAMPLES: dict[str, Any] = {
     "mean_radius_mm": 58,
     "outer_diameter_mm": 133,
     "pressure_factor": 1.0,
+    "torque_filter_ms": 20.0,
     # a run and its fits, an inspection
     "bytes": 812345,
     "channels": {"pressure_bar": [5, 5, 5, 5, 5], "speed_rpm": _SPEEDS, "torque_nm": _TORQUES},
@@ -114,6 +115,8 @@ EXAMPLES: dict[str, Any] = {
     "mse_percent": 1.7,
     "noise_nm": 0.17,
     "oil_temperature_c": [84.1, 84.3, 84.9, 85.2, 85.6],
+    "plate_temperature_front_c": [84.3, 86.0, 92.4, 101.8, 117.5],
+    "plate_temperature_rear_c": [84.2, 85.8, 91.9, 100.9, 115.7],
     "periods": 3,
     "performed_at": _MOMENT,
     "photograph_id": _SHA256,

@@ -18,6 +18,8 @@ LEAST_WIDTH_MM = 0.1
 MOST_FRICTION_FACES = 1000
 #: Lining pressure over line pressure.
 LEAST_PRESSURE_FACTOR, MOST_PRESSURE_FACTOR = 1e-6, 1e6
+#: Time constant of the torque channel's own low-pass, ms: a slower one would hide the swing of a dynamic test (0.1 Hz).
+MOST_TORQUE_FILTER_MS = 1000
 #: Exponent of the severity of a duty cycle.
 MOST_SEVERITY_EXPONENT = 10
 

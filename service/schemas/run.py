@@ -27,6 +27,10 @@ Pressure = Annotated[Column, Field(description="Line pressure, bar")]
 Speed = Annotated[Column, Field(description="Sliding speed, rpm")]
 Torque = Annotated[Column, Field(description="Friction torque, Nm")]
 OilTemperature = Annotated[Column | None, Field(description="Oil temperature, °C")]
+FrontTemperature = Annotated[
+    Column | None, Field(description="Temperature of the reaction plate at its front, or at the one place measured, °C")
+]
+RearTemperature = Annotated[Column | None, Field(description="Temperature of the reaction plate at its rear, °C")]
 
 
 GivenReason = Annotated[Reason, StringConstraints(min_length=1)]
@@ -42,6 +46,8 @@ class StationaryChannels(Schema):
         default=None, description="Standard deviation of each plateau's mean torque, Nm"
     )
     oil_temperature_c: OilTemperature = None
+    plate_temperature_front_c: FrontTemperature = None
+    plate_temperature_rear_c: RearTemperature = None
     time_s: Column | None = Field(default=None, description="Time of each sample, s; left out, rows are plateaus")
 
 
@@ -53,6 +59,8 @@ class DynamicChannels(Schema):
     speed_rpm: Speed
     torque_nm: Torque
     oil_temperature_c: OilTemperature = None
+    plate_temperature_front_c: FrontTemperature = None
+    plate_temperature_rear_c: RearTemperature = None
 
 
 class Duty(Schema):

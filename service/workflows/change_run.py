@@ -156,7 +156,7 @@ def _corrected(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
     sent = replace(stored_runs.run_reader(database, row.clutch_id).read(row.run_id), cycles=cycles)
     event = loaded.event.at(cycles)
     event = replace(event, cofs=cofs_among(others, event, loaded.levels.get(row.run_id, ())))
-    analysis = analyse(sent, others.geometry)
+    analysis = analyse(sent, others.geometry, others.record.torque_filter)
     if "time_s" in sent.channels and sent.kind == STATIONARY:  # as on arrival: its plateaus stand for a long record
         sent = replace(sent, channels={})
     doubtful = doubts(sent, analysis, event, others)

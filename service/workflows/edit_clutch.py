@@ -1,7 +1,7 @@
 """A clutch's record is edited, or the clutch archived: what depends on the record is computed anew before it is stored.
 
-Curves depend on the geometry alone: where it changes, every run is fitted again. The record that was registered stays
-stored.
+Curves depend on the geometry and on the torque channel's filter alone: where these change, every run is fitted again. The
+record that was registered stays stored.
 """
 
 from collections.abc import Mapping
@@ -73,7 +73,7 @@ def _results(database: Database, before: ClutchIn, record: ClutchIn) -> Results 
     with database.reading() as connection:
         state = records.state(connection, record.clutch_id, edited=record)
         levels, receipts = records.levels(connection, record.clutch_id), records.receipts(connection, record.clutch_id)
-    if record.geometry != before.geometry:
+    if (record.geometry, record.torque_filter) != (before.geometry, before.torque_filter):
         return stored_runs.recomputed(database, state)
     reader = stored_runs.run_reader(database, record.clutch_id)
     tests = reader.stationary_tests(state.lives[-1]) if state.events else iter(())

@@ -84,14 +84,15 @@ def ingest(
         stored = runs.get(connection, clutch_id, run.run_id)
     if stored is not None:
         return _repeat(stored, run), False
-    geometry, sampled = records.record(clutch).geometry.to_model(), "time_s" in run.channels
+    record, sampled = records.record(clutch), "time_s" in run.channels
+    geometry, torque_filter = record.geometry.to_model(), record.torque_filter
     if sampled:
         with ThreadPoolExecutor(1) as beside:  # deflating a long record lets its cutting run
             encoding = beside.submit(channels.encoded, run.channels)
-            analysis = analyse(run, geometry)
+            analysis = analyse(run, geometry, torque_filter)
             columns = encoding.result()
     else:  # a thread takes longer to begin than a few plateaus to deflate
-        analysis, columns = analyse(run, geometry), channels.encoded(run.channels)
+        analysis, columns = analyse(run, geometry, torque_filter), channels.encoded(run.channels)
     if sampled and run.kind == STATIONARY:  # loops are yet to be fitted; another long record need not be held twice
         run = replace(run, channels={})
     arrival = Arrival(run=run, sampled=sampled, analysis=analysis, received_at=received_at)
@@ -274,7 +275,9 @@ def _own_loops(
     if run.kind != DYNAMIC:
         return ()
     test = stationary_tests_of(state.events)[event.run_id]
-    return loops_of(run.channels, state.geometry, [] if test is None else levels.get(test, []))
+    return loops_of(
+        run.channels, state.geometry, state.record.torque_filter, [] if test is None else levels.get(test, [])
+    )
 
 
 def _changes_the_past(before: ClutchState, ordered: Sequence[Event], event: Event) -> bool:

@@ -84,7 +84,7 @@ class Bench:
 
     def _read(self, body: Body) -> tuple[IncomingRun, Analysis, Event]:
         run = read_run(json.dumps(body).encode())
-        analysis = self._analyses.get(run.run_id) or analyse(run, self.geometry)
+        analysis = self._analyses.get(run.run_id) or analyse(run, self.geometry, 0.0)
         self._analyses[run.run_id] = analysis
         event = _event(run, analysis)
         life = life_with(order([*self.events, event]), event)

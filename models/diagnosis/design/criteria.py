@@ -67,3 +67,7 @@ FEWEST_PER_BIN = 4.0
 ALIKE_SAMPLING = 1.2
 #: A correlation of neighbours below this [-] is taken for none. Chosen; no table.
 LEAST_CORRELATION = 0.02
+
+#: [K m²/W] A plate that warms by less with the heat flux counts as warming by so much: 1 K at 0.32 W/mm². Chosen, above what
+#: thermometers drift with speed (some tenths of a kelvin); no table. Friction that heats an interface does so by tens of K.
+LEAST_PLATE_RISE = 1.0 / 0.32e6

@@ -23,6 +23,7 @@ from models.diagnosis.design.points import IntArray, Points, concatenate, mark_o
 from models.diagnosis.design.sample_autocorrelation import bin_autocorrelation
 from models.diagnosis.design.thinning import thinned
 from models.records.pressure_levels import levels_of
+from models.records.runs import plate_rise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -227,6 +228,7 @@ def _plateaus(
     times = PLATEAU_DURATION * (np.arange(table.torque.size) + 0.5) if run.time is None else np.array(run.time)
     clock = np.asarray(times[usable], dtype=np.float64)
     nan: FloatArray = np.full(count, np.nan, dtype=np.float64)
+    rise = plate_rise(table)
     moment = nan if run.moment is None else np.asarray(run.moment + clock, dtype=np.float64)
     consecutive = np.concatenate([[-1], np.where(np.diff(usable) == 1, offset + np.arange(count - 1), -1)])
     points = Points(
@@ -238,6 +240,7 @@ def _plateaus(
         sign=sign,
         acceleration=np.zeros(count),
         temperature=nan if table.oil_temperature is None else table.oil_temperature[usable],
+        plate_rise=nan if rise is None else rise[usable],
         clock=clock,
         moment=moment,
         angular_frequency=np.zeros(count),
@@ -259,6 +262,7 @@ def _loop_points(loop: BinnedLoop, run: int, number: int, cycles: float, moment:
         sign=np.full(count, loop.sign),
         acceleration=loop.acceleration,
         temperature=np.full(count, loop.temperature),
+        plate_rise=loop.plate_rise,
         clock=loop.clock,
         moment=np.full(count, np.nan) if moment is None else moment + loop.clock,
         angular_frequency=np.full(count, loop.angular_frequency),

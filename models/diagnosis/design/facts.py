@@ -13,6 +13,7 @@ from models.diagnosis.design.criteria import (
     FEWEST_BLOCKS,
     FEWEST_TIMED,
     LEAST_PAUSE,
+    LEAST_PLATE_RISE,
     LONGEST_ENGAGEMENT,
     PACE_QUANTILE,
     PAUSE_RATIO,
@@ -22,7 +23,7 @@ from models.diagnosis.design.criteria import (
 )
 from models.diagnosis.design.limits import MOST_ONSETS
 from models.records.criteria import UNLOADED
-from models.records.runs import Plateaus, Record
+from models.records.runs import Plateaus, Record, plate_rise
 
 Run: TypeAlias = StationaryRun | DynamicRun | DutyRun
 
@@ -40,6 +41,9 @@ class Facts:
                                engagement
     first_moment, last_moment  [s] of the timed tests, None where fewer than two were timed
     usual_torque, usual_pressure  medians over the closed clutch [Nm], [Pa]
+    plate_warming              the plate's rise above the oil at no heat flux of friction [K], and what it rises by with that
+                               [K m²/W]; None where its temperature was not measured
+    plate_in_all_tests         whether it was measured in every test
     """
 
     geometry: Geometry
@@ -58,6 +62,8 @@ class Facts:
     last_moment: float | None = None
     usual_torque: float = USUAL_TORQUE
     usual_pressure: float = USUAL_PRESSURE
+    plate_warming: tuple[float, float] | None = None
+    plate_in_all_tests: bool = False
 
     @property
     def life(self) -> float:
@@ -111,7 +117,25 @@ def facts_of(campaign: Campaign) -> Facts:
         last_moment=max(timed) if spread else None,
         usual_torque=_median(torques, USUAL_TORQUE),
         usual_pressure=_median(pressures, USUAL_PRESSURE),
+        plate_warming=_plate_warming(campaign),
+        plate_in_all_tests=bool(tests) and all(table.plate_temperature is not None for _, table in tests),
     )
+
+
+def _plate_warming(campaign: Campaign) -> tuple[float, float] | None:
+    """The line of the plate's rise [K] over the flux |M| ω/A of friction [W/m²]: by plateaus, which have time to warm, or by
+    loops where no plateau has the channel. Its slope is LEAST_PLATE_RISE at least."""
+    plateaus, records = [run.plateaus for run in campaign.stationary], [run.record for run in campaign.dynamic]
+    area = campaign.geometry.friction_faces * campaign.geometry.lining_area
+    for tables in (plateaus, records):
+        measured = [(table, rise) for table in tables if (rise := plate_rise(table)) is not None]
+        if measured:
+            flux = np.concatenate([np.abs(table.torque * table.speed) for table, _ in measured]) / area
+            rise = np.concatenate([rise for _, rise in measured])
+            off = flux - flux.mean()
+            slope = max(float(off @ rise) / max(float(off @ off), 1e-300), LEAST_PLATE_RISE)
+            return float(rise.mean() - slope * flux.mean()), slope
+    return None
 
 
 def _median(values: FloatArray, otherwise: float) -> float:

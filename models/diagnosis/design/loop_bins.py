@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
@@ -25,7 +26,7 @@ from models.records.criteria import SPEED_HARMONICS
 from models.records.outliers import beside, inliers
 from models.records.periods import Cycle, fit_cycle, harmonics
 from models.records.pressure_stretches import pressure_stretches
-from models.records.runs import Record
+from models.records.runs import Record, plate_rise
 
 #: Phases at which a loop is computed, and bins in which it is compared; a bin holds a whole number of phases.
 PHASES, BINS = 120, 60
@@ -39,7 +40,8 @@ _STANDSTILL = 1e-5
 class BinnedLoop:
     """One pressure of a dynamic test [Pa].
 
-    At PHASES phases: phase [rad], velocity [m/s] >= 0, acceleration [m/s²], clock [s].
+    At PHASES phases: phase [rad], velocity [m/s] >= 0, acceleration [m/s²], clock [s], plate_rise [K] above the oil, NaN
+    where not measured.
     In BINS bins: torque [Nm] (folded); samples, how many it is the mean of, 0 where the bin is not used; bin_offset, how far
     past the bin's middle [of a bin] they lie on average (with a rate that is a multiple of the speed's, always as far).
     period_differences [p, BINS] Nm (`design.period_differences`).
@@ -53,6 +55,7 @@ class BinnedLoop:
     velocity: FloatArray
     acceleration: FloatArray
     clock: FloatArray
+    plate_rise: FloatArray
     torque: FloatArray
     samples: FloatArray
     bin_offset: FloatArray
@@ -63,7 +66,7 @@ class BinnedLoop:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Stretch:
     """Samples [n] at one pressure [Pa], folded: time [s], velocity [m/s], torque [Nm]; the sign, the mean oil temperature
-    [K], and the record's first time [s]."""
+    [K], the plate's rise above the oil [n] K (None where not measured), and the record's first time [s]."""
 
     time: FloatArray
     velocity: FloatArray
@@ -71,6 +74,7 @@ class _Stretch:
     pressure: float
     sign: float
     temperature: float
+    plate_rise: FloatArray | None
     test_start: float
 
 
@@ -81,6 +85,7 @@ def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], 
     time, pressure = record.time[order], record.pressure[order]
     velocity, torque = geometry.sliding_velocity(record.speed[order]), record.torque[order]
     temperature = None if record.oil_temperature is None else record.oil_temperature[order]
+    rise = plate_rise(record)
     loops: list[BinnedLoop] = []
     notes: list[str] = []
     before: Cycle | None = None
@@ -95,6 +100,7 @@ def binned_loops(record: Record, geometry: Geometry) -> tuple[list[BinnedLoop], 
             pressure=stretch.pressure,
             sign=sign,
             temperature=float("nan") if temperature is None else float(temperature[rows].mean()),
+            plate_rise=None if rise is None else rise[order][rows],
             test_start=float(time[0]),
         )
         cycle = _speed_cycle(samples.time, samples.velocity, before)
@@ -195,6 +201,7 @@ def _binned(stretch: _Stretch, cycle: Cycle) -> BinnedLoop | str:
         phase=phase,
         velocity=_effective_velocity(cycle, time, stretch.velocity, _STANDSTILL * fastest),
         acceleration=angular * cycle.gradient(phase),
+        plate_rise=_plate_rise(stretch, inside, number, phase),
         clock=np.asarray(cycle.origin + passed / cycle.frequency - stretch.test_start, dtype=np.float64),
         torque=np.bincount(number, weights=torque[inside], minlength=BINS) / np.maximum(count, 1.0),
         samples=count,
@@ -202,3 +209,15 @@ def _binned(stretch: _Stretch, cycle: Cycle) -> BinnedLoop | str:
         period_differences=period_differences(torque[inside], number, (time[inside] - settled) * cycle.frequency, BINS),
         autocorrelation=sample_autocorrelation(torque, sample_phase, moving, per_bin),
     )
+
+
+def _plate_rise(
+    stretch: _Stretch, inside: NDArray[np.bool_], number: NDArray[np.intp], phase: FloatArray
+) -> FloatArray:
+    """The plate's rise at the phases [PHASES] K: the bins' means (`number` is the bin of each sample inside), and lines."""
+    if stretch.plate_rise is None:
+        return np.full(phase.size, np.nan)
+    count = np.bincount(number, minlength=BINS)
+    filled = np.flatnonzero(count)
+    mean = np.bincount(number, weights=stretch.plate_rise[inside], minlength=BINS)[filled] / count[filled]
+    return np.interp(phase, 2 * math.pi / BINS * (filled + 0.5), mean, period=2 * math.pi)

@@ -23,6 +23,7 @@ class Points:
     velocity           [m/s] >= 0, folded; sign ±1 says which way the clutch turned
     acceleration       [m/s²] of the folded velocity
     temperature        of the oil [K], NaN where not measured
+    plate_rise         of the plate above the oil [K], NaN where not measured
     clock              [s] since the test began
     moment             [s] since 1970, NaN where unknown
     angular_frequency  [rad/s], 0 at plateaus
@@ -39,6 +40,7 @@ class Points:
     sign: FloatArray
     acceleration: FloatArray
     temperature: FloatArray
+    plate_rise: FloatArray
     clock: FloatArray
     moment: FloatArray
     angular_frequency: FloatArray

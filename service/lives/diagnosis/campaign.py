@@ -20,6 +20,7 @@ from models.diagnosis.campaign import (
 )
 from models.records.plateaus import cut_plateaus
 from models.records.runs import Plateaus, Record
+from models.records.torque_filter import filtered_as_torque
 from service.columns import CHANNELS
 from service.lives.criteria import MOST_OF_CAMPAIGN, MOST_OF_RECORD
 from service.lives.history import DYNAMIC, MAINTENANCE, STATIONARY, Life
@@ -79,12 +80,16 @@ def records_to_keep(run_ids: Sequence[str], samples: Mapping[str, int]) -> set[s
     return {run_id for run_id, _ in fitting[::every]}
 
 
-def run_of(run: IncomingRun, *, origin: float, keep_record: bool = True) -> CampaignRun:
-    """A run with its channels, its cycles counted from `origin`. Raises ValueError where its record holds no plateau."""
+def run_of(run: IncomingRun, *, origin: float, torque_filter: float = 0.0, keep_record: bool = True) -> CampaignRun:
+    """A run with its channels, its cycles counted from `origin`. Raises ValueError where its record holds no plateau.
+
+    The torque channel's filter of `torque_filter` [s] is taken off tests that are sampled (`models.records.torque_filter`).
+    """
     if run.kind == STATIONARY:
-        return _stationary(run, origin, keep_record)
+        return _stationary(run, origin, torque_filter, keep_record)
     if run.kind == DYNAMIC:
-        return DynamicRun(**_head(run, origin), record=thinned(sampled_record(run.channels)))
+        record = filtered_as_torque(sampled_record(run.channels), torque_filter)
+        return DynamicRun(**_head(run, origin), record=thinned(record))
     if run.kind == MAINTENANCE:
         return MaintenanceEvent(**_head(run, origin), event=EventKind(run.details["event"]))
     duty = run.details["duty"]
@@ -121,11 +126,11 @@ def _head(run: IncomingRun, origin: float) -> dict[str, Any]:
     return {"run_id": run.run_id, "cycles": run.cycles - origin, "moment": moment}
 
 
-def _stationary(run: IncomingRun, origin: float, keep_record: bool) -> StationaryRun:
+def _stationary(run: IncomingRun, origin: float, torque_filter: float, keep_record: bool) -> StationaryRun:
     if "time_s" not in run.channels:
         return StationaryRun(**_head(run, origin), plateaus=stationary_plateaus(run.channels))
     record = sampled_record(run.channels)
-    cut = cut_plateaus(record)
+    cut = cut_plateaus(record, torque_filter)
     return StationaryRun(
         **_head(run, origin),
         plateaus=cut.plateaus,
@@ -150,6 +155,7 @@ def thinned(record: Record, most: int = MOST_OF_RECORD) -> Record:
         speed=means(record.speed),
         torque=means(record.torque),
         oil_temperature=None if record.oil_temperature is None else means(record.oil_temperature),
+        plate_temperature=None if record.plate_temperature is None else means(record.plate_temperature),
     )
 
 

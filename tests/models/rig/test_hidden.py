@@ -8,8 +8,10 @@ import pytest
 from models.diagnosis.campaign import Campaign, DynamicRun, StationaryRun
 from models.diagnosis.diagnose import diagnose
 from models.diagnosis.effects.catalogue import CATALOGUE
+from models.diagnosis.report.report import Report
 from models.rig.campaign import simulate, simulated_clutch
 from models.rig.hidden import EFFECTS, clutch_for, effect_of, hidden_in
+from models.rig.plate import with_plate
 from models.rig.programme import Programme
 from models.rig.sampled import DynamicTest
 from models.rig.simulated_runs import RunKind, SimulatedRun
@@ -67,10 +69,7 @@ def test_every_hidden_effect_is_of_the_catalogue_and_an_unknown_one_lists_them()
         effect_of("warm_oil")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("slug", ["oil_temperature", "torque_zero_shift"])
-def test_a_diagnosis_names_what_is_hidden(slug: str) -> None:
-    found = runs({slug: effect_of(slug).size}, 9)
+def diagnosed(found: list[SimulatedRun]) -> Report:
     tests = [
         StationaryRun(run_id=run.run_id, cycles=run.cycles, plateaus=run.plateaus)
         for run in found
@@ -81,5 +80,22 @@ def test_a_diagnosis_names_what_is_hidden(slug: str) -> None:
         for run in found
         if run.kind is RunKind.DYNAMIC_STRIBECK and run.record is not None
     ]
-    report = diagnose(Campaign(stationary=tuple(tests), dynamic=tuple(loops)), rng=np.random.default_rng(1))
+    return diagnose(Campaign(stationary=tuple(tests), dynamic=tuple(loops)), rng=np.random.default_rng(1))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("slug", ["oil_temperature", "torque_zero_shift"])
+def test_a_diagnosis_names_what_is_hidden(slug: str) -> None:
+    report = diagnosed(runs({slug: effect_of(slug).size}, 9))
     assert slug in report.causes, (report.verdict, report.causes, report.summary)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("slug", "rise", "named"),
+    [("interface_heating", 25.0, True), ("interface_heating", 0.0, False), ("oil_temperature", 0.0, False)],
+)
+def test_heating_is_named_by_a_warm_plate_only(slug: str, rise: float, named: bool) -> None:
+    geometry = simulated_clutch(7).geometry
+    report = diagnosed([with_plate(run, geometry, rise) for run in runs({slug: effect_of(slug).size}, 9)])
+    assert ("interface_heating" in report.causes) is named, (report.verdict, report.causes, report.summary)

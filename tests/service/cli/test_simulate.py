@@ -37,6 +37,17 @@ def test_what_is_hidden_is_in_a_file_and_not_on_the_screen(tmp_path: Path) -> No
     assert {round(pressure) for pressure in loops["pressure_bar"][::500]} == {4, 5}
 
 
+def test_the_plate_is_measured_where_that_is_asked_for(tmp_path: Path) -> None:
+    for rise, folder in ((None, tmp_path / "none"), (25.0, tmp_path / "warm"), (0.0, tmp_path / "cold")):
+        simulated(folder, *(() if rise is None else ("--plate-rise", str(rise))))
+        channels = json.loads((folder / "sim-3-stationary-00000.json").read_bytes())["channels"]
+        plate = channels.pop("plate_temperature_front_c", None)
+        assert (plate is None) == (rise is None)
+        if plate is not None:
+            above = max(p - oil for p, oil in zip(plate, channels["oil_temperature_c"], strict=True))
+            assert above == pytest.approx(25.0, abs=8.0) if rise else above == pytest.approx(0.0, abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -41,6 +41,7 @@ GEOMETRY = {"geometry": {"inner_diameter_mm": 90, "outer_diameter_mm": 140, "fri
 EDITS = [
     pytest.param(GEOMETRY, False, id="geometry"),
     pytest.param(GEOMETRY, True, id="geometry under an adopted model"),
+    pytest.param({"torque_filter_ms": 20}, False, id="the torque channel's filter"),
     pytest.param({"end_of_life": {"cof_fraction": 0.8}}, False, id="end of life"),
     pytest.param({"severity": {"basis": "dissipated_energy", "exponent": 1.5}}, True, id="severity"),
     pytest.param(

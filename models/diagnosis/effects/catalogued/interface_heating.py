@@ -1,4 +1,9 @@
-"""Friction heats the interface above the oil's temperature, and torque falls with the power density."""
+"""Friction heats the interface above the oil's temperature, and torque falls with it.
+
+The interface's warmth is computed from the power density. Where the plate's temperature was measured it is the plate's own
+rise above the oil, over what the campaign's plate rises by at the reference's flux, so that the amplitude keeps its meaning.
+A plate that stays at the oil's temperature leaves nothing of this effect.
+"""
 
 import numpy as np
 
@@ -12,9 +17,13 @@ from models.diagnosis.effects.first_order_lag import ends_of, phases_of
 REFERENCE_FLUX = 0.32e6
 #: What weakens: all of the friction, or the oil's shear.
 WHOLE, VISCOUS = 0.0, 1.0
+#: The most that a measured rise counts for, of that at the reference's flux: a faulty thermometer must not overflow.
+_MOST_WARMTH = 30.0
 
 
-def _grid(_facts: Facts) -> tuple[Tried, ...]:
+def _grid(facts: Facts) -> tuple[Tried, ...]:
+    if facts.plate_in_all_tests:  # settling and saturation are in what was measured
+        return tuple(Tried(shape=(0.0, part, 0.0)) for part in (WHOLE, VISCOUS))
     return tuple(
         Tried(shape=(float(np.log(settling)), part, saturation))
         for settling in (0.03, 0.3, 1.5, 6.0, 30.0)
@@ -25,14 +34,28 @@ def _grid(_facts: Facts) -> tuple[Tried, ...]:
 
 def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     log_settling, part, saturation = shape
-    settling = float(np.exp(log_settling))
+    warmth = _measured(scene, _computed(scene, float(np.exp(log_settling)), saturation))
+    carried = scene.curve if part == WHOLE else scene.viscous
+    return np.asarray(-carried * -np.expm1(-amplitude * warmth), dtype=np.float64)
+
+
+def _measured(scene: Scene, computed: FloatArray) -> FloatArray:
+    """The interface's warmth [P], by the plate's temperature where it was measured, else as computed."""
+    rise, warming = scene.points.plate_rise, scene.facts.plate_warming
+    if warming is None:
+        return computed
+    at_rest, per_flux = warming
+    warmth = np.clip((rise - at_rest) / (per_flux * REFERENCE_FLUX), -_MOST_WARMTH, _MOST_WARMTH)
+    return np.where(np.isfinite(rise), warmth, computed)
+
+
+def _computed(scene: Scene, settling: float, saturation: float) -> FloatArray:
+    """The interface's warmth [P] by the flux of friction, saturating and settling in `settling` s; 1 at the reference's."""
     geometry = scene.facts.geometry
     power = np.abs(scene.curve) * scene.points.velocity / geometry.mean_radius
     heat = power / (geometry.friction_faces * geometry.lining_area * REFERENCE_FLUX)
     heat = heat * (1.0 + saturation) / (1.0 + saturation * heat)
-    warmth = _around(_along(heat, scene, settling), scene, settling)
-    carried = scene.curve if part == WHOLE else scene.viscous
-    return np.asarray(-carried * -np.expm1(-amplitude * warmth), dtype=np.float64)
+    return _around(_along(heat, scene, settling), scene, settling)
 
 
 def _along(heat: FloatArray, scene: Scene, settling: float) -> FloatArray:
@@ -69,7 +92,7 @@ EFFECT = Effect(
     physics="Frictional power heats the interface above the oil's temperature; the boundary film and the oil there lose "
     "strength.",
     formula="-S (1 - e^{-a w}), w the heat flux |S| ω/A over 0.32 W/mm², saturating by s and lagging by τ; S or its "
-    "viscous part",
+    "viscous part; where the plate's temperature was measured w is its rise above the oil over that at 0.32 W/mm²",
     source="Marklund and Larsson, Tribology Int. 41 (2008) 824: friction of wet clutches by interface temperature",
     family=Family.THERMAL,
     kind=Kind.ARTEFACT,

@@ -130,3 +130,27 @@ def test_nothing_of_it_is_written(client: TestClient, database_url: str) -> None
     before = path.read_bytes()
     campaign(database_url)
     assert path.read_bytes() == before
+
+
+def test_the_plate_and_a_declared_filter_reach_the_diagnosis(client: TestClient, database_url: str) -> None:
+    def with_plate(channels: dict[str, Any]) -> dict[str, Any]:
+        return channels | {"plate_temperature_rear_c": [95.0] * len(channels["torque_nm"])}
+
+    raw = {"kind": "stationary_stribeck", "cycles": 0, "run_id": "raw", "channels": with_plate(raw_record())}
+    loops = {"kind": "dynamic_stribeck", "cycles": 0, "run_id": "loops", "channels": with_plate(dynamic_record())}
+    rows = stationary(500, run_id="rows")
+    post(client, raw, loops, rows | {"channels": with_plate(rows["channels"])})
+    plain = campaign(database_url).campaign
+    tables = [*(run.plateaus for run in plain.stationary), *(run.record for run in plain.dynamic)]
+    assert all(table.plate_temperature == pytest.approx(368.15) for table in tables)
+    edit = {"torque_filter_ms": 100, "reason": "the amplifier"}
+    assert client.patch("/v1/clutches/c1", json=edit).status_code == 200
+    declared = campaign(database_url).campaign
+    before, after = (found.dynamic[0].record for found in (plain, declared))
+    late = np.interp(after.time[500:] - 0.1, before.time, before.speed)
+    np.testing.assert_allclose(after.speed[500:], late, atol=1.5)  # a delay, but for where the swing turns
+    assert np.abs(before.speed[500:] - late).max() > 5
+    # dwells begin when the speed has come through the filter
+    assert declared.stationary[0].time != plain.stationary[0].time
+    assert declared.stationary[0].plateaus.torque == pytest.approx(plain.stationary[0].plateaus.torque, rel=0.01)
+    np.testing.assert_array_equal(declared.stationary[1].plateaus.torque, plain.stationary[1].plateaus.torque)

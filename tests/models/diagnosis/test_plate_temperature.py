@@ -1,0 +1,151 @@
+"""Heating is judged by the plate's temperature where it was measured, and as before where it was not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.arrays import FloatArray
+from models.clutch import Geometry
+from models.diagnosis.baseline.laws import Scene
+from models.diagnosis.baseline.prediction import frame_of, predict
+from models.diagnosis.campaign import Campaign
+from models.diagnosis.design.design import build_design
+from models.diagnosis.design.facts import facts_of
+from models.diagnosis.effects.catalogued import interface_heating
+from models.diagnosis.pooled_fit.starts import starting_laws
+from models.friction.stribeck import torque
+from models.records.runs import Plateaus, Record
+from tests.models.diagnosis.campaigns import Where, campaign
+from tests.models.diagnosis.test_diagnose import PLANTED, look
+
+GEOMETRY = Geometry()
+#: Loss of torque at the reference's heat flux, and what the plate then rises by [K], both at the usual flow of oil.
+LOSS, RISE = 0.12, 25.0
+SLUG = interface_heating.EFFECT.slug
+
+
+def warmth(friction: FloatArray, velocity: FloatArray, cycles: float, clock: FloatArray) -> FloatArray:
+    """Of the interface, over that at 0.32 W/mm²: the heat flux, more or less as the flow of cooling oil is, from test
+    to test and within one; no power density knows of that."""
+    area = GEOMETRY.friction_faces * GEOMETRY.lining_area
+    flow = 1 + 0.5 * np.sin(2 * np.pi * cycles / 7000.0) + 0.3 * np.sin(clock / 90.0)
+    return np.abs(friction) * velocity / GEOMETRY.mean_radius / (0.32e6 * area) * flow
+
+
+def heated(at: Where) -> FloatArray:
+    bare = torque(at.velocity, at.parameters)
+    return bare * np.expm1(-LOSS * warmth(bare, at.velocity, at.cycles, at.clock))
+
+
+def with_plate(given: Campaign, rise: float, offset: float = 0.0) -> Campaign:
+    """The campaign with the plate's temperature: `rise` K above the oil for each unit of warmth, by the friction as it was
+    before it was weakened; and a thermometer's noise of 0.1 K and offset."""
+    rng = np.random.default_rng(0)
+
+    def temperature(table: Plateaus | Record, cycles: float, clock: FloatArray) -> FloatArray:
+        velocity, bare = GEOMETRY.sliding_velocity(table.speed), table.torque
+        for _ in range(5):
+            bare = table.torque * np.exp(LOSS * warmth(bare, velocity, cycles, clock))
+        above = rise * warmth(bare, velocity, cycles, clock)
+        oil = table.oil_temperature
+        return (358.15 if oil is None else oil) + offset + above + 0.1 * rng.standard_normal(above.size)
+
+    stationary, dynamic = [], []
+    for run in given.stationary:
+        clock = 5.0 * np.arange(run.plateaus.torque.size) + 2.5
+        plate = temperature(run.plateaus, run.cycles, clock)
+        stationary.append(replace(run, plateaus=replace(run.plateaus, plate_temperature=plate)))
+    for run in given.dynamic:
+        plate = temperature(run.record, run.cycles, run.record.time)
+        dynamic.append(replace(run, record=replace(run.record, plate_temperature=plate)))
+    return replace(given, stationary=tuple(stationary), dynamic=tuple(dynamic))
+
+
+def scene_of(given: Campaign) -> Scene:
+    design = build_design(given)
+    return predict(design, starting_laws(design, frame_of(design))).scene
+
+
+def test_hidden_heating_is_named_by_the_plate_and_not_without_it() -> None:
+    given = with_plate(campaign(7, heated), RISE)
+    report = look(given)
+    assert report.causes == (SLUG,)
+    estimate = report.candidates[0].estimate
+    warming = facts_of(given).plate_warming
+    assert warming is not None
+    expected = 100 * LOSS * warming[1] * interface_heating.REFERENCE_FLUX / RISE  # at the flow that was usual
+    assert abs(estimate.value - expected) < 4 * estimate.sd
+    assert SLUG not in look(campaign(7, heated)).causes
+
+
+def test_a_plate_as_cold_as_the_oil_was_not_heated_whatever_else_is_hidden() -> None:
+    for planted, cause in ((PLANTED["hydrodynamic_drag"], "hydrodynamic_drag"), (heated, None)):
+        report = look(with_plate(campaign(7, planted), 0.0))
+        assert SLUG not in report.causes
+        assert all(each.effect != SLUG for each in report.candidates)
+        assert cause is None or report.causes == (cause,)
+
+
+def test_without_the_channel_the_effect_is_what_it_was() -> None:
+    scene = scene_of(campaign(1))
+    assert scene.facts.plate_warming is None
+    assert np.isnan(scene.points.plate_rise).all()
+    tried = interface_heating.EFFECT.grid(scene.facts)
+    assert len(tried) == 20
+    computed = interface_heating._computed(scene, 1.5, 1.5)
+    assert interface_heating._measured(scene, computed) is computed
+
+
+def test_with_the_channel_it_goes_with_the_plate_and_a_thermometers_offset_is_nothing() -> None:
+    for offset in (0.0, -4.0):
+        scene = scene_of(with_plate(campaign(1), RISE, offset))
+        assert len(interface_heating.EFFECT.grid(scene.facts)) == 2
+        change = interface_heating.EFFECT.change(scene, 0.1, (0.0, interface_heating.WHOLE, 0.0))
+        lost = -np.log1p(change / scene.curve) / 0.1
+        area = GEOMETRY.friction_faces * GEOMETRY.lining_area
+        assert scene.facts.plate_warming is not None
+        at_rest, per_flux = scene.facts.plate_warming
+        assert at_rest == pytest.approx(offset, abs=1.5)
+        assert per_flux * 0.32e6 == pytest.approx(RISE, rel=0.4)  # flow and losses are in it
+        np.testing.assert_allclose(lost, (scene.points.plate_rise - at_rest) / (per_flux * 0.32e6), atol=1e-9)
+        loops = ~scene.points.steady
+        modelled = warmth(scene.curve, scene.points.velocity, 0.0, np.zeros(1)) * 0.32e6 * area
+        assert np.corrcoef(lost[loops], modelled[loops])[0, 1] > 0.7  # the course within a loop is the plate's own
+
+
+def test_where_some_tests_have_it_the_others_are_computed() -> None:
+    given = with_plate(campaign(1), RISE)
+    bare = tuple(replace(run, record=replace(run.record, plate_temperature=None)) for run in given.dynamic)
+    scene = scene_of(replace(given, dynamic=bare))
+    assert len(interface_heating.EFFECT.grid(scene.facts)) == 20
+    computed = interface_heating._computed(scene, 1.5, 0.0)
+    used, steady = interface_heating._measured(scene, computed), scene.points.steady
+    np.testing.assert_array_equal(used[~steady], computed[~steady])
+    assert np.abs(used - computed)[steady].min() > 0
+
+
+def test_without_oil_temperature_the_plate_is_above_its_own_coldest() -> None:
+    given = with_plate(campaign(1, temperature=False), RISE)
+    points = build_design(given).points
+    for run in range(len(given.stationary)):
+        assert points.plate_rise[points.steady & (points.run == run)].min() == 0.0
+    assert facts_of(given).plate_warming is not None
+
+
+def test_an_adopted_model_takes_off_by_the_plate_of_a_later_test() -> None:
+    given = with_plate(campaign(7, heated), RISE)
+    extension = look(given).extension
+    assert extension is not None
+    last = given.stationary[-1]
+    warm, cold = (
+        extension.artefact(replace(last, run_id="later", plateaus=plateaus), given)
+        for plateaus in (last.plateaus, replace(last.plateaus, plate_temperature=last.plateaus.oil_temperature))
+    )
+    assert warm is not None
+    assert cold is not None
+    assert warm.min() < -0.5
+    assert np.abs(cold).max() < 0.1 * np.abs(warm).max()
+    kept = type(extension).from_dict(extension.to_dict())
+    again = kept.artefact(replace(last, run_id="later"), given)
+    np.testing.assert_array_equal(again, warm)
