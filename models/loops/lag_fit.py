@@ -5,7 +5,8 @@ in it, so its likelihood is nearly normal, which that of C itself is not. Beside
 are fitted (`models.loops.lag_problem`), none of which has a loop area, so that u follows from how the torque differs
 between accelerating and decelerating. u maximises the likelihood (the others are profiled out); its deviation comes from
 the curvature there, with the noise taken from the residual and raised where that is not white: what no u explains makes
-u less certain. What an error of the curve would explain of that residual is left out of it, for it is counted by itself.
+u less certain. What an error of the curve, as large as it is stated to be, would explain of that
+residual is left out of it, for it is counted by itself.
 
 The curve's own error contributes: the lag is S S' v̇/C, so that C is off by 9 to 18 % with M̄_c 2 % off, by up to 3 %
 with V_S 5 % off, by up to 5 % with C_v 5 % off. u's gradient by the four parameters, each from one Gauss-Newton step at a
@@ -17,7 +18,7 @@ By scaling, a torque g S is followed at C when S is followed at C/g: the attract
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -124,7 +125,7 @@ def fit_lag(law: Law, cycle: Cycle, phase: FloatArray, measured: FloatArray, cur
         return after
 
     slant = _by_curve(stepped, curve)
-    erring = np.stack([course - middle for course in courses[1:]]) if courses else np.zeros((0, middle.size))
+    erring = _erring(courses, curve) if courses else np.zeros((0, middle.size))
     sd, gain = posed.problem.deviation(middle, change, lag, cycle, scaled=law.scaled, erring=erring)
     share = 1 / gain if law.scaled else 1.0
     estimate = _Estimate(lag * share, sd * share, slant)
@@ -172,6 +173,19 @@ def _by_curve(estimate: Callable[[StribeckParameters], float], curve: Stationary
         gradient[k] = (estimate(StribeckParameters.from_array(moved)) - here) / (moved[k] - values[k])
     variance = float(gradient @ curve.covariance @ gradient)
     return math.sqrt(max(variance, 0.0)) if math.isfinite(variance) else math.inf
+
+
+def _erring(courses: Sequence[FloatArray], curve: StationaryCurve) -> FloatArray:
+    """How the torque [k, n] Nm changes with the curve's parameters, in k independent directions of a deviation each.
+
+    `courses` are the torque at the curve, and with each uncertain parameter moved by _MOVED of its deviation.
+    """
+    deviation = np.sqrt(np.maximum(np.diag(curve.covariance), 0.0))
+    uncertain = np.flatnonzero(deviation)
+    spread = deviation[uncertain]
+    roots, vectors = np.linalg.eigh(curve.covariance[np.ix_(uncertain, uncertain)] / np.outer(spread, spread))
+    changes = np.stack([course - courses[0] for course in courses[1:]]) / _MOVED
+    return np.asarray((vectors * np.sqrt(np.maximum(roots, 0.0))).T @ changes)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -68,16 +68,17 @@ class LagProblem:
     ) -> tuple[float, float]:
         """Deviation of u at the optimum (of gain x u/gain where the lag is `scaled` by the gain), and the gain there.
 
-        `erring` [k, n] are directions that the torque takes where the curve errs: of the residual they are no noise.
+        `erring` [k, n] Nm is how the torque changes where the curve errs by a deviation, in independent directions: what
+        that explains of the residual is no noise.
         """
         base, slope = self.without(course), self.without(change)
         gain = self.gain(base)
         residual = self.left - gain * base
-        directions = (
-            np.stack([self.without(way) for way in erring], axis=1) if len(erring) else np.zeros((base.size, 0))
-        )
-        residual -= directions @ np.linalg.lstsq(directions, residual, rcond=1e-6)[0]
-        sd = self._deviation(residual, taken=len(erring))
+        directions = np.stack([self.without(way) for way in erring]) if len(erring) else erring
+        strength = directions @ directions.T
+        damped = strength + self.noise**2 * np.eye(len(erring))
+        residual -= np.linalg.solve(damped, directions @ residual) @ directions
+        sd = self._deviation(residual, taken=float(np.trace(np.linalg.solve(damped, strength))))
         information = np.array([[base @ base + (self.noise / GAIN_SD) ** 2, gain * (base @ slope)], [0, 0]])
         information[1] = information[0, 1], gain**2 * (slope @ slope)
         variance = sd**2 * np.linalg.inv(information + 1e-12 * np.diag(np.diag(information)))
@@ -97,10 +98,10 @@ class LagProblem:
         lead /= cycle.amplitude**2
         return abs(shift) * math.sqrt(max(float(lead @ cycle.covariance @ lead), 0.0))
 
-    def _deviation(self, residual: FloatArray, taken: int = 0) -> float:
+    def _deviation(self, residual: FloatArray, taken: float = 0.0) -> float:
         """Of a sample; raised where the means over blocks of phase scatter more than white noise would make them.
 
-        `taken` directions were taken out of the residual beside what is absorbed.
+        `taken` degrees of freedom were taken out of the residual beside what is absorbed.
         """
         taken += self.absorbed.shape[1] + 2
         free = max(residual.size - taken, 1)

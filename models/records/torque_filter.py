@@ -20,6 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from models.arrays import FloatArray
+from models.records.cleaning import clean
 from models.records.runs import Record
 from models.relaxation import relax
 
@@ -41,10 +42,12 @@ def filtered(time: FloatArray, channel: FloatArray, time_constant: float) -> Flo
 def filtered_as_torque(record: Record, time_constant: float) -> Record:
     """The record with pressure and speed behind the torque channel's filter of `time_constant` >= 0 s; 0: as it is.
 
-    Temperatures are slower than any such filter and stay.
+    Spikes are removed before: behind the filter they would be tails that nothing tells from the channel. Temperatures are
+    slower than any such filter and stay. Raises ValueError as `cleaning.clean` does.
     """
     if time_constant == 0.0:
         return record
+    record, _, _ = clean(record)
     return replace(
         record,
         pressure=filtered(record.time, record.pressure, time_constant),

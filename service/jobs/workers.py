@@ -71,6 +71,7 @@ class Workers:
         self._calls = dict.fromkeys(Lane, 0)
         self._turns: dict[str, deque[_Task]] = {}
         self._restarts: dict[Lane, Future[Any]] = {}
+        self._lost: set[Lane] = set()  # whose processes ended at a call and again at its repetition
         self._lock = threading.Lock()
         self._closed = False
 
@@ -108,19 +109,21 @@ class Workers:
             return dict(self._calls)
 
     def ended(self) -> list[Lane]:
-        """Lanes of which a process has ended while it had nothing to do, and whose next ones are not up yet: asking starts
-        them. A process that ends at work is replaced with its call. One thread may ask at a time."""
+        """Lanes of which a process has ended while it had nothing to do, or twice at one call, and whose next ones are not
+        up yet: asking starts them. One that ends at work once is replaced with its call. One thread may ask at a time."""
         with self._lock:
             broken = [lane for lane, pool in self._pools.items() if isinstance(pool, _Processes) and pool.broken]
             for lane in broken:
                 del self._pools[lane]
+            lost = {lane for lane in self._lost if lane not in self._restarts}
         failed = [lane for lane, restart in self._restarts.items() if restart.done() and restart.exception()]
-        for lane in {*broken, *failed}:
+        for lane in {*broken, *failed, *lost}:
             self._restarts[lane] = self.submit(lane, worker.load)
         self._restarts = {
             lane: restart for lane, restart in self._restarts.items() if not restart.done() or restart.exception()
         }
-        return list(self._restarts)
+        with self._lock:
+            return [lane for lane in Lane if lane in self._restarts or lane in self._lost]
 
     def warm(self) -> None:
         """Have the processes that take in runs started and loaded; waits for nothing."""
@@ -161,10 +164,14 @@ class Workers:
                 task.retried = True
                 self._start(task)
                 return
+            with self._lock:
+                self._lost.add(task.lane)
             error = BusyError("the process that worked on this has ended: ask again in a little while")
         following = None
         with self._lock:
             self._calls[task.lane] -= 1
+            if error is None:
+                self._lost.discard(task.lane)
             if task.turn is not None:
                 waiting = self._turns[task.turn]
                 if waiting:

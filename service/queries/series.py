@@ -10,7 +10,7 @@ from service.lives.assumptions import ALL_PRESSURES, MEAN_COF
 from service.lives.engagements.over_life import ALL_INDICATORS
 from service.lives.history import DYNAMIC, STATIONARY
 from service.lives.payloads import PARAMETER_UNITS
-from service.lives.quantities.measured import LOOP_COLUMNS
+from service.lives.quantities.measured import LOOP_COLUMNS, rounded_frequency
 from service.lives.quantities.names import QUANTITIES
 from storage import results, runs
 from storage.engine.database import Database
@@ -29,7 +29,8 @@ def series(database: Database, clutch_id: str, quantity: str | None) -> list[dic
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
         rows = runs.page(connection, clutch_id, kind=STATIONARY, state=runs.ACCEPTED)
-        dynamic = runs.page(connection, clutch_id, kind=DYNAMIC, state=runs.ACCEPTED)
+        of_loops = quantity is None or quantity in LOOP_COLUMNS
+        dynamic = runs.page(connection, clutch_id, kind=DYNAMIC, state=runs.ACCEPTED) if of_loops else []
         engaged = measured_lives.engagements(connection, clutch_id)
         predicted = results.predictions_of(connection, clutch_id, "particle", ALL_PRESSURES)
     measured = (item for row in rows for fit in row.receipt["fits"] for item in _measured(row.receipt, fit))
@@ -51,7 +52,11 @@ def _measured(receipt: dict[str, Any], fit: dict[str, Any]) -> Iterator[dict[str
 
 
 def _of_loop(receipt: dict[str, Any], loop: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    place = {"pressure_bar": loop["pressure_bar"], "frequency_hz": loop["frequency_hz"]}
+    frequency = loop["frequency_hz"]
+    place = {
+        "pressure_bar": loop["pressure_bar"],
+        "frequency_hz": None if frequency is None else rounded_frequency(frequency),
+    }
     for quantity, (value, sd) in LOOP_COLUMNS.items():
         if loop[value] is not None and loop[sd] is not None:
             yield _of_run(receipt) | _row(quantity, QUANTITIES[quantity].unit, loop[value], loop[sd]) | place

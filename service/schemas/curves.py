@@ -81,7 +81,7 @@ class SeriesItem(Answer):
     value: float | None = Field(description="The value; the median of a prediction")
     lower: float | None = Field(description="5 % quantile")
     upper: float | None = Field(description="95 % quantile")
-    frequency_hz: float | None = Field(description="Frequency of a friction loop, Hz; null for all else")
+    frequency_hz: float | None = Field(description="Frequency of a friction loop, Hz, to two digits; null for all else")
 
 
 class SeriesPage(Answer):

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from logging import DEBUG, INFO, WARNING
 from typing import Any
 
-from fastapi import Request
 from fastapi.responses import Response
 from starlette.datastructures import MutableHeaders
+from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.errors import ServiceError, TooLargeError, TooManyError, TooSlowError
@@ -224,6 +224,8 @@ class Edge:
 
         try:
             await self.app(scope, receive, noting)
+        except ClientDisconnect:  # nobody is there to be answered
+            status = 499  # as proxies log it
         except Exception as error:
             if status:  # too late to say so: the server logs it and ends the connection
                 raise
@@ -271,8 +273,7 @@ class Polls:
             return
         address = (scope["path"], scope["query_string"])
         poll = self._polls.get(address)
-        response = None if poll is None else self._answered(poll, scope)
-        if response is not None:
+        if poll is not None and (response := self._answered(poll, scope)) is not None:
             await response(scope, receive, send)
             return
         await self.app(scope, receive, send)

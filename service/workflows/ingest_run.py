@@ -11,8 +11,9 @@ from typing import Any
 
 from sqlalchemy import Connection
 
+from models.clutch import Geometry
 from service import records, stored_runs
-from service.errors import ArchivedError, ConflictError
+from service.errors import ArchivedError, BusyError, ConflictError
 from service.lives.history import (
     DYNAMIC,
     REBUILD,
@@ -76,8 +77,8 @@ def ingest(
     """Take in a run that `by` sent; returns its receipt and whether it is new.
 
     The same run again gives the receipt as it is then, marked a duplicate. Raises NotFoundError for an unknown clutch,
-    ArchivedError for one that takes in no more, and ConflictError where other content is known under the run's name; then
-    nothing has changed.
+    ArchivedError for one that takes in no more, ConflictError where other content is known under the run's name, and
+    BusyError where the clutch's geometry or filter was edited meanwhile; then nothing has changed.
     """
     with database.reading() as connection:
         clutch = records.clutch(connection, clutch_id)
@@ -101,7 +102,7 @@ def ingest(
             stored = runs.get(connection, clutch_id, run.run_id)
         if stored is not None:
             return _repeat(stored, run), False
-        outcome = _computed(database, clutch_id, arrival)
+        outcome = _computed(database, clutch_id, arrival, (geometry, torque_filter))
         with database.writing() as connection:  # another process's run of the same name moves the revision
             if records.unchanged(connection, clutch_id, outcome.revision):
                 return _store(connection, clutch_id, arrival, columns, outcome, by=by), True
@@ -116,12 +117,14 @@ def _repeat(stored: RunRow, run: IncomingRun) -> dict[str, Any]:
     return records.receipt(stored) | {"duplicate": True}
 
 
-def _computed(database: Database, clutch_id: str, arrival: Arrival) -> _Outcome:
-    """The results of the run in the clutch's history as it is now."""
+def _computed(database: Database, clutch_id: str, arrival: Arrival, read_with: tuple[Geometry, float]) -> _Outcome:
+    """The results of the run in the clutch's history as it is now; it was read with a geometry and a filter."""
     with database.reading() as connection:
         if records.clutch(connection, clutch_id).archived:
             raise ArchivedError(f"clutch {clutch_id!r} is archived and takes in no more runs")
         before = records.state(connection, clutch_id, carried=True)
+    if (before.geometry, before.record.torque_filter) != read_with:
+        raise BusyError("the clutch's geometry or filter was edited while the run was read: send it again")
     event = _event_of(arrival)
     event = replace(event, cofs=cofs_among(before, event, arrival.analysis.fits))
     state = replace(before, events=order([*before.events, event]))

@@ -17,7 +17,10 @@ def faults(path: Path, *, journal_mode: str, least_free: int) -> dict[str, str]:
     waits for no writer, and where there is none a commit in progress shows that the file is in use.
     """
     wrong = {}
-    fault = _fault_of_file(path, journal_mode)
+    try:
+        fault = _fault_of_file(path, journal_mode)
+    except OSError as error:
+        fault = f"the file cannot be read: {error.strerror}"
     if fault is not None:
         wrong["database"] = fault
     try:

@@ -28,7 +28,8 @@ async def readyz(request: Request) -> Response:
         "journal_mode": context.database.journal_mode,
         "checks": dict.fromkeys(PARTS, "ok") | faults,
     }
-    return JSONResponse(content, status_code=503 if faults else 200, headers={"Cache-Control": "no-store"})
+    headers = {"Cache-Control": "no-store"} | ({"Retry-After": "1"} if faults else {})
+    return JSONResponse(content, status_code=503 if faults else 200, headers=headers)
 
 
 @router.get("/metrics", response_class=Response, responses=described())

@@ -31,10 +31,13 @@ _MEDIA_TYPES: dict[str, MediaType] = {"image/png": "image/png", "image/jpeg": "i
 _FILES = {name: {"schema": {"type": "string", "format": "binary"}} for name in _MEDIA_TYPES}
 #: What a photograph is served with: it is never another, and whatever is in it, a browser runs nothing of it.
 _OF_A_FILE = {
-    "Cache-Control": "private, max-age=31536000, immutable",
+    "Cache-Control": "private, no-cache",  # the key is looked at each time; the tag makes it a 304
     "Content-Security-Policy": "default-src 'none'; sandbox",
 }
-_KEPT = {"description": "Keep it: under this address it is never another", "schema": {"type": "string"}}
+_KEPT = {
+    "description": "Keep it, and ask each time: under this address it is never another",
+    "schema": {"type": "string"},
+}
 _READING_FILE = READING | {
     200: {"content": _FILES, "headers": {"Cache-Control": _KEPT}, "description": "The file as it was sent"}
 }

@@ -131,6 +131,19 @@ def test_a_process_that_ends_is_replaced_and_its_call_made_once_more(processes: 
     assert processes.submit(Lane.RUNS, calls.ids).result(IN_TIME) == ["c1"]
 
 
+def test_a_lane_whose_processes_end_at_a_call_again_and_again_is_told_until_one_is_up(
+    processes: Workers, tmp_path: Path
+) -> None:
+    with pytest.raises(BusyError, match="has ended"):
+        processes.submit(Lane.RUNS, calls.dies, tmp_path / "mark", 99).result(IN_TIME)
+    assert processes.ended() == [Lane.RUNS]
+    deadline = time.monotonic() + IN_TIME
+    while processes.ended():
+        assert time.monotonic() < deadline, "no other process came up"
+        time.sleep(0.05)
+    assert isinstance(processes.submit(Lane.RUNS, calls.pid).result(IN_TIME), int)
+
+
 def test_nothing_is_begun_after_the_end(database: Database, tmp_path: Path) -> None:
     made = in_threads(database)
     gate = tmp_path / "gate"

@@ -54,7 +54,7 @@ def test_a_stop_amid_posts_ends_with_0_and_keeps_every_acknowledged_run(tmp_path
     rigs = [threading.Thread(target=post, args=(number,)) for number in range(3)]
     for rig in rigs:
         rig.start()
-    while len(acknowledged) < 6:
+    while len(acknowledged) < 6 and any(rig.is_alive() for rig in rigs):
         time.sleep(0.01)
     assert server.stop() == 0
     for rig in rigs:
@@ -102,7 +102,7 @@ def test_a_stop_of_all_processes_finishes_what_was_on_its_way(tmp_path: Path) ->
             time.sleep(0.01)
         while len(asked) == len(answers):
             time.sleep(0.001)
-        time.sleep(0.01)  # by then the service has the request
+        time.sleep(0.2)  # by then the service has the request
         on_its_way = asked[-1]
         for pid in family(server.pid):
             os.kill(pid, signal.SIGTERM)

@@ -65,7 +65,7 @@ def test_ready_writes_nothing_and_waits_for_nobody(database: Database) -> None:
     with database.writing():
         begun = time.monotonic()
         assert not database.faults(), "who writes now can write"
-        assert time.monotonic() - begun < 1.0
+        assert time.monotonic() - begun < 5.0
 
 
 def _hold(path: str, begin: str, say: "multiprocessing.connection.Connection") -> None:
@@ -83,10 +83,11 @@ def test_ready_at_once_while_another_process_holds_the_lock(tmp_path: Path, jour
         ours, theirs = spawn.Pipe()
         other = spawn.Process(target=_hold, args=(str(database.path), begin, theirs))
         other.start()
+        assert ours.poll(60)
         assert ours.recv() == "held"
         begun = time.monotonic()
         wrong = database.faults()
-        assert time.monotonic() - begun < 1.0
+        assert time.monotonic() - begun < 5.0
         assert wrong == {}
         ours.send("end")
         other.join(60)

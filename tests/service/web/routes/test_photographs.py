@@ -37,7 +37,7 @@ def test_a_browser_runs_nothing_of_a_photograph_and_keeps_it(client: TestClient)
     headers = client.get(photograph, headers={"Accept-Encoding": "gzip"}).headers
     assert headers["content-security-policy"] == "default-src 'none'; sandbox"
     assert headers["x-content-type-options"] == "nosniff"
-    assert headers["cache-control"] == "private, max-age=31536000, immutable"
+    assert headers["cache-control"] == "private, no-cache"
     assert "content-encoding" not in headers
     unchanged = client.get(photograph, headers={"If-None-Match": headers["etag"]})
     assert (unchanged.status_code, unchanged.content) == (304, b"")
