@@ -24,6 +24,8 @@ _SANE = re.compile(rb"[!-~]{1,128}")
 _CONTINUED = "\n    | "
 #: A line a request.
 access = logging.getLogger("clutchlife.access")
+#: What an operator must know of a start, whatever is chosen to be logged later: who may ask, what is misspelt.
+start = logging.getLogger("clutchlife.start")
 
 
 def sane(sent: bytes) -> str | None:
@@ -46,6 +48,7 @@ def configure(form: LogFormat, level: LogLevel, stream: TextIO | None = None) ->
     root.setLevel(max(lowest, logging.WARNING))
     for name in _OWN:
         logging.getLogger(name).setLevel(lowest)
+    start.setLevel(min(lowest, logging.WARNING))
     logging.captureWarnings(True)
 
 

@@ -1,7 +1,6 @@
 """`clutchlife serve`: the service."""
 
 import gc
-import logging
 import os
 import signal
 from contextlib import closing
@@ -13,7 +12,7 @@ import uvicorn
 from threadpoolctl import threadpool_limits
 
 from service.cli.options import DATABASE, EX_USAGE, Database, errors_in_a_line, fail
-from service.logging import LogLevel, configure
+from service.logging import LogLevel, configure, start
 
 if TYPE_CHECKING:
     from service.settings import Settings
@@ -22,8 +21,6 @@ LOOPBACK = "127.0.0.1"
 #: Seconds that requests on their way have once the service is to stop. Chosen: less than `docker stop` waits.
 STOP_SECONDS = 10
 LOG_LEVELS = get_args(LogLevel)
-
-_log = logging.getLogger("clutchlife")
 
 
 def serve(
@@ -38,7 +35,7 @@ def serve(
     ] = None,
 ) -> None:
     """Run the service."""
-    if log_level is not None and log_level not in LOG_LEVELS:
+    if log_level is not None and log_level.lower() not in LOG_LEVELS:
         fail(f"log-level must be one of {', '.join(LOG_LEVELS)}, got {log_level!r}", EX_USAGE)
     # what a stop finds before the server listens for it, and what the server leaves it to once all is finished
     signal.signal(signal.SIGTERM, _end)
@@ -49,7 +46,9 @@ def serve(
     with errors_in_a_line():
         settings = Settings.from_environment(database, **{name: value for name, value in given.items() if value})
         configure(settings.log_format, settings.log_level)
-        _log.info("settings", extra={"fields": settings.shown()})
+        start.info("settings", extra={"fields": settings.shown()})
+        for line in Settings.misspelt():
+            start.warning(line)
         host = _allowed(host, settings)
     from service.app import create_app  # start-up time
 
@@ -91,16 +90,16 @@ def _allowed(host: str, settings: "Settings") -> str:
         opens = keys.any_active(connection, datetime.now(UTC).isoformat(timespec="seconds"))
     make = "make one with: clutchlife key create --scope admin"
     if has_keys and not opens:
-        _log.warning("all keys are revoked or expired, so every request is refused; %s", make)
+        start.warning("all keys are revoked or expired, so every request is refused; %s", make)
     elif not has_keys and not is_loopback(host):
-        _log.warning("no keys are configured, so the service listens at %s and not at %s; %s", LOOPBACK, host, make)
+        start.warning("no keys are configured, so the service listens at %s and not at %s; %s", LOOPBACK, host, make)
         host = LOOPBACK
     elif not has_keys:
         passed = "also what a proxy passes on" if settings.insecure_local else "and nothing that a proxy passes on"
-        _log.warning("no keys are configured: everybody on this machine may do everything, %s; %s", passed, make)
+        start.warning("no keys are configured: everybody on this machine may do everything, %s; %s", passed, make)
     if open_to_readers := missing():
         unkept = " and ".join(open_to_readers)
-        _log.warning("this system cannot keep a process that reads a file from outside from %s", unkept)
+        start.warning("this system cannot keep a process that reads a file from outside from %s", unkept)
     return host
 
 

@@ -19,6 +19,8 @@ PARTS = ("database", "disk", "memory", "workers")
 _MEMORY = Path("/proc/meminfo")
 _GROUP = Path("/proc/self/cgroup")
 _GROUPS = Path("/sys/fs/cgroup")
+#: What a group gives back when it is needed: what files and their names are cached in.
+_GIVEN_BACK = ("inactive_file", "active_file", "slab_reclaimable")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,9 +89,8 @@ def available_memory() -> int | None:
         group = _GROUPS / _GROUP.read_text(encoding="utf-8").strip().rpartition("::")[2].lstrip("/")
         most = int((group / "memory.max").read_text(encoding="ascii"))
         statistics = dict(line.split() for line in (group / "memory.stat").read_text(encoding="ascii").splitlines())
-        # what files are cached in is given back when it is needed
-        taken = int((group / "memory.current").read_text(encoding="ascii")) - int(statistics["inactive_file"])
-        left.append(most - taken)
+        taken = int((group / "memory.current").read_text(encoding="ascii"))
+        left.append(most - taken + sum(int(statistics[name]) for name in _GIVEN_BACK))
     except (OSError, ValueError, KeyError):  # no such group, or one without a bound ("max")
         pass
     return min(left, default=None)

@@ -35,7 +35,7 @@ def path_of(url: str) -> Path:
         )
     path = rest.removeprefix("/")
     if not rest.startswith("/") or not path or path.startswith(":memory:"):
-        raise ValueError(f"a database needs a file, as in sqlite:///clutchlife.db, got {url!r}")
+        raise ValueError("a database needs a file, as in sqlite:///clutchlife.db")  # the address may hold a password
     if "?" in path or path.startswith("file:"):
         shown = re.sub(r"\?.*", "?...", url)  # an option may be a password
         raise ValueError(f"a database is given by its path alone, without options, got {shown!r}")

@@ -12,7 +12,7 @@ from storage.engine.backup import copy, copy_beside
 from storage.engine.connect import found_journal_mode, make_engine, path_of, set_journal_mode, wanted_journal_mode
 from storage.engine.errors import DatabaseTooNew, DatabaseTooOld, StorageUnavailable
 from storage.engine.health import faults
-from storage.engine.limits import LEAST_FREE, LOCK_TIMEOUT
+from storage.engine.limits import LOCK_TIMEOUT
 from storage.engine.private_files import make_if_missing
 from storage.engine.service_lock import service_lock
 from storage.engine.transactions import Transactions, transaction, translated
@@ -27,7 +27,7 @@ class Database(Transactions):
         super().__init__(path, lock_timeout, writable=writable)
         self.journal_mode = journal_mode
 
-    def faults(self, *, least_free: int = LEAST_FREE) -> dict[str, str]:
+    def faults(self, *, least_free: int) -> dict[str, str]:
         """What keeps the file (`database`) or its disk (`disk`) from being used, in words; empty where nothing does.
 
         `least_free` [byte] must be free on the disk. Nothing is written, and no lock is taken or waited for.

@@ -50,6 +50,28 @@ def test_every_wrong_variable_is_named_in_one_line(monkeypatch: pytest.MonkeyPat
     assert "CLUTCHLIFE_BODY_SECONDS must be a whole number, got ''" in said
 
 
+SLIPS = {
+    "LOG_LEVLE": "LOG_LEVEL",
+    "WORKER": "WORKERS",
+    "LOGLEVEL": "LOG_LEVEL",
+    "ENIGNE": "ENGINE",
+    "MAX_BODY": "MAX_BODY_MB",
+    "LEAST_FREE": "LEAST_FREE_MB",
+    "MAX_FILES_MB": "MAX_FILE_MB",
+}
+#: Of the commands, and of an orchestrator that has a service called clutchlife.
+NO_SLIPS = ("URL", "KEY", "KEY_FILE", "PORT", "SERVICE_HOST", "SERVICE_PORT", "PORT_8000_TCP", "PORT_8000_TCP_ADDR")
+
+
+def test_a_misspelt_variable_is_told_from_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in (*SLIPS, *NO_SLIPS, "WORKERS"):
+        monkeypatch.setenv(f"{PREFIX}{name}", "1")
+    told = [
+        f"{PREFIX}{name} is no setting and has no effect; is {PREFIX}{SLIPS[name]} meant?" for name in sorted(SLIPS)
+    ]
+    assert list(Settings.misspelt()) == told
+
+
 @pytest.mark.parametrize(
     ("address", "shown"),
     [

@@ -41,7 +41,7 @@ def test_every_line_of_a_service_is_json_from_its_start_to_its_stop(tmp_path: Pa
     lines: list[dict[str, Any]] = [json.loads(line) for line in said.splitlines()]
     assert lines[0]["message"] == "settings"
     assert lines[0]["workers"] == 2
-    assert {"clutchlife", "clutchlife.access", "uvicorn.error"} <= {line["logger"] for line in lines}
+    assert {"clutchlife.start", "clutchlife.access", "uvicorn.error"} <= {line["logger"] for line in lines}
     ours = [line for line in lines if line.get("request_id") == "rig-7"]
     assert [(line["method"], line["status"]) for line in ours] == [("POST", 201), ("POST", 201), ("GET", 404)]
     assert [answer.headers["X-Request-ID"] for answer in answers.values()] == ["rig-7"] * 3
@@ -50,9 +50,14 @@ def test_every_line_of_a_service_is_json_from_its_start_to_its_stop(tmp_path: Pa
     assert any("no keys are configured" in line["message"] for line in lines)
 
 
-@pytest.mark.parametrize("arguments", [("--log-level", "warning"), ()])
-def test_the_level_is_that_of_the_option_or_else_of_the_environment(tmp_path: Path, arguments: tuple[str, ...]) -> None:
-    environment = {"CLUTCHLIFE_LOG_FORMAT": "text", "CLUTCHLIFE_LOG_LEVEL": "info" if arguments else "warning"}
-    said, _ = served(tmp_path, environment | {"CLUTCHLIFE_WORKERS": "0"}, *arguments)
-    (line,) = said.splitlines()
-    assert " WARNING clutchlife: no keys are configured" in line
+@pytest.mark.parametrize("arguments", [("--log-level", "ERROR"), ()])
+def test_the_level_is_that_of_the_option_or_else_of_the_environment_and_a_start_warns_at_any(
+    tmp_path: Path, arguments: tuple[str, ...]
+) -> None:
+    environment = {"CLUTCHLIFE_LOG_FORMAT": "text", "CLUTCHLIFE_LOG_LEVEL": "info" if arguments else "Error"}
+    environment |= {"CLUTCHLIFE_WORKERS": "0", "CLUTCHLIFE_MAX_BODY": "3", "CLUTCHLIFE_SERVICE_PORT": "8000"}
+    said, _ = served(tmp_path, environment, *arguments)
+    misspelt, open_to_all = said.splitlines()
+    assert " WARNING clutchlife.start: CLUTCHLIFE_MAX_BODY is no setting" in misspelt
+    assert misspelt.endswith("is CLUTCHLIFE_MAX_BODY_MB meant?")
+    assert " WARNING clutchlife.start: no keys are configured" in open_to_all

@@ -11,24 +11,26 @@ from types import SimpleNamespace
 import pytest
 
 from storage.engine.database import Database, open_database
-from storage.engine.limits import LEAST_FREE
+
+#: Bytes that must be free in these tests.
+LEAST_FREE = 16 << 20
 
 
 def test_ready_while_the_file_is_there_and_open(database: Database) -> None:
-    assert not database.faults()
+    assert not database.faults(least_free=LEAST_FREE)
     database.path.rename(database.path.with_suffix(".gone"))
-    assert database.faults()
+    assert database.faults(least_free=LEAST_FREE)
     database.path.with_suffix(".gone").rename(database.path)
-    assert not database.faults()
+    assert not database.faults(least_free=LEAST_FREE)
     database.close()
-    assert database.faults()
+    assert database.faults(least_free=LEAST_FREE)
 
 
 def test_not_ready_on_a_full_disk(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("storage.engine.health.shutil.disk_usage", lambda _: SimpleNamespace(free=LEAST_FREE - 1))
-    assert database.faults()
+    assert database.faults(least_free=LEAST_FREE)
     monkeypatch.setattr("storage.engine.health.shutil.disk_usage", lambda _: SimpleNamespace(free=LEAST_FREE))
-    assert not database.faults()
+    assert not database.faults(least_free=LEAST_FREE)
 
 
 def test_not_ready_where_nothing_can_be_written(
@@ -38,33 +40,35 @@ def test_not_ready_where_nothing_can_be_written(
     access = os.access
     with closing(open_database(f"sqlite:///{tmp_path}/a.db")) as database:
         assert database.journal_mode == journal_mode
-        assert not database.faults()
+        assert not database.faults(least_free=LEAST_FREE)
         for unwritable in (database.path, database.path.parent):
             with monkeypatch.context() as patch:
                 patch.setattr(
                     "storage.engine.health.os.access", lambda path, how, no=unwritable: path != no and access(path, how)
                 )
-                assert database.faults() == {"database": "the file or its folder cannot be written"}
-        assert not database.faults()
+                assert database.faults(least_free=LEAST_FREE) == {
+                    "database": "the file or its folder cannot be written"
+                }
+        assert not database.faults(least_free=LEAST_FREE)
 
 
 def test_a_file_that_is_no_database_is_said_to_be_unreadable(database: Database) -> None:
     database.path.write_bytes(b"x" * 8192)
-    assert "cannot be read" in database.faults()["database"]
+    assert "cannot be read" in database.faults(least_free=LEAST_FREE)["database"]
 
 
 def test_ready_writes_nothing_and_waits_for_nobody(database: Database) -> None:
     def files() -> dict[str, bytes]:  # but for the log's index, which holds the marks of those who read
         return {path.name: path.read_bytes() for path in database.path.parent.iterdir() if path.suffix != ".db-shm"}
 
-    assert not database.faults()
+    assert not database.faults(least_free=LEAST_FREE)
     before = files()
     for _ in range(20):
-        assert not database.faults()
+        assert not database.faults(least_free=LEAST_FREE)
     assert files() == before
     with database.writing():
         begun = time.monotonic()
-        assert not database.faults(), "who writes now can write"
+        assert not database.faults(least_free=LEAST_FREE), "who writes now can write"
         assert time.monotonic() - begun < 5.0
 
 
@@ -86,7 +90,7 @@ def test_ready_at_once_while_another_process_holds_the_lock(tmp_path: Path, jour
         assert ours.poll(60)
         assert ours.recv() == "held"
         begun = time.monotonic()
-        wrong = database.faults()
+        wrong = database.faults(least_free=LEAST_FREE)
         assert time.monotonic() - begun < 5.0
         assert wrong == {}
         ours.send("end")

@@ -172,7 +172,7 @@ def test_memory_is_that_of_the_machine_and_of_the_own_group(tmp_path: Path, monk
     monkeypatch.setattr(readiness, "_GROUPS", tmp_path)
     assert available_memory() == 700 << 10, "without a group of its own"
     write("own/memory.current", "300000\n")
-    write("own/memory.stat", "anon 1\ninactive_file 50000\n")
+    write("own/memory.stat", "anon 1\ninactive_file 20000\nactive_file 25000\nslab_reclaimable 5000\n")
     write("own/memory.max", "max\n")
     assert available_memory() == 700 << 10, "in a group without a bound"
     write("own/memory.max", "400000\n")
