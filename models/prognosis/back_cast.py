@@ -19,8 +19,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import ndtri
-from scipy.stats import binom
+from scipy.special import bdtr, ndtri
 
 from models.arrays import FloatArray
 from models.prognosis.criteria import AHEAD, BAND, COVERAGE, MOST_MISSED, SURPRISING, UNTIL
@@ -54,7 +53,7 @@ class BackCast:
     @property
     def surprising(self) -> bool:
         """Whether so few tests are improbable, had each been within with 90 %."""
-        return bool(binom.cdf(self.held, self.misses.size, COVERAGE) < SURPRISING)
+        return bool(bdtr(self.held, self.misses.size, COVERAGE) < SURPRISING)
 
     @property
     def widening(self) -> float:

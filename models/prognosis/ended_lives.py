@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.stats import t as student
 
 from models.arrays import FloatArray
 from models.prognosis.back_cast import HALF_WIDTH, kept_after
@@ -153,7 +152,8 @@ class _Predictive:
 
     def log_density(self, values: FloatArray) -> FloatArray:
         """Log density at values [n], up to a constant."""
-        return np.asarray(student.logpdf((values - self.mean) / self.scale, self.freedom))
+        deviations = (values - self.mean) / self.scale
+        return np.asarray(-0.5 * (self.freedom + 1.0) * np.log1p(deviations**2 / self.freedom))
 
 
 def _predictive(values: FloatArray, deviation: float, worth: tuple[float, float]) -> _Predictive:

@@ -14,7 +14,12 @@ from service.background import use_one_blas_thread, yield_to_others
 from storage.engine.database import Database, open_database
 
 #: What nearly every call needs, loaded before the first comes.
-LOADED_EARLY = ("service.workflows.ingest_run", "service.run_files.json_run", "service.run_files.upload")
+LOADED_EARLY = (
+    "filterpy.kalman",
+    "service.workflows.ingest_run",
+    "service.run_files.json_run",
+    "service.run_files.upload",
+)
 
 #: Seconds after a SIGTERM until which a worker works on. Chosen: longer than the service waits for requests when it stops.
 _LAST_SECONDS = 15.0

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import median_filter
-from scipy.stats import gamma
+from scipy.special import gammaincc, gammainccinv, gammaincinv
 
 from models.arrays import FloatArray
 from models.diagnosis.criteria import LINES_FALSE_ALARMS
@@ -62,7 +62,7 @@ def lines(problem: FitProblem, residual: FloatArray) -> AlarmStatistic:
         return _NOTHING
     power = np.sum([run.power(_FIRST - _SLOWER, last, np.pi / duration) for run in kept], axis=0)
     # a line is above its neighbourhood: noise whose autocorrelation was misjudged is not
-    middle = float(gamma.ppf(0.5, len(kept)))
+    middle = float(gammaincinv(len(kept), 0.5))
     for column in power.T:
         column /= np.maximum(median_filter(column, size=_NEIGHBOURS, mode="reflect") / middle, 1.0)
     # ... and above everything slower: structure that is larger the slower it is has no period
@@ -73,8 +73,8 @@ def lines(problem: FitProblem, residual: FloatArray) -> AlarmStatistic:
     tests = 1.5 * power.size
     return AlarmStatistic(
         value=max(highest - middle, 0.0),
-        threshold=float(gamma.isf(LINES_FALSE_ALARMS / tests, len(kept))) - middle,
-        p_value=float(min(1.0, tests * np.exp(float(gamma.logsf(highest, len(kept)))))),
+        threshold=float(gammainccinv(len(kept), LINES_FALSE_ALARMS / tests)) - middle,
+        p_value=min(1.0, tests * float(gammaincc(len(kept), highest))),
         index=index,
     )
 

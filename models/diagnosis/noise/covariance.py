@@ -10,7 +10,6 @@ rank-one terms (Woodbury), whitened by shrinking along one direction.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 from scipy.sparse import csr_array
 
 from models.arrays import FloatArray
@@ -50,6 +49,8 @@ def whitened(columns: FloatArray, design: Design, noise: Noise) -> FloatArray:
 
 def _filter(blocks: FloatArray, correlation: Correlation) -> None:
     """Whiten blocks [b, n, m] along n, in place."""
+    from scipy.signal import lfilter  # start-up time
+
     theta, scale = arma(correlation)
     first = blocks[:, :1]
     start = -correlation.decay / scale * first - theta * first  # as if the first innovation were all of x_0

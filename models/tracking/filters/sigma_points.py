@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from filterpy.kalman import MerweScaledSigmaPoints
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
@@ -130,6 +129,8 @@ def measured(
 @cache
 def _standard_points(dimension: int) -> tuple[FloatArray, FloatArray]:
     """filterpy's sigma points of a standard normal [2 d, d] with their weights [2 d], without the centre, which has none."""
+    from filterpy.kalman import MerweScaledSigmaPoints  # start-up time
+
     points = MerweScaledSigmaPoints(dimension, alpha=1.0, beta=0.0, kappa=0.0)
     return points.sigma_points(np.zeros(dimension), np.eye(dimension))[1:], points.Wm[1:]
 

@@ -17,7 +17,6 @@ import numpy as np
 from scipy.interpolate import make_lsq_spline
 from scipy.linalg import solve_toeplitz
 from scipy.ndimage import uniform_filter1d
-from scipy.signal import lfilter
 
 from models.arrays import FloatArray
 from models.diagnosis.detection.raw_records.criteria import (
@@ -111,6 +110,8 @@ def _speed_period(speed: FloatArray, step: float) -> float:
 
 def _whitened(pieces: Sequence[Piece], step: float, between: int, least_variance: float) -> WhitenedRecord | None:
     """None where noise is too small beside the recorder's steps (its median variance at most `least_variance` [Nm²])."""
+    from scipy.signal import lfilter  # start-up time
+
     smooth = [_spline(piece.torque, between) for piece in pieces]
     fast = [piece.torque - slow for piece, slow in zip(pieces, smooth, strict=True)]
     largest = max(float(np.abs(piece.torque).max()) for piece in pieces)
