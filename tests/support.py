@@ -84,7 +84,17 @@ def wait_until_ready(url: str, ended: Callable[[], bool]) -> None:
 
 #: Forks services off a process that has loaded the library already, which is most of what a start takes.
 _LOADED = multiprocessing.get_context("forkserver")
-_LOADED.set_forkserver_preload(["service.cli.main", "service.app"])
+_LOADED.set_forkserver_preload(
+    [
+        "filterpy.kalman",
+        "models.rig.campaign",
+        "scipy.signal",
+        "service.app",
+        "service.cli.demo.demo",
+        "service.cli.main",
+        "service.workflows.replay",
+    ]
+)
 
 
 def _run(arguments: list[str], environment: dict[str, str], output: Path | None = None) -> None:
