@@ -8,10 +8,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from playwright.sync_api import Browser, BrowserType, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserType, Page, expect, sync_playwright
 
 from tests.browser import system
 from tests.support import free_port, wait_until_ready
+
+#: [ms] How long a page may take to show what is waited for: on a busy machine a diagnosis took more than 20 s.
+_PATIENCE = 60_000
+expect.set_options(timeout=_PATIENCE)
 
 #: Software rendering, so that 3D charts are drawn on a machine without a graphics card.
 ARGUMENTS = (
@@ -64,8 +68,7 @@ class Watched:
         self.page = self.context.new_page()
         self.asked: list[str] = []
         self.said: list[str] = []
-        self.page.set_default_timeout(20_000)
-        self.page.set_default_navigation_timeout(60_000)  # a busy machine takes its time
+        self.page.set_default_timeout(_PATIENCE)
         self.page.on("request", lambda request: self.asked.append(request.url))
         self.page.on("console", lambda message: self.said.append(f"{message.type}: {message.text}"))
         self.page.on("pageerror", lambda error: self.said.append(f"error: {error}"))

@@ -20,7 +20,6 @@ from tests.browser.slips import CLUTCH, LAST, answers, ask, done, fill, opened, 
 from tests.support import ONCE, Server, serving
 
 pytestmark = pytest.mark.browser
-expect.set_options(timeout=20_000)
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,6 @@ from tests.browser.pixels import seen
 from tests.support import ONCE, Server, serving, stationary
 
 pytestmark = pytest.mark.browser
-expect.set_options(timeout=20_000)
 
 CHARTS = {
     "fan": "Mean COF against its threshold",

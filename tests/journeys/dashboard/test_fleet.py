@@ -13,7 +13,6 @@ from tests.browser.lives import post, worn
 from tests.support import ONCE, Server, serving, stationary
 
 pytestmark = pytest.mark.browser
-expect.set_options(timeout=20_000)
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,6 @@ from tests.journeys.dashboard.test_axe import violations
 from tests.support import ONCE, Server, serving, stationary
 
 pytestmark = pytest.mark.browser
-expect.set_options(timeout=20_000)
 
 PRESSURES = (4.0, 5.0, 6.0)
 CRITERIA = [{"quantity": "mean_cof"}, {"quantity": "slope", "pressure_bar": 5, "speed_rpm": 100}]

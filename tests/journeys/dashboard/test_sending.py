@@ -15,7 +15,6 @@ from tests.browser.pixels import seen
 from tests.support import ONCE, Server, serving, stationary
 
 pytestmark = pytest.mark.browser
-expect.set_options(timeout=20_000)
 
 WRONG = "pressure_bar,speed_rpm,torque_nm\n5,20,21\n5,120,abc\n5,520,21.5\n5,1020,\n5,1970,20\n"
 #: What a browser notes of an answer that is no success.
