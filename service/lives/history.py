@@ -1,8 +1,9 @@
 """A clutch's history as series over duty cycles, ready to be tracked.
 
 Runs may have arrived in any order; the history is ordered by cycles, and at equal cycles by when the runs were started
-(or received, where the rig did not say). A rebuild starts a new life: cycles count from it, and the first stationary test
-after it is the new reference. Any other maintenance begins an epoch: it may have shifted the level of what is measured.
+(or received, where the rig did not say; a clock that was set back meanwhile does not exchange them). A rebuild starts a
+new life: cycles count from it, and the first stationary test after it is the new reference. Any other maintenance begins an
+epoch: it may have shifted the level of what is measured.
 """
 
 import bisect
@@ -171,8 +172,16 @@ class Life:
 
 
 def order(events: Sequence[Event]) -> tuple[Event, ...]:
-    """By cycles, at equal cycles by when they were made: whatever the order of arrival, the history is the same."""
-    return tuple(sorted(events, key=lambda event: (event.cycles, event.moment, event.run_id)))
+    """By cycles, at equal cycles by when they were made: whatever the order of arrival, the history is the same.
+
+    Where the rig did not say when, a run is no earlier than those that had arrived before it, whatever the clock said then.
+    """
+    arrived = sorted((event for event in events if not event.dated), key=lambda event: event.arrived)
+    moments = itertools.accumulate((event.moment for event in arrived), max)
+    made = {event.run_id: (moment, place) for place, (event, moment) in enumerate(zip(arrived, moments, strict=True))}
+    return tuple(
+        sorted(events, key=lambda event: (event.cycles, *made.get(event.run_id, (event.moment, 0)), event.run_id))
+    )
 
 
 def lives_of(events: Sequence[Event]) -> list[Life]:

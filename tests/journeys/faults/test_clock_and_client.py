@@ -1,49 +1,131 @@
-"""The clock is set back while runs come in; the client is killed while the service comes and goes: nothing is lost."""
+"""The clock is set back while the service runs; the client is killed while the service comes and goes: nothing is lost."""
 
 import json
 import random
 import subprocess
 import sys
 import time
+from datetime import datetime, timedelta, tzinfo
 from pathlib import Path
+from typing import Any
 
-import httpx2
 import numpy as np
+import pytest
 
-from service.run_files.json_run import read_run
-from service.web.answers import to_json
-from service.workflows.ingest_run import ingest
 from tests.journeys.faults.test_kills import findings, kills, stored
-from tests.service.workflows.benches import CLUTCH, Bench, body
-from tests.support import ONCE, Server, stationary
+from tests.service.clients import client_on
+from tests.service.web.routes.granting import granted, revoke_all
+from tests.service.workflows.benches import CLUTCH, body
+from tests.support import ONCE, serving, stationary
 
-#: The clock goes on, is set back by a year, and then past where it was.
-CLOCK = (
-    "2026-11-02T10:00:00",
-    "2026-11-02T11:00:00",
-    "2025-11-02T11:00:00",
-    "2025-11-02T11:00:01",
-    "2026-12-01T00:00:00",
+HOUR, DAY = timedelta(hours=1), timedelta(days=1)
+BASE = f"/v1/clutches/{CLUTCH}"
+#: Runs, and how far the clock is off when each comes in: it goes on, is set back by a year and by another, and then past
+#: where it was. The rig does not say when the last four were made: at equal cycles the order of arrival holds, a rebuild
+#: ends the life of the test that was sent before it and begins that of the test after it, whatever they are called.
+SENT: tuple[tuple[timedelta, dict[str, Any]], ...] = (
+    (timedelta(), body("test", "a", 0.0)),
+    (30 * DAY, body("test", "b", 1000.0)),
+    (30 * DAY + HOUR, body("test", "z", 2000.0) | {"started_at": None}),
+    (-365 * DAY, body("rebuild", "y", 2000.0) | {"started_at": None}),
+    (-730 * DAY, body("test", "x", 2000.0, wear=0.0) | {"started_at": None}),
+    (60 * DAY, body("test", "w", 3000.0, wear=0.1) | {"started_at": None}),
 )
+#: Of an answer, what says when something happened.
+TIMES = ("received_at", "created_at", "at", "time")
 
 
-def test_a_clock_that_is_set_back_changes_no_answer_and_loses_no_run(tmp_path: Path) -> None:
-    sent = [body("test", f"r{index}", 1000.0 * index) for index in range(len(CLOCK))]
-    right, set_back = Bench(tmp_path / "right.db"), Bench(tmp_path / "set-back.db")
-    for run, moment in zip(sent, CLOCK, strict=True):
-        right.send(run)
-        receipt, _ = ingest(set_back.database, CLUTCH, read_run(to_json(run)), received_at=f"{moment}+00:00")
-        assert receipt["state"] == "accepted"
-    ours, theirs = set_back.answers(), right.answers()
-    different = [name for name in theirs if ours[name] != theirs[name]]
-    assert different == ["runs"]  # they say when they arrived
-    assert [run["run_id"] for run in ours["runs"]] == [run["run_id"] for run in theirs["runs"]]
-    for bench in (right, set_back):
-        bench.close()
+class Clock(datetime):
+    """A clock that is off."""
+
+    off = timedelta()
+
+    @classmethod
+    def now(cls, tz: tzinfo | None = None) -> datetime:  # type: ignore[override]
+        """The time by this clock."""
+        return datetime.now(tz) + cls.off
+
+
+@pytest.fixture(autouse=True)
+def clock(monkeypatch: pytest.MonkeyPatch) -> type[Clock]:
+    """What every module of the service in this process reads; and no run is doubted."""
+    readers = [
+        module
+        for name, module in sys.modules.items()
+        if name.partition(".")[0] in ("service", "storage") and getattr(module, "datetime", None) is datetime
+    ]
+    assert {"service.web.answers", "service.web.auth"} <= {module.__name__ for module in readers}
+    for module in readers:
+        monkeypatch.setattr(module, "datetime", Clock)
+    for workflow in ("ingest_run", "change_run"):
+        monkeypatch.setattr(f"service.workflows.{workflow}.doubts", lambda *_: ())
+    monkeypatch.setattr(Clock, "off", timedelta())
+    return Clock
+
+
+def served(path: Path, clock: type[Clock], *, jumps: bool) -> dict[str, Any]:
+    """Everything that a service answers of what was sent and changed while its clock jumped, or did not."""
+    revisions, moments = [], []
+    with client_on(f"sqlite:///{path}") as client:
+        client.post("/v1/clutches", json={"clutch_id": CLUTCH})
+        for off, run in SENT:
+            clock.off = off if jumps else timedelta()
+            answer = client.post(f"{BASE}/runs", json=run)
+            assert (answer.status_code, answer.json()["state"]) == (201, "accepted")
+            moments.append(answer.json()["received_at"])
+            revisions.append(client.get(f"{BASE}/remaining-useful-life").json()["revision"])
+        for number, change in enumerate(("withdraw", "restore")):
+            clock.off = -number * DAY if jumps else timedelta()
+            assert client.post(f"{BASE}/runs/b/{change}", json={"reason": "x"}).status_code == 200
+        again = client.post(f"{BASE}/runs", json=SENT[0][1])
+        assert (again.status_code, again.json()["received_at"]) == (200, moments[0])
+        names = ("", "/runs", "/changes", "/remaining-useful-life", "/degradation", "/stribeck", "/series", "/scores")
+        answers = {name: timeless(client.get(f"{BASE}{name}").json()) for name in names}
+    assert (moments == sorted(moments)) is not jumps, "the clock did not do what was asked of it"
+    return answers | {"revisions": revisions}
+
+
+def timeless(answer: Any) -> Any:
+    """An answer without what says when something happened."""
+    if isinstance(answer, list):
+        return [timeless(item) for item in answer]
+    if isinstance(answer, dict):
+        return {name: timeless(value) for name, value in answer.items() if name not in TIMES}
+    return answer
+
+
+def test_a_clock_that_is_set_back_changes_no_answer_and_loses_no_run(tmp_path: Path, clock: type[Clock]) -> None:
+    ours = served(tmp_path / "set-back.db", clock, jumps=True)
+    theirs = served(tmp_path / "right.db", clock, jumps=False)
+    assert [name for name in theirs if ours[name] != theirs[name]] == []
+    assert ours["revisions"] == sorted(set(ours["revisions"]))
+    assert [change["action"] for change in ours["/changes"]["items"]] == ["restore", "withdraw"]
+    assert ours["/remaining-useful-life"]["runs_used"] == 2  # of the life since the rebuild
     content = stored(tmp_path / "set-back.db")
-    assert len(content) == len(CLOCK)
+    assert len(content) == len(SENT)
     assert content == stored(tmp_path / "right.db")
     assert findings(tmp_path / "set-back.db") == []
+
+
+def test_a_key_expires_by_the_clock_and_one_that_is_revoked_stays_so(tmp_path: Path, clock: type[Clock]) -> None:
+    """Set back past its end, the clock lets an expired key in again; nothing does that for a revoked one."""
+    with client_on(f"sqlite:///{tmp_path / 'a.db'}") as client:
+        lasting, short = granted(client), granted(client, days=1)
+
+        def statuses(off: timedelta) -> list[int]:
+            clock.off = off
+            return [client.get("/v1/clutches", headers=headers).status_code for headers in (lasting, short, {})]
+
+        assert statuses(timedelta()) == [200, 200, 401]
+        assert statuses(2 * DAY) == [200, 401, 401]
+        assert statuses(-365 * DAY) == [200, 200, 401]
+        revoke_all(client)
+        for off in (timedelta(), 2 * DAY, -3650 * DAY):
+            assert statuses(off) == [401, 401, 401]
+
+
+#: For each kill so many runs, that they last: until a kill is made, the service takes in some of them.
+RUNS_PER_KILL = 6
 
 
 @kills(4, 50)
@@ -55,31 +137,41 @@ def test_what_a_client_that_is_killed_sends_to_a_service_that_comes_and_goes_arr
     folder, path = tmp_path / "runs", tmp_path / "clutchlife.db"
     folder.mkdir()
     sent = {}
-    for index in range(number):
+    for index in range(RUNS_PER_KILL * number):
         run = stationary(100 * index, run_id=f"r{index}", pressures=(4.0, 6.0))
         (folder / f"{index:03}.json").write_text(json.dumps(run))
         sent[CLUTCH, f"r{index}"] = {name: np.array(column).tobytes() for name, column in run["channels"].items()}
-    server = Server(path, loaded=True)
-    server.start()
-    ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": CLUTCH})
-    push = [sys.executable, "-m", "service.cli.main", "push", str(folder), "--clutch", CLUTCH, "--url", server.url]
-    push += ["--spool", str(tmp_path / "spool"), "--patience", "60"]
-    for kill in range(number):
-        client = subprocess.Popen(push, stdout=subprocess.DEVNULL)
-        time.sleep(rng.uniform(0.3, 1.5))
-        if kill % 2:
-            server.kill()
-            time.sleep(rng.uniform(0.0, 0.5))
-            client.kill()
-            server.start()
-        else:
-            client.kill()
-        client.wait()
-    done = subprocess.run(push, capture_output=True, text=True, check=False)
-    assert (done.returncode, "0 refused" in done.stdout) == (0, True), done.stdout + done.stderr
-    with httpx2.Client(base_url=server.url, timeout=60) as http:
-        page = http.get(f"/v1/clutches/{CLUTCH}/runs", params={"limit": 1000}).json()
-    assert [item["run_id"] for item in page["items"]] == [f"r{index}" for index in range(number)]
-    server.stop()
+    amid = 0
+    with serving(path, loaded=True) as server:
+        push = [sys.executable, "-m", "service.cli.main", "push", str(folder), "--clutch", CLUTCH, "--url", server.url]
+        push += ["--spool", str(tmp_path / "spool"), "--patience", "60"]
+        ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": CLUTCH})
+
+        def there() -> int:
+            return int(ONCE.get(f"{server.url}{BASE}").json()["runs"])
+
+        for kill in range(number):
+            before = there()
+            client = subprocess.Popen(push, stdout=subprocess.DEVNULL)
+            try:
+                deadline = time.monotonic() + 60
+                while there() == before and client.poll() is None:
+                    assert time.monotonic() < deadline, "the client sends nothing"
+                    time.sleep(0.005)
+                time.sleep(rng.uniform(0.0, 0.05))
+                if kill % 2:
+                    server.kill()
+                    time.sleep(rng.uniform(0.0, 0.5))
+            finally:
+                client.kill()
+                client.wait()
+            if kill % 2:
+                server.start()
+            amid += before < there() < len(sent)
+        assert amid >= number / 2, f"{amid} of {number} kills came while runs were sent"
+        done = subprocess.run(push, capture_output=True, text=True, check=False)
+        assert (done.returncode, "0 refused" in done.stdout) == (0, True), done.stdout + done.stderr
+        page = ONCE.get(f"{server.url}{BASE}/runs", params={"limit": 1000}).json()
+        assert [item["run_id"] for item in page["items"]] == [f"r{index}" for index in range(len(sent))]
     assert stored(path) == sent
     assert findings(path) == []

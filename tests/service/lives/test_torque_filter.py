@@ -8,15 +8,17 @@ from fastapi.testclient import TestClient
 
 from service.schemas.limits import MOST_TORQUE_FILTER_MS
 from tests.models.loops.dynamic_records import FALLING, attractor, record
-from tests.models.records.test_torque_filter import FILTER, behind
+from tests.models.records.test_torque_filter import FILTER, behind, spiking
 
 RPM = 2 * np.pi / 60
 
 
-def swing(*, late: bool) -> dict[str, Any]:
-    """A dynamic test as it is posted, the torque behind a filter of 20 ms or not."""
+def swing(*, late: bool, spiked: bool = False) -> dict[str, Any]:
+    """A dynamic test as it is posted, the torque behind a filter of 20 ms or not, every channel with spikes or not."""
     torque = attractor(FALLING, 150.0)
     made = record([behind(torque) if late else torque], [5e5])
+    if spiked:
+        made = spiking(made, np.random.default_rng(1))
     channels = {
         "time_s": made.time.tolist(),
         "pressure_bar": (made.pressure / 1e5).tolist(),
@@ -31,9 +33,9 @@ def area(client: TestClient, clutch: str) -> float:
     return float(loop["loop_area_nm_m_s"])
 
 
-def sent(client: TestClient, clutch: str, *, late: bool, **fields: Any) -> float:
+def sent(client: TestClient, clutch: str, *, late: bool, spiked: bool = False, **fields: Any) -> float:
     assert client.post("/v1/clutches", json={"clutch_id": clutch} | fields).status_code == 201
-    assert client.post(f"/v1/clutches/{clutch}/runs", json=swing(late=late)).status_code == 201
+    assert client.post(f"/v1/clutches/{clutch}/runs", json=swing(late=late, spiked=spiked)).status_code == 201
     return area(client, clutch)
 
 
@@ -43,6 +45,9 @@ def test_a_declared_filter_is_taken_off_and_an_edit_does_so_afterwards(client: T
     assert abs(wrong / bare - 1) > 0.08
     mended = sent(client, "mended", late=True, torque_filter_ms=1000 * FILTER)
     assert mended == pytest.approx(bare, rel=0.01)
+    assert sent(client, "spiked", late=True, spiked=True, torque_filter_ms=1000 * FILTER) == pytest.approx(
+        bare, rel=0.01
+    )
     edit = {"torque_filter_ms": 1000 * FILTER, "reason": "the amplifier's data sheet"}
     assert client.patch("/v1/clutches/wrong", json=edit).json()["torque_filter_ms"] == 1000 * FILTER
     assert area(client, "wrong") == mended

@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -71,6 +72,38 @@ def test_every_panel_finds_rows_among_them(aged: TestClient) -> None:
         assert all(row["value"] is not None for row in rows[2:]), panel["title"]
         for series in panel["options"]["series"]:
             assert {series[axis]["matcher"]["options"] for axis in "xy"} <= columns, panel["title"]
+
+
+def test_lags_make_a_group_for_each_pressure_and_frequency_whatever_the_recorder_s_clock(client: TestClient) -> None:
+    """Three tests at two pressures and two frequencies, by a recorder whose clock is off by some tenths of a percent."""
+    swings = [DynamicTest(rate=25.0, frequency=f, duration=1.5 / f, pressures=(4e5, 6e5)) for f in (0.1, 0.25)]
+    clock = iter([1.0, 1.0, 1.003, 1.004, 0.998, 0.997])
+    for run in simulate(7, most_tests=3, programme=Programme(dynamic=swings[0], further=(swings[1],))):
+        sent = simulated_body(run)
+        if sent["kind"] == "dynamic_stribeck":
+            rate = next(clock)
+            sent["channels"]["time_s"] = [rate * time for time in sent["channels"]["time_s"]]
+        assert client.post("/v1/clutches/c1/runs", json=sent).status_code == 201
+    measured = {
+        loop["frequency_hz"] for run in client.get("/v1/clutches/c1/runs").json()["items"] for loop in run["loops"]
+    }
+    assert len(measured) > 4, "the clock is not off"
+    parted = [
+        (panel, step["options"]["fields"])
+        for panel in DASHBOARD["panels"]
+        for step in panel.get("transformations", [])
+        if step["id"] == "partitionByValues" and "frequency_hz" in step["options"]["fields"]
+    ]
+    assert len(parted) == 2
+    for panel, fields in parted:
+        (target,) = panel["targets"]
+        params = {each["key"]: each["value"] for each in target["url_options"]["params"]}
+        rows = client.get("/v1/clutches/c1/series", params=params).json()["items"]
+        assert fields == ["pressure_bar", "frequency_hz"]
+        groups = Counter((row["pressure_bar"], row["frequency_hz"]) for row in rows)
+        assert groups.keys() == {(pressure, frequency) for pressure in (4.0, 6.0) for frequency in (0.1, 0.25)}
+        # a film time that the noise leaves open has no row
+        assert set(groups.values()) == {3} or params == {"quantity": "film_time"}
 
 
 def test_every_expression_selects_by_labels_that_are_there(aged: TestClient) -> None:
