@@ -11,6 +11,8 @@
 # make blind   hides effects and wants them found: the table of docs/diagnosis.md      (SEED= SIZE=small|full ONLY= ARGS=)
 # make load     rigs and clients against a running service, what they wait and what is lost: a table of docs/benchmarks.md
 #              (ARGS="--seconds 60 --no-raw"); a few minutes, on a machine that does nothing else
+# make scale    requests and commands with 1,000 clutches of 200 tests in one file, beside 10: a table of docs/scale.md
+#              (ARGS="--clutches 10000 --states 5"); needs 7 GB of disk
 # make plausibility  sends mistyped and honest runs: the tables of docs/plausibility.md  (SEED= CAMPAIGNS= HONEST= ARGS=--write)
 # make real    what is said of real measurements; make benchmark: how long things take; make picture: README's pictures;
 #              make figures: the figures of docs/
@@ -26,7 +28,7 @@ JAVASCRIPT := tests/javascript/node_modules
 LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --exclude-newer "7 days" \
 	--custom-compile-command "make lock"
 
-.PHONY: demo test slow faults check lowest benchmark load real figures architecture blind plausibility score rivals picture lock clean
+.PHONY: demo test slow faults check lowest benchmark load scale real figures architecture blind plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
@@ -68,6 +70,9 @@ benchmark: $(VENV)/.tests
 
 load: $(VENV)/.tests
 	$(BIN)/python -m tests.load $(ARGS)
+
+scale: $(VENV)/.tests
+	$(BIN)/python -m tests.scale $(ARGS)
 
 real: $(VENV)/.tests
 	$(BIN)/python -m tests.real $(ARGS)

@@ -9,16 +9,17 @@ deflated by run lengths alone (Z_RLE), which is twice as fast; the same code inf
 
 A plane as long as the column is stored plain, a shorter one is deflated.
 
-`pack` stores several named arrays of any shape, plain: filter states, which are rewritten at every run.
+`pack` stores several named arrays of any shape, plain: filter states, which are rewritten at every run. An array of nothing
+but 0 and 1, as the particles' flags of outlying runs, takes a bit a value: [name, shape, "bits"].
 
     crc32 of the rest (4 bytes) | bytes of the index (4 bytes) | index, JSON [[name, shape], ...] | the arrays' bytes
 """
 
 import json
+import math
 import struct
 import zlib
 from collections.abc import Mapping, Sequence
-from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ CODEC = "shuffle-zlib"
 _PLANES = 8
 _PLANE_SIZES = struct.Struct("<8I")
 _NUMBER = struct.Struct("<I")
+_BITS = "bits"
 #: A longer plane is deflated only where its middle 16 KiB shrink below 80 %: a smaller gain is not worth the time.
 _PROBE = 1 << 14
 _WORTH_IT = 0.8
@@ -62,12 +64,24 @@ def decode(data: bytes | bytearray, codec: str, length: int) -> NDArray[np.float
 
 
 def pack(arrays: Mapping[str, NDArray[np.float64]]) -> bytes:
-    """Named arrays of any shape as bytes, order kept. Raises ValueError on an array that is not of 64-bit floats."""
+    """Named arrays of any shape as bytes, order kept, flags (0 and 1) as bits.
+
+    Raises ValueError on an array that is not of 64-bit floats.
+    """
+    index: list[tuple[object, ...]] = []
+    parts: list[bytes] = []
     for name, array in arrays.items():
         if array.dtype != np.float64:
             raise ValueError(f"{name} must be of float64, got {array.dtype}")
-    index = json.dumps([[name, array.shape] for name, array in arrays.items()], separators=(",", ":")).encode()
-    return _sealed(_NUMBER.pack(len(index)), index, *(_little_endian(array).tobytes() for array in arrays.values()))
+        flags = array == 1.0
+        if (flags | ((array == 0.0) & ~np.signbit(array))).all():
+            index.append((name, array.shape, _BITS))
+            parts.append(np.packbits(flags).tobytes())
+        else:
+            index.append((name, array.shape))
+            parts.append(_little_endian(array).tobytes())
+    names = json.dumps(index, separators=(",", ":")).encode()
+    return _sealed(_NUMBER.pack(len(names)), names, *parts)
 
 
 def unpack(data: bytes) -> dict[str, NDArray[np.float64]]:
@@ -77,15 +91,26 @@ def unpack(data: bytes) -> dict[str, NDArray[np.float64]]:
     try:
         index = json.loads(bytes(body[_NUMBER.size : start]))
         arrays = {}
-        for name, shape in index:
-            values = np.frombuffer(body, dtype="<f8", count=prod(shape), offset=start)
-            arrays[name] = values.reshape(shape).astype(np.float64)
-            start += values.nbytes
+        for name, shape, *form in index:
+            arrays[name], taken = _unpacked(body, start, shape, form)
+            start += taken
     except (ValueError, TypeError) as error:
         raise DamagedData(f"packed arrays do not unpack: {error}") from error
     if start != len(body):
         raise DamagedData(f"packed arrays end at byte {start} of {len(body)}")
     return arrays
+
+
+def _unpacked(body: memoryview, start: int, shape: list[int], form: list[str]) -> tuple[NDArray[np.float64], int]:
+    """An array from `start` on, and how many bytes it takes."""
+    size = math.prod(shape)
+    if not form:
+        values = np.frombuffer(body, dtype="<f8", count=size, offset=start)
+        return values.reshape(shape).astype(np.float64), values.nbytes
+    if form != [_BITS] or size < 0:
+        raise ValueError(f"{size} values in the form {form}")
+    bits = np.frombuffer(body, dtype=np.uint8, count=math.ceil(size / 8), offset=start)
+    return np.unpackbits(bits, count=size).reshape(shape).astype(np.float64), bits.nbytes
 
 
 def _little_endian(array: NDArray[np.float64]) -> NDArray[np.float64]:

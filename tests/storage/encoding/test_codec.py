@@ -124,6 +124,25 @@ def test_packed_arrays_come_back(patterns: dict[str, NDArray[np.uint64]]) -> Non
     assert all(back[name].shape == array.shape and same_bits(back[name], array) for name, array in arrays.items())
 
 
+@given(
+    hnp.arrays(
+        np.float64, hnp.array_shapes(min_dims=1, max_dims=3, min_side=0), elements=st.sampled_from([0.0, 1.0, -0.0])
+    )
+)
+def test_flags_come_back(array: NDArray[np.float64]) -> None:
+    back = unpack(pack({"flags": array}))["flags"]
+    assert back.shape == array.shape
+    assert same_bits(back, array)
+
+
+def test_flags_take_a_bit_each_and_states_of_earlier_releases_are_read() -> None:
+    flags = np.eye(64)
+    assert len(pack({"flags": flags})) < 64 * 64 / 8 + 50
+    index = b'[["flags",[64,64]]]'
+    plain = _sealed(struct.pack("<I", len(index)) + index + flags.tobytes())
+    assert same_bits(unpack(plain)["flags"], flags)
+
+
 def test_packing_takes_64_bit_floats_only_and_names_the_array() -> None:
     with pytest.raises(ValueError, match="weights must be of float64, got float32"):
         pack({"weights": np.zeros(3, np.float32)})
@@ -151,7 +170,18 @@ def _sealed(body: bytes) -> bytes:
 
 @pytest.mark.parametrize(
     "index",
-    [b"not json", b'[["a"]]', b'[["a", [9]]]', b'[["a", "x"]]', b'[["a", [-1]]]', b"7", b'[["a", [1]], ["b", [1]]]'],
+    [
+        b"not json",
+        b'[["a"]]',
+        b'[["a", [9]]]',
+        b'[["a", "x"]]',
+        b'[["a", [-1]]]',
+        b"7",
+        b'[["a", [1]], ["b", [1]]]',
+        b'[["a", [-96], "bits"]]',
+        b'[["a", [90], "bits"], ["b", [1]]]',
+        b'[["a", [12], "bytes"]]',
+    ],
 )
 def test_an_index_that_does_not_fit_its_bytes_is_noticed(index: bytes) -> None:
     with pytest.raises(DamagedData):
