@@ -52,7 +52,7 @@ def errors_in_a_line() -> Iterator[None]:
 @contextmanager
 def existing(url: str) -> Iterator["Opened"]:
     """An open database that exists already: a mistyped address makes no new one. An older one is migrated."""
-    from storage.engine.database import open_database  # start-up time: most commands open no database
+    from storage.engine.opening import open_database  # start-up time: most commands open no database
 
     with errors_in_a_line():
         require_database(url)
@@ -63,7 +63,7 @@ def existing(url: str) -> Iterator["Opened"]:
 @contextmanager
 def read_only(url: str) -> Iterator["Opened"]:
     """An existing database for a command that only reads it: it stays as it is, at whatever revision."""
-    from storage.engine.database import find_database  # start-up time: most commands open no database
+    from storage.engine.opening import find_database  # start-up time: most commands open no database
 
     with errors_in_a_line():
         require_database(url)
@@ -73,11 +73,11 @@ def read_only(url: str) -> Iterator["Opened"]:
 
 def require_database(url: str) -> None:
     """End the command where there is no database at the address."""
-    from storage.engine.connect import path_of  # start-up time: most commands open no database
+    from service.settings import redacted  # start-up time: most commands open no database
+    from storage.engine.opening import database_exists  # start-up time: most commands open no database
 
-    path = path_of(url)
-    if not path.exists():
-        fail(f"there is no database at {path}", EX_USAGE)
+    if not database_exists(url):
+        fail(f"there is no database at {redacted(url)}", EX_USAGE)
 
 
 def fail(message: str, code: int = 1) -> NoReturn:

@@ -21,7 +21,8 @@ from service.lives.history import STATIONARY, Life, lives_of
 from service.lives.model_correction import corrected_cofs
 from service.lives.prediction_at import predict_at
 from storage import channels, results, runs
-from storage.engine.database import Database, open_database
+from storage.engine.database import Database
+from storage.engine.opening import open_database
 
 _METHOD = "particle"
 #: One for all: what is drawn must hang on nothing but the runs, not on what their clutch is called.

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from storage.engine import connect
-from storage.engine.database import Database, open_database
+from storage.engine.database import Database
+from storage.engine.opening import open_database
+from storage.engine.sqlite import connect
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from service.cli.options import DATABASE, Database, errors_in_a_line, out, requi
 
 def backup(path: Path, database: Database = DATABASE) -> None:
     """A consistent copy of the database at PATH, as it is, while the service runs."""
-    from storage.engine.database import back_up  # start-up time
+    from storage.engine.sqlite.database import back_up  # start-up time
 
     with errors_in_a_line():
         require_database(database)

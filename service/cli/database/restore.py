@@ -27,7 +27,7 @@ def restore(
             fail("a run is restored for a reason: give --reason", EX_USAGE)
         run_changes.restore(backup_or_clutch, run, reason, url, key, patience)
         return
-    from storage.engine.restore import restore as put_back  # start-up time
+    from storage.engine.sqlite.restore import restore as put_back  # start-up time
 
     with errors_in_a_line():
         kept = put_back(database, Path(backup_or_clutch))

@@ -12,20 +12,21 @@ from pathlib import Path
 import pytest
 
 from storage import channels, clutches, runs
-from storage.engine.database import Database, open_database
+from storage.engine.database import Database
 from storage.engine.errors import DatabaseBusy
+from storage.engine.opening import open_database
 from tests.storage.samples import child, clutch_row, integrity, store_run
 
 CLUTCH = "bench3-017"
 
 WRITER = """
 import sys
-import storage.engine.connect
-import storage.engine.database
+import storage.engine.sqlite.connect
+import storage.engine.opening
 from tests.storage.samples import store_run
 path, mode, first, number = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4])
-storage.engine.connect.JOURNAL_MODE = mode
-database = storage.engine.database.open_database(f"sqlite:///{path}")
+storage.engine.sqlite.connect.JOURNAL_MODE = mode
+database = storage.engine.opening.open_database(f"sqlite:///{path}")
 print("open", flush=True)
 sys.stdin.readline()
 for each in range(first, first + number):
