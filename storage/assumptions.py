@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 import sqlalchemy as sa
 from sqlalchemy import Connection, Row, bindparam, delete, func, select
 
+from storage.dialects import json_length
 from storage.encoding.json_text import Json, to_list, to_object, to_text
 from storage.tables import adopted_model, corrected_cof, fleet_prior, run
 
@@ -131,7 +132,7 @@ _fleet_all_current = (
     .order_by(fleet_prior.c.fleet)
 )
 _fleet_ended_lives = _fleet_all_current.with_only_columns(
-    func.coalesce(func.sum(func.json_array_length(fleet_prior.c.content, "$.ended")), 0)
+    func.coalesce(func.sum(json_length(fleet_prior.c.content, "ended")), 0)
 ).order_by(None)
 _fleet_forget = delete(fleet_prior).where(
     fleet_prior.c.fleet == bindparam("of_fleet"),

@@ -26,5 +26,9 @@ class ServiceRuns(StorageError):
     """A service uses the file."""
 
 
+class UnstorableText(StorageError):
+    """Text holds a character that the database does not have."""
+
+
 class DamagedData(StorageError):
     """A stored array does not decode to what was stored."""

@@ -4,9 +4,20 @@ from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from sqlalchemy import Connection
 
-from storage.engine.errors import DatabaseTooOld
-from storage.migrations.upgrade import current, head
+from storage.engine.errors import DatabaseTooNew, DatabaseTooOld
+from storage.migrations.upgrade import current, head, revisions
 from storage.tables import metadata
+
+#: What a server has beside the tables of `storage/tables.py`.
+_OWN_TABLES = ("commits",)
+
+
+def refuse_newer(revision: str | None) -> None:
+    """Raise DatabaseTooNew on a revision that this code does not know."""
+    if revision is not None and revision not in revisions():
+        raise DatabaseTooNew(
+            f"the database is at revision {revision}, this release knows up to {head()}: use a newer one"
+        )
 
 
 def other_schema(connection: Connection) -> list[str]:
@@ -14,7 +25,10 @@ def other_schema(connection: Connection) -> list[str]:
     if current(connection) != head():
         raise DatabaseTooOld(
             f"the database is at revision {current(connection)}: its runs are checked at {head()} only, to which "
-            "`clutchlife serve` brings it, with a copy kept beside it"
+            "`clutchlife serve` brings it, with a copy of a file kept beside it"
         )
-    differences = compare_metadata(MigrationContext.configure(connection), metadata)
-    return [f"the schema differs: {difference}" for difference in differences]
+    own = _OWN_TABLES if connection.dialect.name == "postgresql" else ()
+    context = MigrationContext.configure(
+        connection, opts={"include_object": lambda _, name, kind, *__: not (kind == "table" and name in own)}
+    )
+    return [f"the schema differs: {difference}" for difference in compare_metadata(context, metadata)]

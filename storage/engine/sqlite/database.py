@@ -8,7 +8,8 @@ from pathlib import Path
 from sqlalchemy import Connection
 from sqlalchemy.exc import OperationalError
 
-from storage.engine.errors import DatabaseTooNew, DatabaseTooOld, StorageUnavailable
+from storage.engine.errors import DatabaseTooOld, StorageUnavailable
+from storage.engine.integrity import refuse_newer
 from storage.engine.limits import LOCK_TIMEOUT
 from storage.engine.sqlite.backup import copy, copy_beside
 from storage.engine.sqlite.connect import (
@@ -24,7 +25,7 @@ from storage.engine.sqlite.private_files import make_if_missing
 from storage.engine.sqlite.service_lock import service_lock
 from storage.engine.sqlite.transactions import Transactions, transaction, translated
 from storage.engine.sqlite.write_lock import WriteLock
-from storage.migrations.upgrade import current, head, revisions, upgrade
+from storage.migrations.upgrade import current, head, upgrade
 
 
 class FileDatabase(Transactions):
@@ -77,7 +78,7 @@ def find_file(path: Path, *, lock_timeout: float = LOCK_TIMEOUT) -> FoundFile:
     database = FoundFile(path, journal_mode=journal_mode, lock_timeout=lock_timeout, writable=False)
     try:
         with database.reading() as connection:
-            _refuse_newer(current(connection))
+            refuse_newer(current(connection))
     except BaseException:
         database.close()
         raise
@@ -138,7 +139,7 @@ def _migrate(path: Path, lock_timeout: float, *, serving: bool) -> None:
         revision = current(connection)
     if revision == head():
         return
-    _refuse_newer(revision)
+    refuse_newer(revision)
     in_use = revision is not None
     with service_lock(path) if in_use and not serving else nullcontext():
         if in_use:
@@ -148,10 +149,3 @@ def _migrate(path: Path, lock_timeout: float, *, serving: bool) -> None:
             broken = connection.exec_driver_sql("PRAGMA foreign_key_check").fetchall()
             if broken:
                 raise StorageUnavailable(f"{path} holds rows that refer to missing rows: {broken[:5]}")
-
-
-def _refuse_newer(revision: str | None) -> None:
-    if revision is not None and revision not in revisions():
-        raise DatabaseTooNew(
-            f"the database is at revision {revision}, this release knows up to {head()}: use a newer one"
-        )

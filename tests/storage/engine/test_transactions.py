@@ -1,0 +1,122 @@
+"""On both kinds of database writers queue, readers see one state, and what fails leaves nothing behind."""
+
+import contextlib
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from storage import channels, clutches, runs
+from storage.engine.database import Database
+from storage.engine.errors import DatabaseBusy, StorageUnavailable
+from storage.engine.opening import open_database
+from tests.storage.samples import clutch_row, store_run
+
+CLUTCH = "bench3-017"
+
+
+def test_a_failed_statement_rolls_back_what_came_before(database: Database) -> None:
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+
+    def fail() -> None:
+        with database.writing() as connection:
+            store_run(connection, 0)
+            clutches.bump_revision(connection, "nobody")
+
+    with pytest.raises(LookupError):
+        fail()
+    with database.reading() as connection:
+        assert len(runs.in_order(connection, CLUTCH)) == 0
+        assert clutches.get(connection, CLUTCH) == clutch_row()
+
+
+def test_threads_take_turns_and_readers_never_see_half_a_run(database: Database) -> None:
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+    done = threading.Event()
+
+    def write(first: int) -> None:
+        for number in range(first, first + 25):
+            with database.writing() as connection:
+                store_run(connection, number)
+
+    def read() -> int:
+        looks = 0
+        while not done.is_set():
+            with database.reading() as connection:
+                clutch = clutches.get(connection, CLUTCH)
+                assert clutch is not None
+                keys = [row.run_key for row in runs.in_order(connection, CLUTCH)]
+                assert clutch.revision == len(keys)
+                assert all(len(channels.read(connection, key)) == 3 for key in keys[-3:])
+            looks += 1
+            time.sleep(0.002)
+        return looks
+
+    with ThreadPoolExecutor(6) as pool:
+        readers = [pool.submit(read) for _ in range(2)]
+        writers = [pool.submit(write, first) for first in (0, 100, 200, 300)]
+        try:
+            for each in writers:
+                each.result()
+        finally:
+            done.set()
+        assert all(each.result() > 0 for each in readers)
+    with database.reading() as connection:
+        assert len(runs.in_order(connection, CLUTCH)) == 100
+
+
+def test_the_version_changes_with_every_commit_and_with_nothing_else(database: Database) -> None:
+    numbers = [database.watch.version(), database.watch.version()]
+    with database.writing() as connection:
+        connection.exec_driver_sql("CREATE TABLE extra (x INTEGER)")
+        numbers.append(database.watch.version())  # not committed yet
+    assert len(set(numbers)) == 1
+    numbers.append(database.watch.version())
+    with contextlib.suppress(RuntimeError), database.writing() as connection:
+        connection.exec_driver_sql("INSERT INTO extra VALUES (1)")
+        raise RuntimeError
+    assert database.watch.version() == numbers[-1] != numbers[0]
+    with database.reading() as connection:
+        connection.exec_driver_sql("SELECT * FROM extra").fetchall()
+    assert database.watch.version() == numbers[-1]
+    other = open_database(database.url)
+    with other.writing() as connection:
+        connection.exec_driver_sql("INSERT INTO extra VALUES (2)")
+    assert database.watch.version() not in numbers
+    other.close()
+
+
+def test_a_reader_keeps_the_state_of_its_first_statement(database: Database) -> None:
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+    with database.reading() as reader:
+        assert runs.in_order(reader, CLUTCH) == []
+        with database.writing() as connection:
+            store_run(connection, 0)
+            assert len(runs.in_order(connection, CLUTCH)) == 1
+        assert runs.in_order(reader, CLUTCH) == []
+        assert clutches.revision(reader, CLUTCH) == 0
+    with database.reading() as reader:
+        assert (len(runs.in_order(reader, CLUTCH)), clutches.revision(reader, CLUTCH)) == (1, 1)
+
+
+def test_a_second_writer_gives_up_in_time(database: Database) -> None:
+    with contextlib.closing(open_database(database.url, lock_timeout=0.1)) as impatient:
+        with database.writing() as connection:
+            clutches.insert(connection, clutch_row())
+            with pytest.raises(DatabaseBusy), impatient.writing():
+                pytest.fail("two writers at once")
+        with impatient.writing() as connection:
+            assert clutches.all_ids(connection) == [CLUTCH]
+
+
+def test_a_closed_database_says_so(database: Database) -> None:
+    database.close()
+    database.close()
+    for block in (database.reading, database.writing):
+        with pytest.raises(StorageUnavailable, match="has been closed"), block():
+            pytest.fail("it was closed")
+    assert database.faults(least_free=0) == {"database": "it has been closed"}
