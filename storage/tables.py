@@ -157,7 +157,8 @@ corrected_cof = Table(
 )
 
 #: Priors learned from fleets of earlier lives, by version from 1 on. `fleet` names the kind of clutch (JSON), `left_out`
-#: the clutch that was not learned from, "" where all were; `members` are the clutches that were learned from.
+#: the clutch that was not learned from, the first of them where there were several, "" where all were; `members` are the
+#: clutches of the fleet.
 fleet_prior = Table(
     "fleet_prior",
     metadata,

@@ -56,6 +56,9 @@ SETTLED = 1e-3
 
 # What ended lives say of one that has not (`ended_lives`): what it achieves is in docs/prognosis.md, A fleet's prior
 
+#: More ended lives than this say no more: their predictive is within 1 % of the normal's width, and each costs every answer
+#: 0.02 ms. Chosen; no table.
+MOST_ENDED = 100
 #: Fewer ended lives than this that were alive at the same ζ say nothing. Chosen; no table.
 FEWEST_ALIVE = 3
 #: Forecasts beyond this multiple of the latest end among them are all alike. Chosen; no table.

@@ -33,6 +33,7 @@ from models.prognosis.criteria import (
     FEWEST_ALIVE,
     FEWEST_TESTS,
     LEAST_DEVIATION,
+    MOST_ENDED,
     VAGUE,
 )
 from models.prognosis.first_passage import Offset, ends_of_life, weighted_quantiles
@@ -111,6 +112,15 @@ def ended_life(
     if not progress:
         return None
     return EndedLife(end=end, fraction=fraction, progress=np.array(progress), forecasts=np.array(forecasts))
+
+
+def representative(lives: Sequence[EndedLife]) -> list[EndedLife]:
+    """The lives; of more than MOST_ENDED, so many, evenly taken by their ends."""
+    if len(lives) <= MOST_ENDED:
+        return list(lives)
+    ordered = sorted(lives, key=lambda life: life.end)
+    places = np.round(np.linspace(0, len(ordered) - 1, MOST_ENDED)).astype(int)
+    return [ordered[place] for place in places.tolist()]
 
 
 def forecast(posterior: Posterior, ends: FloatArray, horizon: float) -> FloatArray:

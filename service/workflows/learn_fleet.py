@@ -1,17 +1,17 @@
 """The fleet's priors: learned from all clutches of a kind, kept by version, and the tracks brought up to date with them.
 
-No clutch is tracked under what was learned from itself: for each clutch that taught a version there is the same version
-learned from the others.
+No clutch is tracked under what was learned from itself: for each clutch that taught a version, or each group of them in a
+large fleet, there is the same version learned from the others.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
 
 from models.prognosis.criteria import FEWEST_CLUTCHES, FEWEST_TESTS_TO_LEARN, HORIZON
-from models.prognosis.ended_lives import EndedLife, ended_life
+from models.prognosis.ended_lives import EndedLife, ended_life, representative
 from models.prognosis.fleet import Taught, population, taught
 from models.prognosis.scoring import measured_end
 from service import records
@@ -44,14 +44,16 @@ class Fleet:
     kind: Json
     lessons: dict[str, list[Lesson]] = field(default_factory=dict)
 
-    def without(self, clutch_id: str = NOBODY) -> Json | None:
-        """What all clutches but one have taught, as it is stored; None where too few are left."""
-        left = [lessons for name, lessons in sorted(self.lessons.items()) if name != clutch_id]
+    def without(self, left_out: Collection[str] = ()) -> Json | None:
+        """What all other clutches have taught, as it is stored; None where too few are left."""
+        left = [lessons for name, lessons in sorted(self.lessons.items()) if name not in left_out]
         if len(left) < FEWEST_CLUTCHES:
             return None
         lessons = [lesson for own in left for lesson in own]
-        ended = [lesson.ended.to_dict() for lesson in lessons if lesson.ended is not None]
-        return population([lesson.taught for lesson in lessons]).to_dict() | {"ended": ended}
+        ended = representative([lesson.ended for lesson in lessons if lesson.ended is not None])
+        return population([lesson.taught for lesson in lessons]).to_dict() | {
+            "ended": [life.to_dict() for life in ended]
+        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,9 +151,9 @@ def _stored_anew(database: Database, fleet: Fleet, now: str, at_once: AtOnce) ->
 
 
 def _versions(fleet: Fleet, version: int, now: str) -> Sequence[FleetPriorRow]:
-    """The prior of all clutches, and of all but each one, as they are stored."""
+    """The prior of all clutches, and of all but each one or group of them, as they are stored."""
     members = tuple(sorted(fleet.lessons))
-    priors = {left_out: fleet.without(left_out) for left_out in (NOBODY, *members)}
+    priors = {NOBODY: fleet.without()} | {group[0]: fleet.without(group) for group in assumptions.groups(members)}
     return [
         FleetPriorRow(
             fleet=fleet.kind,

@@ -13,17 +13,15 @@ import numpy as np
 from models.prognosis.criteria import HORIZON
 from models.prognosis.ended_lives import EndedLife, ended_life, severity_exponent
 from models.prognosis.first_passage import weighted_quantiles
-from models.prognosis.scoring import crps_of_sample, measured_end
+from models.prognosis.scoring import crps_of_sample
 from models.prognosis.stated_end import stated_end
-from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
 from tests.real.lag import Row, table
-from tests.real.lives import STAGES, tests_of
-from tests.real.prognosis import columns
+from tests.real.lives import cracks, filters
+from tests.statistical.forecasts import DRAWS, GRID, STAGES
 
-SEED, DRAWS, OTHERS, CRACK = 2026, 1_000, 10, 0.25
-GRID = Grid()
+SEED, OTHERS = 2026, 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,32 +38,6 @@ def life(kind: float, tests: list[Measurement], end: float) -> Life:
     teaches = ended_life(tests, end, fraction=0.5, horizon=HORIZON)
     assert teaches is not None
     return Life(kind=kind, tests=tests, end=end, teaches=teaches)
-
-
-def filters() -> list[Life]:
-    data = columns("filter_lives", "filters_odd.csv")
-    lives = []
-    for number in np.unique(data["life"]).tolist():
-        here = data["life"] == number
-        tests, end = tests_of(data["time_s"][here], data["differential_pressure_pa"][here])
-        lives.append(life(float(data["dust_feed"][here][0]), tests, end))
-    return lives
-
-
-def cracks() -> list[Life]:
-    data = columns("crack_growth", "crack_growth.csv")
-    lives = []
-    for unit in range(1, 11):
-        lengths = data[f"unit{unit}"]
-        values = 0.1 * (1.0 - 0.5 * (lengths - lengths[0]) / (CRACK - lengths[0]))
-        end = measured_end(1_000.0 * data["time"], values, 0.05)
-        assert end is not None
-        tests = [
-            Measurement(progress=progress, value=value, variance=0.0)
-            for progress, value in zip((1_000.0 * data["time"]).tolist(), values.tolist(), strict=True)
-        ]
-        lives.append(life(0.0, tests, end))
-    return lives
 
 
 def judged(lives: Sequence[Life], others: int) -> list[Row]:
@@ -117,9 +89,9 @@ def judged(lives: Sequence[Life], others: int) -> list[Row]:
 
 def main() -> None:
     """The tables."""
-    clogged = filters()
+    clogged = [life(*each) for each in filters()]
     print(f"### Filters that clog, with {OTHERS} ended lives of the same feed\n\n{table(judged(clogged, OTHERS))}\n")
-    print(f"### Cracks, with the nine others\n\n{table(judged(cracks(), OTHERS))}\n")
+    print(f"### Cracks, with the nine others\n\n{table(judged([life(*each) for each in cracks()], OTHERS))}\n")
     ends, feeds = np.array([each.end for each in clogged]), np.array([each.kind for each in clogged])
     exponent, deviation = severity_exponent(ends, feeds)
     print(f"### The feed as severity\n\nexponent {-exponent:.3f} ± {deviation:.3f} of {ends.size} lives")

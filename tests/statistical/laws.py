@@ -5,13 +5,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from models.prognosis.first_passage import predict_first_passage
-from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
-from models.tracking.prior import weak
-from tests.statistical.lives import CAP
 
-STAGES = (0.2, 0.4, 0.6, 0.8)
 TESTS, SCATTER = 25, 0.003
 
 LAWS: dict[str, Callable[[float], float]] = {
@@ -32,19 +27,3 @@ def observed(course: Callable[[float], float], rng: np.random.Generator, end: fl
         cof = 0.1 * course(share) * (1 + SCATTER * rng.standard_normal())
         seen.append(Measurement(progress=share * end, value=cof, variance=(0.001 * cof) ** 2))
     return seen
-
-
-def followed(
-    course: Callable[[float], float], rng: np.random.Generator, end: float = 10_000.0
-) -> list[tuple[bool, bool, float]]:
-    """For each stage of a life: does the exact filter's interval hold the end, does it begin after it, how wide is it
-    in lives?"""
-    grid, told = Grid(), []
-    tests = observed(course, rng, end)
-    for stage in STAGES:
-        seen = [each for each in tests if each.progress <= (stage + 0.01) * end]
-        posterior = grid.posterior(grid.from_history(weak(seen[0], falling=True), seen), 1_000, rng)
-        found = predict_first_passage(posterior, fraction=0.5, as_of=seen[-1].progress).end_of_life
-        low, high = found[0.05] or math.inf, found[0.95] or math.inf
-        told.append((low <= end <= high, low > end, (min(high, CAP) - min(low, CAP)) / end))
-    return told

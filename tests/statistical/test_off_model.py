@@ -15,7 +15,8 @@ from models.rig.truth import draw
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
-from tests.statistical.laws import LAWS, followed
+from tests.statistical.forecasts import STAGES, followed
+from tests.statistical.laws import LAWS
 
 pytestmark = pytest.mark.slow
 
@@ -23,8 +24,8 @@ LIVES = 30
 
 
 def shares(told: Any) -> tuple[list[float], list[float]]:
-    """Share of lives whose interval holds the truth, and whose interval begins after it, by stage."""
-    found = np.array(told, dtype=float)
+    """Share of lives whose interval holds the truth, and whose interval begins after it, by stage: the filter alone."""
+    found = np.array([[by_stage[stage] for stage in STAGES] for by_stage in told])
     return found[:, :, 0].mean(axis=0).tolist(), found[:, :, 1].mean(axis=0).tolist()
 
 

@@ -54,6 +54,37 @@ def test_a_clutch_gets_what_it_did_not_teach_of_its_version_or_the_newest(databa
         assert assumptions.current_fleet_prior(connection, PAPER.fleet) == newer
 
 
+def test_a_large_fleet_is_left_out_in_twenty_groups(database: Database) -> None:
+    members = tuple(f"clutch-{number:02}" for number in range(45))
+    groups = assumptions.groups(members)
+    assert sorted(name for group in groups for name in group) == list(members)
+    assert len(groups) == 20
+    assert assumptions.groups(members[:20]) == [(name,) for name in members[:20]]
+    everyone = replace(PAPER, members=members)
+    with database.writing() as connection:
+        assumptions.insert_fleet_prior(connection, everyone)
+        for group in groups:
+            without = replace(everyone, left_out=group[0], content={"without": list(group)})
+            assumptions.insert_fleet_prior(connection, without)
+        for name in members:
+            found = assumptions.fleet_prior_for(connection, PAPER.fleet, name, 1)
+            assert found is not None
+            assert name in found.content["without"]
+        assert assumptions.fleet_prior_for(connection, PAPER.fleet, "another", 1) == everyone
+
+
+def test_each_is_left_out_by_itself_where_an_earlier_release_stored_it_so(database: Database) -> None:
+    everyone = replace(PAPER, members=tuple(f"clutch-{number:02}" for number in range(30)))
+    with database.writing() as connection:
+        assumptions.insert_fleet_prior(connection, everyone)
+        for name in everyone.members:
+            assumptions.insert_fleet_prior(connection, replace(everyone, left_out=name, content={"without": [name]}))
+        for name in everyone.members:
+            found = assumptions.fleet_prior_for(connection, PAPER.fleet, name, None)
+            assert found is not None
+            assert found.content == {"without": [name]}
+
+
 def test_a_version_is_stored_once(database: Database) -> None:
     with database.writing() as connection:
         assumptions.insert_fleet_prior(connection, PAPER)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from models.prognosis.ended_lives import EndedLife, calibrated, ended_life
+from models.prognosis.ended_lives import EndedLife, calibrated, ended_life, representative
 from models.prognosis.first_passage import weighted_quantiles
 from models.tracking.measurement import Measurement
 
@@ -40,6 +40,17 @@ def test_forecasts_that_are_late_are_led_back_to_the_ends() -> None:
     lives = [ended(end, off, 0.3) for end, off in zip(ENDS, scatter, strict=True)]
     low, middle, high = quantiles(ended(1_000.0, 15.0, 0.3), lives)
     assert (low, middle, high) == pytest.approx((860.0, 1_005.0, 1_175.0), rel=0.05)
+
+
+def test_a_hundred_of_a_thousand_say_the_same() -> None:
+    rng = np.random.default_rng(2)
+    lives = [ended(1_000.0 * math.exp(off), 1.0 + 0.1 * off) for off in rng.normal(0.0, 0.2, 1_000).tolist()]
+    some = representative(lives)
+    assert len(some) == 100
+    assert {life.end for life in some} >= {min(life.end for life in lives), max(life.end for life in lives)}
+    own = ended(1_100.0, 1.0, 0.3)
+    assert quantiles(own, some) == pytest.approx(quantiles(own, lives), rel=0.02)
+    assert representative(lives[:100]) == lives[:100]
 
 
 def test_it_is_alive_now() -> None:
