@@ -1,5 +1,6 @@
 """The application: its parts put together, nothing made at import."""
 
+import shutil
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -73,6 +74,7 @@ def create_app(settings: Settings) -> FastAPI:
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         database = open_database(settings.database, serving=True)
+        folder = emptied_folder(database.path)
         log = (settings.log_format, settings.log_level)
         workers = in_processes(database, settings.workers, log) if settings.workers else in_threads(database)
         queue = DiagnosisQueue(database.url, settings, _Diagnoses(database, workers))
@@ -89,7 +91,7 @@ def create_app(settings: Settings) -> FastAPI:
                 revalidation=Revalidation(MOST_REVALIDATED_BYTES),
                 readiness=readiness,
                 insecure_local=settings.insecure_local,
-                folder=emptied_folder(database.path),
+                folder=folder,
             )
             yield
         finally:
@@ -97,6 +99,8 @@ def create_app(settings: Settings) -> FastAPI:
             queue.close()
             workers.close()
             database.close()
+            if database.path is None:
+                shutil.rmtree(folder, ignore_errors=True)
 
     @asynccontextmanager
     async def alone(app: FastAPI) -> AsyncIterator[None]:

@@ -23,7 +23,12 @@ out = Console(highlight=False)
 err = Console(stderr=True, highlight=False)
 
 Database = Annotated[
-    str, typer.Option("--database", envvar="CLUTCHLIFE_DATABASE", help="sqlite:///path, or sqlite:////absolute/path")
+    str,
+    typer.Option(
+        "--database",
+        envvar="CLUTCHLIFE_DATABASE",
+        help="sqlite:///path, sqlite:////absolute/path, or postgresql+psycopg://user@host/database",
+    ),
 ]
 ClutchId = Annotated[str, typer.Argument(metavar="ID")]
 Url = Annotated[str, typer.Option("--url", envvar="CLUTCHLIFE_URL", help="The address of the service")]
@@ -78,6 +83,14 @@ def require_database(url: str) -> None:
 
     if not database_exists(url):
         fail(f"there is no database at {redacted(url)}", EX_USAGE)
+
+
+def require_file(url: str, instead: str) -> None:
+    """End the command where the database is not a file."""
+    from storage.engine.postgresql.connect import is_on_server  # start-up time: most commands open no database
+
+    if is_on_server(url):
+        fail(f"the database is on a PostgreSQL server: {instead}", EX_USAGE)
 
 
 def fail(message: str, code: int = 1) -> NoReturn:

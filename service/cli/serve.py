@@ -80,10 +80,7 @@ def _allowed(host: str, settings: "Settings") -> str:
     from service.web.auth import is_loopback  # start-up time
     from storage import keys  # start-up time
     from storage.engine.opening import open_database, service_lock  # start-up time
-    from storage.engine.postgresql.connect import is_on_server  # start-up time
 
-    if is_on_server(settings.database):
-        raise ValueError("the service runs on SQLite alone as yet: give --database sqlite:///path")
     with service_lock(settings.database):
         pass  # a second service ends here with a line; the application holds the lock from its start to its end
     with closing(open_database(settings.database)) as opened, opened.reading() as connection:

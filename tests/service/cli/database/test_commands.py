@@ -97,6 +97,17 @@ def test_verify_names_a_damaged_page(path: Path) -> None:
     assert "damaged" in clutchlife("verify", "--database", f"sqlite:///{path}", code=1)
 
 
+def test_what_needs_a_file_names_what_does_it_on_a_server(tmp_path: Path) -> None:
+    url = ("--database", "postgresql+psycopg://u:s3cr3t@127.0.0.1:1/db")
+    for command, program in (("backup", "pg_dump"), ("restore", "pg_restore")):
+        output = clutchlife(command, tmp_path / "backup.db", *url, code=64)
+        assert program in output
+        assert "s3cr3t" not in output
+    output = clutchlife("verify", *url, code=1)
+    assert "the server cannot be used" in output
+    assert "s3cr3t" not in output
+
+
 def test_a_backup_is_restored_unless_a_service_runs(path: Path, tmp_path: Path) -> None:
     url = ("--database", f"sqlite:///{path}")
     clutchlife("backup", tmp_path / "backup.db", *url)
