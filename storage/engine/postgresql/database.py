@@ -11,7 +11,7 @@ from sqlalchemy import URL, Connection, insert, text
 from sqlalchemy.exc import ProgrammingError, SQLAlchemyError
 
 from storage.engine.database import Database
-from storage.engine.errors import DatabaseTooOld, StorageUnavailable
+from storage.engine.errors import DatabaseTooOld, StorageError, StorageUnavailable
 from storage.engine.integrity import refuse_newer
 from storage.engine.postgresql.connect import make_engine, shown
 from storage.engine.postgresql.driver_errors import translated
@@ -67,7 +67,7 @@ class ServerDatabase(Database):
             with self.reading() as connection:
                 revision = current(connection)
                 standby = connection.exec_driver_sql("SELECT pg_is_in_recovery()").scalar_one()
-        except (StorageUnavailable, SQLAlchemyError) as error:
+        except (StorageError, SQLAlchemyError) as error:
             return {"database": f"the database cannot be read: {type(error).__name__}"}
         if revision != head():
             return {"database": f"the database is at revision {revision}, this release needs {head()}"}

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing, suppress
 
 import pytest
-from sqlalchemy import text
+from sqlalchemy import make_url, text
 from sqlalchemy.exc import ProgrammingError
 
 from storage import changes, clutches, runs
@@ -115,6 +115,15 @@ def test_a_database_that_is_not_in_utf8_is_refused(postgresql: PostgresServer) -
     postgresql.execute("CREATE DATABASE latin ENCODING 'LATIN1' LOCALE 'C' TEMPLATE template0")
     with pytest.raises(StorageUnavailable, match="LATIN1"):
         open_database(postgresql.url("latin"))
+
+
+def test_what_is_acknowledged_is_on_the_disk_whatever_the_database_s_default(
+    database: Database, postgresql: PostgresServer
+) -> None:
+    name = make_url(database.url).database
+    postgresql.execute(f"ALTER DATABASE {name} SET synchronous_commit = off")
+    with closing(open_database(database.url)) as opened, opened.writing() as connection:
+        assert connection.exec_driver_sql("SHOW synchronous_commit").scalar_one() == "on"
 
 
 def test_text_that_postgresql_does_not_have_is_refused(database: Database) -> None:
