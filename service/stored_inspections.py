@@ -29,6 +29,7 @@ def answers(connection: Connection, rows: Sequence[InspectionRow]) -> list[dict[
             "received_at": row.received_at,
             "received_by": row.received_by,
             "state": row.state,
+            "duplicate": False,
             "photographs": [photograph_answer(photograph) for photograph in photographs[row.inspection_key]],
         }
         for row in rows

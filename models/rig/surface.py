@@ -5,7 +5,8 @@
 for R_a and R_sk alike, with the mean COF μ. The reference measured both ends, each the average of eight radial places of
 one wafer block: R_a fell from 9.52 to 1.94 µm and R_sk from -0.87 to -3.4 over its tests, the lining had become smooth and
 flat. It says nothing of the states between, and nothing of other clutches: that the surface goes with the loss of COF and
-is the reference's worn one where half of it is lost is assumed here.
+is the reference's worn one where half of it is lost is assumed here. The reference prints no scatter of its averages: none
+is added.
 
 Source: Ompusunggu, Janssens, Sas, ISRN Tribology 2013, 607279, section 3, figs. 4 and 5.
 """

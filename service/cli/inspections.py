@@ -47,7 +47,11 @@ def inspect(
         address = f"{address}/{inspection['inspection_id']}"
         for path, media_type in photographs.items():
             service.post_photograph(f"{address}/photographs", path, media_type)
-        _show([service.get(address)])
+        inspection = service.get(address)
+    _show([inspection])
+    if inspection["state"] == "withdrawn":
+        text = "was stored before and withdrawn since: it stays withdrawn until it is restored on the clutch's page"
+        out.print(f"{inspection['inspection_id']} {text}", markup=False, soft_wrap=True)
 
 
 def inspections(

@@ -13,6 +13,7 @@ from service.run_files import manifest
 if TYPE_CHECKING:
     from models.rig.programme import Programme
     from models.rig.simulated_runs import SimulatedRun
+    from models.rig.surface import Surface
     from service.run_files.record_writer import RecordFormat
 
 #: The campaign ends at this share of the mean COF when new. Chosen: a little below the end of life at 0.5.
@@ -54,13 +55,16 @@ def simulate(
 ) -> None:
     """Simulate a clutch's life on the rig and write it, a file a run; `clutchlife push` sends it.
 
+    The lining's roughness and skewness at each stationary test are written too, into a folder of inspections.
+
     What --hide hides is in answer.json beside the runs, which push does not send; friction lags speed then as in the
     service's own model, so that nothing else is there to be found. An unknown effect lists all of them.
 
     Run-in and duty blocks are JSON whatever the format. Tests in another format are listed in runs.json, which push reads.
     """
-    from models.rig import campaign, hidden, plate, stationary  # start-up time
+    from models.rig import campaign, hidden, plate, stationary, surface  # start-up time
     from models.rig.hysteresis import ATTRACTOR  # start-up time
+    from models.rig.simulated_runs import RunKind  # start-up time
     from service.run_files import record_writer, simulated  # start-up time
 
     with errors_in_a_line():
@@ -91,6 +95,8 @@ def simulate(
                 if plate_rise is not None:
                     made = plate.with_plate(made, clutch.geometry, plate_rise)
                 listed += _write(out_folder, made, record_format)
+                if run.kind is RunKind.STATIONARY_STRIBECK:
+                    _inspect(out_folder, surface.surface(clutch, run.wear), run.cycles)
                 wear_and_cycles.append((run.wear, run.cycles))
         if listed:
             manifest.write(out_folder / manifest.MANIFEST, listed)
@@ -147,6 +153,16 @@ def _write(folder: Path, run: "SimulatedRun", record_format: "RecordFormat") -> 
     head, name = simulated.simulated_head(run), f"{run.run_id}{record_format.suffix}"
     record_writer.write_record(folder / name, record_format, simulated.simulated_channels(run), head)
     return [{"file": name} | head]
+
+
+def _inspect(folder: Path, surface: "Surface", cycles: float) -> None:
+    """The inspection of a lining into a file of its own."""
+    from service.run_files import simulated  # start-up time
+
+    inspections = folder / manifest.INSPECTIONS
+    inspections.mkdir(exist_ok=True)
+    body = simulated.simulated_inspection(surface, cycles)
+    manifest.write(inspections / f"inspection-{cycles:05.0f}.json", body)
 
 
 def _progress() -> Progress:

@@ -1,44 +1,56 @@
-"""`/series`: flat rows for dashboards and spreadsheets, every fitted quantity and then the predictions."""
+"""`/series`: flat rows for dashboards and spreadsheets, every fitted quantity and then the predictions.
 
-from collections.abc import Iterator
+Every row is stored or follows in closed form from a stored fit, as the slopes do: nothing is fitted or tracked here.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from models.clutch import Geometry
 from models.friction.criteria import Z90
 from service import measured_lives, records
-from service.columns import whole
+from service.columns import bar, whole
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF
 from service.lives.engagements.over_life import ALL_INDICATORS
 from service.lives.history import DYNAMIC, STATIONARY
 from service.lives.payloads import PARAMETER_UNITS
-from service.lives.quantities.measured import LOOP_COLUMNS, rounded_frequency
-from service.lives.quantities.names import QUANTITIES
+from service.lives.quantities.measured import LOOP_COLUMNS, curves_of, rounded_frequency, slope_of
+from service.lives.quantities.names import QUANTITIES, SLOPE, SLOPE_SPEEDS
+from service.lives.run_analysis import LevelFit
+from service.schemas.clutch import ClutchIn
 from storage import results, runs
 from storage.engine.database import Database
 from storage.results import PredictionRow
+from storage.runs import RunRow
 
-#: Over all pressures, and at no frequency.
-_NOWHERE = {"pressure_bar": None, "frequency_hz": None}
+#: Over all pressures, and at no frequency or speed.
+_NOWHERE = {"pressure_bar": None, "frequency_hz": None, "speed_rpm": None}
 
 
 def series(database: Database, clutch_id: str, quantity: str | None) -> list[dict[str, Any]]:
-    """Each quantity of each test by cycles, of each friction loop, the indicators of each engagement, then the remaining
-    cycles as they were predicted; of one quantity, or of all.
+    """Each quantity of each test by cycles, the slopes of its curves, those of each friction loop, the indicators of each
+    engagement, then the remaining cycles as they were predicted; of one quantity, or of all.
 
     Raises NotFoundError.
     """
     with database.reading() as connection:
-        records.clutch(connection, clutch_id)
+        clutch = records.clutch(connection, clutch_id)
         rows = runs.page(connection, clutch_id, kind=STATIONARY, state=runs.ACCEPTED)
+        levels = records.levels(connection, clutch_id) if quantity in (None, SLOPE) else {}
         of_loops = quantity is None or quantity in LOOP_COLUMNS
         dynamic = runs.page(connection, clutch_id, kind=DYNAMIC, state=runs.ACCEPTED) if of_loops else []
         engaged = measured_lives.engagements(connection, clutch_id)
         predicted = results.predictions_of(connection, clutch_id, "particle", ALL_PRESSURES)
     measured = (item for row in rows for fit in row.receipt["fits"] for item in _measured(row.receipt, fit))
+    slopes = _slopes(records.record(clutch), rows, levels)
     lags = (item for row in dynamic for loop in row.receipt["loops"] for item in _of_loop(row.receipt, loop))
     indicators = (item for row in engaged for item in _indicators(row))
     ahead = (item for row in predicted for item in _predicted(row))
     return [
-        item for items in (measured, lags, indicators, ahead) for item in items if quantity in (None, item["quantity"])
+        item
+        for items in (measured, slopes, lags, indicators, ahead)
+        for item in items
+        if quantity in (None, item["quantity"])
     ]
 
 
@@ -49,6 +61,26 @@ def _measured(receipt: dict[str, Any], fit: dict[str, Any]) -> Iterator[dict[str
     of_run = _of_run(receipt) | {"pressure_bar": fit["pressure_bar"]}
     for quantity, unit, value, sd in values:
         yield of_run | _row(quantity, unit, value, sd)
+
+
+def _slopes(
+    record: ClutchIn, rows: Sequence[RunRow], levels: Mapping[str, Sequence[LevelFit]]
+) -> Iterator[dict[str, Any]]:
+    """dμ/dv of every fitted curve, at the usual speeds and those of the clutch's criteria."""
+    geometry = record.geometry.to_model()
+    limits = record.end_of_life.criteria
+    speeds = sorted({*SLOPE_SPEEDS, *(limit.speed_rpm for limit in limits if limit.speed_rpm is not None)})
+    for row in rows:
+        for curve in curves_of(levels.get(row.run_id, ())):
+            for speed in speeds:
+                yield from _slope(row.receipt, curve, geometry, speed)
+
+
+def _slope(receipt: dict[str, Any], curve: LevelFit, geometry: Geometry, speed_rpm: float) -> Iterator[dict[str, Any]]:
+    slope = slope_of(curve, geometry, speed_rpm)
+    if slope is not None:
+        place = {"pressure_bar": bar(curve.fit.pressure), "speed_rpm": speed_rpm}
+        yield _of_run(receipt) | _row(SLOPE, QUANTITIES[SLOPE].unit, *slope) | place
 
 
 def _of_loop(receipt: dict[str, Any], loop: dict[str, Any]) -> Iterator[dict[str, Any]]:

@@ -1,4 +1,5 @@
-"""A folder of runs: JSON files that are posted as they are, record files listed in a manifest, `clutch.json` for the clutch.
+"""A folder of runs: JSON files that are posted as they are, record files listed in a manifest, `clutch.json` for the clutch,
+and in a folder `inspections` the JSON bodies of inspections.
 
 The manifest, `runs.json`, holds for each record file (CSV, TDMS, MDF4, Parquet) what its channels do not:
 
@@ -18,6 +19,8 @@ from typing import Any
 
 CLUTCH_FILE = "clutch.json"
 MANIFEST = "runs.json"
+#: The folder of inspections in one of runs.
+INSPECTIONS = "inspections"
 #: What was hidden in a simulated campaign: for who rehearses a diagnosis, and no run.
 ANSWER = "answer.json"
 #: Cycles from which a file is not taken for a run. Chosen: far beyond what the service accepts (`schemas.limits`).
@@ -28,10 +31,15 @@ _RECORDS = (".csv", ".txt", ".tdms", ".mf4", ".mdf", ".parquet")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunFile:
-    """A run's file and the parameters that the manifest has for it; None for JSON and for a record that is not listed."""
+    """A file to send and the parameters that the manifest has for it; None for JSON and for a record that is not listed."""
 
     path: Path
     parameters: Mapping[str, str] | None = None
+
+    @property
+    def of_inspection(self) -> bool:
+        """Whether it is an inspection's: JSON in a folder of them."""
+        return self.path.suffix == ".json" and self.path.absolute().parent.name == INSPECTIONS
 
 
 def write(path: Path, body: Mapping[str, Any] | Sequence[Mapping[str, Any]]) -> None:
@@ -42,7 +50,7 @@ def write(path: Path, body: Mapping[str, Any] | Sequence[Mapping[str, Any]]) -> 
 
 
 def find(paths: Iterable[Path]) -> list[RunFile]:
-    """The files at `paths`, and the runs in the folders among them, those of a folder sorted by cycles.
+    """The files at `paths`, and the runs and inspections in the folders among them, those of a folder sorted by cycles.
 
     Raises FileNotFoundError for a path that does not exist, ValueError for a manifest that is wrong and for a file of a
     folder that lies outside it.
@@ -60,12 +68,13 @@ def find(paths: Iterable[Path]) -> list[RunFile]:
 
 
 def _in_folder(folder: Path) -> list[RunFile]:
-    """The runs of a folder by cycles, then by name."""
+    """The runs and inspections of a folder by cycles, then by name."""
     runs = [
         (float(parameters["cycles"]), RunFile(path=path, parameters=parameters))
         for path, parameters in _listed(folder).items()
     ]
     bodies = [path for path in folder.glob("*.json") if path.name not in (CLUTCH_FILE, MANIFEST, ANSWER)]
+    bodies += (folder / INSPECTIONS).glob("*.json")
     for path in (*bodies, folder / CLUTCH_FILE, folder / MANIFEST):
         _require_within(folder, path, str(path))
     runs += [(_cycles(path), RunFile(path=path)) for path in bodies]

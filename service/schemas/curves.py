@@ -71,8 +71,8 @@ class SeriesItem(Answer):
     time: str | None = Field(description="When the run was started, else received, ISO 8601; null for predictions")
     run_id: str | None = Field(description="The run's name; null for predictions")
     quantity: str = Field(
-        description="A fitted quantity, one of a friction loop, an indicator of an engagement, or one of the prediction "
-        "at these cycles"
+        description="A fitted quantity, the slope dμ/dv of a curve, one of a friction loop, an indicator of an "
+        "engagement, or one of the prediction at these cycles"
     )
     unit: str = Field(description="Its unit")
     pressure_bar: float | None = Field(
@@ -82,6 +82,7 @@ class SeriesItem(Answer):
     lower: float | None = Field(description="5 % quantile")
     upper: float | None = Field(description="95 % quantile")
     frequency_hz: float | None = Field(description="Frequency of a friction loop, Hz, to two digits; null for all else")
+    speed_rpm: float | None = Field(description="Speed of a slope, rpm; null for all else")
 
 
 class SeriesPage(Answer):

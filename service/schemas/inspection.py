@@ -67,6 +67,7 @@ class InspectionOut(Answer):
     received_at: str = Field(description="When it was stored; UTC, ISO 8601")
     received_by: str = Field(description="Who posted it: `key:` with the key's id and note, or `local`")
     state: Literal["accepted", "withdrawn"] = Field(description="Whether it holds: `withdrawn` until it is restored")
+    duplicate: bool = Field(description="Whether the inspection was stored before this request")
     photographs: list[PhotographOut] = Field(description="Its photographs, in the order in which they came")
 
 

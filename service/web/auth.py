@@ -24,6 +24,8 @@ from storage.keys import KeyRow
 
 Scope = Literal["read", "ingest", "admin"]
 SCOPES: tuple[Scope, ...] = get_args(Scope)
+#: What a request is called that no route answers.
+UNMATCHED = "unmatched"
 #: The caller's name where no keys are configured.
 LOCAL = "local"
 #: Headers by which proxies say that a request is another's; all that begin with the prefix, too.
@@ -211,6 +213,11 @@ def clutch_of(request: Request) -> str | None:
     """The clutch that the path names."""
     clutch_id: str | None = request.scope["path_params"].get("clutch_id")
     return clutch_id
+
+
+def route_of(request: Request) -> str:
+    """What logs and metrics call the request's address: its route's template, which says nothing that its path names."""
+    return getattr(request.scope.get("route"), "path", UNMATCHED)
 
 
 def name_of_caller(request: Request) -> str:

@@ -22,7 +22,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.errors import ServiceError, TooLargeError, TooManyError, TooSlowError
 from service.logging import access, log_request, request_id, sane
-from service.web.auth import authorise, caller_of, clutch_of, context_of
+from service.web.auth import UNMATCHED, authorise, caller_of, clutch_of, context_of, route_of
 from service.web.limits import (
     MOST_CALLERS,
     MOST_POLLED,
@@ -234,8 +234,8 @@ class Edge:
             self._note(scope, status or 500, size, time.perf_counter() - started)
 
     def _note(self, scope: Scope, status: int, size: int, seconds: float) -> None:
-        route = getattr(scope.get("route"), "path", "unmatched")
-        method = scope["method"] if route != "unmatched" else "any"
+        route = route_of(Request(scope))
+        method = scope["method"] if route != UNMATCHED else "any"
         self.metrics.requests.labels(method, route, str(status)).inc()
         self.metrics.seconds.labels(method, route).observe(seconds)
         level = WARNING if status >= 500 else DEBUG if status == 304 or route in _PROBES else INFO

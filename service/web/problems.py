@@ -29,6 +29,7 @@ from service.errors import (
 from service.logging import request_id
 from service.queries.cache import to_json
 from service.schemas.problem import Problem
+from service.web.auth import route_of
 from service.web.limits import RETRY_AFTER_SECONDS
 from storage.engine.errors import DatabaseBusy, StorageError, UnstorableText
 
@@ -135,7 +136,7 @@ def _system_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, OSError)  # noqa: S101  (registered for it)
     if error.errno not in _NO_ROOM:
         return unexpected(request, error)
-    _log.error("%s %s: %s", request.method, request.url.path, error)
+    _log.error("%s %s: %s", request.method, route_of(request), error)
     detail = (
         f"the service's disk has no room for the file ({error.strerror}): nothing was stored; make room and send it again. "
         "The parts of a form are kept in the system's folder of temporary files, which may be small: send the file as the "
@@ -146,7 +147,7 @@ def _system_error(request: Request, error: Exception) -> Response:
 
 def unexpected(request: Request, error: Exception) -> Response:
     """The answer for an error of the program, which the log says all of and the answer nothing."""
-    _log.error("%s %s", request.method, request.url.path, exc_info=error)
+    _log.error("%s %s", request.method, route_of(request), exc_info=error)
     return problem(500, ServiceError.slug, ServiceError.title, "the service's log says more")
 
 

@@ -45,7 +45,7 @@ def inspect(database: Database, clutch_id: str, sent: InspectionIn, *, by: str, 
         new = inspections.get(connection, clutch_id, row.inspection_id) is None
         if new:
             inspections.insert(connection, row)
-        return _answer(connection, clutch_id, row.inspection_id), new
+        return _answer(connection, clutch_id, row.inspection_id) | {"duplicate": not new}, new
 
 
 def add_photograph(

@@ -23,18 +23,26 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_campaign_is_simulated_the_same_each_time(campaign: Path, tmp_path: Path) -> None:
     clutchlife("simulate", "--seed", "7", "--no-dynamic", "--out", tmp_path / "again")
-    names = sorted(path.name for path in campaign.iterdir())
-    assert names == sorted(path.name for path in (tmp_path / "again").iterdir())
+    names = sorted(path.relative_to(campaign) for path in campaign.rglob("*.json"))
+    assert names == sorted(path.relative_to(tmp_path / "again") for path in (tmp_path / "again").rglob("*.json"))
+    assert Path("inspections/inspection-07000.json") in names
     for name in names:
         assert (campaign / name).read_bytes() == (tmp_path / "again" / name).read_bytes()
         assert json.loads((campaign / name).read_bytes())["origin"] == "simulated"
 
 
 def test_a_campaign_is_pushed_exported_and_pushed_again(campaign: Path, server: Server, tmp_path: Path) -> None:
-    runs = len(list(campaign.iterdir())) - 1
+    runs, inspections = len(list(campaign.glob("*.json"))) - 1, len(list(campaign.glob("inspections/*.json")))
     push = ("push", campaign, "--clutch", "sim-7", "--url", server.url, "--spool", tmp_path / "spool")
-    assert f"{runs} stored, 0 known already, 0 refused" in clutchlife(*push)
-    assert f"0 stored, {runs} known already, 0 refused" in clutchlife(*push)
+    assert f"{runs + inspections} stored, 0 known already, 0 refused" in clutchlife(*push)
+    assert f"0 stored, {runs + inspections} known already, 0 refused" in clutchlife(*push)
+    inspected = ONCE.get(f"{server.url}/v1/clutches/sim-7/inspections").json()["items"]
+    tests = ONCE.get(f"{server.url}/v1/clutches/sim-7/stribeck?limit=1000").json()["items"]
+    assert [item["cycles"] for item in inspected] == [item["cycles"] for item in tests]
+    assert len(inspected) == inspections
+    roughness = [item["roughness_um"] for item in inspected]
+    assert (roughness[0], roughness) == (9.52, sorted(roughness, reverse=True))
+    assert {item["origin"] for item in inspected} == {"simulated"}
     address = "/v1/clutches/sim-7/remaining-useful-life"
     first = ONCE.get(server.url + address).json()
     assert (first["status"], first["origin"]) == ("reached", "simulated")

@@ -1,5 +1,6 @@
 """A service in this process, with a database of its own for each test."""
 
+import logging
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -7,6 +8,19 @@ import pytest
 from fastapi.testclient import TestClient
 
 from tests.service.clients import client_on
+
+
+@pytest.fixture(autouse=True)
+def unchanged_loggers() -> Iterator[None]:
+    """What `configure` changes is of the whole process."""
+    root = logging.getLogger()
+    names = (None, "clutchlife", "uvicorn")
+    handlers, levels = list(root.handlers), [logging.getLogger(name).level for name in names]
+    yield
+    logging.captureWarnings(False)
+    root.handlers[:] = handlers
+    for name, level in zip(names, levels, strict=True):
+        logging.getLogger(name).setLevel(level)
 
 
 @pytest.fixture

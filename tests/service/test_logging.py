@@ -4,7 +4,6 @@ import io
 import json
 import logging
 import sys
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -12,19 +11,6 @@ import pytest
 from service.logging import JsonLines, LogFormat, LogLevel, TextLines, configure, log_request, request_id, sane
 
 FORGED = 'x\n2026-01-01T00:00:00.000Z INFO clutchlife: key revoked\r\n{"level": "info"}\x85\u2028\x1b[2Jy'
-
-
-@pytest.fixture(autouse=True)
-def unchanged_loggers() -> Iterator[None]:
-    """What `configure` changes is of the whole process."""
-    root = logging.getLogger()
-    names = (None, "clutchlife", "uvicorn")
-    handlers, levels = list(root.handlers), [logging.getLogger(name).level for name in names]
-    yield
-    logging.captureWarnings(False)
-    root.handlers[:] = handlers
-    for name, level in zip(names, levels, strict=True):
-        logging.getLogger(name).setLevel(level)
 
 
 def record(message: str, *arguments: object, error: BaseException | None = None, **fields: Any) -> logging.LogRecord:

@@ -1,4 +1,4 @@
-"""What waits in a spool, sent: each run is stored, refused, or stays."""
+"""What waits in a spool, sent: each run or inspection is stored, refused, or stays."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,12 +7,15 @@ from typing import Any
 from service.cli.sending import entry as entries
 from service.cli.sending.answers import RefusedError, ServiceAwayError
 from service.cli.sending.client import NoLongerWantedError, Service
-from service.cli.sending.entry import Entry
+from service.cli.sending.entry import INSPECTIONS, RUNS, Entry
 from service.cli.sending.spool import Spool
 
 #: Runs in a row that an otherwise present service does not answer, after which it is taken to be away. Chosen: one run that
 #: it cannot take must not hold up the others; two cost twice the patience.
 _MOST_UNANSWERED = 2
+
+#: What receipts call the name of a run and of an inspection.
+_NAMES = {RUNS: "run_id", INSPECTIONS: "inspection_id"}
 
 Report = Callable[[str], None]
 
@@ -64,10 +67,10 @@ def _present(service: Service, spool: Spool) -> bool:
 
 
 def _send(service: Service, spool: Spool, entry: Entry, sent: Sent, report: Report) -> None:
-    """One run; raises NoLongerWantedError where it waits no more, and what `deliver` raises."""
+    """One entry; raises NoLongerWantedError where it waits no more, and what `deliver` raises."""
     answer = "sent, and no answer was received"
     spool.note(entry, tries=entry.tries + 1, last_try=entries.stamp(), last_answer=answer, perhaps_stored=True)
-    address = f"/v1/clutches/{spool.clutch_id}/runs" + ("" if entry.parameters is None else "/file")
+    address = f"/v1/clutches/{spool.clutch_id}/{entry.resource}" + ("" if entry.parameters is None else "/file")
     try:
         receipt = service.post_file(address, spool.body(entry), entry.parameters, lambda: spool.awaits(entry))
     except FileNotFoundError as error:
@@ -83,13 +86,13 @@ def _send(service: Service, spool: Spool, entry: Entry, sent: Sent, report: Repo
         sent.refused += 1
         _refused(spool, entry, error, report)
         return
-    if not {"run_id", "duplicate"} <= receipt.keys():
+    if not {_NAMES[entry.resource], "duplicate"} <= receipt.keys():
         raise ServiceAwayError(f"{service.http.base_url}: the answer is no receipt, so it is not the service's")
     sent.unanswered = 0
     sent.duplicates += bool(receipt["duplicate"])
     sent.stored += not receipt["duplicate"]
     waited = spool.done(entry)
-    for line in _remarks(receipt, spool, waited=waited):
+    for line in _remarks(receipt, receipt[_NAMES[entry.resource]], spool, waited=waited):
         report(line)
 
 
@@ -110,24 +113,24 @@ def _refused(spool: Spool, entry: Entry, error: RefusedError, report: Report) ->
         )
 
 
-def _remarks(receipt: dict[str, Any], spool: Spool, *, waited: bool) -> list[str]:
-    """What the sender has to know of a stored run: that it is doubted, or not what was sent any more."""
-    run_id, cycles = receipt["run_id"], receipt.get("cycles")
+def _remarks(receipt: dict[str, Any], name: str, spool: Spool, *, waited: bool) -> list[str]:
+    """What the sender has to know of what was stored: that it is doubted, or not what was sent any more."""
+    cycles = receipt.get("cycles")
     sent_cycles = receipt.get("sent_cycles", cycles)
     lines = []
     if receipt.get("state") == "withdrawn":
-        lines.append(f"{run_id} was stored before and withdrawn since: it stays withdrawn, and waits no more")
+        lines.append(f"{name} was stored before and withdrawn since: it stays withdrawn, and waits no more")
     if receipt.get("state") == "held":
         doubts = "; ".join(str(doubt.get("message")) for doubt in receipt.get("doubts", ()))
-        lines.append(f"{run_id} is held: {doubts}")
+        lines.append(f"{name} is held: {doubts}")
     if receipt["duplicate"] and cycles != sent_cycles:
         lines.append(
-            f"{run_id} was stored before and corrected since, from {sent_cycles:g} to {cycles:g} cycles: it stays "
+            f"{name} was stored before and corrected since, from {sent_cycles:g} to {cycles:g} cycles: it stays "
             "corrected, and waits no more"
         )
     if not waited:
         lines.append(
-            f"{run_id} was stored while a newer version of it was pushed: if both are stored, withdraw this one: "
-            f"clutchlife withdraw {spool.clutch_id} {run_id}"
+            f"{name} was stored while a newer version of it was pushed: if both are stored, withdraw this one, a run by: "
+            f"clutchlife withdraw {spool.clutch_id} {name}"
         )
     return lines

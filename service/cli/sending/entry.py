@@ -1,4 +1,4 @@
-"""A run in the spool: the bytes that will be sent, and beside them what is known of it, as JSON in `NAME.entry`.
+"""A run or an inspection in the spool: the bytes that will be sent, and what is known of it, as JSON in `NAME.entry`.
 
 Earlier releases wrote no `.entry`: `NAME.json` was a body, and `NAME.run` a record file with the parameters of its
 request in `NAME.asked`. They are read as entries of which less is known.
@@ -15,13 +15,15 @@ from service.cli.sending.run_head import RunHead
 
 #: What is known of a run; its bytes; the same two of earlier releases, and their parameters; the answer to a refused run.
 ENTRY, BODY, OLD_BODIES, OLD_PARAMETERS, PROBLEM = ".entry", ".body", (".json", ".run"), ".asked", ".problem"
+#: What is sent to, below the clutch's address.
+RUNS, INSPECTIONS = "runs", "inspections"
 #: A file that is being written.
 PARTIAL = ".part"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """One run in a folder of the spool. `stem` is its number and its content's digest, the name of its files.
+    """One run or inspection in a folder of the spool. `stem` is its number and its content's digest, the name of its files.
 
     `failures`: tries at which the service was there and did not take the run; `perhaps_stored`: a try may have been carried
     out without an answer.
@@ -32,6 +34,7 @@ class Entry:
     since: str
     url: str | None = None
     clutch_id: str | None = None
+    resource: str = RUNS
     parameters: dict[str, str] | None = None
     head: RunHead = field(default_factory=RunHead)
     sources: tuple[str, ...] = ()

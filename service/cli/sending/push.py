@@ -8,7 +8,7 @@ import typer
 
 from service.cli.options import EX_DATAERR, EX_USAGE, URL, Key, Patience, Url, errors_in_a_line, fail
 from service.cli.sending.client import Service
-from service.cli.sending.entry import Entry
+from service.cli.sending.entry import INSPECTIONS, RUNS, Entry
 from service.cli.sending.spool import Spool, default_folder
 from service.cli.sending.transmission import say, transmit
 from service.run_files import manifest
@@ -30,6 +30,8 @@ def push(
 ) -> None:
     """Send run files: JSON, or CSV, TDMS, MDF4 and Parquet, with their kind and cycles in a runs.json or in options.
 
+    JSON files in a folder named inspections are sent as inspections.
+
     Runs that the service cannot store now wait in the spool and are sent first next time. A file that is pushed again with
     other content takes the place of the version that waits.
     """
@@ -41,9 +43,14 @@ def push(
         for record in manifest.unlisted(paths):
             say(f"{record} is not listed in {manifest.MANIFEST} and not sent")
         waiting = Spool.of(spool, url, clutch)
-        digests, replaced = waiting.add([_request(file, kind, cycles, channel_map) for file in files])
-        for entry in replaced:
-            say(_replacement(waiting, entry))
+        runs = [_request(file, kind, cycles, channel_map) for file in files if not file.of_inspection]
+        inspections = [(file.path, None) for file in files if file.of_inspection]
+        digests: set[str] = set()
+        for resource, requests in ((RUNS, runs), (INSPECTIONS, inspections)):
+            added, replaced = waiting.add(requests, resource)
+            digests |= added
+            for entry in replaced:
+                say(_replacement(waiting, entry))
         _warn_of_others(waiting, digests)
         transmit([waiting], url, key, patience, lambda service, _: _register(service, clutch, paths))
 

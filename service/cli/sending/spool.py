@@ -1,4 +1,4 @@
-"""Runs that are still to be sent, kept on disk until the service has stored them.
+"""Runs and inspections that are still to be sent, kept on disk until the service has stored them.
 
 A run is copied into the spool before it is sent and removed when the service has answered that it is stored (now or
 earlier), so a crash or a power cut on the sender's side loses nothing. A run that the service refuses is moved to
@@ -16,7 +16,7 @@ from typing import Any
 
 from service.cli.sending import entry as entries
 from service.cli.sending import run_head, spool_files
-from service.cli.sending.entry import BODY, ENTRY, PARTIAL, PROBLEM, Entry
+from service.cli.sending.entry import BODY, ENTRY, PARTIAL, PROBLEM, RUNS, Entry
 from service.cli.sending.folder_lock import locked
 from service.cli.sending.run_head import same_run
 from service.cli.sending.spool_files import REFUSED, REPLACED
@@ -110,8 +110,8 @@ class Spool:
         with self._changing():
             spool_files.mend(self.folder, self.url, self.clutch_id)
 
-    def add(self, files: RunFiles) -> tuple[set[str], list[Entry]]:
-        """Keep runs: JSON bodies (no parameters), or files with the parameters of their requests.
+    def add(self, files: RunFiles, resource: str = RUNS) -> tuple[set[str], list[Entry]]:
+        """Keep runs: JSON bodies (no parameters), or files with the parameters of their requests; or inspections' bodies.
 
         The same content is kept once. An older version that waits is replaced in the same instant in which the newer one is
         kept; files of one call do not replace each other. Returns the digests of what was added, and what was replaced.
@@ -124,7 +124,7 @@ class Spool:
             waiting = self._entries(self.folder)
             for (path, parameters), digest in zip(files, digests, strict=True):
                 present = next((other for other in waiting if other.whole and other.digest == digest), None)
-                entry = present or self._kept(_next(waiting), path, parameters)
+                entry = present or self._kept(_next(waiting), path, parameters, resource)
                 source = str(path.resolve())
                 older = [other for other in waiting if _older(other, entry, source, batch)]
                 self._wait(entry, older, source)
@@ -140,7 +140,7 @@ class Spool:
             sources = (*(other for other in entry.sources if other != source), source)
             spool_files.store(self.folder, replace(entry, sources=sources), older)
 
-    def _kept(self, number: int, path: Path, parameters: Mapping[str, str] | None) -> Entry:
+    def _kept(self, number: int, path: Path, parameters: Mapping[str, str] | None, resource: str) -> Entry:
         """The bytes of a run copied into the spool; its entry is still to be stored."""
         partial = self.folder / f"{number:08d}{PARTIAL}"
         sha256 = hashlib.sha256()
@@ -164,6 +164,7 @@ class Spool:
             since=entries.stamp(),
             url=self.url,
             clutch_id=self.clutch_id,
+            resource=resource,
             parameters=None if parameters is None else dict(parameters),
             head=head,
         )

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from service.cli.options import EX_DATAERR, EX_TEMPFAIL, URL, Key, Patience, Url, errors_in_a_line, fail, out
-from service.cli.sending.entry import Entry
+from service.cli.sending.entry import INSPECTIONS, Entry
 from service.cli.sending.folder_lock import HeldError
 from service.cli.sending.push import SPOOL, SpoolFolder
 from service.cli.sending.spool import Spool
@@ -130,6 +130,7 @@ def _item(run: Kept) -> dict[str, Any]:
         "state": run.state,
         "clutch_id": run.spool.clutch_id,
         "url": run.spool.url,
+        "resource": entry.resource,
         "run_id": head.run_id,
         "files": list(entry.sources),
         "kind": head.kind,
@@ -159,6 +160,7 @@ def _print(kept: list[Kept]) -> None:
 
 def _line(run: Kept) -> str:
     entry, head = run.entry, run.entry.head
+    kind = "inspection" if entry.resource == INSPECTIONS else head.kind or "kind not stated"
     cycles = "cycles not stated" if head.cycles is None else f"{head.cycles:g} cycles"
     tried = (
         "not tried yet" if not entry.tries else f"tried {entry.tries} times, last {entry.last_try}: {entry.last_answer}"
@@ -170,4 +172,4 @@ def _line(run: Kept) -> str:
         tried = "not kept whole: push its file again"
     elif run.state == REPLACED:
         tried = "a newer version was pushed"
-    return f"{run.state:<8}  {entry.label}  {head.kind or 'kind not stated'}  {cycles}  since {entry.since}  {tried}"
+    return f"{run.state:<8}  {entry.label}  {kind}  {cycles}  since {entry.since}  {tried}"

@@ -73,18 +73,14 @@ class MeasuredLife:
         return self.life.series(self.assumptions, quantity.internal, ALL_PRESSURES, at_events)
 
     def _slopes(self, level: float, speed_rpm: float) -> Series:
-        velocity = float(self.geometry.sliding_velocity(np.array(speed_rpm * RADIANS_PER_SECOND_PER_RPM)))
-        values = [self._slope(levels, level, velocity) for levels in self.tests]
+        values = [self._slope(levels, level, speed_rpm) for levels in self.tests]
         series = self.life.series(self.assumptions, f"{SLOPE}@{speed_rpm:g}rpm", level, values)
         return replace(series, speed_rpm=speed_rpm)
 
-    def _slope(self, levels: Sequence[LevelFit], level: float, velocity: float) -> Value | None:
-        fits = {fitted.fit.pressure: fitted for fitted in levels if fitted.speeds >= FEWEST_SPEEDS}
-        near = nearest_pressure(level, list(fits))
-        if near is None:
-            return None
-        slope = cof_slope(fits[near].fit, velocity, self.geometry.torque_per_cof(fits[near].mean_pressure))
-        return None if slope is None else (slope.value, slope.sd)
+    def _slope(self, levels: Sequence[LevelFit], level: float, speed_rpm: float) -> Value | None:
+        curves = {curve.fit.pressure: curve for curve in curves_of(levels)}
+        near = nearest_pressure(level, list(curves))
+        return None if near is None else slope_of(curves[near], self.geometry, speed_rpm)
 
     def _of_loops(self, quantity: Quantity) -> Iterator[Series]:
         """Each pressure by itself, and never two frequencies in one series."""
@@ -103,6 +99,18 @@ class MeasuredLife:
                 name = f"{quantity.internal}@{frequency:g}Hz"
                 at_level = [nearest(level, of_event) for of_event in values]
                 yield replace(self.life.series(self.assumptions, name, level, at_level), frequency_hz=frequency)
+
+
+def curves_of(levels: Sequence[LevelFit]) -> list[LevelFit]:
+    """The levels of a test that were measured at enough speeds for a curve."""
+    return [fitted for fitted in levels if fitted.speeds >= FEWEST_SPEEDS]
+
+
+def slope_of(curve: LevelFit, geometry: Geometry, speed_rpm: float) -> Value | None:
+    """dμ/dv of a fitted curve at a speed > 0 and its standard error [s/m]; None of a curve without friction."""
+    velocity = float(geometry.sliding_velocity(np.array(speed_rpm * RADIANS_PER_SECOND_PER_RPM)))
+    slope = cof_slope(curve.fit, velocity, geometry.torque_per_cof(curve.mean_pressure))
+    return None if slope is None else (slope.value, slope.sd)
 
 
 def _values(loops: Sequence[Mapping[str, Any]], columns: tuple[str, str], frequency: float) -> dict[float, Value]:

@@ -27,8 +27,7 @@ QuantityName = Literal["mean_cof", LevelQuantity, EngagementQuantity]
 #: Rows of `/series`.
 SeriesQuantity = Literal[
     "mean_cof",
-    ParameterQuantity,
-    LoopQuantity,
+    LevelQuantity,
     EngagementQuantity,
     "health",
     "remaining_cycles",

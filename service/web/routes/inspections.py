@@ -57,7 +57,8 @@ EXAMPLE = {
     "",
     status_code=201,
     response_model=InspectionOut,
-    responses=SENDING | {200: {"model": InspectionOut, "description": "The same inspection again"}},
+    responses=SENDING
+    | {200: {"model": InspectionOut, "description": "The same inspection again; withdrawn where its `state` says so"}},
     openapi_extra=described_body(InspectionIn, EXAMPLE),
 )
 async def post_inspection(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:

@@ -11,8 +11,10 @@ def test_campaigns_of_records_are_pushed_without_a_word_on_kind_and_cycles(serve
         folder = tmp_path / form
         assert "3 simulated runs" in clutchlife("simulate", "--out", folder, "--format", form, "--tests", "1")
         push = ("push", folder, "--clutch", form, "--url", server.url, "--spool", tmp_path / "spool")
-        assert "3 stored, 0 known already, 0 refused" in clutchlife(*push)
-        assert "0 stored, 3 known already, 0 refused" in clutchlife(*push)
+        assert "4 stored, 0 known already, 0 refused" in clutchlife(*push)
+        assert "0 stored, 4 known already, 0 refused" in clutchlife(*push)
+        (inspection,) = ONCE.get(f"{server.url}/v1/clutches/{form}/inspections").json()["items"]
+        assert (inspection["cycles"], inspection["roughness_um"], inspection["skewness"]) == (0, 9.52, -0.87)
         items = ONCE.get(f"{server.url}/v1/clutches/{form}/runs").json()["items"]
         runs: dict[str, dict[str, Any]] = {run["kind"]: run for run in items}
         assert set(runs) == {"run_in", "stationary_stribeck", "dynamic_stribeck"}
@@ -31,4 +33,4 @@ def test_a_record_that_no_manifest_lists_is_named(server: Server, tmp_path: Path
     push = ("push", folder, "--clutch", "sim-7", "--url", server.url, "--spool", tmp_path / "spool")
     output = clutchlife(*push)
     assert "lonely.csv is not listed in runs.json and not sent" in output
-    assert "2 stored" in output
+    assert "3 stored" in output

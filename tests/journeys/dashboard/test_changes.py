@@ -157,6 +157,15 @@ def test_a_held_run_is_confirmed_and_withdrawn_and_restored(
         "Withdrawn", "Restored", "Withdrawn", "Restored", "Withdrawn", "Confirmed", "Held on arrival",
     ]  # fmt: skip
 
+    # sent once more it stays withdrawn, and the receipt says so
+    drop(page, {"far.json": json.dumps(right(LAST) | {"run_id": "far", "cycles": 90_000})})
+    sending = page.get_by_role("dialog", name="Send a run")
+    sending.get_by_role("button", name="Send").click()
+    sending.get_by_text("It was withdrawn since, and stays so.").wait_for()
+    sending.get_by_role("link", name="Restore it in the list of runs").click()
+    expect(sending).to_have_count(0)
+    assert answers(server.url) == references["after"]
+
 
 def test_a_reason_is_asked_for_and_a_refusal_is_shown(watched: Watched, server: Server) -> None:
     page = opened(watched)

@@ -65,17 +65,96 @@ def test_roughness_and_skewness_are_charts_and_photographs_open_larger(
     thumbnails = section.get_by_role("button", name="show it larger")
     expect(thumbnails).to_have_count(2)
     thumbnails.last.scroll_into_view_if_needed()
-    expect(section.locator(".thumbnail img")).to_have_count(2)
+    expect(section.locator(".thumbnail canvas")).to_have_count(2)
     assert violations(page) == []
     thumbnails.first.click()
     dialog = page.get_by_role("dialog", name="Photograph 1 of 2 at 11,000 cycles, disc 2, side A")
-    image = dialog.get_by_role("img")
-    image.evaluate("(element) => element.decode()")
-    assert image.evaluate("(element) => element.naturalWidth") == 64
+    expect(dialog.get_by_role("img")).to_have_js_property("naturalWidth", 64)
     assert violations(page) == []
     dialog.get_by_role("button", name="Close").click()
     expect(thumbnails.first).to_be_focused()
     assert page.evaluate("document.documentElement.scrollWidth") <= viewport["width"]
+    watched.close()
+
+
+#: Counts the addresses of files that are held in memory, as an attribute of the page.
+_COUNTING = """
+const { createObjectURL, revokeObjectURL } = URL;
+const held = new Set();
+const note = () => { document.documentElement.dataset.held = String(held.size); };
+URL.createObjectURL = (file) => {
+  const address = createObjectURL.call(URL, file);
+  held.add(address);
+  note();
+  return address;
+};
+URL.revokeObjectURL = (address) => {
+  held.delete(address);
+  note();
+  revokeObjectURL.call(URL, address);
+};
+"""
+
+
+def polled(page: Page, times: int) -> None:
+    """Wait until the list of inspections was asked for so many times more."""
+    for _ in range(times):
+        page.wait_for_event("requestfinished", lambda request: "/inspections?" in request.url)
+
+
+def test_photographs_are_kept_small_and_drawn_again_only_where_they_changed(browser: Browser, bench: Server) -> None:
+    with httpx2.Client(base_url=bench.url, timeout=60) as http:
+        http.post("/v1/clutches", json={"clutch_id": "large"}).raise_for_status()
+        address = http.post("/v1/clutches/large/inspections", json=WORN).headers["location"]
+        http.post(f"{address}/photographs", content=png(size=1200), headers={"Content-Type": "image/png"})
+        watched = Watched(browser, bench.url)
+        watched.page.add_init_script(_COUNTING)
+        page = watched.open("/clutches/large")
+        section = page.locator("#inspections")
+        section.locator(".thumbnail").scroll_into_view_if_needed()
+        drawing = section.locator(".thumbnail canvas").first
+        assert drawing.evaluate("(canvas) => [canvas.width, canvas.height]") == [352, 352]
+        drawing.evaluate("(canvas) => { canvas.dataset.marked = 'drawing'; }")
+        listed = section.get_by_role("table", name="Inspections, by duty cycles")
+        listed.evaluate("(table) => { table.dataset.marked = 'table'; }")
+        holding = page.locator("html")
+        assert holding.get_attribute("data-held") is None
+
+        polled(page, 2)
+        expect(listed).to_have_attribute("data-marked", "table")
+        http.post(address.rsplit("/", 1)[0], json=FRESH).raise_for_status()
+        expect(listed.get_by_role("row")).to_have_count(3)
+        assert listed.get_attribute("data-marked") is None
+        expect(drawing).to_have_attribute("data-marked", "drawing")
+        assert len([url for url in watched.asked if "/photographs/" in url]) == 1
+
+        section.get_by_role("button", name="show it larger").click()
+        dialog = page.get_by_role("dialog", name="Photograph 1 of 1 at 11,000 cycles")
+        image = dialog.get_by_role("img")
+        expect(image).to_have_js_property("naturalWidth", 1200)
+        expect(holding).to_have_attribute("data-held", "1")
+        dialog.get_by_role("button", name="Close").click()
+        expect(holding).to_have_attribute("data-held", "0")
+    watched.close()
+
+
+def test_an_inspection_that_was_withdrawn_and_is_sent_again_is_said_to_stay_so(browser: Browser, bench: Server) -> None:
+    with httpx2.Client(base_url=bench.url, timeout=60) as http:
+        http.post("/v1/clutches", json={"clutch_id": "again"}).raise_for_status()
+        body = {"cycles": 7000, "roughness_um": 2.5}
+        address = http.post("/v1/clutches/again/inspections", json=body).headers["location"]
+        http.post(f"{address}/withdraw", json={"reason": "another disc"}).raise_for_status()
+        watched, page = opened(browser, bench, "again")
+        section = page.locator("#inspections")
+        section.get_by_text("Add an inspection").click()
+        section.get_by_label("Duty cycles since new").fill("7000")
+        section.get_by_label("Roughness Ra, µm").fill("2.5")
+        section.get_by_role("button", name="Send the inspection").click()
+        said = section.get_by_text("The inspection at 7,000 cycles was stored before and withdrawn since")
+        expect(said).to_contain_text("it stays withdrawn until it is restored in the table")
+        expect(section.get_by_text("is stored.")).to_have_count(0)
+        assert violations(page) == []
+        assert http.get(address).json()["state"] == "withdrawn"
     watched.close()
 
 
@@ -112,7 +191,7 @@ def test_an_inspection_is_sent_by_the_form_withdrawn_and_restored(browser: Brows
     rows = section.get_by_role("table", name="Inspections, by duty cycles").get_by_role("row")
     expect(rows).to_have_count(2)
     expect(rows.nth(1)).to_contain_text("2 Nov 2026")
-    expect(section.locator(".thumbnail img")).to_have_count(1)
+    expect(section.locator(".thumbnail canvas")).to_have_count(1)
     section.get_by_role("button", name="Withdraw the inspection at 7,000 cycles").click()
     dialog = page.get_by_role("dialog", name="Withdraw this inspection")
     dialog.get_by_label("Reason").fill("the other bench's disc")
@@ -122,7 +201,7 @@ def test_an_inspection_is_sent_by_the_form_withdrawn_and_restored(browser: Brows
     expect(section.locator(".thumbnail")).to_have_count(0)
     page.locator(".done").get_by_role("button", name="Undo").click()
     page.locator(".done").get_by_text("The inspection at 7,000 cycles is restored.").wait_for()
-    expect(section.locator(".thumbnail img")).to_have_count(1)
+    expect(section.locator(".thumbnail canvas")).to_have_count(1)
     # the browser notes every refusal in its console
     watched.said = [line for line in watched.said if "422" not in line]
     watched.close()
@@ -144,12 +223,12 @@ def test_with_keys_photographs_are_shown_and_sent_with_the_readers_key(browser: 
         page.keyboard.press("Enter")
         section = page.locator("#inspections")
         section.locator(".thumbnail").scroll_into_view_if_needed()
-        expect(section.locator(".thumbnail img")).to_have_count(1)
+        expect(section.locator(".thumbnail canvas")).to_have_count(1)
         section.get_by_text("Add an inspection").click()
         section.get_by_label("Duty cycles since new").fill("12000")
         section.get_by_label("Photographs").set_input_files([PICTURE])
         section.get_by_role("button", name="Send the inspection").click()
-        expect(section.locator(".thumbnail img")).to_have_count(2)
+        expect(section.locator(".thumbnail canvas")).to_have_count(2)
         section.get_by_role("button", name="Withdraw the inspection at 12,000 cycles").click()
         dialog = page.get_by_role("dialog", name="Withdraw this inspection")
         dialog.get_by_label("Reason").fill("a slip")

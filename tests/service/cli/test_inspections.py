@@ -48,6 +48,19 @@ def test_an_inspection_is_sent_with_its_photographs_and_repeated_safely(
     assert json.loads(terminal("inspections", "c1", "--json")) == [stored]
 
 
+def test_an_inspection_that_was_withdrawn_and_is_sent_again_is_said_to_stay_so(
+    terminal: Terminal, client: TestClient
+) -> None:
+    inspect = ("inspect", "c1", "--cycles", 11000, "--ra", 1.94)
+    assert "withdrawn" not in terminal(*inspect)
+    (stored,) = client.get(LIST).json()["items"]
+    address = f"{LIST}/{stored['inspection_id']}"
+    assert client.post(f"{address}/withdraw", json={"reason": "another disc"}).status_code == 200
+    shown = terminal(*inspect)
+    assert f"{stored['inspection_id']} was stored before and withdrawn since: it stays withdrawn" in shown
+    assert client.get(address).json()["state"] == "withdrawn"
+
+
 def test_a_photograph_alone_is_an_inspection_too(terminal: Terminal, client: TestClient, tmp_path: Path) -> None:
     assert "c1 has no inspections" in terminal("inspections", "c1")
     (tmp_path / "a.png").write_bytes(png())

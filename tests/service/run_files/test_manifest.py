@@ -31,6 +31,18 @@ class TestManifest:
         assert manifest.find([tmp_path / "c.TDMS"])[0].parameters is None
         assert [path.name for path in manifest.unlisted([tmp_path])] == ["c.TDMS"]
 
+    def test_finds_inspections_in_their_folder_among_the_runs_by_cycles(self, tmp_path: Path) -> None:
+        (tmp_path / "inspections").mkdir()
+        for name, cycles in (("a.json", 0), ("b.json", 200), ("inspections/c.json", 100)):
+            (tmp_path / name).write_text(f'{{"cycles": {cycles}}}', encoding="utf-8")
+        found = [(file.path.name, file.of_inspection) for file in manifest.find([tmp_path])]
+        assert found == [("a.json", False), ("c.json", True), ("b.json", False)]
+        for alone in (tmp_path / "inspections", tmp_path / "inspections" / "c.json"):
+            assert [(file.path.name, file.of_inspection) for file in manifest.find([alone])] == [("c.json", True)]
+        (tmp_path / "inspections" / "link.json").symlink_to(Path(__file__))
+        with pytest.raises(ValueError, match="lies outside the folder"):
+            manifest.find([tmp_path])
+
     @pytest.mark.parametrize(
         ("content", "rule"),
         [

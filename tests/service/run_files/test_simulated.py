@@ -54,6 +54,11 @@ def simulated(*options: str | Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(called, check=True, capture_output=True, text=True)
 
 
+def runs_in(folder: Path) -> list[manifest.RunFile]:
+    """The files of runs, not of inspections."""
+    return [file for file in manifest.find([folder]) if not file.of_inspection]
+
+
 def incoming(file: manifest.RunFile) -> Any:
     """A run's file as the service would read it."""
     if file.parameters is None:
@@ -64,16 +69,16 @@ def incoming(file: manifest.RunFile) -> Any:
 
 @pytest.mark.parametrize("form", FORMATS)
 def test_every_format_holds_the_run_bit_for_bit(campaigns: dict[str, Path], form: str) -> None:
-    plain, other = ([incoming(file) for file in manifest.find([campaigns[name]])] for name in ("json", form))
+    plain, other = ([incoming(file) for file in runs_in(campaigns[name])] for name in ("json", form))
     assert len(plain) == 3
     assert {run.run_id: run.content_sha256 for run in plain} == {run.run_id: run.content_sha256 for run in other}
-    assert {path.suffix for path in campaigns[form].iterdir()} == {".json", RecordFormat(form).suffix}
+    assert {path.suffix for path in campaigns[form].rglob("*.*")} == {".json", RecordFormat(form).suffix}
 
 
 @pytest.mark.parametrize("form", FORMATS)
 def test_every_format_gives_the_same_fits_and_loops(campaigns: dict[str, Path], form: str) -> None:
     stationary, dynamic = measured(Programme(dynamic=DynamicTest()))
-    read = {run.kind: run for run in map(incoming, manifest.find([campaigns[form]]))}
+    read = {run.kind: run for run in map(incoming, runs_in(campaigns[form]))}
     fits = fit_curves(curves_by_pressure(stationary.plateaus, GEOMETRY))
     again = fit_curves(curves_by_pressure(stationary_plateaus(read["stationary_stribeck"].channels), GEOMETRY))
     for fit, back in zip(fits, again, strict=True):

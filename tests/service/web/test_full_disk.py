@@ -39,13 +39,17 @@ def full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(files.tempfile, "TemporaryDirectory", folder)
 
 
-def test_a_file_for_which_the_disk_has_no_room_is_refused_with_the_reason(client: TestClient, full: None) -> None:
+def test_a_file_for_which_the_disk_has_no_room_is_refused_with_the_reason(
+    client: TestClient, full: None, caplog: pytest.LogCaptureFixture
+) -> None:
     del full
     for sent in ({"content": text()}, {"files": {"file": ("a.csv", text())}}):
         answer = client.post(ADDRESS, **sent)  # type: ignore[arg-type]
         assert (answer.status_code, answer.headers["content-type"]) == (507, "application/problem+json")
         assert answer.json()["type"] == "urn:clutchlife:problem:no-room"
         assert "No space left on device" in answer.json()["detail"]
+    said = [record.getMessage() for record in caplog.records if record.levelname == "ERROR"]
+    assert [line.partition(": ")[0] for line in said] == ["POST /v1/clutches/{clutch_id}/runs/file"] * 2
     assert client.get("/v1/clutches/c1/runs").json()["items"] == []
 
 

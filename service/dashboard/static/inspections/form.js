@@ -24,6 +24,21 @@ const input = (name, attributes) => h("input", { id: `inspection-${name}`, name,
 /** @param {HTMLInputElement} element */
 const numberIn = ({ value }) => (value === "" ? null : Number(value));
 
+/**
+ * What became of an inspection that was sent.
+ * @param {InspectionOut} inspection
+ */
+function outcomeOf({ cycles, state }) {
+  const named = `The inspection at ${fixed(cycles)} cycles`;
+  return state === "accepted"
+    ? h("p", { class: "notice good", role: "status" }, `${named} is stored.`)
+    : h(
+        "p",
+        { class: "notice odd", role: "status" },
+        `${named} was stored before and withdrawn since: it stays withdrawn until it is restored in the table.`,
+      );
+}
+
 export class InspectionForm {
   /**
    * @param {string} clutchId
@@ -67,8 +82,7 @@ export class InspectionForm {
       const { body } = await sendJson("POST", this.base, this.inspection());
       const refused = await this.sendPhotographs(`${this.base}/${body.inspection_id}/photographs`);
       if (refused.length === 0) this.form.reset();
-      const stored = `The inspection at ${fixed(body.cycles)} cycles is stored.`;
-      this.answer.replaceChildren(h("p", { class: "notice good", role: "status" }, stored), ...refused);
+      this.answer.replaceChildren(outcomeOf(body), ...refused);
       await this.sent();
     } catch (problem) {
       if (!(problem instanceof Problem)) throw problem;

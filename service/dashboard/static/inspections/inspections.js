@@ -36,7 +36,8 @@ export class Inspections {
     place.append(form.element);
     /** @type {Receipt[]} */
     this.events = [];
-    this.drawn = false;
+    /** @type {InspectionOut[] | null} those that are accepted; null before they are read */
+    this.accepted = null;
   }
 
   /**
@@ -45,17 +46,28 @@ export class Inspections {
    */
   async poll(events) {
     /** @type {{ items: InspectionOut[], changed: boolean }} */
-    const { items: read, changed } = await readAll(`${clutchPath(this.clutchId)}/inspections?limit=1000`);
-    if (this.drawn && !changed && events === this.events) return;
-    this.drawn = true;
+    const { items, changed } = await readAll(`${clutchPath(this.clutchId)}/inspections?limit=1000`);
+    if (changed || this.accepted === null) {
+      items.sort((a, b) => a.cycles - b.cycles || a.lining.localeCompare(b.lining));
+      this.list.replaceChildren(...(items.length > 0 ? this.table(items) : [h("p", {}, "No inspection yet.")]));
+      const accepted = items.filter(({ state }) => state === "accepted");
+      this.photographs.show(accepted);
+      this.draw(accepted, events);
+    } else if (events !== this.events) {
+      this.draw(this.accepted, events);
+    }
+  }
+
+  /**
+   * @param {InspectionOut[]} accepted
+   * @param {Receipt[]} events
+   */
+  draw(accepted, events) {
+    this.accepted = accepted;
     this.events = events;
-    const items = [...read].sort((a, b) => a.cycles - b.cycles || a.lining.localeCompare(b.lining));
-    const accepted = items.filter(({ state }) => state === "accepted");
     this.charts.hidden = accepted.every((item) => item.roughness_um === null && item.skewness === null);
     this.roughness.show(surfaceOverLife({ inspections: accepted, events, quantity: "roughness_um" }));
     this.skewness.show(surfaceOverLife({ inspections: accepted, events, quantity: "skewness" }));
-    this.list.replaceChildren(...(items.length > 0 ? this.table(items) : [h("p", {}, "No inspection yet.")]));
-    this.photographs.show(accepted);
   }
 
   /** @param {InspectionOut[]} items */

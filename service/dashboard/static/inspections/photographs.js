@@ -1,6 +1,7 @@
 // @ts-check
 // The photographs of the inspections as thumbnails, by state; each opens larger. Their files are read with the reader's key
-// when they come to the screen, and kept by the browser: a photograph never changes.
+// when they come to the screen, one after the other, and kept by the browser: a photograph never changes. Of each the page
+// keeps a drawing as small as its thumbnail, and the whole of one while it is open.
 
 import { clutchPath, readFile } from "../shared/api.js";
 import { h } from "../shared/dom.js";
@@ -10,18 +11,37 @@ import { fixed } from "../shared/format.js";
 
 /** @typedef {{ path: string, text: string }} Shown a photograph's address, and what it shows in words */
 
+/**
+ * Pixels across a drawing: the 132 of a thumbnail (inspections.css) on a screen that has two for each, and a third more, as of
+ * a photograph of 16:9 the sides are cut off.
+ */
+const WIDTH = 352;
+
+/**
+ * A photograph's file drawn small; no more than that stays in memory.
+ * @param {Blob} file
+ */
+async function drawn(file) {
+  const small = await createImageBitmap(file, { resizeWidth: WIDTH, resizeQuality: "medium" });
+  const canvas = h("canvas", { width: small.width, height: small.height, "aria-hidden": "true" });
+  canvas.getContext("bitmaprenderer")?.transferFromImageBitmap(small);
+  return canvas;
+}
+
 export class Photographs {
   /** @param {string} clutchId */
   constructor(clutchId) {
     this.base = `${clutchPath(clutchId)}/inspections`;
     this.element = h("div", { class: "photographs" });
-    /** @type {Map<string, Promise<string>>} addresses of files that were read, by path */
-    this.files = new Map();
+    /** @type {Map<string, HTMLCanvasElement>} the drawings that are shown, by path */
+    this.drawings = new Map();
+    /** what is being read and drawn: a photograph at a time, as one of 24 megapixels takes 100 MB while it is drawn */
+    this.queue = Promise.resolve();
     /** @type {Map<Element, Shown>} */
     this.waiting = new Map();
     this.visibility = new IntersectionObserver(
       (entries) => {
-        for (const { target, isIntersecting } of entries) if (isIntersecting) this.load(target);
+        for (const { target, isIntersecting } of entries) if (isIntersecting) this.want(target);
       },
       { rootMargin: "300px" },
     );
@@ -33,6 +53,7 @@ export class Photographs {
     this.waiting.clear();
     const shown = inspections.filter(({ photographs }) => photographs.length > 0);
     this.element.replaceChildren(...shown.map((inspection) => this.state(inspection)));
+    for (const [path, drawing] of this.drawings) if (!drawing.isConnected) this.drawings.delete(path);
   }
 
   /** @param {InspectionOut} inspection */
@@ -50,32 +71,34 @@ export class Photographs {
     const open = () => this.open(photograph);
     const label = `${photograph.text}: show it larger`;
     const button = h("button", { type: "button", class: "thumbnail", "aria-label": label, onclick: open });
-    this.waiting.set(button, photograph);
-    this.visibility.observe(button);
+    const drawing = this.drawings.get(photograph.path);
+    if (drawing !== undefined) {
+      button.append(drawing);
+    } else {
+      this.waiting.set(button, photograph);
+      this.visibility.observe(button);
+    }
     return button;
   }
 
   /** @param {Element} button */
-  async load(button) {
-    const photograph = this.waiting.get(button);
-    if (photograph === undefined) return;
-    this.waiting.delete(button);
+  want(button) {
     this.visibility.unobserve(button);
+    this.queue = this.queue.then(() => this.draw(button));
+  }
+
+  /** @param {Element} button */
+  async draw(button) {
+    const photograph = this.waiting.get(button); // none where it is shown no more
+    if (photograph === undefined) return;
+    const { path } = photograph;
     try {
-      button.replaceChildren(h("img", { src: await this.file(photograph.path), alt: "" }));
+      const drawing = this.drawings.get(path) ?? (await drawn(await readFile(path)));
+      button.replaceChildren(drawing);
+      this.drawings.set(path, drawing);
     } catch {
       button.replaceChildren("could not be read");
     }
-  }
-
-  /** @param {string} path */
-  file(path) {
-    const held = this.files.get(path);
-    if (held !== undefined) return held;
-    const file = readFile(path).then((blob) => URL.createObjectURL(blob));
-    this.files.set(path, file);
-    file.catch(() => this.files.delete(path)); // asked for again when it is next shown
-    return file;
   }
 
   /** @param {Shown} photograph */
@@ -83,12 +106,19 @@ export class Photographs {
     const dialog = h("dialog", { class: "photograph", "aria-labelledby": "photograph-title" });
     const close = h("button", { type: "button", class: "main", onclick: () => dialog.close() }, "Close");
     const image = h("img", { alt: text });
+    let address = "";
     dialog.append(h("h2", { id: "photograph-title" }, text), image, h("div", { class: "buttons" }, close));
-    dialog.addEventListener("close", () => dialog.remove());
+    dialog.addEventListener("close", () => {
+      dialog.remove();
+      URL.revokeObjectURL(address);
+    });
     document.body.append(dialog);
     dialog.showModal();
     try {
-      image.src = await this.file(path);
+      const file = await readFile(path);
+      if (!dialog.open) return;
+      address = URL.createObjectURL(file);
+      image.src = address;
     } catch {
       image.replaceWith(h("p", { class: "notice bad", role: "alert" }, "The photograph could not be read."));
     }

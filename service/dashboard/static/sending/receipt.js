@@ -9,22 +9,29 @@ import { cycles, fixed, kindName, sentence, significant, withSd, words } from ".
 /** @import { CurvePoint } from "../charts/stribeck_law.js" */
 /** @import { ClutchOut, Fit, Loop, Parameters, Receipt, RunOut, Warned } from "../shared/types.js" */
 
+/** What is said of a run that does not count, by its state: that, and where on the clutch's page it is made to count. */
+const UNCOUNTED = {
+  held: ["It does not count yet. ", "#held", "Confirm, correct or withdraw it"],
+  withdrawn: ["It was withdrawn since, and stays so. ", "#runs", "Restore it in the list of runs"],
+};
+
 /**
  * What became of a run, in a line.
  * @param {Receipt} receipt
  */
 export function outcomeOf(receipt) {
-  const held = receipt.state === "held";
-  const result = receipt.duplicate ? "Stored before: this repeat changed nothing" : held ? "Stored and held" : "Stored";
-  const run = ` · ${kindName(receipt.kind)} at ${cycles(receipt.cycles, 0, 20)} cycles · `;
-  const name = h("p", {}, h("b", {}, result), run, h("code", {}, receipt.run_id));
-  if (!held) return h("div", { class: "notice good" }, name);
+  const { clutch_id: clutchId, cycles: at, duplicate, kind, run_id: runId, state } = receipt;
+  const held = state === "held";
+  const result = duplicate ? "Stored before: this repeat changed nothing" : held ? "Stored and held" : "Stored";
+  const run = ` · ${kindName(kind)} at ${cycles(at, 0, 20)} cycles · `;
+  const name = h("p", {}, h("b", {}, result), run, h("code", {}, runId));
+  if (state === "accepted") return h("div", { class: "notice good" }, name);
   const close = (/** @type {Event} */ event) => {
     if (event.target instanceof Element) event.target.closest("dialog")?.close();
   };
-  const address = `/clutches/${encodeURIComponent(receipt.clutch_id)}#held`;
-  const link = h("a", { href: address, onclick: close }, "Confirm, correct or withdraw it");
-  return h("div", { class: "notice odd" }, name, doubtList(receipt), h("p", {}, "It does not count yet. ", link));
+  const [words, section, change] = UNCOUNTED[state];
+  const link = h("a", { href: `/clutches/${encodeURIComponent(clutchId)}${section}`, onclick: close }, change);
+  return h("div", { class: "notice odd" }, name, held && doubtList(receipt), h("p", {}, words, link));
 }
 
 /**

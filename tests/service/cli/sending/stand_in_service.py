@@ -41,9 +41,18 @@ class StandInService:
         other = self.instead(request)
         if other is not None:
             return other
-        if request.method == "GET" or not request.url.path.endswith(("/runs", "/file")):
+        if request.method == "GET" or not request.url.path.endswith(("/runs", "/file", "/inspections")):
             return httpx2.Response(200, json={"clutch_id": "c1"})
+        if request.url.path.endswith("/inspections"):
+            return self._inspect(content)
         return self._store(content, request.url.params.get("run_id"))
+
+    def _inspect(self, content: bytes) -> httpx2.Response:
+        name = hashlib.sha256(content).hexdigest()[:16]
+        known = name in self.stored
+        self.stored[name] = content
+        receipt = {"inspection_id": name, "duplicate": known} | self.states.get(name, {})
+        return httpx2.Response(200 if known else 201, json=receipt)
 
     def _store(self, content: bytes, name: str | None) -> httpx2.Response:
         digest = hashlib.sha256(content).hexdigest()

@@ -10,6 +10,7 @@ from service.cli.sending import client
 from service.cli.sending.answers import RefusedError, ServiceAwayError
 from service.cli.sending.client import Service
 from service.cli.sending.delivery import Sent, deliver
+from service.cli.sending.entry import INSPECTIONS
 from service.cli.sending.spool import Spool
 from tests.service.cli.sending.stand_in_service import URL, Answer, StandInService, body, problem
 from tests.service.cli.sending.test_client import Clock
@@ -141,6 +142,23 @@ def test_a_run_that_was_withdrawn_since_waits_no_more(sender: Sender) -> None:
     assert sender.send().duplicates == 1
     assert sender.counts == (1, 0, 0)
     assert ["withdrawn since" in line for line in sender.lines] == [True]
+
+
+def test_an_inspection_waits_while_the_service_is_away_and_is_sent_to_its_own_address(sender: Sender) -> None:
+    content, asked = b'{"cycles": 0, "roughness_um": 9.52}', []
+    sender.spool.add([(written(sender.folder / "i.json", content), None)], INSPECTIONS)
+    sender.service.instead = lambda _request: httpx2.Response(503)
+    with pytest.raises(ServiceAwayError):
+        sender.send()
+    assert sender.counts == (0, 1, 0)
+    sender.service.instead = lambda request: asked.append(request.url.path)
+    assert str(sender.send()) == "1 stored, 0 known already, 0 refused"
+    assert (sender.counts, asked) == ((1, 0, 0), ["/v1/clutches/c1/inspections"])
+    (name,) = sender.service.stored
+    sender.service.states[name] = {"state": "withdrawn"}
+    sender.spool.add([(sender.folder / "i.json", None)], INSPECTIONS)
+    assert sender.send().duplicates == 1
+    assert sender.lines[-1:] == [f"{name} was stored before and withdrawn since: it stays withdrawn, and waits no more"]
 
 
 def test_a_run_that_was_corrected_since_waits_no_more(sender: Sender) -> None:

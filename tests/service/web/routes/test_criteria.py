@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from models.clutch import Geometry
+from models.friction.stribeck import StribeckParameters, torque
 from models.rig.campaign import simulate
 from models.rig.programme import Programme
 from models.rig.sampled import DynamicTest
@@ -129,6 +131,40 @@ def test_the_lag_stands_in_the_rows_for_dashboards_with_its_frequency(tested: Te
         assert {row["unit"] for row in rows} == {unit}
         assert all(row["lower"] < row["value"] < row["upper"] for row in rows)
     assert all(row["frequency_hz"] is None for row in asked(tested, "series", quantity="mean_cof")["items"])
+
+
+def test_slopes_stand_in_the_rows_for_dashboards_at_the_speeds_of_the_criteria_too(tested: TestClient) -> None:
+    rows = asked(tested, "series", quantity="slope")["items"]
+    assert {(row["quantity"], row["unit"], row["frequency_hz"]) for row in rows} == {("slope", "s/m", None)}
+    assert {row["speed_rpm"] for row in rows} == {50, 100, 500}
+    assert all(row["lower"] < row["value"] < row["upper"] for row in rows)
+    tracked = asked(tested, "degradation", quantity="slope")["items"]
+    for item in tracked:
+        place = (item["pressure_bar"], item["speed_rpm"])
+        of_place = [row for row in rows if (row["pressure_bar"], row["speed_rpm"]) == place]
+        assert [row["cycles"] for row in of_place] == item["measured"]["cycles"]
+        assert [row["value"] for row in of_place] == pytest.approx(item["measured"]["value"], rel=1e-12)
+    assert asked(tested, "series")["items"][0]["speed_rpm"] is None
+    edit = {"end_of_life": {"criteria": [SHUDDER | {"speed_rpm": 200}]}, "reason": "it creeps faster now"}
+    assert tested.patch("/v1/clutches/s", json=edit).status_code == 200
+    table = tested.get("/v1/clutches/s/series.csv", params={"quantity": "slope"}).text.splitlines()
+    assert table[0].endswith(",frequency_hz,speed_rpm")
+    assert {float(line.rpartition(",")[2]) for line in table[1:]} == {50, 100, 200, 500}
+
+
+def test_a_slope_in_the_rows_is_the_difference_of_the_curve_that_the_receipt_shows(tested: TestClient) -> None:
+    """1e-4: near its change of sign a slope is a small difference, and the central one is off by some 1e-6 of it."""
+    geometry = Geometry()
+    rows = [row for row in asked(tested, "series", quantity="slope")["items"] if row["speed_rpm"] == 100]
+    for row in rows[:: len(rows) // 3]:
+        run = asked(tested, f"runs/{row['run_id']}")
+        (fit,) = (fit for fit in run["fits"] if fit["pressure_bar"] == row["pressure_bar"])
+        parameters = StribeckParameters.from_array(np.array(list(fit["parameters"].values())))
+        measured = np.array(run["channels"]["pressure_bar"])
+        pressure = 1e5 * float(measured[np.abs(measured - row["pressure_bar"]) < 0.1].mean())
+        velocity = 100 * np.pi / 30 * geometry.mean_radius * np.array([0.999, 1.001])
+        low, high = torque(velocity, parameters) / geometry.torque_per_cof(pressure)
+        assert row["value"] == pytest.approx((high - low) / (velocity[1] - velocity[0]), rel=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,8 @@ def test_an_inspection_is_stored_as_it_was_sent_and_its_repeat_is_the_same_one(c
         "accepted", "local", "measured", [],
     )  # fmt: skip
     again = client.post(LIST, json=WORN)
-    assert (again.status_code, again.json(), again.headers["location"]) == (200, stored, address)
+    assert (again.status_code, again.headers["location"]) == (200, address)
+    assert again.json() == stored | {"duplicate": True}
     other = client.post(LIST, json=WORN | {"lining": "disc 2, side B"})
     assert other.status_code == 201
     assert len(client.get(LIST).json()["items"]) == 2

@@ -131,6 +131,7 @@ def test_an_unexpected_error_is_logged_whole_and_answered_without_internals(
         assert answer.json()["request_id"] == "rig-7"
     error, request = lines()
     assert (error["level"], error["request_id"]) == ("error", "rig-7")
+    assert error["message"] == f"{method} /v1/clutches/{{clutch_id}}"
     assert error["exception"].startswith("Traceback")
     assert "s3cr3t" in error["exception"]
     assert (request["level"], request["status"], request["request_id"]) == ("warning", 500, "rig-7")
