@@ -180,7 +180,9 @@ def fleet_prior_for(connection: Connection, fleet: Json, clutch_id: str, version
     if version == 0:
         return None
     values: dict[str, object] = {"of_fleet": _fleet_key(fleet), "of_version": version}
-    version_row = connection.execute(_fleet_members_of, values).first() or connection.execute(_fleet_members, values).first()
+    version_row = (
+        connection.execute(_fleet_members_of, values).first() or connection.execute(_fleet_members, values).first()
+    )
     if version_row is None:
         return None
     members = to_list(version_row.members)
