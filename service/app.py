@@ -1,5 +1,6 @@
 """The application: its parts put together, nothing made at import."""
 
+import shutil
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -26,9 +27,8 @@ from service.web.revalidation import Revalidation
 from service.web.routes import clutches, description, diagnoses, exports, files, fleet, health, inspections, life, runs
 from service.workflows import adopt_model, run_diagnosis
 from storage.diagnoses import NewDiagnosis
-from storage.engine.connect import path_of
-from storage.engine.database import Database, open_database
-from storage.engine.service_lock import service_lock
+from storage.engine.database import Database
+from storage.engine.opening import open_database, service_lock
 
 _DESCRIPTION = """Condition monitoring and prognostics of wet friction clutches.
 
@@ -74,9 +74,10 @@ def create_app(settings: Settings) -> FastAPI:
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         database = open_database(settings.database, serving=True)
+        folder = emptied_folder(database.path)
         log = (settings.log_format, settings.log_level)
         workers = in_processes(database, settings.workers, log) if settings.workers else in_threads(database)
-        queue = DiagnosisQueue(f"sqlite:///{database.path.absolute()}", settings, _Diagnoses(database, workers))
+        queue = DiagnosisQueue(database.url, settings, _Diagnoses(database, workers))
         readiness = Readiness(database, workers, queue, Needs(disk=settings.least_free, memory=settings.least_memory))
         try:
             workers.warm()
@@ -90,7 +91,7 @@ def create_app(settings: Settings) -> FastAPI:
                 revalidation=Revalidation(MOST_REVALIDATED_BYTES),
                 readiness=readiness,
                 insecure_local=settings.insecure_local,
-                folder=emptied_folder(database.path),
+                folder=folder,
             )
             yield
         finally:
@@ -98,10 +99,12 @@ def create_app(settings: Settings) -> FastAPI:
             queue.close()
             workers.close()
             database.close()
+            if database.path is None:
+                shutil.rmtree(folder, ignore_errors=True)
 
     @asynccontextmanager
     async def alone(app: FastAPI) -> AsyncIterator[None]:
-        with service_lock(path_of(settings.database)):
+        with service_lock(settings.database):
             async with lifespan(app):
                 yield
 

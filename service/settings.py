@@ -17,6 +17,7 @@ from service.logging import LogFormat, LogLevel
 CODE_VERSION = version("clutchlife")
 
 PREFIX = "CLUTCHLIFE_"
+DATABASE_VARIABLE = f"{PREFIX}DATABASE"
 _MIB = 2**20
 #: How alike a name must be to that of a setting (2 x signs in common / signs of both) to be one misspelt. Tried: seven
 #: slips are alike by 0.93 to 0.98, eight names of commands and orchestrators by at most 0.81. See its tests.
@@ -32,7 +33,8 @@ class Settings(BaseSettings):
     model_config = SettingsConfigDict(env_prefix=PREFIX, frozen=True, extra="forbid")
 
     database: str = Field(
-        default=DEFAULT_DATABASE, description="`sqlite:///relative/path` or `sqlite:////absolute/path`"
+        default=DEFAULT_DATABASE,
+        description="`sqlite:///relative/path`, `sqlite:////absolute/path` or `postgresql+psycopg://user@host/database`",
     )
     # as `make load` has it, on two cores
     workers: int = Field(

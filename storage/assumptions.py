@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 import sqlalchemy as sa
 from sqlalchemy import Connection, Row, bindparam, delete, func, select
 
+from storage.dialects import json_length
 from storage.encoding.json_text import Json, to_list, to_object, to_text
 from storage.tables import adopted_model, corrected_cof, fleet_prior, run
 
@@ -137,7 +138,7 @@ _fleet_all_current = (
     .order_by(fleet_prior.c.fleet)
 )
 _fleet_ended_lives = _fleet_all_current.with_only_columns(
-    func.coalesce(func.sum(func.json_array_length(fleet_prior.c.content, "$.ended")), 0)
+    func.coalesce(func.sum(json_length(fleet_prior.c.content, "ended")), 0)
 ).order_by(None)
 _fleet_forget = delete(fleet_prior).where(
     fleet_prior.c.fleet == bindparam("of_fleet"),
@@ -179,16 +180,18 @@ def fleet_prior_for(connection: Connection, fleet: Json, clutch_id: str, version
     if version == 0:
         return None
     values: dict[str, object] = {"of_fleet": _fleet_key(fleet), "of_version": version}
-    found = connection.execute(_fleet_members_of, values).first() or connection.execute(_fleet_members, values).first()
-    if found is None:
+    version_row = (
+        connection.execute(_fleet_members_of, values).first() or connection.execute(_fleet_members, values).first()
+    )
+    if version_row is None:
         return None
-    members = to_list(found.members)
+    members = to_list(version_row.members)
     left_out = [NOBODY]
     if clutch_id in members:
         # earlier releases left each clutch out by itself, however many there were
         left_out = [clutch_id, members[members.index(clutch_id) % _GROUPS]]
     for name in left_out:
-        row = connection.execute(_fleet_without, values | {"of_version": found.version, "wanted": name}).first()
+        row = connection.execute(_fleet_without, values | {"of_version": version_row.version, "wanted": name}).first()
         if row is not None:
             return _fleet_row(row)
     return None

@@ -3,8 +3,9 @@
 from dataclasses import dataclass, fields
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Row, bindparam, func, or_, select
+from sqlalchemy import Connection, Double, Row, Text, bindparam, func, or_, select
 
+from storage.dialects import ALL_ROWS
 from storage.encoding.json_text import Json, to_object, to_text
 from storage.tables import change
 
@@ -50,8 +51,8 @@ _newest_first = (
     select(change)
     .where(
         _of_clutch,
-        change.c.change_key < bindparam("before_key"),
-        or_(bindparam("of_run").is_(None), change.c.run_id == bindparam("of_run")),
+        change.c.change_key < bindparam("before_key", type_=Double),
+        or_(bindparam("of_run", type_=Text).is_(None), change.c.run_id == bindparam("of_run")),
     )
     .order_by(change.c.change_key.desc())
     .limit(bindparam("most"))
@@ -77,7 +78,7 @@ def page(
     values = {
         "of_clutch": clutch_id,
         "of_run": run_id,
-        "most": -1 if limit is None else limit,
+        "most": ALL_ROWS if limit is None else limit,
         "before_key": 2.0**62 if before is None else before,
     }
     return [_row(row) for row in connection.execute(_newest_first, values)]

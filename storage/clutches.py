@@ -4,8 +4,9 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Row, bindparam, func, select, tuple_, update
+from sqlalchemy import Connection, Row, bindparam, case, func, select, tuple_, update
 
+from storage.dialects import among
 from storage.encoding.json_text import Json, to_object, to_text
 from storage.tables import clutch
 
@@ -37,7 +38,7 @@ _worst_first = (
     .order_by(clutch.c.rank, clutch.c.clutch_id)
     .limit(bindparam("most"))
 )
-_only = clutch.c.clutch_id.in_(select(func.json_each(bindparam("of_only")).table_valued("value").c.value))
+_only = among(clutch.c.clutch_id, "of_only")
 _worst_first_after = _worst_first.where(
     tuple_(clutch.c.rank, clutch.c.clutch_id) > tuple_(bindparam("after_rank"), bindparam("after_id"))
 )
@@ -151,7 +152,7 @@ def count(connection: Connection) -> int:
 
 def count_within(connection: Connection, ranks: Sequence[float]) -> dict[float, int]:
     """How many clutches in use have at most each of these ranks; only those within the greatest are looked at."""
-    counts = [func.coalesce(func.sum(clutch.c.rank <= rank), 0) for rank in ranks]
+    counts = [func.coalesce(func.sum(case((clutch.c.rank <= rank, 1), else_=0)), 0) for rank in ranks]
     row = connection.execute(select(*counts).where(clutch.c.rank <= max(ranks), clutch.c.archived == 0)).one()
     return dict(zip(ranks, row, strict=True))
 

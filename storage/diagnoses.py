@@ -3,7 +3,7 @@
 from dataclasses import dataclass, fields
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Row, bindparam, select, update
+from sqlalchemy import Connection, Double, Row, bindparam, select, update
 
 from storage.encoding.json_text import Json, to_object, to_text
 from storage.runs import ACCEPTED
@@ -47,7 +47,7 @@ _of_clutch = diagnosis.c.clutch_id == bindparam("of_clutch")
 _by_id = select(diagnosis).where(_of_clutch, diagnosis.c.diagnosis_id == bindparam("wanted"))
 _newest = (
     select(diagnosis)
-    .where(_of_clutch, diagnosis.c.diagnosis_key < bindparam("before"))
+    .where(_of_clutch, diagnosis.c.diagnosis_key < bindparam("before", type_=Double))
     .order_by(diagnosis.c.diagnosis_key.desc())
     .limit(bindparam("most"))
 )

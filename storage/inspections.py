@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Row, bindparam, func, select, tuple_, update
+from sqlalchemy import Connection, Row, bindparam, select, tuple_, update
 
+from storage.dialects import ALL_ROWS, among
 from storage.encoding.json_text import Json, to_object, to_text
 from storage.runs import ACCEPTED
 from storage.tables import inspection, inspection_photograph, photograph
@@ -62,7 +63,6 @@ _in_order = (
 )
 _after = tuple_(inspection.c.cycles, inspection.c.inspection_id) > tuple_(bindparam("at"), bindparam("after_id"))
 _set_state = update(inspection).where(inspection.c.inspection_key == bindparam("wanted"))
-_wanted = func.json_each(bindparam("of_keys")).table_valued("value")
 _photographs = (
     select(
         inspection_photograph.c.inspection_key,
@@ -73,7 +73,7 @@ _photographs = (
         inspection_photograph.c.received_by,
     )
     .join(photograph, photograph.c.sha256 == inspection_photograph.c.sha256)
-    .where(inspection_photograph.c.inspection_key.in_(select(_wanted.c.value)))
+    .where(among(inspection_photograph.c.inspection_key, "of_keys"))
     .order_by(inspection_photograph.c.inspection_key, inspection_photograph.c.position)
 )
 _stored = select(photograph.c.sha256).where(photograph.c.sha256 == bindparam("wanted"))
@@ -87,7 +87,8 @@ _data = (
 def insert(connection: Connection, row: NewInspection) -> int:
     """Store a new inspection and return its key. Raises IntegrityError where the clutch is unknown or has this id."""
     values = {name: getattr(row, name) for name in _NEW} | {"content": to_text(row.content)}
-    return connection.execute(_insert, values).lastrowid
+    inspection_key: int = next(iter(connection.execute(_insert, values).inserted_primary_key or ()))
+    return inspection_key
 
 
 def get(connection: Connection, clutch_id: str, inspection_id: str) -> InspectionRow | None:
@@ -100,7 +101,7 @@ def page(
     connection: Connection, clutch_id: str, *, limit: int | None = None, after: tuple[float, str] | None = None
 ) -> list[InspectionRow]:
     """Inspections of a clutch by cycles, at most `limit`, behind `after`, the (cycles, inspection_id) of another."""
-    values: dict[str, object] = {"of_clutch": clutch_id, "most": -1 if limit is None else limit}
+    values: dict[str, object] = {"of_clutch": clutch_id, "most": ALL_ROWS if limit is None else limit}
     query = _in_order
     if after is not None:
         query, values = query.where(_after), values | {"at": after[0], "after_id": after[1]}

@@ -13,8 +13,8 @@ import numpy as np
 import sqlalchemy as sa
 from numpy.typing import NDArray
 from sqlalchemy import Connection, Row, bindparam, delete, select
-from sqlalchemy.dialects.sqlite import insert
 
+from storage.dialects import upsert
 from storage.encoding.codec import pack, unpack
 from storage.encoding.json_text import Json, to_list, to_object, to_text
 from storage.engine.errors import DamagedData
@@ -125,11 +125,7 @@ class PredictionRow:
     code_version: str
 
 
-_prediction_new = insert(prediction)
-_prediction_put = _prediction_new.on_conflict_do_update(
-    index_elements=["clutch_id", "method", "pressure", "cycles"],
-    set_={"payload": _prediction_new.excluded.payload, "code_version": _prediction_new.excluded.code_version},
-)
+_prediction_put = upsert(prediction)
 _prediction_of_clutch = prediction.c.clutch_id == bindparam("of_clutch")
 _prediction_series = select(
     prediction.c.cycles, prediction.c.method, prediction.c.pressure, prediction.c.payload, prediction.c.code_version
@@ -158,7 +154,7 @@ def put_predictions(connection: Connection, clutch_id: str, rows: Sequence[Predi
         for row in rows
     ]
     if values:
-        connection.execute(_prediction_put, values)
+        connection.execute(_prediction_put[connection.dialect.name], values)
 
 
 def prediction_at(
@@ -204,15 +200,7 @@ class FilterStateRow:
     code_version: str
 
 
-_state_new = insert(filter_state)
-_state_put = _state_new.on_conflict_do_update(
-    index_elements=["clutch_id", "method", "pressure"],
-    set_={
-        "runs": _state_new.excluded.runs,
-        "arrays": _state_new.excluded.arrays,
-        "code_version": _state_new.excluded.code_version,
-    },
-)
+_state_put = upsert(filter_state)
 _state_of_clutch = filter_state.c.clutch_id == bindparam("of_clutch")
 _state_get = (
     select(
@@ -242,7 +230,7 @@ def put_filter_states(connection: Connection, clutch_id: str, rows: Sequence[Fil
         for row in rows
     ]
     if values:
-        connection.execute(_state_put, values)
+        connection.execute(_state_put[connection.dialect.name], values)
 
 
 def filter_states_of(connection: Connection, clutch_id: str) -> dict[tuple[str, float], FilterStateRow]:

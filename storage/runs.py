@@ -8,10 +8,11 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Row, Select, bindparam, exists, func, or_, select, tuple_, update
+from sqlalchemy import Connection, Row, Select, Text, bindparam, exists, func, or_, select, tuple_, update
 
+from storage.dialects import ALL_ROWS, Pair, json_text, json_value
 from storage.encoding.json_text import Json, to_list, to_object, to_text
-from storage.tables import fit, run
+from storage.tables import HELD_ONLY, fit, run
 
 ACCEPTED, HELD, WITHDRAWN = "accepted", "held", "withdrawn"
 
@@ -84,8 +85,8 @@ _of_clutch = run.c.clutch_id == bindparam("of_clutch")
 _by_id = select(run).where(_of_clutch, run.c.run_id == bindparam("wanted"))
 _CHOSEN = (
     _of_clutch,
-    or_(bindparam("of_kind").is_(None), run.c.kind == bindparam("of_kind")),
-    or_(bindparam("of_state").is_(None), run.c.state == bindparam("of_state")),
+    or_(bindparam("of_kind", type_=Text).is_(None), run.c.kind == bindparam("of_kind")),
+    or_(bindparam("of_state", type_=Text).is_(None), run.c.state == bindparam("of_state")),
 )
 _ordered = select(run).where(*_CHOSEN).order_by(run.c.cycles, run.c.run_id).limit(bindparam("most"))
 _receipts = _ordered.with_only_columns(*(run.c[field.name] for field in fields(ReceiptRow)))
@@ -95,25 +96,25 @@ _LIGHT = tuple(field.name for field in fields(RunInOrder))
 _light_of_any = (
     select(
         *(run.c[name] for name in _LIGHT[:6]),
-        func.json_extract(run.c.details, "$.speed_range[0]"),
-        func.json_extract(run.c.details, "$.speed_range[1]"),
-        func.json_extract(run.c.details, "$.event"),
-        func.json_extract(run.c.details, "$.oil_temperature"),
-        func.json_extract(run.c.details, "$.duty.cycles"),
-        func.json_extract(run.c.details, "$.duty.energy_per_cycle_kj"),
-        func.json_extract(run.c.details, "$.duty.initial_speed_rpm"),
-        func.json_extract(run.c.details, "$.duty.engagement_duration_s"),
+        json_value(run.c.details, "speed_range", 0),
+        json_value(run.c.details, "speed_range", 1),
+        json_value(run.c.details, "event"),
+        json_value(run.c.details, "oil_temperature"),
+        json_value(run.c.details, "duty", "cycles"),
+        json_value(run.c.details, "duty", "energy_per_cycle_kj"),
+        json_value(run.c.details, "duty", "initial_speed_rpm"),
+        json_value(run.c.details, "duty", "engagement_duration_s"),
     )
     .where(_of_clutch)
     .order_by(run.c.cycles, run.c.run_id)
 )
 _light = _light_of_any.where(run.c.state == ACCEPTED)
-_rebuilds = _light.where(func.json_extract(run.c.details, "$.event") == "rebuild")
+_rebuilds = _light.where(json_text(run.c.details, "event") == "rebuild")
 _set_aside = _light_of_any.where(run.c.state != ACCEPTED)
-#: The value stands in the text: with a parameter in its place SQLite would not use the index of held runs alone.
-_held = select(run.c.clutch_id, func.count()).where(sa.text("state = 'held'")).group_by(run.c.clutch_id)
-_held_of_all = select(func.count()).select_from(run).where(sa.text("state = 'held'"))
-_greatest_key = select(func.coalesce(func.max(run.c.run_key), 0))
+_held = select(run.c.clutch_id, func.count()).where(HELD_ONLY).group_by(run.c.clutch_id)
+_held_of_all = select(func.count()).select_from(run).where(HELD_ONLY)
+#: Of SQLite's keys none is left out: the greatest one counts the runs, for none is ever deleted.
+_number = select(Pair(func.coalesce(func.max(run.c.run_key), 0), func.count(run.c.run_key)))
 _keys = select(run.c.run_id, run.c.run_key).where(_of_clutch)
 _set_results = update(run).where(run.c.run_key == bindparam("wanted"))
 
@@ -124,7 +125,8 @@ def insert(connection: Connection, row: NewRun) -> int:
     values["details"] = to_text(row.details)
     values["receipt"] = to_text(row.receipt)
     values["doubts"] = to_text(row.doubts)
-    return connection.execute(_insert, values).lastrowid
+    run_key: int = next(iter(connection.execute(_insert, values).inserted_primary_key or ()))
+    return run_key
 
 
 def get(connection: Connection, clutch_id: str, run_id: str) -> RunRow | None:
@@ -148,7 +150,7 @@ def page(
     Of one kind or all, in one state or any; `fitted`: only runs through which a curve was fitted.
     """
     query, values = _behind(_ordered.where(_fitted) if fitted else _ordered, after)
-    values |= {"of_clutch": clutch_id, "of_kind": kind, "of_state": state, "most": -1 if limit is None else limit}
+    values |= {"of_clutch": clutch_id, "of_kind": kind, "of_state": state, "most": ALL_ROWS if limit is None else limit}
     return [_row(row) for row in connection.execute(query, values)]
 
 
@@ -193,8 +195,8 @@ def held(connection: Connection) -> dict[str, int]:
 
 
 def count(connection: Connection) -> int:
-    """How many runs there are in any state: none is ever deleted, so that the greatest key counts them."""
-    number: int = connection.execute(_greatest_key).scalar_one()
+    """How many runs there are in any state."""
+    number: int = connection.execute(_number).scalar_one()
     return number
 
 

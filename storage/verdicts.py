@@ -7,6 +7,7 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, bindparam, select
 
 from storage.diagnoses import FINISHED
+from storage.dialects import json_fields
 from storage.encoding.json_text import to_object
 from storage.tables import adopted_model, diagnosis
 
@@ -38,12 +39,7 @@ _in_force = (
     .limit(1)
     .scalar_subquery()
 )
-_short = sa.func.json_object(
-    "verdict",
-    sa.func.json_extract(diagnosis.c.report, "$.verdict"),
-    "causes",
-    sa.func.json_extract(diagnosis.c.report, "$.causes"),
-)
+_short = json_fields(diagnosis.c.report, "verdict", "causes")
 _verdicts = select(
     diagnosis.c.clutch_id,
     diagnosis.c.diagnosis_id,

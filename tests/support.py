@@ -125,18 +125,21 @@ def clutchlife(*arguments: str | Path, code: int = 0, **environment: str) -> str
 class Server:
     """A service in a process of its own, over a real socket; `loaded`: forked, where its start and memory are no matter.
 
+    `database`: the path of a file, or an address.
+
     `environment`: variables beside those of the tests.
     """
 
     def __init__(
         self,
-        database: Path,
+        database: Path | str,
         *,
         port: int | None = None,
         loaded: bool = False,
         environment: Mapping[str, str] | None = None,
     ) -> None:
         self.database = database
+        self.address = database if isinstance(database, str) else f"sqlite:///{database}"
         self.port = port or free_port()
         self.loaded = loaded
         self.environment = dict(environment or {})
@@ -146,7 +149,7 @@ class Server:
     def start(self) -> None:
         """Start and wait until it is ready."""
         arguments = ["serve", "--port", str(self.port), "--log-level", "warning"]
-        arguments += ["--database", f"sqlite:///{self.database}"]
+        arguments += ["--database", self.address]
         environment = os.environ | self.environment
         if self.loaded:
             # a process that is forked off another's may have none of its own
@@ -188,7 +191,9 @@ class Server:
 
 
 @contextmanager
-def serving(database: Path, *, loaded: bool = False, environment: Mapping[str, str] | None = None) -> Iterator[Server]:
+def serving(
+    database: Path | str, *, loaded: bool = False, environment: Mapping[str, str] | None = None
+) -> Iterator[Server]:
     """A running service on that database, stopped at the end whatever happens."""
     server = Server(database, loaded=loaded, environment=environment)
     server.start()

@@ -35,7 +35,7 @@ def create(
     """Print a new key, once; only its hash is stored."""
     from service.web.auth import SCOPES, make_key  # start-up time
     from storage import keys  # start-up time
-    from storage.engine.database import open_database  # start-up time
+    from storage.engine.opening import open_database  # start-up time
 
     if scope not in SCOPES:
         fail(f"scope must be one of {', '.join(SCOPES)}, got {scope!r}", EX_USAGE)

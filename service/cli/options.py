@@ -23,7 +23,12 @@ out = Console(highlight=False)
 err = Console(stderr=True, highlight=False)
 
 Database = Annotated[
-    str, typer.Option("--database", envvar="CLUTCHLIFE_DATABASE", help="sqlite:///path, or sqlite:////absolute/path")
+    str,
+    typer.Option(
+        "--database",
+        envvar="CLUTCHLIFE_DATABASE",
+        help="sqlite:///path, sqlite:////absolute/path, or postgresql+psycopg://user@host/database",
+    ),
 ]
 ClutchId = Annotated[str, typer.Argument(metavar="ID")]
 Url = Annotated[str, typer.Option("--url", envvar="CLUTCHLIFE_URL", help="The address of the service")]
@@ -52,7 +57,7 @@ def errors_in_a_line() -> Iterator[None]:
 @contextmanager
 def existing(url: str) -> Iterator["Opened"]:
     """An open database that exists already: a mistyped address makes no new one. An older one is migrated."""
-    from storage.engine.database import open_database  # start-up time: most commands open no database
+    from storage.engine.opening import open_database  # start-up time: most commands open no database
 
     with errors_in_a_line():
         require_database(url)
@@ -63,7 +68,7 @@ def existing(url: str) -> Iterator["Opened"]:
 @contextmanager
 def read_only(url: str) -> Iterator["Opened"]:
     """An existing database for a command that only reads it: it stays as it is, at whatever revision."""
-    from storage.engine.database import find_database  # start-up time: most commands open no database
+    from storage.engine.opening import find_database  # start-up time: most commands open no database
 
     with errors_in_a_line():
         require_database(url)
@@ -73,11 +78,19 @@ def read_only(url: str) -> Iterator["Opened"]:
 
 def require_database(url: str) -> None:
     """End the command where there is no database at the address."""
-    from storage.engine.connect import path_of  # start-up time: most commands open no database
+    from service.settings import redacted  # start-up time: most commands open no database
+    from storage.engine.opening import database_exists  # start-up time: most commands open no database
 
-    path = path_of(url)
-    if not path.exists():
-        fail(f"there is no database at {path}", EX_USAGE)
+    if not database_exists(url):
+        fail(f"there is no database at {redacted(url)}", EX_USAGE)
+
+
+def require_file(url: str, instead: str) -> None:
+    """End the command where the database is not a file."""
+    from storage.engine.postgresql.connect import is_on_server  # start-up time: most commands open no database
+
+    if is_on_server(url):
+        fail(f"the database is on a PostgreSQL server: {instead}", EX_USAGE)
 
 
 def fail(message: str, code: int = 1) -> NoReturn:

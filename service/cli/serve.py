@@ -79,11 +79,9 @@ def _allowed(host: str, settings: "Settings") -> str:
     from service.readers.confinement import missing  # start-up time
     from service.web.auth import is_loopback  # start-up time
     from storage import keys  # start-up time
-    from storage.engine.connect import path_of  # start-up time
-    from storage.engine.database import open_database  # start-up time
-    from storage.engine.service_lock import service_lock  # start-up time
+    from storage.engine.opening import open_database, service_lock  # start-up time
 
-    with service_lock(path_of(settings.database)):
+    with service_lock(settings.database):
         pass  # a second service ends here with a line; the application holds the lock from its start to its end
     with closing(open_database(settings.database)) as opened, opened.reading() as connection:
         has_keys = keys.any_ever(connection)

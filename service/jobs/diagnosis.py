@@ -20,8 +20,10 @@ from service.lives.diagnosis.report import public
 from service.lives.history import STATIONARY, Life, lives_of
 from service.lives.model_correction import corrected_cofs
 from service.lives.prediction_at import predict_at
+from service.settings import DATABASE_VARIABLE
 from storage import channels, results, runs
-from storage.engine.database import Database, open_database
+from storage.engine.database import Database
+from storage.engine.opening import open_database
 
 _METHOD = "particle"
 #: One for all: what is drawn must hang on nothing but the runs, not on what their clutch is called.
@@ -41,8 +43,8 @@ class Task:
 
 
 def main() -> None:
-    """Diagnose what the first argument names, JSON."""
-    task = Task(**json.loads(sys.argv[1]))
+    """Diagnose what the first argument names, JSON, in the database of the environment."""
+    task = Task(**json.loads(sys.argv[1]), database=os.environ[DATABASE_VARIABLE])
     threading.Thread(target=_end_with_the_service, daemon=True).start()
     resource.setrlimit(resource.RLIMIT_AS, (task.bytes, task.bytes))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

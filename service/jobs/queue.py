@@ -19,7 +19,7 @@ from typing import Any, Protocol
 
 from service.errors import BusyError
 from service.logging import request_id
-from service.settings import Settings
+from service.settings import DATABASE_VARIABLE, Settings
 from storage.diagnoses import NewDiagnosis
 from storage.engine.errors import StorageError
 
@@ -159,7 +159,6 @@ class DiagnosisQueue:
     def _run(self, job: Job) -> dict[str, Any]:
         """What the process wrote. Raises FailedError."""
         task = {
-            "database": self._database_url,
             "clutch_id": job.diagnosis.clutch_id,
             "last_run_key": job.diagnosis.last_run_key,
             "engine": self._settings.engine,
@@ -180,7 +179,9 @@ class DiagnosisQueue:
                     stdin=subprocess.PIPE,
                     stdout=answer,
                     stderr=errors,
-                    env=os.environ | _MEMORY,
+                    env=os.environ
+                    | _MEMORY
+                    | {DATABASE_VARIABLE: self._database_url},  # not an argument: others see those
                 )
             code = self._ended(self._process)
             if code == -signal.SIGXCPU:

@@ -11,7 +11,8 @@ from typing import Any
 
 from service import logging
 from service.background import use_one_blas_thread, yield_to_others
-from storage.engine.database import Database, open_database
+from storage.engine.database import Database
+from storage.engine.opening import open_database
 
 #: What nearly every call needs, loaded before the first comes.
 LOADED_EARLY = (

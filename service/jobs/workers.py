@@ -205,10 +205,10 @@ def in_processes(database: Database, processes: int, log: tuple[LogFormat, LogLe
     context.set_forkserver_preload([worker.__name__, *worker.LOADED_EARLY])
     _start_forkserver()
     sizes = dict.fromkeys(Lane, 1) | {Lane.RUNS: processes}
-    url = f"sqlite:///{database.path.absolute()}"
 
     def make(lane: Lane) -> Executor:
-        return _Processes(sizes[lane], mp_context=context, initializer=worker.begin, initargs=(url, lane.value, log))
+        arguments = (database.url, lane.value, log)
+        return _Processes(sizes[lane], mp_context=context, initializer=worker.begin, initargs=arguments)
 
     return Workers(make, worker.call, sizes)
 

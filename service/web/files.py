@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import BinaryIO
@@ -15,11 +16,14 @@ PARQUET_TYPE = "application/vnd.apache.parquet"
 _PIECE = 1 << 18
 
 
-def emptied_folder(database: Path) -> Path:
+def emptied_folder(database: Path | None) -> Path:
     """The folder `FILE-files` beside a database, for files that come in and go out; what a killed service left is gone.
 
     Beside the database there is room for what is to be stored in it; the system's folder of temporary files may be memory.
+    It is there that the folder is where the database is on a server (None): a new one, which the caller removes.
     """
+    if database is None:
+        return Path(tempfile.mkdtemp(prefix="clutchlife-"))
     folder = database.with_name(f"{database.name}-files")
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(mode=0o700, exist_ok=True)

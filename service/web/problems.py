@@ -31,7 +31,7 @@ from service.queries.cache import to_json
 from service.schemas.problem import Problem
 from service.web.auth import route_of
 from service.web.limits import RETRY_AFTER_SECONDS
-from storage.engine.errors import DatabaseBusy, StorageError
+from storage.engine.errors import DatabaseBusy, StorageError, UnstorableText
 
 PROBLEM_TYPE = "application/problem+json"
 
@@ -98,6 +98,8 @@ def _service_error(_: Request, error: Exception) -> Response:
 
 
 def _storage_error(_: Request, error: Exception) -> Response:
+    if isinstance(error, UnstorableText):
+        return refused(InvalidError, str(error))
     slug, title = ("busy", "Busy") if isinstance(error, DatabaseBusy) else ("storage", "The database cannot be used")
     _log.error("storage: %s", error)
     return problem(503, slug, title, "nothing was changed; try again, or see the service's log")

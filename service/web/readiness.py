@@ -49,7 +49,8 @@ class Readiness:
         try:
             return await asyncio.wait_for(asyncio.shield(self._looking), LONGEST_LOOK_SECONDS)
         except TimeoutError:
-            return {"disk": f"the database's disk has not answered for {LONGEST_LOOK_SECONDS:g} s"}
+            part, place = ("database", "server") if self._database.path is None else ("disk", "database's disk")
+            return {part: f"the {place} has not answered for {LONGEST_LOOK_SECONDS:g} s"}
 
     def close(self) -> None:
         """End the thread, once it has looked."""

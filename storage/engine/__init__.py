@@ -1,6 +1,6 @@
-"""One SQLite file: opened, read and written in transactions, watched over and copied.
+"""A database is opened, read and written in transactions, and watched over.
 
-In: the URL of a database, `sqlite:///path`. Out: a `Database`, whose `reading` and `writing` hand out connections.
-Open `database.py` first; then `connect.py` (opening), `transactions.py`, the locks `write_lock.py` and `service_lock.py`,
-`backup.py` and `restore.py`, `health.py` and `integrity.py`.
+In: the address of a database, `sqlite:///path` or `postgresql+psycopg://user@host/database`. Out: a `Database`, whose
+`reading` and `writing` hand out connections. Open `database.py` first, what the rest of the program holds; `opening.py`
+makes one, `sqlite/` of a file, `postgresql/` of a database on a server.
 """

@@ -11,19 +11,23 @@ class DatabaseBusy(StorageError):
 
 
 class StorageUnavailable(StorageError):
-    """The file cannot be used now: the disk is full, the file is read-only, unreachable, damaged or no database."""
+    """The database cannot be used now: it is unreachable, read-only, damaged or none, or its disk is full."""
 
 
 class DatabaseTooNew(StorageError):
-    """The file was written by a newer release of this program."""
+    """The database was written by a newer release of this program."""
 
 
 class DatabaseTooOld(StorageError):
-    """The file is at an earlier revision than what is asked of it, and is only read."""
+    """The database is at an earlier revision than what is asked of it, and is only read."""
 
 
 class ServiceRuns(StorageError):
-    """A service uses the file."""
+    """A service uses the database."""
+
+
+class UnstorableText(StorageError):
+    """Text holds a character that the database does not have."""
 
 
 class DamagedData(StorageError):

@@ -1,32 +1,23 @@
-"""Whether a file is whole: its pages and indexes, the references between its rows, and its schema.
-
-Source: https://www.sqlite.org/pragma.html#pragma_integrity_check.
-"""
-
-import sqlite3
-from contextlib import closing
-from pathlib import Path
+"""Whether a database has the schema of this code."""
 
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from sqlalchemy import Connection
 
-from storage.engine.connect import read_only
-from storage.engine.errors import DatabaseTooOld
-from storage.migrations.upgrade import current, head
+from storage.engine.errors import DatabaseTooNew, DatabaseTooOld
+from storage.migrations.upgrade import current, head, revisions
 from storage.tables import metadata
 
-#: Findings of one kind that are listed. Chosen: a screenful; SQLite's own default is 100.
-_MOST_LISTED = 20
+#: What a server has beside the tables of `storage/tables.py`.
+_OWN_TABLES = ("commits",)
 
 
-def damage(connection: Connection) -> list[str]:
-    """What is wrong with the pages, the indexes and the references of a database; empty where nothing is."""
-    pages = [str(row[0]) for row in connection.exec_driver_sql(f"PRAGMA integrity_check({_MOST_LISTED})")]
-    broken = connection.exec_driver_sql("PRAGMA foreign_key_check").fetchmany(_MOST_LISTED)
-    return [f"integrity: {line}" for line in pages if line != "ok"] + [
-        f"row {row} of {table} refers to a row of {other} that is missing" for table, row, other, _ in broken
-    ]
+def refuse_newer(revision: str | None) -> None:
+    """Raise DatabaseTooNew on a revision that this code does not know."""
+    if revision is not None and revision not in revisions():
+        raise DatabaseTooNew(
+            f"the database is at revision {revision}, this release knows up to {head()}: use a newer one"
+        )
 
 
 def other_schema(connection: Connection) -> list[str]:
@@ -34,17 +25,10 @@ def other_schema(connection: Connection) -> list[str]:
     if current(connection) != head():
         raise DatabaseTooOld(
             f"the database is at revision {current(connection)}: its runs are checked at {head()} only, to which "
-            "`clutchlife serve` brings it, with a copy kept beside it"
+            "`clutchlife serve` brings it, with a copy of a file kept beside it"
         )
-    differences = compare_metadata(MigrationContext.configure(connection), metadata)
-    return [f"the schema differs: {difference}" for difference in differences]
-
-
-def require_whole(path: Path) -> None:
-    """Raise sqlite3.DatabaseError unless the file at `path` is a whole database of this program, at whatever revision."""
-    with closing(sqlite3.connect(read_only(path), uri=True)) as connection:
-        (line,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
-        if line != "ok":
-            raise sqlite3.DatabaseError(f"it is damaged: {line}")
-        if not connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'alembic_version'").fetchone():
-            raise sqlite3.DatabaseError("it is not a database of this program")
+    own = _OWN_TABLES if connection.dialect.name == "postgresql" else ()
+    context = MigrationContext.configure(
+        connection, opts={"include_object": lambda _, name, kind, *__: not (kind == "table" and name in own)}
+    )
+    return [f"the schema differs: {difference}" for difference in compare_metadata(context, metadata)]

@@ -9,7 +9,7 @@ import httpx2
 from playwright.sync_api import Browser, Page
 
 from storage import clutches
-from storage.engine.database import open_database
+from storage.engine.opening import open_database
 from tests.browser.driving import chromium, pointed_at
 from tests.browser.lives import demo
 from tests.support import serving

@@ -17,7 +17,7 @@ import httpx2
 
 from models.rig import campaign
 from service.run_files.simulated import simulated_body
-from storage.engine.database import back_up
+from storage.engine.sqlite.database import back_up
 from tests.benchmarks.memory import held
 from tests.scale.copies import kilobytes, life, multiply, name
 from tests.support import serving

@@ -13,7 +13,7 @@ import pytest
 
 from service.background import AtOnce, directly, in_background
 from storage import clutches
-from storage.engine.database import open_database
+from storage.engine.opening import open_database
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "SCHED_IDLE"), reason="this system has no such policy")
 

@@ -17,7 +17,8 @@ from sqlalchemy import Connection
 from storage import channels, clutches, diagnoses, runs
 from storage.clutches import ClutchRow
 from storage.diagnoses import NewDiagnosis
-from storage.engine.database import Database, open_database
+from storage.engine.database import Database
+from storage.engine.opening import open_database
 from storage.results import FitRow
 from storage.runs import NewRun
 

@@ -1,4 +1,4 @@
-"""Adopted models: each function against a real file."""
+"""Adopted models: each function against a real database."""
 
 import pytest
 from sqlalchemy.exc import IntegrityError

@@ -52,5 +52,5 @@ def test_the_last_change_of_a_history_is_none_that_leaves_it_alone(database: Dat
 
 
 def test_a_change_belongs_to_a_clutch(database: Database) -> None:
-    with pytest.raises(IntegrityError, match="FOREIGN KEY"), database.writing() as connection:
+    with pytest.raises(IntegrityError, match=r"(?i)foreign key"), database.writing() as connection:
         changes.insert(connection, new_change(1))

@@ -1,4 +1,4 @@
-"""Clutches: each function against a real file."""
+"""Clutches: each function against a real database."""
 
 from dataclasses import replace
 from math import nan

@@ -1,4 +1,4 @@
-"""Diagnoses: each function against a real file."""
+"""Diagnoses: each function against a real database."""
 
 import pytest
 

@@ -1,15 +1,17 @@
-"""Filter states: each function against a real file."""
+"""Filter states: each function against a real database."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from sqlalchemy import update
 from sqlalchemy.exc import IntegrityError
 
 from storage import results
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData
 from storage.results import FilterStateRow
+from storage.tables import filter_state
 from tests.storage.samples import store_two_clutches
 
 CLUTCH = "bench3-017"
@@ -54,7 +56,7 @@ def test_filter_states_come_back_are_replaced_and_cleared(stocked: Database) -> 
 def test_a_damaged_state_is_named(stocked: Database) -> None:
     with stocked.writing() as connection:
         results.put_filter_states(connection, CLUTCH, [state("ukf", 5e5)])
-        connection.exec_driver_sql("UPDATE filter_state SET arrays = x'00'")
+        connection.execute(update(filter_state).values(arrays=b"\0"))
     with (
         stocked.reading() as connection,
         pytest.raises(DamagedData, match=r"state of ukf at 500000 Pa of clutch 'bench3"),
@@ -63,5 +65,5 @@ def test_a_damaged_state_is_named(stocked: Database) -> None:
 
 
 def test_states_belong_to_a_clutch(database: Database) -> None:
-    with pytest.raises(IntegrityError, match="FOREIGN KEY"), database.writing() as connection:
+    with pytest.raises(IntegrityError, match=r"(?i)foreign key"), database.writing() as connection:
         results.put_filter_states(connection, "nobody", [state("ukf", 0.0)])

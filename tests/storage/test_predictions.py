@@ -1,4 +1,4 @@
-"""Predictions: each function against a real file."""
+"""Predictions: each function against a real database."""
 
 import pytest
 from sqlalchemy.exc import IntegrityError
@@ -52,5 +52,5 @@ def test_predictions_are_replaced_and_cleared_for_one_clutch(stocked: Database) 
 
 
 def test_predictions_belong_to_a_clutch(database: Database) -> None:
-    with pytest.raises(IntegrityError, match="FOREIGN KEY"), database.writing() as connection:
+    with pytest.raises(IntegrityError, match=r"(?i)foreign key"), database.writing() as connection:
         results.put_predictions(connection, "nobody", [prediction(0.0)])

@@ -1,4 +1,4 @@
-"""Runs: each function against a real file."""
+"""Runs: each function against a real database."""
 
 from dataclasses import asdict, replace
 
@@ -96,12 +96,12 @@ def test_a_rebuild_that_is_held_is_none(database: Database) -> None:
 
 
 def test_a_run_belongs_to_a_clutch_and_its_id_is_taken_once(database: Database) -> None:
-    with pytest.raises(IntegrityError, match="FOREIGN KEY"), database.writing() as connection:
+    with pytest.raises(IntegrityError, match=r"(?i)foreign key"), database.writing() as connection:
         runs.insert(connection, new_run())
     with database.writing() as connection:
         clutches.insert(connection, clutch_row())
         runs.insert(connection, new_run())
-    with pytest.raises(IntegrityError, match="UNIQUE"), database.writing() as connection:
+    with pytest.raises(IntegrityError, match=r"(?i)unique"), database.writing() as connection:
         runs.insert(connection, new_run())
 
 
@@ -123,7 +123,7 @@ def test_an_unknown_run_is_named(database: Database) -> None:
         runs.set_results(connection, 99, {}, {}, "0.1.0")
 
 
-def test_held_runs_are_counted_by_clutch_from_an_index_of_their_own(database: Database) -> None:
+def test_held_runs_are_counted_by_clutch_and_in_all(database: Database) -> None:
     states = ["accepted", "held", "withdrawn", "held"]
     with database.writing() as connection:
         clutches.insert(connection, clutch_row())
@@ -134,6 +134,12 @@ def test_held_runs_are_counted_by_clutch_from_an_index_of_their_own(database: Da
         runs.insert(connection, replace(new_run(9), clutch_id="other", state="withdrawn"))
     with database.reading() as connection:
         assert runs.held(connection) == {CLUTCH: 2}
+        assert runs.count_held(connection) == 2
+        assert runs.count(connection) == 5
+
+
+def test_held_runs_are_counted_from_an_index_of_their_own(in_file: Database) -> None:
+    with in_file.reading() as connection:
         plan = [row.detail for row in connection.execute(text(f"EXPLAIN QUERY PLAN {runs._held}"))]
     assert len(plan) == 1
     assert "INDEX run_held" in plan[0]

@@ -6,7 +6,19 @@ from typing import Annotated
 import typer
 
 from service.cli.changes import run_changes
-from service.cli.options import DATABASE, EX_USAGE, URL, Database, Key, Patience, Url, errors_in_a_line, fail, out
+from service.cli.options import (
+    DATABASE,
+    EX_USAGE,
+    URL,
+    Database,
+    Key,
+    Patience,
+    Url,
+    errors_in_a_line,
+    fail,
+    out,
+    require_file,
+)
 
 
 def restore(
@@ -27,9 +39,10 @@ def restore(
             fail("a run is restored for a reason: give --reason", EX_USAGE)
         run_changes.restore(backup_or_clutch, run, reason, url, key, patience)
         return
-    from storage.engine.restore import restore as put_back  # start-up time
+    from storage.engine.sqlite.restore import restore as put_back  # start-up time
 
     with errors_in_a_line():
+        require_file(database, "put a dump back with pg_restore, while no service runs")
         kept = put_back(database, Path(backup_or_clutch))
     out.print(f"{backup_or_clutch} is in the place of {database}", markup=False, soft_wrap=True)
     if kept is not None:

@@ -24,7 +24,7 @@ def verify(
     from service.queries.verification.results import check_results  # start-up time
     from service.queries.verification.surfaces import check_inspections  # start-up time
     from storage import clutches  # start-up time
-    from storage.engine.integrity import damage, other_schema  # start-up time
+    from storage.engine.integrity import other_schema  # start-up time
 
     use_one_blas_thread()
     findings = runs = inspections = photographs = 0
@@ -37,7 +37,7 @@ def verify(
 
     with read_only(database) as opened, Progress(console=err, transient=True) as progress:
         with opened.reading() as connection:
-            damaged = tell(damage(connection))
+            damaged = tell(opened.damage(connection))
             if damaged:  # what is read of a damaged file is not to be trusted: neither runs nor what follows from them
                 fail(f"{damaged} findings: the file is damaged. Put a backup back: clutchlife restore BACKUP")
             findings += tell(other_schema(connection))

@@ -213,7 +213,7 @@ def test_a_service_that_goes_away_and_comes_back(browser: Browser, tmp_path: Pat
 def test_with_keys_the_page_asks_for_one(browser: Browser, tmp_path: Path) -> None:
     from service.web import auth
     from storage import keys
-    from storage.engine.database import open_database
+    from storage.engine.opening import open_database
 
     with serving(tmp_path / "clutchlife.db", loaded=True) as server:
         ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "secret"})

@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from service.web.auth import make_key
 from storage import keys
-from storage.engine.database import open_database
+from storage.engine.opening import open_database
 from tests.browser.driving import Watched
 from tests.browser.lives import worn
 from tests.journeys.dashboard.test_axe import violations

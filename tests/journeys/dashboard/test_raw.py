@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from storage import channels, runs
-from storage.engine.database import open_database
+from storage.engine.opening import open_database
 from tests.browser.driving import Watched, pointed_at
 from tests.browser.lives import loops, post
 from tests.support import Server, serving, stationary, torque_nm

@@ -21,9 +21,10 @@ from service.queries.verification.content import check_runs
 from service.queries.verification.results import check_results
 from service.workflows.adopt_model import adopt
 from storage import assumptions, channels, clutches, runs
-from storage.engine.database import back_up, find_database, open_database
-from storage.engine.integrity import damage, other_schema
-from storage.engine.restore import restore
+from storage.engine.integrity import other_schema
+from storage.engine.opening import find_database, open_database
+from storage.engine.sqlite.database import back_up
+from storage.engine.sqlite.restore import restore
 from storage.migrations.upgrade import head
 from tests.service.workflows.benches import Bench, body, stood_in
 from tests.storage.samples import OLD, integrity, old_database, revision
@@ -65,21 +66,26 @@ def duration(act: Callable[[], object]) -> float:
     return time.perf_counter() - started
 
 
-def findings(path: Path) -> list[str]:
+def address_of(database: Path | str) -> str:
+    """The address of a database that is given as such, or by its path."""
+    return database if isinstance(database, str) else f"sqlite:///{database}"
+
+
+def findings(path: Path | str) -> list[str]:
     """What `clutchlife verify` would find."""
-    with closing(find_database(f"sqlite:///{path}")) as database:
+    with closing(find_database(address_of(path))) as database:
         with database.reading() as connection:
-            wrong = damage(connection) + other_schema(connection)
+            wrong = database.damage(connection) + other_schema(connection)
             names = clutches.all_ids(connection)
         for name in names:
             wrong += [*check_runs(database, name).findings, *check_results(database, name).findings]
     return wrong
 
 
-def stored(path: Path) -> dict[tuple[str, str], dict[str, bytes]]:
+def stored(path: Path | str) -> dict[tuple[str, str], dict[str, bytes]]:
     """Every run's channels, bit for bit."""
     content = {}
-    with closing(find_database(f"sqlite:///{path}")) as database, database.reading() as connection:
+    with closing(find_database(address_of(path))) as database, database.reading() as connection:
         for name in clutches.all_ids(connection):
             for row in runs.page(connection, name):
                 columns = channels.read(connection, row.run_key)

@@ -20,7 +20,8 @@ from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
 from service.workflows import register_clutch
 from service.workflows.ingest_run import ingest_posted
-from storage.engine.database import Database, open_database
+from storage.engine.database import Database
+from storage.engine.opening import open_database
 from tests.service.jobs import calls
 from tests.support import stationary
 

@@ -9,7 +9,7 @@ from fastapi.testclient import TestClient
 
 from service.lives.model_correction import corrected_cofs
 from service.workflows.replay import replay_clutch
-from storage.engine.database import open_database
+from storage.engine.opening import open_database
 from tests.service.lives.diagnosis.test_campaign import campaign, post
 from tests.service.run_files.test_upload import dynamic_record
 from tests.support import stationary

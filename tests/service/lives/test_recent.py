@@ -13,7 +13,8 @@ from service.lives.payloads import recent
 from service.queries import clutch_list
 from storage import clutches, diagnoses
 from storage.diagnoses import NewDiagnosis
-from storage.engine.database import Database, open_database
+from storage.engine.database import Database
+from storage.engine.opening import open_database
 from tests.support import stationary
 
 AT = "2026-11-02T10:00:00+00:00"

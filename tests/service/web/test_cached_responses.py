@@ -10,7 +10,8 @@ from service.app import create_app
 from service.queries import series
 from service.settings import Settings
 from service.workflows.replay import replay_clutch
-from storage.engine.database import back_up, open_database
+from storage.engine.opening import open_database
+from storage.engine.sqlite.database import back_up
 from tests.support import stationary
 
 BASE = "/v1/clutches/c1"

@@ -5,7 +5,7 @@ from fastapi.testclient import TestClient
 
 from service.web.auth import make_key
 from storage import keys
-from storage.engine.database import open_database
+from storage.engine.opening import open_database
 from tests.support import stationary
 
 BASE = "/v1/clutches/c1"

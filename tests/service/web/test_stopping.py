@@ -13,7 +13,7 @@ import httpx2
 import pytest
 
 from storage import runs
-from storage.engine.database import open_database
+from storage.engine.opening import open_database
 from tests.support import ONCE, Server, stationary
 
 RUNS = "/v1/clutches/c1/runs"

@@ -25,7 +25,8 @@ from service.workflows.adopt_model import adopt
 from service.workflows.ingest_run import ingest
 from storage import diagnoses, results
 from storage.diagnoses import NewDiagnosis
-from storage.engine.database import Database, open_database
+from storage.engine.database import Database
+from storage.engine.opening import open_database
 from tests.service.workflows import stand_in_engine
 from tests.support import stationary, torque_nm
 

@@ -19,7 +19,7 @@ from service.workflows.adopt_model import finish_and_adopt
 from service.workflows.ingest_run import ingest
 from service.workflows.replay import replay_clutch
 from storage import assumptions, clutches
-from storage.engine.database import open_database
+from storage.engine.opening import open_database
 from tests.service.workflows.benches import AT, CLUTCH, EXTENSION, Bench, assert_same, body, stood_in
 
 

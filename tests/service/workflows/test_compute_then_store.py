@@ -28,9 +28,10 @@ from service.workflows.ingest_run import ingest
 from service.workflows.replay import replay_clutch
 from storage import assumptions, clutches, diagnoses, results, runs
 from storage.diagnoses import NewDiagnosis
-from storage.engine.database import Database, open_database
+from storage.engine.database import Database
 from storage.engine.errors import DamagedData
-from storage.engine.transactions import Transactions
+from storage.engine.opening import open_database
+from storage.engine.sqlite.transactions import Transactions
 from tests.service.workflows import stand_in_engine
 from tests.support import stationary
 

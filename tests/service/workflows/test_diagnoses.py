@@ -13,7 +13,7 @@ from service.schemas.diagnosis import DiagnosisListed, DiagnosisOut, ModelOut
 from service.web.auth import SCOPES, Scope, make_key
 from service.workflows.replay import replay_clutch
 from storage import keys
-from storage.engine.database import open_database
+from storage.engine.opening import open_database
 from tests.service.workflows import stand_in_engine
 from tests.service.workflows.diagnosing import BASE, diagnosed, post_tests, service
 

@@ -11,7 +11,7 @@ from service.queries import clutch_list
 from service.queries import runs as run_query
 from service.schemas.clutch import ClutchEdit, ClutchIn
 from service.workflows import edit_clutch, learn_fleet, register_clutch
-from storage.engine.database import open_database
+from storage.engine.opening import open_database
 from tests.service.workflows.benches import AT, CLUTCH, WHO, Bench, assert_same, body, stood_in
 
 HISTORY = (("test", 0.0), ("duty", 400.0), ("loop", 500.0), ("oil_change", 1500.0), ("test", 2000.0))

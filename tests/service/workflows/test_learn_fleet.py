@@ -15,7 +15,7 @@ from service.lives.recomputation import ClutchState, Tracking
 from service.settings import Settings
 from service.workflows import learn_fleet
 from service.workflows.replay import replay_clutch
-from storage.engine.database import open_database
+from storage.engine.opening import open_database
 from tests.support import stationary
 
 LIFE = "/v1/clutches/{}/remaining-useful-life"

@@ -14,8 +14,9 @@ from sqlalchemy import Connection, insert
 
 from storage import clutches, diagnoses, runs, tables
 from storage.encoding.json_text import to_text
-from storage.engine.database import Database, open_database
+from storage.engine.database import Database
 from storage.engine.errors import DatabaseTooNew, StorageUnavailable
+from storage.engine.opening import open_database
 from storage.migrations import upgrade as migrations
 from storage.tables import metadata
 from tests.storage.samples import (
@@ -33,12 +34,12 @@ CLUTCH = "bench3-017"
 
 STARTER = """
 import sys
-import storage.engine.connect
-import storage.engine.database
-storage.engine.connect.JOURNAL_MODE = sys.argv[1]
+import storage.engine.sqlite.connect
+import storage.engine.opening
+storage.engine.sqlite.connect.JOURNAL_MODE = sys.argv[1]
 print("loaded", flush=True)
 for line in sys.stdin:
-    database = storage.engine.database.open_database(f"sqlite:///{line.strip()}")
+    database = storage.engine.opening.open_database(f"sqlite:///{line.strip()}")
     print(not database.faults(least_free=0), flush=True)
     database.close()
 """
@@ -174,7 +175,7 @@ def test_a_step_that_breaks_references_is_undone(tmp_path: Path, monkeypatch: py
         migrations.upgrade(connection)  # type: ignore[arg-type]
         connection.exec_driver_sql("INSERT INTO prediction VALUES ('nobody', 'q', 0, 0, '{}', '')")  # type: ignore[attr-defined]
 
-    monkeypatch.setattr("storage.engine.database.upgrade", breaking)
+    monkeypatch.setattr("storage.engine.sqlite.database.upgrade", breaking)
     with pytest.raises(StorageUnavailable, match="refer to missing rows"):
         open_database(f"sqlite:///{tmp_path}/a.db")
     monkeypatch.undo()
@@ -209,7 +210,7 @@ def test_a_migration_that_is_tried_again_replaces_no_copy(tmp_path: Path, monkey
     """The same content is kept once; a file that was worked on in between is kept beside it."""
     path = old_database(tmp_path, monkeypatch)
     with monkeypatch.context() as failing:
-        failing.setattr("storage.engine.database.upgrade", lambda _: 1 / 0)
+        failing.setattr("storage.engine.sqlite.database.upgrade", lambda _: 1 / 0)
         for _ in range(2):
             with pytest.raises(ZeroDivisionError):
                 open_database(f"sqlite:///{path}")

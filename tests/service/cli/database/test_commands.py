@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from service.app import create_app
 from service.cli.main import app
 from service.settings import Settings
-from storage.engine.service_lock import service_lock
+from storage.engine.sqlite.service_lock import service_lock
 from tests.storage.samples import OLD, integrity, old_database, revision
 from tests.support import stationary
 
@@ -95,6 +95,17 @@ def test_verify_names_a_damaged_page(path: Path) -> None:
     page = len(whole) // 2 // 4096 * 4096
     path.write_bytes(whole[:page] + b"\xff" * 4096 + whole[page + 4096 :])
     assert "damaged" in clutchlife("verify", "--database", f"sqlite:///{path}", code=1)
+
+
+def test_what_needs_a_file_names_what_does_it_on_a_server(tmp_path: Path) -> None:
+    url = ("--database", "postgresql+psycopg://u:s3cr3t@127.0.0.1:1/db")
+    for command, program in (("backup", "pg_dump"), ("restore", "pg_restore")):
+        output = clutchlife(command, tmp_path / "backup.db", *url, code=64)
+        assert program in output
+        assert "s3cr3t" not in output
+    output = clutchlife("verify", *url, code=1)
+    assert "the server cannot be used" in output
+    assert "s3cr3t" not in output
 
 
 def test_a_backup_is_restored_unless_a_service_runs(path: Path, tmp_path: Path) -> None:

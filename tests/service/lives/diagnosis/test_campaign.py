@@ -13,7 +13,7 @@ from models.records.runs import Record
 from service.jobs.diagnosis import read_life
 from service.lives.diagnosis import campaign as campaign_module
 from service.lives.diagnosis.campaign import DiagnosedLife, thinned
-from storage.engine.database import open_database
+from storage.engine.opening import open_database
 from tests.service.run_files.test_upload import dynamic_record, raw_record
 from tests.support import PRESSURES_BAR, SPEEDS_RPM, stationary
 

@@ -11,7 +11,7 @@ from fastapi.testclient import TestClient
 from service import measured_lives
 from service.lives.engagements.over_life import ALL_INDICATORS, indicator_columns
 from service.workflows.replay import replay_clutch
-from storage.engine.database import open_database
+from storage.engine.opening import open_database
 from tests.models.engagements.closed_forms import Engagement, constant, record
 from tests.support import stationary
 

@@ -17,7 +17,8 @@ from service.errors import NotAcceptableError, NotFoundError
 from service.queries.raw_run import formats
 from service.queries.raw_run.answer import entity_tag, write_run
 from storage import channels, clutches, runs
-from storage.engine.database import Database, open_database
+from storage.engine.database import Database
+from storage.engine.opening import open_database
 from tests.storage.samples import clutch_row, new_run
 from tests.support import stationary
 

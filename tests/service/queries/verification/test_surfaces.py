@@ -12,7 +12,8 @@ from service.app import create_app
 from service.cli.main import app
 from service.queries.verification.surfaces import CheckedInspections, check_inspections
 from service.settings import Settings
-from storage.engine.database import back_up, find_database
+from storage.engine.opening import find_database
+from storage.engine.sqlite.database import back_up
 from tests.service.web.routes.surfaces import FRESH, WORN, inspected, png, sha256
 
 

@@ -11,7 +11,8 @@ from service.app import create_app
 from service.queries.verification.content import CheckedRuns, check_runs
 from service.queries.verification.results import CheckedResults, check_results
 from service.settings import Settings
-from storage.engine.database import back_up, find_database
+from storage.engine.opening import find_database
+from storage.engine.sqlite.database import back_up
 from tests.support import stationary
 
 BASE = "/v1/clutches/c1"

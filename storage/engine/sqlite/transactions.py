@@ -10,11 +10,12 @@ from pathlib import Path
 
 from sqlalchemy import Connection, Engine
 
-from storage.engine.connect import make_engine
-from storage.engine.driver_errors import DRIVER_ERRORS, store_error
+from storage.engine.database import Database
 from storage.engine.errors import StorageUnavailable
-from storage.engine.watch import Watch
-from storage.engine.write_lock import WriteLock
+from storage.engine.sqlite.connect import make_engine
+from storage.engine.sqlite.driver_errors import DRIVER_ERRORS, store_error
+from storage.engine.sqlite.watch import FileWatch
+from storage.engine.sqlite.write_lock import WriteLock
 
 
 @contextmanager
@@ -37,8 +38,11 @@ def transaction(engine: Engine, begin: str) -> Iterator[Connection]:
         yield connection
 
 
-class Transactions:
+class Transactions(Database):
     """The transactions of a database file. Threads share it; `close` it at the end."""
+
+    path: Path
+    watch: FileWatch
 
     def __init__(self, path: Path, lock_timeout: float, *, writable: bool = True) -> None:
         self.path = path
@@ -47,7 +51,7 @@ class Transactions:
         self._closed = False
         self._engine = make_engine(path, lock_timeout, writable=writable)
         with translated(path):
-            self.watch = Watch(path, lock_timeout, writable=writable)
+            self.watch = FileWatch(path, lock_timeout, writable=writable)
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:

@@ -13,9 +13,10 @@ from pathlib import Path
 import pytest
 
 from storage import clutches
-from storage.engine.database import Database, open_database
+from storage.engine.database import Database
 from storage.engine.errors import DatabaseBusy, StorageUnavailable
-from storage.engine.write_lock import WriteLock
+from storage.engine.opening import open_database
+from storage.engine.sqlite.write_lock import WriteLock
 from tests.storage.samples import clutch_row
 
 IN_TIME = 60.0

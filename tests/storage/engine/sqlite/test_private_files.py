@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from storage import clutches
-from storage.engine.backup import copy
-from storage.engine.database import open_database
+from storage.engine.opening import open_database
+from storage.engine.sqlite.backup import copy
 from tests.storage.samples import clutch_row
 
 

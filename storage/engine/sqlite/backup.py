@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
-from storage.engine.connect import read_only
-from storage.engine.private_files import make_if_missing, make_new
+from storage.engine.sqlite.connect import read_only
+from storage.engine.sqlite.private_files import make_if_missing, make_new
 
 
 def copy(source: Path, target: Path, *, lock_timeout: float) -> None:

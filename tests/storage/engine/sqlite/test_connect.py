@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 
 from storage import clutches
-from storage.engine.database import Database, back_up, open_database
+from storage.engine.database import Database
+from storage.engine.opening import open_database
+from storage.engine.sqlite.database import back_up
 from tests.storage.samples import clutch_row
 
 
@@ -28,7 +30,7 @@ def test_a_file_of_another_sqlite_is_turned_and_keeps_its_rows(
 ) -> None:
     url = f"sqlite:///{tmp_path}/a.db"
     with monkeypatch.context() as patch:
-        patch.setattr("storage.engine.connect.JOURNAL_MODE", earlier)
+        patch.setattr("storage.engine.sqlite.connect.JOURNAL_MODE", earlier)
         with closing(open_database(url)) as database, database.writing() as connection:
             clutches.insert(connection, clutch_row())
     assert journal_mode_of_file(tmp_path / "a.db") == earlier

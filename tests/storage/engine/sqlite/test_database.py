@@ -8,8 +8,9 @@ from sqlalchemy import text
 from sqlalchemy.exc import OperationalError
 
 from storage import changes, clutches
-from storage.engine.database import Database, find_database, open_database
+from storage.engine.database import Database
 from storage.engine.errors import DatabaseTooOld, StorageUnavailable
+from storage.engine.opening import find_database, open_database
 from tests.storage.samples import OLD, clutch_row, old_database, store_run
 
 

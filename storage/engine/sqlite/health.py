@@ -6,7 +6,7 @@ import sqlite3
 from contextlib import closing
 from pathlib import Path
 
-from storage.engine.connect import JOURNAL_MODE, read_only
+from storage.engine.sqlite.connect import JOURNAL_MODE, read_only
 from storage.migrations.upgrade import head
 
 

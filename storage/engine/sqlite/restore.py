@@ -6,15 +6,15 @@ import sqlite3
 from contextlib import closing
 from pathlib import Path
 
-from storage.engine.backup import copy_whole, names_beside, renamed
-from storage.engine.connect import path_of
-from storage.engine.driver_errors import DRIVER_ERRORS
 from storage.engine.errors import DatabaseBusy, StorageUnavailable
-from storage.engine.integrity import require_whole
 from storage.engine.limits import LOCK_TIMEOUT
-from storage.engine.service_lock import service_lock
-from storage.engine.transactions import translated
-from storage.engine.write_lock import WriteLock
+from storage.engine.sqlite.backup import copy_whole, names_beside, renamed
+from storage.engine.sqlite.connect import path_of
+from storage.engine.sqlite.driver_errors import DRIVER_ERRORS
+from storage.engine.sqlite.integrity import require_whole
+from storage.engine.sqlite.service_lock import service_lock
+from storage.engine.sqlite.transactions import translated
+from storage.engine.sqlite.write_lock import WriteLock
 
 #: What SQLite keeps beside a file: commits that are not in it yet, and what readers share.
 _LOG, _SHARED = "-wal", "-shm"

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from storage import channels, clutches, runs
-from storage.engine.database import Database, open_database
+from storage.engine.database import Database
+from storage.engine.opening import open_database
 from tests.storage.samples import child, clutch_row, columns, integrity, store_run
 
 CLUTCH = "bench3-017"
@@ -18,13 +19,13 @@ CLUTCH = "bench3-017"
 #: Kills itself at a named moment of the second run's transaction.
 SUICIDE = """
 import os, signal, sys
-import storage.engine.connect
-import storage.engine.database
+import storage.engine.sqlite.connect
+import storage.engine.opening
 from storage import channels, clutches, runs
 from tests.storage.samples import columns, new_run
 path, mode, moment, length = sys.argv[1], sys.argv[2], sys.argv[3], int(sys.argv[4])
-storage.engine.connect.JOURNAL_MODE = mode
-database = storage.engine.database.open_database(f"sqlite:///{path}")
+storage.engine.sqlite.connect.JOURNAL_MODE = mode
+database = storage.engine.opening.open_database(f"sqlite:///{path}")
 def reached(name):
     if name == moment:
         os.kill(os.getpid(), signal.SIGKILL)
@@ -46,12 +47,12 @@ with database.writing() as connection:
 #: Commits run after run and says so, until it is killed.
 BUSY = """
 import sys
-import storage.engine.connect
-import storage.engine.database
+import storage.engine.sqlite.connect
+import storage.engine.opening
 from tests.storage.samples import store_run
 path, mode = sys.argv[1], sys.argv[2]
-storage.engine.connect.JOURNAL_MODE = mode
-database = storage.engine.database.open_database(f"sqlite:///{path}")
+storage.engine.sqlite.connect.JOURNAL_MODE = mode
+database = storage.engine.opening.open_database(f"sqlite:///{path}")
 for number in range(1, 100_000):
     with database.writing() as connection:
         store_run(connection, number, length=2000)

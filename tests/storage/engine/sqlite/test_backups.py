@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 
 from storage import channels, clutches, runs
-from storage.engine.database import Database, back_up, open_database
+from storage.engine.database import Database
 from storage.engine.errors import StorageUnavailable
+from storage.engine.opening import open_database
+from storage.engine.sqlite.database import back_up
 from tests.storage.samples import OLD, clutch_row, integrity, old_database, revision, store_run
 
 CLUTCH = "bench3-017"

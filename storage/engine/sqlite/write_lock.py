@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from storage.engine.errors import DatabaseBusy, StorageUnavailable
-from storage.engine.private_files import MODE
+from storage.engine.sqlite.private_files import MODE
 
 #: [s] Between two attempts to take the lock from another process: first and longest. Chosen: a commit takes 1 to 5 ms.
 _FIRST_RETRY, _LONGEST_RETRY = 0.0005, 0.005

@@ -10,7 +10,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from storage.engine.database import Database, open_database
+from storage.engine.database import Database
+from storage.engine.opening import open_database
 
 #: Bytes that must be free in these tests.
 LEAST_FREE = 16 << 20
@@ -27,9 +28,11 @@ def test_ready_while_the_file_is_there_and_open(database: Database) -> None:
 
 
 def test_not_ready_on_a_full_disk(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("storage.engine.health.shutil.disk_usage", lambda _: SimpleNamespace(free=LEAST_FREE - 1))
+    monkeypatch.setattr(
+        "storage.engine.sqlite.health.shutil.disk_usage", lambda _: SimpleNamespace(free=LEAST_FREE - 1)
+    )
     assert database.faults(least_free=LEAST_FREE)
-    monkeypatch.setattr("storage.engine.health.shutil.disk_usage", lambda _: SimpleNamespace(free=LEAST_FREE))
+    monkeypatch.setattr("storage.engine.sqlite.health.shutil.disk_usage", lambda _: SimpleNamespace(free=LEAST_FREE))
     assert not database.faults(least_free=LEAST_FREE)
 
 
@@ -44,7 +47,8 @@ def test_not_ready_where_nothing_can_be_written(
         for unwritable in (database.path, database.path.parent):
             with monkeypatch.context() as patch:
                 patch.setattr(
-                    "storage.engine.health.os.access", lambda path, how, no=unwritable: path != no and access(path, how)
+                    "storage.engine.sqlite.health.os.access",
+                    lambda path, how, no=unwritable: path != no and access(path, how),
                 )
                 assert database.faults(least_free=LEAST_FREE) == {
                     "database": "the file or its folder cannot be written"

@@ -1,0 +1,52 @@
+"""A database is opened by its address, which says of what kind it is: `sqlite:///path`, or one on a PostgreSQL server."""
+
+from contextlib import AbstractContextManager
+
+from storage.engine.database import Database
+from storage.engine.limits import LOCK_TIMEOUT
+from storage.engine.postgresql import service_lock as session_lock
+from storage.engine.postgresql.connect import address_of, is_on_server
+from storage.engine.postgresql.database import find_server, open_server, server_has_tables
+from storage.engine.sqlite import service_lock as file_lock
+from storage.engine.sqlite.connect import path_of
+from storage.engine.sqlite.database import find_file, open_file
+
+
+def open_database(url: str, *, lock_timeout: float = LOCK_TIMEOUT, serving: bool = False) -> Database:
+    """Open `sqlite:///path` (`sqlite:////path` where it is absolute) or `postgresql+psycopg://user@host/database`.
+
+    The file, or the tables of an empty database, is made, and the migrations that are missing are run.
+
+    `serving`: it is the service itself that opens it, and holds `service_lock`. Raises ValueError on another address, and
+    what `open_file` and `open_server` do.
+    """
+    if is_on_server(url):
+        return open_server(address_of(url), lock_timeout=lock_timeout, serving=serving)
+    return open_file(path_of(url), lock_timeout=lock_timeout, serving=serving)
+
+
+def find_database(url: str, *, lock_timeout: float = LOCK_TIMEOUT) -> Database:
+    """Open a database to read it as it is, whatever its revision up to this code's; nothing is made or migrated.
+
+    Raises ValueError and DatabaseTooNew as `open_database` does, StorageUnavailable where there is none.
+    """
+    if is_on_server(url):
+        return find_server(address_of(url), lock_timeout=lock_timeout)
+    return find_file(path_of(url), lock_timeout=lock_timeout)
+
+
+def database_exists(url: str) -> bool:
+    """Whether there is a database at the address.
+
+    Raises ValueError on an address of no kind, StorageUnavailable where a server does not answer or has none of that name.
+    """
+    if is_on_server(url):
+        return server_has_tables(address_of(url), lock_timeout=LOCK_TIMEOUT)
+    return path_of(url).exists()
+
+
+def service_lock(url: str) -> AbstractContextManager[None]:
+    """Held inside: the lock of the one service that may use the database. Raises ServiceRuns where another holds it."""
+    if is_on_server(url):
+        return session_lock.service_lock(address_of(url))
+    return file_lock.service_lock(path_of(url))

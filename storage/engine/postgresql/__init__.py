@@ -1,0 +1,6 @@
+"""A database on a PostgreSQL server: opened, read and written in transactions, and watched over.
+
+In: its address, `postgresql+psycopg://user@host/database`. Out: a `ServerDatabase`, whose `reading` and `writing` hand out
+connections. Open `database.py` first; then `connect.py` (its address, and the settings of every connection), `watch.py`,
+`service_lock.py` and `driver_errors.py`.
+"""

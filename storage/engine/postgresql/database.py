@@ -1,0 +1,173 @@
+"""A database on a server: its transactions, and how its tables come to be.
+
+Writers queue for one lock of the database, so that transactions are committed in the order of the numbers that they give
+(revisions, keys, `commits`). Locks of single clutches, under which several write at once, need numbers that keep that order.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+
+from sqlalchemy import URL, Connection, insert, text
+from sqlalchemy.exc import ProgrammingError, SQLAlchemyError
+
+from storage.engine.database import Database
+from storage.engine.errors import DatabaseTooOld, StorageError, StorageUnavailable
+from storage.engine.integrity import refuse_newer
+from storage.engine.postgresql.connect import make_engine, shown
+from storage.engine.postgresql.driver_errors import translated
+from storage.engine.postgresql.service_lock import WRITE_KEY, service_lock
+from storage.engine.postgresql.watch import ServerWatch, commits, count_commit, own_tables
+from storage.migrations.upgrade import current, head, make_all, upgrade
+
+_LOCK = text(f"SELECT pg_advisory_xact_lock({WRITE_KEY})")
+#: A transaction that changed nothing has no number and is not counted.
+_COUNT = count_commit.where(text("pg_current_xact_id_if_assigned() IS NOT NULL"))
+
+
+class ServerDatabase(Database):
+    """An open database on a server. Made by `open_server`."""
+
+    path = None
+    journal_mode = None
+
+    def __init__(self, address: URL, *, lock_timeout: float, writable: bool = True) -> None:
+        self.url = address.render_as_string(hide_password=False)
+        self.name = shown(address)
+        self._address = address
+        self._closed = False
+        self._engine = make_engine(address, lock_timeout)
+        self._readers = self._engine.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
+        # a statement of a writer sees what was committed before the lock was free
+        self._writers = self._engine.execution_options(
+            isolation_level="READ COMMITTED", postgresql_readonly=not writable
+        )
+        self.watch = ServerWatch(self._engine, self.name)
+
+    @contextmanager
+    def reading(self) -> Iterator[Connection]:
+        """A connection that sees one state of the database, that of its first statement, until the block ends."""
+        self._refuse_closed()
+        with translated(self.name), self._readers.begin() as connection:
+            yield connection
+
+    @contextmanager
+    def writing(self) -> Iterator[Connection]:
+        """A connection that holds the lock of writers: committed when the block ends, rolled back on any exception."""
+        self._refuse_closed()
+        with translated(self.name), self._writers.begin() as connection:
+            connection.execute(_LOCK)
+            yield connection
+            connection.execute(_COUNT)
+
+    def faults(self, *, least_free: int) -> dict[str, str]:  # noqa: ARG002  (the server's disk is its operator's)
+        """What keeps the server from being used; of its disk nothing is known here."""
+        if self._closed:
+            return {"database": "it has been closed"}
+        try:
+            with self.reading() as connection:
+                revision = current(connection)
+                standby = connection.exec_driver_sql("SELECT pg_is_in_recovery()").scalar_one()
+        except (StorageError, SQLAlchemyError) as error:
+            return {"database": f"the database cannot be read: {type(error).__name__}"}
+        if revision != head():
+            return {"database": f"the database is at revision {revision}, this release needs {head()}"}
+        return {"database": "the server is a standby, which is only read"} if standby else {}
+
+    def damage(self, connection: Connection) -> list[str]:  # noqa: ARG002  (pages are the server's: pg_amcheck)
+        """Nothing: the server refuses rows that refer to missing ones, and checks its pages itself."""
+        return []
+
+    def close(self) -> None:
+        """Close all connections; any later use raises StorageUnavailable. May be called twice."""
+        self._closed = True
+        self._engine.dispose()
+
+    def migrate(self, *, serving: bool) -> None:
+        """Make the tables of an empty database, or run the steps that it lacks, not under a running service."""
+        with self.reading() as connection:
+            _require_utf8(connection, self.name)
+            revision = current(connection)
+        if revision == head():
+            return
+        in_use = revision is not None
+        with service_lock(self._address) if in_use and not serving else nullcontext(), self.writing() as connection:
+            revision = current(connection)  # another process may have been before
+            if revision is None:
+                make_all(connection)
+                own_tables.create_all(connection)
+                connection.execute(insert(commits).values(number=0))
+            elif revision != head():
+                refuse_newer(revision)
+                upgrade(connection)
+
+    def _refuse_closed(self) -> None:
+        if self._closed:
+            raise StorageUnavailable(f"{self.name} has been closed")
+
+
+class FoundServerDatabase(ServerDatabase):
+    """A database that is only read, at the revision that it was found at. Made by `find_server`."""
+
+    @contextmanager
+    def reading(self) -> Iterator[Connection]:
+        """As every database's; raises DatabaseTooOld where what is asked for came with a later revision."""
+        try:
+            with super().reading() as connection:
+                yield connection
+        except ProgrammingError as error:
+            with super().reading() as connection:
+                revision = current(connection)
+            if revision == head():
+                raise
+            raise DatabaseTooOld(
+                f"{self.name} is at revision {revision}, this needs {head()}: `clutchlife serve` brings it there"
+            ) from error
+
+
+def open_server(address: URL, *, lock_timeout: float, serving: bool = False) -> ServerDatabase:
+    """Open a database on a server, make the tables of an empty one and run the migrations that it lacks.
+
+    Raises DatabaseTooNew on that of a newer release, StorageUnavailable where it cannot be used or is not in UTF-8,
+    DatabaseBusy where another writes for `lock_timeout` [s], ServiceRuns where it is to be migrated under a service.
+    """
+    database = ServerDatabase(address, lock_timeout=lock_timeout)
+    try:
+        database.migrate(serving=serving)
+    except BaseException:
+        database.close()
+        raise
+    return database
+
+
+def find_server(address: URL, *, lock_timeout: float) -> ServerDatabase:
+    """Open a database on a server to read it as it is. Raises DatabaseTooNew, StorageUnavailable where it has no tables."""
+    database = FoundServerDatabase(address, lock_timeout=lock_timeout, writable=False)
+    try:
+        with database.reading() as connection:
+            _refuse_empty(connection, database.name)
+            refuse_newer(current(connection))
+    except BaseException:
+        database.close()
+        raise
+    return database
+
+
+def server_has_tables(address: URL, *, lock_timeout: float) -> bool:
+    """Whether the database holds this program's tables. Raises StorageUnavailable where there is no such database."""
+    database = ServerDatabase(address, lock_timeout=lock_timeout, writable=False)
+    try:
+        with database.reading() as connection:
+            return current(connection) is not None
+    finally:
+        database.close()
+
+
+def _refuse_empty(connection: Connection, name: str) -> None:
+    if current(connection) is None:
+        raise StorageUnavailable(f"{name} is empty: `clutchlife serve` makes its tables")
+
+
+def _require_utf8(connection: Connection, name: str) -> None:
+    encoding = connection.exec_driver_sql("SHOW server_encoding").scalar_one()
+    if encoding != "UTF8":
+        raise StorageUnavailable(f"{name} is encoded in {encoding}, it must be made with ENCODING 'UTF8'")

@@ -1,0 +1,213 @@
+"""A database on a server: how it comes to be, who may use it, and what is said where it cannot be used."""
+
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, closing, suppress
+
+import pytest
+from sqlalchemy import make_url, text
+from sqlalchemy.exc import ProgrammingError
+
+from storage import changes, clutches, runs
+from storage.engine.database import Database
+from storage.engine.errors import (
+    DatabaseTooNew,
+    DatabaseTooOld,
+    ServiceRuns,
+    StorageUnavailable,
+    UnstorableText,
+)
+from storage.engine.integrity import other_schema
+from storage.engine.opening import database_exists, find_database, open_database, service_lock
+from storage.migrations.upgrade import current, head
+from tests.storage.engine.postgresql.server import PostgresServer, postgresql_server
+from tests.storage.samples import clutch_row, store_run
+
+SECRET = "s3cr3t"  # noqa: S105 - a test's
+
+
+@pytest.fixture
+def database(on_server: Database) -> Database:
+    return on_server
+
+
+@pytest.fixture
+def empty(postgresql: PostgresServer) -> Iterator[str]:
+    url = postgresql.empty()
+    yield url
+    postgresql.drop(url)
+
+
+def set_revision(database: Database, revision: str) -> None:
+    with database.writing() as connection:
+        connection.execute(text("UPDATE alembic_version SET version_num = :revision"), {"revision": revision})
+
+
+def test_an_empty_database_gets_its_tables_once_whoever_opens_it_first(empty: str) -> None:
+    assert not database_exists(empty)
+    with pytest.raises(StorageUnavailable, match="is empty"):
+        find_database(empty)
+    together = threading.Barrier(4)
+
+    def start() -> Database:
+        together.wait()
+        return open_database(empty)
+
+    with ThreadPoolExecutor(4) as pool, ExitStack() as stack:
+        opened = [stack.enter_context(closing(each.result())) for each in [pool.submit(start) for _ in range(4)]]
+        assert database_exists(empty)
+        with opened[0].reading() as connection:
+            assert current(connection) == head()
+            assert other_schema(connection) == []
+        assert [each.faults(least_free=0) for each in opened] == [{}] * 4
+
+
+def test_another_schema_is_noticed(database: Database) -> None:
+    with database.writing() as connection:
+        connection.exec_driver_sql("ALTER TABLE clutch ADD COLUMN forgotten TEXT")
+        connection.exec_driver_sql("DROP INDEX run_in_order")
+    with database.reading() as connection:
+        assert len(other_schema(connection)) == 2
+        assert database.damage(connection) == []
+
+
+def test_a_newer_release_s_database_is_refused(database: Database) -> None:
+    set_revision(database, "s9999_later")
+    for opening in (open_database, find_database):
+        with pytest.raises(DatabaseTooNew, match="s9999_later"):
+            opening(database.url)
+    assert "s9999_later" in database.faults(least_free=0)["database"]
+
+
+def test_a_database_of_an_earlier_revision_is_not_migrated_under_a_service(database: Database) -> None:
+    set_revision(database, "s0006_key_bounds")
+    with service_lock(database.url), pytest.raises(ServiceRuns, match="a service uses"):
+        open_database(database.url)
+
+
+def test_what_came_with_a_later_revision_is_not_found(database: Database) -> None:
+    with database.writing() as connection:
+        connection.exec_driver_sql("DROP TABLE change")
+    with closing(find_database(database.url)) as found:
+        with pytest.raises(ProgrammingError), found.reading() as connection:
+            changes.page(connection, "c1", limit=1)
+        set_revision(database, "s0006_key_bounds")
+        with pytest.raises(DatabaseTooOld, match="s0006_key_bounds"), found.reading() as connection:
+            changes.page(connection, "c1", limit=1)
+        with pytest.raises(StorageUnavailable, match="read-only"), found.writing() as connection:
+            clutches.insert(connection, clutch_row())
+
+
+def test_one_service_of_a_database_at_a_time(database: Database, postgresql: PostgresServer) -> None:
+    other = postgresql.fresh()
+    with service_lock(database.url), service_lock(other):
+        with pytest.raises(ServiceRuns, match="stop it first"), service_lock(database.url):
+            pytest.fail("two services at once")
+        with database.writing() as connection:  # commands beside it
+            clutches.insert(connection, clutch_row())
+    with service_lock(database.url):
+        pass
+    postgresql.drop(other)
+
+
+def test_a_database_that_is_not_in_utf8_is_refused(postgresql: PostgresServer) -> None:
+    postgresql.execute("CREATE DATABASE latin ENCODING 'LATIN1' LOCALE 'C' TEMPLATE template0")
+    with pytest.raises(StorageUnavailable, match="LATIN1"):
+        open_database(postgresql.url("latin"))
+
+
+def test_what_is_acknowledged_is_on_the_disk_whatever_the_database_s_default(
+    database: Database, postgresql: PostgresServer
+) -> None:
+    name = make_url(database.url).database
+    postgresql.execute(f"ALTER DATABASE {name} SET synchronous_commit = off")
+    with closing(open_database(database.url)) as opened, opened.writing() as connection:
+        assert connection.exec_driver_sql("SHOW synchronous_commit").scalar_one() == "on"
+
+
+def test_text_that_postgresql_does_not_have_is_refused(database: Database) -> None:
+    with pytest.raises(UnstorableText, match="NUL"), database.writing() as connection:
+        clutches.insert(connection, clutch_row("a\0b"))
+    with pytest.raises(UnstorableText, match="NUL"):
+        database.watch.revision("a\0b")
+
+
+def test_a_rolled_back_run_leaves_no_gap_in_what_is_counted(database: Database) -> None:
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+    with suppress(RuntimeError), database.writing() as connection:
+        store_run(connection, 0)
+        raise RuntimeError
+    with database.writing() as connection:
+        assert store_run(connection, 1) > 1
+        assert runs.count(connection) == 1
+
+
+def test_what_was_committed_is_there_after_the_server_was_killed() -> None:
+    """Who has the database open says so while the server is away, and goes on when it is back."""
+    with postgresql_server() as server:
+        url = server.fresh()
+        with closing(open_database(url)) as database:
+            with database.writing() as connection:
+                clutches.insert(connection, clutch_row())
+            before = database.watch.version()
+            server.kill()
+            for question in (database.watch.version, lambda: open_database(url)):
+                with pytest.raises(StorageUnavailable):
+                    question()
+            with pytest.raises(StorageUnavailable), database.writing() as connection:
+                pytest.fail("written without a server")
+            assert database.faults(least_free=0)["database"].startswith("the database cannot be read")
+            server.start()
+            assert database.watch.version() == before
+            with database.writing() as connection:
+                store_run(connection, 0)
+            assert database.watch.version() == before + 1
+            assert database.faults(least_free=0) == {}
+
+
+def test_a_transaction_that_the_server_did_not_end_is_not_there() -> None:
+    with postgresql_server() as server, closing(open_database(server.fresh())) as database:
+
+        def write_and_lose_the_server() -> None:
+            with database.writing() as connection:
+                clutches.insert(connection, clutch_row())
+                server.kill()
+
+        with pytest.raises(StorageUnavailable):
+            write_and_lose_the_server()
+        server.start()
+        with database.reading() as connection:
+            assert clutches.all_ids(connection) == []
+
+
+@pytest.mark.parametrize(
+    ("url", "says"),
+    [
+        (f"postgresql+psycopg://u:{SECRET}@", "needs a name"),
+        (f"postgresql+psycopg://u:{SECRET}@h:port/db", "must be given as"),
+        (f"postgresql+psycopg://u:1@{SECRET}@host/db", "%40"),
+        (f"postgresql://u:{SECRET}@host/db", "'postgresql'"),
+    ],
+)
+def test_wrong_addresses_are_refused_without_their_password(url: str, says: str) -> None:
+    with pytest.raises(ValueError, match=says) as refusal:
+        open_database(url)
+    assert SECRET not in str(refusal.value)
+
+
+def test_a_server_that_is_not_there_is_named_without_the_password(postgresql: PostgresServer) -> None:
+    for url in (
+        f"postgresql+psycopg://u:{SECRET}@127.0.0.1:1/db",
+        f"postgresql+psycopg://u:{SECRET}@/none?host={postgresql.folder}&sslpassword={SECRET}",
+    ):
+        with pytest.raises(StorageUnavailable, match="PostgreSQL database") as refusal:
+            open_database(url)
+        assert SECRET not in str(refusal.value)
+
+
+def test_a_missing_driver_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "psycopg", None)
+    with pytest.raises(StorageUnavailable, match=r"pip install clutchlife\[postgresql\]"):
+        open_database("postgresql+psycopg://u@h/db")
