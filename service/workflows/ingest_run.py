@@ -98,11 +98,15 @@ def ingest(
         run = replace(run, channels={})
     arrival = Arrival(run=run, sampled=sampled, analysis=analysis, received_at=received_at)
     while True:
-        with database.reading() as connection:  # a repeat may have waited for its turn
+        with database.reading() as connection:  # one state: the same run may come in beside this one at any moment
             stored = runs.get(connection, clutch_id, run.run_id)
-        if stored is not None:
-            return _repeat(stored, run), False
-        outcome = _computed(database, clutch_id, arrival, (geometry, torque_filter))
+            if stored is not None:
+                return _repeat(stored, run), False
+            archived = records.clutch(connection, clutch_id).archived
+            before = records.state(connection, clutch_id, carried=True)
+        if archived:
+            raise ArchivedError(f"clutch {clutch_id!r} is archived and takes in no more runs")
+        outcome = _computed(database, before, arrival, (geometry, torque_filter))
         with database.writing() as connection:  # another process's run of the same name moves the revision
             if records.unchanged(connection, clutch_id, outcome.revision):
                 return _store(connection, clutch_id, arrival, columns, outcome, by=by), True
@@ -117,12 +121,8 @@ def _repeat(stored: RunRow, run: IncomingRun) -> dict[str, Any]:
     return records.receipt(stored) | {"duplicate": True}
 
 
-def _computed(database: Database, clutch_id: str, arrival: Arrival, read_with: tuple[Geometry, float]) -> _Outcome:
-    """The results of the run in the clutch's history as it is now; it was read with a geometry and a filter."""
-    with database.reading() as connection:
-        if records.clutch(connection, clutch_id).archived:
-            raise ArchivedError(f"clutch {clutch_id!r} is archived and takes in no more runs")
-        before = records.state(connection, clutch_id, carried=True)
+def _computed(database: Database, before: ClutchState, arrival: Arrival, read_with: tuple[Geometry, float]) -> _Outcome:
+    """The results of the run in the clutch's history `before` it; it was read with a geometry and a filter."""
     if (before.geometry, before.record.torque_filter) != read_with:
         raise BusyError("the clutch's geometry or filter was edited while the run was read: send it again")
     event = _event_of(arrival)
@@ -130,7 +130,7 @@ def _computed(database: Database, clutch_id: str, arrival: Arrival, read_with: t
     state = replace(before, events=order([*before.events, event]))
     levels = _levels(database, state, event, arrival)
     answer = receipt(
-        clutch_id,
+        before.clutch_id,
         arrival.run,
         received_at=arrival.received_at,
         levels=arrival.analysis.fits,

@@ -16,7 +16,6 @@ from service import stored_runs
 from service.cli.main import app
 from service.lives import model_correction, recomputation, run_analysis, tracks
 from service.lives.criteria import MOST_ATTEMPTS
-from service.lives.incoming_run import name_run
 from service.lives.recomputation import ClutchState
 from service.queries import degradation
 from service.queries.cache import to_json
@@ -174,24 +173,6 @@ def test_a_run_that_comes_while_another_is_computed_counts_for_it(
     with database.reading() as connection:
         assert clutches.revision(connection, "c1") == 3
     calm.close()
-
-
-def test_the_same_run_of_two_threads_is_stored_once(database: Database) -> None:
-    answers: list[bool] = []
-
-    def send() -> None:
-        run = name_run(
-            kind="maintenance", cycles=5.0, run_id="oil", started_at=None, origin="measured", channels={},
-            details={"event": "oil_change", "note": ""},
-        )  # fmt: skip
-        answers.append(ingest(database, "c1", run, received_at=AT)[1])
-
-    senders = [threading.Thread(target=send) for _ in range(4)]
-    for thread in senders:
-        thread.start()
-    for thread in senders:
-        thread.join(120)
-    assert sorted(answers) == [False, False, False, True]
 
 
 def test_a_replay_beside_a_rig_that_never_rests_ends_and_says_why(
