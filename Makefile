@@ -135,6 +135,7 @@ $(JAVASCRIPT)/.package-lock.json: tests/javascript/package.json tests/javascript
 
 lock:
 	uv pip compile $(LOCK) pyproject.toml -o docker/requirements.txt
+	uv pip compile $(LOCK) pyproject.toml --extra cluster --extra objects --extra postgresql -o docker/requirements-scale.txt
 	uv pip compile $(LOCK) pyproject.toml --group test -o tests/requirements.txt
 	uv pip compile $(LOCK) --group generator -o tests/requirements-generator.txt
 	uv pip compile $(LOCK) --resolution lowest-direct pyproject.toml --group test -o tests/requirements-lowest.txt
