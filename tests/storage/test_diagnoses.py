@@ -31,14 +31,6 @@ def test_a_diagnosis_runs_and_ends_once(stocked: Database) -> None:
     assert (found["d2"].status, found["d2"].finished_at) == (RUNNING, None)
 
 
-def test_what_was_left_running_ends_at_once(stocked: Database) -> None:
-    with stocked.writing() as connection:
-        diagnoses.finish(connection, "d0", "later", {}, None)
-        assert diagnoses.fail_all(connection, "now", "interrupted") == 2
-        assert diagnoses.fail_all(connection, "now", "interrupted") == 0
-        assert [row.status for row in diagnoses.page(connection, CLUTCH, limit=10)] == [FAILED, FAILED, FINISHED]
-
-
 def test_pages_and_the_one_that_runs(stocked: Database) -> None:
     with stocked.writing() as connection:
         first = diagnoses.page(connection, CLUTCH, limit=2)
