@@ -100,8 +100,8 @@ def numerics(monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
     writing = Transactions.writing
 
     @contextmanager
-    def watched(self: Transactions) -> Iterator[Any]:
-        with writing(self) as connection:
+    def watched(self: Transactions, **of: Any) -> Iterator[Any]:
+        with writing(self, **of) as connection:
             lock.held = True
             try:
                 yield connection
