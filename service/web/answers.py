@@ -162,9 +162,7 @@ async def _computed(
     lane: Lane = Lane.ANSWERS,
 ) -> tuple[int, Answer]:
     preferred = preferred_wait(prefer)
-    # where other services may have given a later answer than the last one here, the newest is waited for in any case
-    last_will_do = context.database.path is not None and not context.workers.are_idle()
-    wait = preferred if preferred is not None else 0 if last_will_do else LONGEST_WAIT_SECONDS
+    wait = preferred if preferred is not None else LONGEST_WAIT_SECONDS if context.workers.are_idle() else 0
 
     def compute(waited_for: bool) -> "Future[Made]":
         among = lane if waited_for or lane is not Lane.ANSWERS else Lane.RENEWALS

@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from itertools import cycle
@@ -24,10 +24,11 @@ ENVIRONMENT = {"CLUTCHLIFE_ENGINE": f"{stand_in_engine.__name__}:diagnose"}
 CLUTCH = "/v1/clutches/c1"
 READ = (
     "/v1/clutches", CLUTCH, *(f"{CLUTCH}/{name}" for name in (
-        "runs", "remaining-useful-life", "remaining-useful-life?method=grid", "degradation", "stribeck", "series", "changes",
-        "diagnoses", "model", "scores",
+        "runs", "remaining-useful-life", "series", "changes", "diagnoses", "model",
     )), "/v1/jobs", "/v1/fleet/priors",
 )  # fmt: skip
+#: What takes a second.
+LONG = tuple(f"{CLUTCH}/{name}" for name in ("remaining-useful-life?method=grid", "degradation", "stribeck", "scores"))
 
 
 @pytest.fixture
@@ -40,14 +41,14 @@ def address(postgresql: PostgresServer) -> Iterator[str]:
 @pytest.fixture
 def servers(address: str) -> Iterator[list[Server]]:
     with ExitStack() as stack:
-        yield [stack.enter_context(serving(address, loaded=True, environment=ENVIRONMENT)) for _ in range(3)]
+        yield [stack.enter_context(serving(address, loaded=True, environment=ENVIRONMENT)) for _ in range(2)]
 
 
-def seen(server: Server) -> dict[str, Any]:
+def seen(server: Server, paths: Sequence[str] = READ) -> dict[str, Any]:
     """Every answer, with its entity tag and revision."""
     answers = {}
     with httpx2.Client(base_url=server.url, timeout=120) as http:
-        for path in READ:
+        for path in paths:
             answer = http.get(path)
             assert answer.status_code == 200, answer.text
             answers[path] = (answer.headers["etag"], answer.headers.get("clutchlife-revision"), answer.json())
@@ -55,13 +56,14 @@ def seen(server: Server) -> dict[str, Any]:
 
 
 def test_what_one_has_taken_in_each_other_shows_at_once(servers: list[Server]) -> None:
-    """Every change goes to the next of the three, and all answers of all of them are alike right behind it."""
+    """Every change goes to the next of the two, and the answers of both are alike right behind it."""
     with ExitStack() as stack:
         clients = [stack.enter_context(httpx2.Client(base_url=each.url, timeout=120)) for each in servers]
         turns = cycle(clients)
         changes: list[tuple[str, str, Any]] = [("POST", "/v1/clutches", {"clutch_id": "c1"})]
         changes += [
-            ("POST", f"{CLUTCH}/runs", stationary(cycles, run_id=f"r{cycles}")) for cycles in (0, 1000, 2000, 1500)
+            ("POST", f"{CLUTCH}/runs", stationary(cycles, run_id=f"r{cycles}", pressures=(4.0, 6.0)))
+            for cycles in (0, 1000, 2000, 1500)
         ]
         changes += [
             ("POST", f"{CLUTCH}/runs/r1500/withdraw", {"reason": "twice"}),
@@ -71,13 +73,13 @@ def test_what_one_has_taken_in_each_other_shows_at_once(servers: list[Server]) -
             http = next(turns)
             http.request(method, path, json=body).raise_for_status()
             answers = [seen(server) for server in servers]
-            assert answers[0] == answers[1] == answers[2]
+            assert answers[0] == answers[1]
         assert len(answers[0][f"{CLUTCH}/runs"][2]["items"]) == 4
         wait = {"Prefer": "wait=120"}
         diagnosed = clients[0].post(f"{CLUTCH}/diagnoses", json={"adopt": True}, headers=wait).json()
         assert (diagnosed["status"], diagnosed["adopted"]) == ("finished", True)
-        answers = [seen(server) for server in servers]
-        assert answers[0] == answers[1] == answers[2]
+        answers = [seen(server, READ + LONG) for server in servers]
+        assert answers[0] == answers[1]
         assert answers[1][f"{CLUTCH}/model"][2]["version"] == 1
 
 
@@ -85,10 +87,10 @@ def test_the_same_run_sent_to_all_at_once_is_one_run(servers: list[Server]) -> N
     ONCE.post(f"{servers[0].url}/v1/clutches", json={"clutch_id": "c1"}).raise_for_status()
     sent = stationary(0, run_id="r0")
     with ThreadPoolExecutor(6) as pool:
-        asked = [pool.submit(ONCE.post, f"{server.url}{CLUTCH}/runs", json=sent) for server in servers * 2]
+        asked = [pool.submit(ONCE.post, f"{server.url}{CLUTCH}/runs", json=sent) for server in servers * 3]
         statuses = sorted(each.result().status_code for each in asked)
     assert statuses == [200] * 5 + [201]
-    assert [len(ONCE.get(f"{server.url}{CLUTCH}/runs").json()["items"]) for server in servers] == [1] * 3
+    assert [len(ONCE.get(f"{server.url}{CLUTCH}/runs").json()["items"]) for server in servers] == [1] * 2
 
 
 def test_a_job_that_one_has_another_cancels(address: str, tmp_path: Path) -> None:
@@ -124,9 +126,9 @@ def test_a_key_that_is_made_or_revoked_counts_everywhere(servers: list[Server], 
             for server in servers
         ]
 
-    assert statuses() == [[401, 200]] * 3
+    assert statuses() == [[401, 200]] * 2
     clutchlife("key", "revoke", key.split("_")[1], "--database", address)
-    assert statuses() == [[401, 401]] * 3
+    assert statuses() == [[401, 401]] * 2
 
 
 def test_processes_behind_one_port_need_a_server(tmp_path: Path) -> None:

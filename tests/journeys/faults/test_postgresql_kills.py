@@ -1,4 +1,4 @@
-"""On PostgreSQL, too, every run that was acknowledged is there, whether a service, one of several, or the server is killed."""
+"""On PostgreSQL, too, all acknowledged runs are there, whether a service, one of several, or the server is killed."""
 
 import random
 import threading
