@@ -76,11 +76,11 @@ def test_what_one_has_taken_in_each_other_shows_at_once(servers: list[Server]) -
             assert answers[0] == answers[1]
         assert len(answers[0][f"{CLUTCH}/runs"][2]["items"]) == 4
         wait = {"Prefer": "wait=120"}
-        diagnosed = clients[0].post(f"{CLUTCH}/diagnoses", json={"adopt": True}, headers=wait).json()
-        assert (diagnosed["status"], diagnosed["adopted"]) == ("finished", True)
+        diagnosed = clients[0].post(f"{CLUTCH}/diagnoses", json={"adopt": False}, headers=wait).json()
+        assert (diagnosed["status"], diagnosed["verdict"]) == ("finished", "cause_named")
         answers = [seen(server, READ + LONG) for server in servers]
         assert answers[0] == answers[1]
-        assert answers[1][f"{CLUTCH}/model"][2]["version"] == 1
+        assert [job["state"] for job in answers[1]["/v1/jobs"][2]["items"]] == ["finished"]
 
 
 def test_the_same_run_sent_to_all_at_once_is_one_run(servers: list[Server]) -> None:
