@@ -44,7 +44,7 @@ def serve_several(settings: Settings, processes: int, options: dict[str, Any]) -
     )
     supervisor = Multiprocess(config, [config.bind_socket()])
     supervisor.run()
-    return all(each.exitcode != STARTUP_FAILURE for each in supervisor.processes)
+    return all(process.exitcode != STARTUP_FAILURE for process in supervisor.processes)
 
 
 def one_of_several() -> FastAPI:

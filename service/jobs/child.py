@@ -57,8 +57,8 @@ class Child:
 
     def progress(self) -> Json | None:
         """How far it says it has come; None where it has not said so yet."""
-        said = [line for line in self._lines() if line.startswith(PROGRESS)]
-        return json.loads(said[-1].removeprefix(PROGRESS)) if said else None
+        steps = [line for line in self._lines() if line.startswith(PROGRESS)]
+        return json.loads(steps[-1].removeprefix(PROGRESS)) if steps else None
 
     def written(self, name: str) -> dict[str, Any]:
         """What it wrote at its end. Raises FailedError; what it complained of is logged under its `name`."""

@@ -49,7 +49,7 @@ class JobQueue:
         self._name = f"{socket.gethostname()}:{os.getpid()}:{secrets.token_hex(4)}"
         self._change = threading.Condition()
         self._closing = False
-        self._asked = False
+        self._woken = False
         self._away = False
         self._thread = threading.Thread(target=self._work, name="jobs", daemon=True)
 
@@ -75,7 +75,7 @@ class JobQueue:
     def wake(self) -> None:
         """Look now for what is to be done: something was asked for here."""
         with self._change:
-            self._asked = True
+            self._woken = True
             self._change.notify_all()
 
     def _work(self) -> None:
@@ -85,8 +85,8 @@ class JobQueue:
                 self._do(job)
                 continue
             with self._change:
-                self._change.wait_for(lambda: self._asked or self._closing, timeout=self._pause)
-                self._asked = False
+                self._change.wait_for(lambda: self._woken or self._closing, timeout=self._pause)
+                self._woken = False
 
     def _claimed(self) -> JobRow | None:
         """The next job, claimed; None where there is none, or the database is away for a while."""

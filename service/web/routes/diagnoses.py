@@ -48,7 +48,7 @@ async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchI
     question = checked(DiagnosisIn, await json_body(request))
     if question.adopt:
         require(request, "admin")
-    asked = partial(
+    ask = partial(
         run_diagnosis.ask,
         by=name_of_caller(request),
         adopt=question.adopt,
@@ -56,7 +56,7 @@ async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchI
         most=context.settings.most_diagnoses,
         created_at=now(),
     )
-    diagnosis_id, _ = await run_in_threadpool(asked, context.database, clutch_id)
+    diagnosis_id, _ = await run_in_threadpool(ask, context.database, clutch_id)
     context.jobs.wake()
     preferred = preferred_wait(prefer)
     wait = WAIT_SECONDS if preferred is None else preferred
