@@ -20,6 +20,7 @@ from service.jobs.child import FailedError
 from service.logging import request_id
 from service.settings import Settings
 from storage import jobs
+from storage.encoding.json_text import Json
 from storage.engine.database import Database
 from storage.engine.errors import StorageError
 from storage.jobs import JobRow
@@ -110,10 +111,25 @@ class JobQueue:
         try:
             ended = self._outcome(job)
             if ended is not None:
-                self._finish(job, ended)
+                self._stored(job, ended)
         except Exception:  # noqa: BLE001  (the next one is to be made all the same)
             _log.exception("diagnosis %s of %s", job.job_id, job.clutch_id)
             self._give_up(job)
+
+    def _stored(self, job: JobRow, ended: Mapping[str, Any]) -> None:
+        """Have its end stored, the lease prolonged meanwhile: what is adopted is tracked anew first."""
+        done = threading.Event()
+        renewing = threading.Thread(target=self._renew_until, args=(done, job), name="lease", daemon=True)
+        renewing.start()
+        try:
+            self._finish(job, ended)
+        finally:
+            done.set()
+            renewing.join()
+
+    def _renew_until(self, done: threading.Event, job: JobRow) -> None:
+        while not done.wait(self._pause) and self._renewed(job, {"step": "stores"}):
+            pass
 
     def _give_up(self, job: JobRow) -> None:
         """Its end could not be stored: say at least that it ended, or leave that to who claims it next."""
@@ -148,7 +164,7 @@ class JobQueue:
                 return False
             if time.monotonic() >= due:
                 due = time.monotonic() + self._pause
-                if not self._renewed(job, process):
+                if not self._renewed(job, process.progress()):
                     return False
         return True
 
@@ -159,10 +175,10 @@ class JobQueue:
         except StorageError as error:
             _log.warning("job %s is made again once its lease has run out: %s", job.job_id, error)
 
-    def _renewed(self, job: JobRow, process: child.Child) -> bool:
+    def _renewed(self, job: JobRow, progress: Json | None) -> bool:
         try:
             with self._database.writing(of=self._name) as connection:
-                return jobs.renew(connection, job.job_id, self._name, lease=self._lease, progress=process.progress())
+                return jobs.renew(connection, job.job_id, self._name, lease=self._lease, progress=progress)
         except StorageError as error:
             _log.warning("job %s: the lease could not be prolonged: %s", job.job_id, error)
             return True

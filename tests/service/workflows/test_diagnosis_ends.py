@@ -13,6 +13,7 @@ from fastapi.testclient import TestClient
 from models.diagnosis.extension import Extension
 from service.jobs.queue import MOST_ATTEMPTS
 from service.schemas.diagnosis import DiagnosisOut, JobPage
+from service.workflows import adopt_model
 from tests.service.workflows import stand_in_engine
 from tests.service.workflows.diagnosing import BASE, diagnosed, post_tests, service
 
@@ -158,6 +159,23 @@ def test_who_joins_a_diagnosis_that_runs_has_it_adopted(tmp_path: Path) -> None:
         assert joined.json()["diagnosis_id"] == first.json()["diagnosis_id"]
         assert (joined.status_code, joined.json()["adopted"]) == (201, True)
         assert client.get(f"{BASE}/model").json()["version"] == 1
+
+
+def test_a_job_is_held_while_what_it_found_is_adopted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else another service would begin it again, and neither come to its end."""
+    adopted, left = adopt_model.finish_and_adopt, []
+
+    def slowly(*arguments: Any, **named: Any) -> bool:
+        time.sleep(2.5)
+        with closing(sqlite3.connect(tmp_path / "a.db")) as connection:
+            left.append(connection.execute("SELECT leased_until FROM job").fetchone()[0] - time.time())
+        return adopted(*arguments, **named)
+
+    monkeypatch.setattr(adopt_model, "finish_and_adopt", slowly)
+    with service(tmp_path, job_lease_seconds=2) as client:
+        post_tests(client, 0, 1000, 2000)
+        assert diagnosed(client, adopt=True)["adopted"]
+    assert left[0] > 0
 
 
 def test_a_job_is_shown_and_cancelled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
