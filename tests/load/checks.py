@@ -12,7 +12,8 @@ from tests.load.exchange import Answer, Blocking, LostError
 from tests.load.field import Acknowledged, Counts, reason
 from tests.support import Server, serving
 
-#: Answers about a clutch that are to be those of the same runs posted calmly.
+#: Answers about a clutch that are to be those of the same runs posted calmly, but for what is a service's own.
+_OWN = {"revision", "time"}
 ANSWERS = ("remaining-useful-life", "degradation", "stribeck", "loops", "series", "scores")
 
 
@@ -115,10 +116,10 @@ def replay_differences(loaded: Server, clutch_ids: Sequence[str]) -> list[str]:
 
 
 def answered(line: Blocking, clutch_id: str, name: str = ANSWERS[0]) -> dict[str, Any]:
-    """The newest answer but for the revision, which says how often something was stored."""
+    """The newest answer but for the revision, which says how often something was stored, and the times of arrival."""
     request = asked(f"/v1/clutches/{clutch_id}/{name}", "Prefer: wait=60")
-    answer: dict[str, Any] = json.loads(_good(line.ask(request)).body)
-    answer.pop("revision", None)
+    body = _good(line.ask(request)).body
+    answer: dict[str, Any] = json.loads(body, object_hook=lambda found: {k: found[k] for k in found.keys() - _OWN})
     return answer
 
 
