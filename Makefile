@@ -10,7 +10,8 @@
 # make rivals  the same beside other packages, in an environment of their own                (SEED= SIZE=)
 # make blind   hides effects and wants them found: the table of docs/diagnosis.md      (SEED= SIZE=small|full ONLY= ARGS=)
 # make load     rigs and clients against a running service, what they wait and what is lost: a table of docs/benchmarks.md
-#              (ARGS="--seconds 60 --no-raw"); a few minutes, on a machine that does nothing else
+#              (ARGS="--seconds 60 --no-raw"; "--services 4 --database postgresql --rigs 16 --clients 40 --no-raw"); a few
+#              minutes, on a machine that does nothing else
 # make scale    requests and commands with 1,000 clutches of 200 tests in one file, beside 10: a table of docs/scale.md
 #              (ARGS="--clutches 10000 --states 5"); needs 7 GB of disk
 # make plausibility  sends mistyped and honest runs: the tables of docs/plausibility.md  (SEED= CAMPAIGNS= HONEST= ARGS=--write)

@@ -3,7 +3,7 @@
 import shutil
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from fastapi import FastAPI
@@ -11,7 +11,7 @@ from fastapi_offline import FastAPIOffline
 
 from service.dashboard import assets
 from service.dashboard import pages as dashboard
-from service.jobs.queue import DiagnosisQueue
+from service.jobs.queue import Finish, JobQueue
 from service.jobs.workers import Lane, Workers, in_processes, in_threads
 from service.queries.cache import AnswerCache
 from service.settings import CODE_VERSION, Settings
@@ -24,11 +24,23 @@ from service.web.metrics import Metrics
 from service.web.middleware import BodyLimit, Edge, Heads, Polls, Shares
 from service.web.readiness import Needs, Readiness
 from service.web.revalidation import Revalidation
-from service.web.routes import clutches, description, diagnoses, exports, files, fleet, health, inspections, life, runs
+from service.web.routes import (
+    clutches,
+    description,
+    diagnoses,
+    exports,
+    files,
+    fleet,
+    health,
+    inspections,
+    jobs,
+    life,
+    runs,
+)
 from service.workflows import adopt_model, run_diagnosis
-from storage.diagnoses import NewDiagnosis
 from storage.engine.database import Database
 from storage.engine.opening import open_database, service_lock
+from storage.jobs import JobRow
 
 _DESCRIPTION = """Condition monitoring and prognostics of wet friction clutches.
 
@@ -36,37 +48,24 @@ Post the Stribeck tests of a rig; each is fitted, the clutch's degradation is tr
 its mean coefficient of friction has halved are predicted with their uncertainty."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Diagnoses:
-    """What the queue asks of the workflows."""
+def _finish(database: Database, workers: Workers) -> Finish:
+    """How the queue has the end of a job stored: what somebody wants adopted is tracked anew by the workers."""
 
-    database: Database
-    workers: Workers
+    def adopt(job: JobRow, ended: Mapping[str, Any]) -> bool:
+        function = partial(adopt_model.finish_and_adopt, claimer=job.claimed_by or "")
+        arguments = (job.clutch_id, job.job_id, dict(ended), now(), job.arguments["adopt_by"])
+        return bool(workers.submit(Lane.ANSWERS, function, *arguments, turn=job.clutch_id).result())
 
-    def fail_running(self, problem: str) -> None:
-        run_diagnosis.fail_running(self.database, problem, at=now())
+    def finish(job: JobRow, ended: Mapping[str, Any]) -> None:
+        run_diagnosis.finish(database, job, ended, at=now(), adopt=adopt)
 
-    def running(self, clutch_id: str) -> str | None:
-        return run_diagnosis.running(self.database, clutch_id)
-
-    def ask(self, clutch_id: str) -> NewDiagnosis:
-        return run_diagnosis.ask(self.database, clutch_id, created_at=now())
-
-    def finish(self, asked_for: NewDiagnosis, ended: Mapping[str, Any], *, adopt_by: str | None) -> None:
-        adopted = False
-        if adopt_by is not None and "report" in ended:
-            clutch_id = asked_for.clutch_id
-            arguments = (clutch_id, asked_for.diagnosis_id, ended, asked_for.life, now(), adopt_by)
-            adopting = self.workers.submit(Lane.ANSWERS, adopt_model.finish_and_adopt, *arguments, turn=clutch_id)
-            adopted = adopting.result()
-        if not adopted:
-            run_diagnosis.finish(self.database, asked_for.diagnosis_id, ended, at=now())
+    return finish
 
 
 def create_app(settings: Settings) -> FastAPI:
     """The service on one database, which is opened (and migrated) when it starts and closed when it stops.
 
-    Starting raises ServiceRuns where another service uses the database.
+    Starting raises ServiceRuns where another service uses the file; a database on a server is any number's.
     """
 
     metrics = Metrics(each_clutch=settings.clutch_metrics)
@@ -77,7 +76,7 @@ def create_app(settings: Settings) -> FastAPI:
         folder = emptied_folder(database.path)
         log = (settings.log_format, settings.log_level)
         workers = in_processes(database, settings.workers, log) if settings.workers else in_threads(database)
-        queue = DiagnosisQueue(database.url, settings, _Diagnoses(database, workers))
+        queue = JobQueue(database, settings, _finish(database, workers))
         readiness = Readiness(database, workers, queue, Needs(disk=settings.least_free, memory=settings.least_memory))
         try:
             workers.warm()
@@ -86,11 +85,11 @@ def create_app(settings: Settings) -> FastAPI:
                 database=database,
                 cache=AnswerCache(MOST_CACHED_BYTES),
                 metrics=metrics,
-                diagnoses=queue,
+                jobs=queue,
+                settings=settings,
                 workers=workers,
                 revalidation=Revalidation(MOST_REVALIDATED_BYTES),
                 readiness=readiness,
-                insecure_local=settings.insecure_local,
                 folder=folder,
             )
             yield
@@ -117,7 +116,7 @@ def create_app(settings: Settings) -> FastAPI:
         redoc_url=None,
     )
     problems.install(app)
-    for part in (health, clutches, files, runs, inspections, life, diagnoses, fleet):
+    for part in (health, clutches, files, runs, inspections, life, diagnoses, jobs, fleet):
         app.include_router(part.router)
     for beside in (exports.router, exports.fleet_router, description.router):
         app.include_router(beside)

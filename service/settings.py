@@ -66,6 +66,12 @@ class Settings(BaseSettings):
     diagnosis_memory_mb: int = Field(
         default=4096, ge=1, description="how much address space the process of a diagnosis may have [MiB]"
     )
+    # an operator's restart of the database takes some seconds, and a lease is prolonged ten times before it runs out
+    job_lease_seconds: int = Field(
+        default=30,
+        ge=1,
+        description="how long after its service was killed a job is begun again by another, or by the next on a file",
+    )
     most_diagnoses: int = Field(default=16, ge=1, description="diagnoses that wait or run; further ones get a 503")
     least_free_mb: int = Field(
         default=64, ge=0, description="free space on the database's disk [MiB] below which `/readyz` says 503"

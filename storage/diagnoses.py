@@ -73,11 +73,6 @@ _end = (
         problem=bindparam("new_problem"),
     )
 )
-_end_all = (
-    update(diagnosis)
-    .where(diagnosis.c.status == RUNNING)
-    .values(status=FAILED, finished_at=bindparam("at"), problem=bindparam("new_problem"))
-)
 _last_run = select(sa.func.max(run.c.run_key)).where(run.c.clutch_id == bindparam("of_clutch"), run.c.state == ACCEPTED)
 
 
@@ -116,11 +111,6 @@ def fail(connection: Connection, diagnosis_id: str, at: str, problem: str) -> bo
     """Store why a running diagnosis has no report; False where it is no longer running."""
     values = {"new_status": FAILED, "new_report": None, "new_extension": None, "new_problem": problem}
     return connection.execute(_end, values | {"wanted": diagnosis_id, "at": at}).rowcount == 1
-
-
-def fail_all(connection: Connection, at: str, problem: str) -> int:
-    """Store why all running diagnoses have no report; returns how many were running."""
-    return connection.execute(_end_all, {"at": at, "new_problem": problem}).rowcount
 
 
 def last_run_key(connection: Connection, clutch_id: str) -> int:

@@ -103,6 +103,12 @@ def among(column: ColumnElement[Any], parameter: str) -> ColumnElement[bool]:
     return Pair(column.in_(select(of_sqlite)), column.in_(select(cast(of_postgresql, column.type))))
 
 
+def now_in_seconds() -> ColumnElement[float]:
+    """Seconds since 1970 by the clock of the database, which is one for all processes that use it."""
+    of_sqlite = (func.julianday("now") - 2440587.5) * 86400.0
+    return Pair(of_sqlite, cast(func.extract("epoch", func.clock_timestamp()), Double))
+
+
 def upsert(table: Table) -> dict[str, Insert]:
     """dialect -> the INSERT that puts a row in the place of the one with the same primary key."""
     keys = [column.name for column in table.primary_key]

@@ -12,6 +12,7 @@ metadata = MetaData()
 
 #: The value stands in the text: with a parameter in its place SQLite would not use the index of held runs alone.
 HELD_ONLY = text("state = 'held'")
+OPEN_ONLY = text("state IN ('waiting', 'running')")
 
 #: `record` is the record in force, defaults filled in, `registered` that which was posted, where it was edited since; `rank`
 #: sorts lists, worst first ascending; `archived` is 1 for a clutch that lists leave out.
@@ -134,6 +135,32 @@ diagnosis = Table(
     Column("code_version", TEXT, nullable=False),
     UniqueConstraint("diagnosis_id", name="diagnosis_once"),
     Index("diagnosis_in_order", "clutch_id", "diagnosis_key"),
+)
+
+#: What is asked for and computed by a service when its turn comes. `clutch_id` null: of no single clutch. `arguments` is
+#: what the kind of job needs (JSON). While it runs it is `claimed_by`'s until `leased_until` (seconds by the database's
+#: clock), which that process moves on; `attempts` counts the claims. `progress` is how far it has come (JSON).
+job = Table(
+    "job",
+    metadata,
+    Column("job_key", WHOLE, primary_key=True),
+    Column("job_id", TEXT, nullable=False),
+    Column("kind", TEXT, nullable=False),
+    Column("clutch_id", TEXT, ForeignKey("clutch.clutch_id")),
+    Column("state", TEXT, nullable=False),
+    Column("asked_at", TEXT, nullable=False),
+    Column("asked_by", TEXT, nullable=False),
+    Column("arguments", TEXT, nullable=False),
+    Column("attempts", WHOLE, nullable=False),
+    Column("claimed_by", TEXT),
+    Column("leased_until", NUMBER),
+    Column("started_at", TEXT),
+    Column("finished_at", TEXT),
+    Column("progress", TEXT),
+    Column("problem", TEXT),
+    UniqueConstraint("job_id", name="job_once"),
+    Index("job_open", "job_key", sqlite_where=OPEN_ONLY, postgresql_where=OPEN_ONLY),
+    Index("job_of_clutch", "clutch_id", "started_at"),
 )
 
 #: The models that a clutch has been tracked under, by version; `diagnosis_id` null is the baseline.

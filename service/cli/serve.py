@@ -1,15 +1,12 @@
 """`clutchlife serve`: the service."""
 
-import gc
-import os
 import signal
 from contextlib import closing
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Annotated, NoReturn, get_args
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, get_args
 
 import typer
 import uvicorn
-from threadpoolctl import threadpool_limits
 
 from service.cli.options import DATABASE, EX_USAGE, Database, errors_in_a_line, fail
 from service.logging import LogLevel, configure, start
@@ -27,6 +24,9 @@ def serve(
     host: Annotated[str, typer.Option(help="The address to listen at; without keys, this machine only")] = LOOPBACK,
     port: Annotated[int, typer.Option(min=0, max=65535)] = 8000,
     database: Database = DATABASE,
+    processes: Annotated[
+        int, typer.Option(min=1, help="How many services answer at the port, of one database on a PostgreSQL server")
+    ] = 1,
     insecure_local: Annotated[
         bool, typer.Option("--insecure-local", help="Without keys, answer also what a proxy on this machine passes on")
     ] = False,
@@ -41,6 +41,7 @@ def serve(
     signal.signal(signal.SIGTERM, _end)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})  # whoever has started it may be deaf to it
     from service.settings import Settings  # start-up time
+    from storage.engine.postgresql.connect import is_on_server  # start-up time
 
     given = {"insecure_local": insecure_local or None, "log_level": log_level}
     with errors_in_a_line():
@@ -49,26 +50,28 @@ def serve(
         start.info("settings", extra={"fields": settings.shown()})
         for line in Settings.misspelt():
             start.warning(line)
+        if processes > 1 and not is_on_server(settings.database):
+            raise ValueError(
+                f"--processes {processes} needs a database on a PostgreSQL server: one service uses a file at a time, which "
+                "CLUTCHLIFE_WORKERS gives more processes that take in runs"
+            )
         host = _allowed(host, settings)
-    from service.app import create_app  # start-up time
+    from service.cli import services  # start-up time
 
-    # the arrays are small: BLAS threads that wait for each other cost more than they gain
-    threadpool_limits(limits=1, user_api="blas")
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    app = create_app(settings)
-    # loaded modules stay: the collector's walk through all of them would delay an answer by a tenth of a second
-    gc.collect()
-    gc.freeze()
-    uvicorn.run(
-        app,
-        host=host,
-        port=port,
-        log_config=None,
-        log_level=settings.log_level,
-        access_log=False,
-        server_header=False,
-        timeout_graceful_shutdown=STOP_SECONDS,
-    )
+    options: dict[str, Any] = {
+        "host": host,
+        "port": port,
+        "log_config": None,
+        "log_level": settings.log_level,
+        "access_log": False,
+        "server_header": False,
+        "timeout_graceful_shutdown": STOP_SECONDS,
+    }
+    if processes > 1:
+        if not services.serve_several(settings, processes, options):
+            fail("a process could not start: see the log")
+    else:
+        uvicorn.run(services.prepared(settings), **options)
 
 
 def _allowed(host: str, settings: "Settings") -> str:

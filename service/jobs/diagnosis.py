@@ -6,6 +6,7 @@ import os
 import resource
 import sys
 import threading
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,6 +16,7 @@ import numpy as np
 from models.diagnosis.campaign import StationaryRun
 from models.diagnosis.extension import Extension
 from service import records, stored_runs
+from service.jobs.child import PROGRESS
 from service.lives.diagnosis.campaign import CampaignRun, DiagnosedLife, records_to_keep, run_of
 from service.lives.diagnosis.report import public
 from service.lives.history import STATIONARY, Life, lives_of
@@ -22,6 +24,7 @@ from service.lives.model_correction import corrected_cofs
 from service.lives.prediction_at import predict_at
 from service.settings import DATABASE_VARIABLE
 from storage import channels, results, runs
+from storage.encoding.json_text import Json, to_text
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 
@@ -43,7 +46,7 @@ class Task:
 
 
 def main() -> None:
-    """Diagnose what the first argument names, JSON, in the database of the environment."""
+    """Diagnose what the first argument names, JSON, in the database of the environment. The last line is the answer."""
     task = Task(**json.loads(sys.argv[1]), database=os.environ[DATABASE_VARIABLE])
     threading.Thread(target=_end_with_the_service, daemon=True).start()
     resource.setrlimit(resource.RLIMIT_AS, (task.bytes, task.bytes))
@@ -51,19 +54,30 @@ def main() -> None:
     # at the first of the two this process ends by SIGXCPU, which says why, at the second by SIGKILL
     resource.setrlimit(resource.RLIMIT_CPU, (task.processor_seconds, task.processor_seconds + 1))
     try:
-        ended = diagnosed(task)
+        ended = diagnosed(task, _say)
     except MemoryError:
         ended = {"problem": f"it needs more than {task.bytes // 2**20} MB of memory"}
-    json.dump(ended, sys.stdout, allow_nan=False)
+    sys.stdout.write(f"{json.dumps(ended, allow_nan=False)}\n")
 
 
-def diagnosed(task: Task) -> dict[str, Any]:
+def _say(progress: Json) -> None:
+    sys.stdout.write(f"{PROGRESS.decode()}{to_text(progress)}\n")
+    sys.stdout.flush()
+
+
+def _nothing(_: Json) -> None:
+    """Nobody wants to know how far it has come."""
+
+
+def diagnosed(task: Task, say: Callable[[Json], None] = _nothing) -> dict[str, Any]:
     """The report in the public shape, and the extension. The same runs give the same, whatever their clutch is called."""
     module, _, function = task.engine.partition(":")
     diagnose = getattr(importlib.import_module(module), function)
     with closing(open_database(task.database)) as database:
-        diagnosed_life = read_life(database, task.clutch_id, last_run_key=task.last_run_key)
+        diagnosed_life = read_life(database, task.clutch_id, last_run_key=task.last_run_key, say=say)
+        say({"step": "diagnoses"})
         report = diagnose(diagnosed_life.campaign, rng=np.random.default_rng(_SEED))
+        say({"step": "predicts"})
         before, after = before_and_after(database, task.clutch_id, diagnosed_life, report.extension)
     origin = 0.0 if diagnosed_life.life is None else diagnosed_life.life.origin
     return {
@@ -72,7 +86,9 @@ def diagnosed(task: Task) -> dict[str, Any]:
     }
 
 
-def read_life(database: Database, clutch_id: str, *, last_run_key: int) -> DiagnosedLife:
+def read_life(
+    database: Database, clutch_id: str, *, last_run_key: int, say: Callable[[Json], None] = _nothing
+) -> DiagnosedLife:
     """The present life by the runs up to `last_run_key`. Raises NotFoundError.
 
     Channels are read run by run: no transaction stays open for longer, for commits wait for it.
@@ -90,7 +106,8 @@ def read_life(database: Database, clutch_id: str, *, last_run_key: int) -> Diagn
     reader = stored_runs.run_reader(database, clutch_id)
     campaign: list[CampaignRun] = []
     notes = []
-    for event in life.events:
+    for number, event in enumerate(life.events):
+        say({"step": "reads the runs", "done": number, "of": len(life.events)})
         try:
             sent = replace(reader.read(event.run_id), cycles=event.cycles)  # corrected meanwhile: the history's hold
             keep = event.run_id in kept

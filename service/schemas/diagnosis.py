@@ -1,4 +1,4 @@
-"""Diagnoses and adopted models; fields that are not known, or not yet, are null or empty."""
+"""Diagnoses, the jobs that make them, and adopted models; fields that are not known, or not yet, are null or empty."""
 
 from typing import Annotated, Literal
 
@@ -11,6 +11,7 @@ from service.schemas.prognosis.life import ModelName
 Number = float | None
 Numbers = list[float | None]
 Table = list[list[float | None]]
+JobState = Literal["waiting", "running", "finished", "failed", "cancelled"]
 DiagnosisName = Annotated[str, Field(description="The diagnosis' name")]
 
 
@@ -225,3 +226,38 @@ class ModelOut(Answer):
     version: int = Field(description="Its number; 0 where none was adopted")
     diagnosis_id: str | None = Field(description="The diagnosis that it comes from; null is the baseline")
     versions: list[ModelVersion] = Field(description="All adopted models, newest first")
+
+
+class JobProgress(Answer):
+    """How far a job has come."""
+
+    step: str = Field(description="What it does")
+    done: int | None = Field(
+        default=None, description="How many of the things that this takes are done; null: not counted"
+    )
+    of: int | None = Field(default=None, description="How many there are")
+
+
+class JobOut(Answer):
+    """What was asked for and is computed by a service when its turn comes. That of a diagnosis has the diagnosis' name."""
+
+    job_id: str = Field(description="The job's name")
+    kind: Literal["diagnosis"] = Field(description="What it computes")
+    clutch_id: str | None = Field(description="The clutch that it is of; null where it is of no single one")
+    state: JobState = Field(
+        description="`waiting` for its turn, `running`, or how it ended: `finished`, `failed` or `cancelled`"
+    )
+    asked_at: str = Field(description="When it was asked for; UTC, ISO 8601")
+    asked_by: str = Field(description="Who asked: `key:ID NOTE`, or `local`")
+    started_at: str | None = Field(description="When it was begun, the last time; null before")
+    finished_at: str | None = Field(description="When it ended; null before")
+    attempts: int = Field(description="How often it was begun: again where the service that had it was killed")
+    progress: JobProgress | None = Field(description="How far it has come; null before it says so")
+    problem: str | None = Field(description="Why it failed, or who cancelled it")
+
+
+class JobPage(Answer):
+    """A page of jobs, newest first."""
+
+    items: list[JobOut] = Field(description="The jobs")
+    next: Next

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from service.schemas.base import StartedAt
+from service.schemas.diagnosis import JobState
 from service.schemas.limits import (
     IDENTIFIER_PATTERN,
     LONGEST_FILENAME,
@@ -18,6 +19,8 @@ from service.schemas.prognosis.quantities import SeriesQuantity
 ClutchId = Annotated[str, Field(description="The clutch's name")]
 RunId = Annotated[str, Field(description="The run's name")]
 DiagnosisId = Annotated[str, Field(description="The diagnosis' name")]
+JobId = Annotated[str, Field(description="The job's name")]
+OfState = Annotated[JobState | None, Field(description="Jobs in this state only; left out, all")]
 InspectionId = Annotated[str, Field(description="The inspection's name")]
 PhotographId = Annotated[str, Field(description="The photograph's name, the SHA-256 of its bytes")]
 Points = Annotated[

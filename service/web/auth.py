@@ -176,7 +176,7 @@ def caller_of(request: Request) -> Caller:
         elif name in _OF_PROXIES or name.startswith(_OF_PROXIES_PREFIX):
             proxy = name.decode("latin-1").title()
     address = None if request.client is None else request.client.host
-    if context_of(request).insecure_local:
+    if context_of(request).settings.insecure_local:
         address = proxy = None
     return Caller(
         authorization=first.get(b"authorization"),
@@ -271,3 +271,4 @@ Admin = Annotated[Context, Depends(allowed("admin"))]
 #: For routes that name no clutch in their path and keep to the caller's own themselves.
 OwnReader = Annotated[Context, Depends(allowed("read", narrowed=True))]
 OwnIngester = Annotated[Context, Depends(allowed("ingest", narrowed=True))]
+OwnAdmin = Annotated[Context, Depends(allowed("admin", narrowed=True))]

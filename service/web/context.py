@@ -7,10 +7,11 @@ from typing import Annotated
 from fastapi import Header, Query
 
 from models.prognosis.criteria import HORIZON
-from service.jobs.queue import DiagnosisQueue
+from service.jobs.queue import JobQueue
 from service.jobs.workers import Workers
 from service.lists import ALL_ITEMS, LONGEST_CURSOR
 from service.queries.cache import AnswerCache
+from service.settings import Settings
 from service.web.key_uses import KeyUses
 from service.web.limits import MOST_HORIZONS, MOST_ITEMS, MOST_PRESSURE_BAR
 from service.web.metrics import Metrics
@@ -26,15 +27,14 @@ class Context:
     database: Database
     cache: AnswerCache
     metrics: Metrics
-    diagnoses: DiagnosisQueue
+    jobs: JobQueue
     workers: Workers
+    settings: Settings
     revalidation: Revalidation
     readiness: Readiness
     #: Where files are kept while they come in and go out.
     folder: Path
     key_uses: KeyUses = field(default_factory=KeyUses)
-    #: Without keys, requests that a proxy on this machine passes on are answered too.
-    insecure_local: bool = False
 
 
 Limit = Annotated[int, Query(ge=1, le=MOST_ITEMS, description="Items a page")]

@@ -35,7 +35,7 @@ class KeyUses:
 
 def _store(database: Database, key_id: str) -> None:
     try:
-        with database.writing() as connection:
+        with database.writing(of=key_id) as connection:
             keys.note_use(connection, key_id, datetime.now(UTC).isoformat(timespec="seconds"))
     except StorageError as error:
         _log.warning("the use of key %s could not be noted: %s", key_id, error)

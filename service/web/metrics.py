@@ -9,7 +9,6 @@ from prometheus_client import CollectorRegistry, Counter, Histogram, ProcessColl
 from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from service.jobs.queue import DiagnosisQueue
 from service.jobs.workers import Workers
 from service.queries import clutch_list
 from service.queries.totals import totals
@@ -33,10 +32,10 @@ class Metrics:
         self.requests = Counter("clutchlife_requests", "Requests answered", labels, registry=self._registry)
         self.seconds = Histogram("clutchlife_request_seconds", "Time to answer", labels[:2], registry=self._registry)
 
-    def exposition(self, database: Database, workers: Workers, diagnoses: DiagnosisQueue) -> bytes:
+    def exposition(self, database: Database, workers: Workers) -> bytes:
         """All metrics as text, the clutches as they stand now."""
         present = CollectorRegistry()
-        present.register(Present(database, workers, diagnoses))
+        present.register(Present(database, workers))
         if self._each_clutch:
             present.register(Clutches(database))
         return generate_latest(self._registry) + generate_latest(present)
@@ -45,10 +44,9 @@ class Metrics:
 class Present(Collector):
     """What is there now and what waits, in numbers of all clutches together."""
 
-    def __init__(self, database: Database, workers: Workers, diagnoses: DiagnosisQueue) -> None:
+    def __init__(self, database: Database, workers: Workers) -> None:
         self._database = database
         self._workers = workers
-        self._diagnoses = diagnoses
 
     def collect(self) -> Iterator[Metric]:
         """The gauges, from a few statements that give a row each, and from the queues."""
@@ -68,7 +66,7 @@ class Present(Collector):
             calls.add_metric([lane.name.lower()], count)
         yield calls
         text = "Diagnoses that wait or run"
-        yield GaugeMetricFamily("clutchlife_diagnoses_waiting", text, value=self._diagnoses.waiting())
+        yield GaugeMetricFamily("clutchlife_diagnoses_waiting", text, value=numbers.diagnoses)
 
 
 class Clutches(Collector):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from service.errors import BusyError
-from service.jobs.queue import DiagnosisQueue
+from service.jobs.queue import JobQueue
 from service.jobs.workers import Workers
 from service.web.limits import LONGEST_LOOK_SECONDS
 from storage.engine.database import Database
@@ -34,10 +34,10 @@ class Needs:
 class Readiness:
     """What keeps the service from working. Asked from the event loop; `close` at the end."""
 
-    def __init__(self, database: Database, workers: Workers, diagnoses: DiagnosisQueue, needs: Needs) -> None:
+    def __init__(self, database: Database, workers: Workers, jobs: JobQueue, needs: Needs) -> None:
         self._database = database
         self._workers = workers
-        self._diagnoses = diagnoses
+        self._jobs = jobs
         self._needs = needs
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="readiness")
         self._looking: asyncio.Future[dict[str, str]] | None = None
@@ -65,8 +65,8 @@ class Readiness:
         return wrong if workers is None else wrong | {"workers": workers}
 
     def _fault_of_workers(self) -> str | None:
-        if not self._diagnoses.is_working():
-            return "the thread that has diagnoses made has ended"
+        if not self._jobs.is_working():
+            return "the thread that does jobs has ended"
         try:
             ended = self._workers.ended()
         except BusyError:

@@ -15,7 +15,7 @@ from service import records, stored_runs
 from service.errors import NotFoundError, NothingToAdoptError
 from service.lives.history import stationary_tests_of
 from service.lives.recomputation import Adoption, ClutchState, Results, computed_anew
-from storage import assumptions, changes, clutches, diagnoses
+from storage import assumptions, changes, clutches, diagnoses, jobs
 from storage.assumptions import AdoptedRow
 from storage.changes import NewChange
 from storage.diagnoses import DiagnosisRow
@@ -43,30 +43,34 @@ def finish_and_adopt(
     clutch_id: str,
     diagnosis_id: str,
     ended: Mapping[str, Any],
-    life: str,
     at: str,
     by: str = "local",
+    *,
+    claimer: str,
 ) -> bool:
     """Store a finished diagnosis and, in the same transaction, adopt its extension; False where there is nothing to adopt.
 
-    `ended` holds the `report` and the `extension` (or None) as the diagnosis made them, `life` is the life that it is of.
-    Where False is answered, nothing was stored.
+    `ended` holds the `report` and the `extension` (or None) as the diagnosis made them, `claimer` is the process whose job
+    it is. Where False is answered, nothing was stored.
     """
     if ended["extension"] is None:
         return False
+    with database.reading() as connection:
+        life = _diagnosed(connection, clutch_id, diagnosis_id).life
     adoption = Adoption(diagnosis_id=diagnosis_id, life=life, extension=Extension.from_dict(ended["extension"]))
 
     def finish(connection: Connection) -> None:
         if changes.last_of_history(connection, clutch_id) > _diagnosed(connection, clutch_id, diagnosis_id).revision:
             raise NothingToAdoptError(f"the runs that diagnosis {diagnosis_id!r} is of were changed meanwhile")
-        if not diagnoses.finish(connection, diagnosis_id, at, ended["report"], ended["extension"]):
+        if not jobs.end(connection, diagnosis_id, jobs.FINISHED, at, claimer=claimer):
             raise NothingToAdoptError(f"diagnosis {diagnosis_id!r} was ended meanwhile")
+        diagnoses.finish(connection, diagnosis_id, at, ended["report"], ended["extension"])
 
     try:
         _change(database, clutch_id, adoption, adopted_at=at, by=by, before=finish)
     except (
         NothingToAdoptError
-    ):  # a rebuild or a correction came meanwhile, or another service declared the diagnosis failed
+    ):  # a rebuild or a correction came meanwhile, or the diagnosis was cancelled or is made by another service
         return False
     return True
 
@@ -84,7 +88,7 @@ def _change(
     diagnosis_id = None if adoption is None else adoption.diagnosis_id
     while True:
         state, results = _computed(database, clutch_id, adoption)
-        with database.writing() as connection:
+        with database.writing(of=clutch_id) as connection:
             if not records.unchanged(connection, clutch_id, state.revision):
                 continue
             if _in_force(connection, clutch_id, diagnosis_id):  # the same request was stored while this one waited

@@ -110,7 +110,7 @@ def _change(database: Database, request: _Request) -> Receipt:
         if (row.state, row.cycles) == (loaded.row.state, loaded.row.cycles):
             return records.receipt(loaded.row)
         changed = _computed(database, loaded, row)
-        with database.writing() as connection:
+        with database.writing(of=request.clutch_id) as connection:
             if records.unchanged(connection, request.clutch_id, loaded.state.revision):
                 _store(connection, loaded, changed, request)
                 return records.receipt(changed.row)

@@ -49,7 +49,7 @@ def edit(
         edited = _computed(database, clutch_id, fields, archived)
         if not _entries(edited):
             return
-        with database.writing() as connection:
+        with database.writing(of=clutch_id) as connection:
             if records.unchanged(connection, clutch_id, edited.before.revision):
                 _store(connection, edited, reason=reason, by=by, at=at)
                 return

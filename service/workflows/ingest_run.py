@@ -107,7 +107,7 @@ def ingest(
         if archived:
             raise ArchivedError(f"clutch {clutch_id!r} is archived and takes in no more runs")
         outcome = _computed(database, before, arrival, (geometry, torque_filter))
-        with database.writing() as connection:  # another process's run of the same name moves the revision
+        with database.writing(of=clutch_id) as connection:  # another process's run of the same name moves the revision
             if records.unchanged(connection, clutch_id, outcome.revision):
                 return _store(connection, clutch_id, arrival, columns, outcome, by=by), True
 

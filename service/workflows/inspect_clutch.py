@@ -31,7 +31,7 @@ def inspect(database: Database, clutch_id: str, sent: InspectionIn, *, by: str, 
     """
     content = sent.model_dump(mode="json")
     content_sha256 = content_of(content)
-    with database.writing() as connection:
+    with database.writing(of=clutch_id) as connection:
         records.clutch(connection, clutch_id)
         row = NewInspection(
             clutch_id=clutch_id,
@@ -64,7 +64,7 @@ def add_photograph(
         received_at=at,
         received_by=by,
     )
-    with database.writing() as connection:
+    with database.writing() as connection:  # a photograph may be of several clutches
         key = inspection(connection, clutch_id, inspection_id).inspection_key
         stored = inspections.photographs(connection, [key])[key]
         for photograph in stored:
@@ -107,7 +107,7 @@ def _change(
     database: Database, clutch_id: str, inspection_id: str, action: str, state: str, reason: str, by: str, at: str
 ) -> dict[str, Any]:
     """What is so already is not changed; else the audit trail says it, and the clutch's revision moves on with it."""
-    with database.writing() as connection:
+    with database.writing(of=clutch_id) as connection:
         row = inspection(connection, clutch_id, inspection_id)
         if row.state != state:
             inspections.set_state(connection, row.inspection_key, state)

@@ -1,58 +1,94 @@
-"""A diagnosis is asked for, and its end is stored."""
+"""A diagnosis is asked for, as a job of the same name, and its end is stored with that of its job."""
 
 import secrets
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from service import records
+from service.errors import BusyError
 from service.lives.history import lives_of
 from service.settings import CODE_VERSION
-from storage import changes, diagnoses
+from storage import changes, diagnoses, jobs
 from storage.diagnoses import NewDiagnosis
 from storage.engine.database import Database
+from storage.jobs import DIAGNOSIS, JobRow, NewJob
 
 
-def ask(database: Database, clutch_id: str, *, created_at: str) -> NewDiagnosis:
-    """Store a diagnosis of all runs that are there now, to be run. Raises NotFoundError."""
-    with database.writing() as connection:
+def ask(
+    database: Database, clutch_id: str, *, by: str, adopt: bool, request: str, most: int, created_at: str
+) -> tuple[str, bool]:
+    """Ask for a diagnosis of all runs that are there now; returns its id, and whether it is new.
+
+    Where the very same runs are being diagnosed already it is that one. `adopt`: what it finds is adopted in the name of
+    `by`; `request` is the id of the request that asks. Raises NotFoundError, BusyError where `most` wait or run already.
+    """
+    with database.writing(of=clutch_id) as connection:
         clutch = records.clutch(connection, clutch_id)
+        last_run_key = diagnoses.last_run_key(connection, clutch_id)
+        changed = changes.last_of_history(connection, clutch_id)
+        diagnosis_id = diagnoses.running(connection, clutch_id, last_run_key, since=changed)
+        if diagnosis_id is not None:
+            job = jobs.get(connection, diagnosis_id)
+            if job is not None and adopt and job.arguments["adopt_by"] is None:
+                jobs.set_arguments(connection, diagnosis_id, job.arguments | {"adopt_by": by})
+            return diagnosis_id, False
+        waiting = jobs.count_open(connection, DIAGNOSIS)
+        if waiting >= most:
+            raise BusyError(f"{waiting} diagnoses wait already: ask again in a little while")
         lives = lives_of(records.events(connection, clutch_id))
         row = NewDiagnosis(
             clutch_id=clutch_id,
             diagnosis_id=secrets.token_hex(8),
             created_at=created_at,
             revision=clutch.revision,
-            last_run_key=diagnoses.last_run_key(connection, clutch_id),
+            last_run_key=last_run_key,
             life=lives[-1].name if lives else "",
             as_of_cycles=lives[-1].events[-1].cycles if lives else None,
             code_version=CODE_VERSION,
         )
         diagnoses.insert(connection, row)
-    return row
-
-
-def running(database: Database, clutch_id: str) -> str | None:
-    """The id of the diagnosis that is running of the very runs that are there now. Raises NotFoundError."""
-    with database.reading() as connection:
-        records.clutch(connection, clutch_id)
-        return diagnoses.running(
-            connection,
-            clutch_id,
-            diagnoses.last_run_key(connection, clutch_id),
-            since=changes.last_of_history(connection, clutch_id),
+        arguments = {"last_run_key": last_run_key, "adopt_by": by if adopt else None, "request": request}
+        job_row = NewJob(
+            job_id=row.diagnosis_id,
+            kind=DIAGNOSIS,
+            clutch_id=clutch_id,
+            asked_at=created_at,
+            asked_by=by,
+            arguments=arguments,
         )
+        jobs.insert(connection, job_row)
+    return row.diagnosis_id, True
 
 
-def finish(database: Database, diagnosis_id: str, ended: Mapping[str, Any], *, at: str) -> None:
-    """Store how a diagnosis ended: its `report` and `extension`, or its `problem`."""
-    with database.writing() as connection:
-        if "problem" in ended:
-            diagnoses.fail(connection, diagnosis_id, at, ended["problem"])
-        else:
-            diagnoses.finish(connection, diagnosis_id, at, ended["report"], ended["extension"])
+def finish(
+    database: Database,
+    job: JobRow,
+    ended: Mapping[str, Any],
+    *,
+    at: str,
+    adopt: Callable[[JobRow, Mapping[str, Any]], bool],
+) -> None:
+    """Store how a claimed job's diagnosis ended: its `report` and `extension`, or its `problem`.
 
-
-def fail_running(database: Database, problem: str, *, at: str) -> None:
-    """Say of all diagnoses that an earlier service left running why they have no report."""
-    with database.writing() as connection:
-        diagnoses.fail_all(connection, at, problem)
+    Where somebody wants what it found adopted, `adopt` does both at once; it returns False where there is nothing to adopt.
+    A job that is no longer the claimer's was cancelled, or is made by another: then nothing is stored.
+    """
+    while True:
+        with database.reading() as connection:
+            newest = jobs.get(connection, job.job_id)
+        if newest is None or newest.clutch_id is None:
+            raise LookupError(f"job {job.job_id!r} of {job.clutch_id!r} is not stored")
+        if newest.arguments["adopt_by"] is not None and "report" in ended and adopt(newest, ended):
+            return
+        with database.writing(of=newest.clutch_id) as connection:
+            now = jobs.get(connection, job.job_id)
+            if now is None or now.arguments != newest.arguments:  # somebody joined who wants it adopted
+                continue
+            problem = ended.get("problem")
+            state = jobs.FINISHED if problem is None else jobs.FAILED
+            if jobs.end(connection, job.job_id, state, at, problem=problem, claimer=job.claimed_by):
+                if problem is None:
+                    diagnoses.finish(connection, job.job_id, at, ended["report"], ended["extension"])
+                else:
+                    diagnoses.fail(connection, job.job_id, at, problem)
+            return

@@ -26,8 +26,11 @@ class Database(ABC):
         """A connection that sees one state of the database until the block ends."""
 
     @abstractmethod
-    def writing(self) -> AbstractContextManager[Connection]:
+    def writing(self, *, of: str | None = None) -> AbstractContextManager[Connection]:
         """A connection that alone writes: committed when the block ends, rolled back on any exception.
+
+        `of` names a clutch, or another thing of which alone the block writes: where the database can have several writers
+        at once, it is then the only one of that thing. None: the only one of all.
 
         Raises DatabaseBusy where another writes for too long, StorageUnavailable where the database cannot be written.
         """

@@ -1,10 +1,9 @@
 """A database is opened by its address, which says of what kind it is: `sqlite:///path`, or one on a PostgreSQL server."""
 
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 
 from storage.engine.database import Database
 from storage.engine.limits import LOCK_TIMEOUT
-from storage.engine.postgresql import service_lock as session_lock
 from storage.engine.postgresql.connect import address_of, is_on_server
 from storage.engine.postgresql.database import find_server, open_server, server_has_tables
 from storage.engine.sqlite import service_lock as file_lock
@@ -17,8 +16,9 @@ def open_database(url: str, *, lock_timeout: float = LOCK_TIMEOUT, serving: bool
 
     The file, or the tables of an empty database, is made, and the migrations that are missing are run.
 
-    `serving`: it is the service itself that opens it, and holds `service_lock`. Raises ValueError on another address, and
-    what `open_file` and `open_server` do.
+    `serving`: it is a service that opens it, inside `service_lock`; nobody migrates the database under it.
+
+    Raises ValueError on another address, and what `open_file` and `open_server` do.
     """
     if is_on_server(url):
         return open_server(address_of(url), lock_timeout=lock_timeout, serving=serving)
@@ -46,7 +46,11 @@ def database_exists(url: str) -> bool:
 
 
 def service_lock(url: str) -> AbstractContextManager[None]:
-    """Held inside: the lock of the one service that may use the database. Raises ServiceRuns where another holds it."""
+    """Held inside: the lock of the one service that may use a file. Raises ServiceRuns where another holds it.
+
+    Any number of services may use a database on a server: they hold nothing here, and each its connections' lock
+    (`open_database(..., serving=True)`).
+    """
     if is_on_server(url):
-        return session_lock.service_lock(address_of(url))
+        return nullcontext()
     return file_lock.service_lock(path_of(url))

@@ -161,10 +161,9 @@ def exported(server: Server, folder: Path) -> dict[str, Any]:
     return files
 
 
-def test_commands_run_beside_a_service_and_a_second_one_does_not_start(postgresql: PostgresServer) -> None:
+def test_commands_run_beside_a_service(postgresql: PostgresServer) -> None:
     address = postgresql.fresh()
     with serving(address, loaded=True) as server:
-        assert "a service uses this database already" in clutchlife("serve", "--database", address, code=1)
         key = clutchlife("key", "create", "--scope", "read", "--database", address).strip()
         headers = {"Authorization": f"Bearer {key}"}
         assert [ONCE.get(f"{server.url}/v1/clutches", headers=each).status_code for each in ({}, headers)] == [401, 200]

@@ -1,6 +1,9 @@
 """`make load`: the rigs and clients of a test field against a service in a process of its own; the tables, as Markdown.
 
-Without and with raw files among the posts, unless one is chosen. Exit code 1 where a demand of `report.demands` is not met.
+Without and with raw files among the posts, unless one is chosen. With `--services 4 --database postgresql` against one
+service and then four on a PostgreSQL server that is started for it, or on the one at an address, whose database is empty;
+half of the clutches are then of no fleet, and their answers compared with those of one service on a file.
+Exit code 1 where a demand of `report.demands` is not met.
 """
 
 import argparse
@@ -12,7 +15,7 @@ import sqlite3
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -25,11 +28,14 @@ from tests.load.beside import Beside, Processor
 from tests.load.bodies import SAMPLES, TESTS, SentLife, life
 from tests.load.exchange import LostError
 from tests.load.field import ALONE, Field
-from tests.load.report import Loaded, demands, markdown
+from tests.load.report import Loaded, demands, markdown, paces
+from tests.storage.engine.postgresql.server import postgresql_server
 from tests.support import Server, serving
 
 #: The clutch that is diagnosed all the time; states with a stationary and a dynamic test each.
 DIAGNOSED, STATES = "diagnosed", 10
+#: In place of an address: a server that is started for the load, whose commits are on the disk.
+TEMPORARY = "postgresql"
 #: Clutches of a fleet whose remaining life a replay must not change.
 _REPLAYED = 2
 
@@ -40,6 +46,7 @@ class Options:
 
     Where a test asks for it, `tests` in a life, `samples` of a raw file and `states` of the diagnosed clutch are fewer, and
     services are forked off a loaded process (`loaded`).
+    `services` share a `database`, an address; empty: one service, on a file.
     """
 
     seconds: float = 180.0
@@ -52,6 +59,13 @@ class Options:
     samples: int = SAMPLES
     states: int = STATES
     loaded: bool = False
+    services: int = 1
+    database: str = ""
+
+    @property
+    def alone(self) -> int:
+        """Rigs whose clutches are of no fleet, so that a service which is sent their runs alone answers the same."""
+        return max(ALONE, self.rigs // 2) if self.database else ALONE
 
 
 def run(options: Options, folder: Path) -> Loaded:
@@ -65,20 +79,25 @@ def run(options: Options, folder: Path) -> Loaded:
         )
         for number in range(options.rigs)
     ]
-    with serving(folder / "load.db", loaded=options.loaded) as server:
-        with httpx2.Client(base_url=server.url, timeout=120) as http:
+    with ExitStack() as stack:
+        database = options.database or folder / "load.db"
+        servers = [stack.enter_context(serving(database, loaded=options.loaded)) for _ in range(options.services)]
+        pids = [server.pid for server in servers]
+        with httpx2.Client(base_url=servers[-1].url, timeout=120) as http:
             post_life(http, DIAGNOSED, options.states, WHOLE)
         with _all_kept():
-            before = Processor.since_start(server.pid)
-            field, noted = asyncio.run(_loaded(options, server, lives))
-            processor = Processor.since_start(server.pid).minus(before)
+            before = Processor.since_start(pids)
+            field, noted = asyncio.run(_loaded(options, servers, lives))
+            processor = Processor.since_start(pids).minus(before)
         return Loaded(
             seconds=options.seconds,
             raw=options.raw,
             counts=field.counts,
             beside=noted,
             processor=processor,
-            losses=_wrong(field, server, folder),
+            losses=_wrong(field, servers[0], folder),
+            services=options.services,
+            on_server=bool(options.database),
         )
 
 
@@ -93,11 +112,12 @@ def _all_kept() -> Iterator[None]:
         gc.unfreeze()
 
 
-async def _loaded(options: Options, server: Server, lives: Sequence[SentLife]) -> tuple[Field, Beside]:
+async def _loaded(options: Options, servers: Sequence[Server], lives: Sequence[SentLife]) -> tuple[Field, Beside]:
     begin = asyncio.get_running_loop().time() + 0.5
     end = begin + options.seconds
     field = Field(
-        port=server.port,
+        ports=[server.port for server in servers],
+        alone=options.alone,
         lives=lives,
         rigs=options.rigs,
         clients=options.clients,
@@ -109,11 +129,11 @@ async def _loaded(options: Options, server: Server, lives: Sequence[SentLife]) -
     noted = Beside()
     await asyncio.gather(
         *field.tasks(),
-        beside.diagnose(server.port, DIAGNOSED, end, noted),
-        beside.refresh_fleets(server.database, begin, end, noted),
-        beside.watch(server.pid, begin, end, noted),
+        beside.diagnose(servers[-1].port, DIAGNOSED, end, noted),
+        beside.refresh_fleets(servers[0].address, begin, end, noted),
+        beside.watch([server.pid for server in servers], begin, end, noted),
     )
-    await beside.refresh_once(server.database, noted)  # all clutches under what is known at the end
+    await beside.refresh_once(servers[0].address, noted)  # all clutches under what is known at the end
     return field, noted
 
 
@@ -122,14 +142,14 @@ def _wrong(field: Field, server: Server, folder: Path) -> list[str]:
     counts = field.counts
     first = [(number, f"load-{number}-000") for number in range(field.rigs)]
     posted = {clutch_id: field.fluid(number, 0) for number, clutch_id in first if clutch_id in counts.acknowledged}
-    alone = dict(list(posted.items())[-ALONE:])
+    alone = dict(list(posted.items())[-field.alone :])
     taught = [clutch_id for clutch_id in posted if clutch_id not in alone][:_REPLAYED]
     asked_for: tuple[Callable[[], list[str]], ...] = (
         lambda: checks.losses(server.port, counts),
         lambda: checks.calm_differences(folder, server, alone, counts.acknowledged),
         lambda: checks.replay_differences(server, taught),
     )
-    most = min(ALONE, field.rigs)
+    most = min(field.alone, field.rigs)
     wrong = [] if len(alone) == most else [f"runs of {len(alone)} clutches to be posted calmly, not of {most}"]
     for check in asked_for:
         try:
@@ -139,15 +159,28 @@ def _wrong(field: Field, server: Server, folder: Path) -> list[str]:
     return wrong
 
 
-def report(options: Options) -> bool:
-    """Run and print; whether all demands are met."""
+def report(options: Options) -> Loaded:
+    """Run and print."""
     with tempfile.TemporaryDirectory(prefix="clutchlife-load-") as folder:
         loaded = run(options, Path(folder))
     shown = "raw files among the posts" if options.raw else "no raw files"
-    print(f"### {options.rigs} rigs and {options.clients} clients for {options.seconds:g} s, {shown}\n")
+    services = f", {options.services} services on PostgreSQL" if options.database else ""
+    print(f"### {options.rigs} rigs and {options.clients} clients for {options.seconds:g} s, {shown}{services}\n")
     versions = f"Python {platform.python_version()}, SQLite {sqlite3.sqlite_version}"
     print(f"{versions}, {os.cpu_count()} cores, seed {options.seed}\n\n{markdown(loaded)}\n", flush=True)
-    return all(each.met for each in demands(loaded))
+    return loaded
+
+
+def reports(options: Options) -> list[Loaded]:
+    """One service on a file; on PostgreSQL one service, then as many as are asked for, each on an empty database."""
+    if options.database != TEMPORARY:
+        return [report(options)]
+    loads = []
+    for services in sorted({1, options.services}):
+        with postgresql_server(fsync="on", full_page_writes="on") as server:
+            loads.append(report(replace(options, services=services, database=server.fresh())))
+    print(f"{paces(loads)}\n", flush=True)
+    return loads
 
 
 def main() -> int:
@@ -159,6 +192,8 @@ def main() -> int:
         ("clients", "that ask once a second"),
         ("seed", "of the lives, and of the moments in a second at which clients ask"),
         ("interval", "seconds from one run of a rig to its next, at least"),
+        ("services", "that share the database"),
+        ("database", f"`{TEMPORARY}`: on a server that is started for it; or an address; left out: a file"),
     ):
         default = getattr(Options, name)
         parser.add_argument(f"--{name}", type=type(default), default=default, help=meaning)
@@ -168,9 +203,11 @@ def main() -> int:
     given = vars(parser.parse_args())
     chosen = given.pop("raw")
     options = Options(**given)
+    if options.services > 1 and not options.database:
+        parser.error("several services need a --database on PostgreSQL: one service uses a file at a time")
     variants = [False, True] if chosen is None else [chosen]
-    met = [report(replace(options, raw=raw)) for raw in variants]
-    return 0 if all(met) else 1
+    loads = [load for raw in variants for load in reports(replace(options, raw=raw))]
+    return 0 if all(each.met for load in loads for each in demands(load)) else 1
 
 
 if __name__ == "__main__":

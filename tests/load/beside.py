@@ -6,6 +6,7 @@ import os
 import resource
 import sys
 from collections import Counter
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,15 +27,15 @@ class Beside:
 
     diagnoses: list[float] = field(default_factory=list)
     refreshes: list[float] = field(default_factory=list)
-    #: By second: the service alone, and with the processes that it has started.
+    #: By second: the services alone, and with the processes that they have started.
     alone: list[int] = field(default_factory=list)
     together: list[int] = field(default_factory=list)
     problems: Counter[str] = field(default_factory=Counter)
 
 
-def fleet_refresh(database: Path) -> list[str]:
+def fleet_refresh(address: str) -> list[str]:
     """The command that learns the fleets' priors anew."""
-    return [sys.executable, "-m", "service.cli.main", "fleet", "refresh", "--database", f"sqlite:///{database}"]
+    return [sys.executable, "-m", "service.cli.main", "fleet", "refresh", "--database", address]
 
 
 async def diagnose(port: int, clutch_id: str, end: float, beside: Beside) -> None:
@@ -61,37 +62,36 @@ async def diagnose(port: int, clutch_id: str, end: float, beside: Beside) -> Non
                 beside.problems[f"diagnosis failed: {report.get('problem') or report.get('summary')}"] += 1
 
 
-async def refresh_fleets(database: Path, begin: float, end: float, beside: Beside) -> None:
+async def refresh_fleets(address: str, begin: float, end: float, beside: Beside) -> None:
     """Refresh the fleets every so many seconds until the end, in a process of its own."""
     loop = asyncio.get_running_loop()
     planned = begin + REFRESH_EVERY / 2
     while planned < end:
         await asyncio.sleep(max(0.0, planned - loop.time()))
-        await refresh_once(database, beside)
+        await refresh_once(address, beside)
         planned = max(planned + REFRESH_EVERY, loop.time())
 
 
-async def refresh_once(database: Path, beside: Beside) -> None:
+async def refresh_once(address: str, beside: Beside) -> None:
     """One refresh, waited for."""
     loop = asyncio.get_running_loop()
     started = loop.time()
     pipe = asyncio.subprocess.PIPE
-    process = await asyncio.create_subprocess_exec(*fleet_refresh(database), stdout=pipe, stderr=pipe)
+    process = await asyncio.create_subprocess_exec(*fleet_refresh(address), stdout=pipe, stderr=pipe)
     _, errors = await process.communicate()
     beside.refreshes.append(loop.time() - started)
     if process.returncode != 0:
         beside.problems[f"fleet refresh ended with {process.returncode}: {errors[-160:].decode(errors='replace')}"] += 1
 
 
-async def watch(pid: int, begin: float, end: float, beside: Beside) -> None:
-    """Resident memory of the service, alone and with its processes, once a second."""
+async def watch(pids: Sequence[int], begin: float, end: float, beside: Beside) -> None:
+    """Resident memory of the services, alone and with their processes, once a second."""
     loop = asyncio.get_running_loop()
     planned = begin
     while planned < end:
         await asyncio.sleep(max(0.0, planned - loop.time()))
-        sizes = [resident(each) for each in family(pid)]
-        beside.alone.append(sizes[0])
-        beside.together.append(sum(sizes))
+        beside.alone.append(sum(map(resident, pids)))
+        beside.together.append(sum(resident(each) for pid in pids for each in family(pid)))
         planned += WATCH_EVERY
 
 
@@ -105,7 +105,7 @@ def resident(pid: int) -> int:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Processor:
-    """Seconds of the processor since some moment: the generator, the service with its processes, the refreshes, and
+    """Seconds of the processor since some moment: the generator, the services with their processes, the refreshes, and
     everything else on the machine."""
 
     generator: float
@@ -114,10 +114,10 @@ class Processor:
     others: float
 
     @classmethod
-    def since_start(cls, pid: int) -> "Processor":
+    def since_start(cls, pids: Sequence[int]) -> "Processor":
         """Since each began, and the machine; only differences mean anything."""
         own, children = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-        service = family_seconds(pid)
+        service = sum(map(family_seconds, pids))
         generator, refreshes = own.ru_utime + own.ru_stime, children.ru_utime + children.ru_stime
         others = busy_seconds() - service - generator - refreshes
         return cls(generator=generator, service=service, refreshes=refreshes, others=others)

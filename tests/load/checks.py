@@ -12,6 +12,10 @@ from tests.load.exchange import Answer, Blocking, LostError
 from tests.load.field import Acknowledged, Counts, reason
 from tests.support import Server, serving
 
+#: Answers about a clutch that are to be those of the same runs posted calmly, but for what is a service's own.
+_OWN = {"revision", "time"}
+ANSWERS = ("remaining-useful-life", "degradation", "stribeck", "loops", "series", "scores")
+
 
 def stored_hashes(port: int, clutch_id: str) -> dict[str, str]:
     """run_id -> content hash of all runs of a clutch, read page by page."""
@@ -60,7 +64,7 @@ def lost_of(
 def calm_differences(
     folder: Path, loaded: Server, sample: Mapping[str, str], acknowledged: Mapping[str, Sequence[Acknowledged]]
 ) -> list[str]:
-    """Differences from a fresh service that is sent the same runs one by one: hashes and remaining life.
+    """Differences from a fresh service on a file that is sent the same runs one by one: hashes and answers.
 
     `sample`: the fluid by clutch_id.
     """
@@ -74,8 +78,11 @@ def calm_differences(
                 receipt = json.loads(_good(calm.ask(run.post.request(clutch_id))).body)
                 if receipt["content_sha256"] != run.sha256:
                     wrong.append(f"{clutch_id}: {run.post.run_id} posted calmly has another sha256")
-            if remaining_life(calm, clutch_id) != remaining_life(line, clutch_id):
-                wrong.append(f"{clutch_id}: the remaining life is not that of the same runs posted calmly")
+            wrong += [
+                f"{clutch_id}: {name} is not that of the same runs posted calmly"
+                for name in ANSWERS
+                if answered(calm, clutch_id, name) != answered(line, clutch_id, name)
+            ]
         calm.close()
     line.close()
     return wrong
@@ -84,7 +91,7 @@ def calm_differences(
 def replay_differences(loaded: Server, clutch_ids: Sequence[str]) -> list[str]:
     """Clutches that a fleet teaches: whose remaining life a replay of the raw runs changes."""
     line = Blocking(loaded.port)
-    before = {clutch_id: remaining_life(line, clutch_id) for clutch_id in clutch_ids}
+    before = {clutch_id: answered(line, clutch_id) for clutch_id in clutch_ids}
     line.close()
     command = [
         sys.executable,
@@ -93,7 +100,7 @@ def replay_differences(loaded: Server, clutch_ids: Sequence[str]) -> list[str]:
         "replay",
         *clutch_ids,
         "--database",
-        f"sqlite:///{loaded.database}",
+        loaded.address,
     ]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode != 0:
@@ -102,16 +109,17 @@ def replay_differences(loaded: Server, clutch_ids: Sequence[str]) -> list[str]:
     wrong = [
         f"{clutch_id}: a replay changes the remaining life"
         for clutch_id in clutch_ids
-        if remaining_life(line, clutch_id) != before[clutch_id]
+        if answered(line, clutch_id) != before[clutch_id]
     ]
     line.close()
     return wrong
 
 
-def remaining_life(line: Blocking, clutch_id: str) -> dict[str, Any]:
-    """The answer but for the revision, which says how often something was stored."""
-    answer: dict[str, Any] = _json(line, f"/v1/clutches/{clutch_id}/remaining-useful-life")
-    del answer["revision"]
+def answered(line: Blocking, clutch_id: str, name: str = ANSWERS[0]) -> dict[str, Any]:
+    """The newest answer but for the revision, which says how often something was stored, and the times of arrival."""
+    request = asked(f"/v1/clutches/{clutch_id}/{name}", "Prefer: wait=60")
+    body = _good(line.ask(request)).body
+    answer: dict[str, Any] = json.loads(body, object_hook=lambda found: {k: found[k] for k in found.keys() - _OWN})
     return answer
 
 

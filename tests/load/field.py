@@ -61,9 +61,10 @@ class Counts:
 
 @dataclass(slots=True)
 class Field:
-    """The field on a service's port, from `begin` to `end` by the clock of the event loop."""
+    """The field on the ports of the services that share a database, over which rigs and clients are spread, from `begin` to
+    `end` by the clock of the event loop."""
 
-    port: int
+    ports: Sequence[int]
     lives: Sequence[SentLife]
     rigs: int
     clients: int
@@ -71,6 +72,7 @@ class Field:
     interval: float
     begin: float
     end: float
+    alone: int = ALONE
     counts: Counts = field(default_factory=Counts)
     #: The clutch on each rig, None before the first.
     on_rigs: list[str | None] = field(init=False)
@@ -92,11 +94,14 @@ class Field:
             self._livez(),
         ]
 
+    def _port(self, number: int) -> int:
+        return self.ports[number % len(self.ports)]
+
     # --- rigs ---
 
     async def _rig(self, number: int, phase: float) -> None:
         loop = asyncio.get_running_loop()
-        with closing(Line(self.port)) as line:
+        with closing(Line(self._port(number))) as line:
             await _until(self.begin + phase * self.interval)  # rigs know nothing of each other
             for turn in itertools.count():
                 clutch_id = f"load-{number}-{turn:03d}"
@@ -118,7 +123,7 @@ class Field:
 
     def fluid(self, number: int, turn: int) -> str:
         """The fluid of that clutch: the last rigs' clutches have each their own."""
-        return f"ATF {number} {turn}" if number >= self.rigs - ALONE else "ATF"
+        return f"ATF {number} {turn}" if number >= self.rigs - self.alone else "ATF"
 
     async def _sent(self, line: Line, request: bytes, what: str) -> Answer | None:
         """The good answer to a POST, which is sent again after an error; None where the time is over before."""
@@ -147,7 +152,7 @@ class Field:
         A dashboard names the answer that it has, a script does not.
         """
         tags, route, dashboard = dict[str, str](), ROUTES[part], number % 2 == 0
-        with closing(Line(self.port)) as line:
+        with closing(Line(self._port(number + part))) as line:
             for tick in itertools.count():
                 planned = self.begin + phase + tick + part / len(ROUTES)
                 if planned >= self.end:
@@ -166,7 +171,7 @@ class Field:
 
     async def _livez(self) -> None:
         request = asked("/livez")
-        with closing(Line(self.port)) as line:
+        with closing(Line(self._port(0))) as line:
             for number in itertools.count():
                 planned = self.begin + number * LIVEZ_EVERY
                 if planned >= self.end:

@@ -46,7 +46,9 @@ def response(status: str, body: bytes = b"{}", *headers: str) -> bytes:
 
 
 def field_on(port: int, begin: float, seconds: float, *, lives: tuple[SentLife, ...] = (), rigs: int = 0) -> Field:
-    return Field(port=port, lives=lives, rigs=rigs, clients=0, seed=1, interval=0.0, begin=begin, end=begin + seconds)
+    return Field(
+        ports=(port,), lives=lives, rigs=rigs, clients=0, seed=1, interval=0.0, begin=begin, end=begin + seconds
+    )
 
 
 def run_named(name: str) -> Post:
@@ -187,7 +189,8 @@ def test_a_refused_run_is_counted_and_sent_again() -> None:
                 field.end = 0.0  # the life is over, and the time
             return found
 
-        server, field.port = await stub(answer)
+        server, port = await stub(answer)
+        field.ports = (port,)
         await field._rig(0, 0.0)
         server.close()
         return field.counts

@@ -1,13 +1,17 @@
-"""Diagnoses: each function against a real database."""
+"""Diagnoses, and the newest finished one of each clutch in short: each function against a real database."""
 
 import pytest
 
-from storage import diagnoses
-from storage.diagnoses import FAILED, FINISHED, RUNNING
+from storage import assumptions, clutches, diagnoses, verdicts
+from storage.assumptions import AdoptedRow
+from storage.clutches import ClutchRow
+from storage.diagnoses import FAILED, FINISHED, RUNNING, NewDiagnosis
 from storage.engine.database import Database
+from storage.verdicts import VerdictRow
 from tests.storage.samples import store_diagnoses
 
 CLUTCH = "bench3-017"
+AT = "2026-11-02T10:00:00+00:00"
 
 
 @pytest.fixture
@@ -31,14 +35,6 @@ def test_a_diagnosis_runs_and_ends_once(stocked: Database) -> None:
     assert (found["d2"].status, found["d2"].finished_at) == (RUNNING, None)
 
 
-def test_what_was_left_running_ends_at_once(stocked: Database) -> None:
-    with stocked.writing() as connection:
-        diagnoses.finish(connection, "d0", "later", {}, None)
-        assert diagnoses.fail_all(connection, "now", "interrupted") == 2
-        assert diagnoses.fail_all(connection, "now", "interrupted") == 0
-        assert [row.status for row in diagnoses.page(connection, CLUTCH, limit=10)] == [FAILED, FAILED, FINISHED]
-
-
 def test_pages_and_the_one_that_runs(stocked: Database) -> None:
     with stocked.writing() as connection:
         first = diagnoses.page(connection, CLUTCH, limit=2)
@@ -55,3 +51,50 @@ def test_pages_and_the_one_that_runs(stocked: Database) -> None:
 def test_nothing_that_json_cannot_carry_is_stored(stocked: Database) -> None:
     with stocked.writing() as connection, pytest.raises(ValueError, match="not JSON compliant"):
         diagnoses.finish(connection, "d0", "later", {"rmse": float("nan")}, None)
+
+
+@pytest.fixture
+def stored(database: Database) -> Database:
+    """Two clutches: of `a` a finished diagnosis, a later one, a failed and a running one; of `b` a failed one only."""
+    with database.writing() as connection:
+        for name in ("a", "b"):
+            row = ClutchRow(
+                clutch_id=name, record={}, content_sha256="", created_at=AT, revision=0, rank=0.0, summary={}
+            )
+            clutches.insert(connection, row)
+        for number, name in enumerate(("a", "a", "a", "a", "b")):
+            new = NewDiagnosis(
+                clutch_id=name,
+                diagnosis_id=f"d{number}",
+                created_at=AT,
+                revision=0,
+                last_run_key=0,
+                life="",
+                as_of_cycles=None,
+                code_version="0",
+            )
+            diagnoses.insert(connection, new)
+        diagnoses.finish(connection, "d0", AT, {"verdict": "model_adequate", "causes": []}, None)
+        diagnoses.finish(connection, "d1", AT, {"verdict": "cause_named", "causes": ["oil_change"], "maps": {}}, {})
+        diagnoses.fail(connection, "d2", AT, "too slow")
+        diagnoses.fail(connection, "d4", AT, "too slow")
+    return database
+
+
+def test_the_newest_that_finished_is_told(stored: Database) -> None:
+    with stored.reading() as connection:
+        said = verdicts.newest(connection, ["a", "b", "nobody"])
+        assert verdicts.newest(connection, []) == {}
+        assert verdicts.newest(connection, ["b"]) == {}
+    expected = VerdictRow(diagnosis_id="d1", life="", verdict="cause_named", causes=("oil_change",), adopted=False)
+    assert said == {"a": expected}
+
+
+def test_adopted_is_what_the_model_in_force_came_from(stored: Database) -> None:
+    for version, diagnosis_id in ((1, "d1"), (2, None), (3, "d0")):
+        with stored.writing() as connection:
+            assumptions.insert_adoption(
+                connection, "a", AdoptedRow(version=version, diagnosis_id=diagnosis_id, adopted_at=AT)
+            )
+        with stored.reading() as connection:
+            assert verdicts.newest(connection, ["a"])["a"].adopted == (diagnosis_id == "d1")

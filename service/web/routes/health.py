@@ -35,5 +35,5 @@ async def readyz(request: Request) -> Response:
 @router.get("/metrics", response_class=Response, responses=described())
 def metrics(context: Reader) -> Response:
     """Metrics for Prometheus: requests by route, what waits, and how many clutches stand where."""
-    content = context.metrics.exposition(context.database, context.workers, context.diagnoses)
+    content = context.metrics.exposition(context.database, context.workers)
     return Response(content=content, media_type=MEDIA_TYPE)

@@ -2,5 +2,5 @@
 
 In: its address, `postgresql+psycopg://user@host/database`. Out: a `ServerDatabase`, whose `reading` and `writing` hand out
 connections. Open `database.py` first; then `connect.py` (its address, and the settings of every connection), `watch.py`,
-`service_lock.py` and `driver_errors.py`.
+`locks.py` and `driver_errors.py`.
 """

@@ -1,11 +1,12 @@
 """A database on a server: its transactions, and how its tables come to be.
 
-Writers queue for one lock of the database, so that transactions are committed in the order of the numbers that they give
-(revisions, keys, `commits`). Locks of single clutches, under which several write at once, need numbers that keep that order.
+Writers of one clutch queue for a lock of that clutch, so that its rows are committed in the order of the numbers that they
+get (revisions, keys); those of different clutches write at once. Who writes of all clutches together waits for all of them.
+`commits`, the number of all, is given last: from then until it is committed a transaction holds that row (`watch`).
 """
 
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import closing, contextmanager, nullcontext
 
 from sqlalchemy import URL, Connection, insert, text
 from sqlalchemy.exc import ProgrammingError, SQLAlchemyError
@@ -15,11 +16,10 @@ from storage.engine.errors import DatabaseTooOld, StorageError, StorageUnavailab
 from storage.engine.integrity import refuse_newer
 from storage.engine.postgresql.connect import make_engine, shown
 from storage.engine.postgresql.driver_errors import translated
-from storage.engine.postgresql.service_lock import WRITE_KEY, service_lock
+from storage.engine.postgresql.locks import hold_service_lock, migration_lock, write_lock
 from storage.engine.postgresql.watch import ServerWatch, commits, count_commit, own_tables
 from storage.migrations.upgrade import current, head, make_all, upgrade
 
-_LOCK = text(f"SELECT pg_advisory_xact_lock({WRITE_KEY})")
 #: A transaction that changed nothing has no number and is not counted.
 _COUNT = count_commit.where(text("pg_current_xact_id_if_assigned() IS NOT NULL"))
 
@@ -30,12 +30,15 @@ class ServerDatabase(Database):
     path = None
     journal_mode = None
 
-    def __init__(self, address: URL, *, lock_timeout: float, writable: bool = True) -> None:
+    def __init__(self, address: URL, *, lock_timeout: float, writable: bool = True, serving: bool = False) -> None:
         self.url = address.render_as_string(hide_password=False)
         self.name = shown(address)
         self._address = address
+        self._lock_timeout = lock_timeout
         self._closed = False
         self._engine = make_engine(address, lock_timeout)
+        if serving:
+            hold_service_lock(self._engine, self.name)
         self._readers = self._engine.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
         # a statement of a writer sees what was committed before the lock was free
         self._writers = self._engine.execution_options(
@@ -51,11 +54,11 @@ class ServerDatabase(Database):
             yield connection
 
     @contextmanager
-    def writing(self) -> Iterator[Connection]:
-        """A connection that holds the lock of writers: committed when the block ends, rolled back on any exception."""
+    def writing(self, *, of: str | None = None) -> Iterator[Connection]:
+        """A connection that holds the lock of writers `of` something: committed when the block ends, else rolled back."""
         self._refuse_closed()
         with translated(self.name), self._writers.begin() as connection:
-            connection.execute(_LOCK)
+            write_lock(connection, of)
             yield connection
             connection.execute(_COUNT)
 
@@ -82,7 +85,7 @@ class ServerDatabase(Database):
         self._closed = True
         self._engine.dispose()
 
-    def migrate(self, *, serving: bool) -> None:
+    def migrate(self) -> None:
         """Make the tables of an empty database, or run the steps that it lacks, not under a running service."""
         with self.reading() as connection:
             _require_utf8(connection, self.name)
@@ -90,7 +93,10 @@ class ServerDatabase(Database):
         if revision == head():
             return
         in_use = revision is not None
-        with service_lock(self._address) if in_use and not serving else nullcontext(), self.writing() as connection:
+        with (
+            migration_lock(self._address, self._lock_timeout) if in_use else nullcontext(),
+            self.writing() as connection,
+        ):
             revision = current(connection)  # another process may have been before
             if revision is None:
                 make_all(connection)
@@ -129,10 +135,15 @@ def open_server(address: URL, *, lock_timeout: float, serving: bool = False) -> 
 
     Raises DatabaseTooNew on that of a newer release, StorageUnavailable where it cannot be used or is not in UTF-8,
     DatabaseBusy where another writes for `lock_timeout` [s], ServiceRuns where it is to be migrated under a service.
+
+    `serving`: it is a service that opens it; from then on until it is closed nobody migrates the database.
     """
-    database = ServerDatabase(address, lock_timeout=lock_timeout)
+    with closing(ServerDatabase(address, lock_timeout=lock_timeout)) as database:
+        database.migrate()
+    database = ServerDatabase(address, lock_timeout=lock_timeout, serving=serving)
     try:
-        database.migrate(serving=serving)
+        with database.reading() as connection:
+            refuse_newer(current(connection))  # a newer release may have migrated it in between
     except BaseException:
         database.close()
         raise

@@ -61,7 +61,7 @@ class Transactions(Database):
             yield connection
 
     @contextmanager
-    def writing(self) -> Iterator[Connection]:
+    def writing(self, *, of: str | None = None) -> Iterator[Connection]:  # noqa: ARG002  (a file has one writer)
         """A connection that holds the write lock: committed when the block ends, rolled back on any exception.
 
         Raises DatabaseBusy where the lock is not free in time, StorageUnavailable where the file cannot be written.

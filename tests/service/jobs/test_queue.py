@@ -1,13 +1,11 @@
-"""How the queue starts the process of a diagnosis."""
+"""How the process of a diagnosis is started."""
 
 from typing import Any
 
 import pytest
 
-from service.jobs import queue
-from service.jobs.queue import DiagnosisQueue, Job
+from service.jobs import child
 from service.settings import DATABASE_VARIABLE, Settings
-from tests.storage.samples import new_diagnosis
 
 ADDRESS = "postgresql+psycopg://u:s3cr3t@host/db"
 
@@ -24,9 +22,8 @@ def test_no_argument_shows_the_address_of_the_database(monkeypatch: pytest.Monke
         started.update(options, command=command)
         raise StartedError
 
-    monkeypatch.setattr(queue.subprocess, "Popen", start)
-    diagnoses = DiagnosisQueue(ADDRESS, Settings(), store=None)
-    with pytest.raises(StartedError):
-        diagnoses._run(Job(new_diagnosis(0), None, "request"))
+    monkeypatch.setattr(child.subprocess, "Popen", start)
+    with pytest.raises(StartedError), child.running({"clutch_id": "c1"}, ADDRESS, Settings()):
+        pytest.fail("it was not started")
     assert "s3cr3t" not in " ".join(started["command"])
     assert started["env"][DATABASE_VARIABLE] == ADDRESS

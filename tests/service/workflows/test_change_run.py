@@ -18,7 +18,7 @@ from service.workflows import change_run, ingest_run, run_diagnosis
 from service.workflows.adopt_model import finish_and_adopt
 from service.workflows.ingest_run import ingest
 from service.workflows.replay import replay_clutch
-from storage import assumptions, clutches
+from storage import assumptions, clutches, jobs
 from storage.engine.opening import open_database
 from tests.service.workflows.benches import AT, CLUTCH, EXTENSION, Bench, assert_same, body, stood_in
 
@@ -224,23 +224,30 @@ def test_a_diagnosis_of_what_was_changed_meanwhile_is_stale_and_not_adopted(benc
     bench, _ = benches
     for cycles in (0.0, 1000.0, 70_000.0):
         bench.send(body("test", f"a{cycles:g}", cycles))
-    asked_for = run_diagnosis.ask(bench.database, CLUTCH, created_at=AT)
-    assert run_diagnosis.running(bench.database, CLUTCH) == asked_for.diagnosis_id
+
+    def ask() -> tuple[str, bool]:
+        return run_diagnosis.ask(bench.database, CLUTCH, by="local", adopt=False, request="", most=9, created_at=AT)
+
+    asked_for, _ = ask()
+    with bench.database.writing() as connection:
+        job = jobs.claim(connection, "one", lease=60.0, at=AT)
+    assert job is not None
     bench.send(body("test", "odd", 1500.0, odd=True))  # held: the runs are the same
-    assert run_diagnosis.running(bench.database, CLUTCH) == asked_for.diagnosis_id
+    assert ask() == (asked_for, False)
     bench.correct("a70000", 7000.0)
-    assert run_diagnosis.running(bench.database, CLUTCH) is None
+    fresh, new = ask()
+    assert new
     before = bench.answers()
     ended = {"report": {"verdict": "cause_named", "causes": []}, "extension": EXTENSION}
-    finished = finish_and_adopt(bench.database, CLUTCH, asked_for.diagnosis_id, ended, life="", at=AT)
+    finished = finish_and_adopt(bench.database, CLUTCH, asked_for, ended, at=AT, claimer="one")
     assert not finished
     with bench.database.reading() as connection:
         assert assumptions.current_adoption(connection, CLUTCH) is None
     assert bench.answers() == before
-    run_diagnosis.finish(bench.database, asked_for.diagnosis_id, ended, at=AT)
-    assert diagnosis_query.diagnosis(bench.database, CLUTCH, asked_for.diagnosis_id)["stale"]
-    fresh = run_diagnosis.ask(bench.database, CLUTCH, created_at=AT)
-    assert not diagnosis_query.diagnosis(bench.database, CLUTCH, fresh.diagnosis_id)["stale"]
+    run_diagnosis.finish(bench.database, job, ended, at=AT, adopt=lambda *_: pytest.fail("nobody wants it adopted"))
+    stale = diagnosis_query.diagnosis(bench.database, CLUTCH, asked_for)
+    assert (stale["status"], stale["stale"]) == ("finished", True)
+    assert not diagnosis_query.diagnosis(bench.database, CLUTCH, fresh)["stale"]
 
 
 def revision_of(bench: Bench) -> int:

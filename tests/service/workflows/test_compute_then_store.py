@@ -25,12 +25,13 @@ from service.workflows import adopt_model, ingest_run, learn_fleet, register_clu
 from service.workflows.adopt_model import adopt, finish_and_adopt
 from service.workflows.ingest_run import ingest
 from service.workflows.replay import replay_clutch
-from storage import assumptions, clutches, diagnoses, results, runs
+from storage import assumptions, clutches, diagnoses, jobs, results, runs
 from storage.diagnoses import NewDiagnosis
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData
 from storage.engine.opening import open_database
 from storage.engine.sqlite.transactions import Transactions
+from storage.jobs import NewJob
 from tests.service.workflows import stand_in_engine
 from tests.support import stationary
 
@@ -80,6 +81,10 @@ def begun(database: Database, diagnosis_id: str) -> None:
             as_of_cycles=None, code_version="0",
         )  # fmt: skip
         diagnoses.insert(connection, row)
+        job = NewJob(
+            job_id=diagnosis_id, kind=jobs.DIAGNOSIS, clutch_id="c1", asked_at=AT, asked_by="local", arguments={}
+        )
+        jobs.insert(connection, job)
 
 
 @pytest.fixture
@@ -95,8 +100,8 @@ def numerics(monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
     writing = Transactions.writing
 
     @contextmanager
-    def watched(self: Transactions) -> Iterator[Any]:
-        with writing(self) as connection:
+    def watched(self: Transactions, **of: Any) -> Iterator[Any]:
+        with writing(self, **of) as connection:
             lock.held = True
             try:
                 yield connection
@@ -202,15 +207,20 @@ def test_a_replay_beside_a_rig_that_never_rests_ends_and_says_why(
 
 
 @pytest.mark.usefixtures("stand_in")
-def test_a_diagnosis_that_was_declared_failed_meanwhile_is_not_adopted(database: Database) -> None:
-    """A service that starts on the same database ends what the former one still computes; nothing of it comes into force."""
+@pytest.mark.parametrize("meanwhile", ["cancelled", "claimed by another"])
+def test_a_diagnosis_that_is_no_longer_the_claimer_s_is_not_adopted(database: Database, meanwhile: str) -> None:
+    """It was cancelled, or a service that was taken for dead comes to its end after all; nothing of it comes into force."""
     post(database, 0.0)
     begun(database, "d1")
     before = stored(database)
     with database.writing() as connection:
-        diagnoses.fail_all(connection, AT, "the service was restarted")
+        assert jobs.claim(connection, "one", lease=-1.0, at=AT) is not None
+        if meanwhile == "cancelled":
+            assert jobs.end(connection, "d1", jobs.CANCELLED, AT)
+        else:
+            assert jobs.claim(connection, "two", lease=60.0, at=AT) is not None
     ended = {"report": REPORT, "extension": EXTENSION}
-    assert not finish_and_adopt(database, "c1", "d1", ended, life="", at=AT)
+    assert not finish_and_adopt(database, "c1", "d1", ended, at=AT, claimer="one")
     with database.reading() as connection:
         assert assumptions.current_adoption(connection, "c1") is None
         assert clutches.revision(connection, "c1") == 1

@@ -7,8 +7,9 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.web.auth import SCOPES, Scope
-from storage import keys
-from tests.service.web.routes.granting import context_of, granted
+from storage import jobs, keys
+from storage.jobs import NewJob
+from tests.service.web.routes.granting import AT, context_of, granted
 from tests.service.web.routes.routes_of import routes_of
 from tests.support import stationary
 
@@ -22,7 +23,13 @@ OPEN = [
     )
 ]  # fmt: skip
 #: Routes that name no clutch and keep to those of the key.
-NARROWED: dict[tuple[str, str], Scope] = {("GET", "/v1/clutches"): "read", ("POST", "/v1/clutches"): "ingest"}
+NARROWED: dict[tuple[str, str], Scope] = {
+    ("GET", "/v1/clutches"): "read",
+    ("POST", "/v1/clutches"): "ingest",
+    ("GET", "/v1/jobs"): "read",
+    ("GET", "/v1/jobs/{job_id}"): "read",
+    ("DELETE", "/v1/jobs/{job_id}"): "admin",
+}
 #: Routes that are of all clutches together: a key that is bound to some has no place there.
 OF_ALL: dict[tuple[str, str], Scope] = {
     ("GET", path): "read"
@@ -134,3 +141,23 @@ def test_an_ingest_key_has_a_diagnosis_made_and_not_adopted(client: TestClient) 
     adopted = client.post("/v1/clutches/c1/diagnoses", json={"adopt": True}, headers=headers)
     assert (adopted.status_code, "admin" in adopted.json()["detail"]) == (403, True)
     assert client.get("/v1/clutches/c1/diagnoses", headers=headers).json()["items"] == []
+
+
+def test_a_key_bound_to_one_clutch_sees_and_cancels_jobs_of_that_alone(client: TestClient) -> None:
+    client.post("/v1/clutches", json={"clutch_id": "c2"})
+    with context_of(client).database.writing() as connection:
+        for clutch_id in ("c1", "c2", None):
+            job = NewJob(
+                job_id=f"j-{clutch_id}", kind=jobs.DIAGNOSIS, clutch_id=clutch_id, asked_at=AT, asked_by="local",
+                arguments={"last_run_key": 0, "adopt_by": None, "request": ""},
+            )  # fmt: skip
+            jobs.insert(connection, job)
+            jobs.end(connection, job.job_id, jobs.FINISHED, AT)
+    bound = granted(client, "admin", clutches=["c2"])
+    assert [item["job_id"] for item in client.get("/v1/jobs", headers=bound).json()["items"]] == ["j-c2"]
+    for method in ("GET", "DELETE"):
+        statuses = [
+            client.request(method, f"/v1/jobs/j-{name}", headers=bound).status_code for name in ("c1", "c2", None)
+        ]
+        assert statuses == [404, 200, 404]
+    assert len(client.get("/v1/jobs", headers=granted(client, "read")).json()["items"]) == 3

@@ -20,7 +20,7 @@ MISSING = "PostgreSQL is not installed: on Debian and Ubuntu, apt install postgr
 #: PostgreSQL refuses to run as root: then it is that of one of these users.
 ORDINARY = ("postgres", "nobody")
 #: What is lost without these two is what a power cut takes; tests cut no power.
-SETTINGS = {"fsync": "off", "full_page_writes": "off", "listen_addresses": "", "max_connections": "60"}
+SETTINGS = {"fsync": "off", "full_page_writes": "off", "listen_addresses": "", "max_connections": "200"}
 TEMPLATE = "template_of_tests"
 
 
@@ -38,12 +38,13 @@ def programs() -> Path | None:
 class PostgresServer:
     """A server; `start` and `stop` it, `kill` it as a crash would."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, **settings: str) -> None:
         place = programs()
         if place is None:
             pytest.skip(MISSING)
         self.programs = place
         self.folder = folder
+        self.settings = SETTINGS | settings
         self.process: subprocess.Popen[bytes] | None = None
         self.user = "postgres"
         self._identity = {}
@@ -58,7 +59,7 @@ class PostgresServer:
 
     def start(self) -> None:
         """Start and wait until it answers."""
-        settings = [part for name, value in SETTINGS.items() for part in ("-c", f"{name}={value}")]
+        settings = [part for name, value in self.settings.items() for part in ("-c", f"{name}={value}")]
         command = [self.programs / "postgres", "-D", self.folder / "data", "-k", self.folder, *settings]
         with (self.folder / "log").open("ab") as log:
             self.process = subprocess.Popen(command, stdout=log, stderr=log, cwd=self.folder, **self._identity)
@@ -115,11 +116,14 @@ class PostgresServer:
 
 
 @contextmanager
-def postgresql_server() -> Iterator[PostgresServer]:
-    """A running server, stopped and removed at the end. Skips the test where PostgreSQL is not installed."""
+def postgresql_server(**settings: str) -> Iterator[PostgresServer]:
+    """A running server, with other settings than the tests' where they are given, stopped and removed at the end.
+
+    Skips the test where PostgreSQL is not installed.
+    """
     folder = Path(mkdtemp(prefix="pg-"))  # the path of a socket must be short
     try:
-        server = PostgresServer(folder)
+        server = PostgresServer(folder, **settings)
         server.start()
         try:
             server.make_template()

@@ -12,6 +12,7 @@ from sqlalchemy.exc import ProgrammingError
 from storage import changes, clutches, runs
 from storage.engine.database import Database
 from storage.engine.errors import (
+    DatabaseBusy,
     DatabaseTooNew,
     DatabaseTooOld,
     ServiceRuns,
@@ -19,7 +20,7 @@ from storage.engine.errors import (
     UnstorableText,
 )
 from storage.engine.integrity import other_schema
-from storage.engine.opening import database_exists, find_database, open_database, service_lock
+from storage.engine.opening import database_exists, find_database, open_database
 from storage.migrations.upgrade import current, head
 from tests.storage.engine.postgresql.server import PostgresServer, postgresql_server
 from tests.storage.samples import clutch_row, store_run
@@ -81,9 +82,27 @@ def test_a_newer_release_s_database_is_refused(database: Database) -> None:
 
 
 def test_a_database_of_an_earlier_revision_is_not_migrated_under_a_service(database: Database) -> None:
-    set_revision(database, "s0006_key_bounds")
-    with service_lock(database.url), pytest.raises(ServiceRuns, match="a service uses"):
-        open_database(database.url)
+    """Services that run hold it up; once they have ended, several that start at once wait for the one that migrates."""
+    services = [open_database(database.url, serving=True) for _ in range(2)]
+    with database.writing() as connection:
+        connection.exec_driver_sql("DROP TABLE job")
+    set_revision(database, "s0007_inspections")
+    for service in services:
+        with pytest.raises(ServiceRuns, match="a service uses"):
+            open_database(database.url, lock_timeout=0.1)
+        service.close()
+    together = threading.Barrier(3)
+
+    def start() -> Database:
+        together.wait()
+        return open_database(database.url, serving=True)
+
+    with ThreadPoolExecutor(3) as pool, ExitStack() as stack:
+        for each in [pool.submit(start) for _ in range(3)]:
+            stack.enter_context(closing(each.result()))
+        with database.reading() as connection:
+            assert current(connection) == head()
+            assert other_schema(connection) == []
 
 
 def test_what_came_with_a_later_revision_is_not_found(database: Database) -> None:
@@ -99,16 +118,45 @@ def test_what_came_with_a_later_revision_is_not_found(database: Database) -> Non
             clutches.insert(connection, clutch_row())
 
 
-def test_one_service_of_a_database_at_a_time(database: Database, postgresql: PostgresServer) -> None:
-    other = postgresql.fresh()
-    with service_lock(database.url), service_lock(other):
-        with pytest.raises(ServiceRuns, match="stop it first"), service_lock(database.url):
-            pytest.fail("two services at once")
-        with database.writing() as connection:  # commands beside it
-            clutches.insert(connection, clutch_row())
-    with service_lock(database.url):
-        pass
-    postgresql.drop(other)
+def test_writers_of_one_clutch_wait_for_each_other_and_those_of_others_do_not(database: Database) -> None:
+    with closing(open_database(database.url, lock_timeout=0.1)) as impatient:
+        with database.writing(of="a"):
+            with impatient.writing(of="b") as connection:
+                clutches.insert(connection, clutch_row("b"))
+            for of in ("a", None):
+                with pytest.raises(DatabaseBusy), impatient.writing(of=of):
+                    pytest.fail("two writers of the same at once")
+        with database.writing(), pytest.raises(DatabaseBusy), impatient.writing(of="a"):
+            pytest.fail("beside one who writes of all")
+        with impatient.reading() as connection:
+            assert clutches.all_ids(connection) == ["b"]
+
+
+def test_who_reads_a_number_of_commits_sees_all_that_was_committed_up_to_it(database: Database) -> None:
+    """Four threads commit at once, of a clutch each; after a number was read, so many commits are there or more."""
+    names = ("a", "b", "c", "d")
+    with database.writing() as connection:
+        for name in names:
+            clutches.insert(connection, clutch_row(name))
+    first = database.watch.version()
+
+    def write(name: str) -> None:
+        for _ in range(40):
+            with database.writing(of=name) as connection:
+                clutches.bump_revision(connection, name)
+
+    seen = []
+    with ThreadPoolExecutor(4) as pool:
+        writing = [pool.submit(write, name) for name in names]
+        while not all(each.done() for each in writing):
+            number = database.watch.version()
+            with database.reading() as connection:
+                seen.append((number - first, sum(clutches.revision(connection, name) or 0 for name in names)))
+        for each in writing:
+            each.result()
+    assert all(committed >= number for number, committed in seen)
+    assert len({number for number, _ in seen}) > 10, "it was read while they wrote"
+    assert database.watch.version() == first + 160
 
 
 def test_a_database_that_is_not_in_utf8_is_refused(postgresql: PostgresServer) -> None:

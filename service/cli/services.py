@@ -1,0 +1,62 @@
+"""The application of one service, made ready to answer; and several services at one port, each in a process of its own."""
+
+import gc
+import multiprocessing
+import os
+import signal
+import threading
+from typing import Any
+
+import uvicorn
+from fastapi import FastAPI
+from threadpoolctl import threadpool_limits
+from uvicorn.config import STARTUP_FAILURE
+from uvicorn.supervisors import Multiprocess
+
+from service.app import create_app
+from service.logging import configure
+from service.settings import PREFIX, Settings
+
+#: [s] After which a process that does not answer its parent is taken for hung, and replaced. Chosen: one that starts loads
+#: the libraries first, beside all others on a busy machine.
+_HUNG_SECONDS = 60
+
+
+def prepared(settings: Settings) -> FastAPI:
+    """The application; from now on this process does nothing but serve it."""
+    # the arrays are small: BLAS threads that wait for each other cost more than they gain
+    threadpool_limits(limits=1, user_api="blas")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    app = create_app(settings)
+    # loaded modules stay: the collector's walk through all of them would delay an answer by a tenth of a second
+    gc.collect()
+    gc.freeze()
+    return app
+
+
+def serve_several(settings: Settings, processes: int, options: dict[str, Any]) -> bool:
+    """Serve in so many processes, which share the port; one that ends is replaced. Whether all could start."""
+    for name, value in settings.model_dump().items():
+        os.environ[f"{PREFIX}{name.upper()}"] = str(value)
+    application = f"{__name__}:{one_of_several.__name__}"
+    config = uvicorn.Config(
+        application, factory=True, workers=processes, timeout_worker_healthcheck=_HUNG_SECONDS, **options
+    )
+    supervisor = Multiprocess(config, [config.bind_socket()])
+    supervisor.run()
+    return all(process.exitcode != STARTUP_FAILURE for process in supervisor.processes)
+
+
+def one_of_several() -> FastAPI:
+    """The application in one of the processes, which end with their parent however that ends."""
+    settings = Settings.from_environment()
+    configure(settings.log_format, settings.log_level)
+    threading.Thread(target=_end_with_the_parent, daemon=True).start()
+    return prepared(settings)
+
+
+def _end_with_the_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os.kill(os.getpid(), signal.SIGTERM)

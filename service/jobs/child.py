@@ -1,0 +1,110 @@
+"""The process of one diagnosis as the service sees it: started, watched, ended where it takes too long, and read."""
+
+import json
+import logging
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import IO, Any
+
+from service.settings import DATABASE_VARIABLE, Settings
+from storage.encoding.json_text import Json
+
+#: Of what a diagnosis' process said, so many bytes are logged: its last ones hold the traceback.
+_TAIL = 8000
+#: Seconds by the clock that a diagnosis may take for each second of processor time that it may: it runs on idle processors
+#: only, beside a full load for many times as long as alone. Chosen; no table. It ends a diagnosis that waits for ever.
+CLOCK_PER_PROCESSOR_SECOND = 6.0
+#: Memory that arrays gave back is kept for the next ones: having it mapped anew each time takes as long as what is
+#: computed in it.
+_MEMORY = {
+    "MALLOC_MMAP_THRESHOLD_": str(32 << 20),
+    "MALLOC_TRIM_THRESHOLD_": str(1 << 30),
+}
+#: With this begins a line that says how far the diagnosis has come, JSON; its last line is the answer.
+PROGRESS = b"progress "
+_log = logging.getLogger("clutchlife")
+
+
+class FailedError(Exception):
+    """The diagnosis has no report; the message says why to the one who asked."""
+
+
+class Child:
+    """A running process. Made by `running`."""
+
+    def __init__(
+        self, process: "subprocess.Popen[bytes]", answer: IO[bytes], errors: IO[bytes], settings: Settings
+    ) -> None:
+        self._process, self._answer, self._errors, self._settings = process, answer, errors, settings
+        self._longest = settings.diagnosis_seconds * CLOCK_PER_PROCESSOR_SECOND
+        self._deadline = time.monotonic() + self._longest
+
+    def ends_within(self, seconds: float) -> bool:
+        """Wait for its end, at most so long. Raises FailedError where it has taken too long by the clock."""
+        try:
+            self._process.wait(timeout=max(0.0, min(seconds, self._deadline - time.monotonic())))
+        except subprocess.TimeoutExpired:
+            if time.monotonic() < self._deadline:
+                return False
+            raise FailedError(f"it took longer than {self._longest:g} s by the clock") from None
+        return True
+
+    def progress(self) -> Json | None:
+        """How far it says it has come; None where it has not said so yet."""
+        steps = [line for line in self._lines() if line.startswith(PROGRESS)]
+        return json.loads(steps[-1].removeprefix(PROGRESS)) if steps else None
+
+    def written(self, name: str) -> dict[str, Any]:
+        """What it wrote at its end. Raises FailedError; what it complained of is logged under its `name`."""
+        code = self._process.returncode
+        if code == -signal.SIGXCPU:
+            raise FailedError(f"it took longer than {self._settings.diagnosis_seconds} s of processor time")
+        self._errors.seek(max(0, self._errors.seek(0, os.SEEK_END) - _TAIL))
+        output = self._errors.read().decode(errors="replace")
+        if output:
+            level = logging.ERROR if code else logging.WARNING
+            _log.log(level, "diagnosis %s: %s", name, output)
+        if code != 0:
+            raise FailedError(f"its process ended with {_ending(code)}: see the log")
+        written: dict[str, Any] = json.loads(self._lines()[-1])
+        return written
+
+    def _lines(self) -> list[bytes]:
+        """The whole lines that it has written so far: it alone moves the place in the file."""
+        size = os.fstat(self._answer.fileno()).st_size
+        return os.pread(self._answer.fileno(), size, 0).split(b"\n")[:-1]
+
+
+@contextmanager
+def running(task: Mapping[str, Any], database_url: str, settings: Settings) -> Iterator[Child]:
+    """A process that makes a diagnosis; killed at the end where it runs still."""
+    modules = "service.background", "service.jobs.diagnosis"
+    # warnings of numerics are logged, those of libraries to their authors are not
+    warned = "-W", "ignore", "-W", "default::RuntimeWarning"
+    command = [sys.executable, "-P", *warned, "-m", *modules, json.dumps(task)]
+    environment = os.environ | _MEMORY | {DATABASE_VARIABLE: database_url}  # not an argument: others see those
+    with tempfile.TemporaryFile() as answer, tempfile.TemporaryFile() as errors:
+        # it ends when its standard input does, which is when this process does, however that comes
+        process = subprocess.Popen(  # noqa: S603  (our own interpreter and module)
+            command, stdin=subprocess.PIPE, stdout=answer, stderr=errors, env=environment
+        )
+        try:
+            yield Child(process, answer, errors, settings)
+        finally:
+            process.kill()
+            process.wait()
+            if process.stdin is not None:
+                process.stdin.close()
+
+
+def _ending(code: int) -> str:
+    try:
+        return signal.Signals(-code).name if code < 0 else f"status {code}"
+    except ValueError:
+        return f"signal {-code}"

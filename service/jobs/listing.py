@@ -1,0 +1,41 @@
+"""`/v1/jobs`: what waits, runs and has ended, as it is answered."""
+
+from collections.abc import Collection
+from typing import Any
+
+from service.errors import NotFoundError
+from service.lists import Place
+from storage import jobs
+from storage.engine.database import Database
+from storage.jobs import JobRow
+
+#: What an answer shows of a row.
+_SHOWN = (
+    "job_id", "kind", "clutch_id", "state", "asked_at", "asked_by", "started_at", "finished_at", "attempts", "progress",
+    "problem",
+)  # fmt: skip
+
+
+def find(database: Database, job_id: str, *, only: Collection[str] | None) -> JobRow:
+    """The job, of one of `only` these clutches. Raises NotFoundError, too where it is another's."""
+    with database.reading() as connection:
+        row = jobs.get(connection, job_id)
+    if row is None or (only is not None and row.clutch_id not in only):
+        raise NotFoundError(f"no job is known as {job_id!r}")
+    return row
+
+
+def page(
+    database: Database, *, limit: int, after: Place | None, state: str | None, only: Collection[str] | None
+) -> tuple[list[dict[str, Any]], Place | None]:
+    """Jobs in that state, of `only` these clutches, newest first, and where the next page starts."""
+    before = None if after is None else after[0]
+    with database.reading() as connection:
+        rows = jobs.page(connection, limit=limit + 1, before=before, state=state, only=only)
+    following = (float(rows[limit - 1].job_key), "") if len(rows) > limit else None
+    return [shown(row) for row in rows[:limit]], following
+
+
+def shown(row: JobRow) -> dict[str, Any]:
+    """A job as it is answered."""
+    return {name: getattr(row, name) for name in _SHOWN}

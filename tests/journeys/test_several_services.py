@@ -1,0 +1,172 @@
+"""Several services on one PostgreSQL database answer as one: what one has taken in the others show at once."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from itertools import cycle
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+
+from tests.service.web.test_stopping import family
+from tests.service.workflows import stand_in_engine
+from tests.storage.engine.postgresql.server import PostgresServer
+from tests.support import ONCE, Server, clutchlife, free_port, serving, stationary, wait_until_ready
+
+ENVIRONMENT = {"CLUTCHLIFE_ENGINE": f"{stand_in_engine.__name__}:diagnose"}
+CLUTCH = "/v1/clutches/c1"
+READ = (
+    "/v1/clutches", CLUTCH, *(f"{CLUTCH}/{name}" for name in (
+        "runs", "remaining-useful-life", "series", "changes", "diagnoses", "model",
+    )), "/v1/jobs", "/v1/fleet/priors",
+)  # fmt: skip
+#: What takes a second.
+LONG = tuple(f"{CLUTCH}/{name}" for name in ("remaining-useful-life?method=grid", "degradation", "stribeck", "scores"))
+
+
+@pytest.fixture
+def address(postgresql: PostgresServer) -> Iterator[str]:
+    url = postgresql.fresh()
+    yield url
+    postgresql.drop(url)
+
+
+@pytest.fixture
+def servers(address: str) -> Iterator[list[Server]]:
+    with ExitStack() as stack:
+        yield [stack.enter_context(serving(address, loaded=True, environment=ENVIRONMENT)) for _ in range(2)]
+
+
+def seen(server: Server, paths: Sequence[str] = READ) -> dict[str, Any]:
+    """Every answer, with its entity tag and revision."""
+    answers = {}
+    with httpx2.Client(base_url=server.url, timeout=120) as http:
+        for path in paths:
+            answer = http.get(path)
+            assert answer.status_code == 200, answer.text
+            answers[path] = (answer.headers["etag"], answer.headers.get("clutchlife-revision"), answer.json())
+    return answers
+
+
+def test_what_one_has_taken_in_each_other_shows_at_once(servers: list[Server]) -> None:
+    """Every change goes to the next of the two, and the answers of both are alike right behind it."""
+    with ExitStack() as stack:
+        clients = [stack.enter_context(httpx2.Client(base_url=each.url, timeout=120)) for each in servers]
+        turns = cycle(clients)
+        changes: list[tuple[str, str, Any]] = [("POST", "/v1/clutches", {"clutch_id": "c1"})]
+        changes += [
+            ("POST", f"{CLUTCH}/runs", stationary(cycles, run_id=f"r{cycles}", pressures=(4.0, 6.0)))
+            for cycles in (0, 1000, 2000, 1500)
+        ]
+        changes += [
+            ("POST", f"{CLUTCH}/runs/r1500/withdraw", {"reason": "twice"}),
+            ("PATCH", CLUTCH, {"reason": "typed", "fluid": "other"}),
+        ]
+        for method, path, body in changes:
+            http = next(turns)
+            http.request(method, path, json=body).raise_for_status()
+            answers = [seen(server) for server in servers]
+            assert answers[0] == answers[1]
+        assert len(answers[0][f"{CLUTCH}/runs"][2]["items"]) == 4
+        wait = {"Prefer": "wait=120"}
+        diagnosed = clients[0].post(f"{CLUTCH}/diagnoses", json={"adopt": False}, headers=wait).json()
+        assert (diagnosed["status"], diagnosed["verdict"]) == ("finished", "cause_named")
+        answers = [seen(server, READ + LONG) for server in servers]
+        assert answers[0] == answers[1]
+        assert [job["state"] for job in answers[1]["/v1/jobs"][2]["items"]] == ["finished"]
+
+
+def test_the_same_run_sent_to_all_at_once_is_one_run(servers: list[Server]) -> None:
+    ONCE.post(f"{servers[0].url}/v1/clutches", json={"clutch_id": "c1"}).raise_for_status()
+    sent = stationary(0, run_id="r0")
+    with ThreadPoolExecutor(6) as pool:
+        asked = [pool.submit(ONCE.post, f"{server.url}{CLUTCH}/runs", json=sent) for server in servers * 3]
+        statuses = sorted(each.result().status_code for each in asked)
+    assert statuses == [200] * 5 + [201]
+    assert [len(ONCE.get(f"{server.url}{CLUTCH}/runs").json()["items"]) for server in servers] == [1] * 2
+
+
+def test_a_job_that_one_has_another_cancels(address: str, tmp_path: Path) -> None:
+    environment = {
+        "CLUTCHLIFE_ENGINE": f"{stand_in_engine.__name__}:endless",
+        "CLUTCHLIFE_JOB_LEASE_SECONDS": "2",
+        "STAND_IN_PID": str(tmp_path / "pid"),
+    }
+    with ExitStack() as stack:
+        one, other = (stack.enter_context(serving(address, loaded=True, environment=environment)) for _ in range(2))
+        ONCE.post(f"{one.url}/v1/clutches", json={"clutch_id": "c1"}).raise_for_status()
+        asked = ONCE.post(f"{one.url}{CLUTCH}/diagnoses", json={}, headers={"Prefer": "wait=0"}).json()["diagnosis_id"]
+        deadline = time.monotonic() + 60
+        while not (tmp_path / "pid").exists() or not (tmp_path / "pid").read_text():
+            assert time.monotonic() < deadline, "it does not begin"
+            time.sleep(0.05)
+        process = (tmp_path / "pid").read_text()
+        for server in (one, other):
+            assert ONCE.delete(f"{server.url}/v1/jobs/{asked}").json()["state"] == "cancelled"
+        while Path("/proc", process).exists():
+            assert time.monotonic() < deadline, "its process goes on"
+            time.sleep(0.05)
+        assert ONCE.get(f"{other.url}{CLUTCH}/diagnoses/{asked}").json()["problem"] == "cancelled by local"
+
+
+def test_a_key_that_is_made_or_revoked_counts_everywhere(servers: list[Server], address: str) -> None:
+    key = clutchlife("key", "create", "--scope", "read", "--database", address).strip()
+    headers = {"Authorization": f"Bearer {key}"}
+
+    def statuses() -> list[list[int]]:
+        return [
+            [ONCE.get(f"{server.url}/v1/clutches", headers=each).status_code for each in ({}, headers)]
+            for server in servers
+        ]
+
+    assert statuses() == [[401, 200]] * 2
+    clutchlife("key", "revoke", key.split("_")[1], "--database", address)
+    assert statuses() == [[401, 401]] * 2
+
+
+def test_processes_behind_one_port_need_a_server(tmp_path: Path) -> None:
+    database = f"sqlite:///{tmp_path}/a.db"
+    said = clutchlife("serve", "--processes", "2", "--port", "0", "--database", database, code=64)
+    assert "--processes 2 needs a database on a PostgreSQL server" in said
+
+
+@pytest.mark.slow  # each process loads all libraries by itself
+def test_processes_behind_one_port_answer_are_replaced_and_stop(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CLUTCHLIFE_WORKERS", "0")
+    port = free_port()
+    command = [sys.executable, "-m", "service.cli.main", "serve", "--processes", "2", "--port", str(port)]
+    service = subprocess.Popen([*command, "--database", address, "--log-level", "warning"])
+    url = f"http://127.0.0.1:{port}"
+    try:
+        wait_until_ready(url, lambda: service.poll() is not None)
+        ONCE.post(f"{url}/v1/clutches", json={"clutch_id": "c1"}).raise_for_status()
+        for cycles in range(0, 5000, 500):
+            ONCE.post(f"{url}{CLUTCH}/runs", json=stationary(cycles)).raise_for_status()
+            assert len(ONCE.get(f"{url}{CLUTCH}/runs").json()["items"]) == cycles // 500 + 1
+        killed = answering(service.pid).pop()
+        os.kill(killed, signal.SIGKILL)
+        answering(service.pid, killed)
+        wait_until_ready(url, lambda: service.poll() is not None)
+        assert len(ONCE.get(f"{url}{CLUTCH}/runs").json()["items"]) == 10
+        service.send_signal(signal.SIGTERM)
+        assert service.wait(60) == 0
+    finally:
+        service.kill()
+
+
+def answering(parent: int, but: int = 0) -> set[int]:
+    """The two processes that serve, once there are two other ones than `but`."""
+    deadline = time.monotonic() + 60
+    while True:
+        found = {pid for pid in family(parent) if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()} - {but}
+        if len(found) == 2:
+            return found
+        assert time.monotonic() < deadline, found
+        time.sleep(0.1)
