@@ -51,18 +51,21 @@ def serve(
             start.warning(line)
         host = _allowed(host, settings)
     from service.app import create_app  # start-up time
+    from service.connections import allow_many, bounded  # start-up time
 
     # the arrays are small: BLAS threads that wait for each other cost more than they gain
     threadpool_limits(limits=1, user_api="blas")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     app = create_app(settings)
     # loaded modules stay: the collector's walk through all of them would delay an answer by a tenth of a second
+    allow_many()
     gc.collect()
     gc.freeze()
     uvicorn.run(
         app,
         host=host,
         port=port,
+        http=bounded(settings.connections_at_once),
         log_config=None,
         log_level=settings.log_level,
         access_log=False,
