@@ -1,5 +1,6 @@
 """The OWASP API Security Top 10 of 2023, a test each: what an attacker would see first, and where the rest is tested."""
 
+import csv
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -172,6 +173,19 @@ def test_api10_what_others_answer_or_send_is_not_trusted() -> None:
         assert not client.follow_redirects
     moved = httpx2.Response(307, headers={"Location": "http://elsewhere.test/v1/clutches"})
     assert "elsewhere.test" in str(passing(moved, None))
+
+
+@pytest.mark.parametrize("note", ["=1+1", "@SUM(A1)", "+1", "-1+cmd", "as new"])
+def test_api10_a_note_is_no_formula_in_a_spreadsheet(client: TestClient, note: str) -> None:
+    """A rig's key must not have an engineer's spreadsheet compute, or ask, what it likes."""
+    sent = {"cycles": 0, "note": note, "roughness_um": 2.5, "skewness": -3.5}
+    assert client.post(f"{CLUTCHES}/c1/inspections", json=sent, headers=granted(client, "ingest")).status_code == 201
+    headers = granted(client, "read")
+    (row,) = csv.DictReader(client.get(f"{CLUTCHES}/c1/inspections.csv", headers=headers).text.splitlines())
+    assert row["note"] == (note if note == "as new" else f"'{note}")
+    assert row["skewness"] == "-3.5", "numbers stay numbers"
+    (item,) = client.get(f"{CLUTCHES}/c1/inspections", headers=headers).json()["items"]
+    assert item["note"] == note
 
 
 def test_all_ten_are_there() -> None:
