@@ -57,6 +57,12 @@ class Settings(BaseSettings):
         description="how often one key may ask, or one address without a key; two seconds' worth may be saved up; then 429",
     )
     requests_at_once: int = Field(default=128, ge=1, description="how many of its requests may be on their way at once")
+    # twice the requests of one caller at once; four such addresses fit in the 1,024 files that a system gives a process
+    connections_at_once: int = Field(
+        default=256,
+        ge=1,
+        description="how many connections one address may have open; further ones are answered 429 and closed",
+    )
     # docs/benchmarks.md: the longest diagnosis takes 11 s
     diagnosis_seconds: int = Field(
         default=300,

@@ -2,13 +2,14 @@
 
 import typer
 
-from service.cli import diagnose, export, fleet, inspections, key, model, score, serve, simulate
+from service.cli import diagnose, export, fleet, inspections, key, model, score, simulate
 from service.cli.answers import degradation, engagement, life, loops
 from service.cli.changes import clutch_changes, run_changes, trail
 from service.cli.changes import runs as run_list
 from service.cli.database import backup, replay, restore, verify
 from service.cli.demo import demo
 from service.cli.sending import push, spool_commands
+from service.cli.serving import serve
 
 app = typer.Typer(
     name="clutchlife",

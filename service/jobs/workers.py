@@ -1,7 +1,8 @@
 """Work outside the process that answers: calls of `function(database, ...)` in lanes of worker processes.
 
 A lane holds what may take equally long, so that a file of a million samples or an answer that takes seconds delays nothing
-that is quick. Calls that change the same clutch take turns, since one would be computed in vain.
+that is quick. Calls that change the same clutch take turns, since one would be computed in vain; so do a caller's answers,
+since who asks for many would hold up all others.
 The same calls can run in threads of the process itself (`in_threads`); both give the same.
 """
 

@@ -1,8 +1,9 @@
 """What the reading process may reach: the code that reads, the one file that is read, a folder of its own, and no network.
 
 Two means of Linux that need no privilege. Landlock: only files below the named paths can be opened, and no TCP port reached.
-Seccomp: no sockets, no further processes or programs, no looking into other processes. Where a system has neither, limits on
-memory, time and files are all that holds; `missing` says so.
+Seccomp: no sockets, no further processes or programs, no looking into other processes, no signal or limit for them, and no
+modes, owners or times of files, which Landlock leaves open. Where a system has neither, limits on memory, time and files are
+all that holds; `missing` says so.
 
 Source: https://docs.kernel.org/userspace-api/landlock.html, https://docs.kernel.org/userspace-api/seccomp_filter.html.
 """
@@ -34,18 +35,32 @@ _LOAD, _EQUAL, _AT_LEAST, _ANY_BIT, _RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
 _NUMBER_AT, _ARCHITECTURE_AT, _FIRST_ARGUMENT_AT = 0, 4, 16
 _CLONE_THREAD = 0x10000
 _OTHER_ABI = 0x40000000
-#: By architecture: its number, those of seccomp, clone and clone3, and of the calls that are refused: sockets, programs,
-#: processes, other processes' memory, namespaces and mounts, kernel facilities that pass by these rules.
+#: By architecture: its number, those of seccomp, clone and clone3; of the calls that a process may make for itself alone: a
+#: signal to a thread, limits, processors; and of the calls that are refused.
 _ARCHITECTURES = {
     "x86_64": (
-        0xC000003E, 317, 56, 435,
-        (41, 42, 43, 44, 49, 50, 53, 288, 57, 58, 59, 322, 62, 101, 310, 311, 434, 438, 272, 308, 165, 166, 155, 161, 304,
-         321, 298, 323, 425, 248, 249, 250),
+        0xC000003E, 317, 56, 435, (234, 302, 203),
+        (
+            41, 42, 43, 44, 49, 50, 53, 288, 57, 58, 59, 322,  # sockets; processes and programs
+            62, 200, 129, 297, 424, 101, 310, 311, 434, 438, 312, 440, 448, 256, 279,  # other processes: signals, memory
+            141, 142, 144, 314, 251,  # and how they are scheduled
+            90, 91, 268, 452, 92, 93, 94, 260, 132, 235, 261, 280, 188, 189, 190, 197, 198, 199, 463, 466,  # modes, owners
+            29, 64, 68, 240,  # memory and queues that outlive it
+            272, 308, 165, 166, 155, 161, 304,  # namespaces and mounts
+            321, 298, 323, 425, 248, 249, 250,  # kernel facilities that pass by these rules
+        ),
     ),
     "aarch64": (
-        0xC00000B7, 277, 220, 435,
-        (198, 203, 202, 206, 200, 201, 199, 242, 221, 281, 129, 117, 270, 271, 434, 438, 97, 268, 40, 39, 41, 51, 265, 280,
-         241, 282, 425, 217, 218, 219),
+        0xC00000B7, 277, 220, 435, (131, 261, 122),
+        (
+            198, 203, 202, 206, 200, 201, 199, 242, 221, 281,
+            129, 130, 138, 240, 424, 117, 270, 271, 434, 438, 272, 440, 448, 238, 239,
+            140, 118, 119, 274, 30,
+            52, 53, 452, 54, 55, 88, 5, 6, 7, 14, 15, 16, 463, 466,
+            194, 190, 186, 180,
+            97, 268, 40, 39, 41, 51, 265,
+            280, 241, 282, 425, 217, 218, 219,
+        ),
     ),
 }  # fmt: skip
 #: What the libraries look at of the system.
@@ -98,13 +113,14 @@ def close_files(*, readable: Sequence[Path], writable: Sequence[Path]) -> None:
 
 
 def close_network_and_processes() -> None:
-    """From now on no thread of this process can open a socket, start a process or look into another.
+    """From now on no thread of this process can open a socket, start a process, or look into another or end it, nor change
+    who may read a file.
 
     Does nothing where the system has no seccomp.
     """
     if not _has_seccomp():
         return
-    architecture, seccomp, clone, clone3, refused = _ARCHITECTURES[platform.machine()]
+    architecture, seccomp, clone, clone3, own, refused = _ARCHITECTURES[platform.machine()]
 
     def refuse(number: int, code: int = errno.EPERM) -> list[bytes]:
         return [_line(_EQUAL, number, 0, 1), _line(_RETURN, _REFUSE | code)]
@@ -114,6 +130,10 @@ def close_network_and_processes() -> None:
     lines += refuse(clone3, errno.ENOSYS)  # the C library then takes clone, whose flags can be seen here
     for number in refused:
         lines += refuse(number)
+    # a signal names the own process by its number, the others call it 0
+    for number, itself in zip(own, (os.getpid(), 0, 0), strict=True):
+        lines += [_line(_EQUAL, number, 0, 4), _line(_LOAD, _FIRST_ARGUMENT_AT), _line(_EQUAL, itself, 0, 1)]
+        lines += [_line(_RETURN, _ALLOW), _line(_RETURN, _REFUSE | errno.EPERM)]
     lines += [_line(_EQUAL, clone, 0, 3), _line(_LOAD, _FIRST_ARGUMENT_AT), _line(_ANY_BIT, _CLONE_THREAD, 1, 0)]
     lines += [_line(_RETURN, _REFUSE | errno.EPERM), _line(_RETURN, _ALLOW)]
     text = ctypes.create_string_buffer(b"".join(lines))

@@ -23,6 +23,7 @@ from service.errors import NotFoundError, UnsupportedMediaTypeError
 from service.jobs.workers import Lane
 from service.lists import ALL_ITEMS, from_cursor, sliced
 from service.queries.cache import Answer, Page, revision_and_json, to_json
+from service.web.auth import name_of_caller
 from service.web.context import Context
 from service.web.files import PARQUET_TYPE
 from service.web.limits import LEAST_PACKED_BYTES, LONGEST_WAIT_SECONDS, PACKING_LEVEL
@@ -115,7 +116,7 @@ async def computed_answer(
     its items where one was asked for. `prefer` is what the sender prefers. Raises NotFoundError.
     """
     after = from_cursor(cursor)
-    revision, whole = await _computed(context, clutch_id, query, arguments, prefer, lane)
+    revision, whole = await _computed(request, context, clutch_id, query, arguments, prefer, lane)
     if limit == ALL_ITEMS and after is None:
         remember(request, _computed_again(context, clutch_id, query, arguments))
         return tagged(request, whole, JSON_TYPE, revision)
@@ -142,7 +143,7 @@ async def computed_table(
 ) -> Response:
     """The CSV export of the same: a page of the `rows` of its JSON, which may be a page itself. Raises NotFoundError."""
     after = from_cursor(cursor)
-    revision, whole = await _computed(context, clutch_id, query, arguments, prefer)
+    revision, whole = await _computed(request, context, clutch_id, query, arguments, prefer)
 
     def one_page() -> Page:
         items, following = sliced_rows(rows(json.loads(whole.body)), limit, after)
@@ -154,6 +155,7 @@ async def computed_table(
 
 
 async def _computed(
+    request: Request,
     context: Context,
     clutch_id: str,
     query: Callable[..., dict[str, Any]],
@@ -166,7 +168,9 @@ async def _computed(
 
     def compute(waited_for: bool) -> "Future[Made]":
         among = lane if waited_for or lane is not Lane.ANSWERS else Lane.RENEWALS
-        return context.workers.submit(among, revision_and_json, query, clutch_id, arguments)
+        # callers take turns: who asks for a hundred answers has them made beside those of others, not before them
+        turn = f"{among.name} for {name_of_caller(request)}"
+        return context.workers.submit(among, revision_and_json, query, clutch_id, arguments, turn=turn)
 
     key = (clutch_id, _name(query), *arguments)
     return await context.revalidation.answer(key, _revision(context, clutch_id), compute, wait=wait)

@@ -28,14 +28,16 @@ SCOPES: tuple[Scope, ...] = get_args(Scope)
 UNMATCHED = "unmatched"
 #: The caller's name where no keys are configured.
 LOCAL = "local"
-#: Headers by which proxies say that a request is another's; all that begin with the prefix, too.
-_OF_PROXIES = {b"forwarded", b"via", b"x-real-ip", b"x-client-ip", b"true-client-ip", b"cf-connecting-ip"}
-_OF_PROXIES_PREFIX = b"x-forwarded-"
+#: Headers by which proxies say that a request is another's; those whose names hold or end in one of the others, too. And the
+#: version in which a proxy asks that adds no header: nginx, where it is not told otherwise; no browser has it.
+_OF_PROXIES = {b"via", b"x-real-ip", b"cf-connecting-ip", b"x-envoy-external-address", b"x-original-host", b"cdn-loop"}
+_FORWARDED, _CLIENT_IP = b"forwarded", b"client-ip"
+_VERSION_OF_PROXIES = "1.0"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Caller:
-    """What a request tells of its sender; `proxy` is a header that a proxy has added."""
+    """What a request tells of its sender; `proxy` is what shows that a proxy has passed it on."""
 
     authorization: str | None
     address: str | None
@@ -169,11 +171,11 @@ def context_of(request: Request) -> Context:
 def caller_of(request: Request) -> Caller:
     """What the request tells of its sender."""
     first: dict[bytes, str] = {}
-    proxy = None
+    proxy = "HTTP/1.0" if request.scope["http_version"] == _VERSION_OF_PROXIES else None
     for name, value in request.scope["headers"]:
         if name in (b"authorization", b"host", b"origin"):
             first.setdefault(name, value.decode("latin-1"))
-        elif name in _OF_PROXIES or name.startswith(_OF_PROXIES_PREFIX):
+        elif name in _OF_PROXIES or _FORWARDED in name or name.endswith(_CLIENT_IP):
             proxy = name.decode("latin-1").title()
     address = None if request.client is None else request.client.host
     if context_of(request).settings.insecure_local:

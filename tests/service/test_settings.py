@@ -20,6 +20,7 @@ EARLIER = {
     "CLUTCHLIFE_BODY_SECONDS": ("7", "body_seconds", 7),
     "CLUTCHLIFE_REQUESTS_PER_SECOND": ("8", "requests_per_second", 8),
     "CLUTCHLIFE_REQUESTS_AT_ONCE": ("9", "requests_at_once", 9),
+    "CLUTCHLIFE_CONNECTIONS_AT_ONCE": ("9", "connections_at_once", 9),
     "CLUTCHLIFE_DIAGNOSIS_SECONDS": ("10", "diagnosis_seconds", 10),
     "CLUTCHLIFE_DIAGNOSIS_MEMORY_MB": ("11", "diagnosis_bytes", 11 << 20),
 }

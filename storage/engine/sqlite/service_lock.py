@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from storage.engine.errors import ServiceRuns, StorageUnavailable
+from storage.engine.sqlite.private_files import MODE
 
 
 @contextmanager
@@ -37,6 +38,6 @@ def service_lock(path: Path) -> Iterator[None]:
 
 def _opened(path: Path) -> BinaryIO:
     try:
-        return open(os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666), "rb+")  # noqa: PTH123  (a descriptor)
+        return open(os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, MODE), "rb+")  # noqa: PTH123  (a descriptor)
     except OSError as error:
         raise StorageUnavailable(f"{path}: the lock of the database cannot be opened ({error})") from error

@@ -1,6 +1,7 @@
 """The reading process: its limits on memory, time and output, and a reader that misbehaves ends alone."""
 
 import os
+import platform
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -74,11 +75,25 @@ REACHES = {
     "a program": "__import__('subprocess').run(['/bin/true'])",
     "a further process": "__import__('os').fork()",
     "the service itself": "__import__('os').kill({service}, 0)",
+    "a thread of the service": "call('tgkill', {service}, {service}, 0)",
+    "a thread of the service by itself": "call('tkill', {service}, 0)",
+    "the limits of the service": "__import__('resource').prlimit({service}, 7)",
+    "the priority of the service": "__import__('os').setpriority(0, {service}, 19)",
+    "the processors of the service": "__import__('os').sched_setaffinity({service}, [0])",
+    "who may read another file": "__import__('os').chmod({secret!r}, 0o644)",
+    "who owns another file": "__import__('os').chown({secret!r}, 0, 0)",
+    "when another file was changed": "__import__('os').utime({secret!r})",
+    "what is noted of another file": "__import__('os').setxattr({secret!r}, 'user.a', b'x')",
+    "memory that outlives it": "call('shmget', 0, 4096, 0o1600)",
 }
+#: Numbers of calls that Python has no function for, by architecture.
+CALLS = {"x86_64": {"tgkill": 234, "tkill": 200, "shmget": 29}, "aarch64": {"tgkill": 131, "tkill": 130, "shmget": 194}}
 #: What a reader may do: read the file, write into its own folder, use threads; and have only so many files open.
 MAY = {
     "the file": "raise ValueError(open(path).read())",
     "a temporary file": "raise ValueError(__import__('tempfile').TemporaryFile().write(b'TDSm') and 'TDSm')",
+    "its own limits": "raise ValueError('TDSm' if __import__('resource').getrlimit(7)[0] == 64 else 'others')",
+    "its own processors": "__import__('os').sched_setaffinity(0, [0]); raise ValueError('TDSm')",
     "a thread": "t = __import__('threading').Thread(target=print); t.start(); t.join(); raise ValueError('TDSm')",
 }
 
@@ -87,7 +102,11 @@ def reading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str) -> str:
     """What a reader that does this is answered with."""
     (tmp_path / "nptdms.py").write_text("class TdmsFile: pass\n", encoding="utf-8")
     (tmp_path / "sitecustomize.py").write_text(
-        "import sys, types, threading, tempfile, socket, subprocess\nfake = types.ModuleType('service.readers.tdms')\n"
+        "import ctypes, sys, types, threading, tempfile, socket, subprocess\n"
+        "fake = types.ModuleType('service.readers.tdms')\n"
+        "def call(name, *arguments):\n"
+        f"    libc, numbers = ctypes.CDLL(None, use_errno=True), {CALLS.get(platform.machine(), {})}\n"
+        "    if libc.syscall(numbers[name], *arguments) < 0:\n        raise OSError(ctypes.get_errno(), name)\n"
         f"def read(path, mapping, limits):\n    {body}\n"
         "fake.read = read\nsys.modules['service.readers.tdms'] = fake\n",
         encoding="utf-8",

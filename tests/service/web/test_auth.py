@@ -1,5 +1,8 @@
 """Without keys, this machine only, under no other name than its own."""
 
+import socket
+from pathlib import Path
+
 import pytest
 from fastapi.testclient import TestClient
 
@@ -7,6 +10,7 @@ from service.app import create_app
 from service.settings import Settings
 from service.web.auth import is_loopback
 from tests.service.web.routes.granting import granted, revoke_all
+from tests.support import serving
 
 
 @pytest.mark.parametrize(
@@ -45,6 +49,7 @@ def test_after_the_last_key_is_revoked_the_service_stays_shut(client: TestClient
 
 
 PROXIED = ["Forwarded", "Via", "X-Forwarded-For", "X-Forwarded-Host", "X-Forwarded-Proto", "X-Real-IP"]
+PROXIED += ["Fastly-Client-IP", "X-Original-Forwarded-For", "X-Envoy-External-Address", "CDN-Loop"]
 
 
 @pytest.mark.parametrize("header", PROXIED)
@@ -53,6 +58,16 @@ def test_what_a_proxy_passes_on_is_refused_without_keys(client: TestClient, head
     answer = client.get("/v1/clutches", headers={header: "127.0.0.1"})
     assert (answer.status_code, header.lower() in answer.json()["detail"].lower()) == (403, True)
     assert client.get("/livez", headers={header: "127.0.0.1"}).status_code == 200
+
+
+@pytest.mark.parametrize(("version", "status"), [("1.0", b"403"), ("1.1", b"200")])
+def test_a_proxy_that_adds_no_header_is_known_by_its_version(tmp_path: Path, version: str, status: bytes) -> None:
+    """nginx as it is installed: it asks in HTTP/1.0, under the name of this machine."""
+    with serving(tmp_path / "a.db", loaded=True) as server:
+        asked = f"GET /v1/clutches HTTP/{version}\r\nHost: 127.0.0.1:{server.port}\r\nConnection: close\r\n\r\n"
+        with socket.create_connection(("127.0.0.1", server.port), timeout=30) as line:
+            line.sendall(asked.encode())
+            assert line.recv(12).partition(b" ")[2] == status
 
 
 def test_insecure_local_answers_what_a_proxy_passes_on(database_url: str) -> None:

@@ -1,17 +1,20 @@
 """The OWASP API Security Top 10 of 2023, a test each: what an attacker would see first, and where the rest is tested."""
 
+import csv
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
 
-from storage import keys
+from storage import diagnoses, keys
 from tests.architecture.source import ROOT
 from tests.service.cli.sending.stand_in_service import URL
 from tests.service.web.routes.granting import context_of, granted, revoke_all
 from tests.service.web.routes.routes_of import routes_of
 from tests.service.web.routes.test_scopes import OPEN
+from tests.storage.samples import new_diagnosis
 from tests.support import stationary
 
 CLUTCHES = "/v1/clutches"
@@ -23,6 +26,34 @@ def test_api1_an_object_of_others_cannot_be_reached_by_its_name(client: TestClie
     assert client.post(CLUTCHES, json={"clutch_id": "mine"}, headers=bound).status_code == 201
     assert client.get(f"{CLUTCHES}/mine", headers=bound).status_code == 200
     assert client.get(f"{CLUTCHES}/c1", headers=bound).status_code == 403
+
+
+def test_api1_an_object_of_others_cannot_be_reached_through_an_own_one(client: TestClient) -> None:
+    """The names of a run, of an inspection and of a diagnosis lead to them below their own clutch only."""
+    runs, inspections = f"{CLUTCHES}/c1/runs", f"{CLUTCHES}/c1/inspections"
+    assert client.post(runs, json=stationary(0.0, run_id="a")).status_code == 201
+    inspection = client.post(inspections, json={"cycles": 0, "note": "as new"}).json()["inspection_id"]
+    with context_of(client).database.writing() as connection:
+        diagnoses.insert(connection, replace(new_diagnosis(0), clutch_id="c1", diagnosis_id="d1"))
+        assert diagnoses.finish(connection, "d1", "2026-11-02", {"verdict": "model_adequate"}, {})
+    bound = granted(client, "admin", clutches=["mine"])
+    client.post(CLUTCHES, json={"clutch_id": "mine"}, headers=bound)
+    reason = {"reason": "x"}
+    tries = [
+        ("GET", "runs/a", None),
+        ("PATCH", "runs/a", {"cycles": 1, **reason}),
+        *[("POST", f"runs/a/{change}", reason) for change in ("withdraw", "restore", "confirm")],
+        ("GET", "diagnoses/d1", None),
+        ("PUT", "model", {"diagnosis_id": "d1"}),
+        ("GET", f"inspections/{inspection}", None),
+        *[("POST", f"inspections/{inspection}/{change}", reason) for change in ("withdraw", "restore")],
+    ]
+    whole = granted(client, "admin")
+    for method, path, body in tries:
+        answer = client.request(method, f"{CLUTCHES}/mine/{path}", json=body, headers=bound)
+        assert answer.status_code == 404, (method, path, answer.json())
+        if method == "GET":
+            assert client.get(f"{CLUTCHES}/c1/{path}", headers=whole).status_code == 200, "it is there"
 
 
 def test_api2_a_key_is_long_kept_as_a_hash_and_ends(client: TestClient) -> None:
@@ -50,7 +81,7 @@ def test_api3_properties_that_are_the_services_own_cannot_be_set(client: TestCli
 
 
 def test_api4_a_request_has_bounds(client: TestClient) -> None:
-    """How often, how slowly, how many at once: test_shares.py. Files: tests/service/readers."""
+    """How often, how slowly, how many at once: test_shares.py, test_connections.py. Files: tests/service/readers."""
     assert client.post(CLUTCHES, content=b" " * (2**20 + 1)).status_code == 413
     assert client.get(f"{CLUTCHES}?limit=1001").status_code == 422
     assert client.get(f"{CLUTCHES}?cursor={'x' * 700}").status_code == 422
@@ -142,6 +173,19 @@ def test_api10_what_others_answer_or_send_is_not_trusted() -> None:
         assert not client.follow_redirects
     moved = httpx2.Response(307, headers={"Location": "http://elsewhere.test/v1/clutches"})
     assert "elsewhere.test" in str(passing(moved, None))
+
+
+@pytest.mark.parametrize("note", ["=1+1", "@SUM(A1)", "+1", "-1+cmd", "as new"])
+def test_api10_a_note_is_no_formula_in_a_spreadsheet(client: TestClient, note: str) -> None:
+    """A rig's key must not have an engineer's spreadsheet compute, or ask, what it likes."""
+    sent = {"cycles": 0, "note": note, "roughness_um": 2.5, "skewness": -3.5}
+    assert client.post(f"{CLUTCHES}/c1/inspections", json=sent, headers=granted(client, "ingest")).status_code == 201
+    headers = granted(client, "read")
+    (row,) = csv.DictReader(client.get(f"{CLUTCHES}/c1/inspections.csv", headers=headers).text.splitlines())
+    assert row["note"] == (note if note == "as new" else f"'{note}")
+    assert row["skewness"] == "-3.5", "numbers stay numbers"
+    (item,) = client.get(f"{CLUTCHES}/c1/inspections", headers=headers).json()["items"]
+    assert item["note"] == note
 
 
 def test_all_ten_are_there() -> None:

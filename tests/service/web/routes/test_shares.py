@@ -20,6 +20,7 @@ from tests.service.web.routes.granting import context_of, granted
 from tests.support import serving, stationary
 
 CLUTCHES = "/v1/clutches"
+WAIT = {"Prefer": "wait=60"}
 
 
 @contextmanager
@@ -133,6 +134,32 @@ def test_a_full_lane_refuses_its_own_and_leaves_all_else_alone(
     assert client.post(upload, content=CSV).status_code == 201, "and it holds"
 
 
+def test_who_asks_for_many_answers_holds_up_nobody_else(client: TestClient, tmp_path: Path, gate: Path) -> None:
+    """Twelve that take long are asked for before somebody else's one; callers take turns, so it is the second."""
+    for cycles in (0.0, 2000.0, 4000.0):
+        client.post(f"{CLUTCHES}/c1/runs", json=stationary(cycles))
+    many, one = granted(client, "read"), granted(client, "read")
+    workers, ended = context_of(client).workers, []
+    held = workers.submit(Lane.ANSWERS, calls.logged, tmp_path / "log", "x", gate)
+
+    def ask(headers: Any, at_cycles: int) -> None:
+        status = client.get(f"{CLUTCHES}/c1/degradation?at_cycles={at_cycles}", headers=headers | WAIT).status_code
+        ended.append((status, headers is one))
+
+    threads = [threading.Thread(target=ask, args=(many, 100 * number)) for number in range(12)]
+    threads.append(threading.Thread(target=ask, args=(one, 2500)))
+    for asked, thread in enumerate(threads, start=2):
+        thread.start()
+        while workers.calls()[Lane.ANSWERS] < asked:
+            time.sleep(0.01)
+    gate.touch()
+    held.result(60)
+    for thread in threads:
+        thread.join()
+    assert [status for status, _ in ended] == [200] * 13
+    assert [of_one for _, of_one in ended].index(True) <= 3
+
+
 def test_sixty_engagements_are_one_computation_where_they_are_the_same(client: TestClient) -> None:
     """Who asks for an answer that is being made waits for that one."""
     for cycles in (0.0, 2000.0, 4000.0):
@@ -147,7 +174,7 @@ def test_sixty_engagements_are_one_computation_where_they_are_the_same(client: T
     workers.submit = counted  # type: ignore[method-assign]
 
     def ask() -> None:
-        statuses.append(client.get(f"{CLUTCHES}/c1/engagement", headers={"Prefer": "wait=60"}).status_code)
+        statuses.append(client.get(f"{CLUTCHES}/c1/engagement", headers=WAIT).status_code)
 
     threads = [threading.Thread(target=ask) for _ in range(60)]
     for thread in threads:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from storage import clutches
-from storage.engine.opening import open_database
+from storage.engine.opening import open_database, service_lock
 from storage.engine.sqlite.backup import copy
 from tests.storage.samples import clutch_row
 
@@ -27,12 +27,12 @@ def modes(folder: Path) -> dict[str, str]:
 
 
 def test_other_users_read_no_file_of_a_new_database(tmp_path: Path) -> None:
-    with closing(open_database(f"sqlite:///{tmp_path}/a.db")) as database:
+    with service_lock(f"sqlite:///{tmp_path}/a.db"), closing(open_database(f"sqlite:///{tmp_path}/a.db")) as database:
         with database.writing() as connection:
             clutches.insert(connection, clutch_row())
         copy(tmp_path / "a.db", tmp_path / "backup.db", lock_timeout=1.0)
         found = modes(tmp_path)
-    assert {"a.db", "a.db-wal", "a.db-shm", "a.db-lock", "backup.db"} <= found.keys()
+    assert {"a.db", "a.db-wal", "a.db-shm", "a.db-lock", "a.db-service", "backup.db"} <= found.keys()
     assert set(found.values()) == {"0o600"}
     (tmp_path / "control").touch()
     assert modes(tmp_path)["control"] == "0o666", "the mask hides what is to be seen"

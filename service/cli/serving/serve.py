@@ -6,7 +6,6 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, get_args
 
 import typer
-import uvicorn
 
 from service.cli.options import DATABASE, EX_USAGE, Database, errors_in_a_line, fail
 from service.logging import LogLevel, configure, start
@@ -56,7 +55,7 @@ def serve(
                 "CLUTCHLIFE_WORKERS gives more processes that take in runs"
             )
         host = _allowed(host, settings)
-    from service.cli import services  # start-up time
+    from service.cli.serving import services  # start-up time
 
     options: dict[str, Any] = {
         "host": host,
@@ -71,7 +70,7 @@ def serve(
         if not services.serve_several(settings, processes, options):
             fail("a process could not start: see the log")
     else:
-        uvicorn.run(services.prepared(settings), **options)
+        services.serve_one(settings, options)
 
 
 def _allowed(host: str, settings: "Settings") -> str:

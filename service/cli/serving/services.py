@@ -14,6 +14,7 @@ from uvicorn.config import STARTUP_FAILURE
 from uvicorn.supervisors import Multiprocess
 
 from service.app import create_app
+from service.connections import allow_many, bounded
 from service.logging import configure
 from service.settings import PREFIX, Settings
 
@@ -28,10 +29,16 @@ def prepared(settings: Settings) -> FastAPI:
     threadpool_limits(limits=1, user_api="blas")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     app = create_app(settings)
+    allow_many()
     # loaded modules stay: the collector's walk through all of them would delay an answer by a tenth of a second
     gc.collect()
     gc.freeze()
     return app
+
+
+def serve_one(settings: Settings, options: dict[str, Any]) -> None:
+    """Serve in this process."""
+    uvicorn.run(prepared(settings), http=bounded(settings.connections_at_once), **options)
 
 
 def serve_several(settings: Settings, processes: int, options: dict[str, Any]) -> bool:
@@ -40,7 +47,12 @@ def serve_several(settings: Settings, processes: int, options: dict[str, Any]) -
         os.environ[f"{PREFIX}{name.upper()}"] = str(value)
     application = f"{__name__}:{one_of_several.__name__}"
     config = uvicorn.Config(
-        application, factory=True, workers=processes, timeout_worker_healthcheck=_HUNG_SECONDS, **options
+        application,
+        factory=True,
+        http="service.cli.serving.bounded_protocol:PROTOCOL",
+        workers=processes,
+        timeout_worker_healthcheck=_HUNG_SECONDS,
+        **options,
     )
     supervisor = Multiprocess(config, [config.bind_socket()])
     supervisor.run()
