@@ -168,7 +168,6 @@ async def _computed(
 
     def compute(waited_for: bool) -> "Future[Made]":
         among = lane if waited_for or lane is not Lane.ANSWERS else Lane.RENEWALS
-        # callers take turns: who asks for a hundred answers has them made beside those of others, not before them
         turn = f"{among.name} for {name_of_caller(request)}"
         return context.workers.submit(among, revision_and_json, query, clutch_id, arguments, turn=turn)
 
@@ -236,9 +235,7 @@ def _following(request: Request, cursor: str) -> str:
 
 def unchanged(request: Request, headers: Mapping[str, str]) -> Response | None:
     """304 where `If-None-Match` names the `ETag` of the headers, else None."""
-    asked_for = request.headers.get("if-none-match")
-    if asked_for is None:
-        return None
+    asked_for = request.headers.get("if-none-match", "")
     if asked_for.strip() == "*" or headers["ETag"] in (tag.strip().removeprefix("W/") for tag in asked_for.split(",")):
         return Response(status_code=304, headers=dict(headers))
     return None
