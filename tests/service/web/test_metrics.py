@@ -111,13 +111,13 @@ def test_the_numbers_of_all_clutches_are_a_row_a_statement(client: TestClient) -
             raw = connection.connection.driver_connection
             assert raw is not None
             query, values = str(arguments[2]), arguments[3]
-            if query.startswith("SELECT"):
+            if query.startswith("SELECT") and not query.startswith("SELECT EXISTS"):  # whether there is a job to do
                 rows.append(len(raw.execute(query, values).fetchall()))
 
     event.listen(database._engine, "before_cursor_execute", noted)
     client.get("/metrics")
     event.remove(database._engine, "before_cursor_execute", noted)
-    assert rows == [1] * 5
+    assert rows == [1] * 6
 
 
 def test_series_of_every_clutch_are_there_where_they_are_asked_for(database_url: str) -> None:
