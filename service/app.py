@@ -25,7 +25,7 @@ from service.web.middleware import BodyLimit, Edge, Heads, Polls, Shares
 from service.web.readiness import Needs, Readiness
 from service.web.revalidation import Revalidation
 from service.web.routes import clutches, description, diagnoses, exports, files, fleet, health, inspections, life, runs
-from service.workflows import adopt_model, run_diagnosis
+from service.workflows import adopt_model, raw_records, run_diagnosis
 from storage.diagnoses import NewDiagnosis
 from storage.engine.database import Database
 from storage.engine.opening import open_database, service_lock
@@ -74,6 +74,7 @@ def create_app(settings: Settings) -> FastAPI:
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         database = open_database(settings.database, serving=True)
+        raw_records.use(database, settings.raw)
         folder = emptied_folder(database.path)
         log = (settings.log_format, settings.log_level)
         workers = in_processes(database, settings.workers, log) if settings.workers else in_threads(database)
