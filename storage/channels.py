@@ -175,11 +175,11 @@ def move(connection: Connection, column: Stored, data: bytes, store: RawStore | 
 
     Raises DatabaseBusy where the blob may have been removed meanwhile with what nothing named: it is to be put again.
     """
-    found: dict[str, Any] = {"data": data, "blob": None, "store_key": None}
+    place: dict[str, Any] = {"data": data, "blob": None, "store_key": None}
     if store is not None:
-        found = {"data": b"", "blob": name_of(data), "store_key": store.store_key}
-        _refuse_removed(connection, store, [found["blob"]])
-    connection.execute(_move, {"of_run": column.run_key, "wanted": column.name} | found)
+        place = {"data": b"", "blob": name_of(data), "store_key": store.store_key}
+        _refuse_removed(connection, store, [place["blob"]])
+    connection.execute(_move, {"of_run": column.run_key, "wanted": column.name} | place)
 
 
 def _refuse_removed(connection: Connection, store: RawStore, blobs: Iterable[str]) -> None:

@@ -51,7 +51,7 @@ def relocate(database: Database, address: str, to: str) -> int:
 
     Raises ValueError where the one is unknown or the other lacks a blob that is named.
     """
-    store = _known(database, normal_address(address))
+    store = _store_at(database, normal_address(address))
     target = open_store(normal_address(to))
     count = 0
     for name in _named(database, store):
@@ -146,17 +146,17 @@ def _claim(database: Database, address: str) -> None:
     """Mark a store as this database's; the mark is noted here first, so that a start that is cut off can be repeated."""
     store = open_store(address)
     with database.reading() as connection:
-        marks = {known.address: known.mark for known in raw_stores.all_of(connection)}
-    found = store.mark()
-    if found is not None and found != marks.get(address):
+        marks = {row.address: row.mark for row in raw_stores.all_of(connection)}
+    mark = store.mark()
+    if mark is not None and mark != marks.get(address):
         raise ValueError(f"{address} holds the raw records of another database: choose an empty place")
     if address not in marks:
         with database.writing() as connection:
-            marks = {known.address: known.mark for known in raw_stores.all_of(connection)}
+            marks = {row.address: row.mark for row in raw_stores.all_of(connection)}
             if address not in marks:
                 marks[address] = secrets.token_hex(16)
                 raw_stores.add(connection, address, marks[address])
-    if found is None:
+    if mark is None:
         store.set_mark(marks[address])
         _require_mark(store, marks[address])
 
@@ -166,12 +166,12 @@ def _require_mark(store: BlobStore, mark: str) -> None:
         raise ValueError(f"{store.address} is not marked as this database's: it is left as it is")
 
 
-def _known(database: Database, address: str) -> RawStore:
+def _store_at(database: Database, address: str) -> RawStore:
     with database.reading() as connection:
         stores = {store.address: store for store in raw_stores.all_of(connection)}
     if address not in stores:
-        known = ", ".join(stores) or "none"
-        raise ValueError(f"no raw records were ever kept in {address}; known are: {known}")
+        addresses = ", ".join(stores) or "none"
+        raise ValueError(f"no raw records were ever kept in {address}; known are: {addresses}")
     return stores[address]
 
 

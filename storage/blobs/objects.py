@@ -56,11 +56,11 @@ class ObjectStore:
         """Put an object, in place of one of that name, in one request."""
         import obstore  # start-up time, optional package
 
-        self._asked(lambda: obstore.put(self._store, name, bytes(data), use_multipart=False))
+        self._request(lambda: obstore.put(self._store, name, bytes(data), use_multipart=False))
 
     def get(self, name: str) -> bytes:
         """The bytes of an object."""
-        data = self._found(name)
+        data = self._bytes_of(name)
         if data is None:
             self._require_mark()
             raise MissingBlob(f"there is no blob {name} in {self.address}")
@@ -71,7 +71,7 @@ class ObjectStore:
         import obstore  # start-up time, optional package
 
         try:
-            self._asked(lambda: obstore.head(self._store, name), absent=True)
+            self._request(lambda: obstore.head(self._store, name), absent=True)
         except FileNotFoundError:
             self._require_mark()
             return False
@@ -82,41 +82,41 @@ class ObjectStore:
         import obstore  # start-up time, optional package
 
         pages = iter(obstore.list(self._store))
-        while (page := self._asked(lambda: next(pages, None))) is not None:
-            for found in page:
-                if found["path"] != MARK:
-                    yield found["path"], found["last_modified"].timestamp()
+        while (page := self._request(lambda: next(pages, None))) is not None:
+            for item in page:
+                if item["path"] != MARK:
+                    yield item["path"], item["last_modified"].timestamp()
 
     def delete(self, name: str) -> None:
         """Remove an object."""
         import obstore  # start-up time, optional package
 
-        self._asked(lambda: obstore.delete(self._store, name))
+        self._request(lambda: obstore.delete(self._store, name))
 
     def mark(self) -> str | None:
         """The content of the mark's object."""
-        data = self._found(MARK)
+        data = self._bytes_of(MARK)
         return None if data is None else data.decode()
 
     def set_mark(self, mark: str) -> None:
         """Put the mark's object; the bucket must be there."""
         self.put(MARK, mark.encode())
 
-    def _found(self, name: str) -> bytes | None:
+    def _bytes_of(self, name: str) -> bytes | None:
         import obstore  # start-up time, optional package
 
         try:
-            return bytes(self._asked(lambda: obstore.get(self._store, name).bytes(), absent=True))
+            return bytes(self._request(lambda: obstore.get(self._store, name).bytes(), absent=True))
         except FileNotFoundError:
             return None
 
     def _require_mark(self) -> None:
-        if self._found(MARK) is None:
+        if self._bytes_of(MARK) is None:
             raise RawStoreUnavailable(
                 f"{self.address} is no store of raw records, or there is no such bucket: it has no object {MARK}"
             )
 
-    def _asked(self, request: Callable[[], _Answer], *, absent: bool = False) -> _Answer:
+    def _request(self, request: Callable[[], _Answer], *, absent: bool = False) -> _Answer:
         """What the request gives; the client's errors as the store's own, but for what is `absent` where that is expected.
 
         What the client says may be long: the log has it, the error one line.

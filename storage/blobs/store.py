@@ -50,9 +50,9 @@ def name_of(data: bytes | bytearray) -> str:
 def fetched(store: BlobStore, name: str) -> bytes:
     """The blob of that name, held against it. Raises DamagedData where it is missing or another."""
     data = store.get(name)
-    found = name_of(data)
-    if found != name:
-        raise DamagedData(f"the blob {name} in {store.address} is damaged: its sha256 is {found}")
+    sha256 = name_of(data)
+    if sha256 != name:
+        raise DamagedData(f"the blob {name} in {store.address} is damaged: its sha256 is {sha256}")
     return data
 
 

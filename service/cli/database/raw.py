@@ -74,6 +74,6 @@ def collect(
     from service.workflows.raw_records import collect as collect_all  # start-up time
 
     with existing(database) as opened:
-        for found in collect_all(opened, grace=grace_hours * _SECONDS_AN_HOUR):
-            line = f"{found.address}: {found.named} blobs in use, {found.removed} removed, {found.new} too new to be removed"
+        for store in collect_all(opened, grace=grace_hours * _SECONDS_AN_HOUR):
+            line = f"{store.address}: {store.named} blobs in use, {store.removed} removed, {store.new} too new to be removed"
             out.print(line, markup=False, soft_wrap=True)
