@@ -37,7 +37,7 @@ from service.web.routes import (
     life,
     runs,
 )
-from service.workflows import adopt_model, run_diagnosis
+from service.workflows import adopt_model, raw_records, run_diagnosis
 from storage.engine.database import Database
 from storage.engine.opening import open_database, service_lock
 from storage.jobs import JobRow
@@ -73,6 +73,7 @@ def create_app(settings: Settings) -> FastAPI:
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         database = open_database(settings.database, serving=True)
+        raw_records.use(database, settings.raw)
         folder = emptied_folder(database.path)
         log = (settings.log_format, settings.log_level)
         workers = in_processes(database, settings.workers, log) if settings.workers else in_threads(database)

@@ -36,6 +36,11 @@ class Settings(BaseSettings):
         default=DEFAULT_DATABASE,
         description="`sqlite:///relative/path`, `sqlite:////absolute/path` or `postgresql+psycopg://user@host/database`",
     )
+    raw: str | None = Field(
+        default=None,
+        description="where long raw records go: `database`, `folder:///path` or `s3://bucket/prefix`; left out, where they "
+        "went before, at first the database",
+    )
     # as `make load` has it, on two cores
     workers: int = Field(
         default=2, ge=0, description="processes that take in runs; 0: no workers, all in the service's own process"

@@ -19,6 +19,7 @@ from service.lives.recomputation import ClutchState, Levels, Receipt, Results, c
 from service.lives.run_analysis import Analysis, analyse
 from service.settings import CODE_VERSION
 from storage import channels, results, runs
+from storage.blobs import raw_stores
 from storage.engine.database import Database
 from storage.runs import RunRow
 
@@ -42,7 +43,8 @@ def run_reader(database: Database, clutch_id: str) -> RunReader:
     def with_channels(run_id: str) -> IncomingRun:
         with database.reading() as connection:
             row = run(connection, clutch_id, run_id)
-            return incoming(row, channels.read(connection, row.run_key))
+            columns = channels.all_stored(connection, row.run_key)
+        return incoming(row, channels.values_of(columns))
 
     with database.reading() as connection:
         record = records.record(records.clutch(connection, clutch_id))
@@ -54,6 +56,13 @@ def run_reader(database: Database, clutch_id: str) -> RunReader:
         sampled=frozenset(run_id for run_id, run_key in names.items() if run_key in sampled),
         torque_filter=record.torque_filter,
     )
+
+
+def placed(database: Database, columns: channels.Encoded) -> channels.Encoded:
+    """The long columns of a run put into the store of raw records, where one is in use: before the row that names them."""
+    with database.reading() as connection:
+        store = raw_stores.in_use(connection)
+    return columns if store is None else columns.put(store)
 
 
 def incoming(row: RunRow, columns: Mapping[str, NDArray[np.float64]]) -> IncomingRun:

@@ -1,32 +1,43 @@
-"""The raw channels of a run, as they were sent: kept bit for bit, written once, never changed."""
+"""The raw channels of a run, as they were sent: kept bit for bit, written once, never changed.
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+A long column may lie in a store beside the database (`storage/blobs`): put there before the row that names it, and fetched
+when no transaction is open any more.
+"""
+
+from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import sqlalchemy as sa
 from numpy.typing import NDArray
-from sqlalchemy import Connection, bindparam, select
+from sqlalchemy import ColumnElement, Connection, Row, and_, bindparam, func, or_, select, tuple_, update
 
+from storage.blobs import raw_stores
+from storage.blobs.opening import open_store
+from storage.blobs.raw_stores import RawStore
+from storage.blobs.store import fetched, name_of
 from storage.encoding.codec import CODEC, decode, encode
 from storage.encoding.decimals import DECIMAL_CODEC, LONG, decode_decimals, encode_decimals
-from storage.engine.errors import DamagedData
-from storage.tables import channel, run
+from storage.engine.errors import DamagedData, DatabaseBusy
+from storage.tables import channel, raw_store, run
+
+#: Bytes of an encoded column that stay in the database wherever raw records go. Chosen by a table of docs/benchmarks.md
+#: (`python -m tests.benchmarks.places`): a store adds 20 to 45 ms to a column of any length. Some 10,000 samples are longer.
+MOST_INLINE = 64 << 10
 
 _insert = sa.insert(channel)
-_of_run = (
-    select(channel.c.name, channel.c.codec, channel.c.length, channel.c.data)
-    .where(channel.c.run_key == bindparam("of_run"))
-    .order_by(channel.c.position)
-)
+_columns = select(
+    channel.c.name, channel.c.codec, channel.c.length, channel.c.data, channel.c.blob, raw_store.c.address
+).select_from(channel.outerjoin(raw_store, raw_store.c.store_key == channel.c.store_key))
+_of_run = _columns.where(channel.c.run_key == bindparam("of_run")).order_by(channel.c.position)
 _lengths = (
     select(channel.c.name, channel.c.length)
     .where(channel.c.run_key == bindparam("of_run"))
     .order_by(channel.c.position)
 )
-_by_name = select(channel.c.codec, channel.c.length, channel.c.data).where(
-    channel.c.run_key == bindparam("of_run"), channel.c.name == bindparam("wanted")
-)
+_by_name = _columns.where(channel.c.run_key == bindparam("of_run"), channel.c.name == bindparam("wanted"))
 _samples = (
     select(channel.c.run_key, channel.c.length)
     .join(run, run.c.run_key == channel.c.run_key)
@@ -34,11 +45,39 @@ _samples = (
 )
 
 
+_LONG_HERE = (channel.c.blob.is_(None), func.length(channel.c.data) > MOST_INLINE)
+_elsewhere = (
+    select(channel.c.run_key, channel.c.name)
+    .where(tuple_(channel.c.run_key, channel.c.name) > tuple_(bindparam("after_key"), bindparam("after_name")))
+    .order_by(channel.c.run_key, channel.c.name)
+    .limit(bindparam("most"))
+)
+_move = update(channel).where(channel.c.run_key == bindparam("of_run"), channel.c.name == bindparam("wanted"))
+
+
 @dataclass(frozen=True, slots=True)
 class Encoded:
-    """The channels of one run as they are stored, order kept: name, codec, length and bytes of each."""
+    """The channels of one run as they are stored, order kept: name, codec, length and bytes of each; and by name the blobs
+    of those that were put into a store, whose bytes are empty here."""
 
     columns: tuple[tuple[str, str, int, bytearray], ...]
+    store: RawStore | None = None
+    blobs: Mapping[str, str] | None = None
+
+    @property
+    def is_long(self) -> bool:
+        """Whether a column would go to a store where one is in use."""
+        return any(len(data) > MOST_INLINE for *_, data in self.columns)
+
+    def put(self, store: RawStore) -> "Encoded":
+        """The same with the long columns in the store; `store` must have been read before. Raises RawStoreUnavailable."""
+        opened = open_store(store.address)
+        long = {name: data for name, _, _, data in self.columns if len(data) > MOST_INLINE}
+        blobs = {name: name_of(data) for name, data in long.items()}
+        with ThreadPoolExecutor(max(len(long), 1)) as pool:  # a store is waited for, it takes no time of the processor
+            list(pool.map(opened.put, blobs.values(), long.values()))
+        columns = tuple((*column[:3], bytearray() if column[0] in blobs else column[3]) for column in self.columns)
+        return replace(self, columns=columns, store=store, blobs=blobs)
 
 
 def encoded(channels: Mapping[str, NDArray[np.float64]]) -> Encoded:
@@ -54,19 +93,110 @@ def _encoded(column: NDArray[np.float64]) -> tuple[str, int, bytearray]:
 
 
 def write(connection: Connection, run_key: int, channels: Encoded) -> None:
-    """Store the channels of a run. Raises IntegrityError where the run has them already."""
+    """Store the channels of a run. Raises IntegrityError where the run has them already, DatabaseBusy where a blob of it,
+    put meanwhile, may have been removed with what nothing named: it is to be put again."""
+    store, blobs = channels.store, channels.blobs or {}
+    if store is not None:
+        _refuse_removed(connection, store, blobs.values())
     rows = [
-        {"run_key": run_key, "name": name, "position": position, "codec": codec, "length": length, "data": data}
+        {
+            "run_key": run_key,
+            "name": name,
+            "position": position,
+            "codec": codec,
+            "length": length,
+            "data": data,
+            "store_key": store.store_key if store is not None and name in blobs else None,
+            "blob": blobs.get(name),
+        }
         for position, (name, codec, length, data) in enumerate(channels.columns)
     ]
     if rows:
         connection.execute(_insert, rows)
 
 
+@dataclass(frozen=True, slots=True)
+class Stored:
+    """One channel of a run as it is stored, to be fetched and decoded when no transaction is open any more: its bytes, or
+    the name of its blob and the address of the blob's store."""
+
+    run_key: int
+    name: str
+    codec: str
+    length: int
+    data: bytes
+    blob: str | None = None
+    address: str | None = None
+
+    def encoded(self) -> bytes:
+        """The bytes, fetched where they lie in a store. Raises as `values` does."""
+        if self.blob is None or self.address is None:
+            return self.data
+        return fetched(open_store(self.address), self.blob)
+
+    def values(self) -> NDArray[np.float64]:
+        """The channel [length]. Raises DamagedData, and RawStoreUnavailable where the store cannot be reached."""
+        try:
+            data = self.encoded()
+            if self.codec == DECIMAL_CODEC:
+                return decode_decimals(data, self.length)
+            return decode(data, self.codec, self.length)
+        except DamagedData as error:
+            raise DamagedData(f"channel {self.name} of run {self.run_key}: {error}") from error
+
+
+def all_stored(connection: Connection, run_key: int) -> list[Stored]:
+    """The channels of a run in the order they were sent, not fetched and not decoded; none for a run without."""
+    return [_stored(run_key, row) for row in connection.execute(_of_run, {"of_run": run_key})]
+
+
+def stored(connection: Connection, run_key: int, name: str) -> Stored:
+    """One channel of a run likewise. Raises LookupError where the run has no such channel."""
+    row = connection.execute(_by_name, {"of_run": run_key, "wanted": name}).first()
+    if row is None:
+        raise LookupError(f"run {run_key} has no channel {name}")
+    return _stored(run_key, row)
+
+
+def kept_elsewhere(
+    connection: Connection, store: RawStore | None, *, after: tuple[int, str], most: int
+) -> list[tuple[int, str]]:
+    """(run_key, name) of channels that a move to `store` (None: to the database) is still to take there, in order, behind
+    `after`: those in other stores and, for a store, long ones in the database."""
+    wanted: ColumnElement[bool] = channel.c.blob.is_not(None)
+    if store is not None:
+        wanted = or_(and_(channel.c.blob.is_not(None), channel.c.store_key != store.store_key), and_(*_LONG_HERE))
+    values = {"after_key": after[0], "after_name": after[1], "most": most}
+    return [(run_key, name) for run_key, name in connection.execute(_elsewhere.where(wanted), values)]
+
+
+def move(connection: Connection, column: Stored, data: bytes, store: RawStore | None) -> None:
+    """Have a channel's bytes, which are in the store already, looked for there; where it is None they are written here.
+
+    Raises DatabaseBusy where the blob may have been removed meanwhile with what nothing named: it is to be put again.
+    """
+    place: dict[str, Any] = {"data": data, "blob": None, "store_key": None}
+    if store is not None:
+        place = {"data": b"", "blob": name_of(data), "store_key": store.store_key}
+        _refuse_removed(connection, store, [place["blob"]])
+    connection.execute(_move, {"of_run": column.run_key, "wanted": column.name} | place)
+
+
+def _refuse_removed(connection: Connection, store: RawStore, blobs: Iterable[str]) -> None:
+    if not raw_stores.are_kept(connection, store, blobs):
+        raise DatabaseBusy(
+            f"raw records of the same content are removed from {store.address}, or it was moved: try again"
+        )
+
+
+def values_of(columns: list[Stored]) -> dict[str, NDArray[np.float64]]:
+    """The channels by name, fetched and decoded one after the other. Raises as `Stored.values` does."""
+    return {column.name: column.values() for column in columns}
+
+
 def read(connection: Connection, run_key: int) -> dict[str, NDArray[np.float64]]:
-    """The channels of a run in the order they were sent, none for a run without. Raises DamagedData."""
-    rows = connection.execute(_of_run, {"of_run": run_key})
-    return {name: _decoded(run_key, name, codec, length, data) for name, codec, length, data in rows}
+    """The same at once, while the transaction waits. Raises as `Stored.values` does."""
+    return values_of(all_stored(connection, run_key))
 
 
 def lengths(connection: Connection, run_key: int) -> dict[str, int]:
@@ -75,37 +205,11 @@ def lengths(connection: Connection, run_key: int) -> dict[str, int]:
     return {name: length for name, length in rows}  # noqa: C416  (rows are no pairs to mypy)
 
 
-@dataclass(frozen=True, slots=True)
-class Stored:
-    """One channel of a run as it is stored, to be decoded when no transaction is open any more."""
-
-    run_key: int
-    name: str
-    codec: str
-    length: int
-    data: bytes
-
-    def values(self) -> NDArray[np.float64]:
-        """The channel [length]. Raises DamagedData."""
-        return _decoded(self.run_key, self.name, self.codec, self.length, self.data)
-
-
-def stored(connection: Connection, run_key: int, name: str) -> Stored:
-    """One channel of a run, not decoded. Raises LookupError where the run has no such channel."""
-    row = connection.execute(_by_name, {"of_run": run_key, "wanted": name}).first()
-    if row is None:
-        raise LookupError(f"run {run_key} has no channel {name}")
-    return Stored(run_key, name, *row)
-
-
-def _decoded(run_key: int, name: str, codec: str, length: int, data: bytes) -> NDArray[np.float64]:
-    try:
-        return decode_decimals(data, length) if codec == DECIMAL_CODEC else decode(data, codec, length)
-    except DamagedData as error:
-        raise DamagedData(f"channel {name} of run {run_key}: {error}") from error
-
-
 def samples(connection: Connection, clutch_id: str) -> dict[int, int]:
     """run_key -> how many samples its record has, of the runs of a clutch that are sampled records."""
     rows = connection.execute(_samples, {"of_clutch": clutch_id})
     return {run_key: length for run_key, length in rows}  # noqa: C416  (rows are no pairs to mypy)
+
+
+def _stored(run_key: int, row: Row[*tuple[Any, ...]]) -> Stored:
+    return Stored(run_key, **row._asdict())

@@ -57,6 +57,34 @@ run = Table(
     Index("run_held", "clutch_id", sqlite_where=HELD_ONLY, postgresql_where=HELD_ONLY),
 )
 
+#: Where raw records are kept beside the database: the `address` of a store, and the `mark` that says there whose it is. New
+#: ones go to the one that is `in_use` (1), into the database where none is; `removals` counts batches of removed blobs.
+raw_store = Table(
+    "raw_store",
+    metadata,
+    Column("store_key", WHOLE, primary_key=True),
+    Column("address", TEXT, nullable=False),
+    Column("mark", TEXT, nullable=False),
+    Column("in_use", WHOLE, nullable=False, server_default="0"),
+    Column("removals", WHOLE, nullable=False, server_default="0"),
+    UniqueConstraint("address", name="raw_store_once"),
+)
+
+#: Blobs that no row names and that are being removed from their store, or (`finished`) were, by the batch's `number`.
+raw_removal = Table(
+    "raw_removal",
+    metadata,
+    Column("store_key", WHOLE, ForeignKey("raw_store.store_key"), primary_key=True),
+    Column("blob", TEXT, primary_key=True),
+    Column("number", WHOLE, nullable=False),
+    Column("at", NUMBER, nullable=False),
+    Column("finished", WHOLE, nullable=False),
+)
+
+#: The value stands in the text, as that of HELD_ONLY.
+IN_A_STORE = text("blob IS NOT NULL")
+
+#: An encoded column is in `data`, or it is the `blob` of that name (its SHA-256) in a store, and `data` is empty.
 channel = Table(
     "channel",
     metadata,
@@ -66,6 +94,9 @@ channel = Table(
     Column("codec", TEXT, nullable=False),
     Column("length", WHOLE, nullable=False),
     Column("data", LargeBinary, nullable=False),
+    Column("store_key", WHOLE, ForeignKey("raw_store.store_key")),
+    Column("blob", TEXT),
+    Index("channel_in_store", "store_key", "blob", sqlite_where=IN_A_STORE, postgresql_where=IN_A_STORE),
 )
 
 fit = Table(

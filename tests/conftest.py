@@ -1,12 +1,19 @@
 """What holds for all tests: how long a property's inputs take to draw is the machine's affair, and fails nothing.
 
-And the one PostgreSQL server of those that need it."""
+And the one PostgreSQL server, and the one that speaks S3, of those that need it; a database of its own for every test, a
+file or one on the server; a place of its own for raw records, a folder or a bucket."""
 
 from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
+from storage.blobs.opening import open_store
+from storage.engine.database import Database
+from storage.engine.opening import open_database
+from tests.storage.blobs.stores import new_bucket, s3_server, use_endpoint
 from tests.storage.engine.postgresql.server import PostgresServer, postgresql_server
 
 settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -17,3 +24,48 @@ settings.load_profile("untimed")
 def postgresql() -> Iterator[PostgresServer]:
     with postgresql_server() as server:
         yield server
+
+
+@pytest.fixture
+def in_file(tmp_path: Path) -> Iterator[Database]:
+    with closing(open_database(f"sqlite:///{tmp_path}/clutches.db")) as opened:
+        yield opened
+
+
+@pytest.fixture
+def on_server(postgresql: PostgresServer) -> Iterator[Database]:
+    url = postgresql.fresh()
+    with closing(open_database(url)) as opened:
+        yield opened
+    postgresql.drop(url)
+
+
+@pytest.fixture(params=["in_file", "on_server"])
+def database(request: pytest.FixtureRequest) -> Database:
+    opened: Database = request.getfixturevalue(request.param)
+    return opened
+
+
+@pytest.fixture(scope="session")
+def s3() -> Iterator[str]:
+    with s3_server() as endpoint:
+        yield endpoint
+
+
+@pytest.fixture
+def in_folder(tmp_path: Path) -> str:
+    return f"folder://{tmp_path}/raw"
+
+
+@pytest.fixture
+def in_bucket(s3: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    use_endpoint(monkeypatch, s3)
+    yield new_bucket(s3)
+    open_store.cache_clear()
+
+
+@pytest.fixture(params=["in_folder", "in_bucket"])
+def raw_address(request: pytest.FixtureRequest) -> str:
+    """Where raw records go: each kind of store."""
+    address: str = request.getfixturevalue(request.param)
+    return address

@@ -36,5 +36,8 @@ RETRY_AFTER_SECONDS = 1
 USE_NOTED_SECONDS = 3600
 #: Seconds after which a disk that does not answer makes the service not ready. Chosen: probes wait for three and more.
 LONGEST_LOOK_SECONDS = 2.0
+#: Seconds that a look at the store of raw records holds, and that is waited for it: less than for the disk, so that each
+#: says what does not answer. Chosen: a request every ten seconds costs nothing.
+RAW_LOOK_SECONDS, LONGEST_RAW_LOOK_SECONDS = 10.0, 1.0
 #: Clutches that the metrics read at once.
 METRICS_PAGE = 1000

@@ -31,7 +31,7 @@ from service.queries.cache import to_json
 from service.schemas.problem import Problem
 from service.web.auth import route_of
 from service.web.limits import RETRY_AFTER_SECONDS
-from storage.engine.errors import DatabaseBusy, StorageError, UnstorableText
+from storage.engine.errors import DatabaseBusy, RawStoreUnavailable, StorageError, UnstorableText
 
 PROBLEM_TYPE = "application/problem+json"
 
@@ -100,8 +100,10 @@ def _service_error(_: Request, error: Exception) -> Response:
 def _storage_error(_: Request, error: Exception) -> Response:
     if isinstance(error, UnstorableText):
         return refused(InvalidError, str(error))
-    slug, title = ("busy", "Busy") if isinstance(error, DatabaseBusy) else ("storage", "The database cannot be used")
     _log.error("storage: %s", error)
+    if isinstance(error, RawStoreUnavailable):
+        return problem(503, "raw-records", "The store of raw records cannot be used", f"{error}; nothing was changed")
+    slug, title = ("busy", "Busy") if isinstance(error, DatabaseBusy) else ("storage", "The database cannot be used")
     return problem(503, slug, title, "nothing was changed; try again, or see the service's log")
 
 

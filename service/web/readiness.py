@@ -4,17 +4,21 @@ One thread looks, for all who ask at that moment; no lock is taken, so that nobo
 """
 
 import asyncio
-from concurrent.futures import ThreadPoolExecutor
+import time
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 from service.errors import BusyError
 from service.jobs.queue import JobQueue
 from service.jobs.workers import Workers
-from service.web.limits import LONGEST_LOOK_SECONDS
+from service.web.limits import LONGEST_LOOK_SECONDS, LONGEST_RAW_LOOK_SECONDS, RAW_LOOK_SECONDS
+from storage.blobs import raw_stores
+from storage.blobs.opening import open_store
 from storage.engine.database import Database
+from storage.engine.errors import StorageError
 
-#: What is looked at, in the order of the answer.
+#: What is looked at, in the order of the answer; `raw`, the store of raw records, is in it where it cannot be used.
 PARTS = ("database", "disk", "memory", "workers")
 _MEMORY = Path("/proc/meminfo")
 _GROUP = Path("/proc/self/cgroup")
@@ -40,6 +44,9 @@ class Readiness:
         self._jobs = jobs
         self._needs = needs
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="readiness")
+        self._raw_thread = ThreadPoolExecutor(1, thread_name_prefix="raw records")
+        self._raw: Future[str | None] | None = None
+        self._look_again = 0.0
         self._looking: asyncio.Future[dict[str, str]] | None = None
 
     async def faults(self) -> dict[str, str]:
@@ -53,16 +60,40 @@ class Readiness:
             return {part: f"the {place} has not answered for {LONGEST_LOOK_SECONDS:g} s"}
 
     def close(self) -> None:
-        """End the thread, once it has looked."""
+        """End the threads, once they have looked."""
         self._thread.shutdown(wait=False)
+        self._raw_thread.shutdown(wait=False)
 
     def _look(self) -> dict[str, str]:
         wrong = self._database.faults(least_free=self._needs.disk)
+        if "database" not in wrong and (away := self._fault_of_raw_records()) is not None:
+            wrong["raw"] = away
         left = available_memory()
         if left is not None and left < self._needs.memory:
             wrong["memory"] = f"{left >> 20} MiB of memory are left, {self._needs.memory >> 20} are needed"
         workers = self._fault_of_workers()
         return wrong if workers is None else wrong | {"workers": workers}
+
+    def _fault_of_raw_records(self) -> str | None:
+        """Why the store of raw records cannot be used, as it was found at the last look at it."""
+        if self._raw is None or (self._raw.done() and time.monotonic() >= self._look_again):
+            self._raw = self._raw_thread.submit(self._look_at_raw_records)
+        try:
+            return self._raw.result(LONGEST_RAW_LOOK_SECONDS)
+        except TimeoutError:
+            return f"the store of raw records has not answered for {LONGEST_RAW_LOOK_SECONDS:g} s"
+
+    def _look_at_raw_records(self) -> str | None:
+        try:
+            with self._database.reading() as connection:
+                store = raw_stores.in_use(connection)
+            if store is not None and open_store(store.address).mark() != store.mark:
+                return f"{store.address} is not marked as this database's"
+        except StorageError as error:
+            return str(error)
+        finally:
+            self._look_again = time.monotonic() + RAW_LOOK_SECONDS
+        return None
 
     def _fault_of_workers(self) -> str | None:
         if not self._jobs.is_working():

@@ -96,6 +96,8 @@ def ingest(
         analysis, columns = analyse(run, geometry, torque_filter), channels.encoded(run.channels)
     if sampled and run.kind == STATIONARY:  # loops are yet to be fitted; another long record need not be held twice
         run = replace(run, channels={})
+    if columns.is_long:
+        columns = stored_runs.placed(database, columns)
     arrival = Arrival(run=run, sampled=sampled, analysis=analysis, received_at=received_at)
     while True:
         with database.reading() as connection:  # one state: the same run may come in beside this one at any moment

@@ -14,6 +14,10 @@ class StorageUnavailable(StorageError):
     """The database cannot be used now: it is unreachable, read-only, damaged or none, or its disk is full."""
 
 
+class RawStoreUnavailable(StorageUnavailable):
+    """The store that holds raw records beside the database cannot be used now. The message names no secret."""
+
+
 class DatabaseTooNew(StorageError):
     """The database was written by a newer release of this program."""
 
@@ -32,3 +36,7 @@ class UnstorableText(StorageError):
 
 class DamagedData(StorageError):
     """A stored array does not decode to what was stored."""
+
+
+class MissingBlob(DamagedData):
+    """A store of raw records does not have what a row names."""

@@ -1,37 +1,8 @@
-"""A database of its own for every test: a file, and one on a PostgreSQL server.
-
-Where a test asks, the file is in each of the two journal modes."""
-
-from collections.abc import Iterator
-from contextlib import closing
-from pathlib import Path
+"""A file in each of the two journal modes, where a test asks. The databases of tests are those of `tests/conftest.py`."""
 
 import pytest
 
-from storage.engine.database import Database
-from storage.engine.opening import open_database
 from storage.engine.sqlite import connect
-from tests.storage.engine.postgresql.server import PostgresServer
-
-
-@pytest.fixture
-def in_file(tmp_path: Path) -> Iterator[Database]:
-    with closing(open_database(f"sqlite:///{tmp_path}/clutches.db")) as opened:
-        yield opened
-
-
-@pytest.fixture
-def on_server(postgresql: PostgresServer) -> Iterator[Database]:
-    url = postgresql.fresh()
-    with closing(open_database(url)) as opened:
-        yield opened
-    postgresql.drop(url)
-
-
-@pytest.fixture(params=["in_file", "on_server"])
-def database(request: pytest.FixtureRequest) -> Database:
-    opened: Database = request.getfixturevalue(request.param)
-    return opened
 
 
 @pytest.fixture(params=["delete", "wal"])

@@ -4,9 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from sqlalchemy.exc import IntegrityError
 
+from service import stored_runs
+from service.workflows import raw_records
 from storage import channels, clutches, runs
+from storage.blobs import raw_stores
+from storage.blobs.opening import DATABASE, open_store
 from storage.encoding.decimals import LONG
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData
@@ -87,3 +92,64 @@ def test_one_channel_is_read_alone_and_decoded_without_a_connection(database: Da
     assert [each.values().tobytes() for each in stored] == [column.tobytes() for column in sent.values()]
     with pytest.raises(DamagedData, match=f"channel time_s of run {key}"):
         replace(stored[0], data=stored[0].data[:50]).values()
+
+
+@pytest.fixture(params=["database", "in_folder", "in_bucket"])
+def place(request: pytest.FixtureRequest) -> str:
+    """Where long columns are: in the database, or in a store beside it."""
+    return DATABASE if request.param == DATABASE else str(request.getfixturevalue(request.param))
+
+
+def store_long_run(database: Database, place: str, sent: dict[str, NDArray[np.float64]]) -> int:
+    """A run whose long columns are in that place."""
+    raw_records.use(database, place)
+    columns = stored_runs.placed(database, channels.encoded(sent))
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+        run_key = runs.insert(connection, new_run(0))
+        channels.write(connection, run_key, columns)
+    return run_key
+
+
+def test_columns_keep_their_bits_wherever_they_are(database: Database, place: str) -> None:
+    sent = columns(7, 50_000) | {"oil_temperature_c": np.zeros(50_000), "time_s": np.arange(50_000) / 1000}
+    run_key = store_long_run(database, place, sent)
+    with database.reading() as connection:
+        held = channels.all_stored(connection, run_key)
+        rows = connection.exec_driver_sql("SELECT name, length(data) FROM channel")
+        sizes = {name: size for name, size in rows}  # noqa: C416  (rows are no pairs to mypy)
+        assert channels.lengths(connection, run_key) == dict.fromkeys(sent, 50_000)
+        one = channels.stored(connection, run_key, "torque_nm")
+        numbers = raw_stores.numbers(connection)
+    assert one.values().tobytes() == sent["torque_nm"].tobytes()
+    kept = channels.values_of(held)
+    assert list(kept) == list(sent)
+    assert all(kept[name].tobytes() == column.tobytes() for name, column in sent.items())
+    assert 0 < sizes["oil_temperature_c"] < channels.MOST_INLINE  # a short one stays in the database
+    assert (sizes["torque_nm"] > channels.MOST_INLINE) == (place == DATABASE)
+    assert numbers == ({} if place == DATABASE else {place: (3, 3)})
+
+
+def test_a_column_that_is_damaged_or_missing_in_its_store_is_named(database: Database, raw_address: str) -> None:
+    run_key = store_long_run(database, raw_address, columns(7, 50_000))
+    with database.reading() as connection:
+        one = channels.stored(connection, run_key, "torque_nm")
+    assert one.blob is not None
+    store = open_store(raw_address)
+    whole = store.get(one.blob)
+    store.put(one.blob, whole[:-1])
+    with pytest.raises(DamagedData, match=f"channel torque_nm of run {run_key}: the blob {one.blob} in .* is damaged"):
+        one.values()
+    store.delete(one.blob)
+    with pytest.raises(DamagedData, match=f"channel torque_nm of run {run_key}: there is no blob {one.blob}"):
+        one.values()
+    store.put(one.blob, whole)
+    assert one.values().size == 50_000
+
+
+def test_short_columns_go_to_no_store_and_ask_for_none(database: Database, in_folder: str) -> None:
+    raw_records.use(database, in_folder)
+    short = channels.encoded(columns(1, channels.MOST_INLINE // 16))
+    assert not short.is_long
+    assert stored_runs.placed(database, short).columns == short.columns
+    assert list(open_store(in_folder).names()) == []

@@ -26,6 +26,13 @@ def serve(
     processes: Annotated[
         int, typer.Option(min=1, help="How many services answer at the port, of one database on a PostgreSQL server")
     ] = 1,
+    raw: Annotated[
+        str | None,
+        typer.Option(
+            envvar="CLUTCHLIFE_RAW",
+            help="Where long raw records go: database, folder:///path or s3://bucket/prefix; else where they went before",
+        ),
+    ] = None,
     insecure_local: Annotated[
         bool, typer.Option("--insecure-local", help="Without keys, answer also what a proxy on this machine passes on")
     ] = False,
@@ -42,7 +49,7 @@ def serve(
     from service.settings import Settings  # start-up time
     from storage.engine.postgresql.connect import is_on_server  # start-up time
 
-    given = {"insecure_local": insecure_local or None, "log_level": log_level}
+    given = {"insecure_local": insecure_local or None, "log_level": log_level, "raw": raw}
     with errors_in_a_line():
         settings = Settings.from_environment(database, **{name: value for name, value in given.items() if value})
         configure(settings.log_format, settings.log_level)
@@ -80,14 +87,17 @@ def _allowed(host: str, settings: "Settings") -> str:
     """
     from service.readers.confinement import missing  # start-up time
     from service.web.auth import is_loopback  # start-up time
+    from service.workflows import raw_records  # start-up time
     from storage import keys  # start-up time
     from storage.engine.opening import open_database, service_lock  # start-up time
 
     with service_lock(settings.database):
         pass  # a second service ends here with a line; the application holds the lock from its start to its end
-    with closing(open_database(settings.database)) as opened, opened.reading() as connection:
-        has_keys = keys.any_ever(connection)
-        opens = keys.any_active(connection, datetime.now(UTC).isoformat(timespec="seconds"))
+    with closing(open_database(settings.database)) as opened:
+        raw_records.use(opened, settings.raw)
+        with opened.reading() as connection:
+            has_keys = keys.any_ever(connection)
+            opens = keys.any_active(connection, datetime.now(UTC).isoformat(timespec="seconds"))
     make = "make one with: clutchlife key create --scope admin"
     if has_keys and not opens:
         start.warning("all keys are revoked or expired, so every request is refused; %s", make)

@@ -29,7 +29,8 @@ def check_runs(database: Database, clutch_id: str) -> CheckedRuns:
 def _finding(database: Database, row: RunRow) -> str | None:
     try:
         with database.reading() as connection:
-            sent = incoming(row, channels.read(connection, row.run_key))
+            columns = channels.all_stored(connection, row.run_key)
+        sent = incoming(row, channels.values_of(columns))
     except DamagedData as error:
         return f"run {row.run_id} is damaged: {error}"
     sha256 = content_hash(

@@ -12,22 +12,26 @@ from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, insert
 
-from storage import clutches, diagnoses, runs, tables
+from storage import channels, clutches, diagnoses, runs, tables
 from storage.encoding.json_text import to_text
 from storage.engine.database import Database
 from storage.engine.errors import DatabaseTooNew, StorageUnavailable
+from storage.engine.integrity import other_schema
 from storage.engine.opening import open_database
 from storage.migrations import upgrade as migrations
 from storage.tables import metadata
+from tests.storage.engine.postgresql.server import PostgresServer
 from tests.storage.samples import (
     OLD,
     child,
     clutch_row,
+    columns,
     integrity,
     new_diagnosis,
     new_run,
     old_database,
     revision,
+    store_run,
 )
 
 CLUTCH = "bench3-017"
@@ -226,3 +230,30 @@ def test_a_migration_that_is_tried_again_replaces_no_copy(tmp_path: Path, monkey
 
 def test_a_new_file_needs_no_copy(database: Database) -> None:
     assert list(database.path.parent.glob("*-before-*")) == []
+
+
+def test_a_server_of_an_earlier_release_is_brought_up(postgresql: PostgresServer) -> None:
+    """The first revision that PostgreSQL had, with a run; its channels stay in the database."""
+    url = postgresql.fresh()
+    with closing(open_database(url)) as old, old.writing() as connection:
+        clutches.insert(connection, clutch_row())
+        run_key = store_run(connection, 1)
+        for statement in (
+            "DROP INDEX channel_in_store",
+            "ALTER TABLE channel DROP COLUMN blob, DROP COLUMN store_key",
+            "DROP TABLE raw_removal",
+            "DROP TABLE raw_store",
+            "UPDATE alembic_version SET version_num = 's0007_inspections'",
+        ):
+            connection.exec_driver_sql(statement)
+    with closing(open_database(url)) as new, new.reading() as connection:
+        assert migrations.current(connection) == migrations.head()
+        assert other_schema(connection) == []
+        kept = channels.read(connection, run_key)
+        assert all(kept[name].tobytes() == column.tobytes() for name, column in columns(1).items())
+        collations = connection.exec_driver_sql(
+            "SELECT count(*) FROM information_schema.columns WHERE collation_name = 'C' "
+            "AND (table_name, column_name) IN (('channel', 'blob'), ('raw_store', 'address'), ('raw_removal', 'blob'))"
+        ).scalar_one()
+        assert collations == 3
+    postgresql.drop(url)

@@ -1,0 +1,160 @@
+"""The stores that hold raw records beside the database, which of them is in use, and which of their blobs are removed.
+
+A blob is put into its store before the row that names it is written, and may be the same as one that nothing names and that
+is being removed. So what is removed is noted first, by number: who has put a blob looks, in the transaction that names it,
+for a removal of that name since before it was put (`are_kept`).
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import sqlalchemy as sa
+from sqlalchemy import Connection, Row, bindparam, func, select, update
+
+from storage.dialects import WHOLE, among, upsert
+from storage.encoding.json_text import to_text
+from storage.tables import channel, raw_removal, raw_store
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RawStore:
+    """A store by its address; `mark` is this database's, `removals` how many batches were removed from it."""
+
+    store_key: int
+    address: str
+    mark: str
+    in_use: bool
+    removals: int
+
+
+_all = select(raw_store).order_by(raw_store.c.store_key)
+_in_use = select(raw_store).where(raw_store.c.in_use == 1)
+_insert = sa.insert(raw_store)
+_of_store = bindparam("of_store", type_=WHOLE)
+_named = (
+    select(channel.c.blob)
+    .where(channel.c.store_key == _of_store, channel.c.blob.is_not(None), among(channel.c.blob, "of_names"))
+    .distinct()
+)
+_all_named = (
+    select(channel.c.blob)
+    .where(channel.c.store_key == _of_store, channel.c.blob.is_not(None), channel.c.blob > bindparam("after"))
+    .distinct()
+    .order_by(channel.c.blob)
+    .limit(bindparam("most"))
+)
+_numbers = (
+    select(raw_store.c.address, func.count(), func.count(channel.c.blob.distinct()))
+    .join(channel, channel.c.store_key == raw_store.c.store_key)
+    .where(channel.c.blob.is_not(None))
+    .group_by(raw_store.c.address)
+    .order_by(raw_store.c.address)
+)
+_one_more = update(raw_store).where(raw_store.c.store_key == _of_store).values(removals=raw_store.c.removals + 1)
+_removals = select(raw_store.c.removals).where(raw_store.c.store_key == _of_store)
+_address = select(raw_store.c.address).where(raw_store.c.store_key == _of_store)
+_mark = upsert(raw_removal)
+_finish = (
+    update(raw_removal)
+    .where(raw_removal.c.store_key == _of_store, among(raw_removal.c.blob, "of_names"))
+    .values(finished=1)
+)
+_interrupted = select(raw_removal.c.blob).where(
+    raw_removal.c.store_key == _of_store, raw_removal.c.finished == 0, raw_removal.c.at < bindparam("before")
+)
+_forget = sa.delete(raw_removal).where(
+    raw_removal.c.store_key == _of_store, raw_removal.c.finished == 1, raw_removal.c.at < bindparam("before")
+)
+_removed_since = (
+    select(func.count())
+    .select_from(raw_removal)
+    .where(
+        raw_removal.c.store_key == _of_store,
+        among(raw_removal.c.blob, "of_names"),
+        sa.or_(raw_removal.c.finished == 0, raw_removal.c.number > bindparam("since")),
+    )
+)
+
+
+def all_of(connection: Connection) -> list[RawStore]:
+    """All stores that ever were in use, the first first."""
+    return [_row(row) for row in connection.execute(_all)]
+
+
+def in_use(connection: Connection) -> RawStore | None:
+    """The store that long columns of new runs go to, None where they go into the database."""
+    row = connection.execute(_in_use).first()
+    return None if row is None else _row(row)
+
+
+def add(connection: Connection, address: str, mark: str) -> None:
+    """A store that is not in use yet. Raises IntegrityError where its address is known."""
+    connection.execute(_insert, {"address": address, "mark": mark})
+
+
+def use(connection: Connection, address: str | None) -> None:
+    """Have new runs go to the store of that address, into the database where it is None."""
+    connection.execute(update(raw_store).values(in_use=0))
+    if address is not None:
+        connection.execute(update(raw_store).where(raw_store.c.address == address).values(in_use=1))
+
+
+def set_address(connection: Connection, store_key: int, address: str) -> None:
+    """Look for a store's blobs at another address. Raises IntegrityError where that is known."""
+    connection.execute(update(raw_store).where(raw_store.c.store_key == store_key).values(address=address))
+
+
+def numbers(connection: Connection) -> dict[str, tuple[int, int]]:
+    """address -> how many columns are there, and how many blobs they are."""
+    return {address: (columns, blobs) for address, columns, blobs in connection.execute(_numbers)}
+
+
+def named(connection: Connection, store_key: int, names: Iterable[str]) -> set[str]:
+    """Those of the names that a row has in the store."""
+    return set(connection.execute(_named, {"of_store": store_key, "of_names": to_text(list(names))}).scalars())
+
+
+def all_named(connection: Connection, store_key: int, *, after: str, most: int) -> list[str]:
+    """The names that rows have in the store, in order, at most so many behind `after`."""
+    values = {"of_store": store_key, "after": after, "most": most}
+    return list(connection.execute(_all_named, values).scalars())
+
+
+def mark_removed(connection: Connection, store_key: int, names: Sequence[str], *, at: float) -> list[str]:
+    """Note that those of the names which no row has are being removed from `at` on [s since 1970]; which these are."""
+    taken = named(connection, store_key, names)
+    unnamed = [name for name in names if name not in taken]
+    if unnamed:
+        connection.execute(_one_more, {"of_store": store_key})
+        number = connection.execute(_removals, {"of_store": store_key}).scalar_one()
+        row = {"store_key": store_key, "number": number, "at": at, "finished": 0}
+        connection.execute(_mark[connection.dialect.name], [row | {"blob": name} for name in unnamed])
+    return unnamed
+
+
+def finish_removal(connection: Connection, store_key: int, names: Sequence[str]) -> None:
+    """Note that these have been removed."""
+    connection.execute(_finish, {"of_store": store_key, "of_names": to_text(list(names))})
+
+
+def interrupted_removals(connection: Connection, store_key: int, *, before: float) -> list[str]:
+    """Names whose removal began before that time [s since 1970] and was not finished."""
+    return list(connection.execute(_interrupted, {"of_store": store_key, "before": before}).scalars())
+
+
+def forget_removals(connection: Connection, store_key: int, *, before: float) -> None:
+    """Forget finished removals from before that time [s since 1970], which no run on its way can be hit by any more."""
+    connection.execute(_forget, {"of_store": store_key, "before": before})
+
+
+def are_kept(connection: Connection, store: RawStore, names: Iterable[str]) -> bool:
+    """Whether what was put into the store since `store` was read is there: not removed, nor the store at another address."""
+    values = {"of_store": store.store_key, "of_names": to_text(list(names)), "since": store.removals}
+    removed = connection.execute(_removed_since, values).scalar_one()
+    address = connection.execute(_address, {"of_store": store.store_key}).scalar_one()
+    return not removed and address == store.address
+
+
+def _row(row: Row[tuple[object, ...]]) -> RawStore:
+    values = row._asdict()
+    return RawStore(**values | {"in_use": bool(values["in_use"])})
