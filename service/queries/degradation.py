@@ -62,7 +62,7 @@ def degradation(
         measured = measured_lives.measured_life(connection, state, chosen)
     head = {"clutch_id": clutch_id, "revision": state.revision, "method": method, "life": chosen.item()}
     if measured is None or (wanted is None and not measured.life.reference):
-        nothing = {"items": [], "rebuilt": None, "severity_estimate": None, "warnings": []}
+        nothing: dict[str, Any] = {"items": [], "rebuilt": None, "severity_estimate": None, "warnings": []}
         return head | nothing | chosen.assumptions.named() | {"next": None}
     estimate = None
     if wanted is None:
