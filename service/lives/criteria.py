@@ -24,6 +24,14 @@ MOST_LEVELS = 100
 PREDICTION_DRAWS = 1000
 #: A prediction warns where the probability of eq. 6 is below this [-]. Chosen: odds of ten to one.
 EQ_6_DOUBTED = 0.1
+#: Exponents of a cycle's work that are weighed by the tests of one life [-]. Chosen: none, and from less than in proportion
+#: to the cube; no table.
+SEVERITY_EXPONENTS = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0)
+#: They are weighed where the largest work of a cycle is more than so many times the smallest [-]. Chosen: a tenth more work
+#: changes ζ by a tenth at exponent 1; no table.
+VARIED_WORK = 1.1
+#: An exponent in force is doubted where its probability is below this [-]. Chosen: odds of ten to one.
+SEVERITY_DOUBTED = 0.1
 #: Draws behind a trajectory's band [-], and the lattice of the exact filter behind it (nodes, rows, levels).
 #: Chosen; no table.
 TRAJECTORY_DRAWS, TRAJECTORY_LATTICE = 400, (13, 13, 7)

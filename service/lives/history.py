@@ -269,15 +269,14 @@ def moment_of(started_at: str | None, received_at: str) -> float:
 def pooled_value(reference: ByPressure, values: ByPressure) -> Value | None:
     """Mean over the reference pressures; for a pressure that is missing the rest stands, scaled as in the reference."""
     if values.keys() == reference.keys():
-        matched, scale = dict(values), 1.0
+        matched, scale = values, 1.0
     else:
         matched = {level: value for level in reference if (value := nearest(level, values)) is not None}
         scale = _mean(reference, reference) / _mean(reference, matched) if matched else 1.0
     if not matched:
         return None
-    mean = _mean(matched, matched) * scale
-    deviation = math.hypot(*(sd for _, sd in matched.values())) / len(matched) * scale
-    return mean, deviation
+    means, deviations = zip(*matched.values(), strict=True)
+    return math.fsum(means) / len(means) * scale, math.hypot(*deviations) / len(means) * scale
 
 
 def _mean(values: ByPressure, levels: ByPressure) -> float:

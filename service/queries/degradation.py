@@ -16,6 +16,7 @@ from models.prognosis.first_passage import paths as track_paths
 from models.prognosis.from_parameters import CofPaths, Disagreement, disagreement, far_apart, mean_cof_paths
 from service import measured_lives, records
 from service.lives.assumptions import ALL_PRESSURES, Assumptions
+from service.lives.criteria import SEVERITY_EXPONENTS
 from service.lives.history import Series, reference_velocities
 from service.lives.payloads import notice_items
 from service.lives.quantities.chosen_life import chosen_life
@@ -25,6 +26,7 @@ from service.lives.quantities.measured import MeasuredLife
 from service.lives.quantities.names import QUANTITIES, Family, Quantity, quantity_named
 from service.lives.quantities.parameters import Track, parameter_tracks, posterior_of
 from service.lives.run_analysis import Notice
+from service.lives.severity_estimate import SeverityEstimate, severity_estimate
 from service.lives.tracks import offset_of, step_rng
 from storage.engine.database import Database
 
@@ -60,12 +62,21 @@ def degradation(
         measured = measured_lives.measured_life(connection, state, chosen)
     head = {"clutch_id": clutch_id, "revision": state.revision, "method": method, "life": chosen.item()}
     if measured is None or (wanted is None and not measured.life.reference):
-        return head | {"items": [], "rebuilt": None, "warnings": []} | chosen.assumptions.named() | {"next": None}
+        nothing: dict[str, Any] = {"items": [], "rebuilt": None, "severity_estimate": None, "warnings": []}
+        return head | nothing | chosen.assumptions.named() | {"next": None}
+    estimate = None
     if wanted is None:
         items, again = _all(measured, method, draws)
+        estimate = severity_estimate(measured.life, measured.assumptions)
     else:
         items, again = _items(measured, wanted, method, draws), None
-    answered = {"items": items, "rebuilt": again, "warnings": notice_items(_disagreements(again))}
+    doubted = [] if estimate is None else estimate.doubts(measured.assumptions.severity)
+    answered = {
+        "items": items,
+        "rebuilt": again,
+        "severity_estimate": _severity_item(estimate),
+        "warnings": notice_items([*_disagreements(again), *doubted]),
+    }
     return head | answered | chosen.assumptions.named() | {"next": None}
 
 
@@ -165,6 +176,19 @@ def _from_parameters(
         rng=step_rng(measured.clutch_id, "rebuilt", series, len(series.measurements)),
     )
     return None if paths is None else _payload(paths, direct[ALL_PRESSURES], measured.assumptions, measured.fraction)
+
+
+def _severity_item(estimate: SeverityEstimate | None) -> dict[str, Any] | None:
+    """The exponents of severity with their probabilities, in the public shape."""
+    if estimate is None:
+        return None
+    return {
+        "basis": estimate.basis.value,
+        "exponents": list(SEVERITY_EXPONENTS),
+        "probabilities": estimate.probability.tolist(),
+        "value": estimate.mean,
+        "sd": estimate.deviation,
+    }
 
 
 def _disagreements(payload: Mapping[str, Any] | None) -> list[Notice]:

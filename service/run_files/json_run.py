@@ -86,7 +86,7 @@ def _cut(value: Any) -> Any:
     if isinstance(value, dict):
         return {name[:_MOST_SHOWN]: _cut(item) for name, item in value.items()}
     if isinstance(value, list):
-        return [_cut(item) for item in value[:_MOST_SHOWN]]
+        return [item if type(item) is float else _cut(item) for item in value[:_MOST_SHOWN]]
     return value[: LONGEST_NOTE + 1] if isinstance(value, str) else value
 
 

@@ -88,6 +88,18 @@ class Rebuilt(Answer):
     disagreement: Disagreement = Field(description="How far it is from the direct track")
 
 
+class SeverityWeighed(Answer):
+    """By which power of its work a duty cycle ages this clutch, by the tests of one life whose duty varies."""
+
+    basis: str = Field(description="The work: `dissipated_energy` or `sliding_distance`")
+    exponents: list[float] = Field(
+        description="The exponents that were weighed; 0: cycles age alike whatever their work"
+    )
+    probabilities: list[float] = Field(description="How probable each of them is")
+    value: float = Field(description="Their mean")
+    sd: float = Field(description="Their standard deviation")
+
+
 class Degradation(Answer):
     """Eq. 6 for every Stribeck parameter and for mean COF, or the track of one quantity."""
 
@@ -97,6 +109,10 @@ class Degradation(Answer):
     life: LifeNumber = Field(description="The life that the tracks are of")
     items: list[DegradationItem] = Field(description="The quantities of this page, by pressure")
     rebuilt: Rebuilt | None = Field(description="COF from the parameters; null with too few tests")
+    severity_estimate: SeverityWeighed | None = Field(
+        description="The exponent of severity as the tests of this life have it; null where its duty states no work or "
+        "hardly varies, with too few tests, and where one quantity was asked for"
+    )
     warnings: list[Warned] = Field(description="Warnings, such as tracks that disagree")
     model: Model
     prior: Prior

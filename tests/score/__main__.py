@@ -12,6 +12,7 @@ from tests.score import off_prior, on_prior, paper
 from tests.score.after_end import after_end
 from tests.score.belief import belief
 from tests.score.fleets import fleets
+from tests.score.severity import severity
 from tests.score.table import written
 
 
@@ -39,6 +40,7 @@ def main() -> None:
         "slopes": lambda: paper.slopes(lives(200), seed + 9),
         "shudder": lambda: paper.shudder(lives(500), seed + 10),
         "lag": lambda: paper.lag(lives(200), seed + 11),
+        "severity": lambda: severity(lives(80), seed + 12),
         "after": lambda: after_end(lives(100), seed + 8),
     }
     for name in chosen.parts or parts:

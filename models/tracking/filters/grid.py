@@ -55,11 +55,12 @@ class GridState:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Laid:
     """The kinds of history that count, the grid's frame, and the posterior's mass [kinds, levels, rows, nodes] on it,
-    summing to one."""
+    summing to one. `log_evidence` is the log probability of everything measured, up to a constant of the prior."""
 
     kinds: Kinds
     frame: Frame
     mass: FloatArray
+    log_evidence: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,8 +100,10 @@ class Grid:
         frame = frame.resized(self.rows, self.levels)
         table = lattice.tabled(frame, self.nodes, history, kinds.course)
         density = lattice.log_density(prior, history, kinds, frame, table)
-        mass = np.exp(density - density.max()) * frame.cells(self.nodes)[:, None, :, None]
-        return Laid(kinds=kinds, frame=frame, mass=mass / mass.sum())
+        top = density.max()
+        mass = np.exp(density - top) * frame.cells(self.nodes)[:, None, :, None]
+        total = mass.sum()
+        return Laid(kinds=kinds, frame=frame, mass=mass / total, log_evidence=float(top + np.log(total)))
 
     def posterior(self, state: GridState, size: int, rng: np.random.Generator) -> Posterior:
         """`size` draws: systematic over the cells, evenly spread within them, weighted by the exact density."""

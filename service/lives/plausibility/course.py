@@ -25,6 +25,13 @@ from service.lives.plausibility import criteria
 _GRID = np.array(
     [(scale, bend, scatter) for scale in criteria.SCALES for bend in criteria.BENDS for scatter in criteria.SCATTERS]
 )
+#: By rows a test that is as others are and one that is off: the log of its share, and its further variance.
+_FURTHER = np.array(
+    [
+        (math.log(1.0 - criteria.OUTLYING_SHARE), 0.0),
+        (math.log(criteria.OUTLYING_SHARE), criteria.OUTLYING_SD**2),
+    ]
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,11 +100,8 @@ class Predicted:
     def log_density(self, index: int, log_cof: float, spread: float) -> float:
         """log density of a test's log COF, whose own deviation is `spread`, at the cycles of that index."""
         off = (log_cof - self.mean[:, index]) ** 2
-        terms = []
-        for share, extra in ((1.0 - criteria.OUTLYING_SHARE, 0.0), (criteria.OUTLYING_SHARE, criteria.OUTLYING_SD**2)):
-            variance = self.variance[:, index] + spread**2 + extra
-            terms.append(math.log(share) + self.log_weight - 0.5 * (off / variance + np.log(2 * math.pi * variance)))
-        together = np.concatenate(terms)
+        variance = self.variance[:, index] + spread**2 + _FURTHER[:, 1:]
+        together = _FURTHER[:, :1] + self.log_weight - 0.5 * (off / variance + np.log(2 * math.pi * variance))
         most = float(together.max())
         return most + math.log(float(np.exp(together - most).sum()))
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
@@ -54,6 +55,13 @@ def test_energy_as_severity_predicts_the_recent_duty(client: TestClient) -> None
     low, high = (by_energy["remaining_cycles"][q] for q in ("0.05", "0.95"))
     assert low < true < high
     assert abs(by_energy["remaining_cycles"]["0.5"] - true) < abs(by_cycles["remaining_cycles"]["0.5"] - true)
+    # what the record counts is weighed against other exponents, and doubted where the tests contradict it
+    weighed = {name: client.get(f"/v1/clutches/{name}/degradation").json() for name in ("by-energy", "by-cycles")}
+    for name, answer in weighed.items():
+        estimate = answer["severity_estimate"]
+        assert estimate["basis"] == "dissipated_energy"
+        assert estimate["exponents"][int(np.argmax(estimate["probabilities"]))] == 1.0
+        assert ("severity_exponent" in {warning["code"] for warning in answer["warnings"]}) is (name == "by-cycles")
     # as it would have been said after the light blocks: cycles of light duty
     then = said(client, "by-energy", at_cycles=5000)
     assert then["remaining_cycles"]["0.5"] > 2.0 * by_energy["remaining_cycles"]["0.5"]
