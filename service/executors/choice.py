@@ -2,14 +2,13 @@
 
 import os
 
+from service.defaults import SCHEDULERS
 from service.executors.cluster import Cluster
 from service.executors.executor import Executor
 from service.executors.in_process import InProcess
 from service.executors.processes import Processes
 
 LOCAL, _POOL, _CLUSTER = "local", "processes", ("tcp://", "tls://")
-#: What `--help` says of the option.
-HELP = "local, processes[:N] on this machine, or tcp://host:port of a Dask scheduler"
 
 
 def executor_of(scheduler: str) -> Executor:
@@ -26,4 +25,4 @@ def executor_of(scheduler: str) -> Executor:
         return Processes(os.cpu_count() or 1)
     if kind == _POOL and count.isdecimal() and int(count) > 0:
         return Processes(int(count))
-    raise ValueError(f"the scheduler must be {HELP}, got {scheduler!r}")
+    raise ValueError(f"the scheduler must be {SCHEDULERS}, got {scheduler!r}")

@@ -57,7 +57,8 @@ class Cluster(Closing):
         except (OSError, TimeoutError, ValueError) as error:
             raise ExecutorUnavailableError(f"{address}: no Dask scheduler answers there ({error})") from error
         self._completed: Any = as_completed(loop=self._client.loop)  # type: ignore[no-untyped-call]
-        self._counted, self._threads = -_COUNT_SECONDS, 0
+        self._counted = -_COUNT_SECONDS
+        self._threads = 0
         try:
             self._require_workers()
         except BaseException:
