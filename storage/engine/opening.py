@@ -4,8 +4,10 @@ from contextlib import AbstractContextManager
 
 from storage.engine.database import Database
 from storage.engine.limits import LOCK_TIMEOUT
+from storage.engine.pending import refuse_pending
 from storage.engine.postgresql import service_lock as session_lock
 from storage.engine.postgresql.connect import address_of, is_on_server
+from storage.engine.postgresql.connect import shown as shown_server
 from storage.engine.postgresql.database import find_server, open_server, server_has_tables
 from storage.engine.sqlite import service_lock as file_lock
 from storage.engine.sqlite.connect import path_of
@@ -17,22 +19,43 @@ def open_database(url: str, *, lock_timeout: float = LOCK_TIMEOUT, serving: bool
 
     The file, or the tables of an empty database, is made, and the migrations that are missing are run.
 
-    `serving`: it is the service itself that opens it, and holds `service_lock`. Raises ValueError on another address, and
-    what `open_file` and `open_server` do.
+    `serving`: it is the service itself that opens it, and holds `service_lock`. Raises ValueError on another address,
+    UnfinishedMigration on the target of a migration that has not ended, and what `open_file` and `open_server` do.
     """
+    return _complete(_opened(url, lock_timeout=lock_timeout, serving=serving))
+
+
+def open_unfinished(url: str) -> Database:
+    """As `open_database`, the target of a migration too; the caller holds `service_lock`."""
+    return _opened(url, lock_timeout=LOCK_TIMEOUT, serving=True)
+
+
+def _opened(url: str, *, lock_timeout: float, serving: bool) -> Database:
     if is_on_server(url):
         return open_server(address_of(url), lock_timeout=lock_timeout, serving=serving)
     return open_file(path_of(url), lock_timeout=lock_timeout, serving=serving)
 
 
+def _complete(database: Database) -> Database:
+    """The database; closed and refused where it is incomplete."""
+    try:
+        with database.reading() as connection:
+            refuse_pending(connection)
+    except BaseException:
+        database.close()
+        raise
+    return database
+
+
 def find_database(url: str, *, lock_timeout: float = LOCK_TIMEOUT) -> Database:
     """Open a database to read it as it is, whatever its revision up to this code's; nothing is made or migrated.
 
-    Raises ValueError and DatabaseTooNew as `open_database` does, StorageUnavailable where there is none.
+    Raises ValueError, DatabaseTooNew and UnfinishedMigration as `open_database` does, and StorageUnavailable where there is
+    none.
     """
     if is_on_server(url):
-        return find_server(address_of(url), lock_timeout=lock_timeout)
-    return find_file(path_of(url), lock_timeout=lock_timeout)
+        return _complete(find_server(address_of(url), lock_timeout=lock_timeout))
+    return _complete(find_file(path_of(url), lock_timeout=lock_timeout))
 
 
 def database_exists(url: str) -> bool:
@@ -50,3 +73,8 @@ def service_lock(url: str) -> AbstractContextManager[None]:
     if is_on_server(url):
         return session_lock.service_lock(address_of(url))
     return file_lock.service_lock(path_of(url))
+
+
+def shown(url: str) -> str:
+    """The database as messages may name it, without a password."""
+    return shown_server(address_of(url)) if is_on_server(url) else f"the file {path_of(url).resolve()}"
