@@ -124,7 +124,7 @@ def test_a_killed_migration_goes_on_where_it_was_and_is_used_by_nobody_before(
     fill(in_file)
     batches = 4 * len(metadata.sorted_tables)
     for after in (1, 3, 4, batches // 2):
-        process = multiprocessing.get_context("spawn").Process(target=killed, args=(in_file, target, after))
+        process = multiprocessing.get_context("forkserver").Process(target=killed, args=(in_file, target, after))
         process.start()
         process.join()
         assert process.exitcode == -signal.SIGKILL
