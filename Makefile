@@ -13,7 +13,8 @@
 #              (ARGS="--seconds 60 --no-raw"; "--services 4 --database postgresql --rigs 16 --clients 40 --no-raw"); a few
 #              minutes, on a machine that does nothing else
 # make scale    requests and commands with 1,000 clutches of 200 tests in one file, beside 10: a table of docs/scale.md
-#              (ARGS="--clutches 10000 --states 5"); needs 7 GB of disk
+#              (ARGS="--clutches 10000 --states 5"); needs 7 GB of disk. python -m tests.scale.replay --clutches 300: a replay
+#              in one process, in a pool and on a Dask cluster of which a worker is killed
 # make plausibility  sends mistyped and honest runs: the tables of docs/plausibility.md  (SEED= CAMPAIGNS= HONEST= ARGS=--write)
 # make real    what is said of real measurements; make benchmark: how long things take; make picture: README's pictures;
 #              make figures: the figures of docs/

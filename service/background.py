@@ -3,6 +3,7 @@
 python -m service.background MODULE ...    runs a module so, what it imports and all
 """
 
+import multiprocessing
 import os
 import queue
 import runpy
@@ -54,6 +55,18 @@ def yield_to_others() -> None:
             os.nice(19)
     else:
         os.nice(19)
+
+
+def end_with_parent() -> None:
+    """Have this process end when the one that started it has, however that ended."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(3)
 
 
 def in_background(work: Callable[[AtOnce], Result]) -> Result:

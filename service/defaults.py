@@ -2,3 +2,5 @@
 
 DEFAULT_DATABASE = "sqlite:///clutchlife.db"
 DEFAULT_URL = "http://127.0.0.1:8000"
+#: What `--scheduler` takes, as its help and its error say.
+SCHEDULERS = "local, processes[:N] on this machine, or tcp://host:port of a Dask scheduler"

@@ -1,7 +1,7 @@
 """Stored runs as they were sent, each read in a transaction of its own when it is asked for, and all results of a clutch
 computed anew from them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,12 +11,13 @@ from sqlalchemy import Connection
 
 from service import records
 from service.errors import InvalidError, NotFoundError
-from service.lives.history import ByPressure, order
+from service.lives.history import ByPressure, Event, order
 from service.lives.incoming_run import IncomingRun
 from service.lives.model_correction import RunReader
 from service.lives.payloads import receipt
 from service.lives.recomputation import ClutchState, Levels, Receipt, Results, computed_anew, computed_aside
 from service.lives.run_analysis import Analysis, analyse
+from service.schemas.clutch import ClutchIn
 from service.settings import CODE_VERSION
 from storage import channels, results, runs
 from storage.blobs import raw_stores
@@ -65,6 +66,38 @@ def placed(database: Database, columns: channels.Encoded) -> channels.Encoded:
     return columns if store is None else columns.put(store)
 
 
+def _loaded_reader(database: Database, record: ClutchIn, rows: Sequence[RunRow]) -> RunReader:
+    """The same runs with their channels as they are stored, all in memory: needs no database any more."""
+    loaded = {}
+    for row in rows:
+        with database.reading() as connection:
+            columns = channels.all_stored(connection, row.run_key)
+        loaded[row.run_id] = tuple(column.loaded() for column in columns)
+    runs_loaded = _LoadedRuns(rows={row.run_id: row for row in rows}, channels=loaded)
+    return RunReader(
+        read=runs_loaded.read,
+        describe=runs_loaded.describe,
+        sampled=frozenset(run_id for run_id, own in loaded.items() if any(each.name == "time_s" for each in own)),
+        torque_filter=record.torque_filter,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _LoadedRuns:
+    """Runs of a clutch by run_id, with their channels not yet decoded."""
+
+    rows: Mapping[str, RunRow]
+    channels: Mapping[str, tuple[channels.Stored, ...]]
+
+    def read(self, run_id: str) -> IncomingRun:
+        """A run with its channels. Raises DamagedData."""
+        return incoming(self.rows[run_id], {each.name: each.values() for each in self.channels[run_id]})
+
+    def describe(self, run_id: str) -> IncomingRun:
+        """A run without its channels."""
+        return incoming(self.rows[run_id], {})
+
+
 def incoming(row: RunRow, columns: Mapping[str, NDArray[np.float64]]) -> IncomingRun:
     """A stored run as it came in."""
     return IncomingRun(
@@ -91,14 +124,32 @@ class Recomputed:
     results: Results
 
 
-def recomputed(database: Database, state: ClutchState) -> Recomputed:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recorded:
+    """All that a clutch's results are computed from: its state, its runs in the order of their arrival, those that are none
+    of the history, and their channels. Picklable where it was loaded whole."""
+
+    state: ClutchState
+    rows: tuple[RunRow, ...]
+    aside: Mapping[str, Event]
+    reader: RunReader
+
+
+def recorded(database: Database, state: ClutchState, *, whole: bool = False) -> Recorded:
+    """The clutch's runs as they are stored; `whole` with all channels in memory, else each is read when it is needed."""
+    with database.reading() as connection:
+        rows, aside = runs.page(connection, state.clutch_id), records.set_aside(connection, state.clutch_id)
+    reader = _loaded_reader(database, state.record, rows) if whole else run_reader(database, state.clutch_id)
+    reader = replace(reader, torque_filter=state.record.torque_filter)
+    return Recorded(state=state, rows=tuple(rows), aside=aside, reader=reader)
+
+
+def recomputed(recorded: Recorded) -> Recomputed:
     """Every run of a clutch analysed anew, under the state's record, and all that follows.
 
     Raises InvalidError where this code refuses a run that is stored, DamagedData where its channels are damaged.
     """
-    with database.reading() as connection:
-        rows, aside = runs.page(connection, state.clutch_id), records.set_aside(connection, state.clutch_id)
-    reader = replace(run_reader(database, state.clutch_id), torque_filter=state.record.torque_filter)
+    state, rows, aside, reader = recorded.state, recorded.rows, recorded.aside, recorded.reader
     details, receipts, levels = {}, {}, {}
     measured: dict[str, dict[str, Any]] = {}
     for row in rows:

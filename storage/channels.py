@@ -134,6 +134,10 @@ class Stored:
             return self.data
         return fetched(open_store(self.address), self.blob)
 
+    def loaded(self) -> "Stored":
+        """The same with its bytes, wherever they lay: what is computed elsewhere needs no store. Raises as `values` does."""
+        return replace(self, data=self.encoded(), blob=None, address=None)
+
     def values(self) -> NDArray[np.float64]:
         """The channel [length]. Raises DamagedData, and RawStoreUnavailable where the store cannot be reached."""
         try:

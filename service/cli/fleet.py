@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.options import DATABASE, Database, existing, out, read_only
+from service.cli.options import DATABASE, Database, Scheduler, err, executor, existing, out, read_only
 
 if TYPE_CHECKING:
     from service.background import AtOnce
@@ -32,20 +32,21 @@ def show(context: typer.Context, database: Database = DATABASE) -> None:
 @app.command()
 def refresh(
     database: Database = DATABASE,
+    scheduler: Scheduler = "local",
     quiet: Annotated[bool, typer.Option("--quiet", help="Print changes only")] = False,
 ) -> None:
     """Learn every kind's prior anew, and update the predictions of clutches whose prior has changed."""
     from service.background import in_background  # start-up time
+    from service.executors.progress import progress  # start-up time
 
     def learn(at_once: "AtOnce") -> "tuple[Refreshed, list[dict[str, Any]]]":
         from service.queries.fleet_priors import newest  # start-up time, in the background
         from service.workflows.learn_fleet import refresh as learn_priors  # start-up time, in the background
 
-        return learn_priors(opened, now=datetime.now(UTC).isoformat(timespec="seconds"), at_once=at_once), newest(
-            opened
-        )
+        now = datetime.now(UTC).isoformat(timespec="seconds")
+        return learn_priors(opened, now=now, at_once=at_once, executor=computing, advance=advance), newest(opened)
 
-    with existing(database) as opened:
+    with existing(database) as opened, executor(scheduler) as computing, progress(err, "learning") as advance:
         done, priors = in_background(learn)
     for item in priors:
         new = item["kind"] in done.kinds

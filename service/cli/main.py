@@ -6,7 +6,7 @@ from service.cli import diagnose, export, fleet, inspections, key, model, score,
 from service.cli.answers import degradation, engagement, life, loops
 from service.cli.changes import clutch_changes, run_changes, trail
 from service.cli.changes import runs as run_list
-from service.cli.database import backup, raw, replay, restore, verify
+from service.cli.database import backup, migrate, raw, replay, restore, verify
 from service.cli.demo import demo
 from service.cli.sending import push, spool_commands
 from service.cli.serving import serve
@@ -43,6 +43,7 @@ app.command()(score.score)
 app.command()(replay.replay)
 app.command()(backup.backup)
 app.command()(verify.verify)
+app.command()(migrate.migrate)
 app.add_typer(spool_commands.app, name="spool")
 app.add_typer(key.app, name="key")
 app.add_typer(raw.app, name="raw")

@@ -9,11 +9,12 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from service.defaults import DEFAULT_DATABASE, DEFAULT_URL
+from service.defaults import DEFAULT_DATABASE, DEFAULT_URL, SCHEDULERS
 from service.errors import NotFoundError
 from storage.engine.errors import StorageError
 
 if TYPE_CHECKING:
+    from service.executors.executor import Executor
     from storage.engine.database import Database as Opened
 
 #: Exit codes of sysexits.h: the input is wrong, the service is away (try again later), the call is wrong.
@@ -37,6 +38,8 @@ Patience = Annotated[float, typer.Option(min=0, help="Seconds to keep trying whi
 Seed = Annotated[int, typer.Option(min=0, help="The simulated clutch and its noise; the same seed, the same bits")]
 
 Json = Annotated[bool, typer.Option("--json", help="As the service answers it")]
+
+Scheduler = Annotated[str, typer.Option("--scheduler", help=f"Where it is computed: {SCHEDULERS}")]
 
 DATABASE, URL = DEFAULT_DATABASE, DEFAULT_URL
 
@@ -74,6 +77,20 @@ def read_only(url: str) -> Iterator["Opened"]:
         require_database(url)
         with closing(find_database(url)) as opened:
             yield opened
+
+
+@contextmanager
+def executor(scheduler: str) -> Iterator["Executor"]:
+    """The executor of an option, closed at the end; that it cannot be used ends the command with a line."""
+    from service.executors.choice import executor_of  # start-up time: few commands compute
+    from service.executors.executor import ExecutorUnavailableError  # start-up time: few commands compute
+
+    with errors_in_a_line():
+        try:
+            with executor_of(scheduler) as made:
+                yield made
+        except ExecutorUnavailableError as error:
+            fail(str(error), EX_TEMPFAIL)
 
 
 def require_database(url: str) -> None:

@@ -2,7 +2,6 @@
 
 import gc
 import importlib
-import multiprocessing
 import os
 import signal
 import threading
@@ -10,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from service import logging
-from service.background import use_one_blas_thread, yield_to_others
+from service.background import end_with_parent, use_one_blas_thread, yield_to_others
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 
@@ -36,7 +35,7 @@ def begin(database_url: str, nice: int | None, log: tuple[logging.LogFormat, log
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _end_later)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
-    threading.Thread(target=_end_with_the_service, daemon=True).start()
+    end_with_parent()
     if nice is None:
         yield_to_others()
     else:
@@ -62,10 +61,3 @@ def _end_later(*_: object) -> None:
     last = threading.Timer(_LAST_SECONDS, os._exit, (3,))
     last.daemon = True
     last.start()
-
-
-def _end_with_the_service() -> None:
-    service = multiprocessing.parent_process()
-    if service is not None:
-        service.join()
-        os._exit(3)

@@ -74,7 +74,7 @@ def _results(database: Database, before: ClutchIn, record: ClutchIn) -> Results 
         state = records.state(connection, record.clutch_id, edited=record)
         levels, receipts = records.levels(connection, record.clutch_id), records.receipts(connection, record.clutch_id)
     if (record.geometry, record.torque_filter) != (before.geometry, before.torque_filter):
-        return stored_runs.recomputed(database, state)
+        return stored_runs.recomputed(stored_runs.recorded(database, state))
     reader = stored_runs.run_reader(database, record.clutch_id)
     tests = reader.stationary_tests(state.lives[-1]) if state.events else iter(())
     evaluated = stationary_tests_of(state.events)

@@ -4,9 +4,8 @@ No clutch is tracked under what was learned from itself: for each clutch that ta
 large fleet, there is the same version learned from the others.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from enum import Enum
 
 import numpy as np
 
@@ -16,11 +15,14 @@ from models.prognosis.fleet import Taught, population, taught
 from models.prognosis.scoring import measured_end
 from service import records
 from service.background import AtOnce, directly
+from service.executors.executor import Executor
+from service.executors.in_process import InProcess
+from service.executors.rounds import Ended, Ending, in_rounds
 from service.lives.assumptions import ALL_PRESSURES, Assumptions, kind_of
 from service.lives.criteria import MOST_ATTEMPTS
 from service.lives.history import Life
 from service.lives.payloads import warned_anew
-from service.lives.recomputation import ClutchState, Results, track
+from service.lives.recomputation import ClutchState, Receipt, Results, track
 from service.lives.tracks import CARRIED, offset_of
 from service.settings import CODE_VERSION
 from storage import assumptions, clutches, results
@@ -66,35 +68,55 @@ class Refreshed:
     left: tuple[str, ...]
 
 
-class _Outcome(Enum):
-    """How a clutch stands after a refresh."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Tracked:
+    """What a clutch's tracks are computed anew from."""
 
-    UP_TO_DATE = "its predictions are by the newest prior"
-    CHANGED = "they have been made anew"
-    LEFT = "they are to be made anew: runs came while they were"
+    state: ClutchState
+    receipts: Mapping[str, Receipt]
 
 
-def refresh(database: Database, *, now: str, at_once: AtOnce = directly) -> Refreshed:
-    """Learn every fleet's prior anew; one that differs is a new version, and tracks are made anew. Stored by `at_once`."""
+def refresh(
+    database: Database,
+    *,
+    now: str,
+    at_once: AtOnce = directly,
+    executor: Executor | None = None,
+    advance: Callable[[], object] = lambda: None,
+) -> Refreshed:
+    """Learn every fleet's prior anew; one that differs is a new version, and tracks are made anew. Stored by `at_once`.
+
+    Computed by the executor, None: in this process. `advance` is called twice for every clutch: as it has taught, and as its
+    tracks are up to date.
+    """
+    executor = InProcess() if executor is None else executor
     fleets: dict[str, Fleet] = {}
     with database.reading() as connection:
         names = clutches.all_ids(connection)
-    for clutch_id in names:
-        kind, lessons = _lessons(database, clutch_id)
+    taught_by = executor.map(lessons_of, (_state(database, clutch_id) for clutch_id in names))
+    for clutch_id, outcome in zip(names, taught_by, strict=True):
+        kind, lessons = outcome.value()
         if lessons:
             fleets.setdefault(to_text(kind), Fleet(kind=kind)).lessons[clutch_id] = lessons
-    fresh = [fleet.kind for fleet in fleets.values() if _stored_anew(database, fleet, now, at_once)]
-    brought_up = {clutch_id: _brought_up(database, clutch_id, at_once) for clutch_id in names}
-    return Refreshed(
-        kinds=tuple(fresh),
-        changed=tuple(clutch_id for clutch_id, outcome in brought_up.items() if outcome is _Outcome.CHANGED),
-        left=tuple(clutch_id for clutch_id, outcome in brought_up.items() if outcome is _Outcome.LEFT),
-    )
+        advance()
+    fresh = [fleet.kind for fleet in fleets.values() if _stored_anew(database, fleet, now, at_once, executor)]
+    ended = []
+    for clutch in _brought_up(database, names, at_once, executor):
+        if clutch.error is not None:
+            raise clutch.error
+        ended.append(clutch)
+        advance()
+    by_ending = {ending: tuple(sorted(clutch.name for clutch in ended if clutch.ending is ending)) for ending in Ending}
+    return Refreshed(kinds=tuple(fresh), changed=by_ending[Ending.STORED], left=by_ending[Ending.LEFT])
 
 
-def _lessons(database: Database, clutch_id: str) -> tuple[Json, list[Lesson]]:
+def _state(database: Database, clutch_id: str) -> ClutchState:
     with database.reading() as connection:
-        state = records.state(connection, clutch_id)
+        return records.state(connection, clutch_id)
+
+
+def lessons_of(state: ClutchState) -> tuple[Json, list[Lesson]]:
+    """A clutch's kind, and what each of its lives teaches."""
     assumptions = state.assumptions()
     lessons = [_lesson(life, assumptions, state.fraction) for life in state.lives]
     kind = kind_of(state.record, assumptions.severity)
@@ -127,15 +149,15 @@ def _lesson(life: Life, assumptions: Assumptions, fraction: float) -> Lesson | N
     return Lesson(taught=lesson, ended=replace(ended.in_unit(1.0 / unit), energy=done / worked if worked else None))
 
 
-def _stored_anew(database: Database, fleet: Fleet, now: str, at_once: AtOnce) -> bool:
+def _stored_anew(database: Database, fleet: Fleet, now: str, at_once: AtOnce, executor: Executor) -> bool:
     """Store a fleet's prior and what it is without each of its clutches, where it is not what is stored already."""
-    learned = fleet.without()
+    (learned,) = executor.map(learned_without, [(fleet, ())])
     with database.reading() as connection:
         stored = assumptions.current_fleet_prior(connection, fleet.kind)
-    if learned is None or (stored is not None and stored.content == learned):
+    if learned.value() is None or (stored is not None and stored.content == learned.value()):
         return False
     version = 1 if stored is None else stored.version + 1
-    rows = _versions(fleet, version, now)
+    rows = _versions(fleet, learned.value(), version, now, executor)
 
     def store() -> bool:
         with database.writing() as connection:
@@ -150,10 +172,18 @@ def _stored_anew(database: Database, fleet: Fleet, now: str, at_once: AtOnce) ->
     return at_once(store)
 
 
-def _versions(fleet: Fleet, version: int, now: str) -> Sequence[FleetPriorRow]:
+def learned_without(of: tuple[Fleet, Collection[str]]) -> Json | None:
+    """What a fleet has taught without some of its clutches."""
+    fleet, left_out = of
+    return fleet.without(left_out)
+
+
+def _versions(fleet: Fleet, whole: Json | None, version: int, now: str, executor: Executor) -> Sequence[FleetPriorRow]:
     """The prior of all clutches, and of all but each one or group of them, as they are stored."""
     members = tuple(sorted(fleet.lessons))
-    priors = {NOBODY: fleet.without()} | {group[0]: fleet.without(group) for group in assumptions.groups(members)}
+    groups = assumptions.groups(members)
+    learned = executor.map(learned_without, ((fleet, group) for group in groups))
+    priors = {NOBODY: whole} | {group[0]: prior.value() for group, prior in zip(groups, learned, strict=True)}
     return [
         FleetPriorRow(
             fleet=fleet.kind,
@@ -169,21 +199,29 @@ def _versions(fleet: Fleet, version: int, now: str) -> Sequence[FleetPriorRow]:
     ]
 
 
-def _brought_up(database: Database, clutch_id: str, at_once: AtOnce) -> _Outcome:
-    """Track a clutch anew where its stored predictions were made under another prior."""
-    for _ in range(MOST_ATTEMPTS):
+def _brought_up(
+    database: Database, names: Sequence[str], at_once: AtOnce, executor: Executor
+) -> Iterator[Ended[Results]]:
+    """Track clutches anew where their stored predictions were made under another prior."""
+
+    def load(clutch_id: str) -> _Tracked | None:
         with database.reading() as connection:
             state = records.state(connection, clutch_id, newest_prior=True)
             last = results.prediction_at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)
-        if last is None or last.payload.get("prior") == dict(state.assumptions().prior.name):
-            return _Outcome.UP_TO_DATE
-        with database.reading() as connection:
-            receipts = records.receipts(connection, clutch_id)
-        tracking = track(state)
-        retracked = Results(tracking=tracking, receipts=warned_anew(state.lives, tracking.warnings, receipts))
-        if at_once(_replaced, database, state, retracked):
-            return _Outcome.CHANGED
-    return _Outcome.LEFT
+            if last is None or last.payload.get("prior") == dict(state.assumptions().prior.name):
+                return None
+            return _Tracked(state=state, receipts=records.receipts(connection, clutch_id))
+
+    def store(tracked: _Tracked, retracked: Results) -> bool:
+        return at_once(_replaced, database, tracked.state, retracked)
+
+    return in_rounds(executor, names, load=load, compute=_retracked, store=store, rounds=MOST_ATTEMPTS)
+
+
+def _retracked(tracked: _Tracked) -> Results:
+    """A clutch's tracks anew."""
+    state, tracking = tracked.state, track(tracked.state)
+    return Results(tracking=tracking, receipts=warned_anew(state.lives, tracking.warnings, tracked.receipts))
 
 
 def _replaced(database: Database, state: ClutchState, results: Results) -> bool:

@@ -1,12 +1,28 @@
-"""Results are recomputed from the raw runs, which are never changed."""
+"""Results are recomputed from the raw runs, which are never changed: loaded, computed by a pure function, stored."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from service import records, stored_runs
 from service.background import AtOnce, directly
-from service.errors import BusyError
+from service.errors import BusyError, ServiceError
+from service.executors.executor import Executor, WorkerLostError
+from service.executors.in_process import InProcess
+from service.executors.rounds import Ending, in_rounds
 from service.lives.criteria import MOST_ATTEMPTS
-from service.lives.recomputation import ClutchState
+from service.stored_runs import Recomputed, Recorded
 from storage import clutches
 from storage.engine.database import Database
+from storage.engine.errors import DamagedData
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Replayed:
+    """What became of a clutch: how many runs were computed anew, or why it keeps the results that it had."""
+
+    clutch_id: str
+    runs: int = 0
+    error: Exception | None = None
 
 
 def clutch_ids(database: Database) -> list[str]:
@@ -15,28 +31,54 @@ def clutch_ids(database: Database) -> list[str]:
         return clutches.all_ids(connection)
 
 
-def replay_clutch(database: Database, clutch_id: str, at_once: AtOnce = directly) -> int:
-    """Fit and track all runs of a clutch anew; returns how many. Raises NotFoundError, and BusyError where runs came at each
-    of MOST_ATTEMPTS.
+def replay(
+    database: Database, clutch_ids: Sequence[str], executor: Executor, at_once: AtOnce = directly
+) -> Iterator[Replayed]:
+    """Fit and track all runs of these clutches anew; each as it ends. Stored by `at_once`.
 
-    The revision moves on only where a result has changed. Stored by `at_once`.
+    A clutch of which runs came at each of MOST_ATTEMPTS has a BusyError; errors that are nobody's data are raised. The
+    revision moves on only where a result has changed.
     """
-    for _ in range(MOST_ATTEMPTS):
+
+    def load(clutch_id: str) -> Recorded:
         with database.reading() as connection:
             state = records.state(connection, clutch_id)
-        replayed = stored_runs.recomputed(database, state)
-        if at_once(_replaced, database, state, replayed):
-            return len(replayed.receipts)
-    raise BusyError(
-        f"left as it was: runs came each of the {MOST_ATTEMPTS} times that it was computed anew; replay it when fewer come"
-    )
+        return stored_runs.recorded(database, state, whole=executor.elsewhere)
+
+    def store(recorded: Recorded, computed: Recomputed) -> bool:
+        return at_once(_replaced, database, recorded, computed)
+
+    for ended in in_rounds(
+        executor, clutch_ids, load=load, compute=stored_runs.recomputed, store=store, rounds=MOST_ATTEMPTS
+    ):
+        if ended.ending is Ending.LEFT:
+            yield Replayed(clutch_id=ended.name, error=BusyError(_LEFT))
+        elif ended.error is None:
+            yield Replayed(clutch_id=ended.name, runs=0 if ended.result is None else len(ended.result.receipts))
+        elif isinstance(ended.error, (ServiceError, DamagedData, WorkerLostError)):
+            yield Replayed(clutch_id=ended.name, error=ended.error)
+        else:
+            raise ended.error
 
 
-def _replaced(database: Database, state: ClutchState, replayed: stored_runs.Recomputed) -> bool:
+def replay_clutch(database: Database, clutch_id: str) -> int:
+    """Replay one clutch in this process; returns how many runs it has. Raises NotFoundError and what `replay` gives."""
+    (replayed,) = replay(database, [clutch_id], InProcess())
+    if replayed.error is not None:
+        raise replayed.error
+    return replayed.runs
+
+
+_LEFT = (
+    f"left as it was: runs came each of the {MOST_ATTEMPTS} times that it was computed anew; replay it when fewer come"
+)
+
+
+def _replaced(database: Database, recorded: Recorded, replayed: Recomputed) -> bool:
     """Store a clutch's results where its revision still is that of the state they follow from; whether it was."""
-    clutch_id = state.clutch_id
+    clutch_id = recorded.state.clutch_id
     with database.writing() as connection:
-        unchanged = records.unchanged(connection, clutch_id, state.revision)
+        unchanged = records.unchanged(connection, clutch_id, recorded.state.revision)
         if unchanged:
             before = records.answers(connection, clutch_id)
             stored_runs.store_recomputed(connection, clutch_id, replayed)

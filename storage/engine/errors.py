@@ -30,6 +30,14 @@ class ServiceRuns(StorageError):
     """A service uses the database."""
 
 
+class UnfinishedMigration(StorageError):
+    """The database holds the beginning of another's content."""
+
+
+class TargetInUse(StorageError):
+    """The target of a migration holds something else."""
+
+
 class UnstorableText(StorageError):
     """Text holds a character that the database does not have."""
 

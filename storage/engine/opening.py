@@ -4,8 +4,11 @@ from contextlib import AbstractContextManager, nullcontext
 
 from storage.engine.database import Database
 from storage.engine.limits import LOCK_TIMEOUT
+from storage.engine.pending import refuse_pending
 from storage.engine.postgresql.connect import address_of, is_on_server
+from storage.engine.postgresql.connect import shown as shown_server
 from storage.engine.postgresql.database import find_server, open_server, server_has_tables
+from storage.engine.postgresql.locks import migration_lock
 from storage.engine.sqlite import service_lock as file_lock
 from storage.engine.sqlite.connect import path_of
 from storage.engine.sqlite.database import find_file, open_file
@@ -18,21 +21,43 @@ def open_database(url: str, *, lock_timeout: float = LOCK_TIMEOUT, serving: bool
 
     `serving`: it is a service that opens it, inside `service_lock`; nobody migrates the database under it.
 
-    Raises ValueError on another address, and what `open_file` and `open_server` do.
+    Raises ValueError on another address, UnfinishedMigration on the target of a migration that has not ended, and what
+    `open_file` and `open_server` do.
     """
+    return _complete(_opened(url, lock_timeout=lock_timeout, serving=serving))
+
+
+def open_unfinished(url: str) -> Database:
+    """As `open_database`, the target of a migration too; inside `sole_use`."""
+    return _opened(url, lock_timeout=LOCK_TIMEOUT, serving=not is_on_server(url))
+
+
+def _opened(url: str, *, lock_timeout: float, serving: bool) -> Database:
     if is_on_server(url):
         return open_server(address_of(url), lock_timeout=lock_timeout, serving=serving)
     return open_file(path_of(url), lock_timeout=lock_timeout, serving=serving)
 
 
+def _complete(database: Database) -> Database:
+    """The database; closed and refused where it is incomplete."""
+    try:
+        with database.reading() as connection:
+            refuse_pending(connection)
+    except BaseException:
+        database.close()
+        raise
+    return database
+
+
 def find_database(url: str, *, lock_timeout: float = LOCK_TIMEOUT) -> Database:
     """Open a database to read it as it is, whatever its revision up to this code's; nothing is made or migrated.
 
-    Raises ValueError and DatabaseTooNew as `open_database` does, StorageUnavailable where there is none.
+    Raises ValueError, DatabaseTooNew and UnfinishedMigration as `open_database` does, and StorageUnavailable where there is
+    none.
     """
     if is_on_server(url):
-        return find_server(address_of(url), lock_timeout=lock_timeout)
-    return find_file(path_of(url), lock_timeout=lock_timeout)
+        return _complete(find_server(address_of(url), lock_timeout=lock_timeout))
+    return _complete(find_file(path_of(url), lock_timeout=lock_timeout))
 
 
 def database_exists(url: str) -> bool:
@@ -54,3 +79,13 @@ def service_lock(url: str) -> AbstractContextManager[None]:
     if is_on_server(url):
         return nullcontext()
     return file_lock.service_lock(path_of(url))
+
+
+def sole_use(url: str) -> AbstractContextManager[None]:
+    """Held inside: no service uses the database, nor starts to. Raises ServiceRuns where one does."""
+    return migration_lock(address_of(url), LOCK_TIMEOUT) if is_on_server(url) else service_lock(url)
+
+
+def shown(url: str) -> str:
+    """The database as messages may name it, without a password."""
+    return shown_server(address_of(url)) if is_on_server(url) else f"the file {path_of(url).resolve()}"

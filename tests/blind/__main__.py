@@ -2,17 +2,21 @@
 
 SEED=  another seed, other campaigns          SIZE=   small, full, or a share of the full table
 ONLY=  rows whose names begin with these (lives: remaining life)    PROCESSES= how many at once (2)
+ARGS="--scheduler WHERE": local, processes[:N], or tcp://host:port of a Dask scheduler whose workers can import these tests
 ARGS=--write puts the table into docs/diagnosis.md, ARGS=--failures lists what went wrong with the line that repeats it
 """
 
-import multiprocessing
 import os
 import sys
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
+from rich.console import Console
+
+from service.executors.choice import executor_of
+from service.executors.executor import Executor
+from service.executors.progress import progress
 from tests.blind import lives, table
 from tests.blind.rows import trials
 from tests.blind.trials import Outcome, judge
@@ -25,15 +29,14 @@ DOCUMENT = Path(__file__).parents[2] / "docs" / "diagnosis.md"
 BEGIN, END = "<!-- blind tests: begin -->", "<!-- blind tests: end -->"
 
 
-def run(work: Callable[[Job], Result], chosen: Sequence[Job], processes: int) -> list[Result]:
-    """All of it, in as many processes, in its order; a word on the way to whoever waits."""
-    results, reported = [], time.monotonic()
-    with multiprocessing.get_context("spawn").Pool(processes, initializer=os.nice, initargs=(10,)) as pool:
-        for done, result in enumerate(pool.imap(work, chosen), start=1):
-            results.append(result)
-            if time.monotonic() - reported > 20:
-                reported = time.monotonic()
-                print(f"{done} of {len(chosen)} {work.__name__}", file=sys.stderr, flush=True)
+def run(work: Callable[[Job], Result], chosen: Sequence[Job], executor: Executor) -> list[Result]:
+    """All of it, in its order."""
+    results = []
+    with progress(Console(stderr=True), work.__name__) as advance:
+        advance(0, total=len(chosen))
+        for outcome in executor.map(work, chosen):
+            results.append(outcome.value())
+            advance()
     return results
 
 
@@ -65,15 +68,21 @@ def write(lines: Sequence[str]) -> None:
     DOCUMENT.write_text(f"{before}{BEGIN}\n\n" + "\n".join(lines) + f"\n{END}{after}", encoding="utf-8")
 
 
+def scheduler(arguments: Sequence[str]) -> str | None:
+    """What follows `--scheduler`."""
+    return arguments[arguments.index("--scheduler") + 1] if "--scheduler" in arguments else None
+
+
 def main() -> None:
     """Print the table."""
     seed, chosen_size = int(os.environ.get("SEED") or 1), os.environ.get("SIZE") or "small"
     only = tuple((os.environ.get("ONLY") or "").split(","))
     size = SIZES[chosen_size] if chosen_size in SIZES else float(chosen_size)
     chosen = [trial for trial in trials(seed, size) if trial.row.startswith(only)]
-    processes = int(os.environ.get("PROCESSES") or 2)
-    outcomes = run(judge, chosen, processes)
-    lived = run(lives.lived, lives.jobs(seed, size) if "lives".startswith(only) else [], processes)
+    processes = os.environ.get("PROCESSES") or "2"
+    with executor_of(scheduler(sys.argv) or f"processes:{processes}") as executor:
+        outcomes = run(judge, chosen, executor)
+        lived = run(lives.lived, lives.jobs(seed, size) if "lives".startswith(only) else [], executor)
     lines = document(outcomes, lived, f"make blind SEED={seed} SIZE={chosen_size}")
     print("\n".join(lines))
     if "--failures" in sys.argv:

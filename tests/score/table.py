@@ -2,7 +2,9 @@
 
 import math
 import re
+import time
 from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -70,6 +72,12 @@ class Scores:
     def histogram(self, name: str, stages: tuple[float, ...]) -> str:
         pits = np.concatenate([self.column(name, stage, "pit") for stage in stages])
         return "/".join(f"{100 * share:.0f}" for share in pit_histogram(pits.tolist()))
+
+
+def timed(part: Callable[[], str]) -> tuple[str, float]:
+    """A part's table, and how long it took [s]."""
+    start = time.monotonic()
+    return part(), time.monotonic() - start
 
 
 def percents(numbers: list[float]) -> str:

@@ -93,7 +93,7 @@ from service.workflows import replay
 from storage import clutches
 from tests.storage.samples import clutch_row
 
-def compute(*_):
+def compute(*_, **__):
     print("computes", flush=True)
     while True:
         np.linalg.svd(np.ones((200, 200)))
@@ -104,7 +104,7 @@ def store(database):
         print("stores", flush=True)
         time.sleep(60)
 
-replay.replay_clutch = {"computes": compute, "stores": lambda database, _, at_once: at_once(store, database)}[sys.argv[1]]
+replay.replay = {"computes": compute, "stores": lambda database, *_, at_once: at_once(store, database)}[sys.argv[1]]
 from service.cli.main import app
 app(["replay", "c1", "--database", sys.argv[2]])
 """

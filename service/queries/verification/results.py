@@ -44,7 +44,7 @@ def check_results(database: Database, clutch_id: str) -> CheckedResults:
             state = records.state(connection, clutch_id)
             stored = _stored(connection, clutch_id)
         try:
-            anew = _anew(stored_runs.recomputed(database, state))
+            anew = _anew(stored_runs.recomputed(stored_runs.recorded(database, state)))
         except (InvalidError, DamagedData) as error:
             return CheckedResults(findings=(f"{clutch_id}: results cannot be computed anew: {error}",), earlier={})
         with database.reading() as connection:

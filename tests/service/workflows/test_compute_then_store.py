@@ -16,7 +16,6 @@ from service import stored_runs
 from service.cli.main import app
 from service.lives import model_correction, recomputation, run_analysis, tracks
 from service.lives.criteria import MOST_ATTEMPTS
-from service.lives.recomputation import ClutchState
 from service.queries import degradation
 from service.queries.cache import to_json
 from service.run_files.json_run import read_run
@@ -189,9 +188,9 @@ def test_a_replay_beside_a_rig_that_never_rests_ends_and_says_why(
     attempts = []
     recomputed = stored_runs.recomputed
 
-    def overtaken(opened: Database, state: ClutchState) -> stored_runs.Recomputed:
-        made = recomputed(opened, state)
-        if state.clutch_id == "c1":
+    def overtaken(recorded: stored_runs.Recorded) -> stored_runs.Recomputed:
+        made = recomputed(recorded)
+        if recorded.state.clutch_id == "c1":
             attempts.append(post(database, 1000.0 * (len(attempts) + 1)))
             assert len(attempts) < 10
         return made

@@ -1,0 +1,45 @@
+"""How far work has come: a bar on a terminal, a line now and then elsewhere."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Protocol
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+#: [s] Between two lines where there is no terminal. Chosen: a log of a night stays a page.
+LINE_SECONDS = 20.0
+
+
+class Advance(Protocol):
+    """Called as an input is done with; a `total` is given once it is known."""
+
+    def __call__(self, count: int = 1, *, total: int | None = None) -> None:
+        """So many more are done."""
+
+
+@contextmanager
+def progress(console: Console, title: str) -> Iterator[Advance]:
+    """What is to be called as work goes on, shown on the console."""
+    if console.is_terminal:
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        with Progress(*columns, console=console, transient=True) as shown:
+            task = shown.add_task(title, total=None)
+
+            def advance_bar(count: int = 1, *, total: int | None = None) -> None:
+                shown.update(task, advance=count, total=total)
+
+            yield advance_bar
+        return
+    done, all_of, said = 0, None, time.monotonic()
+
+    def advance_line(count: int = 1, *, total: int | None = None) -> None:
+        nonlocal done, all_of, said
+        done, all_of = done + count, all_of if total is None else total
+        if time.monotonic() - said >= LINE_SECONDS:
+            said = time.monotonic()
+            of_all = "" if all_of is None else f" of {all_of}"
+            console.print(f"{title}: {done}{of_all}", markup=False, soft_wrap=True)
+
+    yield advance_line
