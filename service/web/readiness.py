@@ -16,7 +16,7 @@ from service.web.limits import LONGEST_LOOK_SECONDS, LONGEST_RAW_LOOK_SECONDS, R
 from storage.blobs import raw_stores
 from storage.blobs.opening import open_store
 from storage.engine.database import Database
-from storage.engine.errors import StorageError
+from storage.engine.errors import RawStoreUnavailable, StorageError
 
 #: What is looked at, in the order of the answer; `raw`, the store of raw records, is in it where it cannot be used.
 PARTS = ("database", "disk", "memory", "workers")
@@ -47,6 +47,7 @@ class Readiness:
         self._raw_thread = ThreadPoolExecutor(1, thread_name_prefix="raw records")
         self._raw: Future[str | None] | None = None
         self._look_again = 0.0
+        self._asking_store = False
         self._looking: asyncio.Future[dict[str, str]] | None = None
 
     async def faults(self) -> dict[str, str]:
@@ -81,17 +82,23 @@ class Readiness:
         try:
             return self._raw.result(LONGEST_RAW_LOOK_SECONDS)
         except TimeoutError:
+            if not self._asking_store:  # whoever holds the database does not make the store look away
+                return None
             return f"the store of raw records has not answered for {LONGEST_RAW_LOOK_SECONDS:g} s"
 
     def _look_at_raw_records(self) -> str | None:
         try:
             with self._database.reading() as connection:
                 store = raw_stores.in_use(connection)
+            self._asking_store = True
             if store is not None and open_store(store.address).mark() != store.mark:
                 return f"{store.address} is not marked as this database's"
-        except StorageError as error:
+        except RawStoreUnavailable as error:
             return str(error)
+        except StorageError:  # that of the database is said beside
+            return None
         finally:
+            self._asking_store = False
             self._look_again = time.monotonic() + RAW_LOOK_SECONDS
         return None
 

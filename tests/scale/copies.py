@@ -88,4 +88,6 @@ def _of_copy(column: sa.Column[Any], number: sa.Column[int], runs: int) -> sa.Co
         return sa.func.named(number)
     if column.name == _OF_RUN:
         return column + runs * number
+    if column is clutch.c.record:
+        return sa.func.json_set(column, f"$.{_OF_CLUTCH}", sa.func.named(number))
     return column + number if column is clutch.c.rank else column
