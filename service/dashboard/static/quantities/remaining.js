@@ -70,7 +70,7 @@ export class RemainingBy {
     this.name = "static_torque_nm";
     /** @type {number | undefined} bar; undefined: over all pressures, or the usual one */
     this.level = undefined;
-    this.asked = "";
+    this.request = "";
     this.revision = 0;
   }
 
@@ -85,8 +85,8 @@ export class RemainingBy {
   draw() {
     const levels = levelsAt(this.name, this.answers);
     const whole = this.name === "mean_cof";
-    const known = this.level !== undefined && levels.includes(this.level);
-    if (!known) this.level = whole ? undefined : usual(levels, undefined);
+    const chosen = this.level !== undefined && levels.includes(this.level);
+    if (!chosen) this.level = whole ? undefined : usual(levels, undefined);
     /** @type {[string, string][]} */
     const names = Object.entries(QUANTITIES).map(([name, { title }]) => [name, title]);
     const quantity = choice("Quantity", names, this.name, (name) => this.choose(name, this.level));
@@ -95,7 +95,9 @@ export class RemainingBy {
     const pressure = choice("Pressure", options, this.level ?? ALL, (level) =>
       this.choose(this.name, level === ALL ? undefined : Number(level)),
     );
-    const focused = [...this.controls.querySelectorAll("select")].findIndex((one) => one === document.activeElement);
+    const focused = [...this.controls.querySelectorAll("select")].findIndex(
+      (select) => select === document.activeElement,
+    );
     this.controls.replaceChildren(...(options.length > 0 ? [quantity, pressure] : [quantity]));
     this.controls.querySelectorAll("select")[focused]?.focus();
   }
@@ -116,17 +118,17 @@ export class RemainingBy {
     const place = this.level === undefined ? "" : `&pressure_bar=${this.level}`;
     const query = `quantity=${this.name}${place}`;
     const wanted = `${this.revision} ${query}`;
-    if (!this.details.open || wanted === this.asked) return;
-    this.asked = wanted;
+    if (!this.details.open || wanted === this.request) return;
+    this.request = wanted;
     this.answer.replaceChildren(h("p", { class: "quiet" }, "Being computed …"));
     try {
       /** @type {{ body: RemainingLife }} */
       const { body } = await read(`${this.address}?${query}`);
-      if (wanted === this.asked) this.answer.replaceChildren(remainingTable(body.criteria));
+      if (wanted === this.request) this.answer.replaceChildren(remainingTable(body.criteria));
     } catch (problem) {
       if (!(problem instanceof Problem)) throw problem;
-      if (wanted !== this.asked) return;
-      this.asked = ""; // it is asked for again when the clutch changes or another choice is made
+      if (wanted !== this.request) return;
+      this.request = ""; // it is asked for again when the clutch changes or another choice is made
       this.answer.replaceChildren(problemView(problem, "No prediction. "));
     }
   }
