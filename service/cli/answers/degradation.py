@@ -6,10 +6,22 @@ from typing import Annotated, Any
 import typer
 
 from service.cli.answers.request import Arguments, AtCycles, Csv, Method, answered, arguments_of
-from service.cli.answers.tables import number, pressure, show_table, warn, with_deviation
+from service.cli.answers.tables import number, place, pressure, show_table, warn, with_deviation
 from service.cli.options import URL, ClutchId, Json, Key, Patience, Url, out
 
-_COLUMNS = ("quantity", "bar", "initial", "change", "scale, cycles", "exponent", "P(eq. 6)")
+_COLUMNS = (
+    "quantity",
+    "bar",
+    "rpm",
+    "Hz",
+    "last",
+    "90 % band there",
+    "initial",
+    "change",
+    "scale, cycles",
+    "exponent",
+    "P(eq. 6)",
+)
 _COEFFICIENTS = ("initial", "change", "scale_cycles", "exponent")
 
 
@@ -45,6 +57,18 @@ def _row(item: Mapping[str, Any]) -> list[str]:
     return [
         item["quantity"],
         pressure(item["pressure_bar"]),
+        place(item["speed_rpm"]),
+        place(item["frequency_hz"]),
+        *_last(item),
         *shown,
         number(item["eq6_probability"], 2),
     ]
+
+
+def _last(item: Mapping[str, Any]) -> tuple[str, str]:
+    """The track at the last measurement: its median and its 90 % band."""
+    measured, band = item["measured"]["cycles"], item["trajectory"]
+    if not measured or band is None or not band["cycles"]:
+        return "-", "-"
+    near = min(range(len(band["cycles"])), key=lambda index: abs(band["cycles"][index] - measured[-1]))
+    return number(band["median"][near]), f"{number(band['lower'][near])} to {number(band['upper'][near])}"

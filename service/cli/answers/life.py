@@ -10,12 +10,14 @@ import typer
 
 from service.cli.answers import planned_duty
 from service.cli.answers.request import Arguments, AtCycles, Csv, Method, answered, arguments_of
-from service.cli.answers.tables import cycles, number, show_table, warn, with_deviation
+from service.cli.answers.tables import cycles, number, place, show_table, warn, with_deviation
+from service.cli.answers.tables import pressure as pressure_of
 from service.cli.connection import service_at
 from service.cli.options import EX_USAGE, URL, ClutchId, Json, Key, Patience, Url, fail, out
 
 #: Quantiles that fit a line; `--json` has all of them.
 _SHOWN = ("0.05", "0.25", "0.5", "0.75", "0.95")
+_CRITERIA = ("criterion", "bar", "rpm", "Hz", "now", "limit", "end, 5 %", "50 %", "95 %", "is the first")
 _STATUS = {
     "predicted": "predicted",
     "reached": "the end of life is reached",
@@ -31,6 +33,12 @@ def life(
         float | None, typer.Option(help="Line pressure, bar; left out, the mean over the pressures")
     ] = None,
     at_cycles: AtCycles = None,
+    quantity: Annotated[
+        str | None, typer.Option(help="By this quantity, as `slope`; left out, by what ends the clutch's life")
+    ] = None,
+    life_number: Annotated[
+        int | None, typer.Option("--life", help="Of an earlier life of a clutch that was rebuilt: 1 is the first")
+    ] = None,
     query: Arguments = None,
     plan: Annotated[Path | None, typer.Option(help="Planned duty: the forecast's request body as a JSON file")] = None,
     block: Annotated[
@@ -50,7 +58,9 @@ def life(
     patience: Patience = 10.0,
 ) -> None:
     """Show the duty cycles that remain until the end of life; with --plan or --block those under planned duty."""
-    arguments = arguments_of(query, method=method, pressure_bar=pressure, at_cycles=at_cycles)
+    arguments = arguments_of(
+        query, method=method, pressure_bar=pressure, at_cycles=at_cycles, quantity=quantity, life=life_number
+    )
     address = f"/v1/clutches/{clutch}/remaining-useful-life"
     answer: dict[str, Any] | None
     if plan is None and not block:
@@ -78,6 +88,9 @@ def show(answer: Mapping[str, Any]) -> None:
         out.print(line, markup=False, soft_wrap=True)
     rows = [(name, *(shown(quantity.get(q)) for q in _SHOWN)) for name, quantity, shown in _rows(answer)]
     show_table(["probability", *(f"{100 * float(q):g} %" for q in _SHOWN)], rows)
+    criteria = answer.get("criteria", [])
+    if len(criteria) > 1 or any(end["quantity"] != "mean_cof" for end in criteria):
+        show_table(_CRITERIA, map(_criterion, criteria))
     warn(answer["warnings"])
 
 
@@ -86,7 +99,7 @@ def _lines(answer: Mapping[str, Any]) -> Iterator[str]:
     if current.get("mean_cof") is not None:
         yield (
             f"mean COF {with_deviation(current['mean_cof'], current['mean_cof_sd'])}, "
-            f"{100 * current['fraction_of_initial']:.0f} % of new; the end of life is at {100 * criterion['fraction']:g} %"
+            f"{100 * current['fraction_of_initial']:.0f} % of new" + _threshold(criterion)
         )
     course = answer.get("course")
     described = "" if course is None else f", course {course['name']} (probability {number(course['probability'], 2)})"
@@ -100,6 +113,28 @@ def _lines(answer: Mapping[str, Any]) -> Iterator[str]:
     if severity:
         worth = ", ".join(number(value) for value in severity)
         yield f"a cycle of each block is worth {worth} cycles of recent duty"
+
+
+def _threshold(criterion: Mapping[str, Any]) -> str:
+    """Where the end of life is, of mean COF alone: others have a table of their own."""
+    if criterion["threshold_mean_cof"] is None or criterion["fraction"] is None:
+        return ""
+    return f"; the end of life is at {100 * criterion['fraction']:g} %"
+
+
+def _criterion(end: Mapping[str, Any]) -> list[str]:
+    """A criterion: what it is now, its limit, when that is reached, and how probably it is the first."""
+    first, current = end["probability_first"], end["current"]
+    return [
+        end["quantity"],
+        pressure_of(end["pressure_bar"]),
+        place(end["speed_rpm"]),
+        place(end["frequency_hz"]),
+        with_deviation(current["value"], current["sd"]),
+        number(end["limit"]),
+        *(cycles(end["end_of_life_cycles"][q]) for q in ("0.05", "0.5", "0.95")),
+        "-" if first is None else f"{100 * first:.0f} %",
+    ]
 
 
 def _rows(answer: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any], Any]]:

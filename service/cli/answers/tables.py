@@ -48,6 +48,11 @@ def pressure(value: float | None) -> str:
     return "mean" if value is None else f"{value:g}"
 
 
+def place(value: float | None) -> str:
+    """A speed or frequency; empty where the quantity has none of its own."""
+    return "" if value is None else f"{value:g}"
+
+
 def warn(warnings: Iterable[Mapping[str, Any]]) -> None:
     """The warnings of an answer, a line each."""
     for notice in warnings:

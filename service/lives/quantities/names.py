@@ -10,6 +10,7 @@ from service.lives.assumptions import ALL_PRESSURES, MEAN_COF
 from service.lives.engagements.over_life import ALL_INDICATORS
 from service.lives.history import Series
 from service.lives.payloads import PARAMETER_UNITS
+from service.schemas.prognosis.quantities import ALIASES
 
 
 class Family(StrEnum):
@@ -58,8 +59,11 @@ _BY_INTERNAL = {quantity.internal: quantity for quantity in QUANTITIES.values()}
 
 
 def quantity_named(name: str) -> Quantity:
-    """The quantity of a public name, or of a parameter's name without its unit. Raises InvalidError for any other."""
-    quantity = QUANTITIES.get(name) or _BY_INTERNAL.get(name)
+    """The quantity of a public name, of another name that criteria may have, or of a parameter's name without its unit.
+
+    Raises InvalidError for any other.
+    """
+    quantity = QUANTITIES.get(ALIASES.get(name, name)) or _BY_INTERNAL.get(name)
     if quantity is None:
         message = f"quantity must be one of {', '.join(QUANTITIES)}, got {name!r}"
         raise InvalidError(message, errors=[FieldError(pointer="/query/quantity", code="unknown", message=message)])

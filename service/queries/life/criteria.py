@@ -25,6 +25,8 @@ from storage.engine.database import Database
 
 #: Draws of the first of several ends.
 _DRAWS = 2_000
+#: What is said of mean COF's course and of its forecasts, where another quantity is asked for.
+_NOT_OF_MEAN_COF: dict[str, Any] = {"course": None, "back_cast": None, "ended_lives": 0, "sample": None}
 #: What a criterion says of itself.
 _GIVEN = ("quantity", "pressure_bar", "speed_rpm", "frequency_hz", "fraction", "below", "above")
 
@@ -57,6 +59,8 @@ def life_by_criteria(
     if measured is None:
         return answer
     wanted = _wanted(state.record.end_of_life, measured, quantity, criterion, pressure_bar)
+    if all(criterion_in.quantity != MEAN_COF for criterion_in in wanted):
+        answer |= _NOT_OF_MEAN_COF
     return answer | _answered(measured, [criterion_end(measured, criterion_in, method) for criterion_in in wanted])
 
 

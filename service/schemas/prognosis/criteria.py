@@ -6,10 +6,8 @@ from pydantic import Field, model_validator
 
 from service.schemas.base import PositiveNumber, Schema
 from service.schemas.limits import LARGEST_LIMIT, MOST_CRITERION_PRESSURE_BAR, MOST_SPEED_RPM
-from service.schemas.prognosis.quantities import LevelQuantity, LoopQuantity, QuantityName
+from service.schemas.prognosis.quantities import ALIASES, LevelQuantity, LoopQuantity, QuantityName
 
-#: Other names of two of them, as the criteria of a record may have them.
-_ALIASES = {"static_ratio": "breakaway_cof_ratio", "stop_time": "stop_time_s", "energy": "engagement_energy_kj"}
 _Value = Annotated[float, Field(ge=-LARGEST_LIMIT, le=LARGEST_LIMIT, allow_inf_nan=False, strict=True)]
 
 
@@ -37,7 +35,7 @@ class CriterionIn(Schema):
     def _has_a_limit(cls, given: Any) -> Any:
         """A slope's limit is 0, where friction begins to fall with speed, and mean COF's half of what it was."""
         if isinstance(given, dict) and isinstance(given.get("quantity"), str):
-            given = given | {"quantity": _ALIASES.get(given["quantity"], given["quantity"])}
+            given = given | {"quantity": ALIASES.get(given["quantity"], given["quantity"])}
         if not isinstance(given, dict) or any(given.get(name) is not None for name in ("fraction", "below", "above")):
             return given
         usual = {"slope": {"below": 0.0}, "mean_cof": {"fraction": 0.5}}

@@ -159,7 +159,8 @@ class RemainingLife(Answer):
         description="Probability that the threshold is reached by the horizon"
     )
     course: Course | None = Field(
-        default=None, description="The course that the tests speak for; null where nothing is predicted"
+        default=None,
+        description="The course of mean COF that the tests speak for; null without a prediction or a criterion on it",
     )
     back_cast: BackCastCount | None = Field(
         default=None, description="What earlier forecasts of this clutch said about the tests since"

@@ -20,6 +20,8 @@ EngagementQuantity = Literal[
     "euclidean_distance",
     "spectral_angle_rad",
 ]
+#: Other names of three of them, as a record's criteria and a query may have them.
+ALIASES = {"static_ratio": "breakaway_cof_ratio", "stop_time": "stop_time_s", "energy": "engagement_energy_kj"}
 #: Measured at a pressure level.
 LevelQuantity = Literal[ParameterQuantity, "slope", LoopQuantity]
 #: Tracked along a life.

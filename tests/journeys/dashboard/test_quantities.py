@@ -110,3 +110,37 @@ def test_curves_of_one_state_and_its_pressure_law(browser: Browser, life: Server
     law.locator("summary").click()
     expect(law.locator("tbody tr").filter(has_text="identified")).to_have_count(len(PRESSURES))
     watched.close()
+
+
+def test_remaining_life_by_any_quantity_and_pressure_is_chosen_on_the_page(browser: Browser, life: Server) -> None:
+    watched = Watched(browser, life.url)
+    page = watched.open("/clutches/bench")
+    assert asked(watched, "remaining-useful-life?quantity") == 0  # nothing is computed before it is opened
+    page.get_by_text("Remaining life by another quantity").click()
+    part = page.locator("#life .by-quantity")
+    quantity, pressure = (part.get_by_role("combobox", name=name) for name in ("Quantity", "Pressure"))
+    table = part.get_by_role("table", name="Remaining life by a quantity")
+    expect(table).to_contain_text("Static torque, 5.0 bar")
+    pressure.select_option("6.0 bar")
+    expect(table).to_contain_text("Static torque, 6.0 bar")
+    quantity.select_option("Film time")
+    expect(table).to_contain_text("Film time, 0.10 Hz, 5.0 bar")
+    quantity.select_option("Mean COF")
+    expect(pressure).to_contain_text("all pressures")
+    expect(table).to_contain_text("Mean COF")
+    assert violations(page) == []
+    quantity.select_option("Stop time")
+    expect(part.get_by_role("alert")).to_contain_text("stop_time_s is not measured in this life")
+    watched.said = [line for line in watched.said if "404" not in line]  # the browser notes the refusal
+    watched.close()
+
+
+def test_a_clutch_that_its_engagements_end_is_shown(browser: Browser, life: Server) -> None:
+    criteria = [{"quantity": "stop_time", "above": 1.5}, {"quantity": "static_ratio", "above": 1.3}]
+    record = {"clutch_id": "stopping", "end_of_life": {"criteria": criteria}}
+    assert ONCE.post(f"{life.url}/v1/clutches", json=record).status_code == 201
+    watched = Watched(browser, life.url)
+    page = watched.open("/clutches/stopping")
+    expect(page.locator("#head")).to_contain_text("Stop time (above 1.50 s)")
+    expect(page.locator("#head")).to_contain_text("Breakaway over midpoint COF (above 1.30)")
+    watched.close()

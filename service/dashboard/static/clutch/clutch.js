@@ -6,6 +6,7 @@
 import { Diagnosis } from "../diagnosis/diagnosis.js";
 import { Inspections } from "../inspections/inspections.js";
 import { criteriaTable } from "../quantities/criteria.js";
+import { RemainingBy } from "../quantities/remaining.js";
 import { sender } from "../sending/sending.js";
 import { clutchPath, Problem, read, readAll } from "../shared/api.js";
 import { byId, h, within } from "../shared/dom.js";
@@ -45,7 +46,7 @@ let due = true;
 let latest = null;
 /**
  * The page's parts, once there is something to put into them.
- * @type {{ board: Board, diagnosis: Diagnosis } | null}
+ * @type {{ board: Board, diagnosis: Diagnosis, remaining: RemainingBy } | null}
  */
 let parts = null;
 document.title = `${ID} · Clutchlife`;
@@ -107,6 +108,7 @@ async function refresh(clutch) {
   shown = { clutch, ...first, tests, loops, runs, events };
   store.showWarnings({ runs: stored, tests, warned });
   if (events.length > 0) board.life({ ...shown, ...first });
+  parts?.remaining.show(shown);
   await board.rest(shown);
   makeReport(byId("report"), shown, board, diagnosis.latest);
 }
@@ -180,8 +182,9 @@ function begin() {
   if (parts !== null) return parts;
   const board = new Board(ID, fileName, (section) => within(section, ".charts"));
   const diagnosis = new Diagnosis(within("diagnosis", ".body"), ID, fileName, () => live.now());
+  const remaining = new RemainingBy(within("life", ".by-quantity"), ID);
   new PlannedDuty(within("life", ".planning"), ID);
-  parts = { board, diagnosis };
+  parts = { board, diagnosis, remaining };
   return parts;
 }
 

@@ -80,7 +80,7 @@ function tiles(clutch, life, state) {
     tile(
       "Course",
       life.course ? COURSES[life.course.name] : "–",
-      small(life.course ? course(life.course) : "too few tests"),
+      small(life.course ? course(life.course) : life.runs_used > 2 ? "of mean COF only" : "too few tests"),
     ),
     tile("Model", words(model.name), small(effects)),
   ];

@@ -4,28 +4,11 @@
 import { column, CYCLES, digitsColumn, HALF_OF_90, KIND } from "../charts/columns.js";
 import { eventMarks } from "../charts/layout.js";
 import { errorBars, titled } from "../charts/traces.js";
+import { INDICATORS } from "../quantities/names.js";
 import { fixed, percent, significant } from "../shared/format.js";
 
 /** @import { ComparedEngagement, EngagementTrace, MeasuredEngagement, Receipt } from "../shared/types.js" */
 /** @import { Colours, PlainTrace, Spec } from "../charts/types.js" */
-
-/** The indicators by name: what it is, and its unit. */
-export const INDICATORS = {
-  stop_time_s: ["Stop time", "s"],
-  midpoint_cof: ["Midpoint COF", ""],
-  initial_cof: ["Initial COF", ""],
-  endpoint_cof: ["Endpoint COF", ""],
-  breakaway_cof: ["Breakaway COF", ""],
-  initial_cof_ratio: ["Initial over midpoint COF", ""],
-  endpoint_cof_ratio: ["Endpoint over midpoint COF", ""],
-  breakaway_cof_ratio: ["Breakaway over midpoint COF", ""],
-  torque_rise: ["Torque's rise at the end", ""],
-  engagement_energy_kj: ["Energy", "kJ"],
-  peak_power_kw: ["Peak power", "kW"],
-  normalised_duration: ["Duration over that of the first", ""],
-  euclidean_distance: ["Distance of speed from the first", ""],
-  spectral_angle_rad: ["Spectral angle from the first", "rad"],
-};
 
 /** The channels of a trace: what it is, and its unit. */
 export const CHANNELS = {

@@ -6,7 +6,8 @@
 import { Chart, choice, setControls } from "../charts/chart.js";
 import { clutchPath, Problem, read } from "../shared/api.js";
 import { fixed } from "../shared/format.js";
-import { CHANNELS, engagementTrace, indicatorOverLife, INDICATORS } from "./charts.js";
+import { INDICATORS } from "../quantities/names.js";
+import { CHANNELS, engagementTrace, indicatorOverLife } from "./charts.js";
 
 /** @import { EngagementOut, Receipt } from "../shared/types.js" */
 /** @import { Channel, Indicator } from "./charts.js" */

@@ -3,31 +3,20 @@
 
 import { h, scrolling, table } from "../shared/dom.js";
 import { cycles, fixed, interval, percent, probability, significant, withSd } from "../shared/format.js";
+import { QUANTITIES } from "./names.js";
 
 /** @import { CriterionIn, CriterionOutcome, RemainingLife } from "../shared/types.js" */
 
-/** @type {Record<string, { title: string, unit: string }>} */
-const QUANTITIES = {
-  mean_cof: { title: "Mean COF", unit: "" },
-  static_torque_nm: { title: "Static torque", unit: "Nm" },
-  coulomb_ratio: { title: "Coulomb ratio", unit: "" },
-  stribeck_velocity_m_s: { title: "Stribeck velocity", unit: "m/s" },
-  viscous_coefficient: { title: "Viscous coefficient", unit: "Nm/(m/s)⁰·³" },
-  slope: { title: "Slope dμ/dv", unit: "s/m" },
-  attractor: { title: "Attractor C", unit: "Nm/s" },
-  film_time: { title: "Film time", unit: "s" },
-  loop_area: { title: "Loop area", unit: "Nm·m/s" },
-};
-
-const COLUMNS = [
+/** What is known of one criterion by itself: the columns of `criterionRow`. */
+export const OWN_COLUMNS = [
   "Criterion",
   "Now",
   "Limit",
   "Reached at, cycles",
   "90 % interval",
   "Probability of reaching it",
-  "Probability of being the first",
 ];
+const COLUMNS = [...OWN_COLUMNS, "Probability of being the first"];
 
 /**
  * A quantity and where it is measured.
@@ -74,24 +63,29 @@ export function reachedText({
 }
 
 /**
+ * What is known of a criterion by itself.
+ * @param {CriterionOutcome} criterion
+ */
+export function criterionRow(criterion) {
+  const { current, end_of_life_cycles: end } = criterion;
+  const { unit } = QUANTITIES[criterion.quantity];
+  return [
+    placeText(criterion),
+    `${withSd(current.value, current.sd)}${unit && ` ${unit}`}`,
+    limitText(criterion),
+    end["0.5"] === null ? "–" : cycles(end["0.5"], end["0.05"], end["0.95"]),
+    interval(end),
+    probability(criterion.probability_of_reaching),
+  ];
+}
+
+/**
  * The criteria as a table; nothing where mean COF alone ends the life.
  * @param {RemainingLife} life
  */
 export function criteriaTable({ criteria }) {
   if (criteria.length === 0 || (criteria.length === 1 && criteria[0].quantity === "mean_cof")) return [];
-  const rows = criteria.map((criterion) => {
-    const { current, end_of_life_cycles: end } = criterion;
-    const { unit } = QUANTITIES[criterion.quantity];
-    return [
-      placeText(criterion),
-      `${withSd(current.value, current.sd)}${unit && ` ${unit}`}`,
-      limitText(criterion),
-      end["0.5"] === null ? "–" : cycles(end["0.5"], end["0.05"], end["0.95"]),
-      interval(end),
-      probability(criterion.probability_of_reaching),
-      probability(criterion.probability_first),
-    ];
-  });
+  const rows = criteria.map((criterion) => [...criterionRow(criterion), probability(criterion.probability_first)]);
   const style = { "margin-bottom": "16px" };
   const text = "The first to be reached ends the life. The charts of mean COF below show its own end.";
   return [

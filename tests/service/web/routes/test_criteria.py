@@ -61,6 +61,25 @@ def test_a_clutch_that_shudders_first_is_said_so(tested: TestClient) -> None:
     assert by_cof["end_of_life_cycles"] == cof["end_of_life_cycles"]
 
 
+def test_another_quantity_is_not_said_to_take_the_course_of_mean_cof(tested: TestClient) -> None:
+    whole = asked(tested, "remaining-useful-life")
+    assert whole["course"]["probability"] > 0.0
+    assert whole["back_cast"]["of"] > 0
+    alone = asked(tested, "remaining-useful-life", criterion="slope")
+    assert [alone[name] for name in ("course", "back_cast", "ended_lives", "sample")] == [None, None, 0, None]
+
+
+@pytest.mark.parametrize(
+    ("alias", "name"),
+    [("static_ratio", "breakaway_cof_ratio"), ("stop_time", "stop_time_s"), ("energy", "engagement_energy_kj")],
+)
+def test_a_query_takes_the_names_that_criteria_take(tested: TestClient, alias: str, name: str) -> None:
+    by_alias, by_name = (asked(tested, "degradation", quantity=quantity) for quantity in (alias, name))
+    assert by_alias["items"] == by_name["items"]
+    answer = tested.get("/v1/clutches/s/remaining-useful-life", params={"quantity": alias}, headers=WAIT)
+    assert answer.status_code == 200 or name in answer.json()["detail"]
+
+
 def test_mean_cof_alone_is_one_criterion_and_as_it_was(tested: TestClient) -> None:
     edit = {"end_of_life": {"cof_fraction": 0.5}, "reason": "shudder is looked at elsewhere"}
     assert tested.patch("/v1/clutches/s", json=edit).status_code == 200

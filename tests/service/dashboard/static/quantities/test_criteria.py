@@ -1,10 +1,11 @@
 """Criteria in words, and the remaining life that the charts of mean COF show whatever else ends a life."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 
+from service.schemas.prognosis.quantities import QuantityName
 from tests.browser.modules import Module
 
 pytestmark = pytest.mark.browser
@@ -13,6 +14,7 @@ NONE = {"0.05": None, "0.5": None, "0.95": None}
 PLACE = {"fraction": None, "below": None, "above": None, "pressure_bar": None, "speed_rpm": None, "frequency_hz": None}
 SLOPE = PLACE | {"quantity": "slope", "below": 0.0, "pressure_bar": 5.0, "speed_rpm": 100.0}
 MEAN_COF = PLACE | {"quantity": "mean_cof", "fraction": 0.5}
+STOP = PLACE | {"quantity": "stop_time_s", "above": 1.2}
 FILM = PLACE | {"quantity": "film_time", "above": 0.02, "pressure_bar": 4.0, "frequency_hz": 0.1}
 
 
@@ -33,6 +35,7 @@ def outcome(criterion: dict[str, Any], end: tuple[Any, Any, Any], now: float, **
     [
         (SLOPE, "Slope dμ/dv, 100 rpm, 5.0 bar", "below 0 s/m"),
         (MEAN_COF, "Mean COF", "50 % of new"),
+        (STOP, "Stop time", "above 1.20 s"),
         (FILM, "Film time, 0.10 Hz, 4.0 bar", "above 0.0200 s"),
     ],
 )
@@ -94,3 +97,10 @@ def test_criteria_are_listed_where_mean_cof_is_not_the_only_criterion(criteria: 
     assert criteria("criteriaTable", life(cof)) == []
     assert len(criteria("criteriaTable", life(slope))) > 0
     assert len(criteria("criteriaTable", life(cof, slope))) > 0
+
+
+@pytest.mark.parametrize("quantity", get_args(QuantityName))
+def test_every_quantity_that_may_end_a_life_has_a_title(criteria: Module, quantity: str) -> None:
+    given = outcome(PLACE | {"quantity": quantity, "above": 1.0}, (5500, 6000, 6500), 5000)
+    assert criteria("placeText", given) not in ("", quantity)
+    assert criteria("criterionRow", given)[3] == "6,000"
