@@ -5,6 +5,8 @@ MOST_CACHED_BYTES = 96 << 20
 #: Bytes of JSON from which a run waits among files, lest it hold up short ones. Chosen: plateaus take some 10 kB, a dynamic
 #: test 300.
 LARGE_BODY_BYTES = 1 << 17
+#: Bytes of any other body. Chosen: four times a plan of 1,000 blocks; checking the worst takes some 20 ms.
+MOST_SHORT_BODY_BYTES = 1 << 18
 #: Bytes of answers that are kept as they were while newer ones are computed. Chosen: some hundred `/degradation`.
 MOST_REVALIDATED_BYTES = 32 << 20
 #: Addresses whose answers are found again before the request is looked at. Chosen: a page asks for some twenty a clutch.

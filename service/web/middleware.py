@@ -26,6 +26,7 @@ from service.web.auth import UNMATCHED, authorise, caller_of, clutch_of, context
 from service.web.limits import (
     MOST_CALLERS,
     MOST_POLLED,
+    MOST_SHORT_BODY_BYTES,
     RETRY_AFTER_SECONDS,
     SAVED_SECONDS,
     SLOWEST_BODY_BYTES_PER_SECOND,
@@ -118,8 +119,12 @@ _UNLIMITED = ("/livez", "/readyz")
 
 
 class BodyLimit:
-    """Refuses a body over `most` bytes (a file over `most_file`) with 413, announced or grown so far, and one that takes
-    longer than `seconds`, and the time that its bytes so far may take, with 408."""
+    """Refuses a body over the bytes that its address allows with 413, announced or grown so far, and one that takes longer
+    than `seconds`, and the time that its bytes so far may take, with 408.
+
+    A run or a photograph may have `most` bytes, a file `most_file`; any other body is a short one, which the process that
+    answers reads itself.
+    """
 
     def __init__(self, app: ASGIApp, most: int, most_file: int, seconds: float) -> None:
         self.app = app
@@ -131,7 +136,7 @@ class BodyLimit:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        most = self.most_file if scope["path"].endswith("/runs/file") else self.most
+        most = self._most(scope["path"])
         detail = f"a request may hold at most {most} bytes here"
         announced = dict(scope["headers"]).get(b"content-length", b"0")
         if announced.isdigit() and int(announced) > most:
@@ -157,6 +162,11 @@ class BodyLimit:
             return message
 
         await self.app(scope, counted, send)
+
+    def _most(self, path: str) -> int:
+        if path.endswith("/runs/file"):
+            return self.most_file
+        return self.most if path.endswith(("/runs", "/photographs")) else min(self.most, MOST_SHORT_BODY_BYTES)
 
 
 class Heads:
