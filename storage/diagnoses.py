@@ -45,6 +45,7 @@ _NEW = tuple(field.name for field in fields(NewDiagnosis))
 _insert = sa.insert(diagnosis)
 _of_clutch = diagnosis.c.clutch_id == bindparam("of_clutch")
 _by_id = select(diagnosis).where(_of_clutch, diagnosis.c.diagnosis_id == bindparam("wanted"))
+_clutch_of = select(diagnosis.c.clutch_id).where(diagnosis.c.diagnosis_id == bindparam("wanted"))
 _newest = (
     select(diagnosis)
     .where(_of_clutch, diagnosis.c.diagnosis_key < bindparam("before", type_=Double))
@@ -90,6 +91,12 @@ def get(connection: Connection, clutch_id: str, diagnosis_id: str) -> DiagnosisR
     """The diagnosis, or None."""
     row = connection.execute(_by_id, {"of_clutch": clutch_id, "wanted": diagnosis_id}).first()
     return None if row is None else _row(row)
+
+
+def clutch_of(connection: Connection, diagnosis_id: str) -> str:
+    """The clutch that a stored diagnosis is of."""
+    clutch_id: str = connection.execute(_clutch_of, {"wanted": diagnosis_id}).scalar_one()
+    return clutch_id
 
 
 def page(connection: Connection, clutch_id: str, *, limit: int, before: float | None = None) -> list[DiagnosisRow]:

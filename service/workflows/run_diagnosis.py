@@ -4,7 +4,7 @@ import secrets
 from collections.abc import Mapping
 from typing import Any
 
-from service import records
+from service import records, stored_verdicts
 from service.lives.history import lives_of
 from service.settings import CODE_VERSION
 from storage import changes, diagnoses
@@ -50,6 +50,7 @@ def finish(database: Database, diagnosis_id: str, ended: Mapping[str, Any], *, a
             diagnoses.fail(connection, diagnosis_id, at, ended["problem"])
         else:
             diagnoses.finish(connection, diagnosis_id, at, ended["report"], ended["extension"])
+            stored_verdicts.note_dispute(connection, diagnoses.clutch_of(connection, diagnosis_id))
 
 
 def fail_running(database: Database, problem: str, *, at: str) -> None:
