@@ -16,7 +16,7 @@ from storage.diagnoses import FINISHED
 from tests.service.workflows.benches import AT, CLUTCH, EXTENSION, WHO, Bench, body, stood_in
 
 #: Sequences, the tests that each begins with, and its writes: with them all states are met, and each kind of write.
-SEEDS, FIRST, WRITES = range(4), 4, 16
+SEEDS, FIRST, WRITES = range(3), 4, 16
 VERDICTS = ("cause_named", "cause_ambiguous", "unexplained_structure", "model_adequate", "insufficient_data")
 DISAGREE = VERDICTS[:3]
 Item = TypeVar("Item")
