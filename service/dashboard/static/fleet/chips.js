@@ -43,7 +43,7 @@ export function drawChips(totals, only, choose) {
     ...names.map((name) => chip(name, STATES[name].word.toLowerCase())),
     chip("held", "with held runs"),
   ];
-  byId("chips").replaceChildren(...chips.filter((each) => each !== null));
+  byId("chips").replaceChildren(...chips.filter((element) => element !== null));
   const again = focused && chipOf(focused);
   if (again instanceof HTMLElement) again.focus();
 }

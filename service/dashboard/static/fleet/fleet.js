@@ -28,7 +28,7 @@ const ARCHIVED = /** @type {HTMLInputElement} */ (byId("archived"));
 let only = null;
 /** @type {FleetTotals | null} */
 let totals = null;
-/** The address of the list that is shown, "" where it must be shown anew. */
+/** The address of the list that is shown, "" where it must be shown again. */
 let shown = "";
 const rows = new Rows(() => live.now());
 

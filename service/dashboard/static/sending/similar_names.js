@@ -28,8 +28,8 @@ export async function registeredLike(text, limit = OFFERED) {
  */
 export async function similarRegistered(id) {
   const parts = [2, 3].flatMap((count) => split(id, count));
-  const found = await Promise.all(parts.map((part) => registeredLike(part, LOOKED_THROUGH)));
-  return similarTo(id, [...new Set(found.flat())]);
+  const names = await Promise.all(parts.map((part) => registeredLike(part, LOOKED_THROUGH)));
+  return similarTo(id, [...new Set(names.flat())]);
 }
 
 /**
