@@ -119,7 +119,7 @@ def create_app(settings: Settings) -> FastAPI:
     problems.install(app)
     for part in (health, clutches, files, runs, inspections, life, diagnoses, jobs, fleet):
         app.include_router(part.router)
-    for beside in (exports.router, exports.fleet_router, description.router):
+    for beside in (clutches.fleet_router, exports.router, exports.fleet_router, description.router):
         app.include_router(beside)
     app.include_router(dashboard.router(assets.load()))
     openapi.install(app)

@@ -20,6 +20,7 @@ from service.columns import whole
 from service.errors import NotFoundError
 from service.lives.assumptions import ALL_PRESSURES, FLEET, LearnedPrior, kind_of, severity_name, severity_under
 from service.lives.history import REBUILD, ByPressure, Event, duty_block, moment_of, order
+from service.lives.payloads import state_of
 from service.lives.recomputation import Adoption, ClutchState, Results, Tracking, newest_adoption
 from service.lives.run_analysis import LevelFit, Value
 from service.lives.tracks import CARRIED, States, Tracked
@@ -192,7 +193,15 @@ def _store_tracking(connection: Connection, clutch_id: str, tracking: Tracking) 
     results.put_predictions(connection, clutch_id, rows)
     results.clear_filter_states(connection, clutch_id)
     results.put_filter_states(connection, clutch_id, _filter_rows(tracking.filters))
-    clutches.set_summary(connection, clutch_id, tracking.rank, tracking.summary)
+    clutches.set_summary(
+        connection,
+        clutch_id,
+        tracking.rank,
+        tracking.summary,
+        life=tracking.summary.get("life", ""),
+        state=state_of(tracking.summary, disputed=False)["name"],
+        if_disputed=state_of(tracking.summary, disputed=True)["name"],
+    )
 
 
 def _filter_rows(filters: States) -> list[FilterStateRow]:

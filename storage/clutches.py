@@ -1,21 +1,23 @@
-"""Clutches: the record in force and the one that was posted, and the summary that lists show."""
+"""Clutches: the record in force and the one that was posted, the summary that lists show, and the lists themselves."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import sqlalchemy as sa
-from sqlalchemy import Connection, Row, bindparam, case, func, select, tuple_, update
+from sqlalchemy import Connection, Row, Select, Text, bindparam, case, func, select, tuple_, update
 
 from storage.dialects import among
 from storage.encoding.json_text import Json, to_object, to_text
-from storage.tables import clutch
+from storage.tables import HELD_ONLY, clutch, run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClutchRow:
     """A clutch. `record` has its defaults filled in, `created_at` is ISO 8601, lists sort by `rank`, ascending.
 
-    `registered` is the record as it was first posted where it was edited since, else None.
+    `registered` is the record as it was first posted where it was edited since, else None. `state` is the name of the
+    clutch's state, `disputed` the life of which the newest finished diagnosis leaves data and model in dispute.
     """
 
     clutch_id: str
@@ -27,22 +29,57 @@ class ClutchRow:
     summary: Json
     archived: bool = False
     registered: Json | None = None
+    state: str = "check"
+    disputed: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """Which clutches a list shows: in use or archived; of all or of `only` some; in one state; with runs that are held;
+    whose id, friction material or fluid contains `find`, whatever its case."""
+
+    archived: bool = False
+    only: Collection[str] | None = None
+    state: str | None = None
+    held: bool = False
+    find: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Counts:
+    """How many clutches a choice holds by state, and how many of them have runs that are held."""
+
+    states: dict[str, int]
+    held: int
 
 
 _insert = sa.insert(clutch)
 _of_wanted = clutch.c.clutch_id == bindparam("wanted")
 _by_id = select(clutch).where(_of_wanted)
-_worst_first = (
-    select(clutch)
-    .where(clutch.c.archived == bindparam("of_archived"))
-    .order_by(clutch.c.rank, clutch.c.clutch_id)
-    .limit(bindparam("most"))
+#: What stands for itself in a pattern.
+_ESCAPED = str.maketrans({sign: f"/{sign}" for sign in "%_/"})
+_rows = select(clutch).where(clutch.c.clutch_id.in_(bindparam("wanted", expanding=True)))
+_ids_of_page = select(clutch.c.clutch_id).limit(bindparam("most")).offset(bindparam("left_out"))
+_worst_first = _ids_of_page.order_by(clutch.c.rank, clutch.c.clutch_id)
+_by_name = _ids_of_page.order_by(clutch.c.clutch_id)
+_after = tuple_(clutch.c.rank, clutch.c.clutch_id) > tuple_(bindparam("after_rank"), bindparam("after_id"))
+_after_name = clutch.c.clutch_id > bindparam("after_id")
+_with_held_runs = clutch.c.clutch_id.in_(select(run.c.clutch_id).where(HELD_ONLY))
+_states = select(clutch.c.state, func.count()).group_by(clutch.c.state)
+_number = select(func.count()).select_from(clutch)
+_below = (clutch.c.rank > 0, clutch.c.rank < bindparam("below"))
+_life_as_disputed = case(
+    (clutch.c.disputed == bindparam("life", type_=Text), bindparam("if_disputed", type_=Text)),
+    else_=bindparam("else", type_=Text),
 )
-_only = among(clutch.c.clutch_id, "of_only")
-_worst_first_after = _worst_first.where(
-    tuple_(clutch.c.rank, clutch.c.clutch_id) > tuple_(bindparam("after_rank"), bindparam("after_id"))
+_set_summary = (
+    update(clutch)
+    .where(_of_wanted)
+    .values(rank=bindparam("new_rank"), summary=bindparam("new_summary"), state=_life_as_disputed)
 )
-_set_summary = update(clutch).where(_of_wanted).values(rank=bindparam("new_rank"), summary=bindparam("new_summary"))
+_set_disputed = (
+    update(clutch).where(_of_wanted).values(disputed=bindparam("new_disputed"), state=bindparam("new_state"))
+)
 _set_record = (
     update(clutch)
     .where(_of_wanted)
@@ -51,6 +88,7 @@ _set_record = (
         content_sha256=bindparam("new_content"),
         registered=bindparam("new_registered"),
         archived=bindparam("new_archived"),
+        searched=bindparam("new_searched"),
     )
 )
 _bump = update(clutch).where(_of_wanted).values(revision=clutch.c.revision + 1)
@@ -72,6 +110,9 @@ def insert(connection: Connection, row: ClutchRow) -> None:
         "summary": to_text(row.summary),
         "archived": int(row.archived),
         "registered": None if row.registered is None else to_text(row.registered),
+        "state": row.state,
+        "disputed": row.disputed,
+        "searched": _searched(row.clutch_id, row.record),
     }
     connection.execute(_insert, values)
 
@@ -84,21 +125,64 @@ def get(connection: Connection, clutch_id: str) -> ClutchRow | None:
 
 def page(
     connection: Connection,
+    choice: Choice = Choice(),
     *,
     limit: int,
     after: tuple[float, str] | None = None,
-    archived: bool = False,
-    only: Collection[str] | None = None,
+    left_out: int = 0,
+    by_name: bool = False,
 ) -> list[ClutchRow]:
-    """At most `limit` clutches that are archived, or are not, worst first; `after` is the (rank, clutch_id) of the last
-    clutch of the page before; of all or of `only` some."""
-    values: dict[str, object] = {"most": limit, "of_archived": int(archived)}
-    query = _worst_first
+    """At most `limit` clutches of a choice, worst first, or by their ids: then none is left out or repeated however ranks
+    change between two pages. `after` is the (rank, clutch_id) of the last clutch of the page before; the first `left_out`
+    behind it are passed over."""
+    query, values = _chosen(_by_name if by_name else _worst_first, choice)
+    values |= {"most": limit, "left_out": left_out}
     if after is not None:
-        query, values = _worst_first_after, values | {"after_rank": after[0], "after_id": after[1]}
-    if only is not None:
-        query, values = query.where(_only), values | {"of_only": to_text(sorted(only))}
-    return [_row(row) for row in connection.execute(query, values)]
+        query = query.where(_after_name if by_name else _after)
+        values |= {"after_id": after[1]} if by_name else {"after_rank": after[0], "after_id": after[1]}
+    # their ids by an index alone, however many are passed over; then the rows
+    ids = list(connection.execute(query, values).scalars())
+    rows = {row.clutch_id: _row(row) for row in connection.execute(_rows, {"wanted": ids})}
+    return [rows[clutch_id] for clutch_id in ids]
+
+
+def counts(connection: Connection, choice: Choice) -> Counts:
+    """How many clutches a choice holds."""
+    by_state, values = _chosen(_states, choice)
+    with_held, _ = _chosen(_number.where(_with_held_runs), choice)
+    return Counts(
+        states={state: int(number) for state, number in connection.execute(by_state, values)},
+        held=connection.execute(with_held, values).scalar_one(),
+    )
+
+
+def at_rank(connection: Connection, choice: Choice, share: float, *, below: float) -> ClutchRow | None:
+    """The clutch that this share of a choice is worse than, of those with a rank between 0 and `below`; None without any."""
+    counted, values = _chosen(_number.where(*_below), choice)
+    number: int = connection.execute(counted, values | {"below": below}).scalar_one()
+    query, _ = _chosen(_worst_first.where(*_below), choice)
+    values |= {"below": below, "most": 1, "left_out": int(share * max(0, number - 1))}
+    clutch_id = connection.execute(query, values).scalar()
+    return None if clutch_id is None else get(connection, clutch_id)
+
+
+def _chosen(query: Select[Any], choice: Choice) -> tuple[Select[Any], dict[str, object]]:
+    """A query of a choice's clutches alone, with its parameters."""
+    query = query.where(clutch.c.archived == bindparam("of_archived"))
+    values: dict[str, object] = {"of_archived": int(choice.archived)}
+    if choice.only is not None:
+        query, values = (
+            query.where(among(clutch.c.clutch_id, "of_only")),
+            values | {"of_only": to_text(sorted(choice.only))},
+        )
+    if choice.state is not None:
+        query, values = query.where(clutch.c.state == bindparam("of_state")), values | {"of_state": choice.state}
+    if choice.held:
+        query = query.where(_with_held_runs)
+    if choice.find:
+        query = query.where(clutch.c.searched.like(bindparam("of_find"), escape="/"))
+        values["of_find"] = f"%{choice.find.casefold().translate(_ESCAPED)}%"
+    return query, values
 
 
 def set_record(
@@ -117,15 +201,30 @@ def set_record(
         "new_content": content_sha256,
         "new_registered": None if registered is None else to_text(registered),
         "new_archived": int(archived),
+        "new_searched": _searched(clutch_id, record),
     }
     if connection.execute(_set_record, values).rowcount != 1:
         raise LookupError(f"clutch {clutch_id!r} is not stored")
 
 
-def set_summary(connection: Connection, clutch_id: str, rank: float, summary: Json) -> None:
-    """Replace what lists show of a clutch. Raises LookupError on an unknown one."""
-    changed = connection.execute(_set_summary, {"wanted": clutch_id, "new_rank": rank, "new_summary": to_text(summary)})
+def set_summary(
+    connection: Connection, clutch_id: str, rank: float, summary: Json, *, life: str, state: str, if_disputed: str
+) -> None:
+    """Replace what lists show of a clutch: `state` is its state's name, or `if_disputed` where `life` is in dispute. Raises
+    LookupError on an unknown one."""
+    values = {"wanted": clutch_id, "new_rank": rank, "new_summary": to_text(summary)}
+    changed = connection.execute(_set_summary, values | {"life": life, "else": state, "if_disputed": if_disputed})
     if changed.rowcount != 1:
+        raise LookupError(f"clutch {clutch_id!r} is not stored")
+
+
+def set_disputed(connection: Connection, clutch_id: str, disputed: str | None, *, state: str) -> None:
+    """Note of which life data and model are in dispute, None: of none, and the state that follows. Raises LookupError on an
+    unknown clutch."""
+    if (
+        connection.execute(_set_disputed, {"wanted": clutch_id, "new_disputed": disputed, "new_state": state}).rowcount
+        != 1
+    ):
         raise LookupError(f"clutch {clutch_id!r} is not stored")
 
 
@@ -173,4 +272,10 @@ def _row(row: Row[tuple[object, ...]]) -> ClutchRow:
     values["summary"] = to_object(values["summary"])
     values["archived"] = bool(values["archived"])
     values["registered"] = None if values["registered"] is None else to_object(values["registered"])
+    del values["searched"]
     return ClutchRow(**values)
+
+
+def _searched(clutch_id: str, record: Json) -> str:
+    """What a search looks into. Folded here: of the two databases each would fold other letters."""
+    return "\n".join([clutch_id, record.get("friction_material", ""), record.get("fluid", "")]).casefold()

@@ -111,7 +111,11 @@ _light_of_any = (
 _light = _light_of_any.where(run.c.state == ACCEPTED)
 _rebuilds = _light.where(json_text(run.c.details, "event") == "rebuild")
 _set_aside = _light_of_any.where(run.c.state != ACCEPTED)
-_held = select(run.c.clutch_id, func.count()).where(HELD_ONLY).group_by(run.c.clutch_id)
+_held = (
+    select(run.c.clutch_id, func.count())
+    .where(HELD_ONLY, run.c.clutch_id.in_(bindparam("wanted", expanding=True)))
+    .group_by(run.c.clutch_id)
+)
 _held_of_all = select(func.count()).select_from(run).where(HELD_ONLY)
 #: Of SQLite's keys none is left out: the greatest one counts the runs, for none is ever deleted.
 _number = select(Pair(func.coalesce(func.max(run.c.run_key), 0), func.count(run.c.run_key)))
@@ -189,9 +193,9 @@ def set_aside(connection: Connection, clutch_id: str) -> list[RunInOrder]:
     return _in_order(connection, _set_aside, clutch_id)
 
 
-def held(connection: Connection) -> dict[str, int]:
-    """clutch_id -> the number of its runs that are held, for those that have any."""
-    return {clutch_id: int(count) for clutch_id, count in connection.execute(_held)}
+def held(connection: Connection, clutch_ids: Sequence[str]) -> dict[str, int]:
+    """clutch_id -> the number of its runs that are held, for those of these clutches that have any."""
+    return {clutch_id: int(count) for clutch_id, count in connection.execute(_held, {"wanted": list(clutch_ids)})}
 
 
 def count(connection: Connection) -> int:

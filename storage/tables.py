@@ -15,7 +15,9 @@ HELD_ONLY = text("state = 'held'")
 OPEN_ONLY = text("state IN ('waiting', 'running')")
 
 #: `record` is the record in force, defaults filled in, `registered` that which was posted, where it was edited since; `rank`
-#: sorts lists, worst first ascending; `archived` is 1 for a clutch that lists leave out.
+#: sorts lists, worst first ascending; `archived` is 1 for a clutch that lists leave out. `state` is the name of its state
+#: (NAMUR NE 107), which follows from the summary and `disputed`: the life of which the newest finished diagnosis found that
+#: data and model disagree, null where there is none or its model is adopted. `searched` is what a search looks into, folded.
 clutch = Table(
     "clutch",
     metadata,
@@ -28,7 +30,11 @@ clutch = Table(
     Column("summary", TEXT, nullable=False),
     Column("archived", WHOLE, nullable=False, server_default="0"),
     Column("registered", TEXT),
-    Index("clutch_worst_first", "rank", "clutch_id"),
+    Column("state", TEXT, nullable=False, server_default="check"),
+    Column("disputed", TEXT),
+    Column("searched", TEXT, nullable=False, server_default=text("''")),
+    Index("clutch_worst_first", "archived", "rank", "clutch_id"),
+    Index("clutch_by_state", "archived", "state", "rank", "clutch_id"),
 )
 
 #: `details` holds what only some kinds have (duty, event, note, origin); `receipt` is the answer without what is in other

@@ -46,3 +46,7 @@ MOST_LINE_POINTS = 32
 #: How often a clutch is computed anew by `replay` or `fleet refresh` where runs come meanwhile. Chosen: at a run each time
 #: it could go on for ever.
 MOST_ATTEMPTS = 3
+
+#: Health (1 new, 0 end of life) below which a clutch's state is "maintenance required". Chosen: the last fifth of its way to
+#: the threshold; no table.
+LOW_HEALTH = 0.2

@@ -10,13 +10,13 @@ from models.prognosis.back_cast import BackCast
 from models.prognosis.course_shares import CourseShare
 from models.prognosis.criteria import HORIZON, QUANTILES
 from models.prognosis.first_passage import FirstPassage
-from service.columns import ZERO_CELSIUS, bar, whole
+from service.columns import bar, whole
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions
-from service.lives.criteria import MOST_LINE_POINTS, OTHER_OIL
+from service.lives.criteria import LOW_HEALTH, MOST_LINE_POINTS
 from service.lives.engagements.evaluation import Engagement, engagement_item
-from service.lives.history import ByPressure, Event, Life, Series, latest_before, nearest
+from service.lives.history import ByPressure, Event, Life, Series, latest_before
 from service.lives.incoming_run import IncomingRun
-from service.lives.prediction_notices import OFF_TRACK, missed, not_eq_6
+from service.lives.prediction_notices import OF_HISTORY, late_arrival, missed, not_eq_6, other_oil, other_pressures
 from service.lives.run_analysis import LevelFit, Notice, Value
 from service.settings import CODE_VERSION
 
@@ -28,12 +28,16 @@ PARAMETER_UNITS = {
     "viscous_coefficient": ("viscous_coefficient", "Nm/(m/s)^0.3"),
 }
 INSUFFICIENT = "insufficient_data"
-#: Warnings of a run in its clutch's history, written anew where the history changes: it arrived after a run of more cycles,
-#: its pressures or its oil temperature are not those of the first test, its mean COF is not what those before it predict.
-LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE = "late_arrival", "other_pressures", "other_oil_temperature"
-OF_HISTORY = LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE, OFF_TRACK
 #: What a list shows of a clutch, out of the particle filter's prediction.
 SUMMARY = ("status", "as_of_cycles", "current", "remaining_cycles", "model")
+#: The states of a clutch after NAMUR NE 107, the worst first.
+STATES = FAILURE, OUT_OF_SPECIFICATION, MAINTENANCE, CHECK, NORMAL = (
+    "failure",
+    "out_of_specification",
+    "maintenance",
+    "check",
+    "normal",
+)
 #: A clutch without a prediction comes after all others in a list.
 RANK_UNKNOWN = 2 * HORIZON
 
@@ -199,9 +203,9 @@ def history_warnings(
     latest = latest_before([event for life in lives for event in life.events])
     return {
         event.run_id: [
-            *notice_items(_late_arrival(event.cycles, latest[event.run_id])),
-            *notice_items(_other_pressures(life.reference, event.cofs)),
-            *notice_items(_other_oil(life, event)),
+            *notice_items(late_arrival(event.cycles, latest[event.run_id])),
+            *notice_items(other_pressures(life.reference, event.cofs)),
+            *notice_items(other_oil(life, event)),
             *off_track.get(event.run_id, ()),
         ]
         for life in lives
@@ -223,41 +227,28 @@ def warned_anew(
     return changed
 
 
-def _late_arrival(cycles: float, latest: float) -> list[Notice]:
-    """A run that arrived after another of more cycles; `latest` are the most of those that were there."""
-    if cycles >= latest:
-        return []
-    message = f"the run's {cycles:g} cycles lie before the latest known {latest:g}: all was tracked anew"
-    return [Notice(code=LATE, message=message)]
-
-
-def _other_pressures(reference: ByPressure, cofs: ByPressure) -> list[Notice]:
-    """A test that cannot be compared with the reference test: none of its pressures is one of that's."""
-    if not cofs or any(nearest(level, cofs) is not None for level in reference):
-        return []
-    measured = ", ".join(f"{bar(level):g}" for level in sorted(reference))
-    message = f"none of its pressures is one of the first stationary test's ({measured} bar): no track uses it"
-    return [Notice(code=OTHER_PRESSURES, message=message)]
-
-
-def _other_oil(life: Life, event: Event) -> list[Notice]:
-    """A test in oil that is much warmer or colder than the reference test's."""
-    if not life.in_other_oil(event) or event.oil_temperature is None or life.reference_oil is None:
-        return []
-    oil, reference = (kelvin - ZERO_CELSIUS for kelvin in (event.oil_temperature, life.reference_oil))
-    message = (
-        f"its oil was at {oil:.0f} °C on average, that of the first stationary test at {reference:.0f} °C, more than "
-        f"{OTHER_OIL:g} °C apart: no track uses it but under an adopted model that corrects for oil temperature"
-    )
-    return [Notice(code=OTHER_OIL_TEMPERATURE, message=message)]
-
-
 def summary_of(payload: dict[str, Any]) -> tuple[dict[str, Any], float]:
     """What a list shows of a clutch, and its rank: the fewer cycles remain, the earlier in the list."""
     median = payload["remaining_cycles"]["0.5"]
     remaining = HORIZON if median is None else float(median)
     rank = RANK_UNKNOWN if payload["status"] == INSUFFICIENT else remaining
     return {name: payload[name] for name in SUMMARY}, rank
+
+
+def state_of(summary: Mapping[str, Any], *, disputed: bool) -> dict[str, str]:
+    """A clutch's state after NAMUR NE 107 by its summary, and why; `disputed`: its newest diagnosis found that data and
+    model disagree, and nobody has acted on it. Its name is stored: another rule here needs a step of storage/migrations."""
+    if summary.get("status", INSUFFICIENT) == INSUFFICIENT:
+        return {"name": CHECK, "why": "fewer than three tests: no prognosis yet"}
+    if summary["status"] == "reached":
+        return {"name": FAILURE, "why": "end of life reached"}
+    if disputed:
+        return {"name": OUT_OF_SPECIFICATION, "why": "data and model disagree: see the diagnosis"}
+    health = summary["current"]["health"]
+    if health is not None and health < LOW_HEALTH:
+        return {"name": MAINTENANCE, "why": "near the end of its life"}
+    never = summary["status"] == "may_never_reach"
+    return {"name": NORMAL, "why": "may never reach end of life" if never else "ageing as modelled"}
 
 
 def recent(events: Sequence[Event], series: Series) -> dict[str, Any]:

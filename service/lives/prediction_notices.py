@@ -1,4 +1,5 @@
-"""What a prediction is warned of: an odd last test, a course that eq. 6 cannot take, earlier forecasts that fared badly."""
+"""What a prediction is warned of (an odd last test, a course that eq. 6 cannot take, forecasts that fared badly), and a run
+in its clutch's history."""
 
 import math
 from collections.abc import Sequence
@@ -9,7 +10,9 @@ from models.tracking.innovation import last_innovation
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
-from service.lives.criteria import EQ_6_DOUBTED
+from service.columns import ZERO_CELSIUS, bar
+from service.lives.criteria import EQ_6_DOUBTED, OTHER_OIL
+from service.lives.history import ByPressure, Event, Life, nearest
 from service.lives.run_analysis import Notice
 
 #: The warning of a last test that lies far off what the tests before it predict.
@@ -18,6 +21,10 @@ OFF_TRACK = "off_track"
 NOT_EQ_6 = "not_eq6"
 #: The warning of a prediction whose forerunners held too few of the tests since.
 MISSED_FORECASTS = "missed_forecasts"
+#: Warnings of a run in its clutch's history, written anew where the history changes: it arrived after a run of more cycles,
+#: its pressures or its oil temperature are not those of the first test, its mean COF is not what those before it predict.
+LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE = "late_arrival", "other_pressures", "other_oil_temperature"
+OF_HISTORY = LATE, OTHER_PRESSURES, OTHER_OIL_TEMPERATURE, OFF_TRACK
 
 
 def not_eq_6(courses: Sequence[CourseShare]) -> list[Notice]:
@@ -57,3 +64,32 @@ def off_track(posterior: Posterior, measurements: Sequence[Measurement], prior: 
         "predict: an outlying run, or the clutch has left its course"
     )
     return [Notice(code=OFF_TRACK, message=message)]
+
+
+def late_arrival(cycles: float, latest: float) -> list[Notice]:
+    """A run that arrived after another of more cycles; `latest` are the most of those that were there."""
+    if cycles >= latest:
+        return []
+    message = f"the run's {cycles:g} cycles lie before the latest known {latest:g}: all was tracked anew"
+    return [Notice(code=LATE, message=message)]
+
+
+def other_pressures(reference: ByPressure, cofs: ByPressure) -> list[Notice]:
+    """A test that cannot be compared with the reference test: none of its pressures is one of that's."""
+    if not cofs or any(nearest(level, cofs) is not None for level in reference):
+        return []
+    measured = ", ".join(f"{bar(level):g}" for level in sorted(reference))
+    message = f"none of its pressures is one of the first stationary test's ({measured} bar): no track uses it"
+    return [Notice(code=OTHER_PRESSURES, message=message)]
+
+
+def other_oil(life: Life, event: Event) -> list[Notice]:
+    """A test in oil that is much warmer or colder than the reference test's."""
+    if not life.in_other_oil(event) or event.oil_temperature is None or life.reference_oil is None:
+        return []
+    oil, reference = (kelvin - ZERO_CELSIUS for kelvin in (event.oil_temperature, life.reference_oil))
+    message = (
+        f"its oil was at {oil:.0f} °C on average, that of the first stationary test at {reference:.0f} °C, more than "
+        f"{OTHER_OIL:g} °C apart: no track uses it but under an adopted model that corrects for oil temperature"
+    )
+    return [Notice(code=OTHER_OIL_TEMPERATURE, message=message)]

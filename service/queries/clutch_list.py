@@ -1,97 +1,128 @@
-"""`/v1/clutches`: clutches worst first, with what a list shows of each."""
+"""`/v1/clutches`: clutches worst first or by name, as lists show them; `/v1/fleet/totals`: how many there are."""
 
-from collections.abc import Collection, Sequence
+import math
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from sqlalchemy import Connection
 
-from service import records
+from models.prognosis.criteria import HORIZON
+from service import records, stored_verdicts
 from service.lists import Place, page_as_bytes
 from service.lives.assumptions import BASELINE
-from service.lives.payloads import SUMMARY
+from service.lives.payloads import STATES, SUMMARY
 from service.queries.cache import AnswerCache, to_json
 from storage import clutches, runs, verdicts
-from storage.clutches import ClutchRow
+from storage.clutches import Choice, ClutchRow
 from storage.engine.database import Database
-from storage.verdicts import VerdictRow
 
 #: What summaries did not hold that were stored before models could be adopted.
 _BEFORE = {"model": dict(BASELINE)}
+#: Share of the clutches whose bars fit, and the cycles at the bars' end where nothing is predicted. Chosen: one that lasts
+#: much longer than the others must not shorten their bars to nothing; a rig's usual life.
+_FITTING, _USUAL_SCALE = 0.9, 10_000.0
 
 
 def look_up(database: Database, clutch_id: str) -> dict[str, Any]:
     """A clutch; raises NotFoundError."""
     with database.reading() as connection:
-        ((row, held, verdict),) = _shown(connection, [records.clutch(connection, clutch_id)])
-    return _item(row, held, verdict)
+        (shown,) = _shown(connection, [records.clutch(connection, clutch_id)])
+    return _item(*shown)
 
 
-def page(
+def page_by_name(
     database: Database, *, limit: int, after: Place | None, archived: bool = False
 ) -> tuple[list[dict[str, Any]], Place | None]:
-    """Clutches in use, or the archived ones, the fewest remaining cycles first, and where the next page starts."""
+    """Clutches in use, or the archived ones, by their names, and where the next page starts: a walk through all of them."""
     with database.reading() as connection:
-        rows = clutches.page(connection, limit=limit + 1, after=after, archived=archived)
+        rows = clutches.page(connection, Choice(archived=archived), limit=limit + 1, after=after, by_name=True)
         items = [_item(*clutch) for clutch in _shown(connection, rows[:limit])]
-    return items, _next(rows, limit)
+    return items, _next(rows, limit, by_name=True)
 
 
 def page_as_json(
     database: Database,
     cache: AnswerCache,
+    choice: Choice,
     *,
     limit: int,
-    after: Place | None,
-    archived: bool = False,
-    only: Collection[str] | None = None,
+    after: Place | None = None,
+    offset: int = 0,
+    by_name: bool = False,
 ) -> bytes:
-    """The same as JSON, of all clutches or of `only` some; each clutch's item is made once for its revision and verdict."""
+    """A page of the clutches of a choice as JSON; each clutch's item is made once for its revision and verdict."""
     with database.reading() as connection:
-        rows = clutches.page(connection, limit=limit + 1, after=after, archived=archived, only=only)
+        rows = clutches.page(connection, choice, limit=limit + 1, after=after, left_out=offset, by_name=by_name)
         clutches_shown = _shown(connection, rows[:limit])
     items = [
-        cache.answer(("clutch", row.clutch_id), (row.revision, to_json(verdict)), partial(_as_json, row, held, verdict))
-        for row, held, verdict in clutches_shown
+        cache.answer(
+            ("clutch", row.clutch_id),
+            (row.revision, row.state, to_json(verdict)),
+            partial(_as_json, row, held, verdict, state),
+        )
+        for row, held, verdict, state in clutches_shown
     ]
-    return page_as_bytes([item.body for item in items], _next(rows, limit))
+    return page_as_bytes([item.body for item in items], _next(rows, limit, by_name=by_name))
 
 
-def _next(rows: Sequence[ClutchRow], limit: int) -> Place | None:
-    return (rows[limit - 1].rank, rows[limit - 1].clutch_id) if len(rows) > limit else None
-
-
-def _as_json(row: ClutchRow, held: int, verdict: dict[str, Any] | None) -> bytes:
-    return to_json(_item(row, held, verdict))
-
-
-def _shown(connection: Connection, rows: Sequence[ClutchRow]) -> list[tuple[ClutchRow, int, dict[str, Any] | None]]:
-    """Clutches, each with the number of its held runs and its newest finished diagnosis as it goes out."""
-    newest = verdicts.newest(connection, [row.clutch_id for row in rows])
-    held = runs.held(connection)
-    return [(row, held.get(row.clutch_id, 0), _latest(connection, row, newest.get(row.clutch_id))) for row in rows]
-
-
-def _latest(connection: Connection, row: ClutchRow, verdict: VerdictRow | None) -> dict[str, Any] | None:
-    """The newest finished diagnosis as it goes out; one of a life that a rebuild has ended is past."""
-    if verdict is None:
-        return None
-    life = row.summary.get("life")  # what was stored by earlier releases does not hold it
-    earlier = verdict.life != (records.present_life(connection, row.clutch_id) if life is None else life)
+def totals(database: Database, choice: Choice) -> dict[str, Any]:
+    """How many clutches of a choice there are, and the cycles at the right end of their intervals' bars."""
+    with database.reading() as connection:
+        found = clutches.counts(connection, choice)
+        archived = clutches.counts(connection, replace(choice, archived=True))
+        boundary = clutches.at_rank(connection, replace(choice, find=""), _FITTING, below=HORIZON)
     return {
-        "diagnosis_id": verdict.diagnosis_id,
-        "verdict": verdict.verdict,
-        "causes": list(verdict.causes),
-        "adopted": verdict.adopted and not earlier,
-        "earlier_life": earlier,
+        "all": sum(found.states.values()),
+        "archived": sum(archived.states.values()),
+        "held": found.held,
+        "states": {name: found.states.get(name, 0) for name in STATES},
+        "scale_cycles": _USUAL_SCALE if boundary is None else _round_above(boundary),
     }
 
 
-def _item(row: ClutchRow, held: int, diagnosis: dict[str, Any] | None) -> dict[str, Any]:
+def _round_above(row: ClutchRow) -> float:
+    """1, 2 or 5 times a power of ten, not below the upper end of a clutch's interval, or its median where that is open."""
+    quantiles = row.summary["remaining_cycles"]
+    end = row.rank if quantiles["0.95"] is None else max(row.rank, quantiles["0.95"])
+    unit = 10.0 ** math.floor(math.log10(end))
+    return next(step * unit for step in (1, 2, 5, 10) if step * unit >= end)
+
+
+def _next(rows: Sequence[ClutchRow], limit: int, *, by_name: bool) -> Place | None:
+    if len(rows) <= limit:
+        return None
+    return 0.0 if by_name else rows[limit - 1].rank, rows[limit - 1].clutch_id
+
+
+def _as_json(row: ClutchRow, held: int, verdict: dict[str, Any] | None, state: dict[str, str]) -> bytes:
+    return to_json(_item(row, held, verdict, state))
+
+
+def _shown(
+    connection: Connection, rows: Sequence[ClutchRow]
+) -> list[tuple[ClutchRow, int, dict[str, Any] | None, dict[str, str]]]:
+    """Clutches, each with the number of its held runs, its newest finished diagnosis as it goes out, and its state."""
+    names = [row.clutch_id for row in rows]
+    newest, held = verdicts.newest(connection, names), runs.held(connection, names)
+    return [
+        (
+            row,
+            held.get(row.clutch_id, 0),
+            stored_verdicts.latest(connection, row, newest.get(row.clutch_id)),
+            stored_verdicts.state(connection, row),
+        )
+        for row in rows
+    ]
+
+
+def _item(row: ClutchRow, held: int, diagnosis: dict[str, Any] | None, state: dict[str, str]) -> dict[str, Any]:
     return records.record(row).model_dump(mode="json") | {
         "archived": row.archived,
         "created_at": row.created_at,
         "revision": row.revision,
+        "state": state,
         "runs": row.summary.get("runs", 0),
         "held": held,
         "summary": {name: (_BEFORE | row.summary)[name] for name in SUMMARY} if row.summary else None,

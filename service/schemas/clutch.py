@@ -219,6 +219,16 @@ class LatestDiagnosis(Answer):
     earlier_life: bool = Field(description="Whether a rebuild has ended the life that it diagnosed")
 
 
+class ClutchState(Answer):
+    """The state of a clutch after NAMUR NE 107."""
+
+    name: Literal["failure", "out_of_specification", "maintenance", "check", "normal"] = Field(
+        description="The worst first: its end of life is reached; data and model disagree; its health is below 0.2; fewer "
+        "than three tests, so that nothing is predicted; none of these"
+    )
+    why: str = Field(description="The reason in words")
+
+
 class ClutchOut(Answer):
     """A registered clutch."""
 
@@ -235,6 +245,7 @@ class ClutchOut(Answer):
     archived: bool = Field(description="Whether lists leave the clutch out and it takes in no more runs")
     created_at: str = Field(description="When it was registered; UTC, ISO 8601")
     revision: Revision
+    state: ClutchState = Field(description="What it asks for")
     runs: int = Field(description="Number of runs that count; those that are held or were withdrawn do not")
     held: int = Field(description="Number of runs that are held: they wait to be confirmed, corrected or withdrawn")
     summary: ClutchSummary | None = Field(description="Health and remaining life; null before the first run")
@@ -243,7 +254,7 @@ class ClutchOut(Answer):
 
 
 class ClutchPage(Answer):
-    """Clutches, the fewest remaining cycles first."""
+    """Clutches, the fewest remaining cycles first or by name."""
 
     items: list[ClutchOut] = Field(description="The clutches of this page")
     next: Next

@@ -142,3 +142,26 @@ class FleetScores(Answer):
     overall: ScoreSummary = Field(description="Means over all predictions")
     stages: list[StageSummary] = Field(description="Means by stage of life")
     pit_histogram: list[float] = Field(description="Shares of predictions in ten equal bins of `pit`")
+
+
+class StateCounts(Answer):
+    """Clutches by their state after NAMUR NE 107."""
+
+    failure: int = Field(description="At their end of life")
+    out_of_specification: int = Field(description="Data and model disagree")
+    maintenance: int = Field(description="Near the end of their lives")
+    check: int = Field(description="Without a prognosis yet")
+    normal: int = Field(description="None of these")
+
+
+class FleetTotals(Answer):
+    """How many clutches a list holds."""
+
+    all: int = Field(description="Clutches in use, or archived ones where these were asked for")
+    archived: int = Field(description="Archived clutches")
+    held: int = Field(description="Those of `all` that have runs that are held")
+    states: StateCounts = Field(description="Those of `all` by their states")
+    scale_cycles: float = Field(
+        description="Where bars of remaining cycles may end: 1, 2 or 5 times a power of ten, above the interval of the "
+        "clutch that nine in ten of those with a prediction have fewer cycles left than"
+    )

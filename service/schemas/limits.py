@@ -50,3 +50,5 @@ MOST_DRAWS = 1_000
 MOST_BLOCKS = 1000
 #: The fewest cycles of a planned block, and its least energy a cycle, kJ: less is mistyped.
 LEAST_BLOCK_CYCLES, LEAST_PLANNED_KJ = 1, 1e-6
+#: Characters that a list is searched for, and items that it may pass over.
+LONGEST_SEARCH, MOST_OFFSET = 200, 10_000_000

@@ -10,8 +10,10 @@ from service.schemas.limits import (
     IDENTIFIER_PATTERN,
     LONGEST_FILENAME,
     LONGEST_MAP,
+    LONGEST_SEARCH,
     MOST_CYCLES,
     MOST_DRAWS,
+    MOST_OFFSET,
     MOST_POINTS,
 )
 from service.schemas.prognosis.quantities import SeriesQuantity
@@ -59,6 +61,33 @@ State = Annotated[
     Literal["accepted", "held", "withdrawn"] | None, Field(description="Runs in this state only; left out, all")
 ]
 Archived = Annotated[bool, Field(description="The archived clutches instead of those in use")]
+ClutchStateName = Annotated[
+    Literal["failure", "out_of_specification", "maintenance", "check", "normal"] | None,
+    Field(description="Clutches in this state only, after NAMUR NE 107; left out, all"),
+]
+Held = Annotated[bool, Field(description="Clutches with runs that are held only")]
+Find = Annotated[
+    str,
+    Field(
+        max_length=LONGEST_SEARCH,
+        pattern=r"^[^\x00-\x1f]*$",
+        description="Clutches whose name, friction material or fluid contains this, whatever its case; left out, all",
+    ),
+]
+Sort = Annotated[
+    Literal["worst", "name"],
+    Field(
+        description="`worst`: the fewest remaining cycles first, a view of the moment: a clutch whose remaining cycles "
+        "change between two pages may be on both or on neither. `name`: by name; a walk from page to page meets each "
+        "clutch once"
+    ),
+]
+Offset = Annotated[
+    int,
+    Field(
+        ge=0, le=MOST_OFFSET, description="Clutches to pass over, to show a part of the list; a walk takes the cursor"
+    ),
+]
 
 # --- of a posted file: what a JSON run has in fields ---
 

@@ -83,7 +83,7 @@ class Clutches(Collector):
         remaining = GaugeMetricFamily("clutchlife_clutch_remaining_cycles", text, labels=["clutch", "quantile"])
         after = None
         while True:
-            items, after = clutch_list.page(self._database, limit=METRICS_PAGE, after=after)
+            items, after = clutch_list.page_by_name(self._database, limit=METRICS_PAGE, after=after)
             for item in items:
                 name, summary = item["clutch_id"], item["summary"]
                 runs.add_metric([name], item["runs"])

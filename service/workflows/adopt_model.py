@@ -11,7 +11,7 @@ from typing import Any
 from sqlalchemy import Connection
 
 from models.diagnosis.extension import Extension
-from service import records, stored_runs
+from service import records, stored_runs, stored_verdicts
 from service.errors import NotFoundError, NothingToAdoptError
 from service.lives.history import stationary_tests_of
 from service.lives.recomputation import Adoption, ClutchState, Results, computed_anew
@@ -100,6 +100,7 @@ def _change(
             row = AdoptedRow(version=version, diagnosis_id=diagnosis_id, adopted_at=adopted_at)
             assumptions.insert_adoption(connection, clutch_id, row)
             records.store(connection, clutch_id, results)
+            stored_verdicts.note_dispute(connection, clutch_id)
             change = NewChange(
                 clutch_id=clutch_id,
                 run_id=None,

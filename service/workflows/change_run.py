@@ -15,8 +15,9 @@ from service import records, stored_runs
 from service.columns import whole
 from service.errors import NotPossibleNowError
 from service.lives.history import STATIONARY, Event, order, stationary_tests_of
-from service.lives.payloads import OF_HISTORY, notice_items
+from service.lives.payloads import notice_items
 from service.lives.plausibility.doubts import doubts
+from service.lives.prediction_notices import OF_HISTORY
 from service.lives.recomputation import (
     ClutchState,
     Levels,

@@ -26,9 +26,14 @@ def held(pid: int) -> int:
     total = 0
     for number in family(pid):
         with suppress(FileNotFoundError, ProcessLookupError):  # it has just ended
-            rollup = Path(f"/proc/{number}/smaps_rollup").read_text(encoding="ascii")
-            total += 1024 * sum(int(line.split()[1]) for line in rollup.splitlines() if line.startswith("Pss:"))
+            total += held_alone(number)
     return total
+
+
+def held_alone(pid: int) -> int:
+    """Bytes of a process; of what it shares with others its part."""
+    rollup = Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="ascii")
+    return 1024 * sum(int(line.split()[1]) for line in rollup.splitlines() if line.startswith("Pss:"))
 
 
 def processor_seconds(pid: int) -> float:

@@ -1,4 +1,6 @@
-"""`make scale`: what requests and commands cost with many clutches in one file, beside few, as Markdown.
+"""`make scale`: what requests, pages and commands cost with many clutches in one database, beside few, as Markdown.
+
+One file, or with `--server postgresql` a PostgreSQL server that is started for it.
 
 Both services run side by side and are asked in turn, so that what else the machine does falls on both.
 """
@@ -10,19 +12,25 @@ import tempfile
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import httpx2
+import sqlalchemy as sa
+from playwright.sync_api import Browser
 
 from models.rig import campaign
 from service.run_files.simulated import simulated_body
 from storage.engine.sqlite.database import back_up
-from tests.benchmarks.memory import held
+from tests.benchmarks.memory import held, held_alone
+from tests.browser.driving import chromium
 from tests.scale.copies import kilobytes, life, multiply, name
+from tests.storage.engine.postgresql.server import postgresql_server
 from tests.support import serving
 
-FEW, ROUNDS = 10, 30
+FEW, ROUNDS, SCREENS = 10, 30, 7
+_SHOWN = "performance.getEntriesByName('fleet-shown')[0]?.startTime ?? null"
 JSON = {"Content-Type": "application/json"}
 
 #: Milliseconds by what was asked.
@@ -31,10 +39,12 @@ Times = defaultdict[str, list[float]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Found:
-    """What a file of so many clutches costs: its bytes, bytes a second of a backup, bytes of the service that was asked."""
+    """What a database of so many clutches costs: its bytes, bytes a second of a backup where it is a file, bytes of the
+    service that was asked, alone and with its workers."""
 
     size: int
-    backup: float
+    backup: float | None
+    alone: int
     memory: int
     times: Times
 
@@ -52,7 +62,7 @@ def timed(times: Times, title: str, work: Callable[[], httpx2.Response]) -> None
     answer.raise_for_status()
 
 
-def asked(http: httpx2.Client, runs: list[bytes], states: int, times: Times) -> Iterator[None]:
+def asked(http: httpx2.Client, runs: list[bytes], clutches: int, states: int, times: Times) -> Iterator[None]:
     """Runs of new clutches; then, of clutches that have so many, one run more and what pages ask; one step at a time."""
 
     def post(clutch: str, number: int) -> httpx2.Response:
@@ -72,6 +82,9 @@ def asked(http: httpx2.Client, runs: list[bytes], states: int, times: Times) -> 
             ("GET remaining life", f"/v1/clutches/{clutch}/remaining-useful-life"),
             ("GET runs, 10 of them", f"/v1/clutches/{clutch}/runs?limit=10"),
             ("GET clutches, the first 10", "/v1/clutches?limit=10"),
+            ("GET clutches, 80 from the middle by offset", f"/v1/clutches?limit=80&offset={clutches // 2}"),
+            ("GET clutches, found by a name", f"/v1/clutches?find={name(clutches - 1)}"),
+            ("GET fleet totals", "/v1/fleet/totals"),
             ("GET metrics", "/metrics"),
             ("GET readyz", "/readyz"),
         ):
@@ -79,55 +92,100 @@ def asked(http: httpx2.Client, runs: list[bytes], states: int, times: Times) -> 
             yield
 
 
-def backed_up(path: Path) -> float:
-    """Bytes a second of a backup."""
+def first_screen(browser: Browser, url: str) -> float:
+    """Milliseconds from the address until the fleet's first rows are shown, in a browser that has nothing of it."""
+    context = browser.new_context(viewport={"width": 1360, "height": 900})
+    page = context.new_page()
+    page.goto(url)
+    while (shown := page.evaluate(_SHOWN)) is None:
+        page.wait_for_timeout(5)
+    assert page.locator("table.fleet tbody tr").count() >= FEW
+    context.close()
+    return float(shown)
+
+
+def backed_up(address: str) -> float | None:
+    """Bytes a second of a backup; a server's is not ours."""
+    if not address.startswith("sqlite"):
+        return None
+    path = Path(address.removeprefix("sqlite:///"))
     target = path.with_suffix(".copy")
     start = time.perf_counter()
-    back_up(f"sqlite:///{path}", target)
+    back_up(address, target)
     taken = time.perf_counter() - start
     target.unlink()
     return path.stat().st_size / taken
 
 
-def side_by_side(paths: list[Path], runs: list[bytes], states: int) -> list[Found]:
-    """What a service on each file costs, asked in turn."""
-    backups = [backed_up(path) for path in paths]
-    few, many = (serving(path) for path in paths)
-    times: list[Times] = [defaultdict(list) for _ in paths]
-    with few as first, many as second:
-        clients = [httpx2.Client(base_url=server.url, timeout=60) for server in (first, second)]
-        steps = [asked(http, runs, states, taken) for http, taken in zip(clients, times, strict=True)]
+def size_of(address: str) -> int:
+    """Bytes of a database."""
+    if address.startswith("sqlite"):
+        return Path(address.removeprefix("sqlite:///")).stat().st_size
+    engine = sa.create_engine(address)
+    with engine.connect() as connection:
+        size: int = connection.execute(sa.select(sa.func.pg_database_size(sa.func.current_database()))).scalar_one()
+    engine.dispose()
+    return size
+
+
+def side_by_side(addresses: list[str], runs: list[bytes], counts: tuple[int, int], states: int) -> list[Found]:
+    """What a service on each database costs, asked in turn."""
+    backups = [backed_up(address) for address in addresses]
+    few, many = (serving(address) for address in addresses)
+    times: list[Times] = [defaultdict(list) for _ in addresses]
+    with few as first, many as second, chromium() as browser:
+        servers = (first, second)
+        clients = [httpx2.Client(base_url=server.url, timeout=60) for server in servers]
+        steps = [
+            asked(http, runs, count, states, taken) for http, count, taken in zip(clients, counts, times, strict=True)
+        ]
         for _ in zip(*steps, strict=True):
             pass
-        taken = [held(server.pid) for server in (first, second)]
-    return [
-        Found(size=path.stat().st_size, backup=backup, memory=bytes_, times=each)
-        for path, backup, bytes_, each in zip(paths, backups, taken, times, strict=True)
-    ]
+        for _ in range(SCREENS):
+            for server, taken in zip(servers, times, strict=True):
+                taken["the fleet page's first screen"].append(first_screen(browser, server.url))
+        return [
+            Found(
+                size=size_of(address), backup=backup, alone=held_alone(server.pid), memory=held(server.pid), times=taken
+            )
+            for address, backup, server, taken in zip(addresses, backups, servers, times, strict=True)
+        ]
 
 
-def main(clutches: int, states: int) -> None:
+@contextmanager
+def two_databases(server: str) -> Iterator[list[str]]:
+    """The addresses of two empty databases of that kind."""
+    if server == "postgresql":
+        with postgresql_server() as running:
+            yield [running.fresh(), running.fresh()]
+    else:
+        with tempfile.TemporaryDirectory() as folder:
+            yield [f"sqlite:///{folder}/{which}.db" for which in ("few", "many")]
+
+
+def main(clutches: int, states: int, server: str) -> None:
     """The table."""
     runs = bodies(states + ROUNDS)
-    with tempfile.TemporaryDirectory() as folder:
-        source = Path(folder) / "one.db"
-        life(source, runs[:states])
-        sizes = kilobytes(source)
-        paths = [Path(folder) / f"{count}.db" for count in (FEW, clutches)]
-        for count, path in zip((FEW, clutches), paths, strict=True):
-            multiply(source, path, count)
-        few, many = side_by_side(paths, runs, states)
-    print(f"\n| clutches of {states} stationary tests | {FEW} | {clutches} | ratio |\n|---|---|---|---|")
+    with two_databases(server) as addresses:
+        for count, address in zip((FEW, clutches), addresses, strict=True):
+            life(address, runs[:states])
+            multiply(address, count)
+        sizes = kilobytes(addresses[0])
+        few, many = side_by_side(addresses, runs, (FEW, clutches), states)
+    print(f"\n| clutches of {states} stationary tests, {server} | {FEW} | {clutches} | ratio |\n|---|---|---|---|")
     for title in few.times:
         beside, here = statistics.median(few.times[title]), statistics.median(many.times[title])
         print(f"| {title}, ms | {beside:.2f} | {here:.2f} | {here / beside:.2f} |")
-    for title, beside, here in (
-        ("backup, MB/s", few.backup / 1e6, many.backup / 1e6),
-        ("memory of the service and its workers, MB", few.memory / 1e6, many.memory / 1e6),
-        ("the file, MB", few.size / 1e6, many.size / 1e6),
+    for title, numbers in (
+        ("backup, MB/s", (few.backup, many.backup)),
+        ("memory of the service alone, MB", (few.alone, many.alone)),
+        ("memory of the service and its workers, MB", (few.memory, many.memory)),
+        ("the database, MB", (few.size, many.size)),
     ):
-        print(f"| {title} | {beside:.0f} | {here:.0f} | {here / beside:.2f} |")
-    filters = sizes.pop("filters")
+        if None not in numbers:
+            beside, here = (float(number or 0) / 1e6 for number in numbers)
+            print(f"| {title} | {beside:.0f} | {here:.0f} | {here / beside:.2f} |")
+    filters = sizes.pop("filters") / FEW
     each = ", ".join(f"{title} {size:.1f} kB" for title, size in sizes.items())
     print(f"\nA run takes {each}, a clutch's filters {filters:.0f} kB.")
 
@@ -136,5 +194,6 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("--clutches", type=int, default=1_000)
     parser.add_argument("--states", type=int, default=200, help="stationary tests of each")
+    parser.add_argument("--server", choices=("sqlite", "postgresql"), default="sqlite", help="of the databases")
     arguments = parser.parse_args()
-    main(arguments.clutches, arguments.states)
+    main(arguments.clutches, arguments.states, arguments.server)

@@ -1,31 +1,19 @@
 """A database with copies of one clutch's life: what a request meets is the same, and only their number differs."""
 
-import shutil
-import sqlite3
 from pathlib import Path
 from typing import Any
 
 import httpx2
 import sqlalchemy as sa
 
-from storage.tables import (
-    adopted_model,
-    change,
-    channel,
-    clutch,
-    diagnosis,
-    filter_state,
-    inspection,
-    metadata,
-    prediction,
-    run,
-)
+from storage.dialects import TEXT
+from storage.tables import change, channel, clutch, filter_state, metadata, prediction, run
 from tests.support import serving
 
-#: Columns that tell copies apart; keys of tables that nothing refers to are given anew.
+#: Columns that tell copies apart; keys of tables that nothing refers to are given by the database.
 _OF_CLUTCH, _OF_RUN = clutch.c.clutch_id.name, run.c.run_key.name
-#: What no copy has.
-_LEFT = {adopted_model, diagnosis, inspection}
+#: Tables whose rows no copy has.
+_LEFT = {"adopted_model", "diagnosis", "inspection", "job"}
 
 
 def name(number: int) -> str:
@@ -33,9 +21,9 @@ def name(number: int) -> str:
     return f"copy-{number:05}"
 
 
-def life(path: Path, bodies: list[bytes]) -> None:
-    """Post a life to a service on a new file."""
-    with serving(path) as server, httpx2.Client(base_url=server.url, timeout=60) as http:
+def life(database: Path | str, bodies: list[bytes]) -> None:
+    """Post a life to a service on a new file, or on an empty database at an address."""
+    with serving(database) as server, httpx2.Client(base_url=server.url, timeout=60) as http:
         http.post("/v1/clutches", json={"clutch_id": name(0)}).raise_for_status()
         for body in bodies:
             http.post(
@@ -43,13 +31,13 @@ def life(path: Path, bodies: list[bytes]) -> None:
             ).raise_for_status()
 
 
-def kilobytes(path: Path) -> dict[str, float]:
+def kilobytes(address: str) -> dict[str, float]:
     """What a life takes, by what it is: of each of its runs, and of the filters once."""
-    engine = sa.create_engine(f"sqlite:///{path}")
+    engine = sa.create_engine(address)
     with engine.connect() as connection:
         runs = connection.execute(sa.select(sa.func.count()).select_from(run)).scalar_one()
         sizes = {
-            title: connection.execute(sa.select(sa.func.sum(sa.func.length(column)))).scalar_one() / 1e3
+            title: float(connection.execute(sa.select(sa.func.sum(sa.func.length(column)))).scalar_one()) / 1e3
             for title, column in (
                 ("channels", channel.c.data),
                 ("receipt", run.c.receipt),
@@ -61,33 +49,40 @@ def kilobytes(path: Path) -> dict[str, float]:
     return {title: size if title == "filters" else size / runs for title, size in sizes.items()}
 
 
-def multiply(source: Path, target: Path, count: int) -> None:
-    """A new file with that life under `count` names, each a little better than the one before."""
-    shutil.copyfile(source, target)
-    engine = sa.create_engine(f"sqlite:///{target}")
-    numbers = sa.Table("copies", sa.MetaData(), sa.Column("n", sa.Integer, primary_key=True), prefixes=["TEMPORARY"])
+def multiply(address: str, count: int) -> None:
+    """Put the life that a database holds under `count` names, each a little better than the one before."""
+    engine = sa.create_engine(address)
+    copies = sa.Table(
+        "copies",
+        sa.MetaData(),
+        sa.Column("number", sa.Integer, primary_key=True),
+        sa.Column("name", TEXT),
+        prefixes=["TEMPORARY"],
+    )
     with engine.begin() as connection:
-        driver = connection.connection.driver_connection
-        assert isinstance(driver, sqlite3.Connection)
-        driver.create_function("named", 1, name)
-        numbers.create(connection)
-        connection.execute(sa.insert(numbers), [{"n": number} for number in range(1, count)])
+        copies.create(connection)
+        connection.execute(sa.insert(copies), [{"number": each, "name": name(each)} for each in range(1, count)])
         last = connection.execute(sa.select(sa.func.max(run.c.run_key))).scalar_one()
         for table in metadata.sorted_tables:
             columns = [column for column in table.columns if column is not change.c.change_key]
-            if table in _LEFT or not {_OF_CLUTCH, _OF_RUN} & {column.name for column in columns}:
+            if table.name in _LEFT or not {_OF_CLUTCH, _OF_RUN} & {column.name for column in columns}:
                 continue
-            values = [_of_copy(column, numbers.c.n, last) for column in columns]
-            copies = sa.select(*values).select_from(table.join(numbers, sa.true()))
-            connection.execute(sa.insert(table).from_select([column.name for column in columns], copies))
+            values = [_of_copy(column, copies, last) for column in columns]
+            rows = sa.select(*values).select_from(table.join(copies, sa.true()))
+            connection.execute(sa.insert(table).from_select([column.name for column in columns], rows))
+        if engine.dialect.name == "postgresql":  # keys were given here: the next is the sequence's
+            greatest = sa.select(sa.func.max(run.c.run_key)).scalar_subquery()
+            connection.execute(sa.select(sa.func.setval(sa.func.pg_get_serial_sequence("run", _OF_RUN), greatest)))
+    with engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
+        connection.exec_driver_sql("ANALYZE" if engine.dialect.name == "sqlite" else "VACUUM ANALYZE")
     engine.dispose()
 
 
-def _of_copy(column: sa.Column[Any], number: sa.Column[int], runs: int) -> sa.ColumnElement[Any]:
+def _of_copy(column: sa.Column[Any], copies: sa.Table, runs: int) -> sa.ColumnElement[Any]:
     if column.name == _OF_CLUTCH:
-        return sa.func.named(number)
+        return copies.c.name
     if column.name == _OF_RUN:
-        return column + runs * number
-    if column is clutch.c.record:
-        return sa.func.json_set(column, f"$.{_OF_CLUTCH}", sa.func.named(number))
-    return column + number if column is clutch.c.rank else column
+        return column + runs * copies.c.number
+    if column.type is TEXT:  # records and receipts name their clutch
+        return sa.func.replace(column, name(0), copies.c.name)
+    return column + copies.c.number if column is clutch.c.rank else column

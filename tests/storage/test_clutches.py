@@ -7,6 +7,7 @@ import pytest
 from sqlalchemy.exc import IntegrityError
 
 from storage import clutches
+from storage.clutches import Choice
 from storage.engine.database import Database
 from tests.storage.samples import clutch_row
 
@@ -27,7 +28,7 @@ def test_a_clutch_id_is_taken_once_and_summaries_are_json(database: Database) ->
     with pytest.raises(IntegrityError), database.writing() as connection:
         clutches.insert(connection, clutch_row())
     with pytest.raises(ValueError, match="not JSON compliant"), database.writing() as connection:
-        clutches.set_summary(connection, CLUTCH, 0.5, {"health": nan})
+        clutches.set_summary(connection, CLUTCH, 0.5, {"health": nan}, life="", state="check", if_disputed="check")
 
 
 def test_lists_are_worst_first_and_pages_join_without_gap_or_repeat(database: Database) -> None:
@@ -55,16 +56,16 @@ def test_archived_clutches_are_listed_apart(database: Database) -> None:
             clutches.set_record(connection, "nobody", **content, archived=True)
     with database.reading() as connection:
         assert [row.clutch_id for row in clutches.page(connection, limit=9)] == ["b"]
-        (row,) = clutches.page(connection, limit=9, archived=True)
+        (row,) = clutches.page(connection, Choice(archived=True), limit=9)
         assert (row.clutch_id, row.record, row.registered) == ("a", {"fluid": "new"}, {"fluid": "old"})
-        assert clutches.page(connection, limit=9, after=(row.rank, "a"), archived=True) == []
+        assert clutches.page(connection, Choice(archived=True), limit=9, after=(row.rank, "a")) == []
 
 
 def test_summary_and_revision(database: Database) -> None:
     with database.writing() as connection:
         clutches.insert(connection, clutch_row())
         clutches.insert(connection, clutch_row("other"))
-        clutches.set_summary(connection, CLUTCH, 0.2, {"health": 0.2})
+        clutches.set_summary(connection, CLUTCH, 0.2, {"health": 0.2}, life="", state="check", if_disputed="check")
         assert [clutches.bump_revision(connection, CLUTCH) for _ in range(3)] == [1, 2, 3]
     with database.reading() as connection:
         assert clutches.get(connection, CLUTCH) == replace(clutch_row(), rank=0.2, summary={"health": 0.2}, revision=3)
@@ -74,6 +75,6 @@ def test_summary_and_revision(database: Database) -> None:
 def test_an_unknown_clutch_is_named(database: Database) -> None:
     with database.writing() as connection:
         with pytest.raises(LookupError, match="'nobody'"):
-            clutches.set_summary(connection, "nobody", 0.0, {})
+            clutches.set_summary(connection, "nobody", 0.0, {}, life="", state="check", if_disputed="check")
         with pytest.raises(LookupError, match="'nobody'"):
             clutches.bump_revision(connection, "nobody")

@@ -1,6 +1,7 @@
-"""Clutches: register, list worst first, look up, edit and archive, and the audit trail."""
+"""Clutches: register, list, count, look up, edit and archive, and the audit trail."""
 
 import asyncio
+from collections.abc import Callable, Hashable
 from functools import partial
 
 from fastapi import APIRouter, Request
@@ -14,7 +15,8 @@ from service.queries.cache import to_json
 from service.queries.degradation import degradation
 from service.run_files.json_run import checked
 from service.schemas.clutch import ClutchEdit, ClutchIn, ClutchOut, ClutchPage
-from service.schemas.parameters import Archived, ClutchId
+from service.schemas.fleet import FleetTotals
+from service.schemas.parameters import Archived, ClutchId, ClutchStateName, Find, Held, Offset, Sort
 from service.schemas.run import ChangePage
 from service.web.answers import (
     JSON_TYPE,
@@ -34,8 +36,11 @@ from service.web.middleware import remember
 from service.web.problems import CHANGING, READING, SENDING
 from service.workflows import register_clutch as registration
 from service.workflows.edit_clutch import edit
+from storage.clutches import Choice
 
 router = APIRouter(prefix="/v1/clutches", tags=["clutches"])
+#: Beside the clutches: below them, `totals` would be a clutch's name.
+fleet_router = APIRouter(prefix="/v1/fleet", tags=["fleet"])
 
 EXAMPLE = {
     "clutch_id": "bench3-017",
@@ -74,16 +79,43 @@ def _register(context: Context, clutch: ClutchIn) -> tuple[dict[str, object], bo
 
 @router.get("", response_model=ClutchPage, responses=READING)
 async def list_clutches(
-    request: Request, context: OwnReader, archived: Archived = False, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
+    request: Request,
+    context: OwnReader,
+    archived: Archived = False,
+    state: ClutchStateName = None,
+    held: Held = False,
+    find: Find = "",
+    sort: Sort = "worst",
+    offset: Offset = 0,
+    limit: Limit = USUAL_ITEMS,
+    cursor: Cursor = None,
 ) -> Response:
-    """All clutches that the key is for, with current health and remaining life, the fewest remaining cycles first."""
-    after, own = from_cursor(cursor), own_clutches(request)
-    key = ("clutches", archived, limit, after, own)
+    """The clutches that the key is for, with health and remaining life: the fewest remaining cycles first, or by name.
+
+    Whoever reads all of them sorts by name: then none is missed or repeated however they change meanwhile.
+    """
+    choice = Choice(archived=archived, only=own_clutches(request), state=state, held=held, find=find)
+    after = from_cursor(cursor)
 
     def make() -> bytes:
         return clutch_list.page_as_json(
-            context.database, context.cache, limit=limit, after=after, archived=archived, only=own
+            context.database, context.cache, choice, limit=limit, after=after, offset=offset, by_name=sort == "name"
         )
+
+    return await _of_all(request, context, ("clutches", choice, limit, after, offset, sort), make)
+
+
+@fleet_router.get("/totals", response_model=FleetTotals, responses=READING)
+async def totals(request: Request, context: OwnReader, archived: Archived = False, find: Find = "") -> Response:
+    """How many clutches that the key is for there are, by their states: what a page shows beside a part of their list."""
+    choice = Choice(archived=archived, only=own_clutches(request), find=find)
+    return await _of_all(
+        request, context, ("totals", choice), lambda: to_json(clutch_list.totals(context.database, choice))
+    )
+
+
+async def _of_all(request: Request, context: Context, key: Hashable, make: Callable[[], bytes]) -> Response:
+    """A GET's answer that any commit may change, made once for what is committed."""
 
     def again(request: Request) -> Response | None:
         held = context.cache.held(key, context.database.watch.version())
@@ -91,7 +123,7 @@ async def list_clutches(
 
     # the version before the rows are read: what is committed meanwhile makes another
     held = await kept(context, key, context.database.watch.version(), make)
-    if own is None:
+    if own_clutches(request) is None:
         remember(request, again)
     return tagged(request, held, JSON_TYPE)
 

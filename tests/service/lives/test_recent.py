@@ -89,7 +89,7 @@ def _forgotten(client: TestClient, database: Database) -> set[bool]:
         assert row is not None
         assert "life" in row.summary
         old = {name: value for name, value in row.summary.items() if name != "life"}
-        clutches.set_summary(connection, "c1", row.rank, old)
+        clutches.set_summary(connection, "c1", row.rank, old, life="", state=row.state, if_disputed=row.state)
     return said | {client.get("/v1/clutches").json()["items"][0]["diagnosis"]["earlier_life"]}
 
 

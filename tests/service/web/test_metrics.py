@@ -49,7 +49,7 @@ def test_clutches_runs_and_what_waits_are_counted_together(client: TestClient) -
     with database.writing() as connection:
         row = clutches.get(connection, "c2")
         assert row is not None
-        clutches.set_summary(connection, "c2", 0.0, row.summary)
+        clutches.set_summary(connection, "c2", 0.0, row.summary, life="", state="failure", if_disputed="failure")
     lines = client.get("/metrics").text.splitlines()
     for line in (
         "clutchlife_clutches 2.0",

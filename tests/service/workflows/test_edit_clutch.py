@@ -111,7 +111,10 @@ def test_an_archived_clutch_is_left_out_takes_in_no_run_and_still_teaches(tmp_pa
     with pytest.raises(ArchivedError, match="archived"):
         bench.send(body("test", "b", 1000.0))
     assert bench.send(known)["duplicate"]
-    listed = [clutch_list.page(bench.database, limit=9, after=None, archived=archived)[0] for archived in (False, True)]
+    listed = [
+        clutch_list.page_by_name(bench.database, limit=9, after=None, archived=archived)[0]
+        for archived in (False, True)
+    ]
     assert [[item["clutch_id"] for item in items] for items in listed] == [[], [CLUTCH]]
     assert learn_fleet.lessons_of(learn_fleet._state(bench.database, CLUTCH))[0]["fluid"] == "ATF"
     edit(bench, archived=False)

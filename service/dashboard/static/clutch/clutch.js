@@ -13,7 +13,6 @@ import { byId, h, within } from "../shared/dom.js";
 import { withKey } from "../shared/key.js";
 import { Live } from "../shared/live.js";
 import { liveBar } from "../shared/live_bar.js";
-import { openVerdict, stateOf } from "../shared/state.js";
 import { firstRun } from "../shared/welcome.js";
 import { Board } from "./board.js";
 import { head } from "./head.js";
@@ -192,12 +191,11 @@ function begin() {
 function drawHead() {
   if (shown === null) return;
   const { clutch, life } = shown;
-  const state = stateOf(life ?? clutch.summary, openVerdict(parts?.diagnosis.latest));
-  const text = JSON.stringify([clutch, life, state]);
+  const text = JSON.stringify([clutch, life]);
   const place = byId("head");
   if (place.dataset.shown === text) return;
   place.dataset.shown = text;
-  place.replaceChildren(...head(clutch, life, state, () => store.archive(true)));
+  place.replaceChildren(...head(clutch, life, () => store.archive(true)));
 }
 
 function showUnregistered() {
@@ -215,5 +213,5 @@ byId("print").addEventListener("click", () => {
 const store = new Stored(ID, () => live.now());
 const inspections = new Inspections(within("inspections", ".body"), ID, fileName, store.change);
 const live = new Live(withKey(poll), liveBar(byId("live")), INTERVAL);
-sender(byId("send"), { clutch: ID, clutches: () => [], sent: () => live.now() });
+sender(byId("send"), { clutch: ID, sent: () => live.now() });
 live.start();

@@ -8,17 +8,16 @@ import { healthBar } from "../shared/sparkline.js";
 import { heldText, stateIcon, STATES } from "../shared/state.js";
 
 /** @import { Content } from "../shared/dom.js" */
-/** @import { State } from "../shared/state.js" */
 /** @import { ClutchOut, CourseShare, RemainingLife } from "../shared/types.js" */
 
 /**
  * @param {ClutchOut} clutch
  * @param {RemainingLife | null} life null before the first run
- * @param {State} state
  * @param {() => unknown} archive asks whether the clutch is to be archived
  * @returns {HTMLElement[]}
  */
-export function head(clutch, life, state, archive) {
+export function head(clutch, life, archive) {
+  const { state } = clutch;
   const simulated = clutch.origin === "simulated" && h("span", { class: "tag" }, "simulated");
   const title = h(
     "div",
@@ -35,7 +34,7 @@ export function head(clutch, life, state, archive) {
     h("p", { class: "quiet" }, description(clutch)),
     clutch.archived ? null : h("button", { type: "button", class: "small", onclick: archive }, "Archive …"),
   );
-  return life === null ? [title] : [title, h("dl", { class: "tiles" }, tiles(clutch, life, state))];
+  return life === null ? [title] : [title, h("dl", { class: "tiles" }, tiles(clutch, life))];
 }
 
 /** @param {ClutchOut} clutch */
@@ -53,9 +52,8 @@ function description({ friction_material: material, reaction_plate: plate, fluid
 /**
  * @param {ClutchOut} clutch
  * @param {RemainingLife} life
- * @param {State} state
  */
-function tiles(clutch, life, state) {
+function tiles(clutch, life) {
   const { current, model, status } = life;
   const { health } = current;
   const [cof, deviation] = withSd(current.mean_cof, current.mean_cof_sd).split(" ± ");
@@ -64,7 +62,7 @@ function tiles(clutch, life, state) {
   const used = `${life.runs_used} ${life.runs_used === 1 ? "test" : "tests"} used, ${clutch.runs} runs`;
   const effects = model.effects.length > 0 ? model.effects.map(words).join(", ") : "without extension";
   return [
-    tile("Health", percent(health), health === null ? null : healthBar(health, state.name)),
+    tile("Health", percent(health), health === null ? null : healthBar(health, clutch.state.name)),
     tile(
       "Remaining cycles",
       remaining(life),

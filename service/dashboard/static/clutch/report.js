@@ -5,7 +5,7 @@ import { sentence } from "../diagnosis/report.js";
 import { byMeanCof } from "../quantities/criteria.js";
 import { h, table } from "../shared/dom.js";
 import { cycles, fixed, interval, moment, percent, probability, withSd, words } from "../shared/format.js";
-import { openVerdict, stateIcon, stateOf, STATES } from "../shared/state.js";
+import { stateIcon, STATES } from "../shared/state.js";
 
 /** @import { ClutchOut, DiagnosisOut, Receipt, RemainingLife, StribeckItem } from "../shared/types.js" */
 /** @import { Board } from "./board.js" */
@@ -24,7 +24,7 @@ export function makeReport(place, { clutch, life, tests, events, runs }, board, 
   if (life === null) return;
   const size = { width: 760, height: 255 };
   const drawings = [board.charts.fan, board.charts.remaining].map((chart) => chart.light({ ...size, scheme: "light" }));
-  const state = stateOf(life, openVerdict(latest));
+  const { state } = clutch;
   const simulated = clutch.origin === "simulated" ? ", simulated" : "";
   const kind = `Wet clutch, ${clutch.friction_material} on ${clutch.reaction_plate}, ${clutch.fluid}${simulated}`;
   const values = facts(life, runs).flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]);

@@ -7,7 +7,7 @@ import { healthBar, intervalBar, sparkline } from "../shared/sparkline.js";
 import { heldText, stateIcon, STATES, VERDICTS } from "../shared/state.js";
 
 /** @import { Content } from "../shared/dom.js" */
-/** @import { State, StateName } from "../shared/state.js" */
+/** @import { StateName } from "../shared/state.js" */
 /** @import { ClutchOut, ClutchSummary } from "../shared/types.js" */
 
 export const COLUMNS = [
@@ -23,11 +23,10 @@ export const COLUMNS = [
 /**
  * The row; `scale` is the cycles at the right end of every interval's bar.
  * @param {ClutchOut} clutch
- * @param {State} state
  * @param {number} scale
  */
-export function row(clutch, state, scale) {
-  const { summary } = clutch;
+export function row(clutch, scale) {
+  const { summary, state } = clutch;
   const address = `/clutches/${encodeURIComponent(clutch.clutch_id)}`;
   const label = h("span", {}, STATES[state.name].word, small(state.why));
   return h(

@@ -9,14 +9,13 @@ import { problemView } from "../shared/problem_view.js";
 import { batchOf } from "./batch.js";
 import { takeFiles } from "./dropping.js";
 import { IDENTIFIER, register } from "./registration.js";
-import { similarTo } from "./similar_names.js";
+import { registeredLike, similarRegistered } from "./similar_names.js";
 
 /** @import { Batch } from "./batch.js" */
 
 /**
  * @typedef {object} Page
  * @property {string} [clutch] the clutch that the page shows; without one the reader names it
- * @property {() => string[]} clutches the registered ids
  * @property {() => unknown} sent hears of stored runs
  */
 
@@ -64,7 +63,7 @@ class Sending {
 
   open() {
     const { runs, wrong } = this.batch;
-    const options = this.page.clutches().map((id) => h("option", { value: id }));
+    const suggestions = h("datalist", { id: "registered" });
     const submit = (/** @type {SubmitEvent} */ event) => {
       event.preventDefault();
       this.send();
@@ -72,12 +71,14 @@ class Sending {
     const close = h("button", { type: "button", onclick: () => this.dialog.close() }, "Close");
     const compare = () => runs.forEach((run) => run.compare(this.clutch.value.trim()));
     this.clutch.addEventListener("input", compare);
+    this.clutch.addEventListener("input", () => this.suggest(suggestions));
+    this.suggest(suggestions);
     this.dialog.append(
       h("h2", { id: "sending-title" }, runs.length > 1 ? `Send ${runs.length} runs` : "Send a run"),
       h(
         "form",
         { onsubmit: submit },
-        h("div", { class: "fields" }, field(this.clutch, "Clutch", h("datalist", { id: "registered" }, options))),
+        h("div", { class: "fields" }, field(this.clutch, "Clutch", suggestions)),
         wrong.length > 0 ? notRuns(wrong) : "",
         h(
           "div",
@@ -93,6 +94,16 @@ class Sending {
     document.body.append(this.dialog);
     this.dialog.showModal();
     this.firstEmpty().focus();
+  }
+
+  /**
+   * Offer registered names that contain what is typed.
+   * @param {HTMLElement} place
+   */
+  async suggest(place) {
+    const typed = this.clutch.value.trim();
+    const names = await registeredLike(typed).catch(() => []); // sending itself says what is wrong
+    if (typed === this.clutch.value.trim()) place.replaceChildren(...names.map((id) => h("option", { value: id })));
   }
 
   /** The field that the reader has to fill in first, else the button that sends. */
@@ -161,7 +172,7 @@ class Sending {
     const lead = `No clutch is registered as “${id}”. Nothing has been sent yet.`;
     const chosen = await register(id, {
       lead,
-      similar: similarTo(id, this.page.clutches()),
+      similar: await similarRegistered(id),
       record: this.batch.record,
     });
     if (chosen !== null) this.clutch.value = chosen;

@@ -1,8 +1,45 @@
 // @ts-check
-// Names that are spelt almost as another: what a slip of typing makes of them.
+// Names of registered clutches that are spelt almost as another: what a slip of typing makes of them.
+
+import { read } from "../shared/api.js";
+
+/** @import { ClutchOut, ListPage } from "../shared/types.js" */
+
+/** Names that are offered while one is typed, and looked through for what may have been meant. */
+const OFFERED = 20;
+const LOOKED_THROUGH = 100;
 
 /** Letters that may differ between a slip of typing and the name that was meant. */
 const MOST_DIFFERENT = 2;
+
+/**
+ * Registered names that contain this text, or whose material or fluid does.
+ * @param {string} text
+ */
+export async function registeredLike(text, limit = OFFERED) {
+  /** @type {{ body: ListPage<ClutchOut> }} */
+  const { body } = await read(`/v1/clutches?sort=name&limit=${limit}&find=${encodeURIComponent(text)}`);
+  return body.items.map((clutch) => clutch.clutch_id);
+}
+
+/**
+ * Registered names that are spelt almost as this one. With one slip a half of the name is as it was meant, with two a third.
+ * @param {string} id
+ */
+export async function similarRegistered(id) {
+  const parts = [2, 3].flatMap((count) => split(id, count));
+  const names = await Promise.all(parts.map((part) => registeredLike(part, LOOKED_THROUGH)));
+  return similarTo(id, [...new Set(names.flat())]);
+}
+
+/**
+ * @param {string} text
+ * @param {number} count
+ */
+function split(text, count) {
+  const length = Math.ceil(text.length / count);
+  return [...Array(count).keys()].map((part) => text.slice(part * length, (part + 1) * length)).filter(Boolean);
+}
 
 /**
  * The names that are spelt almost as this one.

@@ -67,8 +67,11 @@ async function request(path, options = {}) {
   throw new Problem(answer.status, body, Number(answer.headers.get("Retry-After")) || null);
 }
 
+/** Addresses whose answers are kept: more than a page polls, fewer than a reader scrolls past in a long list. */
+const MOST_KEPT = 64;
+
 /**
- * What was last read of an address, and its tag: an unchanged answer costs a few hundred bytes.
+ * What was last read of an address, and its tag: an unchanged answer costs a few hundred bytes. Those lately read come last.
  * @type {Map<string, { tag: string | null, body: any }>}
  */
 const answers = new Map();
@@ -87,10 +90,14 @@ export async function read(path) {
   const answer = await request(path, { headers });
   if (answer.status === 304 && before) {
     await answer.arrayBuffer(); // an answer that is not read to its end keeps its connection busy
+    answers.delete(path);
+    answers.set(path, before);
     return { body: before.body, changed: false };
   }
   const body = await answer.json();
+  answers.delete(path);
   answers.set(path, { tag: answer.headers.get("ETag"), body });
+  if (answers.size > MOST_KEPT) answers.delete([...answers.keys()][0]);
   return { body, changed: true };
 }
 

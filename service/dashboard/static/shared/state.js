@@ -1,18 +1,11 @@
 // @ts-check
-// The state of a clutch, after NAMUR NE 107: one of five states, each with its own word, shape and colour.
+// The state of a clutch, after NAMUR NE 107, as the service says it: one of five, each with its own word, shape and colour.
 
 import { svg } from "./dom.js";
 
-/** @import { ClutchSummary } from "./types.js" */
+/** @import { ClutchState } from "./types.js" */
 
-/**
- * @typedef {"failure" | "out_of_specification" | "maintenance" | "check" | "normal"} StateName
- * @typedef {{ name: StateName, why: string }} State its name and the sentence why
- * @typedef {{ status?: string, verdict: string | null, adopted: boolean, earlier_life: boolean }} Verdict of a diagnosis
- */
-
-/** Below this health (1 new, 0 end of life) a replacement should be planned. */
-const LOW_HEALTH = 0.2;
+/** @typedef {ClutchState["name"]} StateName */
 
 /** @type {Record<StateName, { order: number, word: string }>} */
 export const STATES = {
@@ -31,37 +24,6 @@ export const VERDICTS = {
   unexplained_structure: "Unexplained structure",
   insufficient_data: "Too little data",
 };
-
-/**
- * The verdict of a finished diagnosis that waits for someone to act on it, or null; a rebuild ends it.
- * @param {Verdict | null | undefined} latest
- */
-export function openVerdict(latest) {
-  return latest && (latest.status ?? "finished") === "finished" && !latest.adopted && !latest.earlier_life
-    ? latest.verdict
-    : null;
-}
-
-/** @type {Set<string | null>} */
-const DISAGREES = new Set(["cause_named", "cause_ambiguous", "unexplained_structure"]);
-
-/**
- * The state of a clutch; `verdict` is that of a diagnosis that nobody has acted on, or null.
- * @param {ClutchSummary | null} summary
- * @param {string | null} [verdict]
- * @returns {State}
- */
-export function stateOf(summary, verdict = null) {
-  if (summary === null || summary.status === "insufficient_data")
-    return { name: "check", why: "fewer than three tests: no prognosis yet" };
-  if (summary.status === "reached") return { name: "failure", why: "end of life reached" };
-  if (DISAGREES.has(verdict))
-    return { name: "out_of_specification", why: "data and model disagree: see the diagnosis" };
-  const health = summary.current.health;
-  if (health !== null && health < LOW_HEALTH) return { name: "maintenance", why: "near the end of its life" };
-  if (summary.status === "may_never_reach") return { name: "normal", why: "may never reach end of life" };
-  return { name: "normal", why: "ageing as modelled" };
-}
 
 /**
  * How many runs of a clutch wait for someone to look at them.

@@ -56,6 +56,11 @@ export interface LatestDiagnosis {
   earlier_life: boolean;
 }
 
+export interface ClutchState {
+  name: "failure" | "out_of_specification" | "maintenance" | "check" | "normal";
+  why: string;
+}
+
 export interface ClutchOut {
   clutch_id: string;
   geometry: GeometryIn;
@@ -65,11 +70,29 @@ export interface ClutchOut {
   fluid: string;
   origin: string;
   archived: boolean;
+  state: ClutchState;
   runs: number;
   held: number;
   summary: ClutchSummary | null;
   recent: Recent | null;
   diagnosis: LatestDiagnosis | null;
+}
+
+// --- service/schemas/fleet.py
+
+export interface StateCounts {
+  failure: number;
+  out_of_specification: number;
+  maintenance: number;
+  check: number;
+  normal: number;
+}
+
+export interface FleetTotals {
+  all: number;
+  held: number;
+  states: StateCounts;
+  scale_cycles: number;
 }
 
 // --- service/schemas/criteria.py

@@ -1,0 +1,161 @@
+// @ts-check
+// The rows of the table: only those about the part of the list that is in sight are read and drawn, whatever its length.
+// What lies above and below them is empty space of the height that they would take.
+
+import { h } from "../shared/dom.js";
+import { COLUMNS, row } from "./row.js";
+
+/** @import { ClutchOut } from "../shared/types.js" */
+
+/**
+ * @typedef {object} Entry a clutch that is drawn
+ * @property {string} text all that its row shows; the same text keeps the row
+ * @property {HTMLElement} element
+ * @typedef {{ offset: number, limit: number }} Part of the list
+ */
+
+/** Rows of a block, at least a screen of them: drawn are the block in sight and one on either side. */
+const BLOCK = 40;
+/** The height of a row before one is measured, px. */
+const USUAL_HEIGHT = 64;
+
+export class Rows {
+  /** @param {() => void} moved hears that another part of the list is to be shown */
+  constructor(moved) {
+    this.moved = moved;
+    this.above = space();
+    this.body = h("tbody", { role: "rowgroup" });
+    this.below = space();
+    const columns = COLUMNS.map((name) => h("th", { role: "columnheader", scope: "col" }, name));
+    this.element = h(
+      "table",
+      { class: "fleet", role: "table" },
+      h("caption", { class: "hidden" }, "Clutches, the fewest remaining cycles first"),
+      h("thead", { role: "rowgroup" }, h("tr", { role: "row", "aria-rowindex": 1 }, columns)),
+      this.above,
+      this.body,
+      this.below,
+    );
+    /** @type {Map<string, Entry>} */
+    this.entries = new Map();
+    this.offset = 0;
+    this.total = 0;
+    this.height = USUAL_HEIGHT;
+    this.looking = false;
+    addEventListener("scroll", () => this.look(), { passive: true });
+    addEventListener("resize", () => {
+      this.measure();
+      this.look();
+    });
+  }
+
+  /** The part of the list to read, by what is in sight. */
+  wanted() {
+    const block = Math.max(BLOCK, Math.ceil(innerHeight / this.height));
+    const within = Math.floor(Math.max(0, Math.min(this.first(), this.total - 1)) / block);
+    const offset = Math.max(0, within - 1) * block;
+    return { offset, limit: (within + 2) * block - offset };
+  }
+
+  /** Another list is to be shown, from its beginning. */
+  restart() {
+    this.offset = 0;
+    this.total = 0;
+    if (scrollY > this.top()) scrollTo(0, this.top());
+  }
+
+  /**
+   * Show a part of a list of so many clutches; `scale` is the cycles at the right end of every interval's bar.
+   * @param {ClutchOut[]} items
+   * @param {number} offset of the first of them
+   * @param {number} total
+   * @param {number} scale
+   */
+  show(items, offset, total, scale) {
+    const first = this.first();
+    const before = this.topOf(first);
+    this.arrange(items.map((clutch) => this.drawn(clutch, scale)));
+    const present = new Set(items.map((clutch) => clutch.clutch_id));
+    for (const id of this.entries.keys()) if (!present.has(id)) this.entries.delete(id);
+    [...this.body.children].forEach((element, index) =>
+      element.setAttribute("aria-rowindex", String(offset + index + 2)),
+    );
+    this.element.setAttribute("aria-rowcount", String(total + 1));
+    if (this.offset === 0 && this.total === 0) this.measure();
+    this.offset = offset;
+    this.total = total;
+    this.above.style.height = `${offset * this.height}px`;
+    this.below.style.height = `${Math.max(0, total - offset - items.length) * this.height}px`;
+    const after = this.topOf(first);
+    // what is in sight stays where it is, though rows above it were guessed higher or lower than they are
+    if (before !== null && after !== null && before !== after) scrollBy(0, after - before);
+    this.look();
+  }
+
+  /** The row's element: a clutch that did not change keeps its row, so nothing flickers. */
+  drawn(/** @type {ClutchOut} */ clutch, /** @type {number} */ scale) {
+    const text = `${scale} ${JSON.stringify(clutch)}`;
+    const before = this.entries.get(clutch.clutch_id);
+    if (before?.text === text) return before.element;
+    const element = row(clutch, scale);
+    if (before !== undefined) element.classList.add("fresh");
+    this.entries.set(clutch.clutch_id, { text, element });
+    return element;
+  }
+
+  /**
+   * Put rows into the table in this order; those that are there already are not touched, and the focus stays.
+   * @param {HTMLElement[]} order
+   */
+  arrange(order) {
+    const focused = document.activeElement;
+    let next = this.body.firstElementChild;
+    for (const element of order) {
+      if (element === next) next = next.nextElementSibling;
+      else this.body.insertBefore(element, next);
+    }
+    while (next !== null) {
+      const gone = next;
+      next = next.nextElementSibling;
+      gone.remove();
+    }
+    if (focused instanceof HTMLElement && this.body.contains(focused)) focused.focus({ preventScroll: true });
+  }
+
+  /** Look where the page stands, once a frame, and say so where that is another part of the list. */
+  look() {
+    if (this.looking) return;
+    this.looking = true;
+    requestAnimationFrame(() => {
+      this.looking = false;
+      if (this.element.isConnected && this.total > 0 && this.wanted().offset !== this.offset) this.moved();
+    });
+  }
+
+  /** The place in the list of the first row in sight, by its row where it is drawn, else by the empty space. */
+  first() {
+    const { top, bottom } = this.body.getBoundingClientRect();
+    if (top > 0) return this.offset - Math.ceil(top / this.height);
+    const rows = [...this.body.children];
+    if (bottom <= 0) return this.offset + rows.length + Math.floor(-bottom / this.height);
+    return this.offset + rows.findIndex((element) => element.getBoundingClientRect().bottom > 0);
+  }
+
+  /** @param {number} index in the list */
+  topOf(index) {
+    return this.body.children[index - this.offset]?.getBoundingClientRect().top ?? null;
+  }
+
+  /** Where the table begins on the page, px. */
+  top() {
+    return this.element.isConnected ? this.element.getBoundingClientRect().top + scrollY : 0;
+  }
+
+  measure() {
+    const rows = this.body.children.length;
+    if (rows > 0) this.height = Math.max(1, this.body.getBoundingClientRect().height / rows);
+  }
+}
+
+/** Room for rows that are not drawn. */
+const space = () => h("tbody", { class: "space", "aria-hidden": "true" });

@@ -1,0 +1,177 @@
+"""A fleet of hundreds: the page holds the rows in sight, shows the others when it is scrolled, and finds one far down."""
+
+import json
+from collections.abc import Iterator
+from itertools import pairwise
+
+import httpx2
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from storage import clutches
+from storage.engine.opening import open_database
+from tests.browser.driving import Watched
+from tests.browser.dropping import drop
+from tests.scale.copies import life, multiply, name
+from tests.support import ONCE, Server, serving, stationary
+
+pytestmark = pytest.mark.browser
+
+CLUTCHES = 400
+MOST_ROWS = 150
+#: Between two cards of a phone's page, px.
+GAP = 13
+PHONE = {"width": 390, "height": 844}
+WIDE = {"width": 1360, "height": 900}
+ROWS = "table.fleet tbody tr"
+#: The rows in sight, by their place in the list, and where they begin and end [px].
+_IN_SIGHT = """rows => rows.map((row) => [row.getBoundingClientRect(), Number(row.ariaRowIndex), row.dataset.clutch])
+  .filter(([box]) => box.bottom > 0 && box.top < innerHeight)
+  .map(([box, place, clutch]) => [place, clutch, box.top, box.bottom])"""
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    path = tmp_path_factory.mktemp("large") / "clutchlife.db"
+    life(path, [json.dumps(stationary(cycles, wear=cycles / 26_000)).encode() for cycles in range(0, 8000, 2000)])
+    multiply(f"sqlite:///{path}", CLUTCHES)
+    with serving(path, loaded=True) as server:
+        yield server
+
+
+@pytest.fixture
+def watched(browser: Browser, fleet: Server) -> Iterator[Watched]:
+    found = Watched(browser, fleet.url)
+    yield found
+    found.close()
+
+
+def opened(watched: Watched) -> Page:
+    page = watched.open("/")
+    page.locator(ROWS).first.wait_for()
+    expect(page.locator("table.fleet")).to_have_attribute("aria-rowcount", str(CLUTCHES + 1))
+    return page
+
+
+def in_sight(page: Page) -> list[tuple[int, str, float, float]]:
+    return [tuple(row) for row in page.eval_on_selector_all(ROWS, _IN_SIGHT)]
+
+
+def settled(page: Page) -> list[tuple[int, str, float, float]]:
+    """The rows in sight, once they fill what is in sight below the head of the table."""
+    for _ in range(200):
+        shown = in_sight(page)
+        if shown and (shown[0][2] <= GAP or shown[0][0] == 2) and (shown[-1][3] >= 840 or shown[-1][0] == CLUTCHES + 1):
+            return shown
+        page.wait_for_timeout(50)
+    raise AssertionError(f"the rows in sight do not fill the page: {shown}")
+
+
+@pytest.mark.parametrize("viewport", [WIDE, PHONE], ids=["wide", "phone"])
+def test_scrolling_shows_every_row_and_the_page_holds_few(
+    browser: Browser, fleet: Server, viewport: dict[str, int]
+) -> None:
+    watched = Watched(browser, fleet.url, viewport=viewport)
+    page = opened(watched)
+    seen: dict[int, str] = {}
+    far = viewport is PHONE  # a card is five rows high: there the way is cut short
+    for _ in range(200):
+        shown = settled(page)
+        places = [place for place, *_ in shown]
+        assert places == list(range(places[0], places[0] + len(places)))
+        assert all(abs(below[2] - above[3]) <= GAP for above, below in pairwise(shown)), "rows overlap or leave gaps"
+        assert page.locator(ROWS).count() <= MOST_ROWS
+        seen |= {place: clutch for place, clutch, *_ in shown}
+        if places[-1] == CLUTCHES + 1 or (far and places[0] > 100):
+            break
+        page.evaluate("scrollBy(0, 500)")
+    last = max(seen)
+    assert seen == {place: name(place - 2) for place in range(2, last + 1)}
+    assert last == CLUTCHES + 1 or far
+    page.keyboard.press("End")
+    expect(page.locator(f"{ROWS} a", has_text=name(CLUTCHES - 1))).to_be_in_viewport()
+    settled(page)
+    page.keyboard.press("Home")
+    expect(page.locator(f"{ROWS} a", has_text=name(0))).to_be_in_viewport()
+    assert page.locator(ROWS).count() <= MOST_ROWS
+    watched.close()
+
+
+def test_a_jump_into_the_middle_reads_only_what_is_in_sight(watched: Watched) -> None:
+    page = opened(watched)
+    assert len([url for url in watched.asked if "/v1/clutches?" in url]) == 1
+    page.evaluate("scrollTo(0, document.documentElement.scrollHeight / 2)")
+    shown = settled(page)
+    assert abs(shown[0][0] - CLUTCHES / 2) < 30
+    lists = [url for url in watched.asked if "/v1/clutches?" in url]
+    assert len(lists) <= 6
+    assert all(int(url.partition("limit=")[2].partition("&")[0]) <= MOST_ROWS for url in lists)
+    before = shown[0]
+    page.wait_for_timeout(4000)  # a poll moves nothing
+    assert settled(page)[0] == before
+
+
+def test_search_finds_one_far_down_and_chips_count_what_is_found(watched: Watched) -> None:
+    page = opened(watched)
+    page.evaluate("scrollTo(0, document.documentElement.scrollHeight)")
+    settled(page)
+    wanted = name(CLUTCHES - 3)
+    page.get_by_label("Find").fill(wanted.upper())
+    expect(page.locator(ROWS)).to_have_count(1)
+    expect(page.get_by_role("link", name=wanted)).to_be_in_viewport()
+    expect(page.locator("#chips")).to_contain_text("1 clutch")
+    page.get_by_label("Find").fill("")
+    expect(page.get_by_role("button", name=f"{CLUTCHES} clutches")).to_be_visible()
+    expect(page.get_by_role("link", name=name(0), exact=True)).to_be_visible()
+
+
+def test_the_focus_stays_while_the_rows_about_it_change(watched: Watched) -> None:
+    page = opened(watched)
+    link = page.get_by_role("link", name=name(60), exact=True)
+    link.focus()
+    settled(page)
+    for number in range(61, 130):
+        page.keyboard.press("Tab")
+        assert page.evaluate("document.activeElement.closest('tr').dataset.clutch") == name(number)
+        if number % 10 == 0:  # nobody is faster than the rows ahead
+            page.get_by_role("link", name=name(number + 11), exact=True).wait_for(state="attached")
+    assert page.locator(ROWS).count() <= MOST_ROWS
+
+
+def test_the_send_dialog_offers_what_is_typed(watched: Watched) -> None:
+    page = opened(watched)
+    drop(page, {"stationary-4000.csv": "pressure_bar,speed_rpm,torque_nm\n5,20,21\n"})
+    dialog = page.get_by_role("dialog", name="Send a run")
+    dialog.get_by_label("Clutch", exact=True).fill(name(321)[:-1])
+    expect(dialog.locator("datalist option")).to_have_count(10)
+    assert name(321) in [option.get_attribute("value") for option in dialog.locator("datalist option").all()]
+
+
+def test_a_print_says_which_rows_it_has(watched: Watched) -> None:
+    page = opened(watched)
+    expect(page.locator("#printed")).to_be_hidden()
+    page.emulate_media(media="print")
+    expect(page.locator("#printed")).to_have_text(f"Rows 1 to 80 of {CLUTCHES}")
+    assert page.locator("table.fleet .space").last.evaluate("element => element.getBoundingClientRect().height") == 0
+
+
+def test_a_walk_by_name_skips_nothing_while_ranks_change(fleet: Server) -> None:
+    """Between two pages half of the clutches get better by so much that they lie behind all others."""
+    database = open_database(fleet.address)
+    seen: list[str] = []
+    with httpx2.Client(base_url=fleet.url, timeout=60) as http:
+        address: str | None = "/v1/clutches?sort=name&limit=37"
+        while address is not None:
+            answer = http.get(address)
+            answer.raise_for_status()
+            seen += [item["clutch_id"] for item in answer.json()["items"]]
+            address = answer.links["next"]["url"] if "next" in answer.links else None
+            with database.writing() as connection:
+                for number in range(len(seen) % 2, CLUTCHES, 2):
+                    row = clutches.get(connection, name(number))
+                    assert row is not None
+                    state = {"life": "", "state": row.state, "if_disputed": row.state}
+                    clutches.set_summary(connection, row.clutch_id, row.rank + 1000.0, row.summary, **state)
+    database.close()
+    assert seen == [name(number) for number in range(CLUTCHES)]
+    assert ONCE.get(f"{fleet.url}/v1/fleet/totals").json()["all"] == CLUTCHES

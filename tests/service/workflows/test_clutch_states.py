@@ -1,0 +1,142 @@
+"""The stored state of a clutch is that which follows from all its rows, whatever was written in which order."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+import pytest
+
+from service.queries import clutch_list
+from service.workflows import replay, run_diagnosis
+from service.workflows.edit_clutch import edit
+from storage import clutches, diagnoses
+from storage.clutches import Choice
+from storage.diagnoses import FINISHED
+from tests.service.workflows.benches import AT, CLUTCH, EXTENSION, WHO, Bench, body, stood_in
+
+#: Sequences, the tests that each begins with, and its writes: with them all states are met, and each kind of write.
+SEEDS, FIRST, WRITES = range(3), 4, 16
+VERDICTS = ("cause_named", "cause_ambiguous", "unexplained_structure", "model_adequate", "insufficient_data")
+DISAGREE = VERDICTS[:3]
+Item = TypeVar("Item")
+
+
+class Written:
+    """A bench that is written to at random; `did` says what."""
+
+    def __init__(self, bench: Bench, seed: int) -> None:
+        self.bench = bench
+        self.rng = np.random.default_rng(seed)
+        self.cycles = 0.0
+        self.made = 0
+        self.did: list[str] = []
+
+    def once(self) -> None:
+        """One write."""
+        often = (self.test, self.diagnose, self.adopt, self.baseline) * 2
+        write = self.one_of((*often, self.rebuild, self.withdraw, self.restore, self.correct, self.replay, self.edit))
+        self.did.append(write.__name__)
+        write()
+
+    def one_of(self, items: Sequence[Item]) -> Item:
+        return items[int(self.rng.integers(len(items)))]
+
+    def name(self) -> str:
+        self.made += 1
+        return f"n{self.made}"
+
+    def test(self) -> None:
+        self.cycles += 2000.0
+        wear = min(0.9, self.cycles / self.one_of((15_000, 60_000)))
+        self.bench.send(body("test", self.name(), self.cycles, wear=wear))
+
+    def rebuild(self) -> None:
+        self.bench.send(body("rebuild", self.name(), self.cycles + 1.0))
+
+    def diagnose(self) -> None:
+        """A diagnosis that was asked for before the writes to come, or now, and ends now."""
+        asked = run_diagnosis.ask(self.bench.database, CLUTCH, created_at=AT)
+        report = {"verdict": self.one_of(VERDICTS), "causes": []}
+        ended = {"report": report, "extension": EXTENSION}
+        if self.rng.random() < 0.2:
+            ended = {"problem": "it failed"}
+        run_diagnosis.finish(self.bench.database, asked.diagnosis_id, ended, at=AT)
+
+    def adopt(self) -> None:
+        with self.bench.database.reading() as connection:
+            rows = diagnoses.page(connection, CLUTCH, limit=9)
+        for row in rows:
+            if row.status == FINISHED and row.life == self.rows()[0].summary.get("life", ""):
+                self.bench.adopt(row.diagnosis_id)
+                return
+
+    def baseline(self) -> None:
+        self.bench.adopt(None)
+
+    def runs(self, state: str) -> list[str]:
+        return [run_id for run_id, receipt in self.bench.receipts().items() if receipt["state"] == state]
+
+    def withdraw(self) -> None:
+        if runs := self.runs("accepted"):
+            self.bench.withdraw(self.one_of(runs))
+
+    def restore(self) -> None:
+        if runs := self.runs("withdrawn"):
+            self.bench.restore(self.one_of(runs))
+
+    def correct(self) -> None:
+        if runs := self.runs("accepted"):
+            self.bench.correct(self.one_of(runs), float(self.rng.integers(40) * 500))
+
+    def replay(self) -> None:
+        replay.replay_clutch(self.bench.database, CLUTCH)
+
+    def edit(self) -> None:
+        end = {"cof_fraction": self.one_of((0.5, 0.7, 0.95)), "criteria": []}
+        edit(self.bench.database, CLUTCH, {"end_of_life": end}, archived=None, reason="another limit", **WHO)
+
+    def rows(self) -> list[clutches.ClutchRow]:
+        with self.bench.database.reading() as connection:
+            return clutches.page(connection, limit=2)
+
+
+def stated_anew(bench: Bench) -> str:
+    """The state by the rules of the docs, from what the API says of the clutch."""
+    item = clutch_list.look_up(bench.database, CLUTCH)
+    summary, found = item["summary"], item["diagnosis"]
+    if summary is None or summary["status"] == "insufficient_data":
+        return "check"
+    if summary["status"] == "reached":
+        return "failure"
+    if found and not found["adopted"] and not found["earlier_life"] and found["verdict"] in DISAGREE:
+        return "out_of_specification"
+    health = summary["current"]["health"]
+    return "maintenance" if health is not None and health < 0.2 else "normal"
+
+
+@pytest.fixture
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
+    with stood_in(monkeypatch):
+        made = Bench(tmp_path / "a.db")
+        yield made
+        made.close()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_stored_state_follows_from_all_rows(bench: Bench, seed: int) -> None:
+    written, met = Written(bench, seed), set[str]()
+    for _ in range(FIRST):
+        written.test()
+    for _ in range(WRITES):
+        written.once()
+        expected = stated_anew(bench)
+        (row,) = written.rows()
+        met.add(row.state)
+        assert (row.state, clutch_list.look_up(bench.database, CLUTCH)["state"]["name"]) == (expected, expected), (
+            written.did
+        )
+        totals = clutch_list.totals(bench.database, Choice())
+        assert totals["states"] == {name: int(name == expected) for name in totals["states"]}
+    print(seed, met, written.did)
+    assert len(met) > 1, "the state never changed: nothing was tested"
