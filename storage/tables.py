@@ -4,11 +4,20 @@ Units are SI (pressure in Pa; 0 stands for the mean over the reference pressures
 times are ISO 8601 text made by the caller. Columns that hold JSON are text, written by `storage.encoding.json_text`.
 """
 
+from typing import Any
+
 from sqlalchemy import Column, ForeignKey, Index, LargeBinary, MetaData, Table, UniqueConstraint, text
+from sqlalchemy.types import TypeEngine
 
 from storage.dialects import NUMBER, TEXT, WHOLE
 
 metadata = MetaData()
+
+
+def _required(kind: type[TypeEngine[Any]] | TypeEngine[Any], *names: str) -> list[Column[Any]]:
+    """Columns that always have a value."""
+    return [Column(name, kind, nullable=False) for name in names]
+
 
 #: The value stands in the text: with a parameter in its place SQLite would not use the index of held runs alone.
 HELD_ONLY = text("state = 'held'")
@@ -22,9 +31,7 @@ clutch = Table(
     "clutch",
     metadata,
     Column("clutch_id", TEXT, primary_key=True),
-    Column("record", TEXT, nullable=False),
-    Column("content_sha256", TEXT, nullable=False),
-    Column("created_at", TEXT, nullable=False),
+    *_required(TEXT, "record", "content_sha256", "created_at"),
     Column("revision", WHOLE, nullable=False),
     Column("rank", NUMBER, nullable=False),
     Column("summary", TEXT, nullable=False),
@@ -49,11 +56,7 @@ run = Table(
     Column("kind", TEXT, nullable=False),
     Column("cycles", NUMBER, nullable=False),
     Column("started_at", TEXT),
-    Column("received_at", TEXT, nullable=False),
-    Column("content_sha256", TEXT, nullable=False),
-    Column("details", TEXT, nullable=False),
-    Column("receipt", TEXT, nullable=False),
-    Column("code_version", TEXT, nullable=False),
+    *_required(TEXT, "received_at", "content_sha256", "details", "receipt", "code_version"),
     Column("state", TEXT, nullable=False, server_default="accepted"),
     Column("sent_cycles", NUMBER),
     Column("doubts", TEXT, nullable=False, server_default="[]"),
@@ -110,14 +113,8 @@ fit = Table(
     metadata,
     Column("run_key", WHOLE, ForeignKey("run.run_key"), primary_key=True),
     Column("pressure", NUMBER, primary_key=True),
-    Column("mean_pressure", NUMBER, nullable=False),
-    Column("static_torque", NUMBER, nullable=False),
-    Column("coulomb_ratio", NUMBER, nullable=False),
-    Column("stribeck_velocity", NUMBER, nullable=False),
-    Column("viscous_coefficient", NUMBER, nullable=False),
-    Column("covariance", TEXT, nullable=False),
-    Column("status", TEXT, nullable=False),
-    Column("undetermined", TEXT, nullable=False),
+    *_required(NUMBER, "mean_pressure", "static_torque", "coulomb_ratio", "stribeck_velocity", "viscous_coefficient"),
+    *_required(TEXT, "covariance", "status", "undetermined"),
     Column("noise", NUMBER, nullable=False),
     Column("mse_percent", NUMBER),
     Column("rmse", NUMBER, nullable=False),
@@ -184,10 +181,7 @@ job = Table(
     Column("job_id", TEXT, nullable=False),
     Column("kind", TEXT, nullable=False),
     Column("clutch_id", TEXT, ForeignKey("clutch.clutch_id")),
-    Column("state", TEXT, nullable=False),
-    Column("asked_at", TEXT, nullable=False),
-    Column("asked_by", TEXT, nullable=False),
-    Column("arguments", TEXT, nullable=False),
+    *_required(TEXT, "state", "asked_at", "asked_by", "arguments"),
     Column("attempts", WHOLE, nullable=False),
     Column("claimed_by", TEXT),
     Column("leased_until", NUMBER),
@@ -229,10 +223,7 @@ fleet_prior = Table(
     Column("fleet", TEXT, primary_key=True),
     Column("version", WHOLE, primary_key=True),
     Column("left_out", TEXT, primary_key=True),
-    Column("created_at", TEXT, nullable=False),
-    Column("members", TEXT, nullable=False),
-    Column("content", TEXT, nullable=False),
-    Column("code_version", TEXT, nullable=False),
+    *_required(TEXT, "created_at", "members", "content", "code_version"),
 )
 
 #: What was found where the clutch was taken apart. `content` is what was posted (JSON, in the units of its fields' names),
@@ -244,11 +235,7 @@ inspection = Table(
     Column("clutch_id", TEXT, ForeignKey("clutch.clutch_id"), nullable=False),
     Column("inspection_id", TEXT, nullable=False),
     Column("cycles", NUMBER, nullable=False),
-    Column("content", TEXT, nullable=False),
-    Column("content_sha256", TEXT, nullable=False),
-    Column("received_at", TEXT, nullable=False),
-    Column("received_by", TEXT, nullable=False),
-    Column("state", TEXT, nullable=False),
+    *_required(TEXT, "content", "content_sha256", "received_at", "received_by", "state"),
     UniqueConstraint("clutch_id", "inspection_id", name="inspection_once_per_clutch"),
     Index("inspection_in_order", "clutch_id", "cycles", "inspection_id"),
 )
@@ -282,12 +269,7 @@ change = Table(
     Column("change_key", WHOLE, primary_key=True),
     Column("clutch_id", TEXT, ForeignKey("clutch.clutch_id"), nullable=False),
     Column("run_id", TEXT),
-    Column("at", TEXT, nullable=False),
-    Column("by", TEXT, nullable=False),
-    Column("action", TEXT, nullable=False),
-    Column("reason", TEXT, nullable=False),
-    Column("before", TEXT, nullable=False),
-    Column("after", TEXT, nullable=False),
+    *_required(TEXT, "at", "by", "action", "reason", "before", "after"),
     Column("revision", WHOLE, nullable=False),
     Index("change_in_order", "clutch_id", "change_key"),
 )
@@ -297,10 +279,7 @@ access_key = Table(
     "access_key",
     metadata,
     Column("key_id", TEXT, primary_key=True),
-    Column("scope", TEXT, nullable=False),
-    Column("secret_sha256", TEXT, nullable=False),
-    Column("note", TEXT, nullable=False),
-    Column("created_at", TEXT, nullable=False),
+    *_required(TEXT, "scope", "secret_sha256", "note", "created_at"),
     Column("revoked_at", TEXT),
     Column("clutches", TEXT),
     Column("expires_at", TEXT),

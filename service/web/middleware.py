@@ -22,15 +22,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.errors import ServiceError, TooLargeError, TooManyError, TooSlowError
 from service.logging import access, log_request, request_id, sane
+from service.web import limits
 from service.web.auth import UNMATCHED, authorise, caller_of, clutch_of, context_of, route_of
-from service.web.limits import (
-    MOST_CALLERS,
-    MOST_POLLED,
-    MOST_SHORT_BODY_BYTES,
-    RETRY_AFTER_SECONDS,
-    SAVED_SECONDS,
-    SLOWEST_BODY_BYTES_PER_SECOND,
-)
 from service.web.metrics import Metrics
 from service.web.problems import refused, unexpected
 from storage.engine.errors import StorageError
@@ -51,7 +44,7 @@ class Shares:
         self._keys: OrderedDict[bytes, str] = OrderedDict()  # by what was sent as Authorization
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http" or scope["path"] in _UNLIMITED:
+        if scope["type"] != "http" or scope["path"] in limits.UNLIMITED:
             await self.app(scope, receive, send)
             return
         sent = next((value for name, value in scope["headers"] if name == b"authorization"), None)
@@ -73,8 +66,8 @@ class Shares:
             name = "" if client is None else client[0]
         share = self._shares.get(name)
         if share is None:
-            share = self._shares[name] = _Share(SAVED_SECONDS * self.per_second, time.monotonic())
-            while len(self._shares) > MOST_CALLERS:
+            share = self._shares[name] = _Share(limits.SAVED_SECONDS * self.per_second, time.monotonic())
+            while len(self._shares) > limits.MOST_CALLERS:
                 self._shares.popitem(last=False)
         else:
             self._shares.move_to_end(name)
@@ -83,10 +76,10 @@ class Shares:
     def _wait(self, share: "_Share") -> float:
         """Seconds after which the caller may ask again; 0 where it may ask now, which is then taken off its share."""
         now = time.monotonic()
-        saved = min(SAVED_SECONDS * self.per_second, share.saved + (now - share.at) * self.per_second)
+        saved = min(limits.SAVED_SECONDS * self.per_second, share.saved + (now - share.at) * self.per_second)
         share.saved, share.at = saved, now
         if share.running >= self.at_once:
-            return RETRY_AFTER_SECONDS
+            return limits.RETRY_AFTER_SECONDS
         if saved < 1:
             return (1 - saved) / self.per_second
         share.saved -= 1
@@ -96,7 +89,7 @@ class Shares:
         grant = scope.get("state", {}).get("grant")
         if grant is not None and grant.key_id is not None:
             self._keys[sent] = f"key {grant.key_id}"
-            while len(self._keys) > MOST_CALLERS:
+            while len(self._keys) > limits.MOST_CALLERS:
                 self._keys.popitem(last=False)
 
     async def _refuse(self, wait: float, scope: Scope, receive: Receive, send: Send) -> None:
@@ -113,9 +106,6 @@ class _Share:
     saved: float
     at: float
     running: int = 0
-
-
-_UNLIMITED = ("/livez", "/readyz")
 
 
 class BodyLimit:
@@ -149,7 +139,7 @@ class BodyLimit:
             nonlocal taken, whole
             if whole:  # what comes now is that the caller has gone
                 return await receive()
-            left = begun + self.seconds + taken / SLOWEST_BODY_BYTES_PER_SECOND - clock()
+            left = begun + self.seconds + taken / limits.SLOWEST_BODY_BYTES_PER_SECOND - clock()
             try:
                 async with asyncio.timeout(left):
                     message = await receive()
@@ -166,7 +156,7 @@ class BodyLimit:
     def _most(self, path: str) -> int:
         if path.endswith("/runs/file"):
             return self.most_file
-        return self.most if path.endswith(("/runs", "/photographs")) else min(self.most, MOST_SHORT_BODY_BYTES)
+        return self.most if path.endswith(("/runs", "/photographs")) else min(self.most, limits.MOST_SHORT_BODY_BYTES)
 
 
 class Heads:
@@ -290,7 +280,7 @@ class Polls:
         again = scope.get(_REMEMBERED)
         if again is not None:
             self._polls[address] = _Poll(scope["route"], clutch_of(Request(scope)), again)
-            while len(self._polls) > MOST_POLLED:
+            while len(self._polls) > limits.MOST_POLLED:
                 self._polls.popitem(last=False)
 
     def _answered(self, poll: _Poll, scope: Scope) -> Response | None:
