@@ -22,10 +22,12 @@ from service.executors.executor import (
     called,
 )
 
-#: [s] How long a scheduler may take to answer, and one without workers to get the first. Chosen; no table.
+#: [s] How long a scheduler may take to answer, and one without workers to get one. Chosen; no table.
 CONNECT_SECONDS, WORKER_SECONDS = 10.0, 60.0
 #: [s] How old the count of the cluster's threads may be. Chosen: a cluster grows within minutes.
 _COUNT_SECONDS = 5.0
+#: [s] Between two looks for what has ended. Chosen: little beside an input that takes a second.
+_LOOK_SECONDS = 0.02
 #: Inputs on their way for each thread of a worker. Chosen: one is computed, and one is there when that has ended.
 _EACH = 2
 #: What must be the same on both sides, for the same results to the last bit.
@@ -58,7 +60,7 @@ class Cluster(Closing):
             raise ExecutorUnavailableError(f"{address}: no Dask scheduler answers there ({error})") from error
         self._completed: Any = as_completed(loop=self._client.loop)  # type: ignore[no-untyped-call]
         self._counted = -_COUNT_SECONDS
-        self._threads = 0
+        self._threads, self._last_seen = 0, time.monotonic()
         try:
             self._require_workers()
         except BaseException:
@@ -77,9 +79,7 @@ class Cluster(Closing):
 
     def width(self) -> int:
         """Two inputs for each thread that the cluster has."""
-        if time.monotonic() - self._counted > _COUNT_SECONDS:
-            self._threads = sum(self._client.nthreads().values())
-            self._counted = time.monotonic()
+        self._count()
         return _EACH * max(1, self._threads)
 
     def submit(self, function: Callable[[Any], Any], item: Any) -> Any:
@@ -92,10 +92,14 @@ class Cluster(Closing):
         return future
 
     def first(self, futures: Sequence[Any]) -> set[Any]:
-        """One that has ended, once one has."""
-        while (future := next(self._completed)) not in futures:  # dropped by who has stopped iterating
-            pass
-        return {future}
+        """One that has ended, once one has. Raises ExecutorUnavailableError where the last worker has ended."""
+        while True:
+            while not self._completed.has_ready():
+                self._require_any_worker()
+                time.sleep(_LOOK_SECONDS)
+            future = next(self._completed)
+            if future in futures:  # another was dropped by who stopped iterating
+                return {future}
 
     def ended(self, future: Any) -> tuple[Any, Exception | None]:
         """What `called` returned; raises ExecutorUnavailableError where the scheduler has ended, or as `_called` does."""
@@ -112,6 +116,19 @@ class Cluster(Closing):
         except Exception as error:  # noqa: BLE001  (an input or a result that cannot be pickled)
             return None, error
         return answer
+
+    def _count(self) -> None:
+        """See how many threads there are, now and then."""
+        now = time.monotonic()
+        if now - self._counted > _COUNT_SECONDS:
+            self._threads = sum(self._client.nthreads().values())
+            self._counted = now
+            self._last_seen = now if self._threads else self._last_seen
+
+    def _require_any_worker(self) -> None:
+        self._count()
+        if self._counted - self._last_seen > WORKER_SECONDS:
+            raise ExecutorUnavailableError(f"{self.address}: the Dask scheduler has no worker any more")
 
     def _require_workers(self) -> None:
         """At least one worker, and none of another release."""

@@ -20,10 +20,10 @@ Process = subprocess.Popen[bytes]
 
 
 class LocalCluster:
-    """The scheduler's address, and its workers' processes, of one thread each. What is killed stays dead."""
+    """The scheduler's address, and its workers' processes, of one thread each. What is killed stays dead without a nanny."""
 
-    def __init__(self, folder: str, **environment: str) -> None:
-        self._folder = folder
+    def __init__(self, folder: str, *, nanny: bool, **environment: str) -> None:
+        self._folder, self._nanny = folder, "--nanny" if nanny else "--no-nanny"
         self.port = free_port()
         self.address = f"tcp://127.0.0.1:{self.port}"
         self.workers: list[Process] = []
@@ -34,7 +34,7 @@ class LocalCluster:
 
     def add_worker(self, **environment: str) -> Process:
         """One more worker."""
-        arguments = (self.address, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", self._folder)
+        arguments = (self.address, "--nthreads", "1", self._nanny, "--no-dashboard", "--local-directory", self._folder)
         self.workers.append(self._started("worker", *arguments, **environment))
         return self.workers[-1]
 
@@ -64,10 +64,10 @@ class LocalCluster:
 
 
 @contextmanager
-def local_cluster(workers: int, **environment: str) -> Iterator[LocalCluster]:
+def local_cluster(workers: int, *, nanny: bool = False, **environment: str) -> Iterator[LocalCluster]:
     """A cluster with so many workers, ended at the end whatever happens. `environment`: the scheduler's."""
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        cluster = LocalCluster(folder, **environment)
+        cluster = LocalCluster(folder, nanny=nanny, **environment)
         try:
             for _ in range(workers):
                 cluster.add_worker()

@@ -43,7 +43,7 @@ def killed(request: pytest.FixtureRequest) -> Iterator[Executor]:
     """An executor whose processes the test may kill."""
     if request.param == "cluster":
         allowed = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"}  # two processes are killed by one input
-        with local_cluster(4, **allowed) as running, executor_of(running.address) as made:
+        with local_cluster(2, nanny=True, **allowed) as running, executor_of(running.address) as made:
             yield made
     else:
         with executor_of(request.param) as made:
