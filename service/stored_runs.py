@@ -77,7 +77,7 @@ def _loaded_reader(database: Database, record: ClutchIn, rows: Sequence[RunRow])
     return RunReader(
         read=runs_loaded.read,
         describe=runs_loaded.describe,
-        sampled=frozenset(run_id for run_id, own in loaded.items() if any(each.name == "time_s" for each in own)),
+        sampled=frozenset(run_id for run_id, own in loaded.items() if any(column.name == "time_s" for column in own)),
         torque_filter=record.torque_filter,
     )
 
@@ -91,7 +91,7 @@ class _LoadedRuns:
 
     def read(self, run_id: str) -> IncomingRun:
         """A run with its channels. Raises DamagedData."""
-        return incoming(self.rows[run_id], {each.name: each.values() for each in self.channels[run_id]})
+        return incoming(self.rows[run_id], {column.name: column.values() for column in self.channels[run_id]})
 
     def describe(self, run_id: str) -> IncomingRun:
         """A run without its channels."""

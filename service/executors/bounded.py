@@ -61,9 +61,9 @@ def bounded(
         nonlocal exhausted
         if waiting:
             return waiting.pop(0)
-        found = None if exhausted else next(numbered, None)
-        exhausted = found is None
-        return None if found is None else _Task(*found)
+        following_input = None if exhausted else next(numbered, None)
+        exhausted = following_input is None
+        return None if following_input is None else _Task(*following_input)
 
     try:
         while True:

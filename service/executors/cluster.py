@@ -29,7 +29,7 @@ _COUNT_SECONDS = 5.0
 #: [s] Between two looks for what has ended. Chosen: little beside an input that takes a second.
 _LOOK_SECONDS = 0.02
 #: Inputs on their way for each thread of a worker. Chosen: one is computed, and one is there when that has ended.
-_EACH = 2
+_INPUTS_AHEAD = 2
 #: What must be the same on both sides, for the same results to the last bit.
 _OF_RESULTS = ("clutchlife", "numpy", "scipy")
 
@@ -80,7 +80,7 @@ class Cluster(Closing):
     def width(self) -> int:
         """Two inputs for each thread that the cluster has."""
         self._count()
-        return _EACH * max(1, self._threads)
+        return _INPUTS_AHEAD * max(1, self._threads)
 
     def submit(self, function: Callable[[Any], Any], item: Any) -> Any:
         """A future of `called` on a worker, which refuses it where it has another release."""

@@ -12,7 +12,7 @@ from service.executors.bounded import bounded
 from service.executors.executor import Closing, Item, Outcome, Result, WorkerLostError, called
 
 #: Inputs on their way for each process. Chosen: one is computed, and one is there when that has ended.
-_EACH = 2
+_INPUTS_AHEAD = 2
 
 
 class Processes(Closing):
@@ -42,7 +42,7 @@ class Processes(Closing):
 
     def width(self) -> int:
         """Two inputs for each process."""
-        return _EACH * self.count
+        return _INPUTS_AHEAD * self.count
 
     def submit(self, function: Callable[[Any], Any], item: Any) -> "Future[Any]":
         """A future of `called`; in a new pool where a process has ended."""

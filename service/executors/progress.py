@@ -32,13 +32,13 @@ def progress(console: Console, title: str) -> Iterator[Advance]:
 
             yield advance_bar
         return
-    done, all_of, said = 0, None, time.monotonic()
+    done, all_of, shown_at = 0, None, time.monotonic()
 
     def advance_line(count: int = 1, *, total: int | None = None) -> None:
-        nonlocal done, all_of, said
+        nonlocal done, all_of, shown_at
         done, all_of = done + count, all_of if total is None else total
-        if time.monotonic() - said >= LINE_SECONDS:
-            said = time.monotonic()
+        if time.monotonic() - shown_at >= LINE_SECONDS:
+            shown_at = time.monotonic()
             of_all = "" if all_of is None else f" of {all_of}"
             console.print(f"{title}: {done}{of_all}", markup=False, soft_wrap=True)
 

@@ -55,16 +55,16 @@ class Transfer:
 
     def differing(self, advance: Advance = lambda *_: None) -> list[str]:
         """The tables whose content is not the same on both sides, in words; none where all is."""
-        found = []
+        differences = []
         for table in metadata.sorted_tables:
             with self.target.reading() as connection:
                 ours, theirs = digest(self.source, table), digest(connection, table)
             if ours != theirs:
-                found.append(
+                differences.append(
                     f"table {table.name}: {ours[0]} rows of sha256 {ours[1]} became {theirs[0]} of {theirs[1]}"
                 )
             advance(table.name, ours[0])
-        return found
+        return differences
 
     def release(self) -> None:
         """The target is complete: keys go on after the last one, and services may use it."""

@@ -196,6 +196,13 @@ def test_a_scheduler_that_ends_is_named() -> None:
             list(outcomes)
 
 
+def test_a_cluster_whose_last_worker_ends_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    with local_cluster(1) as running, executor_of(running.address) as made:
+        monkeypatch.setattr(cluster, "WORKER_SECONDS", 1.0)
+        with pytest.raises(ExecutorUnavailableError, match="has no worker any more"):
+            list(made.map(functions.killed_always, range(6)))
+
+
 @pytest.mark.parametrize(
     "scheduler", ["", "process", "processes:", "processes:0", "processes:x", "http://a:1", "Local"]
 )
