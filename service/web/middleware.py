@@ -109,24 +109,24 @@ class _Share:
 
 
 class BodyLimit:
-    """Refuses a body over the bytes that its address allows with 413, announced or grown so far, and one that takes longer
-    than `seconds`, and the time that its bytes so far may take, with 408.
-
-    A run or a photograph may have `most` bytes, a file `most_file`; any other body is a short one, which the process that
-    answers reads itself.
-    """
+    """Refuses a body over the bytes of its address with 413, announced or grown so far, and one that takes longer than
+    `seconds`, and the time that its bytes so far may take, with 408."""
 
     def __init__(self, app: ASGIApp, most: int, most_file: int, seconds: float) -> None:
         self.app = app
-        self.most = most
-        self.most_file = most_file
+        self.most = {
+            "/runs/file": most_file,
+            "/runs": most,
+            "/photographs": most,
+            "": min(most, limits.MOST_SHORT_BODY_BYTES),
+        }
         self.seconds = seconds
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        most = self._most(scope["path"])
+        most = next(most for end, most in self.most.items() if scope["path"].endswith(end))
         detail = f"a request may hold at most {most} bytes here"
         announced = dict(scope["headers"]).get(b"content-length", b"0")
         if announced.isdigit() and int(announced) > most:
@@ -152,11 +152,6 @@ class BodyLimit:
             return message
 
         await self.app(scope, counted, send)
-
-    def _most(self, path: str) -> int:
-        if path.endswith("/runs/file"):
-            return self.most_file
-        return self.most if path.endswith(("/runs", "/photographs")) else min(self.most, limits.MOST_SHORT_BODY_BYTES)
 
 
 class Heads:

@@ -60,7 +60,7 @@ def by_source(outcomes: Sequence[Outcome]) -> Iterator[str]:
 
 def by_mechanism(wrong: Sequence[Outcome], honest: Sequence[Outcome]) -> Iterator[str]:
     """A row a mechanism that is left out: what is then held."""
-    yield "| left out | slips held, those beside the demand among them | honest held |"
+    yield "| left out or changed | slips held, those beside the demand among them | honest held |"
     yield "|---|---|---|"
     judged = [one for one in honest if one.answer.without]
     held, false = sum(one.held for one in wrong), sum(one.held for one in judged)

@@ -6,6 +6,7 @@ With y = log COF, ζ the cycles since the life began, Z those of its latest test
 
 a Gaussian process whose level, slope and bend (an integrated random walk) are normal, averaged over φ, bend and scatter by
 their marginal likelihood on the tests of the life. Before the first test the level is what physics allows of a wet clutch.
+After a rebuild the level starts anew, and COF may go on as it did in the life before, or not: both are averaged likewise.
 One test in some is off by more than its scatter. It is looser than eq. 6 on purpose: lives that accelerate, run in
 steeply or drift with their oil are honest.
 
@@ -38,7 +39,8 @@ _FURTHER = np.array(
 class Course:
     """The tests of a life: cycles since it began [n], log COF [n], its variance [n], epoch of maintenance [n].
 
-    `level` and `level_sd` are what was known of log COF before the first test.
+    `level` and `level_sd` are what was known of log COF before the first test; `before` is the course of the life before,
+    cycles since that began and how far log COF had changed by then [2, k], None in a first life.
     """
 
     cycles: FloatArray
@@ -47,6 +49,7 @@ class Course:
     epoch: FloatArray
     level: float
     level_sd: float
+    before: FloatArray | None = None
 
     def predict(self, cycles: FloatArray, epoch: FloatArray) -> "Predicted":
         """log COF at cycles [m] since the life began, in epochs [m]."""
@@ -57,20 +60,32 @@ class Course:
         n = len(near)
         scatter = _GRID[:, 2, None] ** 2
         noise = self.variance[near] + scatter
-        residual = self.log_cof[near] - self.level
+        means = self._means(x)
+        residual = self.log_cof[near] - means[:, :n]
         if n == 0:
-            mean = np.full((len(_GRID), cycles.size), self.level)
-            variance = np.diagonal(kernel, axis1=1, axis2=2) + scatter
-            return _possible(np.full(len(_GRID), -math.log(len(_GRID))), mean, variance)
+            mean = np.repeat(means, len(_GRID), axis=0)
+            variance = np.tile(np.diagonal(kernel, axis1=1, axis2=2) + scatter, (len(means), 1))
+            return _possible(np.full(len(mean), -math.log(len(mean))), mean, variance)
         factor = np.linalg.cholesky(kernel[:, :n, :n] + noise[:, :, None] * np.eye(n))
-        both = np.concatenate([np.broadcast_to(residual[:, None], (len(_GRID), n, 1)), kernel[:, :n, n:]], axis=2)
+        both = np.concatenate([np.broadcast_to(residual.T, (len(_GRID), *residual.T.shape)), kernel[:, :n, n:]], axis=2)
         solved = np.linalg.solve(factor, both)
-        of_residual, of_cross = solved[:, :, 0], solved[:, :, 1:]
-        evidence = -0.5 * (of_residual**2).sum(axis=1) - np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+        of_residual, of_cross = solved[:, :, : len(means)], solved[:, :, len(means) :]
+        determinant = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+        evidence = (-0.5 * (of_residual**2).sum(axis=1) - determinant[:, None]).T.ravel()
         log_weight = evidence - evidence.max()
-        mean = self.level + np.einsum("gn,gnm->gm", of_residual, of_cross)
+        mean = means[:, None, n:] + np.einsum("gnk,gnm->kgm", of_residual, of_cross)
         left = np.diagonal(kernel[:, n:, n:], axis1=1, axis2=2) - (of_cross**2).sum(axis=1)
-        return _possible(log_weight - math.log(np.exp(log_weight).sum()), mean, np.maximum(left, 0.0) + scatter)
+        return _possible(
+            log_weight - math.log(np.exp(log_weight).sum()),
+            mean.reshape(evidence.size, -1),
+            np.tile(np.maximum(left, 0.0) + scatter, (len(means), 1)),
+        )
+
+    def _means(self, cycles: FloatArray) -> FloatArray:
+        """What is expected of log COF at cycles [k] before the life's own tests are looked at [1 or 2, k]: its level, and
+        the level with the course of the life before."""
+        level = np.full((1, cycles.size), self.level)
+        return level if self.before is None else np.vstack([level, level + np.interp(cycles, *self.before)])
 
     def _nearest(self, cycles: FloatArray) -> list[int]:
         """Indices of the tests that are looked at: the nearest to any of the cycles."""
@@ -122,8 +137,10 @@ def _possible(log_weight: FloatArray, mean: FloatArray, variance: FloatArray) ->
     )
 
 
-def course_of(measurements: Sequence[Measurement], *, level: float, level_sd: float) -> Course:
-    """The course of what was measured along a life."""
+def course_of(
+    measurements: Sequence[Measurement], *, level: float, level_sd: float, before: FloatArray | None = None
+) -> Course:
+    """The course of what was measured along a life, after the one `before`."""
     rows = [(m.progress, m.value, m.variance, float(m.epoch)) for m in measurements]
     columns = np.array(rows, dtype=np.float64).reshape(-1, 4).T
     return Course(
@@ -133,4 +150,5 @@ def course_of(measurements: Sequence[Measurement], *, level: float, level_sd: fl
         epoch=columns[3],
         level=level,
         level_sd=level_sd,
+        before=before,
     )

@@ -141,12 +141,13 @@ def history_of(events: Sequence[Event], newest: Event, *, corrected: bool) -> Hi
     """The history before a run; `corrected`: a model in force corrects the mean COFs of tests."""
     lives = tuple(lives_of(events)) if events else ()
     courses: list[Course] = []
-    level, level_sd = math.log(criteria.COF), criteria.LOG_COF_SD
+    level, level_sd, before = math.log(criteria.COF), criteria.LOG_COF_SD, None
     for life in lives:
         measurements = _log_cofs(life)
-        courses.append(course_of(measurements, level=level, level_sd=level_sd))
+        courses.append(course_of(measurements, level=level, level_sd=level_sd, before=before))
         if measurements:
             level, level_sd = measurements[0].value, criteria.REBUILT_SD
+            before = np.array([(m.progress, m.value - level) for m in measurements]).T
     if not lives:
         courses.append(course_of([], level=level, level_sd=level_sd))
     dated = tuple(sorted(_dated_start(event) for event in events if event.dated))

@@ -3,7 +3,8 @@
     P(n) = Σ w_k P_k(n) / Σ w_k
 
 over ways in which the next run comes about: at known cycles where its kind is still to come, at the end of a block that
-begins where another ended, after the gap that was between runs before or one like it, late among those known, or anywhere.
+begins where another ended or that is one of equal blocks from the start, after the gap that was between runs before or one
+like it, late among those known, or anywhere.
 Runs come in any order and gaps of every size are honest: each way has its share, and none is zero.
 """
 
@@ -37,6 +38,8 @@ class Pace:
     def log_probability(self, cycles: float) -> float:
         """log P that the next run is made at `cycles`."""
         ways = [(criteria.ANYWHERE, anywhere(cycles)), *self._after_gap(cycles)]
+        if self.block is not None:
+            ways.append((criteria.BLOCKS, self._blocks(cycles, self.block)))
         if self.cycles.size == 0:
             ways.append((criteria.JOINS_LATEST, float(_equal(cycles, self.block or 0.0))))
         else:
@@ -77,8 +80,11 @@ class Pace:
 
     @cached_property
     def _ends(self) -> FloatArray:
-        """Where the next run's block would end if it began where another ended, or at the start."""
-        return np.union1d(self.cycles, [0.0]) + (self.block or 0.0)
+        """Where the next run's block would end if it began where another ended, or at the start, or if one as long that ends
+        at a known run followed it."""
+        block = self.block or 0.0
+        ends = np.union1d(np.append(self.cycles, 0.0) + block, self.cycles - block)
+        return ends[ends >= block]
 
     @cached_property
     def _like_gaps(self) -> tuple[float, FloatArray, FloatArray, FloatArray]:
@@ -109,6 +115,12 @@ class Pace:
         latest = float(_equal(cycles, float(self.cycles[-1]) + self.block))
         earlier = float(_among(cycles, self._ends)) / self._ends.size
         return [(criteria.TILES, latest), (criteria.TILES_EARLIER, earlier)]
+
+    @staticmethod
+    def _blocks(cycles: float, block: float) -> float:
+        """Probability of the end of one of the equal blocks that fill a life from its start: any of them may come next."""
+        is_end = block >= 1.0 and _equal(block * round(cycles / block), cycles)
+        return min(block * anywhere(cycles), 1.0) if is_end else 0.0
 
     def _after_gap(self, cycles: float) -> list[tuple[float, float]]:
         gap = cycles - (float(self._base[-1]) if self._base.size else 0.0)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.plausibility import simulated, slips
+from tests.plausibility.ablation import without
 from tests.plausibility.bench import REFUSED, Bench
 from tests.support import stationary
 
@@ -114,6 +115,26 @@ def test_after_a_rebuild_cof_may_jump_back() -> None:
     assert bench.answer(copy.deepcopy(new)).codes != ()
     bench.accept({"kind": "maintenance", "event": "rebuild", "run_id": "r", "cycles": 6500})
     assert bench.answer(new).codes == ()
+
+
+def test_a_second_life_may_go_as_the_first_did() -> None:
+    """The second test after a rebuild comes late: only the life before tells how far COF falls until then."""
+    bench = bench_after()
+    bench.accept({"kind": "maintenance", "event": "rebuild", "run_id": "r", "cycles": 6500})
+    bench.accept(stationary(6500, run_id="r0", wear=0.0))
+    late = stationary(6000, run_id="r6000") | {"cycles": 12_500}
+    with without("the life before"):
+        assert bench.answer(copy.deepcopy(late)).codes == ("cof_off_course",)
+    assert bench.answer(late).codes == ()
+
+
+def test_any_of_equal_blocks_may_come_first() -> None:
+    """Of blocks of 1000 cycles each, sent in any order; a zero too many in a block is seen all the same."""
+    block: Body = {"kind": "duty_cycles", "run_id": "d", "duty": {"cycles": 1000, "initial_speed_rpm": 2000}}
+    with without("equal blocks"):
+        assert bench_after((5500,)).answer(block | {"cycles": 10_000}).codes == ("cycles_off_pace",)
+    assert bench_after((5500,)).answer(block | {"cycles": 10_000}).codes == ()
+    assert bench_after().answer(block | {"cycles": 70_000}).codes == ("cycles_off_pace",)
 
 
 @pytest.mark.parametrize("name", [*slips.UNITS, *slips.UNPLUGGED])
