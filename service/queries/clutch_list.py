@@ -70,14 +70,14 @@ def page_as_json(
 def totals(database: Database, choice: Choice) -> dict[str, Any]:
     """How many clutches of a choice there are, and the cycles at the right end of their intervals' bars."""
     with database.reading() as connection:
-        found = clutches.counts(connection, choice)
+        listed = clutches.counts(connection, choice)
         archived = clutches.counts(connection, replace(choice, archived=True))
         boundary = clutches.at_rank(connection, replace(choice, find=""), _FITTING, below=HORIZON)
     return {
-        "all": sum(found.states.values()),
+        "all": sum(listed.states.values()),
         "archived": sum(archived.states.values()),
-        "held": found.held,
-        "states": {name: found.states.get(name, 0) for name in STATES},
+        "held": listed.held,
+        "states": {name: listed.states.get(name, 0) for name in STATES},
         "scale_cycles": _USUAL_SCALE if boundary is None else _round_above(boundary),
     }
 

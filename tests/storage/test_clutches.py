@@ -1,4 +1,4 @@
-"""Clutches: each function against a real database."""
+"""Clutches: each function against a real database; lists filtered, searched, counted, and walked while ranks change."""
 
 from dataclasses import replace
 from math import nan
@@ -6,10 +6,10 @@ from math import nan
 import pytest
 from sqlalchemy.exc import IntegrityError
 
-from storage import clutches
-from storage.clutches import Choice
+from storage import clutches, runs
+from storage.clutches import Choice, Counts
 from storage.engine.database import Database
-from tests.storage.samples import clutch_row
+from tests.storage.samples import clutch_row, new_run
 
 CLUTCH = "bench3-017"
 
@@ -78,3 +78,157 @@ def test_an_unknown_clutch_is_named(database: Database) -> None:
             clutches.set_summary(connection, "nobody", 0.0, {}, life="", state="check", if_disputed="check")
         with pytest.raises(LookupError, match="'nobody'"):
             clutches.bump_revision(connection, "nobody")
+
+
+#: id -> rank, state, material, fluid, archived
+FLEET = {
+    "A-1": (3.0, "normal", "Papier", "ÖL 100%", False),
+    "a-2": (1.0, "failure", "carbon", "ATF_1", False),
+    "b-3": (2.0, "normal", "carbon", "ATF/1", False),
+    "c-4": (9.0, "check", "paper", "ATF", False),
+    "gone": (0.5, "normal", "carbon", "ATF", True),
+}
+
+IN_USE = Choice()
+
+
+@pytest.fixture
+def fleet(database: Database) -> Database:
+    with database.writing() as connection:
+        for clutch_id, (rank, state, material, fluid, archived) in FLEET.items():
+            record = {"clutch_id": clutch_id, "friction_material": material, "fluid": fluid}
+            row = replace(clutch_row(clutch_id, rank=rank), record=record, state=state, archived=archived)
+            clutches.insert(connection, row)
+        for clutch_id, state in (("b-3", "held"), ("gone", "held"), ("a-2", "withdrawn")):
+            runs.insert(connection, replace(new_run(1, clutch_id=clutch_id), state=state))
+        runs.insert(connection, replace(new_run(2, clutch_id="b-3"), state="held"))
+    return database
+
+
+def ids(database: Database, choice: Choice = IN_USE, *, by_name: bool = False) -> list[str]:
+    with database.reading() as connection:
+        return [row.clutch_id for row in clutches.page(connection, choice, limit=9, by_name=by_name)]
+
+
+@pytest.mark.parametrize(
+    ("choice", "worst_first"),
+    [
+        (Choice(), ["a-2", "b-3", "A-1", "c-4"]),
+        (Choice(archived=True), ["gone"]),
+        (Choice(state="normal"), ["b-3", "A-1"]),
+        (Choice(state="maintenance"), []),
+        (Choice(held=True), ["b-3"]),
+        (Choice(held=True, archived=True), ["gone"]),
+        (Choice(held=True, state="failure"), []),
+        (Choice(only={"A-1", "c-4", "gone"}), ["A-1", "c-4"]),
+        (Choice(find="a-"), ["a-2", "A-1"]),
+        (Choice(find="CARBON"), ["a-2", "b-3"]),
+        (Choice(find="öl 100%"), ["A-1"]),
+        (Choice(find="%"), ["A-1"]),
+        (Choice(find="f_1"), ["a-2"]),
+        (Choice(find="F/1"), ["b-3"]),
+        (Choice(find="\\"), []),
+        (Choice(find="carbon", state="normal", only={"b-3", "c-4"}), ["b-3"]),
+    ],
+)
+def test_a_choice_is_listed_and_counted(fleet: Database, choice: Choice, worst_first: list[str]) -> None:
+    assert ids(fleet, choice) == worst_first
+    assert ids(fleet, choice, by_name=True) == sorted(worst_first)
+    with fleet.reading() as connection:
+        counts = clutches.counts(connection, choice)
+    states = [FLEET[clutch_id][1] for clutch_id in worst_first]
+    held = [clutch_id for clutch_id in worst_first if clutch_id in ("b-3", "gone")]
+    assert counts == Counts(states={state: states.count(state) for state in set(states)}, held=len(held))
+
+
+def test_a_part_of_a_list_is_what_stands_there_in_the_whole(fleet: Database) -> None:
+    whole = ids(fleet)
+    with fleet.reading() as connection:
+        for left_out in range(5):
+            part = clutches.page(connection, limit=2, left_out=left_out)
+            assert [row.clutch_id for row in part] == whole[left_out : left_out + 2]
+
+
+def test_what_an_edit_changes_is_searched_for(fleet: Database) -> None:
+    with fleet.writing() as connection:
+        content = {"record": {"friction_material": "sintered"}, "content_sha256": "cd", "registered": None}
+        clutches.set_record(connection, "c-4", **content, archived=False)
+    assert (ids(fleet, Choice(find="SINTER")), ids(fleet, Choice(find="paper"))) == (["c-4"], [])
+
+
+def test_a_walk_by_name_meets_each_clutch_once_while_ranks_change_and_one_worst_first_does_not(fleet: Database) -> None:
+    def walked(by_name: bool) -> list[str]:
+        seen: list[str] = []
+        place = None
+        for _ in range(6):
+            with fleet.writing() as connection:
+                page = clutches.page(connection, limit=1, after=place, by_name=by_name)
+                if not page:
+                    break
+                seen.append(page[0].clutch_id)
+                place = page[0].rank, page[0].clutch_id
+                named = {"life": "", "state": "normal", "if_disputed": "normal"}
+                # the clutch that was seen falls behind all others, and the last of the list comes to its front
+                clutches.set_summary(connection, page[0].clutch_id, 20.0 + len(seen), {}, **named)
+                clutches.set_summary(connection, "c-4", -float(len(seen)), {}, **named)
+        return seen
+
+    shown = walked(by_name=False)
+    assert len(shown) > len(set(shown))
+    assert "c-4" not in shown
+    assert walked(by_name=True) == ["A-1", "a-2", "b-3", "c-4"]
+
+
+def test_the_clutch_at_a_share_of_the_ranks(fleet: Database) -> None:
+    with fleet.reading() as connection:
+
+        def at(share: float, choice: Choice = IN_USE, below: float = 9.0) -> str | None:
+            row = clutches.at_rank(connection, choice, share, below=below)
+            return None if row is None else row.clutch_id
+
+        assert [at(0.0), at(0.5), at(0.9), at(1.0)] == ["a-2", "b-3", "b-3", "A-1"]
+        assert at(1.0, below=100.0) == "c-4"
+        assert at(0.9, Choice(only=())) is None
+
+
+def test_a_dispute_counts_in_its_life(fleet: Database) -> None:
+    def summarised(life: str) -> str:
+        named = {"life": life, "state": "normal", "if_disputed": "out_of_specification"}
+        with fleet.writing() as connection:
+            clutches.set_summary(connection, "A-1", 1.0, {}, **named)
+            row = clutches.get(connection, "A-1")
+            assert row is not None
+            return row.state
+
+    assert summarised("") == "normal"
+    with fleet.writing() as connection:
+        clutches.set_disputed(connection, "A-1", "rebuilt", state="normal")
+        with pytest.raises(LookupError, match="'nobody'"):
+            clutches.set_disputed(connection, "nobody", None, state="normal")
+    assert [summarised(life) for life in ("", "rebuilt", "rebuilt-again")] == [
+        "normal",
+        "out_of_specification",
+        "normal",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("question", "index"),
+    [
+        ("SELECT clutch_id FROM clutch WHERE archived = 0 ORDER BY rank, clutch_id", "clutch_worst_first (archived=?)"),
+        (
+            "SELECT clutch_id FROM clutch WHERE archived = 0 AND (rank, clutch_id) > (1.0, 'a') ORDER BY rank, clutch_id",
+            "clutch_worst_first (archived=? AND (rank,clutch_id)>(?,?))",
+        ),
+        (
+            "SELECT clutch_id FROM clutch WHERE archived = 0 AND state = 'check' ORDER BY rank, clutch_id",
+            "clutch_by_state (archived=? AND state=?)",
+        ),
+        ("SELECT state, count(*) FROM clutch WHERE archived = 0 GROUP BY state", "clutch_by_state (archived=?)"),
+    ],
+)
+def test_an_index_alone_answers(in_file: Database, question: str, index: str) -> None:
+    """What is asked of 10,000 clutches reads none of their records, and sorts nothing."""
+    with in_file.reading() as connection:
+        plan = [row.detail for row in connection.exec_driver_sql(f"EXPLAIN QUERY PLAN {question}")]
+    assert plan == [f"SEARCH clutch USING COVERING INDEX {index}"]

@@ -69,7 +69,7 @@ def _disputes(connection: sa.Connection) -> dict[str, str]:
         .where(_diagnosis.c.status == "finished")
         .order_by(_diagnosis.c.diagnosis_key)
     )
-    newest = {clutch_id: found for clutch_id, *found in connection.execute(finished)}
+    newest = {clutch_id: diagnosed for clutch_id, *diagnosed in connection.execute(finished)}
     return {
         clutch_id: life
         for clutch_id, (diagnosis_id, life, short) in newest.items()

@@ -88,7 +88,8 @@ export class Rows {
     this.below.style.height = `${Math.max(0, total - offset - items.length) * this.height}px`;
     const after = this.topOf(first);
     // what is in sight stays where it is, though rows above it were guessed higher or lower than they are
-    if (before !== null && after !== null && before !== after) scrollBy(0, after - before);
+    // (by less than a pixel nothing is moved: it would stop a scroll that is under way)
+    if (before !== null && after !== null && Math.abs(after - before) >= 1) scrollBy(0, after - before);
     this.look();
   }
 
