@@ -8,7 +8,6 @@ cancelled, wherever that was asked for, is ended at the next prolongation. How a
 import logging
 import os
 import secrets
-import socket
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -47,7 +46,7 @@ class JobQueue:
         self._finish = finish
         self._lease = float(settings.job_lease_seconds)
         self._pause = self._lease / RENEWALS_A_LEASE
-        self._name = f"{socket.gethostname()}:{os.getpid()}:{secrets.token_hex(4)}"
+        self._name = f"{os.uname().nodename}:{os.getpid()}:{secrets.token_hex(4)}"
         self._change = threading.Condition()
         self._closing = False
         self._woken = False
