@@ -26,6 +26,7 @@ OPEN = [
 NARROWED: dict[tuple[str, str], Scope] = {
     ("GET", "/v1/clutches"): "read",
     ("POST", "/v1/clutches"): "ingest",
+    ("GET", "/v1/fleet/totals"): "read",
     ("GET", "/v1/jobs"): "read",
     ("GET", "/v1/jobs/{job_id}"): "read",
     ("DELETE", "/v1/jobs/{job_id}"): "admin",
