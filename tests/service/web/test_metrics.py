@@ -92,7 +92,7 @@ def test_more_clutches_cost_no_more_unless_each_is_asked_for(database_url: str, 
         post_tests(client, "c2")
         many, many_series = cost(client)
         assert few == many
-        assert 0 < few < 12
+        assert 0 < few < 13
         assert (many_series == few_series) is not clutch_metrics
         named = {line for line in many_series if re.search(r'clutch="|quantile="', line)}
         assert bool(named) is clutch_metrics
