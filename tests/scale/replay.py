@@ -52,13 +52,13 @@ class Found:
 
 def source(path: Path, states: int, clutches: int) -> None:
     """A file with a life of so many stationary tests, under so many names."""
-    one = path.with_suffix(".one")
+    address = f"sqlite:///{path}"
     runs = [each for each in campaign.simulate(1, stop_fraction=0.01, most_tests=states) if each.plateaus is not None]
-    with closing(open_database(f"sqlite:///{one}")) as database:
+    with closing(open_database(address)) as database:
         register(database, ClutchIn(clutch_id=name(0)), created_at=AT)
         for each in runs[:states]:
             ingest(database, name(0), read_run(to_json(simulated_body(each))), received_at=AT)
-    multiply(one, path, clutches)
+    multiply(address, clutches)
 
 
 def replayed(path: Path, scheduler: str, advance: Callable[[int], object] = lambda _: None) -> Found:
