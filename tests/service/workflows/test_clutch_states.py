@@ -10,7 +10,7 @@ import pytest
 from service.queries import clutch_list
 from service.workflows import replay, run_diagnosis
 from service.workflows.edit_clutch import edit
-from storage import clutches, diagnoses
+from storage import clutches, diagnoses, jobs
 from storage.clutches import Choice
 from storage.diagnoses import FINISHED
 from tests.service.workflows.benches import AT, CLUTCH, EXTENSION, WHO, Bench, body, stood_in
@@ -56,12 +56,16 @@ class Written:
 
     def diagnose(self) -> None:
         """A diagnosis that was asked for before the writes to come, or now, and ends now."""
-        asked = run_diagnosis.ask(self.bench.database, CLUTCH, created_at=AT)
+        database = self.bench.database
+        run_diagnosis.ask(database, CLUTCH, by="local", adopt=False, request="", most=1, created_at=AT)
+        with database.writing() as connection:
+            job = jobs.claim(connection, "one", lease=60.0, at=AT)
+        assert job is not None
         report = {"verdict": self.one_of(VERDICTS), "causes": []}
         ended = {"report": report, "extension": EXTENSION}
         if self.rng.random() < 0.2:
             ended = {"problem": "it failed"}
-        run_diagnosis.finish(self.bench.database, asked.diagnosis_id, ended, at=AT)
+        run_diagnosis.finish(database, job, ended, at=AT, adopt=lambda *_: False)
 
     def adopt(self) -> None:
         with self.bench.database.reading() as connection:
