@@ -99,6 +99,7 @@ def test_a_raw_record_gives_plateaus_and_stays(
 ) -> None:
     raw = {"kind": "stationary_stribeck", "cycles": 0, "run_id": "raw", "channels": raw_record()}
     post(client, raw, raw | {"cycles": 1000, "run_id": "later"})
+    client.post("/v1/clutches/c1/runs/later/confirm", json={"reason": "a bench of two tests"})
     run = campaign(database_url).campaign.stationary[0]
     assert run.record is not None
     assert run.time is not None
