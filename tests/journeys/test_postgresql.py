@@ -20,7 +20,9 @@ from tests.storage.engine.postgresql.server import PostgresServer
 from tests.support import ONCE, PRESSURES_BAR, Server, clutchlife, serving, stationary
 
 #: What hangs on the clock or is drawn at random.
-OF_ITS_OWN = re.compile(r"time|(received_|created_|finished_|adopted_)?at|diagnosis_id|request_id")
+OF_ITS_OWN = re.compile(
+    r"time|(received_|created_|finished_|adopted_|asked_|started_)?at|(diagnosis|job|request)_id|progress"
+)
 #: Addresses that describe the process, not what is stored.
 OF_THE_PROCESS = ("/livez", "/readyz", "/metrics", "/openapi.json")
 LISTS = ("/v1/clutches", *(f"/v1/clutches/b2/{name}" for name in ("runs", "changes", "diagnoses")))
