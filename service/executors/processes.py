@@ -84,8 +84,8 @@ class _Pool(ProcessPoolExecutor):
         return bool(self._broken)
 
     def end(self) -> None:
-        """End the processes at once; by SIGKILL, for they are deaf to SIGTERM where a service's workers began the server that
-        forks them."""
+        """End the processes at once; by SIGKILL, for they are deaf to SIGTERM where a service's workers began what forks
+        them."""
         for process in list((self._processes or {}).values()):
             process.kill()
         self.shutdown(wait=True, cancel_futures=True)
