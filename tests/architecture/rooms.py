@@ -7,7 +7,7 @@ routes run in a pool of threads, so that every thread is watched. A file is ente
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -23,19 +23,27 @@ from tests.support import stationary
 COUNTED = ("service", "storage")
 PRESSURES = (4.0, 5.0, 6.0)
 EARLIER_RUNS = 4
+#: Threads that look for jobs and keep hold of them.
+JOBS: Set[str] = {"jobs", "lease"}
 
 
 class Watch:
-    """Records files in the order in which they are entered, while `on`. Installed before the service's threads start."""
+    """Records files in the order in which they are entered, while `on`. Installed before the service's threads start.
 
-    def __init__(self) -> None:
+    `but`: names of threads that do no part of the errand, such as the one that looks for jobs from time to time.
+    """
+
+    def __init__(self, but: Set[str] = frozenset()) -> None:
         self.on = False
+        self.but = but
         self.entered: dict[str, None] = {}
         self._folders = tuple(f"{ROOT / folder}/" for folder in COUNTED)
 
     def __call__(self, frame: FrameType, event: str, _: object) -> None:
         """The hook: Python calls it at every call and return."""
-        if self.on and event == "call" and frame.f_code.co_filename.startswith(self._folders):
+        if not self.on or event != "call" or not frame.f_code.co_filename.startswith(self._folders):
+            return
+        if threading.current_thread().name not in self.but:
             self.entered[frame.f_code.co_filename] = None
 
     @contextmanager
@@ -52,9 +60,9 @@ class Watch:
 
 
 @contextmanager
-def watched_service() -> Iterator[tuple[TestClient, Watch]]:
+def watched_service(but: Set[str] = JOBS) -> Iterator[tuple[TestClient, Watch]]:
     """A service whose threads are watched, with two clutches of some stationary runs each."""
-    before, before_threads, watch = sys.getprofile(), threading.getprofile(), Watch()
+    before, before_threads, watch = sys.getprofile(), threading.getprofile(), Watch(but)
     threading.setprofile(watch)
     sys.setprofile(watch)
     try:
@@ -108,6 +116,6 @@ def of_post() -> list[str]:
 
 def of_diagnosis() -> list[str]:
     """The files of this process that a POST of a diagnosis enters until its report is there; it is computed in another."""
-    with watched_service() as (http, watch), watch.watching() as paths:
+    with watched_service(but=frozenset()) as (http, watch), watch.watching() as paths:
         post_diagnosis(http, "watched")
     return paths

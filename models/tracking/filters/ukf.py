@@ -143,7 +143,8 @@ class Ukf:
         )
 
     def posterior(self, state: UkfState, size: int, rng: np.random.Generator) -> Posterior:
-        """`size` evenly spread draws of equal weight from the normals; the scatter is a point estimate of each."""
+        """`size` evenly spread draws of equal weight from the normals, those left out whose course would have ended before
+        the last measurement; the scatter is a point estimate of each."""
         prior, history = state.prior, state.history
         kind = systematic(_weights(state.log_weight), size, float(rng.random()))
         normals = spread_normals(size, rng.random(5))
@@ -158,8 +159,10 @@ class Ukf:
         sizes = FORM_SIZE[form]
         course = np.where(sizes[:, None] > 0.0, (np.linalg.pinv(at_end()) @ ends).T, 0.0)
         heights = np.stack(beside[2:], axis=1) if len(beside) > 2 else np.zeros((size, 0))
+        weight = np.where((scale < 0.0) & (-scale <= history.span), 0.0, 1.0)
+        weight = weight if weight.any() else np.ones(size)
         return Posterior(
-            weight=np.full(size, 1.0 / size),
+            weight=weight / weight.sum(),
             initial=initial,
             change=change,
             scale=scale,

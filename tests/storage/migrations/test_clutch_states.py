@@ -17,7 +17,7 @@ from tests.storage.engine.postgresql.server import PostgresServer
 from tests.storage.samples import clutch_row, new_diagnosis, new_run
 
 ADDED = ("state", "disputed", "searched")
-BEFORE = "s0007_inspections"
+BEFORE = "s0009_raw_stores"
 AT = "2026-11-02T10:00:00+00:00"
 
 

@@ -155,3 +155,21 @@ def test_a_step_of_all_filters_at_once_is_filterpys_step_of_each() -> None:
         assert expected[one] == pytest.approx(0.1 / unit - theirs.y[0], rel=1e-12)
         assert variance[one] == pytest.approx(theirs.S[0, 0], rel=1e-9)
         np.testing.assert_allclose(across[one], theirs.K[:, 0] * theirs.S[0, 0], rtol=0, atol=1e-12)
+
+
+def test_no_course_that_the_ukf_draws_ended_before_the_last_test() -> None:
+    """A quantity that wanders until no course fits: a course that grows without bounds at an end that is behind would be
+    thousands of times the quantity."""
+    progress = np.arange(4.0, 200.0, 4.0)
+    values = 0.05 + 0.003 * np.sin(progress / 14.0) + 0.005 * (progress / 160.0) ** 6 * (progress < 165.0)
+    measurements = [Measurement(progress=z, value=y, variance=1e-8) for z, y in zip(progress, values, strict=True)]
+    ended = 0.0
+    state = followed(Ukf(), weak(measurements[0], falling=True), measurements[:20])
+    for measurement in measurements[20:]:
+        state = Ukf().update(state, measurement)
+        draws = Ukf().posterior(state, 2_000, np.random.default_rng(7))
+        behind = (draws.scale < 0.0) & (-draws.scale <= state.history.span)
+        ended = max(ended, float(behind.mean()))
+        assert float(draws.weight @ behind) == 0.0
+        assert abs(float(draws.weight @ draws.values(np.array([measurement.progress]))[0]) - measurement.value) < 0.02
+    assert ended > 0.0, "the case shows nothing: no course was drawn beyond its end"
