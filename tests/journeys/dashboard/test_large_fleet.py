@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from contextlib import suppress
 from itertools import pairwise
 
 import httpx2
@@ -71,6 +72,18 @@ def settled(page: Page) -> list[tuple[int, str, float, float]]:
     raise AssertionError(f"the rows in sight do not fill the page: {shown}")
 
 
+def goes_to(page: Page, key: str, clutch: str) -> None:
+    """A key that scrolls brings a clutch in sight; without a window, Chromium now and then drops the key, which is pressed
+    again then."""
+    link = page.locator(f"{ROWS} a", has_text=clutch)
+    for _ in range(4):
+        page.keyboard.press(key)
+        with suppress(AssertionError):
+            expect(link).to_be_in_viewport(timeout=5_000)
+            return
+    expect(link).to_be_in_viewport()
+
+
 @pytest.mark.parametrize("viewport", [WIDE, PHONE], ids=["wide", "phone"])
 def test_scrolling_shows_every_row_and_the_page_holds_few(
     browser: Browser, fleet: Server, viewport: dict[str, int]
@@ -92,11 +105,9 @@ def test_scrolling_shows_every_row_and_the_page_holds_few(
     last = max(seen)
     assert seen == {place: name(place - 2) for place in range(2, last + 1)}
     assert last == CLUTCHES + 1 or far
-    page.keyboard.press("End")
-    expect(page.locator(f"{ROWS} a", has_text=name(CLUTCHES - 1))).to_be_in_viewport()
+    goes_to(page, "End", name(CLUTCHES - 1))
     settled(page)
-    page.keyboard.press("Home")
-    expect(page.locator(f"{ROWS} a", has_text=name(0))).to_be_in_viewport()
+    goes_to(page, "Home", name(0))
     assert page.locator(ROWS).count() <= MOST_ROWS
     watched.close()
 

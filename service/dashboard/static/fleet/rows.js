@@ -84,12 +84,14 @@ export class Rows {
     if (this.offset === 0 && this.total === 0) this.measure();
     this.offset = offset;
     this.total = total;
-    this.above.style.height = `${offset * this.height}px`;
+    const room = offset * this.height;
+    this.above.style.height = `${room}px`;
     this.below.style.height = `${Math.max(0, total - offset - items.length) * this.height}px`;
-    const after = this.topOf(first);
-    // what is in sight stays where it is, though rows above it were guessed higher or lower than they are
-    // (by less than a pixel nothing is moved: it would stop a scroll that is under way)
-    if (before !== null && after !== null && Math.abs(after - before) >= 1) scrollBy(0, after - before);
+    // what is in sight stays where it is, though rows above it were guessed higher or lower than they are: by the empty space,
+    // for to scroll would end a scroll that is under way
+    const moved = before === null ? 0 : (this.topOf(first) ?? before) - before;
+    if (offset > 0) this.above.style.height = `${Math.max(0, room - moved)}px`;
+    else if (Math.abs(moved) >= 1) scrollBy(0, moved);
     this.look();
   }
 
