@@ -155,8 +155,11 @@ def test_posting_on_and_tracking_anew_agree_under_a_fleets_prior(tmp_path: Path)
                 body = stationary(
                     1000 * index, wear=wear(1000 * index, 6000.0), speeds=SPEEDS, pressures=(5.0,), run_id=f"t{index}"
                 )
-                assert client.post("/v1/clutches/new/runs", json=body).status_code == 201
+                receipt = client.post("/v1/clutches/new/runs", json=body).json()
+                if receipt["state"] == "held":  # a quarter of the COF gone since the only test before
+                    assert client.post(f"/v1/clutches/new/runs/t{index}/confirm", json={}).status_code == 200
             answers.append(client.get(LIFE.format("new"), params={"method": "ukf"}).json())
+            del answers[-1]["revision"]  # that of a confirmed run is one more
     assert answers[0]["prior"]["name"] == "fleet"
     assert answers[0] == answers[1]
 
