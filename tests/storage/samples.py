@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from alembic import command
 from numpy.typing import NDArray
-from sqlalchemy import Connection
+from sqlalchemy import Connection, text
 
 from storage import channels, clutches, diagnoses, runs
 from storage.clutches import ClutchRow
@@ -163,3 +163,34 @@ def integrity(path: Path) -> list[str]:
     with closing(sqlite3.connect(path)) as connection:
         problems = [row[0] for row in connection.execute("PRAGMA integrity_check")]
         return problems + [str(row) for row in connection.execute("PRAGMA foreign_key_check")]
+
+
+#: By migration, what takes back all that it made, the newest first; a column of SQLite's that refers to a table stays.
+TAKEN_BACK = {
+    "s0010_clutch_states": (
+        "DROP INDEX clutch_worst_first",
+        "DROP INDEX clutch_by_state",
+        "ALTER TABLE clutch DROP COLUMN state",
+        "ALTER TABLE clutch DROP COLUMN disputed",
+        "ALTER TABLE clutch DROP COLUMN searched",
+        "CREATE INDEX clutch_worst_first ON clutch (rank, clutch_id)",
+    ),
+    "s0009_raw_stores": (
+        "DROP INDEX channel_in_store",
+        "ALTER TABLE channel DROP COLUMN blob",
+        "ALTER TABLE channel DROP COLUMN store_key",
+        "DROP TABLE raw_removal",
+        "DROP TABLE raw_store",
+    ),
+    "s0008_jobs": ("DROP TABLE job",),
+}
+
+
+def take_back(connection: Connection, revision: str) -> None:
+    """Bring a database of today to an earlier revision, keeping what it holds. Those before s0007 are not known."""
+    for step, statements in TAKEN_BACK.items():
+        if step == revision:
+            break
+        for statement in statements:
+            connection.exec_driver_sql(statement)
+    connection.execute(text("UPDATE alembic_version SET version_num = :before"), {"before": revision})

@@ -14,9 +14,8 @@ from storage.clutches import Choice
 from storage.engine.opening import open_database
 from storage.migrations import upgrade as migrations
 from tests.storage.engine.postgresql.server import PostgresServer
-from tests.storage.samples import clutch_row, new_diagnosis, new_run
+from tests.storage.samples import clutch_row, new_diagnosis, new_run, take_back
 
-ADDED = ("state", "disputed", "searched")
 BEFORE = "s0009_raw_stores"
 AT = "2026-11-02T10:00:00+00:00"
 
@@ -34,15 +33,10 @@ def summary(status: str = "predicted", health: float | None = 0.5, **more: Any) 
 
 
 def as_before(address: str, fill: Callable[[sa.Connection], None]) -> None:
-    """A database as the release before left it: filled, then without the columns and with the index that it had."""
+    """A database as the release before left it, filled."""
     with closing(open_database(address)) as database, database.writing() as connection:
         fill(connection)
-        for index in ("clutch_worst_first", "clutch_by_state"):
-            connection.exec_driver_sql(f"DROP INDEX {index}")
-        for column in ADDED:
-            connection.exec_driver_sql(f"ALTER TABLE clutch DROP COLUMN {column}")
-        connection.exec_driver_sql("CREATE INDEX clutch_worst_first ON clutch (rank, clutch_id)")
-        connection.execute(sa.text("UPDATE alembic_version SET version_num = :before"), {"before": BEFORE})
+        take_back(connection, BEFORE)
 
 
 def diagnosed(connection: sa.Connection, clutch_id: str, verdict: str, *, life: str = "", number: int = 0) -> str:

@@ -32,6 +32,7 @@ from tests.storage.samples import (
     old_database,
     revision,
     store_run,
+    take_back,
 )
 
 CLUTCH = "bench3-017"
@@ -238,19 +239,7 @@ def test_a_server_of_an_earlier_release_is_brought_up(postgresql: PostgresServer
     with closing(open_database(url)) as old, old.writing() as connection:
         clutches.insert(connection, clutch_row())
         run_key = store_run(connection, 1)
-        for statement in (
-            "DROP INDEX clutch_worst_first",
-            "DROP INDEX clutch_by_state",
-            "ALTER TABLE clutch DROP COLUMN state, DROP COLUMN disputed, DROP COLUMN searched",
-            "CREATE INDEX clutch_worst_first ON clutch (rank, clutch_id)",
-            "DROP INDEX channel_in_store",
-            "ALTER TABLE channel DROP COLUMN blob, DROP COLUMN store_key",
-            "DROP TABLE raw_removal",
-            "DROP TABLE raw_store",
-            "DROP TABLE job",
-            "UPDATE alembic_version SET version_num = 's0007_inspections'",
-        ):
-            connection.exec_driver_sql(statement)
+        take_back(connection, "s0007_inspections")
     with closing(open_database(url)) as new, new.reading() as connection:
         assert migrations.current(connection) == migrations.head()
         assert other_schema(connection) == []

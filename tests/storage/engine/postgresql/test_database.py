@@ -23,7 +23,7 @@ from storage.engine.integrity import other_schema
 from storage.engine.opening import database_exists, find_database, open_database
 from storage.migrations.upgrade import current, head
 from tests.storage.engine.postgresql.server import PostgresServer, postgresql_server
-from tests.storage.samples import clutch_row, store_run
+from tests.storage.samples import clutch_row, store_run, take_back
 
 SECRET = "s3cr3t"  # noqa: S105 - a test's
 
@@ -85,8 +85,7 @@ def test_a_database_of_an_earlier_revision_is_not_migrated_under_a_service(datab
     """Services that run hold it up; once they have ended, several that start at once wait for the one that migrates."""
     services = [open_database(database.url, serving=True) for _ in range(2)]
     with database.writing() as connection:
-        connection.exec_driver_sql("DROP TABLE job")
-    set_revision(database, "s0007_inspections")
+        take_back(connection, "s0007_inspections")
     for service in services:
         with pytest.raises(ServiceRuns, match="a service uses"):
             open_database(database.url, lock_timeout=0.1)
