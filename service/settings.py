@@ -46,7 +46,9 @@ class Settings(BaseSettings):
         default=2, ge=0, description="processes that take in runs; 0: no workers, all in the service's own process"
     )
     max_body_mb: int = Field(
-        default=64, ge=1, description="the largest body that is accepted [MiB]; longer records are posted as files"
+        default=64,
+        ge=1,
+        description="the largest run that is accepted as JSON [MiB]; longer records are posted as files",
     )
     max_file_mb: int = Field(default=1024, ge=1, description="the largest file that is accepted [MiB]")
     # a rig's run arrives within one second, over a bad line within ten

@@ -62,10 +62,14 @@ class Cleaning:
         return channel if self.rows is None else channel[self.rows]
 
 
+class UnusableRecordError(ValueError):
+    """A record of which nothing can be said, for its own sake and not for a fault of the code."""
+
+
 def clean(record: Record) -> tuple[Record, float, tuple[Note, ...]]:
     """The record with times in order and without spikes, its sampling period [s], and notes.
 
-    Raises ValueError as `plan_cleaning` does.
+    Raises UnusableRecordError as `plan_cleaning` does.
     """
     kept = plan_cleaning(record)
     if kept.rows is not None:
@@ -84,17 +88,17 @@ def clean(record: Record) -> tuple[Record, float, tuple[Note, ...]]:
 def plan_cleaning(record: Sampled) -> Cleaning:
     """The rows of a record to keep, with times in order and without spikes; channels are examined one by one.
 
-    Raises ValueError on fewer than 16 samples, values beyond ±1e15, times that do not advance, a clock that falls back,
-    and samples that lie less than 1 µs or more than 10 s apart.
+    Raises UnusableRecordError on fewer than 16 samples, values beyond ±1e15, times that do not advance, a clock that falls
+    back, and samples that lie less than 1 µs or more than 10 s apart.
     """
     size = record.time.size
     if size < FEWEST_SAMPLES:
-        raise ValueError(f"time must have at least {FEWEST_SAMPLES} samples, got {size}")
+        raise UnusableRecordError(f"time must have at least {FEWEST_SAMPLES} samples, got {size}")
     _require_measurements("time", record.time)
     order, period, notes = _in_order(record.time)
     ordered = Cleaning(rows=order, period=period, notes=())
     if not FASTEST <= period <= SLOWEST:
-        raise ValueError(f"samples must lie {FASTEST:g} to {SLOWEST:g} s apart, got {period:.3g} s")
+        raise UnusableRecordError(f"samples must lie {FASTEST:g} to {SLOWEST:g} s apart, got {period:.3g} s")
     spikes: NDArray[np.bool_] = np.zeros(size, dtype=np.bool_)
     removed = []
     for name in _CHANNELS:
@@ -116,7 +120,9 @@ def plan_cleaning(record: Sampled) -> Cleaning:
 
 def _require_measurements(name: str, channel: FloatArray) -> None:
     if max(float(channel.max()), -float(channel.min())) > LARGEST_VALUE:
-        raise ValueError(f"{name} must lie within ±{LARGEST_VALUE:g}, got {float(channel[np.abs(channel).argmax()])}")
+        raise UnusableRecordError(
+            f"{name} must lie within ±{LARGEST_VALUE:g}, got {float(channel[np.abs(channel).argmax()])}"
+        )
 
 
 def _in_order(time: FloatArray) -> tuple[NDArray[np.intp] | None, float, list[Note]]:
@@ -126,14 +132,14 @@ def _in_order(time: FloatArray) -> tuple[NDArray[np.intp] | None, float, list[No
     forward = steps[:: max(1, steps.size // SCALE_SAMPLES)]
     forward = forward[forward > 0]
     if forward.size == 0 or time.max() <= time.min():
-        raise ValueError(f"time must advance, but no interval of the {time.size} samples does")
+        raise UnusableRecordError(f"time must advance, but no interval of the {time.size} samples does")
     period = float(np.median(forward))
     swapped = int(np.count_nonzero(steps < 0))
     if swapped:
         fallback = np.maximum.accumulate(time) - time
         worst = int(fallback.argmax())
         if fallback[worst] > max(LARGEST_SWAP, 10 * period):
-            raise ValueError(
+            raise UnusableRecordError(
                 f"time must run forwards, but time[{worst}] = {time[worst]} s lies {fallback[worst]:.6g} s before an "
                 "earlier sample of the record"
             )

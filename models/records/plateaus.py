@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from models.records.cleaning import SCALE_SAMPLES, Note, Sampled, plan_cleaning
+from models.records.cleaning import SCALE_SAMPLES, Note, Sampled, UnusableRecordError, plan_cleaning
 from models.records.criteria import DRIFTING, SETTLING
 from models.records.dwells import Blocks, Dwell, average, find_dwells, listed
 from models.records.mean_deviation import Stretch, deviations
@@ -62,15 +62,15 @@ def cut_plateaus(record: Sampled, torque_filter: float = 0.0) -> PlateauCut:
     own low-pass where it is declared, through which pressure and speed are then seen (`records.torque_filter`).
 
     Steps of speed and pressure may come in any order and direction; samples may be missing, their times jitter, single
-    samples spike, signals be quantised. Raises ValueError on fewer than 16 samples, a clock that does not advance or
-    falls back, and a record without any steady dwell in motion, and under pressure where there is any.
+    samples spike, signals be quantised. Raises UnusableRecordError on fewer than 16 samples, a clock that does not advance
+    or falls back, and a record without any steady dwell in motion, and under pressure where there is any.
     """
     kept = plan_cleaning(record)
     blocks = _filtered(average(record, kept), torque_filter)
     dwells, left_out = find_dwells(blocks)
     if not dwells:
         reasons = " ".join(sentence for _, sentence in left_out)
-        raise ValueError(
+        raise UnusableRecordError(
             f"the record has no steady dwell in motion and, where it has any, under pressure. {reasons}".rstrip()
         )
     duration = np.array([blocks.time[dwell.stop - 1] - blocks.time[dwell.start] + blocks.duration for dwell in dwells])

@@ -32,6 +32,7 @@ from models.diagnosis.detection.raw_records.shaft_orders import best_order
 from models.diagnosis.detection.raw_records.whitened_torque import WhitenedRecord, whitened_record
 from models.diagnosis.effects.catalogued import shaft_ripple, stick_slip, unsettled_dwell
 from models.diagnosis.effects.estimate import Estimate
+from models.records.cleaning import UnusableRecordError
 from models.records.plateaus import PlateauCut, cut_plateaus
 from models.records.runs import Record
 
@@ -73,7 +74,7 @@ def _evenly(runs: Sequence[tuple[Run, Record]]) -> Sequence[tuple[Run, Record]]:
 def _cut(record: Record) -> PlateauCut | None:
     try:
         return cut_plateaus(record)
-    except ValueError:  # a record without dwells: the run that it came with has reported it
+    except UnusableRecordError:  # a record without dwells: the run that it came with has reported it
         return None
 
 

@@ -36,7 +36,7 @@ from models.diagnosis.detection.raw_records.criteria import (
     SEGMENT,
 )
 from models.diagnosis.detection.raw_records.pieces import Piece, pieces_of
-from models.records.cleaning import clean
+from models.records.cleaning import UnusableRecordError, clean
 from models.records.runs import Record
 
 #: Points at which the autoregression's gain is tabulated.
@@ -77,7 +77,7 @@ def whitened_record(record: Record, spans: FloatArray | None = None) -> Whitened
     few samples, or samples too far apart."""
     try:
         cleaned, period, _ = clean(record)
-    except ValueError:
+    except UnusableRecordError:
         return None
     count = max(1, int(1.0 / (RATE * period)))
     step = count * period

@@ -164,3 +164,13 @@ def test_records_that_hold_nothing_say_nothing() -> None:
     still = type(short)(time=short.time, pressure=short.pressure, speed=0 * short.speed, torque=0 * short.torque)
     assert raw_evidence(campaign([cut, still], [cut, still])) == ()
     assert raw_evidence(Campaign()) == ()
+
+
+@pytest.mark.parametrize("where", ["evidence.cut_plateaus", "whitened_torque.clean"])
+def test_a_fault_of_the_code_is_no_record_that_holds_nothing(where: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        raise ValueError("shapes (3,) and (4,) do not match")
+
+    monkeypatch.setattr(f"models.diagnosis.detection.raw_records.{where}", broken)
+    with pytest.raises(ValueError, match="do not match"):
+        raw_evidence(campaign([stepped(np.random.default_rng(0))], [swinging(np.random.default_rng(1), 0.0)]))
