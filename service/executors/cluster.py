@@ -102,20 +102,25 @@ class Cluster(Closing):
                 return {future}
 
     def ended(self, future: Any) -> tuple[Any, Exception | None]:
-        """What `called` returned; raises ExecutorUnavailableError where the scheduler has ended, or as `_called` does."""
+        """What `called` returned; raises ExecutorUnavailableError where the scheduler has ended or has no worker any more,
+        or as `_called` does. What ended with a worker before it was read is computed again by another."""
         from distributed import KilledWorker  # optional, and start-up time
 
-        if future.cancelled():
-            raise ExecutorUnavailableError(f"{self.address}: the Dask scheduler has ended")
-        try:
-            answer: tuple[Any, Exception | None] = future.result()
-        except KilledWorker as error:
-            raise WorkerLostError(f"the processes that worked on this have ended ({error})") from error
-        except ExecutorUnavailableError:
-            raise
-        except Exception as error:  # noqa: BLE001  (an input or a result that cannot be pickled)
-            return None, error
-        return answer
+        while True:
+            if future.cancelled():
+                raise ExecutorUnavailableError(f"{self.address}: the Dask scheduler has ended")
+            try:
+                answer: tuple[Any, Exception | None] = future.result(timeout=CONNECT_SECONDS)
+            except TimeoutError:  # it is no error of the function's: those are returned
+                self._require_any_worker()
+            except KilledWorker as error:
+                raise WorkerLostError(f"the processes that worked on this have ended ({error})") from error
+            except ExecutorUnavailableError:
+                raise
+            except Exception as error:  # noqa: BLE001  (an input or a result that cannot be pickled)
+                return None, error
+            else:
+                return answer
 
     def _count(self) -> None:
         """See how many threads there are, now and then."""
