@@ -1,0 +1,301 @@
+"""Replays and fleet refreshes as jobs: asked for, done in a process of their own, seen, cancelled, and made again."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+from fastapi.testclient import TestClient
+from sqlalchemy import text
+
+from service.app import create_app
+from service.background import directly
+from service.errors import BusyError
+from service.executors.in_process import InProcess
+from service.jobs.workflow import MOST_REASONS, Task, done
+from service.run_files.json_run import read_run
+from service.schemas.clutch import ClutchIn
+from service.schemas.diagnosis import JobOut, JobPage
+from service.settings import Settings
+from service.web.answers import to_json
+from service.workflows import ask_job, learn_fleet
+from service.workflows.ingest_run import ingest
+from service.workflows.register_clutch import register
+from service.workflows.replay import clutch_ids, replay
+from storage import jobs
+from storage.encoding.json_text import Json
+from storage.engine.database import Database
+from storage.engine.opening import open_database
+from storage.engine.sqlite.database import back_up
+from storage.tables import filter_state, fit, fleet_prior, prediction
+from storage.transfer.digest import digest
+from tests.service.web.routes.granting import granted
+from tests.support import ONCE, Server, serving, stationary
+
+AT = "2026-11-02T10:00:00+00:00"
+LIFE = "/v1/clutches/{}/remaining-useful-life"
+#: So many that a replay is seen midway.
+CLUTCHES = 6
+WAIT = {"Prefer": "wait=120"}
+RESULTS = (fit, prediction, filter_state)
+#: What code versions each clutch's results have.
+VERSIONS = (
+    "SELECT run.clutch_id, fit.code_version FROM fit JOIN run ON run.run_key = fit.run_key "
+    "UNION SELECT clutch_id, code_version FROM prediction UNION SELECT clutch_id, code_version FROM filter_state"
+)
+OLD = "0.0.1"
+
+
+def stock(database: Database, clutches: int = CLUTCHES, tests: int = 2) -> dict[str, tuple[int, str]]:
+    """Clutches with some tests each; what a replay in this process stores of them."""
+    for number in range(clutches):
+        register(database, ClutchIn(clutch_id=f"c{number}"), created_at=AT)
+        for each in range(tests):
+            sent = stationary(1000 * each + number, run_id=f"r{each}", pressures=(5.0,))
+            ingest(database, f"c{number}", read_run(to_json(sent)), received_at=AT)
+    assert all(replayed.error is None for replayed in replay(database, clutch_ids(database), InProcess()))
+    return stored(database)
+
+
+def stored(database: Database) -> dict[str, tuple[int, str]]:
+    with database.reading() as connection:
+        return {table.name: digest(connection, table) for table in RESULTS}
+
+
+def age(database: Database) -> None:
+    """Have all results be those of an earlier release, with other numbers."""
+    with database.writing() as connection:
+        for table in RESULTS:
+            connection.execute(table.update().values(code_version=OLD))
+        connection.execute(text("UPDATE fit SET mean_cof = 0.25"))
+
+
+def aged(database: Database) -> set[str]:
+    """The clutches whose results are old; of none some are."""
+    with database.reading() as connection:
+        rows = [tuple(row) for row in connection.execute(text(VERSIONS))]
+    old = {clutch_id for clutch_id, version in rows if version == OLD}
+    assert old.isdisjoint(clutch_id for clutch_id, version in rows if version != OLD), "a clutch is half done"
+    return old
+
+
+@contextmanager
+def client_of(database: Database, **settings: Any) -> Iterator[TestClient]:
+    """A service in this process on the database."""
+    application = create_app(Settings(workers=0, database=database.url, **settings))
+    with TestClient(application, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
+        yield client
+
+
+def midway(get: Callable[[str], httpx2.Response], job_id: str) -> None:
+    """Wait until some of a replay is done."""
+    deadline = time.monotonic() + 120
+    while True:
+        job = get(f"/v1/jobs/{job_id}").json()
+        if job["progress"] is not None and job["progress"]["done"] > 0:
+            assert job["state"] == "running", job
+            return
+        assert time.monotonic() < deadline, job
+        time.sleep(0.02)
+
+
+def processes(database: Database) -> list[str]:
+    """The processes of replays and refreshes on the database."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            command, environment = (path / "cmdline").read_bytes(), (path / "environ").read_bytes()
+        except OSError:  # it has ended, or is another user's
+            continue
+        if b"service.jobs.workflow" in command and database.url.encode() in environment:
+            found.append(path.name)
+    return found
+
+
+def until_none(database: Database) -> None:
+    deadline = time.monotonic() + 60
+    while processes(database):
+        assert time.monotonic() < deadline, "its process goes on"
+        time.sleep(0.05)
+
+
+def test_a_replay_stores_what_one_in_process_does(database: Database) -> None:
+    expected = stock(database, 3)
+    with client_of(database) as client:
+        before = client.get(LIFE.format("c0")).json()
+        age(database)
+        asked = client.post("/v1/jobs", json={"kind": "replay", "clutch_id": "c1"}, headers=WAIT)
+        job = asked.json()
+        JobOut.model_validate(job)
+        assert (asked.status_code, asked.headers["Location"]) == (200, f"/v1/jobs/{job['job_id']}")
+        assert asked.headers["Preference-Applied"] == "wait=120"
+        assert (job["state"], job["clutch_id"], job["attempts"]) == ("finished", "c1", 1)
+        assert job["progress"] == {"step": "replays the clutches", "done": 1, "of": 1}
+        assert job["result"] == {"replayed": 1, "left": 0, "reasons": []}
+        assert aged(database) == {"c0", "c2"}
+        whole = client.post("/v1/jobs", json={"kind": "replay"}, headers=WAIT).json()
+        assert (whole["state"], whole["result"]["replayed"]) == ("finished", 3)
+        assert stored(database) == expected
+        again = client.get(LIFE.format("c0")).json()
+        assert again == before | {"revision": again["revision"]}
+        assert again["revision"] == before["revision"] + 1, "others' numbers were shown meanwhile"
+        listed = client.get("/v1/jobs").json()
+        JobPage.model_validate(listed)
+        assert listed["items"] == [whole, job]
+        assert client.get(asked.headers["Location"]).json() == job
+
+
+def test_a_clutch_that_is_left_is_named_with_the_reason(in_file: Database, caplog: pytest.LogCaptureFixture) -> None:
+    stock(in_file, 2)
+    with in_file.writing() as connection:
+        connection.execute(
+            text(
+                "UPDATE channel SET data = x'00' WHERE run_key = (SELECT min(run_key) FROM run WHERE clutch_id = 'c0')"
+            )
+        )
+    age(in_file)
+    with client_of(in_file) as client:
+        job = client.post("/v1/jobs", json={"kind": "replay"}, headers=WAIT).json()
+    result = job["result"]
+    assert (job["state"], result["replayed"], result["left"]) == ("finished", 1, 1)
+    assert [each["clutch_id"] for each in result["reasons"]] == ["c0"]
+    assert result["reasons"][0]["reason"]
+    assert aged(in_file) == {"c0"}
+    said = [record.getMessage() for record in caplog.records if record.getMessage().startswith("replay ")]
+    assert ["c0: left as it was" in line for line in said] == [True]
+
+
+def leaving(
+    database: Database, clutch_id: str | None, *, at: str, say: Callable[[Json], None], at_once: object
+) -> tuple[dict[str, int], dict[str, str]]:
+    """A workflow that leaves many clutches."""
+    assert (database, clutch_id, at, at_once) == (None, None, AT, directly)
+    say({"step": "leaves", "done": 1, "of": 2})
+    say({"step": "leaves", "done": 2, "of": 2})
+    return {"replayed": 3}, {f"c{number}": "why" for number in range(MOST_REASONS + 5)}
+
+
+def test_the_result_has_few_reasons_and_the_log_all(capsys: pytest.CaptureFixture[str]) -> None:
+    said: list[Json] = []
+    task = Task(function=f"{__name__}:leaving", clutch_id=None, at=AT)
+    ended = done(None, task, said.append, directly)  # type: ignore[arg-type]  # the workflow reads nothing
+    assert ended["progress"] == said[-1] == {"step": "leaves", "done": 2, "of": 2}
+    assert (ended["result"]["replayed"], ended["result"]["left"]) == (3, MOST_REASONS + 5)
+    assert ended["result"]["reasons"] == [{"clutch_id": f"c{n}", "reason": "why"} for n in range(MOST_REASONS)]
+    assert len(capsys.readouterr().err.splitlines()) == MOST_REASONS + 5
+
+
+def test_a_fleet_refresh_stores_what_one_in_process_does(in_file: Database, tmp_path: Path) -> None:
+    before = stock(in_file, 4, tests=6)
+    back_up(in_file.url, tmp_path / "copy.db")
+    with client_of(in_file) as client:
+        job = client.post("/v1/jobs", json={"kind": "fleet_refresh"}, headers=WAIT).json()
+        JobOut.model_validate(job)
+        assert (job["state"], job["clutch_id"]) == ("finished", None)
+        assert job["result"] == {"kinds": 1, "changed": 4, "left": 0, "reasons": []}
+        assert job["progress"] == {"step": "updates their predictions", "done": 4, "of": 4}
+        assert client.get("/v1/fleet/priors").json()["items"][0]["version"] == 1
+        assert client.get(LIFE.format("c0")).json()["prior"]["name"] == "fleet"
+        again = client.post("/v1/jobs", json={"kind": "fleet_refresh"}, headers=WAIT).json()
+        assert again["result"] == {"kinds": 0, "changed": 0, "left": 0, "reasons": []}
+    with closing(open_database(f"sqlite:///{tmp_path / 'copy.db'}")) as copy:
+        assert stored(copy) == before != stored(in_file)
+        learn_fleet.refresh(copy, now=AT)
+        assert (stored(copy), priors(copy)) == (stored(in_file), priors(in_file))
+
+
+def priors(database: Database) -> list[Any]:
+    with database.reading() as connection:
+        rows = connection.execute(fleet_prior.select()).mappings()
+        return sorted(repr({name: value for name, value in row.items() if name != "created_at"}) for row in rows)
+
+
+def test_who_asks_twice_joins_and_too_many_are_sent_away(database: Database) -> None:
+    for number in range(3):
+        register(database, ClutchIn(clutch_id=f"c{number}"), created_at=AT)
+
+    def ask(kind: str, clutch_id: str | None) -> str:
+        return ask_job.ask(database, kind, clutch_id, by="local", request="", most=3, asked_at=AT).job_id
+
+    first, other, whole = (ask(jobs.REPLAY, clutch_id) for clutch_id in ("c0", "c1", None))
+    assert len({first, other, whole}) == 3
+    assert [ask(jobs.REPLAY, clutch_id) for clutch_id in ("c0", "c1", None)] == [first, other, whole]
+    with pytest.raises(BusyError, match="3 jobs of the kind replay wait"):
+        ask(jobs.REPLAY, "c2")
+    assert ask(jobs.FLEET_REFRESH, None) not in {first, other, whole}
+    with database.writing() as connection:
+        jobs.end(connection, first, jobs.CANCELLED, AT)
+    assert ask(jobs.REPLAY, "c2") not in {first, other, whole}
+
+
+def test_what_is_asked_for_is_checked(in_file: Database) -> None:
+    stock(in_file, 1, tests=1)
+    with client_of(in_file, most_replays=1, job_lease_seconds=1) as client:
+        for body, status in (
+            ({"kind": "replay", "clutch_id": "unknown"}, 404),
+            ({"kind": "fleet_refresh", "clutch_id": "c0"}, 422),
+            ({"kind": "diagnosis", "clutch_id": "c0"}, 422),
+            ({}, 422),
+        ):
+            assert client.post("/v1/jobs", json=body).status_code == status, body
+        assert client.get("/v1/jobs").json()["items"] == []
+        asked = client.post("/v1/jobs", json={"kind": "replay"})
+        assert (asked.status_code, asked.json()["state"] in jobs.OPEN) == (202, True)
+        assert asked.headers["Location"] == f"/v1/jobs/{asked.json()['job_id']}"
+        away = client.post("/v1/jobs", json={"kind": "replay", "clutch_id": "c0"})
+        assert (away.status_code, away.headers["Retry-After"]) == (503, "1")
+
+
+def test_a_bound_key_has_its_own_clutches_replayed_and_no_others(in_file: Database) -> None:
+    stock(in_file, 2, tests=1)
+    with client_of(in_file) as client:
+        bound = granted(client, "admin", clutches=["c1"])
+        for body in ({"kind": "replay"}, {"kind": "fleet_refresh"}, {"kind": "replay", "clutch_id": "c0"}):
+            assert client.post("/v1/jobs", json=body, headers=bound).status_code == 403, body
+        narrow = granted(client, "ingest")
+        assert client.post("/v1/jobs", json={"kind": "replay"}, headers=narrow).status_code == 403
+        own = client.post("/v1/jobs", json={"kind": "replay", "clutch_id": "c1"}, headers={**bound, **WAIT}).json()
+        assert (own["state"], own["result"]["replayed"]) == ("finished", 1)
+        assert client.get("/v1/jobs", headers=bound).json()["items"] == [own]
+
+
+def test_a_cancelled_replay_leaves_whole_clutches(in_file: Database) -> None:
+    expected = stock(in_file)
+    age(in_file)
+    with client_of(in_file, job_lease_seconds=1) as client:
+        asked = client.post("/v1/jobs", json={"kind": "replay"}).json()["job_id"]
+        midway(client.get, asked)
+        cancelled = client.delete(f"/v1/jobs/{asked}").json()
+        assert (cancelled["state"], cancelled["problem"]) == ("cancelled", "cancelled by local")
+        assert cancelled["result"] is None
+        until_none(in_file)
+        assert 0 < len(aged(in_file)) < CLUTCHES
+        again = client.post("/v1/jobs", json={"kind": "replay"}, headers=WAIT).json()
+        assert (again["state"], again["job_id"] == asked) == ("finished", False)
+    assert aged(in_file) == set()
+    assert stored(in_file) == expected
+
+
+def test_the_replay_of_a_killed_service_is_made_again(database: Database) -> None:
+    expected = stock(database)
+    age(database)
+    environment = {"CLUTCHLIFE_JOB_LEASE_SECONDS": "2"}
+    address = database.url if database.path is None else database.path
+    killed = Server(address, loaded=True, environment=environment)
+    killed.start()
+    asked = ONCE.post(f"{killed.url}/v1/jobs", json={"kind": "replay"}).json()["job_id"]
+    midway(lambda path: ONCE.get(f"{killed.url}{path}"), asked)
+    killed.kill()
+    until_none(database)
+    assert 0 < len(aged(database)) < CLUTCHES
+    with serving(address, loaded=True, environment=environment) as server:
+        deadline = time.monotonic() + 120
+        while (job := ONCE.get(f"{server.url}/v1/jobs/{asked}").json())["state"] in jobs.OPEN:
+            assert time.monotonic() < deadline, job
+            time.sleep(0.1)
+    assert (job["state"], job["attempts"], job["result"]["replayed"]) == ("finished", 2, CLUTCHES)
+    assert aged(database) == set()
+    assert stored(database) == expected
