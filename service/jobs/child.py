@@ -26,7 +26,13 @@ _MEMORY = {
 }
 #: With this begins a line that says how far the job has come, JSON; its last line is the answer.
 PROGRESS = b"progress "
+#: The status with which a process ends that the database was away from: the job is to be done again.
+AWAY = os.EX_TEMPFAIL
 _log = logging.getLogger("clutchlife")
+
+
+class AwayError(Exception):
+    """The job did not come to its end, because the database was away for a while: it is to be done again."""
 
 
 class FailedError(Exception):
@@ -69,7 +75,7 @@ class Child:
         return json.loads(steps[-1].removeprefix(PROGRESS)) if steps else None
 
     def written(self, name: str) -> dict[str, Any]:
-        """What it wrote at its end. Raises FailedError; what it complained of is logged under its `name`."""
+        """What it wrote at its end. Raises FailedError, AwayError; what it complained of is logged under its `name`."""
         code = self._process.returncode
         if code == -signal.SIGXCPU:
             raise FailedError(f"it took longer than {self._work.processor_seconds} s of processor time")
@@ -78,6 +84,8 @@ class Child:
         if output:
             level = logging.ERROR if code else logging.WARNING
             _log.log(level, "%s: %s", name, output)
+        if code == AWAY:
+            raise AwayError
         if code != 0:
             raise FailedError(f"its process ended with {_ending(code)}: see the log")
         written: dict[str, Any] = json.loads(self._lines()[-1])

@@ -16,7 +16,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from service.jobs import child
-from service.jobs.child import FailedError
+from service.jobs.child import AwayError, FailedError
 from service.jobs.kinds import Kind
 from service.logging import request_id
 from service.settings import Settings
@@ -29,7 +29,7 @@ from storage.jobs import JobRow
 #: How often a job is begun at most. Chosen: whatever ends the service once, as an operator may, is not the job's fault; what
 #: ends it three times is.
 MOST_ATTEMPTS = 3
-GIVEN_UP = f"the service ended {MOST_ATTEMPTS} times while it ran"
+GIVEN_UP = f"the service or its database ended {MOST_ATTEMPTS} times while it ran"
 UNSTORED = "its end could not be stored: see the service's log"
 #: A lease is prolonged so many times before it would run out. Chosen: a database that is away for some seconds loses none.
 RENEWALS_A_LEASE = 10
@@ -148,12 +148,15 @@ class JobQueue:
             _log.exception("%s %s is made again once its lease has run out", job.kind, job.job_id)
 
     def _outcome(self, job: JobRow, kind: Kind) -> dict[str, Any] | None:
-        """What its process wrote, or a problem; None where it is no longer this service's to do."""
+        """What its process wrote, or a problem; None where it is not to be ended now: by another service, or later."""
         if job.attempts > MOST_ATTEMPTS:
             return {"problem": GIVEN_UP}
         try:
             with child.running(kind.work(job, self._settings), self._database.url) as process:
                 return process.written(f"{job.kind} {job.job_id}") if self._seen_through(job, process) else None
+        except AwayError:
+            _log.warning("%s %s is made again once its lease has run out", job.kind, job.job_id)
+            return None
         except FailedError as error:
             return {"problem": str(error)}
 

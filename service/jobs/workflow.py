@@ -12,9 +12,11 @@ from typing import Any
 
 from service.background import AtOnce, in_background
 from service.jobs import own_process
+from service.jobs.child import AWAY
 from service.settings import DATABASE_VARIABLE
 from storage.encoding.json_text import Json
 from storage.engine.database import Database
+from storage.engine.errors import DatabaseBusy, StorageUnavailable
 from storage.engine.opening import open_database
 
 #: Of so many clutches that were left it is kept why; of all of them the log says it. Chosen: an answer stays a page.
@@ -31,11 +33,19 @@ class Task:
 
 
 def main() -> None:
-    """Do what the first argument names, JSON, to the database of the environment. The last line is the answer."""
+    """Do what the first argument names, JSON, to the database of the environment. The last line is the answer.
+
+    Where the database is away meanwhile, the process ends so that the service has it done again: it takes hours, and a
+    restart of the database takes seconds.
+    """
     task = Task(**json.loads(sys.argv[1]))
     own_process.end_with_the_service()
-    with closing(open_database(os.environ[DATABASE_VARIABLE])) as database:
-        own_process.answer(in_background(partial(done, database, task, own_process.say)))
+    try:
+        with closing(open_database(os.environ[DATABASE_VARIABLE])) as database:
+            own_process.answer(in_background(partial(done, database, task, own_process.say)))
+    except (DatabaseBusy, StorageUnavailable) as error:
+        sys.stderr.write(f"{error}\n")
+        sys.exit(AWAY)
 
 
 def done(database: Database, task: Task, say: Callable[[Json], None], at_once: AtOnce) -> dict[str, Any]:

@@ -1,125 +1,30 @@
-"""Replays and fleet refreshes as jobs: asked for, done in a process of their own, seen, cancelled, and made again."""
+"""Replays and fleet refreshes as jobs: asked for, done in a process of their own, and seen."""
 
-import time
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-import httpx2
 import pytest
-from fastapi.testclient import TestClient
 from sqlalchemy import text
 
-from service.app import create_app
 from service.background import directly
 from service.errors import BusyError
-from service.executors.in_process import InProcess
 from service.jobs.workflow import MOST_REASONS, Task, done
-from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
 from service.schemas.diagnosis import JobOut, JobPage
-from service.settings import Settings
-from service.web.answers import to_json
 from service.workflows import ask_job, learn_fleet
-from service.workflows.ingest_run import ingest
 from service.workflows.register_clutch import register
-from service.workflows.replay import clutch_ids, replay
 from storage import jobs
 from storage.encoding.json_text import Json
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 from storage.engine.sqlite.database import back_up
-from storage.tables import filter_state, fit, fleet_prior, prediction
-from storage.transfer.digest import digest
+from storage.tables import fleet_prior
+from tests.service.jobs.replaying import AT, WAIT, age, aged, client_of, stock, stored
 from tests.service.web.routes.granting import granted
-from tests.support import ONCE, Server, serving, stationary
 
-AT = "2026-11-02T10:00:00+00:00"
 LIFE = "/v1/clutches/{}/remaining-useful-life"
-#: So many that a replay is seen midway.
-CLUTCHES = 6
-WAIT = {"Prefer": "wait=120"}
-RESULTS = (fit, prediction, filter_state)
-#: What code versions each clutch's results have.
-VERSIONS = (
-    "SELECT run.clutch_id, fit.code_version FROM fit JOIN run ON run.run_key = fit.run_key "
-    "UNION SELECT clutch_id, code_version FROM prediction UNION SELECT clutch_id, code_version FROM filter_state"
-)
-OLD = "0.0.1"
-
-
-def stock(database: Database, clutches: int = CLUTCHES, tests: int = 2) -> dict[str, tuple[int, str]]:
-    """Clutches with some tests each; what a replay in this process stores of them."""
-    for number in range(clutches):
-        register(database, ClutchIn(clutch_id=f"c{number}"), created_at=AT)
-        for each in range(tests):
-            sent = stationary(1000 * each + number, run_id=f"r{each}", pressures=(5.0,))
-            ingest(database, f"c{number}", read_run(to_json(sent)), received_at=AT)
-    assert all(replayed.error is None for replayed in replay(database, clutch_ids(database), InProcess()))
-    return stored(database)
-
-
-def stored(database: Database) -> dict[str, tuple[int, str]]:
-    with database.reading() as connection:
-        return {table.name: digest(connection, table) for table in RESULTS}
-
-
-def age(database: Database) -> None:
-    """Have all results be those of an earlier release, with other numbers."""
-    with database.writing() as connection:
-        for table in RESULTS:
-            connection.execute(table.update().values(code_version=OLD))
-        connection.execute(text("UPDATE fit SET mean_cof = 0.25"))
-
-
-def aged(database: Database) -> set[str]:
-    """The clutches whose results are old; of none some are."""
-    with database.reading() as connection:
-        rows = [tuple(row) for row in connection.execute(text(VERSIONS))]
-    old = {clutch_id for clutch_id, version in rows if version == OLD}
-    assert old.isdisjoint(clutch_id for clutch_id, version in rows if version != OLD), "a clutch is half done"
-    return old
-
-
-@contextmanager
-def client_of(database: Database, **settings: Any) -> Iterator[TestClient]:
-    """A service in this process on the database."""
-    application = create_app(Settings(workers=0, database=database.url, **settings))
-    with TestClient(application, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
-        yield client
-
-
-def midway(get: Callable[[str], httpx2.Response], job_id: str) -> None:
-    """Wait until some of a replay is done."""
-    deadline = time.monotonic() + 120
-    while True:
-        job = get(f"/v1/jobs/{job_id}").json()
-        if job["progress"] is not None and job["progress"]["done"] > 0:
-            assert job["state"] == "running", job
-            return
-        assert time.monotonic() < deadline, job
-        time.sleep(0.02)
-
-
-def processes(database: Database) -> list[str]:
-    """The processes of replays and refreshes on the database."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*"):
-        try:
-            command, environment = (path / "cmdline").read_bytes(), (path / "environ").read_bytes()
-        except OSError:  # it has ended, or is another user's
-            continue
-        if b"service.jobs.workflow" in command and database.url.encode() in environment:
-            found.append(path.name)
-    return found
-
-
-def until_none(database: Database) -> None:
-    deadline = time.monotonic() + 60
-    while processes(database):
-        assert time.monotonic() < deadline, "its process goes on"
-        time.sleep(0.05)
 
 
 def test_a_replay_stores_what_one_in_process_does(database: Database) -> None:
@@ -260,42 +165,3 @@ def test_a_bound_key_has_its_own_clutches_replayed_and_no_others(in_file: Databa
         own = client.post("/v1/jobs", json={"kind": "replay", "clutch_id": "c1"}, headers={**bound, **WAIT}).json()
         assert (own["state"], own["result"]["replayed"]) == ("finished", 1)
         assert client.get("/v1/jobs", headers=bound).json()["items"] == [own]
-
-
-def test_a_cancelled_replay_leaves_whole_clutches(in_file: Database) -> None:
-    expected = stock(in_file)
-    age(in_file)
-    with client_of(in_file, job_lease_seconds=1) as client:
-        asked = client.post("/v1/jobs", json={"kind": "replay"}).json()["job_id"]
-        midway(client.get, asked)
-        cancelled = client.delete(f"/v1/jobs/{asked}").json()
-        assert (cancelled["state"], cancelled["problem"]) == ("cancelled", "cancelled by local")
-        assert cancelled["result"] is None
-        until_none(in_file)
-        assert 0 < len(aged(in_file)) < CLUTCHES
-        again = client.post("/v1/jobs", json={"kind": "replay"}, headers=WAIT).json()
-        assert (again["state"], again["job_id"] == asked) == ("finished", False)
-    assert aged(in_file) == set()
-    assert stored(in_file) == expected
-
-
-def test_the_replay_of_a_killed_service_is_made_again(database: Database) -> None:
-    expected = stock(database)
-    age(database)
-    environment = {"CLUTCHLIFE_JOB_LEASE_SECONDS": "2"}
-    address = database.url if database.path is None else database.path
-    killed = Server(address, loaded=True, environment=environment)
-    killed.start()
-    asked = ONCE.post(f"{killed.url}/v1/jobs", json={"kind": "replay"}).json()["job_id"]
-    midway(lambda path: ONCE.get(f"{killed.url}{path}"), asked)
-    killed.kill()
-    until_none(database)
-    assert 0 < len(aged(database)) < CLUTCHES
-    with serving(address, loaded=True, environment=environment) as server:
-        deadline = time.monotonic() + 120
-        while (job := ONCE.get(f"{server.url}/v1/jobs/{asked}").json())["state"] in jobs.OPEN:
-            assert time.monotonic() < deadline, job
-            time.sleep(0.1)
-    assert (job["state"], job["attempts"], job["result"]["replayed"]) == ("finished", 2, CLUTCHES)
-    assert aged(database) == set()
-    assert stored(database) == expected
