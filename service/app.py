@@ -1,7 +1,7 @@
 """The application: its parts put together, nothing made at import."""
 
 import shutil
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any
@@ -11,7 +11,9 @@ from fastapi_offline import FastAPIOffline
 
 from service.dashboard import assets
 from service.dashboard import pages as dashboard
-from service.jobs.queue import Finish, JobQueue
+from service.jobs import kinds
+from service.jobs.kinds import Kind
+from service.jobs.queue import JobQueue
 from service.jobs.workers import Lane, Workers, in_processes, in_threads
 from service.queries.cache import AnswerCache
 from service.settings import CODE_VERSION, Settings
@@ -37,10 +39,10 @@ from service.web.routes import (
     life,
     runs,
 )
-from service.workflows import adopt_model, raw_records, run_diagnosis
+from service.workflows import adopt_model, ask_job, raw_records, run_diagnosis
 from storage.engine.database import Database
 from storage.engine.opening import open_database, service_lock
-from storage.jobs import JobRow
+from storage.jobs import DIAGNOSIS, FLEET_REFRESH, REPLAY, JobRow
 
 _DESCRIPTION = """Condition monitoring and prognostics of wet friction clutches.
 
@@ -48,18 +50,30 @@ Post the Stribeck tests of a rig; each is fitted, the clutch's degradation is tr
 its mean coefficient of friction has halved are predicted with their uncertainty."""
 
 
-def _finish(database: Database, workers: Workers) -> Finish:
-    """How the queue has the end of a job stored: what somebody wants adopted is tracked anew by the workers."""
+def _kinds(database: Database, workers: Workers) -> Sequence[Mapping[str, Kind]]:
+    """How jobs are done, by their kind, and their ends stored: what somebody wants adopted is tracked anew by the workers.
+
+    Of each group one is done at a time: a diagnosis does not wait until a thousand clutches are replayed.
+    """
 
     def adopt(job: JobRow, ended: Mapping[str, Any]) -> bool:
         function = partial(adopt_model.finish_and_adopt, claimer=job.claimed_by or "")
         arguments = (job.clutch_id, job.job_id, dict(ended), now(), job.arguments["adopt_by"])
         return bool(workers.submit(Lane.ANSWERS, function, *arguments, turn=job.clutch_id).result())
 
-    def finish(job: JobRow, ended: Mapping[str, Any]) -> None:
+    def finish_diagnosis(job: JobRow, ended: Mapping[str, Any]) -> None:
         run_diagnosis.finish(database, job, ended, at=now(), adopt=adopt)
 
-    return finish
+    def finish(job: JobRow, ended: Mapping[str, Any]) -> None:
+        ask_job.finish(database, job, ended, at=now())
+
+    return (
+        {DIAGNOSIS: Kind(kinds.diagnosis, finish_diagnosis)},
+        {
+            REPLAY: Kind(kinds.workflow("service.workflows.replay:as_job"), finish),
+            FLEET_REFRESH: Kind(kinds.workflow("service.workflows.learn_fleet:as_job"), finish),
+        },
+    )
 
 
 def create_app(settings: Settings) -> FastAPI:
@@ -77,7 +91,7 @@ def create_app(settings: Settings) -> FastAPI:
         folder = emptied_folder(database.path)
         log = (settings.log_format, settings.log_level)
         workers = in_processes(database, settings.workers, log) if settings.workers else in_threads(database)
-        queue = JobQueue(database, settings, _finish(database, workers))
+        queue = JobQueue(database, settings, _kinds(database, workers))
         readiness = Readiness(database, workers, queue, Needs(disk=settings.least_free, memory=settings.least_memory))
         try:
             workers.warm()

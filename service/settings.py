@@ -86,6 +86,13 @@ class Settings(BaseSettings):
         description="how long after its service was killed a job is begun again by another, or by the next on a file",
     )
     most_diagnoses: int = Field(default=16, ge=1, description="diagnoses that wait or run; further ones get a 503")
+    # docs/scale.md: 10,000 clutches of 16 tests take four hours of a core, of 200 tests more than twelve times as long
+    replay_hours: int = Field(
+        default=72, ge=1, description="how long a replay or a fleet refresh that is a job may take, by the clock [h]"
+    )
+    most_replays: int = Field(
+        default=16, ge=1, description="replays of clutches that wait or run as jobs; further ones get a 503"
+    )
     least_free_mb: int = Field(
         default=64, ge=0, description="free space on the database's disk [MiB] below which `/readyz` says 503"
     )

@@ -16,8 +16,10 @@ from storage.encoding.json_text import Json, to_object, to_text
 from storage.tables import OPEN_ONLY, job
 
 WAITING, RUNNING, FINISHED, FAILED, CANCELLED = "waiting", "running", "finished", "failed", "cancelled"
+#: The states of a job that has not ended.
+OPEN = (WAITING, RUNNING)
 #: The kinds of job that there are.
-DIAGNOSIS = "diagnosis"
+DIAGNOSIS, REPLAY, FLEET_REFRESH = "diagnosis", "replay", "fleet_refresh"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,8 +62,18 @@ _newest = (
     .order_by(job.c.job_key.desc())
     .limit(bindparam("most"))
 )
+_same = (
+    select(*_COLUMNS)
+    .where(
+        OPEN_ONLY, job.c.kind == bindparam("of_kind"), job.c.clutch_id.is_not_distinct_from(bindparam("of", type_=Text))
+    )
+    .order_by(job.c.job_key)
+    .limit(1)
+)
 _count = select(func.count()).select_from(job).where(OPEN_ONLY, job.c.kind == bindparam("of_kind"))
-_free = and_(OPEN_ONLY, or_(job.c.state == WAITING, job.c.leased_until < now_in_seconds()))
+_free = and_(
+    OPEN_ONLY, among(job.c.kind, "of_kinds"), or_(job.c.state == WAITING, job.c.leased_until < now_in_seconds())
+)
 _any_free = select(sa.exists(select(job.c.job_key).where(_free)))
 #: The clutch that was served longest ago comes first, then the job that was asked for first: however many of its jobs wait,
 #: a clutch holds up another's by one. Jobs of no clutch come before all.
@@ -98,6 +110,7 @@ _ended = {
     "state": bindparam("new_state"),
     "finished_at": bindparam("at"),
     "problem": bindparam("new_problem", type_=Text),
+    "progress": func.coalesce(bindparam("new_progress", type_=Text), job.c.progress),
     "leased_until": None,
 }
 _end_claimed = update(job).where(_claimed).values(**_ended)
@@ -141,14 +154,20 @@ def count_open(connection: Connection, kind: str) -> int:
     return connection.execute(_count, {"of_kind": kind}).scalar_one()
 
 
-def any_free(connection: Connection) -> bool:
-    """Whether a job could be claimed."""
-    return bool(connection.execute(_any_free).scalar_one())
+def find_open(connection: Connection, kind: str, clutch_id: str | None) -> JobRow | None:
+    """The job of a kind and a clutch that waits or runs, the first of them; `clutch_id` None: of no single clutch."""
+    row = connection.execute(_same, {"of_kind": kind, "of": clutch_id}).first()
+    return None if row is None else _row(row)
 
 
-def claim(connection: Connection, claimer: str, *, lease: float, at: str) -> JobRow | None:
-    """The job whose turn it is, the claimer's for `lease` [s] from now on; None where none is free."""
-    job_id: str | None = connection.execute(_next).scalar()
+def any_free(connection: Connection, kinds: Collection[str]) -> bool:
+    """Whether a job of these kinds could be claimed."""
+    return bool(connection.execute(_any_free, {"of_kinds": to_text(list(kinds))}).scalar_one())
+
+
+def claim(connection: Connection, claimer: str, kinds: Collection[str], *, lease: float, at: str) -> JobRow | None:
+    """The job of these kinds whose turn it is, the claimer's for `lease` [s] from now on; None where none is free."""
+    job_id: str | None = connection.execute(_next, {"of_kinds": to_text(list(kinds))}).scalar()
     if job_id is None:
         return None
     connection.execute(_claim, {"wanted": job_id, "claimer": claimer, "lease": lease, "at": at})
@@ -178,10 +197,21 @@ def set_arguments(connection: Connection, job_id: str, arguments: Json) -> None:
 
 
 def end(
-    connection: Connection, job_id: str, state: str, at: str, *, problem: str | None = None, claimer: str | None = None
+    connection: Connection,
+    job_id: str,
+    state: str,
+    at: str,
+    *,
+    problem: str | None = None,
+    claimer: str | None = None,
+    progress: Json | None = None,
 ) -> bool:
-    """Store how a job ended; False where it has ended already or, where a `claimer` is named, is not its."""
+    """Store how a job ended; False where it has ended already or, where a `claimer` is named, is not its.
+
+    `progress` None: how far it had come stays as it is stored.
+    """
     values = {"wanted": job_id, "new_state": state, "at": at, "new_problem": problem}
+    values["new_progress"] = None if progress is None else to_text(progress)
     if claimer is not None:
         return connection.execute(_end_claimed, values | {"claimer": claimer}).rowcount == 1
     return connection.execute(_end_open, values).rowcount == 1

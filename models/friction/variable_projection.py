@@ -270,16 +270,15 @@ def _tie(problem: Problem, scan: Profile, lowest: FloatArray) -> FloatArray:
 
 def _narrow(points: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The lowest of points [P, N], the vertex of the parabola through it and its neighbours, and how far they are."""
-    low, last = f.argmin(axis=1)[:, None], points.shape[1] - 1
+    row, last = np.arange(len(points))[:, None], points.shape[1] - 1
+    low = f.argmin(axis=1)[:, None]
     middle = np.clip(low, 1, last - 1)
-    (t0, f0), (t1, f1), (t2, f2) = (
-        (np.take_along_axis(points, middle + k, axis=1), np.take_along_axis(f, middle + k, axis=1)) for k in (-1, 0, 1)
-    )
+    (t0, f0), (t1, f1), (t2, f2) = ((points[row, middle + k], f[row, middle + k]) for k in (-1, 0, 1))
     falling, rising = (f1 - f0) * (t2 - t1), (f2 - f1) * (t1 - t0)
     curvature = (rising - falling) * 2
     step = np.divide(falling * (t2 - t0), curvature, out=np.zeros_like(f0), where=curvature > 0)
-    left, right = (np.take_along_axis(points, np.clip(low + k, 0, last), axis=1) for k in (-1, 1))
-    lowest = np.take_along_axis(points, low, axis=1)
+    left, right = (points[row, np.clip(low + k, 0, last)] for k in (-1, 1))
+    lowest = points[row, low]
     vertex = np.clip(np.where(curvature > 0, (t0 + t1) / 2 - step, lowest), left, right)
     return lowest, vertex, np.maximum(right - vertex, vertex - left)
 

@@ -54,8 +54,8 @@ def refresh(
             out.print(_line(item) + (" (new)" if new else ""), markup=False, soft_wrap=True)
     for clutch_id in done.changed:
         out.print(f"{clutch_id}: predictions updated", markup=False)
-    for clutch_id in done.left:
-        out.print(f"{clutch_id}: left to the next refresh: runs came while its predictions were made", markup=False)
+    for clutch_id, reason in done.left.items():
+        out.print(f"{clutch_id}: {reason}", markup=False)
     if not priors and not quiet:
         out.print("no kind has three clutches with six tests each: all priors stay weak", markup=False)
 

@@ -1,4 +1,4 @@
-"""The process of one diagnosis as the service sees it: started, watched, ended where it takes too long, and read."""
+"""The process of one job as the service sees it: started, watched, ended where it takes too long, and read."""
 
 import json
 import logging
@@ -10,40 +10,54 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import IO, Any
 
-from service.settings import DATABASE_VARIABLE, Settings
+from service.settings import DATABASE_VARIABLE
 from storage.encoding.json_text import Json
 
-#: Of what a diagnosis' process said, so many bytes are logged: its last ones hold the traceback.
+#: Of what a job's process said, so many bytes are logged: its last ones hold the traceback.
 _TAIL = 8000
-#: Seconds by the clock that a diagnosis may take for each second of processor time that it may: it runs on idle processors
-#: only, beside a full load for many times as long as alone. Chosen; no table. It ends a diagnosis that waits for ever.
-CLOCK_PER_PROCESSOR_SECOND = 6.0
 #: Memory that arrays gave back is kept for the next ones: having it mapped anew each time takes as long as what is
 #: computed in it.
 _MEMORY = {
     "MALLOC_MMAP_THRESHOLD_": str(32 << 20),
     "MALLOC_TRIM_THRESHOLD_": str(1 << 30),
 }
-#: With this begins a line that says how far the diagnosis has come, JSON; its last line is the answer.
+#: With this begins a line that says how far the job has come, JSON; its last line is the answer.
 PROGRESS = b"progress "
+#: The status with which a process ends that the database was away from: the job is to be done again.
+AWAY = os.EX_TEMPFAIL
 _log = logging.getLogger("clutchlife")
 
 
+class AwayError(Exception):
+    """The job did not come to its end, because the database was away for a while: it is to be done again."""
+
+
 class FailedError(Exception):
-    """The diagnosis has no report; the message says why to the one who asked."""
+    """The job did not come to its end; the message says why to the one who asked."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Work:
+    """What a process is to do: `modules` run with `task` as their argument, JSON, for at most `longest` [s] by the clock.
+
+    `processor_seconds` is the processor time after which it ends itself, by SIGXCPU; None: it does not.
+    """
+
+    modules: tuple[str, ...]
+    task: Mapping[str, Any]
+    longest: float
+    processor_seconds: int | None = None
 
 
 class Child:
     """A running process. Made by `running`."""
 
-    def __init__(
-        self, process: "subprocess.Popen[bytes]", answer: IO[bytes], errors: IO[bytes], settings: Settings
-    ) -> None:
-        self._process, self._answer, self._errors, self._settings = process, answer, errors, settings
-        self._longest = settings.diagnosis_seconds * CLOCK_PER_PROCESSOR_SECOND
-        self._deadline = time.monotonic() + self._longest
+    def __init__(self, process: "subprocess.Popen[bytes]", answer: IO[bytes], errors: IO[bytes], work: Work) -> None:
+        self._process, self._answer, self._errors, self._work = process, answer, errors, work
+        self._deadline = time.monotonic() + work.longest
 
     def ends_within(self, seconds: float) -> bool:
         """Wait for its end, at most so long. Raises FailedError where it has taken too long by the clock."""
@@ -52,7 +66,7 @@ class Child:
         except subprocess.TimeoutExpired:
             if time.monotonic() < self._deadline:
                 return False
-            raise FailedError(f"it took longer than {self._longest:g} s by the clock") from None
+            raise FailedError(f"it took longer than {self._work.longest:g} s by the clock") from None
         return True
 
     def progress(self) -> Json | None:
@@ -61,15 +75,17 @@ class Child:
         return json.loads(steps[-1].removeprefix(PROGRESS)) if steps else None
 
     def written(self, name: str) -> dict[str, Any]:
-        """What it wrote at its end. Raises FailedError; what it complained of is logged under its `name`."""
+        """What it wrote at its end. Raises FailedError, AwayError; what it complained of is logged under its `name`."""
         code = self._process.returncode
         if code == -signal.SIGXCPU:
-            raise FailedError(f"it took longer than {self._settings.diagnosis_seconds} s of processor time")
+            raise FailedError(f"it took longer than {self._work.processor_seconds} s of processor time")
         self._errors.seek(max(0, self._errors.seek(0, os.SEEK_END) - _TAIL))
         output = self._errors.read().decode(errors="replace")
         if output:
             level = logging.ERROR if code else logging.WARNING
-            _log.log(level, "diagnosis %s: %s", name, output)
+            _log.log(level, "%s: %s", name, output)
+        if code == AWAY:
+            raise AwayError
         if code != 0:
             raise FailedError(f"its process ended with {_ending(code)}: see the log")
         written: dict[str, Any] = json.loads(self._lines()[-1])
@@ -82,12 +98,11 @@ class Child:
 
 
 @contextmanager
-def running(task: Mapping[str, Any], database_url: str, settings: Settings) -> Iterator[Child]:
-    """A process that makes a diagnosis; killed at the end where it runs still."""
-    modules = "service.background", "service.jobs.diagnosis"
+def running(work: Work, database_url: str) -> Iterator[Child]:
+    """A process that does the work; killed at the end where it runs still."""
     # warnings of numerics are logged, those of libraries to their authors are not
     warned = "-W", "ignore", "-W", "default::RuntimeWarning"
-    command = [sys.executable, "-P", *warned, "-m", *modules, json.dumps(task)]
+    command = [sys.executable, "-P", *warned, "-m", *work.modules, json.dumps(work.task)]
     environment = os.environ | _MEMORY | {DATABASE_VARIABLE: database_url}  # not an argument: others see those
     with tempfile.TemporaryFile() as answer, tempfile.TemporaryFile() as errors:
         # it ends when its standard input does, which is when this process does, however that comes
@@ -95,7 +110,7 @@ def running(task: Mapping[str, Any], database_url: str, settings: Settings) -> I
             command, stdin=subprocess.PIPE, stdout=answer, stderr=errors, env=environment
         )
         try:
-            yield Child(process, answer, errors, settings)
+            yield Child(process, answer, errors, work)
         finally:
             process.kill()
             process.wait()

@@ -5,7 +5,6 @@ import json
 import os
 import resource
 import sys
-import threading
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -16,7 +15,7 @@ import numpy as np
 from models.diagnosis.campaign import StationaryRun
 from models.diagnosis.extension import Extension
 from service import records, stored_runs
-from service.jobs.child import PROGRESS
+from service.jobs import own_process
 from service.lives.diagnosis.campaign import CampaignRun, DiagnosedLife, records_to_keep, run_of
 from service.lives.diagnosis.report import public
 from service.lives.history import STATIONARY, Life, lives_of
@@ -24,7 +23,7 @@ from service.lives.model_correction import corrected_cofs
 from service.lives.prediction_at import predict_at
 from service.settings import DATABASE_VARIABLE
 from storage import channels, results, runs
-from storage.encoding.json_text import Json, to_text
+from storage.encoding.json_text import Json
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 
@@ -48,21 +47,15 @@ class Task:
 def main() -> None:
     """Diagnose what the first argument names, JSON, in the database of the environment. The last line is the answer."""
     task = Task(**json.loads(sys.argv[1]), database=os.environ[DATABASE_VARIABLE])
-    threading.Thread(target=_end_with_the_service, daemon=True).start()
+    own_process.end_with_the_service()
     resource.setrlimit(resource.RLIMIT_AS, (task.bytes, task.bytes))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     # at the first of the two this process ends by SIGXCPU, which says why, at the second by SIGKILL
     resource.setrlimit(resource.RLIMIT_CPU, (task.processor_seconds, task.processor_seconds + 1))
     try:
-        ended = diagnosed(task, _say)
+        ended = diagnosed(task, own_process.say)
     except MemoryError:
         ended = {"problem": f"it needs more than {task.bytes // 2**20} MB of memory"}
-    sys.stdout.write(f"{json.dumps(ended, allow_nan=False)}\n")
-
-
-def _say(progress: Json) -> None:
-    sys.stdout.write(f"{PROGRESS.decode()}{to_text(progress)}\n")
-    sys.stdout.flush()
+    own_process.answer(ended)
 
 
 def _nothing(_: Json) -> None:
@@ -146,13 +139,6 @@ def before_and_after(
 
     before = prediction(predicted[0], None)
     return before, before if extension is None else prediction(predicted[1], extension)
-
-
-def _end_with_the_service() -> None:
-    """Standard input is a pipe whose other end nobody writes to: it ends when the service does."""
-    while os.read(0, 1):  # not by way of sys.stdin, whose lock would be in the way when this process ends
-        pass
-    os._exit(3)
 
 
 if __name__ == "__main__":

@@ -38,4 +38,8 @@ def page(
 
 def shown(row: JobRow) -> dict[str, Any]:
     """A job as it is answered."""
-    return {name: getattr(row, name) for name in _SHOWN}
+    answered = {name: getattr(row, name) for name in _SHOWN}
+    result = None if row.progress is None else row.progress.get("result")
+    if result is not None:
+        answered["progress"] = {name: value for name, value in answered["progress"].items() if name != "result"}
+    return answered | {"result": result}

@@ -1,8 +1,9 @@
-"""A service's part in the jobs of its database: one at a time, each in a process of its own, claimed when its turn comes.
+"""A service's part in the jobs of its database: each in a process of its own, claimed when its turn comes.
 
 Jobs are rows (`storage.jobs`), so any service on the database does them: who is free claims the next one and prolongs its
 lease while it works. The job of a service that was killed is claimed by another once the lease has run out; one that was
-cancelled, wherever that was asked for, is ended at the next prolongation. How an end is stored the queue is given.
+cancelled, wherever that was asked for, is ended at the next prolongation. How a kind of job is done, and how its end is
+stored, the queue is given.
 """
 
 import logging
@@ -10,12 +11,13 @@ import os
 import secrets
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
 from service.jobs import child
-from service.jobs.child import FailedError
+from service.jobs.child import AwayError, FailedError
+from service.jobs.kinds import Kind
 from service.logging import request_id
 from service.settings import Settings
 from storage import jobs
@@ -27,76 +29,84 @@ from storage.jobs import JobRow
 #: How often a job is begun at most. Chosen: whatever ends the service once, as an operator may, is not the job's fault; what
 #: ends it three times is.
 MOST_ATTEMPTS = 3
-GIVEN_UP = f"the service ended {MOST_ATTEMPTS} times while the diagnosis ran"
-UNSTORED = "its report could not be stored: see the service's log"
+GIVEN_UP = f"the service or its database ended {MOST_ATTEMPTS} times while it ran"
+UNSTORED = "its end could not be stored: see the service's log"
 #: A lease is prolonged so many times before it would run out. Chosen: a database that is away for some seconds loses none.
 RENEWALS_A_LEASE = 10
 #: [s] Between two looks whether the service is to stop. Chosen: nobody waits for it.
 _LOOK = 0.2
-Finish = Callable[[JobRow, Mapping[str, Any]], None]
 _log = logging.getLogger("clutchlife")
 
 
 class JobQueue:
-    """The thread that does jobs. `start` it once the database is open, `close` it before that is closed."""
+    """The threads that do jobs. `start` it once the database is open, `close` it before that is closed."""
 
-    def __init__(self, database: Database, settings: Settings, finish: Finish) -> None:
+    def __init__(self, database: Database, settings: Settings, groups: Sequence[Mapping[str, Kind]]) -> None:
+        """`groups`: how jobs are done, by their kind; of each group one job at a time."""
         self._database = database
         self._settings = settings
-        self._finish = finish
         self._lease = float(settings.job_lease_seconds)
         self._pause = self._lease / RENEWALS_A_LEASE
         self._name = f"{os.uname().nodename}:{os.getpid()}:{secrets.token_hex(4)}"
         self._change = threading.Condition()
         self._closing = False
-        self._woken = False
+        self._wakes = 0
         self._away = False
-        self._thread = threading.Thread(target=self._work, name="jobs", daemon=True)
+        self._threads = [
+            threading.Thread(target=self._work, args=(group,), name="jobs", daemon=True) for group in groups
+        ]
 
     def start(self) -> None:
         """Begin. Of a file's jobs none is held by another: one service uses it, and the lock says that it is this."""
         if self._database.path is not None:
             with self._database.writing() as connection:
                 jobs.release_all(connection)
-        self._thread.start()
+        for thread in self._threads:
+            thread.start()
 
     def close(self) -> None:
         """End what runs, give it back to be done later or by another service, and stop."""
         with self._change:
             self._closing = True
             self._change.notify_all()
-        if self._thread.is_alive():  # else the service could not start, and what stopped it is to be seen
-            self._thread.join()
+        for thread in self._threads:
+            if thread.is_alive():  # else the service could not start, and what stopped it is to be seen
+                thread.join()
 
     def is_working(self) -> bool:
-        """Whether the thread is there."""
-        return self._thread.is_alive()
+        """Whether the threads are there."""
+        return all(thread.is_alive() for thread in self._threads)
 
     def wake(self) -> None:
         """Look now for what is to be done: something was asked for here."""
         with self._change:
-            self._woken = True
+            self._wakes += 1
             self._change.notify_all()
 
-    def _work(self) -> None:
+    def _work(self, group: Mapping[str, Kind]) -> None:
+        wakes = 0
         while not self._closing:
-            job = self._claimed()
+            job = self._claimed(group)
             if job is not None:
-                self._do(job)
-                continue
-            with self._change:
-                self._change.wait_for(lambda: self._woken or self._closing, timeout=self._pause)
-                self._woken = False
+                self._do(job, group[job.kind])
+            else:
+                wakes = self._waited(wakes)
 
-    def _claimed(self) -> JobRow | None:
-        """The next job, claimed; None where there is none, or the database is away for a while."""
+    def _waited(self, wakes: int) -> int:
+        """How often the queue was woken by now, once that is not `wakes` any more, or after a pause."""
+        with self._change:
+            self._change.wait_for(lambda: self._wakes != wakes or self._closing, timeout=self._pause)
+            return self._wakes
+
+    def _claimed(self, group: Mapping[str, Kind]) -> JobRow | None:
+        """The next job of a group, claimed; None where there is none, or the database is away for a while."""
         try:
             with self._database.reading() as connection:
-                free = jobs.any_free(connection)
+                free = jobs.any_free(connection, group)
             if not free:
                 return None
             with self._database.writing(of=self._name) as connection:
-                claimed = jobs.claim(connection, self._name, lease=self._lease, at=_now())
+                claimed = jobs.claim(connection, self._name, group, lease=self._lease, at=_now())
         except StorageError as error:
             if not self._away:
                 _log.warning("jobs wait for the database: %s", error)
@@ -105,23 +115,23 @@ class JobQueue:
         self._away = False
         return claimed
 
-    def _do(self, job: JobRow) -> None:
+    def _do(self, job: JobRow, kind: Kind) -> None:
         request_id.set(job.arguments["request"])
         try:
-            ended = self._outcome(job)
+            ended = self._outcome(job, kind)
             if ended is not None:
-                self._stored(job, ended)
+                self._stored(job, kind, ended)
         except Exception:  # noqa: BLE001  (the next one is to be made all the same)
-            _log.exception("diagnosis %s of %s", job.job_id, job.clutch_id)
-            self._give_up(job)
+            _log.exception("%s %s of %s", job.kind, job.job_id, job.clutch_id)
+            self._give_up(job, kind)
 
-    def _stored(self, job: JobRow, ended: Mapping[str, Any]) -> None:
+    def _stored(self, job: JobRow, kind: Kind, ended: Mapping[str, Any]) -> None:
         """Have its end stored, the lease prolonged meanwhile: what is adopted is tracked anew first."""
         done = threading.Event()
         renewing = threading.Thread(target=self._renew_until, args=(done, job), name="lease", daemon=True)
         renewing.start()
         try:
-            self._finish(job, ended)
+            kind.finish(job, ended)
         finally:
             done.set()
             renewing.join()
@@ -130,27 +140,23 @@ class JobQueue:
         while not done.wait(self._pause) and self._renewed(job, {"step": "stores"}):
             pass
 
-    def _give_up(self, job: JobRow) -> None:
+    def _give_up(self, job: JobRow, kind: Kind) -> None:
         """Its end could not be stored: say at least that it ended, or leave that to who claims it next."""
         try:
-            self._finish(job, {"problem": UNSTORED})
+            kind.finish(job, {"problem": UNSTORED})
         except StorageError:
-            _log.exception("diagnosis %s is made again once its lease has run out", job.job_id)
+            _log.exception("%s %s is made again once its lease has run out", job.kind, job.job_id)
 
-    def _outcome(self, job: JobRow) -> dict[str, Any] | None:
-        """What its process wrote, or a problem; None where it is no longer this service's to do."""
+    def _outcome(self, job: JobRow, kind: Kind) -> dict[str, Any] | None:
+        """What its process wrote, or a problem; None where it is not to be ended now: by another service, or later."""
         if job.attempts > MOST_ATTEMPTS:
             return {"problem": GIVEN_UP}
-        task = {
-            "clutch_id": job.clutch_id,
-            "last_run_key": job.arguments["last_run_key"],
-            "engine": self._settings.engine,
-            "bytes": self._settings.diagnosis_bytes,
-            "processor_seconds": self._settings.diagnosis_seconds,
-        }
         try:
-            with child.running(task, self._database.url, self._settings) as process:
-                return process.written(job.job_id) if self._seen_through(job, process) else None
+            with child.running(kind.work(job, self._settings), self._database.url) as process:
+                return process.written(f"{job.kind} {job.job_id}") if self._seen_through(job, process) else None
+        except AwayError:
+            _log.warning("%s %s is made again once its lease has run out", job.kind, job.job_id)
+            return None
         except FailedError as error:
             return {"problem": str(error)}
 

@@ -1,10 +1,10 @@
 """Diagnoses, the jobs that make them, and adopted models; fields that are not known, or not yet, are null or empty."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, StringConstraints
+from pydantic import Field, StringConstraints, model_validator
 
-from service.schemas.base import Answer, ClutchName, Next, Revision, Schema
+from service.schemas.base import Answer, ClutchName, Identifier, Next, Revision, Schema
 from service.schemas.limits import LONGEST_DIAGNOSIS_ID
 from service.schemas.prognosis.life import ModelName
 
@@ -228,6 +228,23 @@ class ModelOut(Answer):
     versions: list[ModelVersion] = Field(description="All adopted models, newest first")
 
 
+class JobIn(Schema):
+    """A job that is asked for."""
+
+    kind: Literal["replay", "fleet_refresh"] = Field(
+        description="`replay`: results anew from the raw runs; `fleet_refresh`: what clutches of a kind share"
+    )
+    clutch_id: Identifier | None = Field(
+        default=None, description="The clutch that is replayed; null or left out, all. A fleet refresh is of all"
+    )
+
+    @model_validator(mode="after")
+    def _of_all(self) -> Self:
+        if self.kind == "fleet_refresh" and self.clutch_id is not None:
+            raise ValueError("a fleet_refresh is of all clutches: leave clutch_id out")
+        return self
+
+
 class JobProgress(Answer):
     """How far a job has come."""
 
@@ -238,11 +255,28 @@ class JobProgress(Answer):
     of: int | None = Field(default=None, description="How many there are")
 
 
+class LeftClutch(Answer):
+    """A clutch that keeps what it had."""
+
+    clutch_id: ClutchName
+    reason: str = Field(description="Why")
+
+
+class JobResult(Answer):
+    """What a replay or a fleet refresh did."""
+
+    replayed: int | None = Field(default=None, description="Clutches whose results were computed anew, of a replay")
+    kinds: int | None = Field(default=None, description="Kinds that have a new version of their prior, of a refresh")
+    changed: int | None = Field(default=None, description="Clutches whose predictions have changed, of a refresh")
+    left: int = Field(description="Clutches that keep what they had")
+    reasons: list[LeftClutch] = Field(description="Why, of the first 20 of them")
+
+
 class JobOut(Answer):
     """What was asked for and is computed by a service when its turn comes. That of a diagnosis has the diagnosis' name."""
 
     job_id: str = Field(description="The job's name")
-    kind: Literal["diagnosis"] = Field(description="What it computes")
+    kind: Literal["diagnosis", "replay", "fleet_refresh"] = Field(description="What it computes")
     clutch_id: str | None = Field(description="The clutch that it is of; null where it is of no single one")
     state: JobState = Field(
         description="`waiting` for its turn, `running`, or how it ended: `finished`, `failed` or `cancelled`"
@@ -254,6 +288,7 @@ class JobOut(Answer):
     attempts: int = Field(description="How often it was begun: again where the service that had it was killed")
     progress: JobProgress | None = Field(description="How far it has come; null before it says so")
     problem: str | None = Field(description="Why it failed, or who cancelled it")
+    result: JobResult | None = Field(description="What it did; null before its end, and of a diagnosis")
 
 
 class JobPage(Answer):

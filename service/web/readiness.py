@@ -104,7 +104,7 @@ class Readiness:
 
     def _fault_of_workers(self) -> str | None:
         if not self._jobs.is_working():
-            return "the thread that does jobs has ended"
+            return "a thread that does jobs has ended"
         try:
             ended = self._workers.ended()
         except BusyError:

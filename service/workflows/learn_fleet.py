@@ -30,6 +30,9 @@ from storage.assumptions import NOBODY, FleetPriorRow
 from storage.encoding.json_text import Json, to_text
 from storage.engine.database import Database
 
+#: Why a refresh leaves a clutch.
+LEFT = "left to the next refresh: runs came while its predictions were made"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lesson:
@@ -61,11 +64,11 @@ class Fleet:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Refreshed:
     """What a refresh did: the kinds of which a new version was stored, the clutches whose answers have changed, and those
-    left to the next refresh, because runs came while they were tracked anew."""
+    left to the next refresh, with the reason."""
 
     kinds: tuple[Json, ...]
     changed: tuple[str, ...]
-    left: tuple[str, ...]
+    left: Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,7 +110,38 @@ def refresh(
         ended.append(clutch)
         advance()
     by_ending = {ending: tuple(sorted(clutch.name for clutch in ended if clutch.ending is ending)) for ending in Ending}
-    return Refreshed(kinds=tuple(fresh), changed=by_ending[Ending.STORED], left=by_ending[Ending.LEFT])
+    left = dict.fromkeys(by_ending[Ending.LEFT], LEFT)
+    return Refreshed(kinds=tuple(fresh), changed=by_ending[Ending.STORED], left=left)
+
+
+def as_job(
+    database: Database,
+    clutch_id: str | None,  # noqa: ARG001  (a fleet is all of them)
+    *,
+    at: str,
+    say: Callable[[Json], None],
+    at_once: AtOnce,
+) -> tuple[dict[str, int], dict[str, str]]:
+    """Refresh all priors in this process, saying how far it has come.
+
+    How many kinds have a new version and of how many clutches the answers have changed, and why others are left.
+    """
+    with database.reading() as connection:
+        number = len(clutches.all_ids(connection))
+    advanced = 0
+
+    def advance() -> None:
+        nonlocal advanced
+        advanced += 1
+        learning = advanced <= number
+        say({"step": _LEARNS if learning else _UPDATES, "done": advanced - (0 if learning else number), "of": number})
+
+    say({"step": _LEARNS, "done": 0, "of": number})
+    done = refresh(database, now=at, at_once=at_once, advance=advance)
+    return {"kinds": len(done.kinds), "changed": len(done.changed)}, dict(done.left)
+
+
+_LEARNS, _UPDATES = "learns from the clutches", "updates their predictions"
 
 
 def _state(database: Database, clutch_id: str) -> ClutchState:

@@ -1,6 +1,6 @@
 """Results are recomputed from the raw runs, which are never changed: loaded, computed by a pure function, stored."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from service import records, stored_runs
@@ -12,6 +12,7 @@ from service.executors.rounds import Ending, in_rounds
 from service.lives.criteria import MOST_ATTEMPTS
 from service.stored_runs import Recomputed, Recorded
 from storage import clutches
+from storage.encoding.json_text import Json
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData
 
@@ -69,6 +70,29 @@ def replay_clutch(database: Database, clutch_id: str) -> int:
     return replayed.runs
 
 
+def as_job(
+    database: Database,
+    clutch_id: str | None,
+    *,
+    at: str,  # noqa: ARG001  (every job of a workflow is called so)
+    say: Callable[[Json], None],
+    at_once: AtOnce,
+) -> tuple[dict[str, int], dict[str, str]]:
+    """Replay a clutch, None: all of them, in this process, saying how far it has come.
+
+    How many clutches were replayed, and why the others keep the results that they had.
+    """
+    names = clutch_ids(database) if clutch_id is None else [clutch_id]
+    left: dict[str, str] = {}
+    say({"step": _STEP, "done": 0, "of": len(names)})
+    for done, replayed in enumerate(replay(database, names, InProcess(), at_once=at_once), start=1):
+        if replayed.error is not None:
+            left[replayed.clutch_id] = str(replayed.error)
+        say({"step": _STEP, "done": done, "of": len(names)})
+    return {"replayed": len(names) - len(left)}, left
+
+
+_STEP = "replays the clutches"
 _LEFT = (
     f"left as it was: runs came each of the {MOST_ATTEMPTS} times that it was computed anew; replay it when fewer come"
 )

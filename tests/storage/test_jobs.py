@@ -39,7 +39,7 @@ def stocked(database: Database) -> Database:
 
 def claimed(database: Database, claimer: str, second: int = 1, lease: float = 60.0) -> JobRow | None:
     with database.writing(of=claimer) as connection:
-        return jobs.claim(connection, claimer, lease=lease, at=AT.format(second))
+        return jobs.claim(connection, claimer, ["diagnosis"], lease=lease, at=AT.format(second))
 
 
 def test_a_clutch_with_many_jobs_does_not_hold_up_another(stocked: Database) -> None:
@@ -112,9 +112,9 @@ def test_what_nobody_holds_any_more_is_free(stocked: Database) -> None:
     for second in range(1, 5):
         assert claimed(stocked, "one", second) is not None
     with stocked.writing() as connection:
-        assert not jobs.any_free(connection)
+        assert not jobs.any_free(connection, ["diagnosis"])
         jobs.release_all(connection)
-        assert jobs.any_free(connection)
+        assert jobs.any_free(connection, ["diagnosis"])
     again = claimed(stocked, "two")
     assert again is not None
     assert again.attempts == 2

@@ -30,6 +30,7 @@ from models.tracking.criteria import DOMAIN, FEW, FORGET, GROWN, LOST
 from models.tracking.discrepancy import PAST, at_end, drawn
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.filters.sigma_points import (
+    BEFORE_STEPS,
     Normals,
     Way,
     coefficients,
@@ -96,7 +97,7 @@ class UkfState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ukf:
-    """The filter, started from the first `together` measurements; its updates use no random numbers."""
+    """The filter, started from the first `together` >= 1 measurements; its updates use no random numbers."""
 
     together: int = 8
 
@@ -106,8 +107,18 @@ class Ukf:
         return "ukf"
 
     def start(self, prior: Prior) -> UkfState:
-        """The prior itself, approximated by normals."""
-        return _started(prior, History.of((), prior))
+        """The prior itself, without normals: the first measurement makes them, and only `posterior` needs them before."""
+        return UkfState(
+            prior=prior,
+            history=History.of((), prior),
+            reference=1.0,
+            squared_innovation=1.0,
+            form=np.zeros(0),
+            log_weight=np.zeros(0),
+            mean=np.zeros((0, BEFORE_STEPS)),
+            covariance=np.zeros((0, BEFORE_STEPS, BEFORE_STEPS)),
+            scatter=np.zeros((0, 2)),
+        )
 
     def update(self, state: UkfState, measurement: Measurement, rng: np.random.Generator | None = None) -> UkfState:  # noqa: ARG002
         """The state after one more measurement: predict, update, symmetrise, keep to the domain; or start anew."""
@@ -146,6 +157,8 @@ class Ukf:
         """`size` evenly spread draws of equal weight from the normals, those left out whose course would have ended before
         the last measurement; the scatter is a point estimate of each."""
         prior, history = state.prior, state.history
+        if history.value.size == 0:
+            state = _started(prior, history)
         kind = systematic(_weights(state.log_weight), size, float(rng.random()))
         normals = spread_normals(size, rng.random(5))
         normals = np.column_stack([normals, rng.standard_normal((size, state.mean.shape[1] - normals.shape[1]))])

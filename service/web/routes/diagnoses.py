@@ -1,9 +1,8 @@
 """Diagnoses: asked for, listed, looked up; and the model that a clutch is tracked under."""
 
 import asyncio
-import time
 from functools import partial
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Header, Request
 from fastapi.concurrency import run_in_threadpool
@@ -19,16 +18,13 @@ from service.schemas.diagnosis import DiagnosisIn, DiagnosisOut, DiagnosisPage, 
 from service.schemas.parameters import ClutchId, DiagnosisId
 from service.web.answers import JSON_TYPE, answer, described_body, json_body, now, preferred_wait
 from service.web.auth import Admin, Ingester, Reader, name_of_caller, require
-from service.web.context import Context, Cursor, Limit
+from service.web.context import Cursor, Limit
 from service.web.limits import USUAL_ITEMS, WAIT_SECONDS
 from service.web.problems import READING, SENDING
+from service.web.routes.waiting import until_ended
 from service.workflows import adopt_model, run_diagnosis
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["diagnosis"])
-
-#: [s] Between two looks whether a diagnosis has ended: first, by how much longer each, and longest. Chosen: a look reads
-#: a few rows, and the quickest diagnosis takes a second.
-_FIRST_PAUSE, _GROWTH, _LONGEST_PAUSE = 0.05, 1.5, 0.4
 
 Prefer = Annotated[
     str | None,
@@ -60,25 +56,13 @@ async def post_diagnosis(request: Request, context: Ingester, clutch_id: ClutchI
     context.jobs.wake()
     preferred = preferred_wait(prefer)
     wait = WAIT_SECONDS if preferred is None else preferred
-    report = await _ended(context, clutch_id, diagnosis_id, wait)
+    look = partial(diagnoses.diagnosis, context.database, clutch_id, diagnosis_id)
+    report = await until_ended(look, lambda diagnosis: diagnosis["status"] != "running", wait)
     headers = {"Location": f"/v1/clutches/{clutch_id}/diagnoses/{diagnosis_id}"}
     if preferred is not None:
         headers["Preference-Applied"] = f"wait={wait}"
     status = 202 if report["status"] == "running" else 201
     return Response(content=to_json(report), status_code=status, media_type=JSON_TYPE, headers=headers)
-
-
-async def _ended(context: Context, clutch_id: str, diagnosis_id: str, wait: float) -> dict[str, Any]:
-    """The diagnosis once it has ended, whichever service makes it, or as it is after `wait` [s]."""
-    deadline = time.monotonic() + wait
-    pause = _FIRST_PAUSE
-    while True:
-        report = await run_in_threadpool(diagnoses.diagnosis, context.database, clutch_id, diagnosis_id)
-        left = deadline - time.monotonic()
-        if report["status"] != "running" or left <= 0:
-            return report
-        await asyncio.sleep(min(pause, left))
-        pause = min(_GROWTH * pause, _LONGEST_PAUSE)
 
 
 @router.get("/diagnoses", response_model=DiagnosisPage, responses=READING)

@@ -1,24 +1,64 @@
-"""Jobs: what waits, runs and has ended, whichever service has it; and cancelled."""
+"""Jobs: replays and fleet refreshes asked for; what waits, runs and has ended, whichever service has it; and cancelled."""
 
 from functools import partial
+from typing import Annotated
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Header, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
 from service.jobs import listing
 from service.lists import from_cursor, page
+from service.logging import request_id
 from service.queries.cache import to_json
-from service.schemas.diagnosis import JobOut, JobPage
+from service.run_files.json_run import checked
+from service.schemas.diagnosis import JobIn, JobOut, JobPage
 from service.schemas.parameters import JobId, OfState
-from service.web.answers import JSON_TYPE, answer, now
-from service.web.auth import OwnAdmin, OwnReader, name_of_caller, own_clutches
+from service.web.answers import JSON_TYPE, answer, described_body, json_body, now, preferred_wait
+from service.web.auth import OwnAdmin, OwnReader, name_of_caller, own_clutches, require_clutch
 from service.web.context import Cursor, Limit
 from service.web.limits import USUAL_ITEMS
-from service.web.problems import READING
-from service.workflows import cancel_job
+from service.web.problems import READING, SENDING
+from service.web.routes.waiting import until_ended
+from service.workflows import ask_job, cancel_job
+from storage.jobs import OPEN
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
+
+Prefer = Annotated[
+    str | None,
+    Header(max_length=200, description="`wait=SECONDS`: how long to wait for the job's end; left out, not at all"),
+]
+
+
+@router.post(
+    "",
+    status_code=202,
+    response_model=JobOut,
+    responses=SENDING | {200: {"model": JobOut, "description": "It has ended within the time that was to be waited"}},
+    openapi_extra=described_body(JobIn, {"kind": "replay", "clutch_id": "bench3-017"}),
+)
+async def post_job(request: Request, context: OwnAdmin, prefer: Prefer = None) -> Response:
+    """Ask for a replay or a fleet refresh. Where the same waits or runs already it is that one which is answered."""
+    wanted = checked(JobIn, await json_body(request))
+    require_clutch(request, wanted.clutch_id)
+    ask = partial(
+        ask_job.ask,
+        by=name_of_caller(request),
+        request=request_id.get(),
+        most=context.settings.most_replays,
+        asked_at=now(),
+    )
+    new_or_open = await run_in_threadpool(ask, context.database, wanted.kind, wanted.clutch_id)
+    context.jobs.wake()
+    wait = preferred_wait(prefer)
+    look = partial(listing.find, context.database, new_or_open.job_id, only=None)
+    row = await until_ended(look, lambda job: job.state not in OPEN, wait or 0)
+    headers = {"Location": f"/v1/jobs/{row.job_id}"}
+    if wait is not None:
+        headers["Preference-Applied"] = f"wait={wait}"
+    status = 202 if row.state in OPEN else 200
+    return Response(content=to_json(listing.shown(row)), status_code=status, media_type=JSON_TYPE, headers=headers)
 
 
 @router.get("", response_model=JobPage, responses=READING)

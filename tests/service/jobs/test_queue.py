@@ -1,13 +1,24 @@
-"""How the process of a diagnosis is started."""
+"""How the process of a job is started, and which jobs wait for which."""
 
+import time
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from service.jobs import child
+from service.jobs.child import Work
+from service.jobs.kinds import Kind
+from service.jobs.queue import JobQueue
 from service.settings import DATABASE_VARIABLE, Settings
+from storage import jobs
+from storage.engine.database import Database
+from storage.jobs import JobRow, NewJob
 
 ADDRESS = "postgresql+psycopg://u:s3cr3t@host/db"
+AT = "2026-11-02T10:00:00+00:00"
+WORK = Work(modules=("tests.service.jobs.sleeping",), task={"clutch_id": "c1"}, longest=60.0)
 
 
 class StartedError(Exception):
@@ -23,7 +34,55 @@ def test_no_argument_shows_the_address_of_the_database(monkeypatch: pytest.Monke
         raise StartedError
 
     monkeypatch.setattr(child.subprocess, "Popen", start)
-    with pytest.raises(StartedError), child.running({"clutch_id": "c1"}, ADDRESS, Settings()):
+    with pytest.raises(StartedError), child.running(WORK, ADDRESS):
         pytest.fail("it was not started")
     assert "s3cr3t" not in " ".join(started["command"])
     assert started["env"][DATABASE_VARIABLE] == ADDRESS
+
+
+def ask(database: Database, job_id: str, kind: str) -> None:
+    new = NewJob(
+        job_id=job_id, kind=kind, clutch_id=None, asked_at=AT, asked_by="local", arguments={"request": ""}
+    )  # fmt: skip
+    with database.writing() as connection:
+        jobs.insert(connection, new)
+
+
+def states(database: Database) -> dict[str, str]:
+    with database.reading() as connection:
+        return {row.job_id: row.state for row in jobs.page(connection, limit=9)}
+
+
+def test_of_a_group_one_is_done_at_a_time_and_other_groups_do_not_wait(
+    in_file: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A diagnosis is made while a replay of the whole fleet runs; a fleet refresh waits for its end."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
+
+    def finish(job: JobRow, ended: Mapping[str, Any]) -> None:
+        with in_file.writing() as connection:
+            problem = ended.get("problem")
+            jobs.end(connection, job.job_id, jobs.FAILED, AT, problem=problem, claimer=job.claimed_by)
+
+    endless = Kind(lambda _job, _settings: WORK, finish)
+    quick = Kind(lambda _job, _settings: Work(modules=("this",), task={}, longest=0.0), finish)
+    groups = [{jobs.DIAGNOSIS: quick}, {jobs.REPLAY: endless, jobs.FLEET_REFRESH: endless}]
+    for job_id, kind in (("r", jobs.REPLAY), ("f", jobs.FLEET_REFRESH), ("d", jobs.DIAGNOSIS), ("other", "unheard of")):
+        ask(in_file, job_id, kind)
+    queue = JobQueue(in_file, Settings(job_lease_seconds=1), groups)
+    queue.start()
+    try:
+        deadline = time.monotonic() + 60
+        while states(in_file) != {"r": "running", "f": "waiting", "d": "failed", "other": "waiting"}:
+            assert time.monotonic() < deadline, states(in_file)
+            time.sleep(0.05)
+        assert queue.is_working()
+        with in_file.writing() as connection:
+            assert jobs.end(connection, "r", jobs.CANCELLED, AT)
+        while states(in_file) != {"r": "cancelled", "f": "running", "d": "failed", "other": "waiting"}:
+            assert time.monotonic() < deadline, states(in_file)
+            time.sleep(0.05)
+    finally:
+        queue.close()
+    assert not queue.is_working()
+    assert states(in_file) == {"r": "cancelled", "f": "waiting", "d": "failed", "other": "waiting"}, "given back"

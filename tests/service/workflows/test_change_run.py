@@ -230,7 +230,7 @@ def test_a_diagnosis_of_what_was_changed_meanwhile_is_stale_and_not_adopted(benc
 
     asked_for, _ = ask()
     with bench.database.writing() as connection:
-        job = jobs.claim(connection, "one", lease=60.0, at=AT)
+        job = jobs.claim(connection, "one", [jobs.DIAGNOSIS], lease=60.0, at=AT)
     assert job is not None
     bench.send(body("test", "odd", 1500.0, odd=True))  # held: the runs are the same
     assert ask() == (asked_for, False)

@@ -59,7 +59,7 @@ class Written:
         database = self.bench.database
         run_diagnosis.ask(database, CLUTCH, by="local", adopt=False, request="", most=1, created_at=AT)
         with database.writing() as connection:
-            job = jobs.claim(connection, "one", lease=60.0, at=AT)
+            job = jobs.claim(connection, "one", [jobs.DIAGNOSIS], lease=60.0, at=AT)
         assert job is not None
         report = {"verdict": self.one_of(VERDICTS), "causes": []}
         ended = {"report": report, "extension": EXTENSION}

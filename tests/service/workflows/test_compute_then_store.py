@@ -213,11 +213,11 @@ def test_a_diagnosis_that_is_no_longer_the_claimer_s_is_not_adopted(database: Da
     begun(database, "d1")
     before = stored(database)
     with database.writing() as connection:
-        assert jobs.claim(connection, "one", lease=-1.0, at=AT) is not None
+        assert jobs.claim(connection, "one", [jobs.DIAGNOSIS], lease=-1.0, at=AT) is not None
         if meanwhile == "cancelled":
             assert jobs.end(connection, "d1", jobs.CANCELLED, AT)
         else:
-            assert jobs.claim(connection, "two", lease=60.0, at=AT) is not None
+            assert jobs.claim(connection, "two", [jobs.DIAGNOSIS], lease=60.0, at=AT) is not None
     ended = {"report": REPORT, "extension": EXTENSION}
     assert not finish_and_adopt(database, "c1", "d1", ended, at=AT, claimer="one")
     with database.reading() as connection:

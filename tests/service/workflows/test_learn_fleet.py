@@ -213,4 +213,4 @@ def test_a_clutch_that_gets_a_run_whenever_it_is_tracked_anew_is_left_to_the_nex
         assert "live: left to the next refresh" in printed
         assert "live: predictions updated" not in printed
         done = refresh(url)
-        assert ("live" in done.changed, done.left) == (True, ())
+        assert ("live" in done.changed, done.left) == (True, {})

@@ -12,7 +12,7 @@ from models.degradation.general_order import Degradation, progress_fraction, val
 from models.prognosis.first_passage import PassageStatus, predict_first_passage
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.sigma_points import Way, measured, predicted, scatter_learnt, unscaled
-from models.tracking.filters.ukf import Ukf
+from models.tracking.filters.ukf import Ukf, UkfState
 from models.tracking.history import History
 from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
@@ -21,6 +21,7 @@ from tests.models.tracking.tracked_series import (
     PRIOR,
     WEIRD,
     followed,
+    same,
 )
 
 
@@ -173,3 +174,14 @@ def test_no_course_that_the_ukf_draws_ended_before_the_last_test() -> None:
         assert float(draws.weight @ behind) == 0.0
         assert abs(float(draws.weight @ draws.values(np.array([measurement.progress]))[0]) - measurement.value) < 0.02
     assert ended > 0.0, "the case shows nothing: no course was drawn beyond its end"
+
+
+def test_before_the_first_measurement_the_ukf_draws_from_the_prior_and_has_no_normals() -> None:
+    """They would be thrown away with the first measurement, from which the filter starts whatever was before it."""
+    state = Ukf().start(PRIOR)
+    assert state.mean.shape == (0, 6)
+    drawn = Ukf().posterior(state, 4_000, np.random.default_rng(0))
+    mean, deviation = drawn.moments(drawn.initial)
+    assert mean == pytest.approx(PRIOR.initial_mean, abs=0.05 * PRIOR.initial_sd)
+    assert deviation == pytest.approx(PRIOR.initial_sd, rel=0.05)
+    assert same(UkfState.from_arrays(state.to_arrays()), state)

@@ -28,6 +28,7 @@ NARROWED: dict[tuple[str, str], Scope] = {
     ("POST", "/v1/clutches"): "ingest",
     ("GET", "/v1/fleet/totals"): "read",
     ("GET", "/v1/jobs"): "read",
+    ("POST", "/v1/jobs"): "admin",
     ("GET", "/v1/jobs/{job_id}"): "read",
     ("DELETE", "/v1/jobs/{job_id}"): "admin",
 }

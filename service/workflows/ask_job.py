@@ -1,0 +1,55 @@
+"""A replay or a fleet refresh is asked for as a job, which stores what it computes; its end is stored when it has come."""
+
+import secrets
+from collections.abc import Mapping
+from typing import Any
+
+from service import records
+from service.errors import BusyError
+from storage import jobs
+from storage.engine.database import Database
+from storage.jobs import JobRow, NewJob
+
+
+def ask(
+    database: Database, kind: str, clutch_id: str | None, *, by: str, request: str, most: int, asked_at: str
+) -> JobRow:
+    """Ask for a job of a kind, of a clutch or None: of all; where the same waits or runs already it is that one.
+
+    `request` is the id of the request that asks. Raises NotFoundError, BusyError where `most` of the kind wait or run.
+    """
+    with database.writing(of=kind) as connection:  # who asks for one of the same kind meanwhile waits
+        if clutch_id is not None:
+            records.clutch(connection, clutch_id)
+        row = jobs.find_open(connection, kind, clutch_id)
+        if row is not None:
+            return row
+        waiting = jobs.count_open(connection, kind)
+        if waiting >= most:
+            raise BusyError(f"{waiting} jobs of the kind {kind} wait already: ask again in a little while")
+        job_id = secrets.token_hex(8)
+        new = NewJob(
+            job_id=job_id,
+            kind=kind,
+            clutch_id=clutch_id,
+            asked_at=asked_at,
+            asked_by=by,
+            arguments={"request": request},
+        )
+        jobs.insert(connection, new)
+        row = jobs.get(connection, job_id)
+    if row is None:
+        raise LookupError(f"job {job_id!r} is not stored")
+    return row
+
+
+def finish(database: Database, job: JobRow, ended: Mapping[str, Any], *, at: str) -> None:
+    """Store how a claimed job ended: its `result`, with how far it had come, or its `problem`.
+
+    Nothing is stored of a job that is no longer the claimer's: it was cancelled, or another does it.
+    """
+    problem = ended.get("problem")
+    progress = None if problem is not None else ended["progress"] | {"result": ended["result"]}
+    state = jobs.FINISHED if problem is None else jobs.FAILED
+    with database.writing(of=job.clutch_id) as connection:
+        jobs.end(connection, job.job_id, state, at, problem=problem, claimer=job.claimed_by, progress=progress)
