@@ -13,6 +13,8 @@ from models.tracking.prior import Prior
 #: Values are resolved to this share of the prior's deviations. Where a series is free of noise its likelihood grows
 #: without bound as the scatter vanishes, and differences of sums weighted by 1/s² would be rounding alone.
 _RESOLUTION = 1e-6
+#: Progress below this counts as none, so that ratios to it are finite. Chosen: a millionth of a duty cycle; no table.
+LEAST_SPAN = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +44,7 @@ class History:
 
     @property
     def span(self) -> float:
-        """The largest progress measured, 1 where nothing has been beyond 0."""
+        """The largest progress measured, 1 where nothing has been beyond LEAST_SPAN."""
         return span_of(self.progress)
 
     @property
@@ -69,8 +71,9 @@ class History:
 
 
 def span_of(progress: FloatArray) -> float:
-    """The largest progress [t], 1 where nothing has been beyond 0."""
-    return float(progress.max(initial=0.0)) or 1.0
+    """The largest progress [t], 1 where nothing has been beyond LEAST_SPAN."""
+    span = float(progress.max(initial=0.0))
+    return span if span > LEAST_SPAN else 1.0
 
 
 def later_epochs(epoch: FloatArray) -> list[float]:

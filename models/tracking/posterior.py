@@ -86,7 +86,10 @@ class Posterior:
         span = self.discrepancy.span
         if progress.ndim == 1 and progress.max(initial=0.0) <= span:
             return np.asarray(law + self.discrepancy.measured(progress))
-        own = np.maximum(zeta, span * share / self._share(np.full((1, 1), span)))
+        whole = np.broadcast_to(self._share(np.full((1, 1), span)), share.shape)
+        own = np.broadcast_to(zeta, share.shape).copy()  # where rounding leaves nothing of a course up to the span
+        np.divide(span * share, whole, out=own, where=whole != 0.0)
+        own = np.maximum(zeta, own)
         return np.asarray(law + self.discrepancy(np.where(zeta > span, own, zeta), zeta))
 
     def _share(self, progress: FloatArray) -> FloatArray:

@@ -83,7 +83,7 @@ def test_no_acknowledged_run_is_lost_where_postgresql_is_killed(postgres: Postgr
             done.set()
             poster.join()
         with httpx2.Client(base_url=server.url, timeout=60) as http:
-            items = http.get("/v1/clutches/c1/runs").json()["items"]
+            items = http.get("/v1/clutches/c1/runs", params={"limit": 1000}).json()["items"]
     assert set(refused) <= {503}
     assert {("c1", item["run_id"]) for item in items} >= acknowledged.keys()
     require_all(url, acknowledged, on_their_way=0)

@@ -230,3 +230,18 @@ def test_a_bad_cursor_is_422(client: TestClient) -> None:
 def test_a_wrong_clutch_is_422(client: TestClient, record: dict[str, Any]) -> None:
     assert client.post("/v1/clutches", json=record).status_code == 422
     assert len(client.get("/v1/clutches").json()["items"]) == 1
+
+
+@pytest.mark.parametrize("cycles", [5e-324, 1.4e-168, 1e-7, 2e-6, 1e-3])
+def test_a_run_at_next_to_no_cycles_is_tracked(client: TestClient, cycles: float) -> None:
+    """What a course is up to there is lost in rounding."""
+    client.post("/v1/clutches", json={"clutch_id": "c1"})
+    for number, at in enumerate((0.0, cycles)):
+        receipt = client.post("/v1/clutches/c1/runs", json=stationary(at, run_id=f"r{number}"))
+        assert receipt.status_code == 201
+        if receipt.json()["state"] == "held":
+            assert client.post(f"/v1/clutches/c1/runs/r{number}/confirm", json={}).status_code == 200
+    for method in ("particle", "ukf", "grid"):
+        life = client.get("/v1/clutches/c1/remaining-useful-life", params={"method": method})
+        assert life.status_code == 200
+        assert life.json()["as_of_cycles"] == cycles
