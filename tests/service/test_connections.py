@@ -61,7 +61,7 @@ async def app(_scope: Scope, _receive: Receive, send: Send) -> None:
 
 async def seconds_until_closed(sent: list[bytes], pause: float) -> tuple[bytes, float]:
     """What is answered to pieces that are sent a pause apart where a head has half a second, and when the server closes."""
-    config = Config(app, http=bounded(9, 0.5), lifespan="off", timeout_keep_alive=60)
+    config = Config(log_config=None, app=app, http=bounded(9, 0.5), lifespan="off", timeout_keep_alive=60)
     config.load()
     state = ServerState()
     loop = asyncio.get_running_loop()
