@@ -127,6 +127,15 @@ class Settings(BaseSettings):
             wrong = [_wrong(details["type"], details) for details in error.errors()]
         raise ValueError("; ".join(wrong))
 
+    def to_environment(self) -> None:
+        """Set the environment so that `from_environment` gives these settings, in this process and those it starts."""
+        for name, value in self.model_dump().items():
+            variable = f"{PREFIX}{name.upper()}"
+            if value is None:
+                os.environ.pop(variable, None)
+            else:
+                os.environ[variable] = str(value)
+
     @classmethod
     def misspelt(cls) -> Iterator[str]:
         """Variables of the environment that look like a setting and are none, each as a line.

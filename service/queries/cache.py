@@ -13,9 +13,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from service.lists import LONGEST_CURSOR
+from service.settings import CODE_VERSION
 from storage import clutches
 from storage.encoding.json_text import to_text
 from storage.engine.database import Database
+from storage.engine.shared_answers import SharedAnswer
 
 #: The end of a list that is answered as JSON and goes on: the cursor of its next page.
 _GOES_ON = re.compile(rb'"next":"([A-Za-z0-9_-]+)"\}$')
@@ -52,13 +54,38 @@ def to_json(payload: object) -> bytes:
     return to_text(payload).encode()
 
 
+def name_of(query: Callable[..., object]) -> str:
+    """What tells the answers of a query from those of others."""
+    return f"{query.__module__}.{query.__qualname__}"
+
+
 def revision_and_json(
     database: Database, query: Callable[..., dict[str, Any]], clutch_id: str, arguments: tuple[Hashable, ...]
 ) -> tuple[int, bytes]:
-    """A clutch's revision, and what `query(database, clutch_id, *arguments)` gives at that or a later one, as JSON."""
+    """A clutch's revision, and what `query(database, clutch_id, *arguments)` gives at that or a later one, as JSON.
+
+    Where several services share the database, what one of them computed without `arguments` is not computed again.
+    """
     with database.reading() as connection:
-        revision = clutches.revision(connection, clutch_id)
-    return revision or 0, to_json(query(database, clutch_id, *arguments))
+        revision = clutches.revision(connection, clutch_id) or 0
+    kept = None if arguments else shared_answer(database, query, clutch_id)
+    if kept is not None and kept[0] >= revision:
+        return kept
+    body = to_json(query(database, clutch_id, *arguments))
+    if database.answers is not None and not arguments:
+        name = name_of(query)
+        database.answers.keep(
+            SharedAnswer(clutch_id=clutch_id, name=name, release=CODE_VERSION, revision=revision, body=body)
+        )
+    return revision, body
+
+
+def shared_answer(database: Database, query: Callable[..., object], clutch_id: str) -> tuple[int, bytes] | None:
+    """The last answer that any of the services on this database computed without arguments, and its revision."""
+    if database.answers is None:
+        return None
+    kept = database.answers.newest(clutch_id, name_of(query), CODE_VERSION)
+    return None if kept is None else (kept.revision, kept.body)
 
 
 class AnswerCache:

@@ -22,7 +22,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from service.errors import NotFoundError, UnsupportedMediaTypeError
 from service.jobs.workers import Lane
 from service.lists import ALL_ITEMS, from_cursor, sliced
-from service.queries.cache import Answer, Page, revision_and_json, to_json
+from service.queries.cache import Answer, Page, name_of, revision_and_json, shared_answer, to_json
 from service.web.auth import name_of_caller
 from service.web.context import Context
 from service.web.files import PARQUET_TYPE
@@ -125,7 +125,7 @@ async def computed_answer(
         payload = json.loads(whole.body)
         return to_json(payload | sliced(payload["items"], limit, after))
 
-    key = (clutch_id, _name(query), *arguments, limit, after)
+    key = (clutch_id, name_of(query), *arguments, limit, after)
     return tagged(request, await kept(context, key, revision, one_page), JSON_TYPE, revision)
 
 
@@ -149,7 +149,7 @@ async def computed_table(
         items, following = sliced_rows(rows(json.loads(whole.body)), limit, after)
         return encode_page(columns, items, following or whole.next)
 
-    key = (clutch_id, f"{_name(query)}.csv", *arguments, limit, after)
+    key = (clutch_id, f"{name_of(query)}.csv", *arguments, limit, after)
     exported = await kept(context, key, revision, one_page)
     return tagged(request, exported, CSV_TYPE, revision)
 
@@ -171,21 +171,24 @@ async def _computed(
         turn = f"{among.name} for {name_of_caller(request)}"
         return context.workers.submit(among, revision_and_json, query, clutch_id, arguments, turn=turn)
 
-    key = (clutch_id, _name(query), *arguments)
+    key = (clutch_id, name_of(query), *arguments)
+    if not arguments and not context.revalidation.knows(key):
+        shared = await run_in_threadpool(shared_answer, context.database, query, clutch_id)
+        if shared is not None:
+            context.revalidation.begin(key, *shared)
     return await context.revalidation.answer(key, _revision(context, clutch_id), compute, wait=wait)
 
 
 async def begin_computed(context: Context, clutch_id: str, query: Callable[..., dict[str, Any]]) -> None:
-    """Hold the answer of a clutch that has just been registered, which costs nothing; later ones are made from then on."""
+    """Hold the answer of a clutch that has just been registered, so that the one after its first run is not waited for."""
     revision, body = await run_in_threadpool(revision_and_json, context.database, query, clutch_id, ())
-    if revision == 0:
-        context.revalidation.begin((clutch_id, _name(query)), body)
+    context.revalidation.begin((clutch_id, name_of(query)), revision, body)
 
 
 def _computed_again(
     context: Context, clutch_id: str, query: Callable[..., dict[str, Any]], arguments: tuple[Hashable, ...]
 ) -> Again:
-    key = (clutch_id, _name(query), *arguments)
+    key = (clutch_id, name_of(query), *arguments)
 
     def again(request: Request) -> Response | None:
         revision = context.database.watch.revision(clutch_id)
@@ -193,10 +196,6 @@ def _computed_again(
         return None if whole is None else tagged(request, whole, JSON_TYPE, revision)
 
     return again
-
-
-def _name(query: Callable[..., object]) -> str:
-    return f"{query.__module__}.{query.__qualname__}"
 
 
 def preferred_wait(prefer: str | None) -> int | None:

@@ -47,9 +47,13 @@ class Revalidation:
         entry = self._entries.get(key)
         return entry.answer if entry is not None and entry.revision == revision else None
 
-    def begin(self, key: Hashable, body: bytes) -> None:
-        """Hold an answer of revision 0, that of a clutch without runs: its first run need not be waited for."""
-        self._entries.setdefault(key, _Entry(revision=0, answer=Answer.of(body)))
+    def knows(self, key: Hashable) -> bool:
+        """Whether an answer is held, of whichever revision, or is being made."""
+        return key in self._entries
+
+    def begin(self, key: Hashable, revision: int, body: bytes) -> None:
+        """Hold an answer that was made elsewhere, where none is known."""
+        self._entries.setdefault(key, _Entry(revision=revision, answer=Answer.of(body)))
 
     async def answer(self, key: Hashable, revision: int, compute: Compute, *, wait: float) -> tuple[int, Answer]:
         """The answer at `revision` or later, or the last one where it is not there within `wait` [s]; and its revision.

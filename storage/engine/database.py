@@ -6,6 +6,7 @@ from pathlib import Path
 
 from sqlalchemy import Connection
 
+from storage.engine.shared_answers import SharedAnswers
 from storage.engine.watch import Watch
 
 
@@ -13,13 +14,14 @@ class Database(ABC):
     """An open database: its transactions, what is asked of it outside them, and its health. Threads share it.
 
     `url` is the address by which another process opens it, which may hold a password; `path` its file, None where it is on a
-    server; `journal_mode` is SQLite's.
+    server; `journal_mode` is SQLite's. `answers` are those that its services share, None where it has one service.
     """
 
     url: str
     path: Path | None
     journal_mode: str | None
     watch: Watch
+    answers: SharedAnswers | None = None
 
     @abstractmethod
     def reading(self) -> AbstractContextManager[Connection]:

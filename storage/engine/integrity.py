@@ -9,7 +9,7 @@ from storage.migrations.upgrade import current, head, revisions
 from storage.tables import metadata
 
 #: What a server has beside the tables of `storage/tables.py`.
-_OWN_TABLES = ("commits",)
+_OWN_TABLES = ("commits", "shared_answer")
 
 
 def refuse_newer(revision: str | None) -> None:

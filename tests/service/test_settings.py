@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -37,6 +38,21 @@ def test_the_variables_of_earlier_releases_hold(name: str, monkeypatch: pytest.M
 def test_what_is_given_wins(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CLUTCHLIFE_DATABASE", "sqlite:///other.db")
     assert Settings.from_environment("sqlite:///own.db").database == "sqlite:///own.db"
+
+
+@pytest.mark.parametrize(
+    "given", [{}, {"raw": "folder:///raw", "workers": 0, "clutch_metrics": True, "log_format": "json"}]
+)
+def test_what_further_processes_find_in_the_environment_are_the_same_settings(
+    given: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in Settings.model_fields:  # so that all are taken back afterwards
+        monkeypatch.setenv(f"{PREFIX}{name.upper()}", "of another service")
+    settings = Settings.model_construct(
+        **{name: field.default for name, field in Settings.model_fields.items()} | given
+    )
+    settings.to_environment()
+    assert Settings.from_environment() == settings
 
 
 def test_every_wrong_variable_is_named_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:

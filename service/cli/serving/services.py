@@ -16,7 +16,7 @@ from uvicorn.supervisors import Multiprocess
 from service.app import create_app
 from service.connections import allow_many, bounded
 from service.logging import configure
-from service.settings import PREFIX, Settings
+from service.settings import Settings
 
 #: [s] After which a process that does not answer its parent is taken for hung, and replaced. Chosen: one that starts loads
 #: the libraries first, beside all others on a busy machine.
@@ -43,8 +43,7 @@ def serve_one(settings: Settings, options: dict[str, Any]) -> None:
 
 def serve_several(settings: Settings, processes: int, options: dict[str, Any]) -> bool:
     """Serve in so many processes, which share the port; one that ends is replaced. Whether all could start."""
-    for name, value in settings.model_dump().items():
-        os.environ[f"{PREFIX}{name.upper()}"] = str(value)
+    settings.to_environment()
     application = f"{__name__}:{one_of_several.__name__}"
     config = uvicorn.Config(
         application,

@@ -55,16 +55,20 @@ def shown(address: URL) -> str:
 
 def make_engine(address: URL, lock_timeout: float) -> Engine:
     """An engine on the database. Raises StorageUnavailable where the driver is not installed."""
+    # a server that was started again has ended the connections that were kept
+    return _engine(address, lock_timeout, pool_size=_KEPT, max_overflow=_MORE, pool_pre_ping=True)
+
+
+def make_asking_engine(address: URL, lock_timeout: float) -> Engine:
+    """An engine for questions of one statement: no transaction, and no look at whether the connection is still there, each
+    of which would be a way to the server and back."""
+    return _engine(address, lock_timeout, pool_size=1, max_overflow=_MORE, isolation_level="AUTOCOMMIT")
+
+
+def _engine(address: URL, lock_timeout: float, **options: Any) -> Engine:
     waited = {} if "connect_timeout" in address.query else {"connect_timeout": _CONNECT_SECONDS}
     try:
-        engine = create_engine(
-            address,
-            connect_args=waited,
-            pool_size=_KEPT,
-            max_overflow=_MORE,
-            pool_timeout=lock_timeout,
-            pool_pre_ping=True,  # a server that was started again has ended the connections that were kept
-        )
+        engine = create_engine(address, connect_args=waited, pool_timeout=lock_timeout, **options)
     except ModuleNotFoundError as error:
         raise StorageUnavailable("PostgreSQL needs a driver: pip install clutchlife[postgresql]") from error
     session = _SESSION.format(lock_timeout=max(1, round(1000 * lock_timeout)))

@@ -8,16 +8,18 @@ get (revisions, keys); those of different clutches write at once. Who writes of 
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, nullcontext
 
-from sqlalchemy import URL, Connection, insert, text
+from sqlalchemy import URL, Connection, insert, inspect, text
 from sqlalchemy.exc import ProgrammingError, SQLAlchemyError
 
 from storage.engine.database import Database
 from storage.engine.errors import DatabaseTooOld, StorageError, StorageUnavailable
 from storage.engine.integrity import refuse_newer
-from storage.engine.postgresql.connect import make_engine, shown
+from storage.engine.postgresql.connect import make_asking_engine, make_engine, shown
 from storage.engine.postgresql.driver_errors import translated
 from storage.engine.postgresql.locks import hold_service_lock, migration_lock, write_lock
-from storage.engine.postgresql.watch import ServerWatch, commits, count_commit, own_tables
+from storage.engine.postgresql.own_tables import commits, count_commit, own_tables
+from storage.engine.postgresql.shared_answers import ServerAnswers
+from storage.engine.postgresql.watch import ServerWatch
 from storage.migrations.upgrade import current, head, make_all, upgrade
 
 #: A transaction that changed nothing has no number and is not counted.
@@ -44,7 +46,9 @@ class ServerDatabase(Database):
         self._writers = self._engine.execution_options(
             isolation_level="READ COMMITTED", postgresql_readonly=not writable
         )
-        self.watch = ServerWatch(self._engine, self.name)
+        self._asking = make_asking_engine(address, lock_timeout)
+        self.watch = ServerWatch(self._asking, self.name)
+        self.answers = ServerAnswers(self._asking, self.name)
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
@@ -84,13 +88,15 @@ class ServerDatabase(Database):
         """Close all connections; any later use raises StorageUnavailable. May be called twice."""
         self._closed = True
         self._engine.dispose()
+        self._asking.dispose()
 
     def migrate(self) -> None:
         """Make the tables of an empty database, or run the steps that it lacks, not under a running service."""
         with self.reading() as connection:
             _require_utf8(connection, self.name)
             revision = current(connection)
-        if revision == head():
+            has_own_tables = set(inspect(connection).get_table_names()) >= set(own_tables.tables)
+        if revision == head() and has_own_tables:
             return
         in_use = revision is not None
         with (
@@ -100,11 +106,12 @@ class ServerDatabase(Database):
             revision = current(connection)  # another process may have been before
             if revision is None:
                 make_all(connection)
-                own_tables.create_all(connection)
-                connection.execute(insert(commits).values(number=0))
             elif revision != head():
                 refuse_newer(revision)
                 upgrade(connection)
+            own_tables.create_all(connection)
+            if revision is None:
+                connection.execute(insert(commits).values(number=0))
 
     def _refuse_closed(self) -> None:
         if self._closed:

@@ -3,19 +3,14 @@ question."""
 
 from typing import Any
 
-from sqlalchemy import BigInteger, Column, Engine, Executable, MetaData, Table, bindparam, exists, select, update
+from sqlalchemy import Engine, Executable, bindparam, exists, select
 from sqlalchemy.engine import Row
+from sqlalchemy.exc import DBAPIError
 
 from storage.engine.postgresql.driver_errors import translated
+from storage.engine.postgresql.own_tables import commits
 from storage.engine.watch import GrantedKey, Watch, granted
 from storage.tables import access_key, clutch
-
-#: One row: how many transactions that changed something were committed. Each raises it as its last statement, while it alone
-#: writes, so that who reads a number also sees all that was committed up to it; the numbers of a sequence do not promise it.
-#: PostgreSQL's alone: SQLite has `PRAGMA data_version`.
-own_tables = MetaData()
-commits = Table("commits", own_tables, Column("number", BigInteger, primary_key=True, autoincrement=False))
-count_commit = update(commits).values(number=commits.c.number + 1)
 
 _version = select(commits.c.number)
 _revision = select(clutch.c.revision).where(clutch.c.clutch_id == bindparam("wanted"))
@@ -26,11 +21,12 @@ _any_key = select(exists(select(access_key.c.key_id)))
 
 
 class ServerWatch(Watch):
-    """The questions, of connections that begin no transaction."""
+    """The questions, of connections that begin no transaction: `engine` is for such (`connect.make_asking_engine`)."""
 
     def __init__(self, engine: Engine, name: str) -> None:
-        self._engine = engine.execution_options(isolation_level="AUTOCOMMIT")
+        self._engine = engine
         self._name = name
+        self._keys_were_made = False
 
     def version(self) -> int:
         """The number of commits."""
@@ -48,10 +44,22 @@ class ServerWatch(Watch):
         return None if row is None else granted(tuple(row))
 
     def keys_are_needed(self) -> bool:
-        """Whether a key was ever made."""
-        row = self._first(_any_key)
-        return row is not None and bool(row[0])
+        """Whether a key was ever made; that it was is never asked again."""
+        if not self._keys_were_made:
+            row = self._first(_any_key)
+            self._keys_were_made = row is not None and bool(row[0])
+        return self._keys_were_made
 
     def _first(self, query: Executable, **values: str) -> Row[Any] | None:
-        with translated(self._name), self._engine.connect() as connection:
+        with translated(self._name):
+            try:
+                return self._asked(query, values)
+            except DBAPIError as error:
+                if not error.connection_invalidated:
+                    raise
+            # the server was started again: the connections of before have been dropped
+            return self._asked(query, values)
+
+    def _asked(self, query: Executable, values: dict[str, str]) -> Row[Any] | None:
+        with self._engine.connect() as connection:
             return connection.execute(query, values).first()

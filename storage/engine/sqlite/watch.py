@@ -31,7 +31,7 @@ class FileWatch(Watch):
             return self._version()
 
     def revision(self, clutch_id: str) -> int | None:
-        """The clutch\'s revision, or None."""
+        """The clutch's revision, or None."""
         row = self._row("SELECT revision FROM clutch WHERE clutch_id = ?", clutch_id)
         return None if row is None else int(row[0])
 
@@ -59,7 +59,7 @@ class FileWatch(Watch):
             return self._rows[key]
 
     def close(self) -> None:
-        """What the key with this hash grants, or None."""
+        """Close the connection; any later question raises StorageUnavailable."""
         with self._lock:
             self._closed = True
             self._connection.close()

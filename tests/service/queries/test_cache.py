@@ -3,11 +3,16 @@
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 
 import pytest
 
-from service.queries.cache import AnswerCache, to_json
+from service.queries.cache import AnswerCache, revision_and_json, shared_answer, to_json
 from service.web.limits import MOST_CACHED_BYTES
+from storage import clutches
+from storage.engine.database import Database
+from storage.engine.opening import open_database
+from tests.storage.samples import clutch_row
 
 
 def made(cache: AnswerCache, name: str, body: bytes) -> bool:
@@ -104,3 +109,28 @@ def test_no_number_leaves_that_json_cannot_carry() -> None:
     assert to_json({"µ": 0.1}) == '{"µ":0.1}'.encode()
     with pytest.raises(ValueError, match="JSON"):
         to_json({"mean_cof": float("nan")})
+
+
+def test_of_several_services_on_a_server_one_computes(on_server: Database) -> None:
+    computed: list[str] = []
+
+    def count(_: Database, clutch_id: str, *arguments: str) -> dict[str, int]:
+        computed.append(clutch_id)
+        return {"computed": len(computed), "arguments": len(arguments)}
+
+    with on_server.writing() as connection:
+        clutches.insert(connection, clutch_row("c1"))
+    with closing(open_database(on_server.url)) as other:
+        assert shared_answer(other, count, "c1") is None
+        first = revision_and_json(on_server, count, "c1", ())
+        assert first == (0, b'{"computed":1,"arguments":0}')
+        assert revision_and_json(other, count, "c1", ()) == first
+        assert shared_answer(other, count, "c1") == first
+        with on_server.writing(of="c1") as connection:
+            clutches.bump_revision(connection, "c1")
+        assert shared_answer(other, count, "c1") == first
+        assert revision_and_json(other, count, "c1", ()) == (1, b'{"computed":2,"arguments":0}')
+        # with arguments, of which there are any number, nothing is kept
+        assert revision_and_json(on_server, count, "c1", ("ukf",)) == (1, b'{"computed":3,"arguments":1}')
+        assert revision_and_json(other, count, "c1", ("ukf",)) == (1, b'{"computed":4,"arguments":1}')
+    assert len(computed) == 4
