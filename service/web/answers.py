@@ -23,7 +23,7 @@ from service.errors import NotFoundError, UnsupportedMediaTypeError
 from service.jobs.workers import Lane
 from service.lists import ALL_ITEMS, from_cursor, sliced
 from service.queries.cache import Answer, Page, name_of, revision_and_json, shared_answer, to_json
-from service.web.auth import name_of_caller
+from service.web.auth import glance_of, name_of_caller
 from service.web.context import Context
 from service.web.files import PARQUET_TYPE
 from service.web.limits import LEAST_PACKED_BYTES, LONGEST_WAIT_SECONDS, PACKING_LEVEL
@@ -59,9 +59,11 @@ async def kept(context: Context, key: Hashable, version: Hashable, make: Callabl
     return await run_in_threadpool(context.cache.answer, key, version, make)
 
 
-async def clutch_bytes(context: Context, clutch_id: str, name: str, make: Callable[[], bytes]) -> bytes:
+async def clutch_bytes(
+    request: Request, context: Context, clutch_id: str, name: str, make: Callable[[], bytes]
+) -> bytes:
     """What follows from a clutch's revision and is needed to answer, not the answer itself. Raises NotFoundError."""
-    return (await kept(context, (clutch_id, name), _revision(context, clutch_id), make)).body
+    return (await kept(context, (clutch_id, name), _revision(request, clutch_id), make)).body
 
 
 async def clutch_answer(
@@ -71,15 +73,14 @@ async def clutch_answer(
 
     `name` and `arguments` tell the clutch's answers apart. Where it was made for this revision already, nothing is read.
     """
-    revision = _revision(context, clutch_id)
+    revision = _revision(request, clutch_id)
     # the revision before the rest is read: what is committed meanwhile is kept under one that nobody asks for again
     key = (clutch_id, name, *arguments)
     held = await kept(context, key, revision, make)
 
     def again(request: Request) -> Response | None:
-        revision = context.database.watch.revision(clutch_id)
-        held = context.cache.held(key, revision)
-        return None if held is None else tagged(request, held, JSON_TYPE, revision)
+        held = context.cache.held(key, glance_of(request).revision)
+        return None if held is None else tagged(request, held, JSON_TYPE, glance_of(request).revision)
 
     remember(request, again)
     return tagged(request, held, JSON_TYPE, revision)
@@ -95,7 +96,7 @@ async def clutch_table(
     *arguments: Hashable,
 ) -> Response:
     """The CSV export of an answer that follows from a clutch's revision, a page of it. Raises NotFoundError."""
-    revision = _revision(context, clutch_id)
+    revision = _revision(request, clutch_id)
     key = (clutch_id, f"{name}.csv", *arguments)
     exported = await kept(context, key, revision, lambda: encode_page(columns, *make()))
     return tagged(request, exported, CSV_TYPE, revision)
@@ -150,8 +151,7 @@ async def computed_table(
         return encode_page(columns, items, following or whole.next)
 
     key = (clutch_id, f"{name_of(query)}.csv", *arguments, limit, after)
-    exported = await kept(context, key, revision, one_page)
-    return tagged(request, exported, CSV_TYPE, revision)
+    return tagged(request, await kept(context, key, revision, one_page), CSV_TYPE, revision)
 
 
 async def _computed(
@@ -176,7 +176,7 @@ async def _computed(
         shared = await run_in_threadpool(shared_answer, context.database, query, clutch_id)
         if shared is not None:
             context.revalidation.begin(key, *shared)
-    return await context.revalidation.answer(key, _revision(context, clutch_id), compute, wait=wait)
+    return await context.revalidation.answer(key, _revision(request, clutch_id), compute, wait=wait)
 
 
 async def begin_computed(context: Context, clutch_id: str, query: Callable[..., dict[str, Any]]) -> None:
@@ -191,7 +191,7 @@ def _computed_again(
     key = (clutch_id, name_of(query), *arguments)
 
     def again(request: Request) -> Response | None:
-        revision = context.database.watch.revision(clutch_id)
+        revision = glance_of(request).revision
         whole = None if revision is None else context.revalidation.held(key, revision)
         return None if whole is None else tagged(request, whole, JSON_TYPE, revision)
 
@@ -204,8 +204,9 @@ def preferred_wait(prefer: str | None) -> int | None:
     return None if preferred is None else min(int(preferred[1]), LONGEST_WAIT_SECONDS)
 
 
-def _revision(context: Context, clutch_id: str) -> int:
-    revision = context.database.watch.revision(clutch_id)
+def _revision(request: Request, clutch_id: str) -> int:
+    """That of the clutch in the path when the request came in. Raises NotFoundError."""
+    revision = glance_of(request).revision
     if revision is None:
         raise NotFoundError(f"no clutch is known as {clutch_id!r}")
     return revision

@@ -19,7 +19,7 @@ from fastapi import Depends, Request
 
 from service.errors import FieldError, ForbiddenError, InvalidError, UnauthorizedError
 from service.web.context import Context
-from storage.engine.watch import GrantedKey, Watch
+from storage.engine.watch import Glance, GrantedKey, Question
 from storage.keys import KeyRow
 
 Scope = Literal["read", "ingest", "admin"]
@@ -77,31 +77,51 @@ def make_key(
     return text, row
 
 
-def authorise(watch: Watch, caller: Caller, scope: Scope, clutch_id: str | None = None) -> Grant:
+def authorise(glance: Glance, caller: Caller, scope: Scope, clutch_id: str | None = None) -> Grant:
     """Let the caller pass and return what it may, or raise UnauthorizedError or ForbiddenError.
 
-    `clutch_id` is the clutch that is asked about; None where it is all of them.
+    `glance` is of the caller's key; `clutch_id` is the clutch that is asked about, None where it is all of them.
     """
-    grant = identify(watch, caller)
+    grant = identify(glance, caller)
     require_scope(grant, scope)
     _require_own(grant, clutch_id)
     return grant
 
 
-def identify(watch: Watch, caller: Caller) -> Grant:
+def identify(glance: Glance, caller: Caller) -> Grant:
     """Who asks; raises UnauthorizedError, or ForbiddenError where no keys are configured and the caller is not local."""
-    if not watch.keys_are_needed():
+    if not glance.keys_are_needed:
         _require_loopback(caller)
         return _LOCAL_GRANT
-    scheme, _, text = (caller.authorization or "").partition(" ")
-    if scheme.lower() != "bearer" or not text:
+    if _key_of(caller) is None:
         raise UnauthorizedError("send a key as: Authorization: Bearer KEY")
-    key = watch.key(_digest(text.strip()))
+    key = glance.key
     if key is None:
         raise UnauthorizedError("the key is not known, or was revoked")
     if key.expires_at is not None and key.expires_at <= _stamp(datetime.now(UTC)):
         raise UnauthorizedError(f"the key expired at {key.expires_at}")
     return _grant(key)
+
+
+def _key_of(caller: Caller) -> str | None:
+    """The key that is sent, None where none is."""
+    scheme, _, text = (caller.authorization or "").partition(" ")
+    return text.strip() if scheme.lower() == "bearer" and text else None
+
+
+async def glance_at(request: Request, caller: Caller, clutch_id: str | None) -> Glance:
+    """What is so of the caller's key and the clutch, asked once a request, of which it stays the `glance`."""
+    key = _key_of(caller)
+    question = Question(clutch_id, None if key is None else _digest(key))
+    glance = await context_of(request).database.watch.look(question)
+    request.state.glance = glance
+    return glance
+
+
+def glance_of(request: Request) -> Glance:
+    """What was so when the request came in."""
+    glance: Glance = request.state.glance
+    return glance
 
 
 @lru_cache(maxsize=256)
@@ -197,8 +217,9 @@ def allowed(scope: Scope, *, narrowed: bool = False) -> Callable[[Request], Awai
     """
 
     async def check(request: Request) -> Context:
-        context = context_of(request)
-        grant = identify(context.database.watch, caller_of(request))
+        context, caller = context_of(request), caller_of(request)
+        glance = getattr(request.state, "glance", None) or await glance_at(request, caller, clutch_of(request))
+        grant = identify(glance, caller)
         require_scope(grant, scope)
         request.state.grant = grant
         if not narrowed:

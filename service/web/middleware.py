@@ -23,7 +23,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from service.errors import ServiceError, TooLargeError, TooManyError, TooSlowError
 from service.logging import access, log_request, request_id, sane
 from service.web import limits
-from service.web.auth import UNMATCHED, authorise, caller_of, clutch_of, context_of, route_of
+from service.web.auth import UNMATCHED, authorise, caller_of, clutch_of, context_of, glance_at, route_of
 from service.web.metrics import Metrics
 from service.web.problems import refused, unexpected
 from storage.engine.errors import StorageError
@@ -268,7 +268,7 @@ class Polls:
             return
         address = (scope["path"], scope["query_string"])
         poll = self._polls.get(address)
-        if poll is not None and (response := self._answered(poll, scope)) is not None:
+        if poll is not None and (response := await self._answered(poll, scope)) is not None:
             await response(scope, receive, send)
             return
         await self.app(scope, receive, send)
@@ -278,11 +278,12 @@ class Polls:
             while len(self._polls) > limits.MOST_POLLED:
                 self._polls.popitem(last=False)
 
-    def _answered(self, poll: _Poll, scope: Scope) -> Response | None:
+    async def _answered(self, poll: _Poll, scope: Scope) -> Response | None:
         request = Request(scope)
         try:
-            context = context_of(request)
-            grant = authorise(context.database.watch, caller_of(request), "read", poll.clutch_id)
+            context, caller = context_of(request), caller_of(request)
+            glance = await glance_at(request, caller, poll.clutch_id)
+            grant = authorise(glance, caller, "read", poll.clutch_id)
             request.state.grant = grant
             response = poll.again(request)
         except (ServiceError, StorageError):  # the usual way says what is wrong

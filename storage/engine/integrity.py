@@ -9,7 +9,7 @@ from storage.migrations.upgrade import current, head, revisions
 from storage.tables import metadata
 
 #: What a server has beside the tables of `storage/tables.py`.
-_OWN_TABLES = ("commits", "shared_answer")
+_SERVER_TABLES = ("commits", "shared_answer")
 
 
 def refuse_newer(revision: str | None) -> None:
@@ -27,7 +27,7 @@ def other_schema(connection: Connection) -> list[str]:
             f"the database is at revision {current(connection)}: its runs are checked at {head()} only, to which "
             "`clutchlife serve` brings it, with a copy of a file kept beside it"
         )
-    own = _OWN_TABLES if connection.dialect.name == "postgresql" else ()
+    own = _SERVER_TABLES if connection.dialect.name == "postgresql" else ()
     context = MigrationContext.configure(
         connection, opts={"include_object": lambda _, name, kind, *__: not (kind == "table" and name in own)}
     )

@@ -1,7 +1,8 @@
-"""What every request asks, without a transaction: whether anything was committed, a clutch's revision, a key's scope."""
+"""What every request asks, without a transaction: whether anything was committed, a clutch's revision, what a key grants."""
 
 import json
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -18,28 +19,49 @@ class GrantedKey:
     expires_at: str | None
 
 
+@dataclass(frozen=True, slots=True)
+class Question:
+    """The clutch that a request is about and the hash of its key, None where it names none."""
+
+    clutch_id: str | None = None
+    secret_sha256: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Glance:
+    """What was so at one moment.
+
+    `version`: a number that changes with every commit, whichever process made it; compare it only with those of the same
+    watch. Read before a query, it shows later whether the query would still give the same rows.
+    `keys_are_needed`: whether a key was ever made; revoking the last one opens nothing.
+    `key`: what the key grants, None where there is none with that hash or it was revoked; whether it has expired the caller
+    looks at. `revision`: the clutch's, None where there is no such clutch.
+    """
+
+    version: int
+    keys_are_needed: bool
+    key: GrantedKey | None
+    revision: int | None
+
+
 class Watch(ABC):
-    """The questions; threads share it."""
+    """Answers the questions; threads share it."""
 
     @abstractmethod
-    def version(self) -> int:
-        """A number that changes with every commit, whichever process made it. Compare it only within this object.
-
-        Read before a query, it shows later whether the query would still give the same rows.
-        """
+    def glances(self, questions: Sequence[Question]) -> list[Glance]:
+        """What is so now, question by question, all at the same moment."""
 
     @abstractmethod
-    def revision(self, clutch_id: str) -> int | None:
-        """The clutch's revision, or None."""
+    async def look(self, question: Question) -> Glance:
+        """What is so now, for one who asks from the event loop, which does not wait for another process meanwhile."""
 
     @abstractmethod
-    def key(self, secret_sha256: str) -> GrantedKey | None:
-        """What the key with this hash grants; None where there is none or it was revoked. Whether it has expired the caller
-        looks at."""
+    def close(self) -> None:
+        """Ask nothing any more."""
 
-    @abstractmethod
-    def keys_are_needed(self) -> bool:
-        """Whether a key was ever made: revoking the last one opens nothing."""
+    def glance(self, clutch_id: str | None = None, secret_sha256: str | None = None) -> Glance:
+        """What is so now, of one clutch and one key."""
+        return self.glances([Question(clutch_id, secret_sha256)])[0]
 
 
 @lru_cache(maxsize=256)

@@ -29,7 +29,16 @@ from service.web.answers import (
     now,
     tagged,
 )
-from service.web.auth import Admin, OwnIngester, OwnReader, Reader, name_of_caller, own_clutches, require_clutch
+from service.web.auth import (
+    Admin,
+    OwnIngester,
+    OwnReader,
+    Reader,
+    glance_of,
+    name_of_caller,
+    own_clutches,
+    require_clutch,
+)
 from service.web.context import Context, Cursor, Limit
 from service.web.limits import USUAL_ITEMS
 from service.web.middleware import remember
@@ -118,11 +127,11 @@ async def _of_all(request: Request, context: Context, key: Hashable, make: Calla
     """A GET's answer that any commit may change, made once for what is committed."""
 
     def again(request: Request) -> Response | None:
-        held = context.cache.held(key, context.database.watch.version())
+        held = context.cache.held(key, glance_of(request).version)
         return None if held is None else tagged(request, held, JSON_TYPE)
 
     # the version before the rows are read: what is committed meanwhile makes another
-    held = await kept(context, key, context.database.watch.version(), make)
+    held = await kept(context, key, glance_of(request).version, make)
     if own_clutches(request) is None:
         remember(request, again)
     return tagged(request, held, JSON_TYPE)

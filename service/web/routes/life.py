@@ -53,7 +53,7 @@ async def remaining_useful_life(
 
     That is mean COF, which has fallen to a fraction, unless the clutch's record names others.
     """
-    own = await clutch_bytes(context, clutch_id, "criteria", lambda: criteria_of(context.database, clutch_id))
+    own = await clutch_bytes(request, context, clutch_id, "criteria", lambda: criteria_of(context.database, clutch_id))
     if own != NO_CRITERIA or (quantity, criterion, life) != (None, None, None):
         arguments = (method, pressure_bar, at_cycles, quantity, criterion, life)
         return await computed_answer(request, context, clutch_id, life_by_criteria, *arguments, prefer=prefer)

@@ -17,7 +17,7 @@ from storage.engine.integrity import refuse_newer
 from storage.engine.postgresql.connect import make_asking_engine, make_engine, shown
 from storage.engine.postgresql.driver_errors import translated
 from storage.engine.postgresql.locks import hold_service_lock, migration_lock, write_lock
-from storage.engine.postgresql.own_tables import commits, count_commit, own_tables
+from storage.engine.postgresql.server_tables import commits, count_commit, server_tables
 from storage.engine.postgresql.shared_answers import ServerAnswers
 from storage.engine.postgresql.watch import ServerWatch
 from storage.migrations.upgrade import current, head, make_all, upgrade
@@ -88,6 +88,7 @@ class ServerDatabase(Database):
         """Close all connections; any later use raises StorageUnavailable. May be called twice."""
         self._closed = True
         self._engine.dispose()
+        self.watch.close()
         self._asking.dispose()
 
     def migrate(self) -> None:
@@ -95,8 +96,8 @@ class ServerDatabase(Database):
         with self.reading() as connection:
             _require_utf8(connection, self.name)
             revision = current(connection)
-            has_own_tables = set(inspect(connection).get_table_names()) >= set(own_tables.tables)
-        if revision == head() and has_own_tables:
+            has_server_tables = set(inspect(connection).get_table_names()) >= set(server_tables.tables)
+        if revision == head() and has_server_tables:
             return
         in_use = revision is not None
         with (
@@ -109,7 +110,7 @@ class ServerDatabase(Database):
             elif revision != head():
                 refuse_newer(revision)
                 upgrade(connection)
-            own_tables.create_all(connection)
+            server_tables.create_all(connection)
             if revision is None:
                 connection.execute(insert(commits).values(number=0))
 

@@ -7,12 +7,12 @@ from sqlalchemy import BigInteger, Column, Engine, LargeBinary, Table, Text, bin
 from sqlalchemy.dialects.postgresql import insert
 
 from storage.engine.postgresql.driver_errors import translated
-from storage.engine.postgresql.own_tables import own_tables
+from storage.engine.postgresql.server_tables import server_tables
 from storage.engine.shared_answers import SharedAnswer, SharedAnswers
 
 shared_answer = Table(
     "shared_answer",
-    own_tables,
+    server_tables,
     Column("clutch_id", Text, primary_key=True),
     Column("name", Text, primary_key=True),
     Column("release", Text, nullable=False),

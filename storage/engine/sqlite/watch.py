@@ -1,16 +1,19 @@
 """What every request asks of a file, without a transaction. A row that was read is kept until something is committed."""
 
 import threading
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from storage.engine.errors import StorageUnavailable
 from storage.engine.sqlite.connect import connect_shared
 from storage.engine.sqlite.driver_errors import DRIVER_ERRORS, store_error
-from storage.engine.watch import GrantedKey, Watch, granted
+from storage.engine.watch import Glance, Question, Watch, granted
 
 #: Rows that are kept at most. Chosen: some clutches and keys; all are forgotten when there are more.
 _MOST_ROWS = 10_000
+_REVISION = "SELECT revision FROM clutch WHERE clutch_id = ?"
+_ANY_KEY = "SELECT EXISTS (SELECT 1 FROM access_key)"
 _KEY = "SELECT key_id, scope, note, clutches, expires_at FROM access_key WHERE secret_sha256 = ? AND revoked_at IS NULL"
 
 
@@ -25,38 +28,36 @@ class FileWatch(Watch):
         self._closed = False
         self._connection = connect_shared(path, lock_timeout, writable=writable)
 
-    def version(self) -> int:
-        """PRAGMA data_version."""
-        with self._lock:
-            return self._version()
-
-    def revision(self, clutch_id: str) -> int | None:
-        """The clutch's revision, or None."""
-        row = self._row("SELECT revision FROM clutch WHERE clutch_id = ?", clutch_id)
-        return None if row is None else int(row[0])
-
-    def key(self, secret_sha256: str) -> GrantedKey | None:
-        """What the key with this hash grants; None where there is none or it was revoked. Whether it has expired the caller
-        looks at."""
-        row = self._row(_KEY, secret_sha256)
-        return None if row is None else granted(row)
-
-    def keys_are_needed(self) -> bool:
-        """Whether a key was ever made: revoking the last one opens nothing."""
-        row = self._row("SELECT EXISTS (SELECT 1 FROM access_key)")
-        return row is not None and bool(row[0])
-
-    def _row(self, query: str, *values: object) -> tuple[Any, ...] | None:
-        """The first row of a query by key as it is now, None where there is none; asked of the file once a commit."""
-        key = (query, values)
+    def glances(self, questions: Sequence[Question]) -> list[Glance]:
+        """What is so now, question by question, all at the same moment."""
         with self._lock:
             version = self._version()
             if version != self._rows_version or len(self._rows) > _MOST_ROWS:
                 self._rows.clear()
                 self._rows_version = version
-            if key not in self._rows:
-                self._rows[key] = self._first(query, values)
-            return self._rows[key]
+            return [self._glance(version, question) for question in questions]
+
+    async def look(self, question: Question) -> Glance:
+        """What is so now, for one who asks from the event loop: the file answers at once."""
+        return self.glances([question])[0]
+
+    def _glance(self, version: int, question: Question) -> Glance:
+        any_key = self._row(_ANY_KEY)
+        key = None if question.secret_sha256 is None else self._row(_KEY, question.secret_sha256)
+        revision = None if question.clutch_id is None else self._row(_REVISION, question.clutch_id)
+        return Glance(
+            version=version,
+            keys_are_needed=any_key is not None and bool(any_key[0]),
+            key=None if key is None else granted(key),
+            revision=None if revision is None else int(revision[0]),
+        )
+
+    def _row(self, query: str, *values: object) -> tuple[Any, ...] | None:
+        """The first row of a query by key as it is now, None where there is none; asked of the file once a commit."""
+        key = (query, values)
+        if key not in self._rows:
+            self._rows[key] = self._first(query, values)
+        return self._rows[key]
 
     def close(self) -> None:
         """Close the connection; any later question raises StorageUnavailable."""
