@@ -22,10 +22,11 @@ DASHBOARD: dict[str, Any] = json.loads((FOLDER / "dashboards" / "clutchlife.json
 TARGETS = [target for panel in DASHBOARD["panels"] for target in panel["targets"]]
 
 
-@pytest.fixture
-def aged(database_url: str) -> Iterator[TestClient]:
+@pytest.fixture(scope="module")
+def aged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     """A service that knows a clutch with three tests of each kind, and has metrics of every clutch."""
-    app = create_app(Settings(workers=0, database=database_url, clutch_metrics=True))
+    database = f"sqlite:///{tmp_path_factory.mktemp('aged') / 'clutchlife.db'}"
+    app = create_app(Settings(workers=0, database=database, clutch_metrics=True))
     with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
         client.post("/v1/clutches", json={"clutch_id": "bench"})
         for run in simulate(7, most_tests=3, programme=Programme(dynamic=DynamicTest(rate=25.0))):

@@ -10,8 +10,9 @@ from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 from models.arrays import FloatArray
 from models.degradation.general_order import Degradation, progress_fraction, value
 from models.prognosis.first_passage import PassageStatus, predict_first_passage
+from models.tracking.courses import FORM_COURSE, SCALE_SIGN
 from models.tracking.filters.grid import Grid
-from models.tracking.filters.sigma_points import Way, measured, predicted, scatter_learnt, unscaled
+from models.tracking.filters.sigma_points import DOMAIN, Way, measured, predicted, scatter_learnt, unscaled
 from models.tracking.filters.ukf import Ukf, UkfState
 from models.tracking.history import History
 from models.tracking.measurement import Measurement
@@ -158,13 +159,16 @@ def test_a_step_of_all_filters_at_once_is_filterpys_step_of_each() -> None:
         np.testing.assert_allclose(across[one], theirs.K[:, 0] * theirs.S[0, 0], rtol=0, atol=1e-12)
 
 
-def test_no_course_that_the_ukf_draws_ended_before_the_last_test() -> None:
-    """A quantity that wanders until no course fits: a course that grows without bounds at an end that is behind would be
-    thousands of times the quantity."""
+def wandering() -> list[Measurement]:
+    """A quantity that wanders until no course fits."""
     progress = np.arange(4.0, 200.0, 4.0)
     values = 0.05 + 0.003 * np.sin(progress / 14.0) + 0.005 * (progress / 160.0) ** 6 * (progress < 165.0)
-    measurements = [Measurement(progress=z, value=y, variance=1e-8) for z, y in zip(progress, values, strict=True)]
-    ended = 0.0
+    return [Measurement(progress=z, value=y, variance=1e-8) for z, y in zip(progress, values, strict=True)]
+
+
+def test_no_course_that_the_ukf_draws_ended_before_the_last_test() -> None:
+    """Where no course fits: one that grows without bounds at an end behind would be thousands of times the quantity."""
+    measurements, ended = wandering(), 0.0
     state = followed(Ukf(), weak(measurements[0], falling=True), measurements[:20])
     for measurement in measurements[20:]:
         state = Ukf().update(state, measurement)
@@ -174,6 +178,28 @@ def test_no_course_that_the_ukf_draws_ended_before_the_last_test() -> None:
         assert float(draws.weight @ behind) == 0.0
         assert abs(float(draws.weight @ draws.values(np.array([measurement.progress]))[0]) - measurement.value) < 0.02
     assert ended > 0.0, "the case shows nothing: no course was drawn beyond its end"
+
+
+def test_where_every_drawn_course_has_ended_all_are_kept_alike() -> None:
+    """Normals of growing courses whose end is just beyond the reference, and a last measurement at twice that."""
+    measurements = wandering()
+    state = followed(Ukf(), weak(measurements[0], falling=True), measurements[:20])
+    growing = SCALE_SIGN[FORM_COURSE[state.form.astype(np.intp)]] < 0.0
+    assert growing.any()
+    mean = state.mean[growing]
+    mean[:, 2] = -DOMAIN
+    state = replace(
+        state,
+        form=state.form[growing],
+        log_weight=state.log_weight[growing],
+        mean=mean,
+        covariance=1e-12 * state.covariance[growing],
+        scatter=state.scatter[growing],
+        history=state.history.append(replace(measurements[20], progress=2.0 * state.reference), state.prior),
+    )
+    drawn = Ukf().posterior(state, 500, np.random.default_rng(0))
+    assert (-drawn.scale <= state.history.span).all(), "the case shows nothing: a course has not ended"
+    np.testing.assert_array_equal(drawn.weight, 1.0 / 500)
 
 
 def test_before_the_first_measurement_the_ukf_draws_from_the_prior_and_has_no_normals() -> None:

@@ -1,39 +1,45 @@
 """Remaining life under planned duty, over HTTP: as severe as recent duty, twice as severe, uncertain, by date."""
 
+from collections.abc import Iterator
 from datetime import datetime
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
+from tests.service.clients import client_on
 from tests.support import stationary
 
 FORECAST = "/v1/clutches/{}/remaining-useful-life/forecast"
 QUANTILES = ("0.05", "0.5", "0.95")
 
 
-@pytest.fixture(autouse=True)
-def _nothing_is_doubted(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("service.workflows.ingest_run.doubts", lambda *_: ())
+@pytest.fixture(scope="module", autouse=True)
+def _nothing_is_doubted() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("service.workflows.ingest_run.doubts", lambda *_: ())
+        yield
 
 
-@pytest.fixture
-def aged(client: TestClient) -> TestClient:
-    """A clutch whose severity is its energy, 20 kJ a cycle, tested every 1,000 cycles and ten hours."""
+def send(client: TestClient, clutch: str, *runs: dict[str, Any]) -> None:
+    for run in runs:
+        assert client.post(f"/v1/clutches/{clutch}/runs", json=run).status_code == 201
+
+
+@pytest.fixture(scope="module")
+def aged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+    """A clutch whose severity is its energy, 20 kJ a cycle, tested every 1,000 cycles, a day apart; nobody adds to it."""
     record = {"clutch_id": "aged", "severity": {"basis": "dissipated_energy", "exponent": 1.0}}
-    assert client.post("/v1/clutches", json=record).status_code == 201
-    for place in range(8):
-        if place:
-            duty = {
-                "kind": "duty_cycles",
-                "cycles": 1000.0 * place,
-                "duty": {"cycles": 1000, "energy_per_cycle_kj": 20},
-            }
-            assert client.post("/v1/clutches/aged/runs", json=duty).status_code == 201
-        test = stationary(1000.0 * place, pressures=(5.0,), speeds=(20, 120, 520, 1020, 1970))
-        test["started_at"] = f"2026-03-0{1 + place}T08:00:00+00:00"
-        assert client.post("/v1/clutches/aged/runs", json=test).status_code == 201
-    return client
+    with client_on(f"sqlite:///{tmp_path_factory.mktemp('aged') / 'clutchlife.db'}") as client:
+        assert client.post("/v1/clutches", json=record).status_code == 201
+        for place in range(8):
+            cycles = 1000.0 * place
+            block = {"cycles": 1000, "energy_per_cycle_kj": 20}
+            duty = {"kind": "duty_cycles", "cycles": cycles, "duty": block}
+            test = stationary(cycles, pressures=(5.0,), speeds=(20, 120, 520, 1020, 1970))
+            test["started_at"] = f"2026-03-0{1 + place}T08:00:00+00:00"
+            send(client, "aged", *([duty, test] if place else [test]))
+        yield client
 
 
 def planned(client: TestClient, *blocks: dict[str, float], clutch: str = "aged", **more: Any) -> dict[str, Any]:
@@ -107,21 +113,18 @@ def test_what_cannot_be_counted_is_said(client: TestClient) -> None:
         "insufficient_data", None, [None],
     )  # fmt: skip
     assert (nothing["pace_from"], nothing["end_of_life_at"]) == (None, None)
-    for cycles in (0.0, 1000.0, 2000.0, 3000.0):
-        client.post("/v1/clutches/c1/runs", json=stationary(cycles, pressures=(5.0,)))
+    send(client, "c1", *(stationary(cycles, pressures=(5.0,)) for cycles in (0.0, 1000.0, 2000.0, 3000.0)))
     counted = planned(client, {"cycles": 100, "energy_per_cycle_kj": 20}, clutch="c1")
     assert "severity_not_counted" in [warning["code"] for warning in counted["warnings"]]
 
 
-def test_a_rebuilt_clutch_has_a_whole_horizon_again(aged: TestClient) -> None:
-    rebuilt = {"kind": "maintenance", "event": "rebuild", "cycles": 999_000}
-    assert aged.post("/v1/clutches/aged/runs", json=rebuilt).status_code == 201
+def test_a_rebuilt_clutch_has_a_whole_horizon_again(client: TestClient) -> None:
+    send(client, "c1", {"kind": "maintenance", "event": "rebuild", "cycles": 999_000})
     for place in range(5):
         test = stationary(1000.0 * place, pressures=(5.0,), speeds=(20, 120, 520, 1020, 1970))
-        test["cycles"] = 999_000.0 + 1000.0 * place
-        assert aged.post("/v1/clutches/aged/runs", json=test).status_code == 201
-    usual = aged.get("/v1/clutches/aged/remaining-useful-life").json()
-    same = planned(aged, {"cycles": 1000})
+        send(client, "c1", test | {"cycles": 999_000.0 + 1000.0 * place})
+    usual = client.get("/v1/clutches/c1/remaining-useful-life").json()
+    same = planned(client, {"cycles": 1000}, clutch="c1")
     assert same["status"] == usual["status"]
     assert same["end_of_life_cycles"]["0.05"] == pytest.approx(usual["end_of_life_cycles"]["0.05"], rel=1e-3)
     assert same["end_of_life_cycles"]["0.5"] == pytest.approx(usual["end_of_life_cycles"]["0.5"], rel=1e-3)
@@ -129,8 +132,7 @@ def test_a_rebuilt_clutch_has_a_whole_horizon_again(aged: TestClient) -> None:
 
 def test_a_life_that_has_ended_did_so_when_it_did(client: TestClient) -> None:
     for place in range(12):
-        body = stationary(1000.0 * place, pressures=(5.0,), wear=0.08 * place, noise=0.002)
-        assert client.post("/v1/clutches/c1/runs", json=body).status_code == 201
+        send(client, "c1", stationary(1000.0 * place, pressures=(5.0,), wear=0.08 * place, noise=0.002))
     usual = client.get("/v1/clutches/c1/remaining-useful-life").json()
     ended = planned(client, {"cycles": 1000}, clutch="c1", pace_cycles_per_hour=10)
     assert (usual["status"], ended["status"]) == ("reached", "reached")
@@ -146,8 +148,7 @@ def test_sliding_distance_is_counted_by_speed_and_duration(client: TestClient) -
         block = {"cycles": 1000, "initial_speed_rpm": 1000, "engagement_duration_s": 1.0}
         duty = {"kind": "duty_cycles", "cycles": 1000.0 * place, "duty": block}
         test = stationary(1000.0 * place, pressures=(5.0,))
-        for run in (duty, test) if place else (test,):
-            assert client.post("/v1/clutches/slid/runs", json=run).status_code == 201
+        send(client, "slid", *([duty, test] if place else [test]))
     far = planned(client, {"cycles": 10, "initial_speed_rpm": 1500, "engagement_duration_s": 2.0}, clutch="slid")
     assert far["block_severity"] == [pytest.approx(3.0)]
     assert [w["code"] for w in planned(client, {"cycles": 10}, clutch="slid")["warnings"]][-1] == "severity_not_counted"
