@@ -26,7 +26,7 @@ from service.queries.cache import Answer, Page, name_of, revision_and_json, shar
 from service.web.auth import glance_of, name_of_caller
 from service.web.context import Context
 from service.web.files import PARQUET_TYPE
-from service.web.limits import LEAST_PACKED_BYTES, LONGEST_WAIT_SECONDS, PACKING_LEVEL
+from service.web.limits import LEAST_PACKED_BYTES, LONGEST_WAIT_SECONDS, PACKING_LEVEL, WAIT_SECONDS
 from service.web.middleware import Again, remember
 from service.web.problems import refused
 from service.web.revalidation import Made
@@ -164,7 +164,8 @@ async def _computed(
     lane: Lane = Lane.ANSWERS,
 ) -> tuple[int, Answer]:
     preferred = preferred_wait(prefer)
-    wait = preferred if preferred is not None else LONGEST_WAIT_SECONDS if context.workers.are_idle() else 0
+    # this service's workers may be idle where another's keep every processor busy
+    wait = preferred if preferred is not None else WAIT_SECONDS if context.workers.are_idle() else 0
 
     def compute(waited_for: bool) -> "Future[Made]":
         among = lane if waited_for or lane is not Lane.ANSWERS else Lane.RENEWALS

@@ -1,7 +1,7 @@
 """Answers that take a second to compute: made by a worker, once, and given as they were while a newer one is made.
 
-The directive stale-while-revalidate of RFC 5861, decided by the service: where the workers are idle, who asks waits for
-the newest answer; where they have more to do, the last one is given at once and its revision says of when it is.
+The directive stale-while-revalidate of RFC 5861, decided by the service: where the workers are idle, who asks waits a while
+for the newest answer; where they have more to do, the last one is given at once and its revision says of when it is.
 `Prefer: wait=SECONDS` waits in any case.
 """
 

@@ -1,7 +1,9 @@
 """Answers that are kept by the clutch's revision: computed once, and never given when they no longer hold."""
 
 import tempfile
+import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
@@ -9,6 +11,7 @@ from fastapi.testclient import TestClient
 from service.app import create_app
 from service.queries import series
 from service.settings import Settings
+from service.web import answers
 from service.workflows.replay import replay_clutch
 from storage.engine.opening import open_database
 from storage.engine.sqlite.database import back_up
@@ -98,3 +101,27 @@ def test_nothing_is_made_twice_for_one_revision(client: TestClient, monkeypatch:
 def test_an_unknown_clutch_is_unknown_however_often_it_is_asked_for(client: TestClient) -> None:
     for name in ASKED:
         assert [client.get(f"/v1/clutches/nobody/{name}").status_code for _ in range(2)] == [404, 404]
+
+
+def test_idle_workers_on_a_busy_machine_are_waited_for_for_a_while(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Other services may keep every processor busy: who asks is given the last answer, the newest once it is made."""
+    post(client, 1000.0)
+    before = client.get(f"{BASE}/degradation")
+    post(client, 2000.0)
+    made, ready = answers.revision_and_json, threading.Event()
+
+    def slowly(*arguments: Any) -> tuple[int, bytes]:
+        ready.wait(20)
+        return made(*arguments)
+
+    monkeypatch.setattr(answers, "revision_and_json", slowly)
+    monkeypatch.setattr(answers, "WAIT_SECONDS", 0.2)
+    given = client.get(f"{BASE}/degradation")
+    assert not ready.is_set()
+    assert (given.headers["ETag"], given.content) == (before.headers["ETag"], before.content)
+    assert given.headers["Clutchlife-Revision"] == before.headers["Clutchlife-Revision"]
+    ready.set()
+    newest = client.get(f"{BASE}/degradation", headers={"Prefer": "wait=60"})
+    assert int(newest.headers["Clutchlife-Revision"]) > int(before.headers["Clutchlife-Revision"])

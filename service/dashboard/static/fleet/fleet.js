@@ -17,6 +17,7 @@ import { Rows } from "./rows.js";
 
 /** @import { ClutchOut, FleetTotals, ListPage } from "../shared/types.js" */
 /** @import { Choice } from "./chips.js" */
+/** @import { Part } from "./rows.js" */
 
 const INTERVAL = 3000; // ms
 /** From the last key that is typed until it is searched, ms. */
@@ -51,23 +52,23 @@ function chosen() {
 
 async function poll() {
   const question = chosen();
-  const { offset, limit } = rows.wanted();
-  const list = `/v1/clutches?${question}${question && "&"}offset=${offset}&limit=${limit}`;
+  const part = rows.wanted();
+  const list = `/v1/clutches?${question}${question && "&"}offset=${part.offset}&limit=${part.limit}`;
   const before = shown;
   shown = ""; // until both are read: an error midway is made good at the next poll
   /** @type {[{ body: FleetTotals, changed: boolean }, { body: ListPage<ClutchOut>, changed: boolean }]} */
   const [counted, page] = await Promise.all([read(`/v1/fleet/totals?${wanted()}`), read(list)]);
   if (question !== chosen()) return; // what was chosen meanwhile is asked for next
-  if (counted.changed || page.changed || before !== list) show(counted.body, page.body.items, offset);
+  if (counted.changed || page.changed || before !== list) show(counted.body, page.body.items, part);
   shown = list;
 }
 
 /**
  * @param {FleetTotals} counted
  * @param {ClutchOut[]} items
- * @param {number} offset of the first of them
+ * @param {Part} part of the list that they are
  */
-function show(counted, items, offset) {
+function show(counted, items, part) {
   totals = counted;
   document.getElementById("nothing")?.remove();
   if (counted.all === 0 && !wanted().has("find")) {
@@ -77,12 +78,12 @@ function show(counted, items, offset) {
   }
   if (!rows.element.isConnected) MAIN.replaceChildren(rows.element);
   const total = countOf(counted, only);
-  rows.show(items, offset, total, counted.scale_cycles);
+  rows.show(items, part, total, counted.scale_cycles);
   drawChips(counted, only, choose);
   if (total === 0)
     MAIN.append(h("p", { id: "nothing", class: "notice", role: "status" }, "No clutch matches the search."));
   byId("printed").textContent =
-    items.length < total ? `Rows ${offset + 1} to ${offset + items.length} of ${total}` : "";
+    items.length < total ? `Rows ${part.offset + 1} to ${part.offset + items.length} of ${total}` : "";
   requestAnimationFrame(() => setTimeout(() => performance.mark("fleet-shown")));
 }
 

@@ -39,6 +39,7 @@ export class Rows {
     /** @type {Map<string, Entry>} */
     this.entries = new Map();
     this.offset = 0;
+    this.limit = 0;
     this.total = 0;
     this.height = USUAL_HEIGHT;
     this.looking = false;
@@ -49,9 +50,11 @@ export class Rows {
     });
   }
 
-  /** The part of the list to read, by what is in sight. */
+  /** The part of the list to read, by what is in sight; of a list of which nothing is known yet a screen, to show it soon. */
   wanted() {
-    const block = Math.max(BLOCK, Math.ceil(innerHeight / this.height));
+    const screen = Math.ceil(innerHeight / this.height);
+    if (this.total === 0) return { offset: 0, limit: screen };
+    const block = Math.max(BLOCK, screen);
     const within = Math.floor(Math.max(0, Math.min(this.first(), this.total - 1)) / block);
     const offset = Math.max(0, within - 1) * block;
     return { offset, limit: (within + 2) * block - offset };
@@ -67,11 +70,11 @@ export class Rows {
   /**
    * Show a part of a list of so many clutches; `scale` is the cycles at the right end of every interval's bar.
    * @param {ClutchOut[]} items
-   * @param {number} offset of the first of them
+   * @param {Part} part that was asked for
    * @param {number} total
    * @param {number} scale
    */
-  show(items, offset, total, scale) {
+  show(items, { offset, limit }, total, scale) {
     const first = this.first();
     const before = this.topOf(first);
     this.arrange(items.map((clutch) => this.drawn(clutch, scale)));
@@ -83,6 +86,7 @@ export class Rows {
     this.element.setAttribute("aria-rowcount", String(total + 1));
     if (this.offset === 0 && this.total === 0) this.measure();
     this.offset = offset;
+    this.limit = limit;
     this.total = total;
     const room = offset * this.height;
     this.above.style.height = `${room}px`;
@@ -131,7 +135,10 @@ export class Rows {
     this.looking = true;
     requestAnimationFrame(() => {
       this.looking = false;
-      if (this.element.isConnected && this.total > 0 && this.wanted().offset !== this.offset) this.moved();
+      if (!this.element.isConnected || this.total === 0) return;
+      const { offset, limit } = this.wanted();
+      const more = Math.min(limit, this.total) !== Math.min(this.limit, this.total);
+      if (offset !== this.offset || more) this.moved();
     });
   }
 
