@@ -1,13 +1,17 @@
 """What the pages load: read once, named by the hash of its content, compressed, kept by the browser for good.
 
 No build step: the tree `static/` is served as it stands, below one folder that is named by the hash of all its files, so
-that modules find each other by relative imports and a new version is a new address. A file's name is its path in the tree,
-as `shared/api.js`. What is not read here at start-up has no name: a request looks names up in a dictionary and never touches
-the disk. The plotting library's JavaScript is the one in the installed wheel of plotly, which is located and never imported.
+that modules find each other by relative imports and a new version is a new address. A page names all modules that it will
+load, so that the browser asks for them at once, and not for each when another has come that imports it. A file's name is
+its path in the tree, as `shared/api.js`. What is not read here at start-up has no name: a request looks names up in a
+dictionary and never touches the disk. The plotting library's JavaScript is the one in the installed wheel of plotly, which
+is located and never imported.
 """
 
 import gzip
 import hashlib
+import posixpath
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,6 +25,9 @@ _TYPES = {
     ".js": "text/javascript; charset=utf-8",
     ".svg": "image/svg+xml",
 }
+#: A page's module, and what a module imports.
+_MODULE = re.compile(r'<script type="module" src="\{assets\}/([^"]+)"></script>')
+_IMPORTED = re.compile(r'^(?:import|export)\b[^;"]*"(\.[^"]+)";', re.MULTILINE)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,10 +68,25 @@ class Assets:
     digest: str
 
     def page(self, name: str) -> Asset:
-        """A page with the addresses of its assets filled in."""
+        """A page with the addresses of its assets filled in, and before its module those of all that this imports."""
         raw = self.by_name[name]
-        text = raw.body.decode().replace("{assets}", f"/assets/{self.digest}")
+        text = _MODULE.sub(self._announced, raw.body.decode()).replace("{assets}", f"/assets/{self.digest}")
         return Asset(name=name, media_type=raw.media_type, body=text.encode())
+
+    def _announced(self, script: re.Match[str]) -> str:
+        links = (f'<link rel="modulepreload" href="{{assets}}/{name}">' for name in self.imported(script[1]))
+        return "\n".join([*links, script[0]])
+
+    def imported(self, module: str) -> list[str]:
+        """All modules that a module imports, those that they import too."""
+        names = [module]
+        for name in names:
+            folder = posixpath.dirname(name)
+            for relative in _IMPORTED.findall(self.by_name[name].body.decode()):
+                met = posixpath.normpath(posixpath.join(folder, relative))
+                if met not in names:
+                    names.append(met)
+        return names[1:]
 
 
 def load(folder: Path = STATIC) -> Assets:

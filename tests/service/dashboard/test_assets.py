@@ -32,6 +32,26 @@ def test_a_page_names_the_folder_of_this_version(tmp_path: Path) -> None:
     assert loaded.page("page.html").body.decode() == f"<p>/assets/{loaded.digest}</p>"
 
 
+def test_a_page_names_all_modules_that_it_loads(tmp_path: Path) -> None:
+    files = {
+        "page.html": '<script type="module" src="{assets}/fleet/page.js"></script>',
+        "fleet/page.js": 'import {\n  h,\n} from "../shared/dom.js";\nimport "./row.js";\n',
+        "fleet/row.js": '/** @import { T } from "../shared/types.js" */\nexport { h } from "../shared/dom.js";\n',
+        "shared/dom.js": '// import { x } from "./no.js";\nimport { y } from "./deep/y.js";\nconst a = "./b.js";\n',
+        "shared/deep/y.js": 'import { page } from "../../fleet/page.js";\n',
+    }
+    loaded = assets.load(written(tmp_path, files))
+    lines = loaded.page("page.html").body.decode().splitlines()
+    folder = f"/assets/{loaded.digest}"
+    assert lines == [
+        *(
+            f'<link rel="modulepreload" href="{folder}/{name}">'
+            for name in ("shared/dom.js", "fleet/row.js", "shared/deep/y.js")
+        ),
+        f'<script type="module" src="{folder}/fleet/page.js"></script>',
+    ]
+
+
 def test_only_what_browsers_load_is_served(tmp_path: Path) -> None:
     loaded = assets.load(written(tmp_path, {**TREE, "shared/types.d.ts": "", "shared/.dom.js.swp": "", "notes.md": ""}))
     assert set(loaded.by_name) == {*TREE, "plotly.min.js"}
