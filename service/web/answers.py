@@ -164,7 +164,6 @@ async def _computed(
     lane: Lane = Lane.ANSWERS,
 ) -> tuple[int, Answer]:
     preferred = preferred_wait(prefer)
-    # this service's workers may be idle where another's keep every processor busy
     wait = preferred if preferred is not None else WAIT_SECONDS if context.workers.are_idle() else 0
 
     def compute(waited_for: bool) -> "Future[Made]":

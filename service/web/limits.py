@@ -21,8 +21,9 @@ USUAL_ITEMS = 100
 #: Pressure [bar] and cycles [-] that an argument may name. Derived: a channel's bound; a million times the horizon.
 MOST_PRESSURE_BAR = 1e4
 MOST_HORIZONS = 1e6
-#: Seconds that a POST of a diagnosis waits for its report, and a GET of an answer that idle workers compute for the newest,
-#: where it does not say, and at most. Chosen: the contract's default; what proxies usually let pass.
+#: Seconds that a POST of a diagnosis waits for its report, and a GET for the newest answer that idle workers compute (whose
+#: processors another service may keep busy), where it does not say, and at most. Chosen: the contract's default; what
+#: proxies usually let pass.
 WAIT_SECONDS, LONGEST_WAIT_SECONDS = 30, 600
 #: Bytes a second at which a body must arrive, beyond the seconds that it has in any case. Chosen: a modem's line; 1 GiB may
 #: take 4.5 hours.

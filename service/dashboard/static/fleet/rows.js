@@ -50,11 +50,11 @@ export class Rows {
     });
   }
 
-  /** The part of the list to read, by what is in sight; of a list of which nothing is known yet a screen, to show it soon. */
+  /** The part of the list to read, by what is in sight; of a short list, and of one not known yet to show it soon, a screen. */
   wanted() {
-    const screen = Math.ceil(innerHeight / this.height);
-    if (this.total === 0) return { offset: 0, limit: screen };
-    const block = Math.max(BLOCK, screen);
+    const screen = Math.ceil(innerHeight / USUAL_HEIGHT);
+    if (this.total <= screen) return { offset: 0, limit: screen };
+    const block = Math.max(BLOCK, Math.ceil(innerHeight / this.height));
     const within = Math.floor(Math.max(0, Math.min(this.first(), this.total - 1)) / block);
     const offset = Math.max(0, within - 1) * block;
     return { offset, limit: (within + 2) * block - offset };
