@@ -80,7 +80,7 @@ def drawn(page: Page, name: str) -> Locator:
 @pytest.mark.slow
 def test_every_chart_is_drawn(browser: Browser, watched: Watched) -> None:
     page = opened(watched)
-    assert page.locator("figure.chart:visible h3").all_inner_texts() == list(CHARTS.values())
+    expect(page.locator("figure.chart:visible h3")).to_have_text(list(CHARTS.values()))
     for name in CHARTS:
         found = seen(browser, drawn(page, name).locator(".plot").screenshot())
         assert found.is_chart, (name, found)
