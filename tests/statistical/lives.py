@@ -11,7 +11,15 @@ from models.degradation.general_order import Degradation, first_passage, value
 from models.prognosis.first_passage import ends_of_life, weighted_quantiles
 from models.prognosis.scoring import crps_of_sample
 from models.tracking import linear_model, sampling
-from models.tracking.courses import FORM_PROPORTIONAL, FORM_SIZE, coefficients_at, log_form_weight, unit_of_change
+from models.tracking.courses import (
+    FORM_COURSE,
+    FORM_PROPORTIONAL,
+    FORM_SIZE,
+    SCALE_SIGN,
+    coefficients_at,
+    log_form_weight,
+    unit_of_change,
+)
 from models.tracking.discrepancy import PAST, drawn
 from models.tracking.filters.particle import ParticleState
 from models.tracking.history import History
@@ -142,7 +150,8 @@ def sampled(
 def weighted(
     prior: Prior, measurements: list[Measurement], points: Points, log_proposal: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """Log weights [n] of points by the density written out in full, over their own; and how many they count for."""
+    """Log weights [n] of points by the density written out in full, over their own; and how many they count for. A course
+    that ended before the last measurement was none of these."""
     log_likelihood = np.concatenate(
         [
             dense.log_likelihood(
@@ -152,8 +161,14 @@ def weighted(
         ]
     )
     log_weight = log_likelihood + log_prior(prior, points) - log_proposal
+    log_weight[_ended(points, max(m.progress for m in measurements))] = -np.inf
     weight = np.exp(log_weight - log_weight.max())
     return log_weight, float(weight.sum() ** 2 / np.square(weight).sum())
+
+
+def _ended(points: Points, span: float) -> np.ndarray:
+    """Whether a point's course ends at |φ| up to that progress [n]."""
+    return np.asarray((SCALE_SIGN[FORM_COURSE[points.form]] < 0.0) & (np.exp(points.log_scale) <= span))
 
 
 def log_prior(prior: Prior, points: Points) -> np.ndarray:
