@@ -167,11 +167,12 @@ def test_deviations_given_too_small_are_not_believed() -> None:
 
 
 def test_the_coverage_check_catches_half_a_covariance_and_a_wrong_model() -> None:
-    """Negative controls: a covariance halved, and data with a viscous exponent of 0.5 instead of 0.3."""
+    """Negative controls: a covariance halved, and data with a viscous exponent of 0.5 instead of 0.3, which the curve takes
+    up in all but its Coulomb ratio."""
     truth, _, noisy = _simulated(0.01)
     fits = fit_curves([curve(VELOCITY, row) for row in noisy])
     halved = _coverage(fits, truth, shrink=np.sqrt(0.5))
     assert (halved < COVERAGE - WITHIN).all()
     wrong_form = noisy + truth[:, 3:] * (VELOCITY**0.5 - VELOCITY**0.3)
     wrong = _coverage(fit_curves([curve(VELOCITY, row) for row in wrong_form]), truth)
-    assert (wrong[:4] < COVERAGE - WITHIN).all()
+    assert (np.delete(wrong, 1) < COVERAGE - WITHIN).all()
