@@ -54,6 +54,7 @@ class Revalidation:
     def begin(self, key: Hashable, revision: int, body: bytes) -> None:
         """Hold an answer that was made elsewhere, where none is known."""
         self._entries.setdefault(key, _Entry(revision=revision, answer=Answer.of(body)))
+        self._trim()
 
     async def answer(self, key: Hashable, revision: int, compute: Compute, *, wait: float) -> tuple[int, Answer]:
         """The answer at `revision` or later, or the last one where it is not there within `wait` [s]; and its revision.
@@ -113,6 +114,9 @@ class Revalidation:
         if revision < entry.revision:  # a later one was quicker
             return
         entry.revision, entry.answer = revision, Answer.of(body)
+        self._trim()
+
+    def _trim(self) -> None:
         while len(self._entries) > 1 and self._held() > self._most:
             self._entries.popitem(last=False)
 

@@ -150,3 +150,10 @@ def test_the_least_lately_asked_for_goes_first() -> None:
         assert [kept.held(name, 1) is not None for name in "abc"] == [False, True, True]
 
     run(scenario)
+
+
+def test_answers_begun_elsewhere_are_bounded_too() -> None:
+    kept = Revalidation(most_bytes=1_000)
+    for number in range(50):
+        kept.begin(number, 1, b"x" * 100)
+    assert [number for number in range(50) if kept.knows(number)] == list(range(40, 50))
