@@ -4,6 +4,7 @@ Where several ask for an answer that is not there yet, one computes it and the o
 """
 
 import hashlib
+import logging
 import re
 import threading
 from collections import OrderedDict
@@ -17,7 +18,10 @@ from service.settings import CODE_VERSION
 from storage import clutches
 from storage.encoding.json_text import to_text
 from storage.engine.database import Database
+from storage.engine.errors import StorageError
 from storage.engine.shared_answers import SharedAnswer
+
+_log = logging.getLogger("clutchlife")
 
 #: The end of a list that is answered as JSON and goes on: the cursor of its next page.
 _GOES_ON = re.compile(rb'"next":"([A-Za-z0-9_-]+)"\}$')
@@ -74,17 +78,24 @@ def revision_and_json(
     body = to_json(query(database, clutch_id, *arguments))
     if database.answers is not None and not arguments:
         name = name_of(query)
-        database.answers.keep(
-            SharedAnswer(clutch_id=clutch_id, name=name, release=CODE_VERSION, revision=revision, body=body)
-        )
+        made = SharedAnswer(clutch_id=clutch_id, name=name, release=CODE_VERSION, revision=revision, body=body)
+        try:
+            database.answers.keep(made)
+        except StorageError as error:  # as after a restart of the server: it is an answer all the same
+            _log.warning("an answer could not be shared: %s", error)
     return revision, body
 
 
 def shared_answer(database: Database, query: Callable[..., object], clutch_id: str) -> tuple[int, bytes] | None:
-    """The last answer that any of the services on this database computed without arguments, and its revision."""
+    """The last answer that any of the services on this database computed without arguments, and its revision; None too
+    where it cannot be read now: it is computed then."""
     if database.answers is None:
         return None
-    kept = database.answers.newest(clutch_id, name_of(query), CODE_VERSION)
+    try:
+        kept = database.answers.newest(clutch_id, name_of(query), CODE_VERSION)
+    except StorageError as error:
+        _log.warning("a shared answer could not be read: %s", error)
+        return None
     return None if kept is None else (kept.revision, kept.body)
 
 

@@ -11,7 +11,9 @@ from service.queries.cache import AnswerCache, revision_and_json, shared_answer,
 from service.web.limits import MOST_CACHED_BYTES
 from storage import clutches
 from storage.engine.database import Database
+from storage.engine.errors import StorageUnavailable
 from storage.engine.opening import open_database
+from storage.engine.shared_answers import SharedAnswer, SharedAnswers
 from tests.storage.samples import clutch_row
 
 
@@ -134,3 +136,25 @@ def test_of_several_services_on_a_server_one_computes(on_server: Database) -> No
         assert revision_and_json(on_server, count, "c1", ("ukf",)) == (1, b'{"computed":3,"arguments":1}')
         assert revision_and_json(other, count, "c1", ("ukf",)) == (1, b'{"computed":4,"arguments":1}')
     assert len(computed) == 4
+
+
+class Unreachable(SharedAnswers):
+    """Those of a server that has just been restarted."""
+
+    def newest(self, clutch_id: str, name: str, release: str) -> SharedAnswer | None:  # noqa: ARG002
+        raise StorageUnavailable("the connection is gone")
+
+    def keep(self, answer: SharedAnswer) -> None:  # noqa: ARG002
+        raise StorageUnavailable("the connection is gone")
+
+
+def test_an_answer_that_cannot_be_shared_is_an_answer_all_the_same(
+    in_file: Database, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def query(database: Database, clutch_id: str) -> dict[str, str]:  # noqa: ARG001
+        return {"clutch_id": clutch_id}
+
+    monkeypatch.setattr(in_file, "answers", Unreachable())
+    assert shared_answer(in_file, query, "c1") is None
+    assert revision_and_json(in_file, query, "c1", ()) == (0, b'{"clutch_id":"c1"}')
+    assert [record.levelname for record in caplog.records] == ["WARNING"] * 3
