@@ -172,11 +172,12 @@ async def _computed(
         return context.workers.submit(among, revision_and_json, query, clutch_id, arguments, turn=turn)
 
     key = (clutch_id, name_of(query), *arguments)
+    revision = _revision(request, clutch_id)
     if not arguments and not context.revalidation.knows(key):
         shared = await run_in_threadpool(shared_answer, context.database, query, clutch_id)
         if shared is not None:
             context.revalidation.begin(key, *shared)
-    return await context.revalidation.answer(key, _revision(request, clutch_id), compute, wait=wait)
+    return await context.revalidation.answer(key, revision, compute, wait=wait)
 
 
 async def begin_computed(context: Context, clutch_id: str, query: Callable[..., dict[str, Any]]) -> None:

@@ -34,12 +34,18 @@ class _Entry:
     making: "asyncio.Task[None] | None" = None
     renewing: "asyncio.Task[None] | None" = None
 
+    @property
+    def size(self) -> int:
+        """Bytes of the answer."""
+        return 0 if self.answer is None else len(self.answer.body)
+
 
 class Revalidation:
     """The last answer by key; the least lately asked for goes first. Used from the event loop alone."""
 
     def __init__(self, most_bytes: int) -> None:
         self._most = most_bytes
+        self._held = 0
         self._entries: OrderedDict[Hashable, _Entry] = OrderedDict()
 
     def held(self, key: Hashable, revision: int) -> Answer | None:
@@ -53,8 +59,8 @@ class Revalidation:
 
     def begin(self, key: Hashable, revision: int, body: bytes) -> None:
         """Hold an answer that was made elsewhere, where none is known."""
-        self._entries.setdefault(key, _Entry(revision=revision, answer=Answer.of(body)))
-        self._trim()
+        if key not in self._entries:
+            self._put(key, _Entry(revision=revision, answer=Answer.of(body)))
 
     async def answer(self, key: Hashable, revision: int, compute: Compute, *, wait: float) -> tuple[int, Answer]:
         """The answer at `revision` or later, or the last one where it is not there within `wait` [s]; and its revision.
@@ -84,15 +90,14 @@ class Revalidation:
                 break
             if making.done():
                 making.result()
-        self._entries[key] = entry
-        self._entries.move_to_end(key)
+        self._put(key, entry)
         return entry.revision, answer
 
     def _begin(self, key: Hashable, entry: _Entry, compute: Compute, *, waits: bool) -> "asyncio.Task[None]":
         """Have the next answer made, for one who waits or for later. Raises BusyError."""
         making = asyncio.create_task(self._make(key, entry, compute(waits), waits=waits))
         making.add_done_callback(_logged)
-        self._entries[key] = entry
+        self._put(key, entry)
         if waits:
             entry.making = making
         else:
@@ -104,7 +109,7 @@ class Revalidation:
             revision, body = await asyncio.wrap_future(computing)
         except BaseException:
             if entry.answer is None:
-                self._entries.pop(key, None)
+                self._drop(key)
             raise
         finally:
             if waits:
@@ -113,15 +118,21 @@ class Revalidation:
                 entry.renewing = None
         if revision < entry.revision:  # a later one was quicker
             return
+        self._drop(key)
         entry.revision, entry.answer = revision, Answer.of(body)
-        self._trim()
+        self._put(key, entry)
 
-    def _trim(self) -> None:
-        while len(self._entries) > 1 and self._held() > self._most:
-            self._entries.popitem(last=False)
+    def _put(self, key: Hashable, entry: _Entry) -> None:
+        self._drop(key)
+        self._entries[key] = entry
+        self._held += entry.size
+        while len(self._entries) > 1 and self._held > self._most:
+            self._drop(next(iter(self._entries)))
 
-    def _held(self) -> int:
-        return sum(len(entry.answer.body) for entry in self._entries.values() if entry.answer is not None)
+    def _drop(self, key: Hashable) -> None:
+        dropped = self._entries.pop(key, None)
+        if dropped is not None:
+            self._held -= dropped.size
 
 
 async def _one_ends(making: "asyncio.Task[None]", renewing: "asyncio.Task[None] | None", seconds: float) -> bool:

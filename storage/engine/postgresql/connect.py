@@ -16,8 +16,17 @@ SCHEME = "postgresql+psycopg"
 #: Connections that a process keeps, and how many more it makes for a while. Chosen: a service's threads seldom ask at once,
 #: and with its eight other processes it stays well under the 100 connections that a server has by default.
 _KEPT, _MORE = 4, 12
-#: [s] How long a connection may take to be made. Chosen; no table.
-_CONNECT_SECONDS = 10
+#: Connections for single statements: one at a time for all requests, others where answers are shared.
+_ASKING_KEPT, _ASKING_MORE = 1, 2
+#: What libpq is told where the address does not say: how long [s] a connection may take to be made, and when a server whose
+#: machine is lost counts as gone: after a minute, [s] where nothing is under way, [ms] where something is. Chosen; no table.
+_CONNECTION = {
+    "connect_timeout": 10,
+    "keepalives_idle": 30,
+    "keepalives_interval": 10,
+    "keepalives_count": 3,
+    "tcp_user_timeout": 60_000,
+}
 #: Settings of every session. Where the machine of a writer is lost, the server notices within a minute and ends its
 #: transaction, and with it the lock. What is acknowledged is on the disk, unless a server promises more (replicas).
 _SESSION = """
@@ -62,13 +71,15 @@ def make_engine(address: URL, lock_timeout: float) -> Engine:
 def make_asking_engine(address: URL, lock_timeout: float) -> Engine:
     """An engine for questions of one statement: no transaction, and no look at whether the connection is still there, each
     of which would be a way to the server and back."""
-    return _engine(address, lock_timeout, pool_size=1, max_overflow=_MORE, isolation_level="AUTOCOMMIT")
+    return _engine(
+        address, lock_timeout, pool_size=_ASKING_KEPT, max_overflow=_ASKING_MORE, isolation_level="AUTOCOMMIT"
+    )
 
 
 def _engine(address: URL, lock_timeout: float, **options: Any) -> Engine:
-    waited = {} if "connect_timeout" in address.query else {"connect_timeout": _CONNECT_SECONDS}
+    unsaid = {name: value for name, value in _CONNECTION.items() if name not in address.query}
     try:
-        engine = create_engine(address, connect_args=waited, pool_timeout=lock_timeout, **options)
+        engine = create_engine(address, connect_args=unsaid, pool_timeout=lock_timeout, **options)
     except ModuleNotFoundError as error:
         raise StorageUnavailable("PostgreSQL needs a driver: pip install clutchlife[postgresql]") from error
     session = _SESSION.format(lock_timeout=max(1, round(1000 * lock_timeout)))

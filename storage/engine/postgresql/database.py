@@ -14,6 +14,7 @@ from sqlalchemy.exc import ProgrammingError, SQLAlchemyError
 from storage.engine.database import Database
 from storage.engine.errors import DatabaseTooOld, StorageError, StorageUnavailable
 from storage.engine.integrity import refuse_newer
+from storage.engine.postgresql.asking import Asking
 from storage.engine.postgresql.connect import make_asking_engine, make_engine, shown
 from storage.engine.postgresql.driver_errors import translated
 from storage.engine.postgresql.locks import hold_service_lock, migration_lock, write_lock
@@ -39,16 +40,18 @@ class ServerDatabase(Database):
         self._lock_timeout = lock_timeout
         self._closed = False
         self._engine = make_engine(address, lock_timeout)
-        if serving:
-            hold_service_lock(self._engine, self.name)
         self._readers = self._engine.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
         # a statement of a writer sees what was committed before the lock was free
         self._writers = self._engine.execution_options(
             isolation_level="READ COMMITTED", postgresql_readonly=not writable
         )
-        self._asking = make_asking_engine(address, lock_timeout)
-        self.watch = ServerWatch(self._asking, self.name)
-        self.answers = ServerAnswers(self._asking, self.name)
+        asking = make_asking_engine(address, lock_timeout)
+        if serving:
+            for engine in (self._engine, asking):
+                hold_service_lock(engine, self.name)
+        self._asking = Asking(asking, self.name)
+        self.watch = ServerWatch(self._asking)
+        self.answers: ServerAnswers = ServerAnswers(self._asking)
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
@@ -89,7 +92,7 @@ class ServerDatabase(Database):
         self._closed = True
         self._engine.dispose()
         self.watch.close()
-        self._asking.dispose()
+        self._asking.close()
 
     def migrate(self) -> None:
         """Make the tables of an empty database, or run the steps that it lacks, not under a running service."""
@@ -148,6 +151,8 @@ def open_server(address: URL, *, lock_timeout: float, serving: bool = False) -> 
     """
     with closing(ServerDatabase(address, lock_timeout=lock_timeout)) as database:
         database.migrate()
+        if serving:
+            database.answers.forget_where_no_service_runs()
     database = ServerDatabase(address, lock_timeout=lock_timeout, serving=serving)
     try:
         with database.reading() as connection:

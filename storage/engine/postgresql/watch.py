@@ -8,10 +8,10 @@ import asyncio
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
-from sqlalchemy import Engine, Row, text
-from sqlalchemy.exc import DBAPIError
+from sqlalchemy import text
 
-from storage.engine.postgresql.driver_errors import translated
+from storage.engine.errors import StorageUnavailable
+from storage.engine.postgresql.asking import Asking
 from storage.engine.watch import Glance, Question, Watch, granted
 
 _GLANCE = text("""
@@ -24,14 +24,14 @@ SELECT (SELECT number FROM commits) AS version,
 
 
 class ServerWatch(Watch):
-    """The questions, of connections that begin no transaction: `engine` is for such (`connect.make_asking_engine`)."""
+    """The questions, one at a time for all who ask from the event loop."""
 
-    def __init__(self, engine: Engine, name: str) -> None:
-        self._engine = engine
-        self._name = name
+    def __init__(self, asking: Asking) -> None:
+        self._server = asking
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="watch")
         self._waiting: list[tuple[Question, asyncio.Future[Glance]]] = []
         self._asking: asyncio.Task[None] | None = None
+        self._closed = False
 
     def glances(self, questions: Sequence[Question]) -> list[Glance]:
         """What is so now, question by question, all at the same moment."""
@@ -44,13 +44,12 @@ class ServerWatch(Watch):
             }
         )
         secrets = sorted({question.secret_sha256 for question in questions if question.secret_sha256 is not None})
-        with translated(self._name):
-            row = self._row({"clutches": clutches, "secrets": secrets})
-        revisions, keys = row.revisions or {}, row.keys or {}
+        [row] = self._server.rows(_GLANCE, {"clutches": clutches, "secrets": secrets})
+        revisions, keys = row["revisions"] or {}, row["keys"] or {}
         return [
             Glance(
-                version=row.version or 0,
-                keys_are_needed=row.keys_are_needed,
+                version=row["version"] or 0,
+                keys_are_needed=row["keys_are_needed"],
                 key=granted(tuple(keys[question.secret_sha256])) if question.secret_sha256 in keys else None,
                 revision=revisions.get(question.clutch_id),
             )
@@ -59,6 +58,8 @@ class ServerWatch(Watch):
 
     async def look(self, question: Question) -> Glance:
         """What is so now, for one who asks from the event loop."""
+        if self._closed:
+            raise StorageUnavailable("the database has been closed")
         answer: asyncio.Future[Glance] = asyncio.get_running_loop().create_future()
         self._waiting.append((question, answer))
         if self._asking is None:
@@ -66,36 +67,29 @@ class ServerWatch(Watch):
         return await answer
 
     def close(self) -> None:
-        """End the thread; nobody may ask any more."""
+        """End the thread; who asks from then on is told that the database was closed. May be called twice."""
+        self._closed = True
         self._thread.shutdown()
 
     async def _ask(self) -> None:
         """Ask for all who wait, until nobody does."""
-        while self._waiting:
-            questions, self._waiting = self._waiting, []
-            try:
-                glances = await asyncio.get_running_loop().run_in_executor(
-                    self._thread, self.glances, [question for question, _ in questions]
-                )
-            except Exception as error:  # noqa: BLE001  (raised again for each who asked)
-                for _, answer in questions:
-                    if not answer.done():
-                        answer.set_exception(error)
-            else:
-                for (_, answer), glance in zip(questions, glances, strict=True):
-                    if not answer.done():  # who asked may have gone
-                        answer.set_result(glance)
-        self._asking = None
-
-    def _row(self, values: dict[str, list[str]]) -> Row[tuple[object, ...]]:
         try:
-            return self._executed(values)
-        except DBAPIError as error:
-            if not error.connection_invalidated:
-                raise
-        # the server was started again: the connections of before have been dropped
-        return self._executed(values)
+            while self._waiting:
+                questions, self._waiting = self._waiting, []
+                await self._ask_for(questions)
+        finally:
+            self._asking = None
 
-    def _executed(self, values: dict[str, list[str]]) -> Row[tuple[object, ...]]:
-        with self._engine.connect() as connection:
-            return connection.execute(_GLANCE, values).one()
+    async def _ask_for(self, questions: list[tuple[Question, asyncio.Future[Glance]]]) -> None:
+        try:
+            glances = await asyncio.get_running_loop().run_in_executor(
+                self._thread, self.glances, [question for question, _ in questions]
+            )
+        except Exception as error:  # noqa: BLE001  (raised again for each who asked)
+            for _, answer in questions:
+                if not answer.done():
+                    answer.set_exception(error)
+        else:
+            for (_, answer), glance in zip(questions, glances, strict=True):
+                if not answer.done():  # who asked may have gone
+                    answer.set_result(glance)

@@ -157,3 +157,18 @@ def test_answers_begun_elsewhere_are_bounded_too() -> None:
     for number in range(50):
         kept.begin(number, 1, b"x" * 100)
     assert [number for number in range(50) if kept.knows(number)] == list(range(40, 50))
+
+
+def test_an_answer_that_is_made_again_and_again_counts_once() -> None:
+    async def scenario(kept: Revalidation, worker: Worker) -> None:
+        kept.begin("other", 1, b"four")
+        for revision in range(1, 20):
+            asking = asyncio.create_task(kept.answer("a", revision, worker.compute, wait=10))
+            await _settled()
+            await worker.gives(revision, b"four")
+            assert await asking == (revision, Answer.of(b"four"))
+        assert kept.knows("other")
+        kept.begin("third", 1, b"four")
+        assert [name for name in ("other", "a", "third") if kept.knows(name)] == ["a", "third"]
+
+    run(scenario)

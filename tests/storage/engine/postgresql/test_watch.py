@@ -11,6 +11,7 @@ from sqlalchemy import create_engine
 from storage import clutches
 from storage.engine.database import Database
 from storage.engine.errors import StorageUnavailable
+from storage.engine.postgresql.asking import Asking
 from storage.engine.postgresql.watch import ServerWatch
 from storage.engine.watch import Glance, Question
 from tests.storage.samples import clutch_row
@@ -20,7 +21,7 @@ class Slow(ServerWatch):
     """A server that answers when it is let: the number of the statement is the version."""
 
     def __init__(self) -> None:
-        super().__init__(create_engine("postgresql+psycopg://"), "slow")
+        super().__init__(Asking(create_engine("postgresql+psycopg://"), "slow"))
         self.statements: list[list[Question]] = []
         self.may_answer = threading.Semaphore(0)
         self.fails = False
