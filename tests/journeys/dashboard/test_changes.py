@@ -168,6 +168,10 @@ def test_a_held_run_is_confirmed_and_withdrawn_and_restored(
 
 
 def test_a_reason_is_asked_for_and_a_refusal_is_shown(watched: Watched, server: Server) -> None:
+    # before the page is loaded: a request that follows at once may pass by what is put before it later
+    watched.page.route(
+        "**/withdraw", lambda route: route.fulfill(status=409, json={"title": "Not possible now", "status": 409})
+    )
     page = opened(watched)
     last = run_in(page, "test-6")
     last.get_by_role("button", name="Withdraw").click()
@@ -175,9 +179,6 @@ def test_a_reason_is_asked_for_and_a_refusal_is_shown(watched: Watched, server: 
     dialog.get_by_role("button", name="Withdraw").click()
     assert dialog.is_visible()
     dialog.get_by_label("Reason").fill("to see a refusal")
-    page.route(
-        "**/withdraw", lambda route: route.fulfill(status=409, json={"title": "Not possible now", "status": 409})
-    )
     page.keyboard.press("Enter")
     dialog.get_by_text("Nothing was changed. Not possible now").wait_for()
     page.keyboard.press("Escape")

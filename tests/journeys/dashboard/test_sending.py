@@ -204,7 +204,6 @@ def test_what_is_wrong_with_a_file_is_said_by_row(watched: Watched, server: Serv
 
 
 def test_a_busy_service_is_asked_again(watched: Watched, server: Server) -> None:
-    page = opened(watched, "/clutches/other")
     busy = ["1", "1"]
 
     def answer(route: Route) -> None:
@@ -214,7 +213,8 @@ def test_a_busy_service_is_asked_again(watched: Watched, server: Server) -> None
         else:
             route.continue_()
 
-    page.route("**/runs/file?*", answer)
+    watched.page.route("**/runs/file?*", answer)  # before the page is loaded, else a request may pass by it
+    page = opened(watched, "/clutches/other")
     drop(page, {"stationary-100.csv": csv_text(100)})
     page.get_by_role("dialog").get_by_role("button", name="Send").click()
     page.get_by_text("at 100 cycles").last.wait_for()
