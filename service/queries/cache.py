@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from service.lists import LONGEST_CURSOR
-from service.settings import CODE_VERSION
+from service.settings import build
 from storage import clutches
 from storage.encoding.json_text import to_text
 from storage.engine.database import Database
@@ -78,7 +78,7 @@ def revision_and_json(
     body = to_json(query(database, clutch_id, *arguments))
     if database.answers is not None and not arguments:
         name = name_of(query)
-        made = SharedAnswer(clutch_id=clutch_id, name=name, release=CODE_VERSION, revision=revision, body=body)
+        made = SharedAnswer(clutch_id=clutch_id, name=name, release=build(), revision=revision, body=body)
         try:
             database.answers.keep(made)
         except StorageError as error:  # as after a restart of the server: it is an answer all the same
@@ -92,7 +92,7 @@ def shared_answer(database: Database, query: Callable[..., object], clutch_id: s
     if database.answers is None:
         return None
     try:
-        kept = database.answers.newest(clutch_id, name_of(query), CODE_VERSION)
+        kept = database.answers.newest(clutch_id, name_of(query), build())
     except StorageError as error:
         _log.warning("a shared answer could not be read: %s", error)
         return None

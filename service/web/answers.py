@@ -114,8 +114,7 @@ async def computed_answer(
     lane: Lane = Lane.ANSWERS,
 ) -> Response:
     """A GET's answer that takes long: `query(database, clutch_id, *arguments)`, computed by a worker of that lane; a page of
-    its items where one was asked for. `prefer` is what the sender prefers. Raises NotFoundError.
-    """
+    its items where one was asked for. `prefer` is what the sender prefers. Raises NotFoundError."""
     after = from_cursor(cursor)
     revision, whole = await _computed(request, context, clutch_id, query, arguments, prefer, lane)
     if limit == ALL_ITEMS and after is None:

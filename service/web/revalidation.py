@@ -108,7 +108,7 @@ class Revalidation:
         try:
             revision, body = await asyncio.wrap_future(computing)
         except BaseException:
-            if entry.answer is None:
+            if entry.answer is None and self._entries.get(key) is entry:
                 self._drop(key)
             raise
         finally:
@@ -118,16 +118,22 @@ class Revalidation:
                 entry.renewing = None
         if revision < entry.revision:  # a later one was quicker
             return
-        self._drop(key)
+        is_held = self._entries.get(key) is entry  # else who waits for it holds it again
+        if is_held:
+            self._drop(key)
         entry.revision, entry.answer = revision, Answer.of(body)
-        self._put(key, entry)
+        if is_held:
+            self._put(key, entry)
 
     def _put(self, key: Hashable, entry: _Entry) -> None:
         self._drop(key)
         self._entries[key] = entry
         self._held += entry.size
-        while len(self._entries) > 1 and self._held > self._most:
-            self._drop(next(iter(self._entries)))
+        while self._held > self._most:
+            oldest = next((other for other, kept in self._entries.items() if kept.size > 0 and other != key), None)
+            if oldest is None:
+                break
+            self._drop(oldest)
 
     def _drop(self, key: Hashable) -> None:
         dropped = self._entries.pop(key, None)

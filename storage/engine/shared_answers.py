@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SharedAnswer:
-    """The answer of that name about a clutch, computed by that release from that revision of the clutch."""
+    """The answer of that name about a clutch, computed by that build of a release from that revision of the clutch."""
 
     clutch_id: str
     name: str
@@ -20,7 +20,7 @@ class SharedAnswers(ABC):
 
     @abstractmethod
     def newest(self, clutch_id: str, name: str, release: str) -> SharedAnswer | None:
-        """The last one that a service of that release computed, None where there is none."""
+        """The last one that a service of that build computed, None where there is none."""
 
     @abstractmethod
     def keep(self, answer: SharedAnswer) -> None:

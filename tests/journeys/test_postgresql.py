@@ -171,7 +171,6 @@ def test_commands_run_beside_a_service(postgresql: PostgresServer) -> None:
         assert [ONCE.get(f"{server.url}/v1/clutches", headers=each).status_code for each in ({}, headers)] == [401, 200]
         assert clutchlife("key", "list", "--database", address).startswith(key.split("_")[1])
         assert ONCE.get(f"{server.url}/v1/clutches/%00", headers=headers).status_code == 422
-        assert ONCE.get(f"{server.url}/v1/clutches/%00/degradation", headers=headers).status_code == 404
         assert ONCE.get(f"{server.url}/readyz").json()["journal_mode"] is None
 
 

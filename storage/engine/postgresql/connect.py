@@ -16,15 +16,15 @@ SCHEME = "postgresql+psycopg"
 #: Connections that a process keeps, and how many more it makes for a while. Chosen: a service's threads seldom ask at once,
 #: and with its eight other processes it stays well under the 100 connections that a server has by default.
 _KEPT, _MORE = 4, 12
-#: Connections for single statements: one at a time for all requests, others where answers are shared.
-_ASKING_KEPT, _ASKING_MORE = 1, 2
-#: What libpq is told where the address does not say: how long [s] a connection may take to be made, and when a server whose
-#: machine is lost counts as gone: after a minute, [s] where nothing is under way, [ms] where something is. Chosen; no table.
+#: Connections for single statements: one of them asks for all requests, the others are of answers that are shared. All are
+#: kept: one that a service makes while a migration waits for its end waits behind it.
+_KEPT_FOR_STATEMENTS = 3
+#: What libpq is told where the address does not say: how long [s] a connection may take to be made, after how long [ms] a
+#: server whose machine is lost counts as gone, and how often [s] one that says nothing is asked. Chosen; no table.
 _CONNECTION = {
     "connect_timeout": 10,
     "keepalives_idle": 30,
     "keepalives_interval": 10,
-    "keepalives_count": 3,
     "tcp_user_timeout": 60_000,
 }
 #: Settings of every session. Where the machine of a writer is lost, the server notices within a minute and ends its
@@ -34,6 +34,7 @@ SELECT set_config('lock_timeout', '{lock_timeout:d}', false),
        set_config('tcp_keepalives_idle', '30', false),
        set_config('tcp_keepalives_interval', '10', false),
        set_config('tcp_keepalives_count', '3', false),
+       set_config('tcp_user_timeout', '60000', false),
        CASE WHEN current_setting('synchronous_commit') = 'off' THEN set_config('synchronous_commit', 'on', false) END
 """
 
@@ -68,12 +69,10 @@ def make_engine(address: URL, lock_timeout: float) -> Engine:
     return _engine(address, lock_timeout, pool_size=_KEPT, max_overflow=_MORE, pool_pre_ping=True)
 
 
-def make_asking_engine(address: URL, lock_timeout: float) -> Engine:
+def make_autocommit_engine(address: URL, lock_timeout: float) -> Engine:
     """An engine for questions of one statement: no transaction, and no look at whether the connection is still there, each
     of which would be a way to the server and back."""
-    return _engine(
-        address, lock_timeout, pool_size=_ASKING_KEPT, max_overflow=_ASKING_MORE, isolation_level="AUTOCOMMIT"
-    )
+    return _engine(address, lock_timeout, pool_size=_KEPT_FOR_STATEMENTS, max_overflow=0, isolation_level="AUTOCOMMIT")
 
 
 def _engine(address: URL, lock_timeout: float, **options: Any) -> Engine:

@@ -14,12 +14,12 @@ from sqlalchemy.exc import ProgrammingError, SQLAlchemyError
 from storage.engine.database import Database
 from storage.engine.errors import DatabaseTooOld, StorageError, StorageUnavailable
 from storage.engine.integrity import refuse_newer
-from storage.engine.postgresql.asking import Asking
-from storage.engine.postgresql.connect import make_asking_engine, make_engine, shown
+from storage.engine.postgresql.connect import make_autocommit_engine, make_engine, shown
 from storage.engine.postgresql.driver_errors import translated
 from storage.engine.postgresql.locks import hold_service_lock, migration_lock, write_lock
 from storage.engine.postgresql.server_tables import commits, count_commit, server_tables
 from storage.engine.postgresql.shared_answers import ServerAnswers
+from storage.engine.postgresql.single_statements import SingleStatements
 from storage.engine.postgresql.watch import ServerWatch
 from storage.migrations.upgrade import current, head, make_all, upgrade
 
@@ -45,13 +45,13 @@ class ServerDatabase(Database):
         self._writers = self._engine.execution_options(
             isolation_level="READ COMMITTED", postgresql_readonly=not writable
         )
-        asking = make_asking_engine(address, lock_timeout)
+        autocommit = make_autocommit_engine(address, lock_timeout)
         if serving:
-            for engine in (self._engine, asking):
+            for engine in (self._engine, autocommit):
                 hold_service_lock(engine, self.name)
-        self._asking = Asking(asking, self.name)
-        self.watch = ServerWatch(self._asking)
-        self.answers: ServerAnswers = ServerAnswers(self._asking)
+        self._statements = SingleStatements(autocommit, self.name)
+        self.watch = ServerWatch(self._statements)
+        self.answers = ServerAnswers(self._statements)
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
@@ -91,8 +91,8 @@ class ServerDatabase(Database):
         """Close all connections; any later use raises StorageUnavailable. May be called twice."""
         self._closed = True
         self._engine.dispose()
+        self._statements.close()
         self.watch.close()
-        self._asking.close()
 
     def migrate(self) -> None:
         """Make the tables of an empty database, or run the steps that it lacks, not under a running service."""
@@ -151,8 +151,6 @@ def open_server(address: URL, *, lock_timeout: float, serving: bool = False) -> 
     """
     with closing(ServerDatabase(address, lock_timeout=lock_timeout)) as database:
         database.migrate()
-        if serving:
-            database.answers.forget_where_no_service_runs()
     database = ServerDatabase(address, lock_timeout=lock_timeout, serving=serving)
     try:
         with database.reading() as connection:

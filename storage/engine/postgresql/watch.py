@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from sqlalchemy import text
 
 from storage.engine.errors import StorageUnavailable
-from storage.engine.postgresql.asking import Asking
+from storage.engine.postgresql.single_statements import SingleStatements
 from storage.engine.watch import Glance, Question, Watch, granted
 
 _GLANCE = text("""
@@ -26,8 +26,8 @@ SELECT (SELECT number FROM commits) AS version,
 class ServerWatch(Watch):
     """The questions, one at a time for all who ask from the event loop."""
 
-    def __init__(self, asking: Asking) -> None:
-        self._server = asking
+    def __init__(self, statements: SingleStatements) -> None:
+        self._statements = statements
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="watch")
         self._waiting: list[tuple[Question, asyncio.Future[Glance]]] = []
         self._asking: asyncio.Task[None] | None = None
@@ -44,7 +44,7 @@ class ServerWatch(Watch):
             }
         )
         secrets = sorted({question.secret_sha256 for question in questions if question.secret_sha256 is not None})
-        [row] = self._server.rows(_GLANCE, {"clutches": clutches, "secrets": secrets})
+        [row] = self._statements.rows(_GLANCE, {"clutches": clutches, "secrets": secrets})
         revisions, keys = row["revisions"] or {}, row["keys"] or {}
         return [
             Glance(
@@ -58,8 +58,7 @@ class ServerWatch(Watch):
 
     async def look(self, question: Question) -> Glance:
         """What is so now, for one who asks from the event loop."""
-        if self._closed:
-            raise StorageUnavailable("the database has been closed")
+        self._refuse_closed()
         answer: asyncio.Future[Glance] = asyncio.get_running_loop().create_future()
         self._waiting.append((question, answer))
         if self._asking is None:
@@ -82,6 +81,7 @@ class ServerWatch(Watch):
 
     async def _ask_for(self, questions: list[tuple[Question, asyncio.Future[Glance]]]) -> None:
         try:
+            self._refuse_closed()
             glances = await asyncio.get_running_loop().run_in_executor(
                 self._thread, self.glances, [question for question, _ in questions]
             )
@@ -93,3 +93,7 @@ class ServerWatch(Watch):
             for (_, answer), glance in zip(questions, glances, strict=True):
                 if not answer.done():  # who asked may have gone
                     answer.set_result(glance)
+
+    def _refuse_closed(self) -> None:
+        if self._closed:
+            raise StorageUnavailable("the database has been closed")

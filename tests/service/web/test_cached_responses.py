@@ -2,6 +2,7 @@
 
 import tempfile
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -101,6 +102,23 @@ def test_nothing_is_made_twice_for_one_revision(client: TestClient, monkeypatch:
 def test_an_unknown_clutch_is_unknown_however_often_it_is_asked_for(client: TestClient) -> None:
     for name in ASKED:
         assert [client.get(f"/v1/clutches/nobody/{name}").status_code for _ in range(2)] == [404, 404]
+
+
+def test_of_an_unknown_clutch_nothing_is_taken_over_from_another_service(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+
+    def kept(_database: object, query: Callable[..., object], clutch_id: str) -> tuple[int, bytes]:
+        asked.append((query.__name__, clutch_id))
+        return 0, b'{"items":[]}'
+
+    monkeypatch.setattr(answers, "shared_answer", kept)
+    assert client.get("/v1/clutches/nobody/degradation").status_code == 404
+    assert asked == []
+    post(client, 1000.0)
+    assert client.get(f"{BASE}/surfaces").status_code == 200
+    assert asked == [("surface", "c1")]
 
 
 def test_idle_workers_on_a_busy_machine_are_waited_for_for_a_while(

@@ -172,3 +172,19 @@ def test_an_answer_that_is_made_again_and_again_counts_once() -> None:
         assert [name for name in ("other", "a", "third") if kept.knows(name)] == ["a", "third"]
 
     run(scenario)
+
+
+def test_what_is_being_made_is_not_made_twice_to_make_room() -> None:
+    async def scenario(kept: Revalidation, worker: Worker) -> None:
+        first = asyncio.create_task(kept.answer("made", 1, worker.compute, wait=0))
+        await _settled()
+        for name in ("a", "b", "c"):
+            kept.begin(name, 1, b"four")
+        second = asyncio.create_task(kept.answer("made", 1, worker.compute, wait=0))
+        await _settled()
+        assert [name for name in ("made", "a", "b", "c") if kept.knows(name)] == ["made", "b", "c"]
+        await worker.gives(1, b"one")
+        assert await first == await second == (1, Answer.of(b"one"))
+        assert len(worker.asked) == 1
+
+    run(scenario)

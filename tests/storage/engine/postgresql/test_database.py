@@ -1,6 +1,5 @@
 """A database on a server: how it comes to be, who may use it, and what is said where it cannot be used."""
 
-import asyncio
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -22,7 +21,6 @@ from storage.engine.errors import (
 )
 from storage.engine.integrity import other_schema
 from storage.engine.opening import database_exists, find_database, open_database
-from storage.engine.watch import Question
 from storage.migrations.upgrade import current, head
 from tests.storage.engine.postgresql.server import PostgresServer, postgresql_server
 from tests.storage.samples import clutch_row, store_run, take_back
@@ -104,41 +102,6 @@ def test_a_database_of_an_earlier_revision_is_not_migrated_under_a_service(datab
         with database.reading() as connection:
             assert current(connection) == head()
             assert other_schema(connection) == []
-
-
-def test_every_connection_of_a_service_says_that_it_runs(database: Database) -> None:
-    """Those for single statements too: one of them outlives the others where no transaction is begun for long."""
-    with closing(open_database(database.url, serving=True)) as service, service.reading():
-        service.watch.glance()
-        with database.reading() as connection:
-            locks = connection.execute(
-                text("SELECT pid FROM pg_locks WHERE locktype = 'advisory' AND mode = 'ShareLock'")
-            )
-            assert len(locks.all()) == 2
-
-
-def test_a_server_whose_machine_is_lost_counts_as_gone_after_a_while(database: Database) -> None:
-    """Else a question that is under way waits for a quarter of an hour, and all requests with it."""
-    said = database.url + "&tcp_user_timeout=5000"
-    for url, milliseconds in ((database.url, "60000"), (said, "5000")):
-        with closing(open_database(url)) as opened, opened.reading() as connection:
-            told = connection.connection.dbapi_connection.info.get_parameters()  # type: ignore[union-attr]
-            assert told["tcp_user_timeout"] == milliseconds
-            assert (told["keepalives_idle"], told["keepalives_interval"], told["keepalives_count"]) == ("30", "10", "3")
-
-
-def test_who_asks_a_database_that_was_closed_is_told_so(database: Database) -> None:
-    opened = open_database(database.url)
-    opened.close()
-    opened.close()
-    assert opened.answers is not None
-    for ask in (
-        opened.watch.glance,
-        lambda: asyncio.run(opened.watch.look(Question("a"))),
-        lambda: opened.answers.newest("a", "degradation", "1.0"),
-    ):
-        with pytest.raises(StorageUnavailable, match="has been closed"):
-            ask()
 
 
 def test_what_came_with_a_later_revision_is_not_found(database: Database) -> None:

@@ -40,32 +40,6 @@ def test_another_release_computes_its_own_and_replaces_it(shared: SharedAnswers)
     assert shared.newest("c1", "degradation", "2.0") == replace(FIRST, release="2.0", revision=2)
 
 
-def test_the_first_service_to_start_begins_without_answers_of_before(on_server: Database) -> None:
-    """Another build of the release may have computed them, or a dump was restored."""
-
-    def kept(database: Database) -> bool:
-        assert database.answers is not None
-        return database.answers.newest("c1", "degradation", "1.0") is not None
-
-    with closing(open_database(on_server.url, serving=True)) as first:
-        assert first.answers is not None
-        first.answers.keep(FIRST)
-        with closing(open_database(on_server.url, serving=True)) as second:
-            assert kept(second)
-        with closing(open_database(on_server.url)) as command:
-            assert kept(command)
-        assert kept(first)
-    with closing(open_database(on_server.url)) as command:
-        assert kept(command)
-    with closing(open_database(on_server.url, serving=True)) as next_one:
-        assert not kept(next_one)
-
-
-def test_no_start_of_a_service_waits_for_writers(on_server: Database) -> None:
-    with on_server.writing(), closing(open_database(on_server.url, lock_timeout=0.1, serving=True)) as service:
-        assert service.watch.glance().version == on_server.watch.glance().version
-
-
 def test_a_database_of_before_gets_the_table_and_counts_its_commits_on(on_server: Database) -> None:
     with on_server.writing() as connection:
         clutches.insert(connection, clutch_row("c1"))

@@ -11,7 +11,7 @@ from sqlalchemy import create_engine
 from storage import clutches
 from storage.engine.database import Database
 from storage.engine.errors import StorageUnavailable
-from storage.engine.postgresql.asking import Asking
+from storage.engine.postgresql.single_statements import SingleStatements
 from storage.engine.postgresql.watch import ServerWatch
 from storage.engine.watch import Glance, Question
 from tests.storage.samples import clutch_row
@@ -21,7 +21,7 @@ class Slow(ServerWatch):
     """A server that answers when it is let: the number of the statement is the version."""
 
     def __init__(self) -> None:
-        super().__init__(Asking(create_engine("postgresql+psycopg://"), "slow"))
+        super().__init__(SingleStatements(create_engine("postgresql+psycopg://"), "slow"))
         self.statements: list[list[Question]] = []
         self.may_answer = threading.Semaphore(0)
         self.fails = False
@@ -76,6 +76,21 @@ def test_what_fails_fails_for_those_who_asked_and_not_for_the_next(slow: Slow) -
         assert (await slow.look(Question("a"))).revision == 2
 
     asyncio.run(ask())
+
+
+def test_who_waits_when_it_is_closed_is_told_so(slow: Slow) -> None:
+    async def ask() -> list[Glance | BaseException]:
+        first = asyncio.create_task(slow.look(Question("a")))
+        await sent(slow, 1)
+        second = asyncio.create_task(slow.look(Question("b")))
+        await asyncio.sleep(0)
+        slow.may_answer.release()
+        slow.close()
+        return await asyncio.gather(first, second, return_exceptions=True)
+
+    first, second = asyncio.run(ask())
+    assert isinstance(first, Glance)
+    assert isinstance(second, StorageUnavailable)
 
 
 def test_a_database_answers_each_what_it_asked(database: Database) -> None:

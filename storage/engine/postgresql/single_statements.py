@@ -10,8 +10,8 @@ from storage.engine.errors import StorageUnavailable
 from storage.engine.postgresql.driver_errors import translated
 
 
-class Asking:
-    """Threads share it. `engine` is one of `connect.make_asking_engine`, `name` that of the database in errors."""
+class SingleStatements:
+    """Threads share it. `engine` is one of `connect.make_autocommit_engine`, `name` that of the database in errors."""
 
     def __init__(self, engine: Engine, name: str) -> None:
         self._engine = engine
@@ -23,8 +23,7 @@ class Asking:
 
         Raises StorageUnavailable where the server cannot be reached, or when this was closed.
         """
-        if self._closed:
-            raise StorageUnavailable(f"{self._name} has been closed")
+        self._refuse_closed()
         with translated(self._name):
             try:
                 return self._run(statement, values)
@@ -32,6 +31,7 @@ class Asking:
                 if not error.connection_invalidated:
                     raise
             # the server was started again: the connections of before have been dropped
+            self._refuse_closed()
             return self._run(statement, values)
 
     def close(self) -> None:
@@ -43,3 +43,7 @@ class Asking:
         with self._engine.connect() as connection:
             found = connection.execute(statement, values)
             return found.mappings().all() if found.returns_rows else ()
+
+    def _refuse_closed(self) -> None:
+        if self._closed:
+            raise StorageUnavailable(f"{self._name} has been closed")
