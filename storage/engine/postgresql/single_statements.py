@@ -41,8 +41,8 @@ class SingleStatements:
 
     def _run(self, statement: Executable, values: dict[str, Any]) -> Sequence[RowMapping]:
         with self._engine.connect() as connection:
-            found = connection.execute(statement, values)
-            return found.mappings().all() if found.returns_rows else ()
+            result = connection.execute(statement, values)
+            return result.mappings().all() if result.returns_rows else ()
 
     def _refuse_closed(self) -> None:
         if self._closed:
