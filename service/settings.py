@@ -1,13 +1,10 @@
 """What an operator may set, by environment or command line: every field of `Settings` as CLUTCHLIFE_ and its name."""
 
-import hashlib
 import os
 import re
 from collections.abc import Iterator
 from difflib import get_close_matches
-from functools import cache
 from importlib.metadata import version
-from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, ValidationError
@@ -18,8 +15,6 @@ from service.logging import LogFormat, LogLevel
 
 #: Stored beside every result: which code made it.
 CODE_VERSION = version("clutchlife")
-#: The folders of all code, beside each other wherever it is installed.
-_FOLDERS = [Path(__file__).parents[1] / name for name in ("models", "storage", "service")]
 
 PREFIX = "CLUTCHLIFE_"
 DATABASE_VARIABLE = f"{PREFIX}DATABASE"
@@ -29,15 +24,6 @@ _MIB = 2**20
 _ALIKE = 0.9
 #: A password in an address, greedy for one that holds an @ itself; and all options, which may hold one.
 _SECRETS = ((re.compile(r"://([^:/@]*):.*@"), r"://\1:***@"), (re.compile(r"\?.*"), "?***"))
-
-
-@cache
-def build() -> str:
-    """The release, and a digest of the code: two builds of a release may compute differently."""
-    digest = hashlib.sha256()
-    for path in sorted(path for folder in _FOLDERS for path in folder.rglob("*.py")):
-        digest.update(path.read_bytes())
-    return f"{CODE_VERSION}+{digest.hexdigest()[:16]}"
 
 
 class Settings(BaseSettings):

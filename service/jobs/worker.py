@@ -17,6 +17,7 @@ from storage.engine.opening import open_database
 LOADED_EARLY = (
     "filterpy.kalman",
     "service.workflows.ingest_run",
+    "service.queries.cache",
     "service.run_files.json_run",
     "service.run_files.upload",
 )

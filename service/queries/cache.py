@@ -8,13 +8,15 @@ import logging
 import re
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable
 from concurrent.futures import Future
 from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 from service.lists import LONGEST_CURSOR
-from service.settings import build
+from service.settings import CODE_VERSION
 from storage import clutches
 from storage.encoding.json_text import to_text
 from storage.engine.database import Database
@@ -25,6 +27,19 @@ _log = logging.getLogger("clutchlife")
 
 #: The end of a list that is answered as JSON and goes on: the cursor of its next page.
 _GOES_ON = re.compile(rb'"next":"([A-Za-z0-9_-]+)"\}$')
+
+
+def build_of(folders: Iterable[Path]) -> str:
+    """The release, and a digest of the code in these folders and of the numerical libraries, by which two builds differ."""
+    digest = hashlib.sha256(f"numpy {version('numpy')} scipy {version('scipy')}".encode())
+    for folder in folders:
+        for path in sorted(folder.rglob("*.py")):
+            digest.update(f"\0{folder.name}/{path.relative_to(folder)}\0".encode() + path.read_bytes())
+    return f"{CODE_VERSION}+{digest.hexdigest()[:16]}"
+
+
+#: That of the code as it was loaded: what is installed under a running service later is another.
+BUILD = build_of(Path(__file__).parents[2] / name for name in ("models", "storage", "service"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +93,7 @@ def revision_and_json(
     body = to_json(query(database, clutch_id, *arguments))
     if database.answers is not None and not arguments:
         name = name_of(query)
-        made = SharedAnswer(clutch_id=clutch_id, name=name, release=build(), revision=revision, body=body)
+        made = SharedAnswer(clutch_id=clutch_id, name=name, release=BUILD, revision=revision, body=body)
         try:
             database.answers.keep(made)
         except StorageError as error:  # as after a restart of the server: it is an answer all the same
@@ -92,7 +107,7 @@ def shared_answer(database: Database, query: Callable[..., object], clutch_id: s
     if database.answers is None:
         return None
     try:
-        kept = database.answers.newest(clutch_id, name_of(query), build())
+        kept = database.answers.newest(clutch_id, name_of(query), BUILD)
     except StorageError as error:
         _log.warning("a shared answer could not be read: %s", error)
         return None

@@ -35,6 +35,11 @@ class _Entry:
     renewing: "asyncio.Task[None] | None" = None
 
     @property
+    def is_made(self) -> bool:
+        """Whether the next one is under way."""
+        return self.making is not None or self.renewing is not None
+
+    @property
     def size(self) -> int:
         """Bytes of the answer."""
         return 0 if self.answer is None else len(self.answer.body)
@@ -51,7 +56,10 @@ class Revalidation:
     def held(self, key: Hashable, revision: int) -> Answer | None:
         """The answer where it is of that very revision."""
         entry = self._entries.get(key)
-        return entry.answer if entry is not None and entry.revision == revision else None
+        if entry is None or entry.revision != revision:
+            return None
+        self._entries.move_to_end(key)
+        return entry.answer
 
     def knows(self, key: Hashable) -> bool:
         """Whether an answer is held, of whichever revision, or is being made."""
@@ -118,19 +126,24 @@ class Revalidation:
                 entry.renewing = None
         if revision < entry.revision:  # a later one was quicker
             return
-        is_held = self._entries.get(key) is entry  # else who waits for it holds it again
-        if is_held:
+        if self._entries.get(key) is entry:
             self._drop(key)
         entry.revision, entry.answer = revision, Answer.of(body)
-        if is_held:
-            self._put(key, entry)
+        self._put(key, entry)
 
     def _put(self, key: Hashable, entry: _Entry) -> None:
+        """Hold an entry as the one asked for last, unless the answer of a later revision is held."""
+        other = self._entries.get(key)
+        if other is not None and other.revision > entry.revision:
+            return
         self._drop(key)
         self._entries[key] = entry
         self._held += entry.size
         while self._held > self._most:
-            oldest = next((other for other, kept in self._entries.items() if kept.size > 0 and other != key), None)
+            oldest = next(
+                (name for name, held in self._entries.items() if held.size > 0 and not held.is_made and name != key),
+                None,
+            )
             if oldest is None:
                 break
             self._drop(oldest)

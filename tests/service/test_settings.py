@@ -10,8 +10,7 @@ from typing import Any
 
 import pytest
 
-from service import settings
-from service.settings import CODE_VERSION, PREFIX, Settings, build, redacted
+from service.settings import PREFIX, Settings, redacted
 
 OPERATIONS = Path(__file__).parents[2] / "docs" / "operations.md"
 #: Names of earlier releases, which services are started with.
@@ -124,17 +123,3 @@ def test_the_table_of_the_documentation_is_that_of_the_settings() -> None:
         (f"{PREFIX}{name.upper()}", f"`{json.dumps(field.default).strip(chr(34))}`", field.description)
         for name, field in fields.items()
     ]
-
-
-def test_two_builds_of_a_release_are_told_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "models").mkdir()
-    code = tmp_path / "models" / "law.py"
-    monkeypatch.setattr(settings, "_FOLDERS", [tmp_path / "models"])
-    builds = []
-    for text in ("EXPONENT = 1.3", "EXPONENT = 1.4", "EXPONENT = 1.3"):
-        code.write_text(text)
-        build.cache_clear()
-        builds.append(build())
-    build.cache_clear()
-    assert builds[0] == builds[2] != builds[1]
-    assert all(each.startswith(f"{CODE_VERSION}+") for each in builds)

@@ -16,9 +16,6 @@ SCHEME = "postgresql+psycopg"
 #: Connections that a process keeps, and how many more it makes for a while. Chosen: a service's threads seldom ask at once,
 #: and with its eight other processes it stays well under the 100 connections that a server has by default.
 _KEPT, _MORE = 4, 12
-#: Connections for single statements: one of them asks for all requests, the others are of answers that are shared. All are
-#: kept: one that a service makes while a migration waits for its end waits behind it.
-_KEPT_FOR_STATEMENTS = 3
 #: What libpq is told where the address does not say: how long [s] a connection may take to be made, after how long [ms] a
 #: server whose machine is lost counts as gone, and how often [s] one that says nothing is asked. Chosen; no table.
 _CONNECTION = {
@@ -69,10 +66,10 @@ def make_engine(address: URL, lock_timeout: float) -> Engine:
     return _engine(address, lock_timeout, pool_size=_KEPT, max_overflow=_MORE, pool_pre_ping=True)
 
 
-def make_autocommit_engine(address: URL, lock_timeout: float) -> Engine:
-    """An engine for questions of one statement: no transaction, and no look at whether the connection is still there, each
-    of which would be a way to the server and back."""
-    return _engine(address, lock_timeout, pool_size=_KEPT_FOR_STATEMENTS, max_overflow=0, isolation_level="AUTOCOMMIT")
+def make_autocommit_engine(address: URL, lock_timeout: float, *, connections: int) -> Engine:
+    """An engine for single statements, by so many connections, which are kept: no transaction, and no look at whether a
+    connection is still there, each of which would be a way to the server and back."""
+    return _engine(address, lock_timeout, pool_size=connections, max_overflow=0, isolation_level="AUTOCOMMIT")
 
 
 def _engine(address: URL, lock_timeout: float, **options: Any) -> Engine:

@@ -45,13 +45,15 @@ class ServerDatabase(Database):
         self._writers = self._engine.execution_options(
             isolation_level="READ COMMITTED", postgresql_readonly=not writable
         )
-        autocommit = make_autocommit_engine(address, lock_timeout)
+        # what every request asks does not wait for connections by which answers are read and written
+        watching = make_autocommit_engine(address, lock_timeout, connections=1)
+        sharing = make_autocommit_engine(address, lock_timeout, connections=2)
         if serving:
-            for engine in (self._engine, autocommit):
+            for engine in (self._engine, watching, sharing):
                 hold_service_lock(engine, self.name)
-        self._statements = SingleStatements(autocommit, self.name)
-        self.watch = ServerWatch(self._statements)
-        self.answers = ServerAnswers(self._statements)
+        self._statements = [SingleStatements(engine, self.name) for engine in (watching, sharing)]
+        self.watch = ServerWatch(self._statements[0])
+        self.answers = ServerAnswers(self._statements[1])
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
@@ -91,8 +93,9 @@ class ServerDatabase(Database):
         """Close all connections; any later use raises StorageUnavailable. May be called twice."""
         self._closed = True
         self._engine.dispose()
-        self._statements.close()
         self.watch.close()
+        for statements in self._statements:
+            statements.close()
 
     def migrate(self) -> None:
         """Make the tables of an empty database, or run the steps that it lacks, not under a running service."""
@@ -155,6 +158,7 @@ def open_server(address: URL, *, lock_timeout: float, serving: bool = False) -> 
     try:
         with database.reading() as connection:
             refuse_newer(current(connection))  # a newer release may have migrated it in between
+        database.watch.glance()  # makes its connection: later one would wait behind a migration that waits for this service
     except BaseException:
         database.close()
         raise

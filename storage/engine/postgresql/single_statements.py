@@ -19,9 +19,10 @@ class SingleStatements:
         self._closed = False
 
     def rows(self, statement: Executable, values: dict[str, Any]) -> Sequence[RowMapping]:
-        """What a statement gives, nothing where it is not a question. It may be run twice.
+        """The rows that a statement returns, none where it returns none. After a lost connection it is run once more.
 
-        Raises StorageUnavailable where the server cannot be reached, or when this was closed.
+        Raises StorageUnavailable where the server cannot be reached, or when this was closed, and DatabaseBusy where no
+        connection is free in time.
         """
         self._refuse_closed()
         with translated(self._name):

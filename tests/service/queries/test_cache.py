@@ -4,10 +4,13 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
+from pathlib import Path
 
 import pytest
 
-from service.queries.cache import AnswerCache, revision_and_json, shared_answer, to_json
+from service.queries import cache as caches
+from service.queries.cache import AnswerCache, build_of, revision_and_json, shared_answer, to_json
+from service.settings import CODE_VERSION
 from service.web.limits import MOST_CACHED_BYTES
 from storage import clutches
 from storage.engine.database import Database
@@ -136,6 +139,35 @@ def test_of_several_services_on_a_server_one_computes(on_server: Database) -> No
         assert revision_and_json(on_server, count, "c1", ("ukf",)) == (1, b'{"computed":3,"arguments":1}')
         assert revision_and_json(other, count, "c1", ("ukf",)) == (1, b'{"computed":4,"arguments":1}')
     assert len(computed) == 4
+
+
+def test_another_build_of_the_release_computes_for_itself(on_server: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    def query(_: Database, clutch_id: str) -> dict[str, str]:
+        return {"clutch_id": clutch_id, "computed_by": caches.BUILD}
+
+    with on_server.writing() as connection:
+        clutches.insert(connection, clutch_row("c1"))
+    _, first = revision_and_json(on_server, query, "c1", ())
+    monkeypatch.setattr(caches, "BUILD", f"{CODE_VERSION}+other")
+    assert shared_answer(on_server, query, "c1") is None
+    _, other = revision_and_json(on_server, query, "c1", ())
+    assert other != first
+    assert shared_answer(on_server, query, "c1") == (0, other)
+
+
+def test_a_build_is_told_by_its_code_and_by_the_names_of_its_files(tmp_path: Path) -> None:
+    folder = tmp_path / "models"
+    folder.mkdir()
+    code = folder / "law.py"
+    builds = []
+    for text in ("EXPONENT = 1.3", "EXPONENT = 1.4", "EXPONENT = 1.3"):
+        code.write_text(text)
+        builds.append(build_of([folder]))
+    code.rename(folder / "laws.py")
+    builds.append(build_of([folder]))
+    assert builds[0] == builds[2]
+    assert len(set(builds)) == 3
+    assert all(each.startswith(f"{CODE_VERSION}+") for each in builds)
 
 
 class Unreachable(SharedAnswers):

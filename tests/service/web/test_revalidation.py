@@ -163,10 +163,11 @@ def test_an_answer_that_is_made_again_and_again_counts_once() -> None:
     async def scenario(kept: Revalidation, worker: Worker) -> None:
         kept.begin("other", 1, b"four")
         for revision in range(1, 20):
+            body = b"four"[: 1 + revision % 4]
             asking = asyncio.create_task(kept.answer("a", revision, worker.compute, wait=10))
             await _settled()
-            await worker.gives(revision, b"four")
-            assert await asking == (revision, Answer.of(b"four"))
+            await worker.gives(revision, body)
+            assert await asking == (revision, Answer.of(body))
         assert kept.knows("other")
         kept.begin("third", 1, b"four")
         assert [name for name in ("other", "a", "third") if kept.knows(name)] == ["a", "third"]
@@ -176,15 +177,27 @@ def test_an_answer_that_is_made_again_and_again_counts_once() -> None:
 
 def test_what_is_being_made_is_not_made_twice_to_make_room() -> None:
     async def scenario(kept: Revalidation, worker: Worker) -> None:
+        kept.begin("renewed", 1, b"four")
+        assert await kept.answer("renewed", 2, worker.compute, wait=0) == (1, Answer.of(b"four"))
         first = asyncio.create_task(kept.answer("made", 1, worker.compute, wait=0))
         await _settled()
         for name in ("a", "b", "c"):
             kept.begin(name, 1, b"four")
         second = asyncio.create_task(kept.answer("made", 1, worker.compute, wait=0))
+        assert await kept.answer("renewed", 2, worker.compute, wait=0) == (1, Answer.of(b"four"))
         await _settled()
-        assert [name for name in ("made", "a", "b", "c") if kept.knows(name)] == ["made", "b", "c"]
+        assert [name for name in ("renewed", "made", "a", "b", "c") if kept.knows(name)] == ["renewed", "made", "c"]
         await worker.gives(1, b"one")
         assert await first == await second == (1, Answer.of(b"one"))
-        assert len(worker.asked) == 1
+        assert len(worker.asked) == 2
 
     run(scenario)
+
+
+def test_a_poll_of_what_is_held_counts_as_asking() -> None:
+    kept = Revalidation(most_bytes=8)
+    for name in ("a", "b"):
+        kept.begin(name, 1, b"four")
+    assert kept.held("a", 1) == Answer.of(b"four")
+    kept.begin("c", 1, b"four")
+    assert [name for name in ("a", "b", "c") if kept.knows(name)] == ["a", "c"]

@@ -1,7 +1,6 @@
 """The connections of a service to a server: what they say of it, and what becomes of them when the server comes back."""
 
 import asyncio
-import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
@@ -30,34 +29,49 @@ WHERE datname = current_database() AND locktype = 'advisory' AND mode = 'ShareLo
 def test_every_connection_of_a_service_says_that_it_runs(on_server: Database) -> None:
     """Those for single statements too."""
     with closing(open_database(on_server.url, serving=True)) as service, service.reading():
-        service.watch.glance()
+        assert service.answers is not None
+        assert service.answers.newest("c1", "degradation", "1.0") is None
         with on_server.reading() as connection:
-            assert connection.execute(_HELD).scalar_one() == 2
+            assert connection.execute(_HELD).scalar_one() == 3
 
 
 def test_a_service_is_asked_on_while_a_migration_waits_for_its_end(on_server: Database) -> None:
-    """Its connections for single statements are kept, whatever its threads have asked at once before."""
-    begun = threading.Event()
+    """Its connection for that is made when it starts: a later one would wait behind the migration."""
 
     def migrate() -> None:
-        begun.set()
         with migration_lock(make_url(on_server.url), 3):
             pytest.fail("migrated under a service")
 
-    with closing(open_database(on_server.url, lock_timeout=1, serving=True)) as service, ThreadPoolExecutor(8) as pool:
-        answers = service.answers
-        assert answers is not None
-
-        def ask(_: int) -> tuple[bool, SharedAnswer | None]:
-            return service.watch.glance().keys_are_needed, answers.newest("c1", "degradation", "1.0")
-
-        assert list(pool.map(ask, range(200))) == [(False, None)] * 200
+    with closing(open_database(on_server.url, lock_timeout=1, serving=True)) as service, ThreadPoolExecutor(9) as pool:
         waiting = pool.submit(migrate)
-        assert begun.wait(30)
-        time.sleep(0.5)
-        assert list(pool.map(ask, range(200))) == [(False, None)] * 200
+        while not waits_for_the_lock(on_server):
+            assert not waiting.done()
+            time.sleep(0.01)
+        glances = list(pool.map(lambda _: service.watch.glance(), range(200)))
+        assert not waiting.done()
+        assert len(glances) == 200
         with pytest.raises(ServiceRuns):
             waiting.result()
+
+
+def waits_for_the_lock(database: Database) -> bool:
+    with database.reading() as connection:
+        waiting = text("SELECT EXISTS (SELECT FROM pg_locks WHERE locktype = 'advisory' AND NOT granted)")
+        return bool(connection.execute(waiting).scalar_one())
+
+
+def test_answers_that_cannot_be_read_hold_up_no_request(on_server: Database) -> None:
+    """They are kept to save work: the question that every request asks has a connection of its own."""
+    with closing(open_database(on_server.url, lock_timeout=20)) as service, ThreadPoolExecutor(8) as pool:
+        answers = service.answers
+        assert answers is not None
+        with on_server.writing() as connection:
+            connection.execute(text("LOCK TABLE shared_answer IN ACCESS EXCLUSIVE MODE"))
+            reading = [pool.submit(answers.newest, "c1", "degradation", "1.0") for _ in range(8)]
+            for _ in range(50):
+                assert not service.watch.glance().keys_are_needed
+            assert not any(each.done() for each in reading)
+        assert [each.result() for each in reading] == [None] * 8
 
 
 def test_libpq_is_told_when_a_lost_machine_counts_as_gone_unless_the_address_says_it(on_server: Database) -> None:
