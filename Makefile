@@ -1,7 +1,7 @@
 # make demo    a simulated clutch's life, posted run by run, with its prognosis      (ARGS=--exit to end by itself)
 # make test    all tests but those of `make slow`
 # make slow    what takes long and rarely fails: what intervals promise, counted over many lives; further ways to the same
-#              answer, files cut off anywhere, charts drawn by the large library                               (20 minutes)
+#              answer, files cut off anywhere, charts drawn by the large library                               (30 minutes)
 # make faults  kills the service and its commands hundreds of times, and sends what nobody sends: schemathesis over whole
 #              sequences of requests, and files of every format with bytes changed          (an hour; ARGS="-k kills")
 # make check   formatting, lint, types, layers; of the dashboard's JavaScript and styles too, for which it needs npm
