@@ -116,7 +116,7 @@ class Revalidation:
         try:
             revision, body = await asyncio.wrap_future(computing)
         except BaseException:
-            if entry.answer is None and self._entries.get(key) is entry:
+            if entry.answer is None:
                 self._drop(key)
             raise
         finally:
@@ -126,16 +126,12 @@ class Revalidation:
                 entry.renewing = None
         if revision < entry.revision:  # a later one was quicker
             return
-        if self._entries.get(key) is entry:
-            self._drop(key)
+        self._drop(key)
         entry.revision, entry.answer = revision, Answer.of(body)
         self._put(key, entry)
 
     def _put(self, key: Hashable, entry: _Entry) -> None:
-        """Hold an entry as the one asked for last, unless the answer of a later revision is held."""
-        other = self._entries.get(key)
-        if other is not None and other.revision > entry.revision:
-            return
+        """Hold an entry as the one asked for last. To make room goes what nobody is making anew: it would be made twice."""
         self._drop(key)
         self._entries[key] = entry
         self._held += entry.size

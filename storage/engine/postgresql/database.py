@@ -51,9 +51,9 @@ class ServerDatabase(Database):
         if serving:
             for engine in (self._engine, watching, sharing):
                 hold_service_lock(engine, self.name)
-        self._statements = [SingleStatements(engine, self.name) for engine in (watching, sharing)]
-        self.watch = ServerWatch(self._statements[0])
-        self.answers = ServerAnswers(self._statements[1])
+        self._watching, self._sharing = SingleStatements(watching, self.name), SingleStatements(sharing, self.name)
+        self.watch = ServerWatch(self._watching)
+        self.answers = ServerAnswers(self._sharing)
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
@@ -94,8 +94,8 @@ class ServerDatabase(Database):
         self._closed = True
         self._engine.dispose()
         self.watch.close()
-        for statements in self._statements:
-            statements.close()
+        self._watching.close()
+        self._sharing.close()
 
     def migrate(self) -> None:
         """Make the tables of an empty database, or run the steps that it lacks, not under a running service."""
