@@ -273,6 +273,7 @@ def _fit_row(level: LevelFit, cof: Value | None) -> FitRow:
         **_parameters(fit.parameters),
         mean_pressure=level.mean_pressure,
         covariance=tuple(fit.covariance.ravel().tolist()),
+        unbiased_covariance=tuple(fit.unbiased_covariance.ravel().tolist()),
         status=fit.status.value,
         speeds=level.speeds,
         mean_cof=mean_cof,
@@ -290,7 +291,8 @@ def _level_fit(row: FitRow) -> LevelFit:
     fit = StribeckFit(
         **{name: getattr(row, name) for name in _FIT_COLUMNS},
         parameters=StribeckParameters(**{name: getattr(row, name) for name in PARAMETER_NAMES}),
-        covariance=np.array(row.covariance, dtype=np.float64).reshape(4, 4),
+        covariance=np.reshape(row.covariance, (4, 4)),
+        unbiased_covariance=np.reshape(row.unbiased_covariance or row.covariance, (4, 4)),
         status=FitStatus(row.status),
         acceptable=row.mse_percent is not None and row.mse_percent < ACCEPTABLE_MSE,
     )

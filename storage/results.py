@@ -25,7 +25,8 @@ from storage.tables import filter_state, fit, prediction, run
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitRow:
-    """One curve's fit. `covariance` is the 4 x 4 matrix, row by row, 16 numbers; `mse_percent` None on a flat curve.
+    """One curve's fit. `covariance` is the 4 x 4 matrix, row by row, 16 numbers, and so is `unbiased_covariance`, None of a
+    fit by a release that had none; `mse_percent` None on a flat curve.
 
     `mean_cof` and its deviation, None where the curve does not determine them, are over the protocol of the first test.
     """
@@ -37,6 +38,7 @@ class FitRow:
     stribeck_velocity: float
     viscous_coefficient: float
     covariance: tuple[float, ...]
+    unbiased_covariance: tuple[float, ...] | None
     status: str
     undetermined: tuple[str, ...]
     noise: float
@@ -50,6 +52,7 @@ class FitRow:
     code_version: str
 
 
+_MATRICES = ("covariance", "unbiased_covariance")
 _FIT_NAMES = tuple(field.name for field in fields(FitRow))
 _fit_columns = [fit.c.run_key, *(fit.c[name] for name in _FIT_NAMES)]
 _fit_insert = sa.insert(fit)
@@ -95,10 +98,12 @@ def cofs_of(connection: Connection, clutch_id: str) -> dict[int, dict[float, tup
 
 
 def _fit_values(run_key: int, row: FitRow) -> dict[str, object]:
-    if len(row.covariance) != 16:
-        raise ValueError(f"covariance must hold 16 numbers, got {len(row.covariance)}")
     values = {name: getattr(row, name) for name in _FIT_NAMES}
-    values["covariance"] = to_text(row.covariance)
+    for name in _MATRICES:
+        matrix = values[name]
+        if matrix is not None and len(matrix) != 16:
+            raise ValueError(f"{name} must hold 16 numbers, got {len(matrix)}")
+        values[name] = None if matrix is None else to_text(matrix)
     values["undetermined"] = to_text(row.undetermined)
     return {"run_key": run_key, **values}
 
@@ -106,7 +111,8 @@ def _fit_values(run_key: int, row: FitRow) -> dict[str, object]:
 def _fit_row(row: Row[Any]) -> tuple[int, FitRow]:
     run_key: int = row[0]
     values: dict[str, Any] = dict(zip(_FIT_NAMES, row[1:], strict=True))
-    values["covariance"] = tuple(to_list(values["covariance"]))
+    for name in _MATRICES:
+        values[name] = None if values[name] is None else tuple(to_list(values[name]))
     values["undetermined"] = tuple(to_list(values["undetermined"]))
     return run_key, FitRow(**values)
 

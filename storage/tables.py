@@ -124,6 +124,7 @@ fit = Table(
     Column("mean_cof_sd", NUMBER),
     Column("message", TEXT, nullable=False),
     Column("code_version", TEXT, nullable=False),
+    Column("unbiased_covariance", TEXT),  # none of a fit by a release that had none
 )
 
 prediction = Table(

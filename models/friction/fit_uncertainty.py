@@ -10,6 +10,8 @@ is not too narrow.
   variance (HC3). Estimate ± 1.645 standard errors then holds the truth in 88 to 92 % of tests for noise of either kind, of
   the slope at low speeds too, which hangs on a few points of high leverage; with (JᵀJ)^-1 alone it was 84 to 87 % under
   noise in proportion. HC3 errs to the wide side by itself in small samples: no Student's factor is on top of it.
+- That width makes up for the error of a variance that one test's residuals give. Where the tests of a life are taken
+  together it is too much: there r²/(1 - h) (HC2) stands for the variance, whose mean over tests is that of the errors.
 - Where the deviation of the points is given it is the noise, unless the weighted residuals exceed the 99 % point of χ²:
   then the noise follows from the residuals, as above.
 - Without any degree of freedom, and without given deviations, noise of 5 % of the torque is assumed.
@@ -20,7 +22,7 @@ is not too narrow.
 
 All quantities are in the scaled units of `models.friction.variable_projection.Problem`.
 
-Source of HC3: J. G. MacKinnon, H. White, J. Econometrics 29 (1985) 305-325.
+Source of HC2 and HC3: J. G. MacKinnon, H. White, J. Econometrics 29 (1985) 305-325.
 """
 
 from dataclasses import dataclass
@@ -85,9 +87,11 @@ def estimate_noise(residual: FloatArray, freedom: FloatArray, given_sd: FloatArr
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Uncertainty:
-    """covariance [P, 4, 4] of (M_s, M̄_c, V_S, C_v), all but M̄_c scaled; undetermined [P, 4]."""
+    """covariance [P, 4, 4] of (M_s, M̄_c, V_S, C_v), all but M̄_c scaled, as wide as the interval of one test needs it, and
+    without that bias; undetermined [P, 4]."""
 
     covariance: FloatArray
+    unbiased_covariance: FloatArray
     undetermined: NDArray[np.bool_]
 
 
@@ -98,31 +102,45 @@ def uncertainty(problem: Problem, optimum: Profile, scan: Profile, noise: Noise,
     size = np.sqrt((columns**2).sum(axis=1) / points[:, None])
     prior = PRIOR_TERM * level[:, None] / np.where(size > 0, size, 1.0)
     prior[:, 3] = PRIOR_LOG_VELOCITY
-    inner = _linearised(columns * prior[:, None, :], _shape(problem, columns, optimum, noise), noise.sd)
-    inner *= prior[:, :, None] * prior[:, None, :]
     stray = _stray(optimum, scan, noise)
-    variance = inner[:, 3, 3]
-    missing = np.where(stray > STRAY, np.maximum((stray / Z90) ** 2 - variance, 0.0), 0.0)
-    direction = inner[:, :, 3] / variance[:, None]
-    inner += missing[:, None, None] * direction[:, :, None] * direction[:, None, :]
     transform = _transform(problem, optimum)
-    covariance = transform @ inner @ transform.swapaxes(1, 2)
-    covariance = (covariance + covariance.swapaxes(1, 2)) / 2
+    covariance, unbiased = (
+        _covariance(columns, prior, shape, noise.sd, stray, transform)
+        for shape in _shapes(problem, columns, optimum, noise)
+    )
     deviation = np.sqrt(np.maximum(np.einsum("pii->pi", covariance), 0.0))
     ratio = transform[:, 1, 1] * optimum.coefficients[:, 0, 1]
     viscous = np.sqrt((problem.viscous**2).sum(axis=1) / points)
     scale = np.stack([level, np.maximum(ratio, 1.0), transform[:, 2, 3], level / np.maximum(viscous, 1e-100)], axis=1)
     undetermined = deviation > UNDETERMINED_SHARE * scale
     undetermined[:, 2] |= stray > STRAY
-    return Uncertainty(covariance=covariance, undetermined=undetermined)
+    return Uncertainty(covariance=covariance, unbiased_covariance=unbiased, undetermined=undetermined)
 
 
-def _shape(problem: Problem, columns: FloatArray, optimum: Profile, noise: Noise) -> FloatArray:
-    """Variance of each point [P, n] over `noise.sd`²: its own r²/(1 - h)², or 1 where the deviations are given."""
+def _covariance(
+    columns: FloatArray, prior: FloatArray, shape: FloatArray, sd: FloatArray, stray: FloatArray, transform: FloatArray
+) -> FloatArray:
+    """Of the four parameters [P, 4, 4], for columns J [P, n, 4], their priors' deviations [P, 4] and points of variance
+    `shape` [P, n] times sd² [P], widened where V_S strays [P]."""
+    inner = _linearised(columns * prior[:, None, :], shape, sd)
+    inner *= prior[:, :, None] * prior[:, None, :]
+    variance = inner[:, 3, 3]
+    missing = np.where(stray > STRAY, np.maximum((stray / Z90) ** 2 - variance, 0.0), 0.0)
+    direction = inner[:, :, 3] / variance[:, None]
+    inner += missing[:, None, None] * direction[:, :, None] * direction[:, None, :]
+    covariance = transform @ inner @ transform.swapaxes(1, 2)
+    return np.asarray((covariance + covariance.swapaxes(1, 2)) / 2)
+
+
+def _shapes(problem: Problem, columns: FloatArray, optimum: Profile, noise: Noise) -> tuple[FloatArray, FloatArray]:
+    """Variance of each point [P, n] over `noise.sd`²: its own r²/(1 - h)², and r²/(1 - h); both 1 where the deviations are
+    given, the first wider where they were raised."""
     fitted = (columns[:, :, :3] @ optimum.coefficients[:, 0, :, None])[..., 0]
     left = np.maximum(1.0 - _leverage(columns), _LEAST_LEFT)
-    own = np.square((problem.torque - fitted) / (left * noise.sd[:, None]))
-    return np.where(noise.shaped[:, None], np.maximum(own, _LEAST_SHARE), noise.widening[:, None] ** 2)
+    own = np.square((problem.torque - fitted) / noise.sd[:, None]) / left
+    shaped = noise.shaped[:, None]
+    wide = np.where(shaped, np.maximum(own / left, _LEAST_SHARE), noise.widening[:, None] ** 2)
+    return wide, np.where(shaped, np.maximum(own, _LEAST_SHARE), 1.0)
 
 
 def _leverage(columns: FloatArray) -> FloatArray:

@@ -44,14 +44,16 @@ class FitStatus(StrEnum):
 class StribeckFit:
     """The identified curve of one pressure [Pa].
 
-    covariance [4, 4] in the order of PARAMETER_NAMES, finite always; noise [Nm]: the deviation of a point; mse_percent:
-    eq. 5, unweighted, on torque folded to v >= 0, None where that does not vary; rmse [Nm]; acceptable: mse_percent
-    < 5; undetermined: names of parameters.
+    covariance [4, 4] in the order of PARAMETER_NAMES, finite always, is as wide as the interval of one test needs it;
+    unbiased_covariance [4, 4] is that of the errors in the mean over tests, for who takes many together; noise [Nm]: the
+    deviation of a point; mse_percent: eq. 5, unweighted, on torque folded to v >= 0, None where that does not vary; rmse
+    [Nm]; acceptable: mse_percent < 5; undetermined: names of parameters.
     """
 
     pressure: float
     parameters: StribeckParameters
     covariance: FloatArray
+    unbiased_covariance: FloatArray
     status: FitStatus
     undetermined: tuple[str, ...]
     noise: float
@@ -207,7 +209,10 @@ def _describe(
     values = np.array([a, b * math.exp(v_s * fastest) / a, v_s, c]) * scale
     parameters = StribeckParameters.from_array(np.minimum(values, _LARGEST))
     with np.errstate(over="ignore"):
-        covariance = np.clip(uncertainties.covariance[row] * (scale[:, None] * scale), -_LARGEST, _LARGEST)
+        covariance, unbiased = (
+            np.clip(matrix[row] * (scale[:, None] * scale), -_LARGEST, _LARGEST)
+            for matrix in (uncertainties.covariance, uncertainties.unbiased_covariance)
+        )
     miss = folded.torque - np.abs(torque(folded.curve.velocity, parameters)) / folded.torque_scale
     mean_square = float((miss**2).mean())
     variance = float(folded.torque.var())
@@ -220,6 +225,7 @@ def _describe(
         pressure=folded.curve.pressure,
         parameters=parameters,
         covariance=covariance,
+        unbiased_covariance=unbiased,
         status=_status(undetermined, at_zero),
         undetermined=undetermined,
         noise=float(noise.sd[row]) * sd_share * folded.torque_scale,

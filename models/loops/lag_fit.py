@@ -26,6 +26,7 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.friction.criteria import Z90
+from models.friction.identification import StribeckFit
 from models.friction.stribeck import StribeckParameters, torque
 from models.loops.attractor import attractor_torque
 from models.loops.criteria import AGAINST
@@ -57,6 +58,11 @@ class StationaryCurve:
     def __post_init__(self) -> None:
         if self.covariance.shape != (4, 4) or not np.isfinite(self.covariance).all():
             raise ValueError(f"covariance must be 4 x 4 and finite, got shape {self.covariance.shape}")
+
+    @classmethod
+    def of(cls, fit: StribeckFit) -> "StationaryCurve":
+        """A fitted curve, with the covariance that many tests together need: lags are tracked along a life."""
+        return cls(parameters=fit.parameters, covariance=fit.unbiased_covariance)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

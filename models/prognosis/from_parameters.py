@@ -27,10 +27,10 @@ from models.tracking.posterior import Posterior
 #: Draws, and places of the paths: evenly up to now, and in equal ratios beyond.
 _DRAWS, _BEHIND, _AHEAD = 200, 24, 48
 #: Tests before and after, over which a fit's covariance is averaged: each is estimated from the residuals of its own test
-#: and errs as that test does, so that tests that happen to scatter less count for too much. Tried on 30 lives of `make score
-#: PARTS=shudder`, held at 40/60/80/120 % of life: none 83/93/77/80 %, all tests 93/97/100/100; on 100 lives: one
-#: 97/98/91/85, two 96/96/95/91.
-_BESIDE = 2
+#: and errs as that test does, so that tests that happen to scatter less count for too much. Tried on 100 lives as those of
+#: `make score PARTS=shudder`, held at 40/60/80/120 % of life: none 86/87/83/72 %, one 91/92/89/83, two 93/97/93/87, three
+#: 91/97/91/90, five 93/96/94/91, all tests 93/99/96/98 (the early ones of which know V_S least).
+_BESIDE = 3
 _COVERED = 3.29  # deviations of a normal between its 5 and 95 % quantiles
 
 
@@ -38,10 +38,10 @@ _COVERED = 3.29  # deviations of a normal between its 5 and 95 % quantiles
 class PressureLevel:
     """What is known at one reference pressure.
 
-    progress [t], parameters [t, 4] and covariance [t, 4, 4]: the fits that determine all four parameters. parameter_tracks:
-    a sample of eq. 6 for each parameter, in the order of PARAMETER_NAMES. tests [m] numbers the tests whose mean COF was
-    measured at cof_progress [m] as cof [m], m >= 1; cof_track is its sample. torque_per_cof [Nm] of a unit COF and
-    reference_cof [-] are those of the reference test.
+    progress [t], parameters [t, 4] and unbiased covariance [t, 4, 4]: the fits that determine all four parameters.
+    parameter_tracks: a sample of eq. 6 for each parameter, in the order of PARAMETER_NAMES. tests [m] numbers the tests
+    whose mean COF was measured at cof_progress [m] as cof [m], m >= 1; cof_track is its sample. torque_per_cof [Nm] of a
+    unit COF and reference_cof [-] are those of the reference test.
     """
 
     progress: FloatArray

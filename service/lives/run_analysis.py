@@ -121,11 +121,7 @@ def loops_of(
     A curve of which some parameter is undetermined counts all the same: what its covariance leaves open makes the lag less
     certain, or unresolved.
     """
-    curves = {
-        level.fit.pressure: StationaryCurve(parameters=level.fit.parameters, covariance=level.fit.covariance)
-        for level in levels
-        if level.speeds >= FEWEST_SPEEDS
-    }
+    curves = {level.fit.pressure: StationaryCurve.of(level.fit) for level in levels if level.speeds >= FEWEST_SPEEDS}
     return evaluate_loops(filtered_as_torque(sampled_record(channels), torque_filter), geometry, curves or None)
 
 

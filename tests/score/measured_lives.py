@@ -37,8 +37,7 @@ def measured_life(
         if dynamic is not None:
             record = sampled_test(clutch, at, dynamic, rng, Sensor())
             fit = fitted[PLACE].fit
-            curve = StationaryCurve(parameters=fit.parameters, covariance=fit.covariance)
-            loops = evaluate_loops(record, clutch.geometry, {fit.pressure: curve})
+            loops = evaluate_loops(record, clutch.geometry, {fit.pressure: StationaryCurve.of(fit)})
             receipts[f"loops-{index}"] = {"loops": loop_items(loops)}
             events.append(Event(run_id=f"loops-{index}", kind=DYNAMIC, cycles=at, moment=2.0 * index + 1.0))
     return MeasuredLife(

@@ -166,6 +166,26 @@ def test_deviations_given_too_small_are_not_believed() -> None:
     assert all("exceed the given torque_sd" in fit.message for fit in fits)
 
 
+@pytest.mark.parametrize(("proportional", "constant"), [(0.005, 0.0), (0.0, 0.1)])
+def test_the_unbiased_covariance_is_that_of_the_errors_of_many_tests(proportional: float, constant: float) -> None:
+    """1,000 tests of one clutch: a variance of so many has a standard error of 4.5 %, here of the errors along the
+    directions of the mean covariance. That of an interval is wider, in one direction by half and more."""
+    rng = np.random.default_rng(SEED)
+    truth = clutch(np.array([5.0]), np.array([0.8]), rng)[0]
+    torque = eq3(truth, VELOCITY)
+    noise = (proportional * torque + constant) * rng.standard_normal((CURVES, torque.size))
+    fits = fit_curves([curve(VELOCITY, row) for row in torque + noise])
+    errors = np.array([fit.parameters.as_array() for fit in fits]) - truth
+    actual = errors.T @ errors / CURVES
+    unbiased, wide = (
+        np.mean([getattr(fit, name) for fit in fits], axis=0) for name in ("unbiased_covariance", "covariance")
+    )
+    of_unbiased, of_wide = (np.linalg.eigvals(np.linalg.solve(mean, actual)).real for mean in (unbiased, wide))
+    print("variance of the errors over the stated one, by direction:", np.sort(of_unbiased), np.sort(of_wide))
+    assert np.abs(of_unbiased - 1.0).max() < 0.2
+    assert of_wide.min() < 0.7
+
+
 def test_the_coverage_check_catches_half_a_covariance_and_a_wrong_model() -> None:
     """Negative controls: a covariance halved, and data with a viscous exponent of 0.5 instead of 0.3, which the curve takes
     up in all but its Coulomb ratio."""

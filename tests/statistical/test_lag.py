@@ -103,7 +103,7 @@ def test_intervals_hold_what_they_promise_with_curves_that_were_fitted(law, reco
             pressure=5e5, mean_pressure=5e5, velocity=speeds, torque=curve_torque(speeds, law_of) * (1 + noise)
         )
         (fitted,) = fit_curves([stationary])
-        curve = StationaryCurve(parameters=fitted.parameters, covariance=fitted.covariance)
+        curve = StationaryCurve.of(fitted)
         low, high = fit_lag(law, cycle, samples.phase, samples.torque, curve).interval
         held["undetermined" if fitted.undetermined else "determined"].append(low <= truth <= high)
         if number < records // 2:

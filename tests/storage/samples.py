@@ -77,6 +77,7 @@ def fit_row(pressure: float, *, mse_percent: float | None = 1.7) -> FitRow:
         stribeck_velocity=1.2,
         viscous_coefficient=-0.3,
         covariance=tuple(float(i) / 7 for i in range(16)),
+        unbiased_covariance=tuple(float(i) / 9 for i in range(16)),
         status="at_bound",
         undetermined=("stribeck_velocity",),
         noise=0.1,
@@ -167,6 +168,7 @@ def integrity(path: Path) -> list[str]:
 
 #: By migration, what takes back all that it made, the newest first; a column of SQLite's that refers to a table stays.
 TAKEN_BACK = {
+    "s0011_unbiased_covariance": ("ALTER TABLE fit DROP COLUMN unbiased_covariance",),
     "s0010_clutch_states": (
         "DROP INDEX clutch_worst_first",
         "DROP INDEX clutch_by_state",

@@ -76,6 +76,15 @@ def test_fits_come_back_and_are_replaced(database: Database) -> None:
         assert results.fits_of(connection, "unknown") == {}
 
 
+def test_a_fit_of_a_release_that_had_no_unbiased_covariance_has_none(database: Database) -> None:
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+        key = runs.insert(connection, new_run())
+        results.write_fits(connection, key, [replace(fit_row(1e5), unbiased_covariance=None)])
+    with database.reading() as connection:
+        assert results.fits_of(connection, CLUTCH)[key][0].unbiased_covariance is None
+
+
 def test_a_fit_has_sixteen_finite_covariances_and_a_run(database: Database) -> None:
     with database.writing() as connection:
         clutches.insert(connection, clutch_row())
@@ -84,6 +93,8 @@ def test_a_fit_has_sixteen_finite_covariances_and_a_run(database: Database) -> N
             results.write_fits(connection, key, [replace(fit_row(1e5), covariance=(1.0, 2.0, 3.0))])
         with pytest.raises(ValueError, match="not JSON compliant"):
             results.write_fits(connection, key, [replace(fit_row(1e5), covariance=(nan,) * 16)])
+        with pytest.raises(ValueError, match="unbiased_covariance must hold 16 numbers, got 1"):
+            results.write_fits(connection, key, [replace(fit_row(1e5), unbiased_covariance=(1.0,))])
     with pytest.raises(IntegrityError), database.writing() as connection:
         results.write_fits(connection, key, [replace(fit_row(1e5), rmse=nan)])
     with pytest.raises(IntegrityError, match=r"(?i)foreign key"), database.writing() as connection:

@@ -35,7 +35,7 @@ def pressure_level(measured: MeasuredLife, tracks: ParameterTracks, direct: Trac
     return PressureLevel(
         progress=np.array(progress),
         parameters=np.array([fit.parameters.as_array() for fit in fits]),
-        covariance=np.array([fit.covariance for fit in fits]),
+        covariance=np.array([fit.unbiased_covariance for fit in fits]),
         parameter_tracks=[tracks[name, pressure][1] for name in PARAMETER_NAMES],
         tests=series.events,
         cof_progress=np.array([measurement.progress for measurement in series.measurements]),

@@ -57,7 +57,7 @@ def test_errors_are_as_large_as_they_are_stated_to_be(law: Law, truth: float, ma
         measured = stationary * (1 + STATIONARY_NOISE * rng.standard_normal(SPEEDS.size))
         (test,) = fit_curves([Curve(pressure=5e5, mean_pressure=5e5, velocity=SPEEDS, torque=measured)])
         torque = noisy(exact, rng)
-        stated = StationaryCurve(parameters=test.parameters, covariance=test.covariance)
+        stated = StationaryCurve.of(test)
         pulls.append(pull(fitted(law, cycle, torque, stated), truth))
         if index < 20:
             controls.append(pull(fitted(law, cycle, torque, StationaryCurve(parameters=test.parameters)), truth))

@@ -59,7 +59,7 @@ def test_a_film_beside_an_attractor_shows_both_laws_when_fresh() -> None:
     for clutch in (film_alone, both):
         rng = np.random.default_rng(7)
         fits = fit_curves(curves_by_pressure(stationary_test(clutch, 0, rng, SHARP), GEOMETRY))
-        curves = {fit.pressure: StationaryCurve(parameters=fit.parameters, covariance=fit.covariance) for fit in fits}
+        curves = {fit.pressure: StationaryCurve.of(fit) for fit in fits}
         loops = evaluate_loops(sampled_test(clutch, 0, DynamicTest(rate=50.0), rng, SHARP), GEOMETRY, curves)
         assert len(loops) == 7
         assert sum(loop.film_time is not None for loop in loops) >= 6
