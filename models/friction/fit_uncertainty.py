@@ -10,8 +10,9 @@ is not too narrow.
   variance (HC3). Estimate ± 1.645 standard errors then holds the truth in 88 to 92 % of tests for noise of either kind, of
   the slope at low speeds too, which hangs on a few points of high leverage; with (JᵀJ)^-1 alone it was 84 to 87 % under
   noise in proportion. HC3 errs to the wide side by itself in small samples: no Student's factor is on top of it.
-- That width makes up for the error of a variance that one test's residuals give. Where the tests of a life are taken
-  together it is too much: there r²/(1 - h) (HC2) stands for the variance, whose mean over tests is that of the errors.
+- That width makes up for the error of a variance that one test's residuals give. Where tests are taken together it is too
+  much: there r²/(1 - h) (HC2) stands for the variance, whose mean over tests is that of the errors, within a third in
+  every direction from six speeds on, where all four parameters are determined.
 - Where the deviation of the points is given it is the noise, unless the weighted residuals exceed the 99 % point of χ²:
   then the noise follows from the residuals, as above.
 - Without any degree of freedom, and without given deviations, noise of 5 % of the torque is assumed.
@@ -47,7 +48,7 @@ from models.friction.variable_projection import Problem, Profile, jacobian
 #: An eigenvalue of JᵀJ below this share of the largest is rounding.
 _ROUNDING = 1e-14
 #: A point that the fit passes through has no residual of its own: its 1 - h, and its variance over that of the others, are
-#: taken as no less than this.
+#: taken as no less than this in HC3; HC2 takes it for a point like the others.
 _LEAST_LEFT, _LEAST_SHARE = 0.05, 1e-4
 
 
@@ -134,13 +135,15 @@ def _covariance(
 
 def _shapes(problem: Problem, columns: FloatArray, optimum: Profile, noise: Noise) -> tuple[FloatArray, FloatArray]:
     """Variance of each point [P, n] over `noise.sd`²: its own r²/(1 - h)², and r²/(1 - h); both 1 where the deviations are
-    given, the first wider where they were raised."""
+    given, the first wider where they were raised. Where 1 - h is next to nothing so is r², whatever the noise: in the second
+    such a point has the variance of the others."""
     fitted = (columns[:, :, :3] @ optimum.coefficients[:, 0, :, None])[..., 0]
-    left = np.maximum(1.0 - _leverage(columns), _LEAST_LEFT)
-    own = np.square((problem.torque - fitted) / noise.sd[:, None]) / left
+    left = 1.0 - _leverage(columns)
+    residual = np.square((problem.torque - fitted) / noise.sd[:, None])
+    floor = np.maximum(left, _LEAST_LEFT)
     shaped = noise.shaped[:, None]
-    wide = np.where(shaped, np.maximum(own / left, _LEAST_SHARE), noise.widening[:, None] ** 2)
-    return wide, np.where(shaped, np.maximum(own, _LEAST_SHARE), 1.0)
+    wide = np.where(shaped, np.maximum(residual / floor**2, _LEAST_SHARE), noise.widening[:, None] ** 2)
+    return wide, np.where(shaped & (left >= _LEAST_LEFT), np.maximum(residual / floor, _LEAST_SHARE), 1.0)
 
 
 def _leverage(columns: FloatArray) -> FloatArray:

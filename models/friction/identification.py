@@ -45,9 +45,10 @@ class StribeckFit:
     """The identified curve of one pressure [Pa].
 
     covariance [4, 4] in the order of PARAMETER_NAMES, finite always, is as wide as the interval of one test needs it;
-    unbiased_covariance [4, 4] is that of the errors in the mean over tests, for who takes many together; noise [Nm]: the
-    deviation of a point; mse_percent: eq. 5, unweighted, on torque folded to v >= 0, None where that does not vary; rmse
-    [Nm]; acceptable: mse_percent < 5; undetermined: names of parameters.
+    unbiased_covariance [4, 4] is that of the errors in the mean over tests, for who takes many together, where all four are
+    determined (else both are as wide as what the data leave open); noise [Nm]: the deviation of a point; mse_percent: eq. 5,
+    unweighted, on torque folded to v >= 0, None where that does not vary; rmse [Nm]; acceptable: mse_percent < 5;
+    undetermined: names of parameters.
     """
 
     pressure: float

@@ -50,7 +50,7 @@ class LagStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StationaryCurve:
-    """The curve that torque lags behind, and its covariance [4, 4] as in `StribeckFit`; zero where it is exact."""
+    """The curve that torque lags behind, and the covariance [4, 4] of its parameters; zero where it is exact."""
 
     parameters: StribeckParameters
     covariance: FloatArray = field(default_factory=lambda: np.zeros((4, 4)))
@@ -61,7 +61,8 @@ class StationaryCurve:
 
     @classmethod
     def of(cls, fit: StribeckFit) -> "StationaryCurve":
-        """A fitted curve, with the covariance that many tests together need: lags are tracked along a life."""
+        """A fitted curve, with its unbiased covariance: lags are tracked along a life, and one loop's interval has the noise
+        of the record beside it."""
         return cls(parameters=fit.parameters, covariance=fit.unbiased_covariance)
 
 

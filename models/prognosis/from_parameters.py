@@ -29,7 +29,8 @@ _DRAWS, _BEHIND, _AHEAD = 200, 24, 48
 #: Tests before and after, over which a fit's covariance is averaged: each is estimated from the residuals of its own test
 #: and errs as that test does, so that tests that happen to scatter less count for too much. Tried on 100 lives as those of
 #: `make score PARTS=shudder`, held at 40/60/80/120 % of life: none 86/87/83/72 %, one 91/92/89/83, two 93/97/93/87, three
-#: 91/97/91/90, five 93/96/94/91, all tests 93/99/96/98 (the early ones of which know V_S least).
+#: 91/97/91/90, five 93/96/94/91, all tests 93/99/96/98 (the early ones of which know V_S least); on 300 more two
+#: 93/94/90/86, three 93/93/92/88, four 93/94/90/89.
 _BESIDE = 3
 _COVERED = 3.29  # deviations of a normal between its 5 and 95 % quantiles
 

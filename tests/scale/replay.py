@@ -125,7 +125,7 @@ def costs(database: Database) -> dict[str, float]:
 
 @contextmanager
 def a_tenth() -> Iterator[None]:
-    """The filters with a tenth of their particles, of the lattice that starts the UKF, and of their draws."""
+    """The filters with a tenth of their particles and of their draws, and a sixteenth of the lattice that starts the UKF."""
     fewer = {"particle": Particle(particles=200)}
     with (
         patch.object(tracks, "_TRACKERS", {**tracks._TRACKERS, **fewer}),
@@ -136,7 +136,7 @@ def a_tenth() -> Iterator[None]:
 
 
 def fits_at_once(states: int) -> tuple[float, float]:
-    """Milliseconds of the processor for the fits of a life's tests, one test after the other, and all at once."""
+    """Milliseconds of the processor for the fits of a life's tests, one test after the other, and all at once: the same."""
     rng = np.random.default_rng(1)
     clutch = draw(rng)
     tests = [
@@ -151,7 +151,10 @@ def fits_at_once(states: int) -> tuple[float, float]:
                 fit_curves(batch)
         return 1e3 * (time.process_time() - begin) / _REPEATS
 
-    taken([whole])  # what is loaded and compiled once
+    one_by_one = [fit for test in tests for fit in fit_curves(test)]
+    for own, together in zip(one_by_one, fit_curves(whole), strict=True):  # and what is loaded and compiled once
+        assert own.parameters == together.parameters, (own, together)
+        assert (own.covariance == together.covariance).all(), (own, together)
     return taken(tests), taken([whole])
 
 
@@ -178,7 +181,9 @@ def main(clutches: int, states: int, workers: int) -> None:
     steps = ", ".join(f"{step} {milliseconds:.1f} ms" for step, milliseconds in each.items())
     print(f"\nA clutch takes of a core: {steps}: {clutches / core:.1f} clutches/s/core in all, `local`.")
     print(f"A worker's part alone: {1e3 / each['compute']:.1f} clutches/s/core.")
-    print(f"With a tenth of particles, nodes and draws: {1e3 / small['compute']:.1f} clutches/s/core.")
+    print(
+        f"With a tenth of particles and draws, and a sixteenth of the nodes: {1e3 / small['compute']:.1f} clutches/s/core."
+    )
     by_test, at_once = fits_at_once(states)
     print(f"Its fits take {by_test:.1f} ms test by test, and {at_once:.1f} ms all at once.")
     print(f"Processes beside took {children.ru_utime + children.ru_stime:.0f} s of the processor.")

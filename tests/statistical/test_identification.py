@@ -166,24 +166,31 @@ def test_deviations_given_too_small_are_not_believed() -> None:
     assert all("exceed the given torque_sd" in fit.message for fit in fits)
 
 
-@pytest.mark.parametrize(("proportional", "constant"), [(0.005, 0.0), (0.0, 0.1)])
-def test_the_unbiased_covariance_is_that_of_the_errors_of_many_tests(proportional: float, constant: float) -> None:
-    """1,000 tests of one clutch: a variance of so many has a standard error of 4.5 %, here of the errors along the
-    directions of the mean covariance. That of an interval is wider, in one direction by half and more."""
+@pytest.mark.parametrize("life", [0.0, 0.8])
+@pytest.mark.parametrize(("proportional", "constant"), [(0.002, 0.0), (0.0, 0.04)])
+@pytest.mark.parametrize(("speeds", "within"), [(6, 0.4), (10, 0.35), (40, 0.2)])
+def test_the_unbiased_covariance_is_that_of_the_errors_of_many_tests(
+    speeds: int, within: float, proportional: float, constant: float, life: float
+) -> None:
+    """1,000 tests of one clutch: a variance of so many has a standard error of 4.5 %. Of the errors along the directions of
+    the mean covariance it is that of the errors within a share that is larger with few speeds, each of which has an error
+    that the curve follows. That of an interval is far from it, in one direction by half and more."""
     rng = np.random.default_rng(SEED)
-    truth = clutch(np.array([5.0]), np.array([0.8]), rng)[0]
-    torque = eq3(truth, VELOCITY)
-    noise = (proportional * torque + constant) * rng.standard_normal((CURVES, torque.size))
-    fits = fit_curves([curve(VELOCITY, row) for row in torque + noise])
+    truth = clutch(np.array([5.0]), np.array([life]))[0]
+    velocity = VELOCITY[np.round(np.linspace(0, VELOCITY.size - 1, speeds)).astype(int)]
+    torque = eq3(truth, velocity)
+    noise = (proportional * torque + constant) * rng.standard_normal((CURVES, speeds))
+    fits = [fit for fit in fit_curves([curve(velocity, row) for row in torque + noise]) if not fit.undetermined]
+    assert len(fits) > 0.98 * CURVES
     errors = np.array([fit.parameters.as_array() for fit in fits]) - truth
-    actual = errors.T @ errors / CURVES
-    unbiased, wide = (
-        np.mean([getattr(fit, name) for fit in fits], axis=0) for name in ("unbiased_covariance", "covariance")
+    actual = errors.T @ errors / len(fits)
+    of_unbiased, of_wide = (
+        np.sort(np.linalg.eigvals(np.linalg.solve(np.mean(matrices, axis=0), actual)).real)
+        for matrices in ([fit.unbiased_covariance for fit in fits], [fit.covariance for fit in fits])
     )
-    of_unbiased, of_wide = (np.linalg.eigvals(np.linalg.solve(mean, actual)).real for mean in (unbiased, wide))
-    print("variance of the errors over the stated one, by direction:", np.sort(of_unbiased), np.sort(of_wide))
-    assert np.abs(of_unbiased - 1.0).max() < 0.2
-    assert of_wide.min() < 0.7
+    print("variance of the errors over the stated one, by direction:", of_unbiased, of_wide)
+    assert np.abs(of_unbiased - 1.0).max() < within
+    assert of_wide.min() < 0.5
 
 
 def test_the_coverage_check_catches_half_a_covariance_and_a_wrong_model() -> None:

@@ -112,7 +112,7 @@ def test_intervals_hold_what_they_promise_with_curves_that_were_fitted(law, reco
             held["taken for exact"].append(low <= truth <= high)
     share = {name: float(np.mean(found)) for name, found in held.items()}
     print(law.name, {name: (len(found), round(share[name], 3)) for name, found in held.items()})
-    # three deviations of a share of so many; the film time's interval is a little too wide (93.2 % of 586)
+    # three deviations of a share of so many
     within = 3 * float(np.sqrt(COVERAGE * (1 - COVERAGE) / len(held["determined"])))
     assert abs(share["determined"] - COVERAGE) <= within
     assert share["undetermined"] >= COVERAGE - within

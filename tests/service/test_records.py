@@ -1,0 +1,47 @@
+"""Fits as rows and back."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from models.rig.stationary import stationary_test
+from models.rig.truth import draw
+from service import records
+from service.lives.run_analysis import LevelFit, levels_of
+from storage import clutches, results, runs
+from storage.engine.database import Database
+from tests.storage.samples import clutch_row, new_run
+
+CLUTCH = "bench3-017"
+
+
+def fitted() -> tuple[LevelFit, ...]:
+    """The curves of one test of a simulated clutch."""
+    rng = np.random.default_rng(3)
+    clutch = draw(rng)
+    return levels_of(stationary_test(clutch, 0.0, rng), clutch.geometry)
+
+
+def test_fits_come_back_with_both_covariances(database: Database) -> None:
+    levels = fitted()
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+        results.write_fits(connection, runs.insert(connection, new_run()), records.fit_rows(levels, {}))
+        [found] = records.levels(connection, CLUTCH).values()
+    for sent, back in zip(levels, found, strict=True):
+        np.testing.assert_array_equal(back.fit.covariance, sent.fit.covariance)
+        np.testing.assert_array_equal(back.fit.unbiased_covariance, sent.fit.unbiased_covariance)
+    determined = [each.fit for each in found if not each.fit.undetermined]
+    assert len(determined) >= 3
+    assert all((fit.unbiased_covariance.diagonal() < fit.covariance.diagonal()).all() for fit in determined)
+
+
+def test_the_wide_covariance_stands_for_the_one_that_an_earlier_release_had_not(database: Database) -> None:
+    levels = fitted()
+    rows = [replace(row, unbiased_covariance=None) for row in records.fit_rows(levels, {})]
+    with database.writing() as connection:
+        clutches.insert(connection, clutch_row())
+        results.write_fits(connection, runs.insert(connection, new_run()), rows)
+        [found] = records.levels(connection, CLUTCH).values()
+    for sent, back in zip(levels, found, strict=True):
+        np.testing.assert_array_equal(back.fit.unbiased_covariance, sent.fit.covariance)
