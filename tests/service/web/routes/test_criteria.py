@@ -96,7 +96,8 @@ def test_mean_cof_alone_is_one_criterion_and_as_it_was(tested: TestClient) -> No
 def test_every_filter_tracks_parameters_and_lag(tested: TestClient, method: str, quantity: str) -> None:
     answer = asked(tested, "degradation", quantity=quantity, method=method, draws=20)
     assert answer["method"] == method
-    item = max(answer["items"], key=lambda item: len(item["measured"]["cycles"]))
+    # at low pressure the film time of this rig does not change, and nothing is known of its course
+    item = max(answer["items"], key=lambda item: (len(item["measured"]["cycles"]), item["pressure_bar"]))
     assert item["frequency_hz"] == (0.1 if quantity == "film_time" else None)
     band = item["trajectory"]
     assert all(low < high for low, high in zip(band["lower"], band["upper"], strict=True))
