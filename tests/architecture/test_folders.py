@@ -1,4 +1,4 @@
-"""A folder is a chapter: few files, an introduction, and tests in the folder of the same name."""
+"""A folder is a chapter: an introduction, and tests in the folder of the same name."""
 
 import re
 from collections import Counter
@@ -6,12 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.architecture.source import PACKAGES, ROOT, Module, modules, none_of
-
-MOST_MODULES = 14
-MOST_LINES = 300
-#: One file an effect: these two grow with what is known of clutches.
-CATALOGUES = ("models/diagnosis/effects/catalogued", "models/diagnosis/effects/uncatalogued")
+from tests.architecture.source import PACKAGES, ROOT, modules, none_of
 
 #: An introduction says what goes in, what comes out, and which file of the folder to open first, as in "In: arrays. Out:
 #: bytes. Open `codec.py` first." or "Arrays go in, bytes come out: `codec` first, then the others."
@@ -23,22 +18,6 @@ OPEN_FIRST = re.compile(
     r"|\breading order:\s+`([\w/]+)",
 )
 SENTENCE = re.compile(r"[.!?](?:\s|$)")
-
-
-def folders(*places: str) -> list[Path]:
-    """All folders below those places that hold Python modules or scripts."""
-    files = [path for place in places for suffix in ("py", "js") for path in (ROOT / place).rglob(f"*.{suffix}")]
-    return sorted({path.parent for path in files if "node_modules" not in path.parts})
-
-
-def test_a_folder_holds_few_modules() -> None:
-    wrong = []
-    for folder in folders(*PACKAGES, "tests"):
-        shown = folder.relative_to(ROOT).as_posix()
-        names = [path.name for path in folder.iterdir() if path.suffix in {".py", ".js"} and path.name != "__init__.py"]
-        if len(names) > MOST_MODULES and shown not in CATALOGUES:
-            wrong.append(f"{shown}: {len(names)} modules, at most {MOST_MODULES}")
-    none_of(wrong, "folders with too many modules:")
 
 
 def lacks(introduction: str, files: set[str]) -> list[str]:
@@ -83,20 +62,6 @@ def test_what_an_introduction_lacks_is_noticed() -> None:
         "the file 'other' that it names"
     ]
     assert len(lacks("", files)) == 4
-
-
-def too_long(module: Module) -> bool:
-    """Whether a module is more than a reader holds in mind."""
-    return module.text.count("\n") >= MOST_LINES
-
-
-def test_a_module_is_short() -> None:
-    long = [f"{module.shown}: {module.text.count(chr(10))} lines" for module in modules() if too_long(module)]
-    scripts = [path for package in PACKAGES for path in (ROOT / package).rglob("*.js")]
-    long += [
-        str(path.relative_to(ROOT)) for path in scripts if path.read_text(encoding="utf-8").count("\n") >= MOST_LINES
-    ]
-    none_of(long, f"files that are not under {MOST_LINES} lines:")
 
 
 def test_tests_stand_where_their_subject_stands() -> None:
