@@ -26,9 +26,12 @@ ARGS ?=
 # what checks JavaScript: of `make check` alone, everything else needs Python only
 JAVASCRIPT := tests/javascript/node_modules
 
+# what filterpy declares for its plots and nothing here imports: 98 MB that stay out of every lock, which is why locked
+# packages are installed with --no-deps
+UNUSED := matplotlib contourpy cycler fonttools kiwisolver pillow
 # versions age a week before they are locked; no index is named
 LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --exclude-newer "7 days" \
-	--custom-compile-command "make lock"
+	--custom-compile-command "make lock" $(foreach name,$(UNUSED),--no-emit-package $(name))
 
 .PHONY: demo test slow faults check lowest benchmark load scale real figures architecture blind plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
@@ -112,22 +115,22 @@ $(VENV)/.python:
 
 $(VENV)-lowest/.tests: pyproject.toml tests/requirements-lowest.txt | $(VENV)/.python
 	$(PYTHON) -m venv $(VENV)-lowest
-	$(VENV)-lowest/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r tests/requirements-lowest.txt
+	$(VENV)-lowest/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r tests/requirements-lowest.txt
 	$(VENV)-lowest/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
 	@touch $@
 
 $(VENV)/.runs: $(VENV)/.python pyproject.toml docker/requirements.txt
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r docker/requirements.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r docker/requirements.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
 	@touch $@
 
 $(VENV)/.tests: $(VENV)/.runs tests/requirements.txt
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r tests/requirements.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r tests/requirements.txt
 	@touch $@
 
 $(VENV)-generator/.ready: tests/requirements-generator.txt | $(VENV)/.python
 	$(PYTHON) -m venv $(VENV)-generator
-	$(VENV)-generator/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r tests/requirements-generator.txt
+	$(VENV)-generator/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r tests/requirements-generator.txt
 	@touch $@
 
 $(JAVASCRIPT)/.package-lock.json: tests/javascript/package.json tests/javascript/package-lock.json
