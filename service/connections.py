@@ -1,45 +1,63 @@
-"""What a connection may take before it has asked for anything: the server's own protocol, with two bounds that it lacks.
+"""What a connection may take before it has asked for anything: the server's own protocol, with bounds that it lacks.
 
-A connection that has not sent the head of a request in time is closed, and one address has only so many: else who opens some
-hundreds and says nothing uses up the files that the process may have open, and nobody is answered any more.
+The head of a request is bounded in bytes (431) and in time (408), trailers after its body too, and one address has only so
+many connections: else whoever opens some hundreds and says nothing uses up the files that the process may have open, and one
+that sends header lines without end fills its memory, before any key is looked at.
 """
 
 import asyncio
+import http
 import resource
-from typing import Any
+from typing import Any, NoReturn
 
-from uvicorn.config import HTTP_PROTOCOLS, Config
-from uvicorn.importer import import_from_string
+from uvicorn.config import Config
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from service.web.limits import HEAD_SECONDS, RETRY_AFTER_SECONDS
+from service.web.limits import HEAD_SECONDS, LINGER_SECONDS, MAX_AHEAD, MAX_HEAD_BYTES, RETRY_AFTER_SECONDS
 
-_REFUSAL = (
-    "HTTP/1.1 429 Too Many Requests\r\ncontent-type: text/plain; charset=utf-8\r\nconnection: close\r\n"
-    f"retry-after: {RETRY_AFTER_SECONDS}\r\ncontent-length: {{}}\r\n\r\n{{}}"
+#: Bytes of a header line beside its name and its value.
+_SEPARATORS = len(": \r\n")
+#: Bytes that the parser is given at once, but for a body's: what it keeps of them is not seen before the next.
+_PIECE = 1 << 12
+_HEAD_TOO_LARGE = (
+    http.HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE,
+    f"the head of a request may have at most {MAX_HEAD_BYTES} bytes",
 )
 
 
 def bounded(most: int, head_seconds: float = HEAD_SECONDS) -> type[asyncio.Protocol]:
-    """The protocol that uvicorn takes by itself, with at most `most` connections of one address, each of which has sent the
-    head of its first request, and of every further one that it begins, after `head_seconds`."""
-    base: Any = import_from_string(HTTP_PROTOCOLS["auto"])
+    """uvicorn's protocol with at most `most` connections of one address, each of which has sent the head of its first
+    request, and of every further one that it begins, after `head_seconds`."""
 
-    class Bounded(base):  # type: ignore[misc]
+    class Bounded(HttpToolsProtocol):
         def __init__(self, config: Config, *arguments: Any, **more: Any) -> None:
             super().__init__(config, *arguments, **more)
             self._deadline: asyncio.TimerHandle | None = None
+            self._head_bytes = 0  # of the request's lines that the parser has passed on, its trailers among them
+            self._held_bytes = 0  # that arrived since the parser passed anything on: it keeps what is unfinished
+            self._in_head = False
+            self._wrong: tuple[http.HTTPStatus, str] | None = None  # why the parsing was ended
+            self._refused = False
 
-        def connection_made(self, transport: asyncio.Transport) -> None:
+        def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
             super().connection_made(transport)
             if self.client is not None and _held_by(self.client[0], self.connections) > most:
-                text = f"one address may have {most} connections at once"
-                transport.write(_REFUSAL.format(len(text), text).encode())
-                transport.close()
+                self._refuse(http.HTTPStatus.TOO_MANY_REQUESTS, f"one address may have {most} connections at once")
                 return
             self._expect_head()
 
         def data_received(self, data: bytes) -> None:
-            super().data_received(data)
+            in_body = self.cycle is not None and self.cycle.more_body
+            step = len(data) if in_body else _PIECE
+            for start in range(0, len(data), step):
+                if self._refused or self.transport.is_closing():
+                    return
+                self._held_bytes += min(step, len(data) - start)
+                super().data_received(data[start : start + step])
+                if self._head_bytes + self._held_bytes > MAX_HEAD_BYTES:
+                    self._refuse(*_HEAD_TOO_LARGE)
+            if self._refused:
+                return
             if self.cycle is None or self.cycle.response_complete:
                 self._expect_head()
             else:
@@ -49,9 +67,79 @@ def bounded(most: int, head_seconds: float = HEAD_SECONDS) -> type[asyncio.Proto
             self._end_deadline()
             super().connection_lost(exc)
 
+        def on_message_begin(self) -> None:
+            self._head_bytes = self._held_bytes = 0
+            self._in_head = True
+            super().on_message_begin()
+
+        def on_url(self, url: bytes) -> None:
+            self._count(len(url))
+            super().on_url(url)
+
+        def on_header(self, name: bytes, value: bytes) -> None:
+            self._count(len(name) + len(value) + _SEPARATORS)
+            super().on_header(name, value)
+
+        def on_headers_complete(self) -> None:
+            self._in_head = False
+            if len(self.pipeline) >= MAX_AHEAD:
+                self._end_parsing(http.HTTPStatus.TOO_MANY_REQUESTS, f"at most {MAX_AHEAD} requests may be sent ahead")
+            super().on_headers_complete()
+
+        def on_body(self, body: bytes) -> None:
+            self._held_bytes = 0
+            super().on_body(body)
+
+        def on_message_complete(self) -> None:
+            self._head_bytes = self._held_bytes = 0
+            super().on_message_complete()
+
+        def send_400_response(self, msg: str) -> None:
+            if self._wrong is not None:
+                self._refuse(*self._wrong)
+            else:
+                super().send_400_response(msg)
+
+        def _count(self, size: int) -> None:
+            self._held_bytes = 0
+            self._head_bytes += size
+            if self._head_bytes > MAX_HEAD_BYTES:
+                self._end_parsing(*_HEAD_TOO_LARGE)
+
+        def _end_parsing(self, status: http.HTTPStatus, text: str) -> NoReturn:
+            """From within the parser: it then calls `send_400_response`."""
+            self._wrong = status, text
+            raise ValueError(text)
+
+        def _refuse(self, status: http.HTTPStatus, text: str) -> None:
+            """Answer, where no answer has begun, and close; what still comes is thrown away for a while, since a socket that
+            is closed with unread bytes takes the answer with it."""
+            if self._refused or self.transport.is_closing():
+                return
+            self._refused = True
+            self._end_deadline()
+            if self.cycle is None or self.cycle.response_complete or not self.cycle.response_started:
+                if self.cycle is not None:
+                    self.cycle.disconnected = True
+                    self.cycle.message_event.set()
+                retry = f"retry-after: {RETRY_AFTER_SECONDS}\r\n" if status == http.HTTPStatus.TOO_MANY_REQUESTS else ""
+                self.transport.write(
+                    f"HTTP/1.1 {status.value} {status.phrase}\r\ncontent-type: text/plain; charset=utf-8\r\n"
+                    f"connection: close\r\n{retry}content-length: {len(text)}\r\n\r\n{text}".encode()
+                )
+                self.transport.write_eof()
+            self._deadline = self.loop.call_later(LINGER_SECONDS, self.transport.close)
+
         def _expect_head(self) -> None:
             if self._deadline is None:
-                self._deadline = self.loop.call_later(head_seconds, self.transport.close)
+                self._deadline = self.loop.call_later(head_seconds, self._end_waiting)
+
+        def _end_waiting(self) -> None:
+            if self._in_head:
+                text = f"the head of a request must be complete within {head_seconds:g} s"
+                self._refuse(http.HTTPStatus.REQUEST_TIMEOUT, text)
+            else:
+                self.transport.close()
 
         def _end_deadline(self) -> None:
             if self._deadline is not None:

@@ -28,8 +28,13 @@ WAIT_SECONDS, LONGEST_WAIT_SECONDS = 30, 600
 #: Bytes a second at which a body must arrive, beyond the seconds that it has in any case. Chosen: a modem's line; 1 GiB may
 #: take 4.5 hours.
 SLOWEST_BODY_BYTES_PER_SECOND = 1 << 16
-#: Seconds within which a connection has sent the head of a request. Chosen: as servers usually have it; no table.
-HEAD_SECONDS = 20.0
+#: Bytes that the head of a request may have, its trailers included, and seconds within which it is complete. Chosen: eight
+#: times what nginx and Apache take by default; a rig's bad line needs two seconds.
+MAX_HEAD_BYTES, HEAD_SECONDS = 1 << 16, 10.0
+#: Requests that one connection may send while an earlier one of its is answered. Chosen: browsers send none ahead.
+MAX_AHEAD = 16
+#: Seconds for which what a refused connection still sends is thrown away. Chosen: several round trips.
+LINGER_SECONDS = 2.0
 #: Callers whose shares are kept, and seconds' worth of requests that one may save up. Chosen: more than there are rigs; a
 #: page loads some hundred files at once.
 MOST_CALLERS, SAVED_SECONDS = 10_000, 2.0

@@ -1,10 +1,11 @@
 """Who opens connections and says nothing cannot keep others from being answered."""
 
 import asyncio
+import resource
 import socket
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -98,6 +99,66 @@ def test_a_connection_that_asks_for_nothing_is_closed(sent: list[bytes], answers
     answered, seconds = asyncio.run(seconds_until_closed(sent, 0.1))
     assert answered.count(b"HTTP/1.1 200") == answers
     assert 0.4 < seconds < 4
+
+
+@pytest.mark.parametrize(
+    ("sent", "answer"),
+    [
+        ([b"GET / HTTP/1.1\r\n", *[b"X: a\r\n"] * 90], b"HTTP/1.1 408"),
+        ([b"GET /" + b"a" * 70_000], b"HTTP/1.1 431"),
+        ([b"GET / HTTP/1.1\r\nX: ", *[b"a" * 30_000] * 9], b"HTTP/1.1 431"),
+        ([b"GET / HTTP/1.1\r\n" + b"X: a\r\n" * 12_000 + b"\r\n"], b"HTTP/1.1 431"),
+        ([b"GET / HTTP/1.1\r\n" + b"X: a\r\n" * 6_000, b"X: a\r\n" * 6_000], b"HTTP/1.1 431"),
+        ([WHOLE, b"GET / HTTP/1.1\r\nX: " + b"a" * 70_000], b"HTTP/1.1 431"),
+        ([b"\r\n" * 70_000], b"HTTP/1.1 431"),
+    ],
+    ids=["slow", "address", "one line", "lines at once", "lines", "second head", "empty lines"],
+)
+def test_a_head_that_is_too_long_or_too_slow_is_told_so_and_closed(sent: list[bytes], answer: bytes) -> None:
+    answered, seconds = asyncio.run(seconds_until_closed(sent, 0.1))
+    assert answer in answered
+    assert b"connection: close" in answered
+    assert seconds < 4
+
+
+def test_a_head_of_60_kib_is_read() -> None:
+    head = b"GET / HTTP/1.1\r\nX: " + b"a" * 60_000 + b"\r\n\r\n"
+    answered, _ = asyncio.run(seconds_until_closed([head[:50_000], head[50_000:], b"GET / "], 0.1))
+    assert answered.count(b"HTTP/1.1 200") == 1
+
+
+#: What one connection sends before any key is asked for: how it begins, and what it goes on with.
+ENDLESS = {
+    "header lines": (b"GET / HTTP/1.1\r\n", b"X-Line: abcdefghijklmnop\r\n"),
+    "one header line": (b"GET / HTTP/1.1\r\nX-Line: ", b"abcdefghijklmnop"),
+    "an address": (b"GET /", b"abcdefghijklmnop"),
+    "trailers": (
+        b"POST /v1/clutches HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n\r\n1\r\na\r\n0\r\n",
+        b"X-Line: abcdefghijklmnop\r\n",
+    ),
+    "requests ahead": (b"", b"GET /v1/clutches HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"),
+}
+
+
+def test_what_one_connection_sends_before_any_key_is_asked_for_is_not_kept(tmp_path: Path) -> None:
+    """64 MiB of each, as long as the service reads: 240 MiB of header lines were all kept."""
+    with serving(tmp_path / "a.db", loaded=True) as server:
+        assert ONCE.get(f"{server.url}/v1/clutches").status_code == 200
+        before = resident(server.pid)
+        for name, (begun, going_on) in ENDLESS.items():
+            piece = going_on * (2**20 // len(going_on))
+            with socket.create_connection(("127.0.0.1", server.port), timeout=30) as line:
+                line.sendall(begun)
+                with suppress(ConnectionError):  # it is closed while it sends
+                    for _ in range(64):
+                        line.sendall(piece)
+                assert resident(server.pid) - before < 24 << 20, name
+        assert ONCE.get(f"{server.url}/livez").status_code == 200
+
+
+def resident(pid: int) -> int:
+    """Bytes of memory that a process holds."""
+    return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * resource.getpagesize()
 
 
 def test_a_connection_that_goes_on_asking_stays_open() -> None:
