@@ -77,7 +77,7 @@ def from_better(baseline: Baseline, better: Fit) -> Baseline:
 
 def _with_its_noise(start: Laws, problem: FitProblem, fitted: Fit) -> Baseline:
     """A fit followed to its end under the noise that its residuals show."""
-    problem, assumed = _with_estimated_noise(problem, fitted)
+    problem, assumed = _with_estimated_noise(replace(problem, fitted=fitted.torque), fitted)
     fitted = fit(problem, fitted.laws)
     _require_weights(problem, fitted)
     curve_gain = likely_curve_gain(gram_of(problem, fitted))

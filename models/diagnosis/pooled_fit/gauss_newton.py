@@ -64,7 +64,7 @@ class Fit:
 def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), *, steps: int = STEPS) -> Fit:
     """Minimise the cost from a start, effects included; `steps` at most.
 
-    Gains are taken along the measured torque: it changes little and keeps the metric fixed while a fit moves.
+    Gains are taken along one torque (`FitProblem.gained`), which keeps the metric fixed while a fit moves.
     """
     white, priors = _whitening(problem), problem.priors
     state = _evaluated(problem, white, start, tuple(effects))
@@ -99,7 +99,7 @@ def fit(problem: FitProblem, start: Laws, effects: Sequence[FittedEffect] = (), 
 
 def _whitening(problem: FitProblem) -> Whiten:
     design, noise = problem.design, problem.noise
-    gains = gains_of(design, design.torque, noise)
+    gains = gains_of(design, problem.gained, noise)
 
     def white(columns: FloatArray) -> FloatArray:
         return without_gains(whitened(columns, design, noise), gains, noise.run_gain, noise.curve_gain)

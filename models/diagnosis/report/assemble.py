@@ -56,7 +56,7 @@ def report_of(
         advice=advice,
         visible=findings.visible,
         maps=residual_maps(problem, projected.fit, validation.extended),
-        loops=loop_traces(problem.design, projected.fit, validation.extended),
+        loops=loop_traces(problem, projected.fit, validation.extended),
         extension=proposed_extension(problem, judgement),
         notes=notes,
         statistics=statistics_of(investigation.alarms, judgement.comparison, scatter),

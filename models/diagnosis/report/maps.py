@@ -1,11 +1,12 @@
 """Maps of a model's error: whitened residuals over speed and pressure and over cycles, and loops beside what models
-predict."""
+predict. As in the models' RMSE (`detection.lack_of_fit`), the likeliest gains of runs and curves are no error."""
 
 import numpy as np
 
 from models.arrays import FloatArray
 from models.diagnosis.design.design import Design
 from models.diagnosis.design.points import IntArray
+from models.diagnosis.detection.lack_of_fit import without_likely_gains
 from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.report.report import LoopTrace, Maps
@@ -27,7 +28,7 @@ def residual_maps(problem: FitProblem, baseline: Fit, extended: Fit | None) -> M
     speeds, of_speed = _binned(speed)
     cycles, of_cycles = _binned(design.rows.cycles[rows])
     after = baseline if extended is None else extended
-    white = [model.residual[rows] / noise.deviation[rows] for model in (baseline, after)]
+    white = [without_likely_gains(problem, model)[rows] / noise.deviation[rows] for model in (baseline, after)]
     by_speed = [_means(residual, of_level, of_speed, (levels.size, speeds.size)) for residual in white]
     by_cycles = [_means(residual, of_cycles, of_level, (cycles.size, levels.size)) for residual in white]
     return Maps(
@@ -59,8 +60,9 @@ def _means(values: FloatArray, row: IntArray, column: IntArray, shape: tuple[int
     return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(shape)
 
 
-def loop_traces(design: Design, baseline: Fit, extended: Fit | None) -> tuple[LoopTrace, ...]:
+def loop_traces(problem: FitProblem, baseline: Fit, extended: Fit | None) -> tuple[LoopTrace, ...]:
     """A few loops, fresh to worn and low to high pressure: a period's bins, as measured and as both models have it."""
+    design = problem.design
     number = design.rows.loop
     loops = np.unique(number[design.plateaus :][design.closed[design.plateaus :]])
     if loops.size == 0:
@@ -72,15 +74,16 @@ def loop_traces(design: Design, baseline: Fit, extended: Fit | None) -> tuple[Lo
         for loop, state, level in zip(loops, states, levels, strict=True)
         if state in _spread(np.unique(states)) and level in _spread(np.unique(levels))
     ]
-    after = baseline if extended is None else extended
-    return tuple(_trace(design, baseline, after, np.flatnonzero(number == loop)) for loop in chosen)
+    before = design.torque - without_likely_gains(problem, baseline)
+    after = before if extended is None else design.torque - without_likely_gains(problem, extended)
+    return tuple(_trace(design, before, after, np.flatnonzero(number == loop)) for loop in chosen)
 
 
 def _spread(values: FloatArray) -> FloatArray:
     return np.asarray(values[np.unique(np.linspace(0, values.size - 1, SHOWN).round().astype(int))])
 
 
-def _trace(design: Design, baseline: Fit, extended: Fit, rows: IntArray) -> LoopTrace:
+def _trace(design: Design, baseline: FloatArray, extended: FloatArray, rows: IntArray) -> LoopTrace:
     at = int(rows[0])
     return LoopTrace(
         pressure=float(design.level[at]),
@@ -88,6 +91,6 @@ def _trace(design: Design, baseline: Fit, extended: Fit, rows: IntArray) -> Loop
         frequency=float(design.rows.angular_frequency[at]) / (2 * np.pi),
         speed=design.rows.velocity[rows] / design.facts.geometry.mean_radius,
         measured=design.torque[rows],
-        baseline=baseline.torque[rows],
-        extended=extended.torque[rows],
+        baseline=baseline[rows],
+        extended=extended[rows],
     )

@@ -128,9 +128,9 @@ def _without(noise: Noise, out: BoolArray) -> Noise:
     return replace(noise, deviation=np.where(out, _LEFT_OUT, 1.0) * noise.deviation)
 
 
-def _white(columns: FloatArray, design: Design, noise: Noise) -> FloatArray:
-    gains = gains_of(design, design.torque, noise)
-    return without_gains(whitened(columns, design, noise), gains, noise.run_gain, noise.curve_gain)
+def _white(columns: FloatArray, problem: FitProblem, noise: Noise) -> FloatArray:
+    gains = gains_of(problem.design, problem.gained, noise)
+    return without_gains(whitened(columns, problem.design, noise), gains, noise.run_gain, noise.curve_gain)
 
 
 def _forecast_score(problem: FitProblem, model: Fit, out: BoolArray) -> float:
@@ -140,8 +140,8 @@ def _forecast_score(problem: FitProblem, model: Fit, out: BoolArray) -> float:
     refit = fit(problem.with_noise(before), model.laws, model.effects, steps=_STEPS)
     own = [effect_columns(design, refit.prediction, effect) for effect in refit.effects]
     jacobian = np.concatenate([refit.prediction.jacobian(design)[:, priors.free], *own], axis=1)
-    fitted = _white(jacobian, design, before)
-    held = _white(np.column_stack([jacobian, refit.residual]), design, _without(noise, ~out))
+    fitted = _white(jacobian, problem, before)
+    held = _white(np.column_stack([jacobian, refit.residual]), problem, _without(noise, ~out))
     precision = fitted.T @ fitted
     rows = priors.rows[:, priors.free]
     precision[: rows.shape[1], : rows.shape[1]] += rows.T @ rows
@@ -165,7 +165,7 @@ def _held(problem: FitProblem, baseline: Fit, extended: Fit, out: BoolArray) -> 
         if bridged is not refit.laws:
             refit = fit(masked, bridged, refit.effects, steps=0)
         errors.append(np.where(out, refit.residual, 0.0))
-    squares = np.square(_white(np.stack(errors, axis=1), problem.design, problem.noise)).sum(axis=0)
+    squares = np.square(_white(np.stack(errors, axis=1), problem, problem.noise)).sum(axis=0)
     rows = np.flatnonzero(out)
     return _Held(rows=rows, before=errors[0][rows], after=errors[1][rows], score=0.5 * float(squares[0] - squares[1]))
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.diagnosis.detection.lack_of_fit import misfit_of, without_likely_gains
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.report.maps import MOST_BINS, SHOWN, loop_traces, residual_maps
 from tests.models.diagnosis.campaigns import CYCLES, PRESSURES, SPEEDS, campaign
@@ -23,10 +24,11 @@ def test_cells_are_means_of_residual_over_noise(bumped):
     assert np.allclose(found.speed, SPEEDS)
     assert np.array_equal(found.cycles, CYCLES)
     design, noise = bumped.design, bumped.problem.noise
+    left = without_likely_gains(bumped.problem, bumped.baseline.fit)
     for p in (0, 3):
         for s in (1, 12):
             cell = [
-                bumped.baseline.fit.residual[i] / noise.deviation[i]
+                left[i] / noise.deviation[i]
                 for i in range(design.plateaus)
                 if abs(design.rows.pressure[i] - PRESSURES[p]) < 1
                 and abs(design.points.velocity[i] / 0.058 - SPEEDS[s]) < 1e-6
@@ -37,10 +39,25 @@ def test_cells_are_means_of_residual_over_noise(bumped):
             rows = (design.rows.cycles[: design.plateaus] == CYCLES[c]) & (
                 np.abs(design.rows.pressure[: design.plateaus] - PRESSURES[p]) < 1
             )
-            white = (bumped.baseline.fit.residual / noise.deviation)[: design.plateaus][rows]
+            white = (left / noise.deviation)[: design.plateaus][rows]
             assert found.pressure_cycles_before[c, p] == pytest.approx(white.mean())
     # without an extension after is before
     assert np.array_equal(found.speed_pressure_before, found.speed_pressure_after)
+
+
+def test_what_maps_and_loops_show_is_the_error_that_the_report_states(bumped: Study) -> None:
+    """Runs that are off by gains of their own were shown as an error of 13 deviations where the RMSE was that of noise."""
+    design, off = bumped.design, 1.0 + 0.15 * (1.0 + bumped.design.rows.run % 2)
+    noise = replace(bumped.problem.noise, run_gain=0.02)
+    problem = replace(bumped.problem, design=replace(design, torque=off * design.torque), noise=noise)
+    fit = replace(bumped.baseline.fit, residual=problem.design.torque - bumped.baseline.fit.torque)
+    rmse = misfit_of(problem, fit).rmse
+    found = residual_maps(problem, bumped.baseline.fit, fit)
+    assert found is not None
+    assert rmse < 0.5
+    assert np.nanmean(np.abs(found.speed_pressure_after)) < 2
+    for loop in loop_traces(problem, fit, None):
+        assert np.sqrt(np.mean((loop.measured - loop.baseline) ** 2)) < 0.5
 
 
 def test_the_bump_shows_where_it_is(bumped):
@@ -84,7 +101,7 @@ def test_many_speeds_and_states_are_gathered(bumped):
 
 def test_loops_are_shown_as_measured_and_as_models_have_them(bumped):
     extended = bumped.extended(("squeeze_film", 1e-3, bumped_shape(bumped)))
-    found = loop_traces(bumped.design, bumped.baseline.fit, extended)
+    found = loop_traces(bumped.problem, bumped.baseline.fit, extended)
     assert len(found) == SHOWN**2
     assert {each.cycles for each in found} == {CYCLES[0], CYCLES[-1], CYCLES[len(CYCLES) // 2]} or len(found) == 9
     for each in found:
@@ -95,7 +112,7 @@ def test_loops_are_shown_as_measured_and_as_models_have_them(bumped):
         assert np.abs(each.measured - each.baseline).max() < 0.15 * each.measured.max()
     assert any(not np.allclose(each.baseline, each.extended) for each in found)
     # the control: without an extension both models are one
-    assert all(np.array_equal(t.baseline, t.extended) for t in loop_traces(bumped.design, bumped.baseline.fit, None))
+    assert all(np.array_equal(t.baseline, t.extended) for t in loop_traces(bumped.problem, bumped.baseline.fit, None))
 
 
 def bumped_shape(given: Study) -> tuple[float, ...]:
@@ -105,4 +122,4 @@ def bumped_shape(given: Study) -> tuple[float, ...]:
 
 def test_without_loops_no_traces():
     given = study(campaign(32, loops=False, cycles=(0.0, 2000.0, 9000.0)))
-    assert loop_traces(given.design, given.baseline.fit, None) == ()
+    assert loop_traces(given.problem, given.baseline.fit, None) == ()
