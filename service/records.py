@@ -3,7 +3,7 @@
 A workflow reads a `ClutchState`, computes outside any transaction, and stores with `unchanged` and `store`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
 from models.prognosis.ended_lives import EndedLife
 from models.prognosis.fleet import FleetPrior
 from service.columns import whole
-from service.errors import NotFoundError
+from service.errors import BusyError, NotFoundError
 from service.lives.assumptions import ALL_PRESSURES, FLEET, LearnedPrior, kind_of, severity_name, severity_under
 from service.lives.history import REBUILD, ByPressure, Event, duty_block, moment_of, order
 from service.lives.payloads import state_of
@@ -31,6 +31,9 @@ from storage.clutches import ClutchRow
 from storage.results import FilterStateRow, FitRow, PredictionRow
 from storage.runs import NewRun, RunInOrder
 
+#: How often what depends on a clutch's history is computed where others change it meanwhile. Derived: beside three services
+#: that change it all the time, each as often as this one, one in a hundred gives up (0.75^16).
+MAX_ATTEMPTS = 16
 #: Columns of a stored fit that are a fit's own.
 _FIT_COLUMNS = ("pressure", "undetermined", "noise", "mse_percent", "rmse", "points", "message")
 
@@ -159,6 +162,12 @@ def answers(connection: Connection, clutch_id: str) -> list[Any]:
 def unchanged(connection: Connection, clutch_id: str, revision: int) -> bool:
     """Whether the clutch still is at the revision that results were computed from."""
     return clutches.revision(connection, clutch_id) == revision
+
+
+def attempts(clutch_id: str) -> Iterator[int]:
+    """The numbers of the attempts to compute and store, from 1; raises BusyError where the clutch has changed at each."""
+    yield from range(1, MAX_ATTEMPTS + 1)
+    raise BusyError(f"clutch {clutch_id!r} was changed by others {MAX_ATTEMPTS} times meanwhile: ask again in a while")
 
 
 def store(connection: Connection, clutch_id: str, computed: Results) -> None:

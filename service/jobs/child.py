@@ -88,7 +88,13 @@ class Child:
             raise AwayError
         if code != 0:
             raise FailedError(f"its process ended with {_ending(code)}: see the log")
-        written: dict[str, Any] = json.loads(self._lines()[-1])
+        try:
+            written = json.loads(self._lines()[-1])
+        except (ValueError, IndexError):
+            written = None
+        if not isinstance(written, dict):
+            _log.error("%s: its process gave no answer that can be read", name)
+            raise FailedError("its process gave no answer that can be read")
         return written
 
     def _lines(self) -> list[bytes]:

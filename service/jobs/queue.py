@@ -13,8 +13,10 @@ import threading
 import time
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
+from functools import partial
 from typing import Any
 
+from service.errors import BusyError
 from service.jobs import child
 from service.jobs.child import AwayError, FailedError
 from service.jobs.kinds import Kind
@@ -31,6 +33,7 @@ from storage.jobs import JobRow
 MOST_ATTEMPTS = 3
 GIVEN_UP = f"the service or its database ended {MOST_ATTEMPTS} times while it ran"
 UNSTORED = "its end could not be stored: see the service's log"
+UNDONE = "it could not be done: see the service's log"
 #: A lease is prolonged so many times before it would run out. Chosen: a database that is away for some seconds loses none.
 RENEWALS_A_LEASE = 10
 #: [s] Between two looks whether the service is to stop. Chosen: nobody waits for it.
@@ -86,11 +89,14 @@ class JobQueue:
     def _work(self, group: Mapping[str, Kind]) -> None:
         wakes = 0
         while not self._closing:
-            job = self._claimed(group)
-            if job is not None:
-                self._do(job, group[job.kind])
-            else:
-                wakes = self._waited(wakes)
+            try:
+                job = self._claimed(group)
+                if job is not None:
+                    self._do(job, group[job.kind])
+                    continue
+            except Exception:  # noqa: BLE001  (the next job is to be done whatever became of this one)
+                _log.exception("a job could not be begun")
+            wakes = self._waited(wakes)
 
     def _waited(self, wakes: int) -> int:
         """How often the queue was woken by now, once that is not `wakes` any more, or after a pause."""
@@ -116,8 +122,8 @@ class JobQueue:
         return claimed
 
     def _do(self, job: JobRow, kind: Kind) -> None:
-        request_id.set(job.arguments["request"])
         try:
+            request_id.set(job.arguments["request"])
             ended = self._outcome(job, kind)
             if ended is not None:
                 self._stored(job, kind, ended)
@@ -131,7 +137,15 @@ class JobQueue:
         renewing = threading.Thread(target=self._renew_until, args=(done, job), name="lease", daemon=True)
         renewing.start()
         try:
-            kind.finish(job, ended)
+            for attempt in range(1, MOST_ATTEMPTS + 1):
+                try:
+                    return kind.finish(job, ended)
+                except BusyError as error:
+                    _log.warning(
+                        "%s %s: its end could not be stored at attempt %d: %s", job.kind, job.job_id, attempt, error
+                    )
+                    if attempt == MOST_ATTEMPTS:
+                        raise
         finally:
             done.set()
             renewing.join()
@@ -141,11 +155,19 @@ class JobQueue:
             pass
 
     def _give_up(self, job: JobRow, kind: Kind) -> None:
-        """Its end could not be stored: say at least that it ended, or leave that to who claims it next."""
-        try:
-            kind.finish(job, {"problem": UNSTORED})
-        except StorageError:
-            _log.exception("%s %s is made again once its lease has run out", job.kind, job.job_id)
+        """Its end could not be stored: say at least that it ended, at the least of the job itself, or leave that to who
+        claims it next."""
+        for end in (partial(kind.finish, job, {"problem": UNSTORED}), partial(self._end_as_failed, job)):
+            try:
+                end()
+            except Exception:  # noqa: BLE001  (as above)
+                _log.exception("%s %s: that it failed could not be stored", job.kind, job.job_id)
+            else:
+                break
+
+    def _end_as_failed(self, job: JobRow) -> None:
+        with self._database.writing(of=self._name) as connection:
+            jobs.end(connection, job.job_id, jobs.FAILED, _now(), problem=UNSTORED, claimer=job.claimed_by)
 
     def _outcome(self, job: JobRow, kind: Kind) -> dict[str, Any] | None:
         """What its process wrote, or a problem; None where it is not to be ended now: by another service, or later."""
@@ -159,6 +181,9 @@ class JobQueue:
             return None
         except FailedError as error:
             return {"problem": str(error)}
+        except Exception:  # noqa: BLE001  (as where no process can be started)
+            _log.exception("%s %s of %s", job.kind, job.job_id, job.clutch_id)
+            return {"problem": UNDONE}
 
     def _seen_through(self, job: JobRow, process: child.Child) -> bool:
         """Wait for the process' end, the lease prolonged; False where it is to be ended before. Raises FailedError."""

@@ -25,6 +25,8 @@ from storage.engine.shared_answers import SharedAnswer
 
 _log = logging.getLogger("clutchlife")
 
+#: Bytes that a kept answer takes beside its body: its key, its tag and its entry. Measured: 700 to 1,100 with a cursor.
+KEPT_BESIDE_BYTES = 1024
 #: The end of a list that is answered as JSON and goes on: the cursor of its next page.
 _GOES_ON = re.compile(rb'"next":"([A-Za-z0-9_-]+)"\}$')
 
@@ -57,6 +59,11 @@ class Answer:
     body: bytes
     tag: str
     next: str | None = None
+
+    @property
+    def size(self) -> int:
+        """Bytes that it takes where it is kept: the empty ones of many keys take room too."""
+        return len(self.body) + KEPT_BESIDE_BYTES
 
     @classmethod
     def of(cls, made: bytes | Page) -> "Answer":
@@ -178,12 +185,12 @@ class AnswerCache:
 
     def _hold(self, key: Hashable, version: Hashable, answer: Answer, begun: int) -> None:
         self._drop(key)
-        if len(answer.body) <= self._most:
-            self._held += len(answer.body)
+        if answer.size <= self._most:
+            self._held += answer.size
             self._answers[key] = version, answer, begun
         while self._held > self._most:
             self._drop(next(iter(self._answers)))
 
     def _drop(self, key: Hashable) -> None:
         if key in self._answers:
-            self._held -= len(self._answers.pop(key)[1].body)
+            self._held -= self._answers.pop(key)[1].size

@@ -32,7 +32,10 @@ LONGEST_DIAGNOSIS_ID = 64
 LONGEST_FILENAME = 255
 LONGEST_MAP = 4000
 #: A clutch's or a run's name: safe in an address and as a file's name, 128 characters at most.
+LONGEST_IDENTIFIER = 128
 IDENTIFIER_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._:@+-]{0,127}$"
+#: Characters of a number in an address. Derived: the longest that a 64-bit float is written in has 24.
+LONGEST_NUMBER = 32
 #: Quotation marks and opening brackets of a JSON body. Derived: those of a note that consists of them, and as many again.
 MOST_MARKS = 10_000
 #: Samples of a channel that a plot may ask for: more than any screen has pixels; all samples need no argument.

@@ -2,14 +2,16 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from service.schemas.base import StartedAt
 from service.schemas.diagnosis import JobState
 from service.schemas.limits import (
     IDENTIFIER_PATTERN,
     LONGEST_FILENAME,
+    LONGEST_IDENTIFIER,
     LONGEST_MAP,
+    LONGEST_NUMBER,
     LONGEST_SEARCH,
     MOST_CYCLES,
     MOST_DRAWS,
@@ -17,6 +19,16 @@ from service.schemas.limits import (
     MOST_POINTS,
 )
 from service.schemas.prognosis.quantities import SeriesQuantity
+
+
+def _short(value: object) -> object:
+    if isinstance(value, str) and len(value) > LONGEST_NUMBER:
+        raise ValueError(f"a number has at most {LONGEST_NUMBER} characters")
+    return value
+
+
+#: Of every argument that is a number: refuses what none is by its length.
+SHORT = BeforeValidator(_short)
 
 ClutchId = Annotated[str, Field(description="The clutch's name")]
 RunId = Annotated[str, Field(description="The run's name")]
@@ -27,6 +39,7 @@ InspectionId = Annotated[str, Field(description="The inspection's name")]
 PhotographId = Annotated[str, Field(description="The photograph's name, the SHA-256 of its bytes")]
 Points = Annotated[
     int | None,
+    SHORT,
     Field(
         ge=1,
         le=MOST_POINTS,
@@ -37,7 +50,10 @@ Points = Annotated[
 Quantity = Annotated[SeriesQuantity | None, Field(description="Rows of this quantity only")]
 EngagementRun = Annotated[
     str | None,
-    Field(description="The run whose measured engagement is compared with the model; left out, the newest of the life"),
+    Field(
+        max_length=LONGEST_IDENTIFIER,
+        description="The run whose measured engagement is compared with the model; left out, the newest of the life",
+    ),
 ]
 TrackedQuantity = Annotated[
     str | None,
@@ -50,12 +66,13 @@ TrackedQuantity = Annotated[
 ]
 LifeNumber = Annotated[
     int | None,
+    SHORT,
     Field(
         ge=1, description="The life by its number, from 1 on; left out, the present one. A rebuild begins a new life"
     ),
 ]
 Draws = Annotated[
-    int, Field(ge=0, le=MOST_DRAWS, description="Joint draws of the coefficients of eq. 6 for each track")
+    int, SHORT, Field(ge=0, le=MOST_DRAWS, description="Joint draws of the coefficients of eq. 6 for each track")
 ]
 State = Annotated[
     Literal["accepted", "held", "withdrawn"] | None, Field(description="Runs in this state only; left out, all")
@@ -84,6 +101,7 @@ Sort = Annotated[
 ]
 Offset = Annotated[
     int,
+    SHORT,
     Field(
         ge=0, le=MOST_OFFSET, description="Clutches to pass over, to show a part of the list; a walk takes the cursor"
     ),
@@ -93,7 +111,9 @@ Offset = Annotated[
 
 FileKind = Annotated[Literal["stationary_stribeck", "dynamic_stribeck"], Field(description="The kind of run")]
 FileCycles = Annotated[
-    float, Field(ge=0, le=MOST_CYCLES, allow_inf_nan=False, description="Duty cycles since new when the run is made")
+    float,
+    SHORT,
+    Field(ge=0, le=MOST_CYCLES, allow_inf_nan=False, description="Duty cycles since new when the run is made"),
 ]
 FileMap = Annotated[
     str | None, Field(max_length=LONGEST_MAP, description="Columns of channels: torque_nm:Mz,speed_rpm:n")

@@ -18,6 +18,7 @@ from typing import Annotated, Literal, get_args
 from fastapi import Depends, Request
 
 from service.errors import FieldError, ForbiddenError, InvalidError, UnauthorizedError
+from service.schemas.limits import LONGEST_IDENTIFIER
 from service.web.context import Context
 from storage.engine.watch import Glance, GrantedKey, Question
 from storage.keys import KeyRow
@@ -112,6 +113,8 @@ def _key_of(caller: Caller) -> str | None:
 async def glance_at(request: Request, caller: Caller, clutch_id: str | None) -> Glance:
     """What is so of the caller's key and the clutch, asked once a request, of which it stays the `glance`."""
     key = _key_of(caller)
+    if clutch_id is not None and len(clutch_id) > LONGEST_IDENTIFIER:
+        clutch_id = None  # no clutch is called so, and whoever asks is not known yet
     question = Question(clutch_id, None if key is None else _digest(key))
     glance = await context_of(request).database.watch.look(question)
     request.state.glance = glance

@@ -11,6 +11,7 @@ from service.jobs.queue import JobQueue
 from service.jobs.workers import Workers
 from service.lists import ALL_ITEMS, LONGEST_CURSOR
 from service.queries.cache import AnswerCache
+from service.schemas.parameters import SHORT
 from service.settings import Settings
 from service.web.key_uses import KeyUses
 from service.web.limits import MOST_HORIZONS, MOST_ITEMS, MOST_PRESSURE_BAR
@@ -37,11 +38,12 @@ class Context:
     key_uses: KeyUses = field(default_factory=KeyUses)
 
 
-Limit = Annotated[int, Query(ge=1, le=MOST_ITEMS, description="Items a page")]
-Whole = Annotated[int, Query(ge=1, le=ALL_ITEMS, description="Items a page; left out, all of them")]
+Limit = Annotated[int, SHORT, Query(ge=1, le=MOST_ITEMS, description="Items a page")]
+Whole = Annotated[int, SHORT, Query(ge=1, le=ALL_ITEMS, description="Items a page; left out, all of them")]
 Cursor = Annotated[str | None, Query(max_length=LONGEST_CURSOR, description="Where an earlier page ended: its `next`")]
 PressureBar = Annotated[
     float | None,
+    SHORT,
     Query(
         ge=0,
         le=MOST_PRESSURE_BAR,
@@ -51,6 +53,7 @@ PressureBar = Annotated[
 ]
 AtCycles = Annotated[
     float | None,
+    SHORT,
     Query(ge=0, le=HORIZON * MOST_HORIZONS, allow_inf_nan=False, description="As it would have been predicted then"),
 ]
 Prefer = Annotated[

@@ -6,17 +6,19 @@ sent, or 304; in every other case, an unknown caller or a changed clutch, the re
 """
 
 import asyncio
+import hashlib
 import math
 import secrets
 import time
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from logging import DEBUG, INFO, WARNING
 from typing import Any
 
+from fastapi.dependencies.utils import request_params_to_args
 from fastapi.responses import Response
-from starlette.datastructures import MutableHeaders
+from starlette.datastructures import MutableHeaders, QueryParams
 from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -41,13 +43,14 @@ class Shares:
         self.per_second = per_second
         self.at_once = at_once
         self._shares: OrderedDict[str, _Share] = OrderedDict()
-        self._keys: OrderedDict[bytes, str] = OrderedDict()  # by what was sent as Authorization
+        self._keys: OrderedDict[bytes, str] = OrderedDict()  # by the digest of what was sent as Authorization
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http" or scope["path"] in limits.UNLIMITED:
             await self.app(scope, receive, send)
             return
-        sent = next((value for name, value in scope["headers"] if name == b"authorization"), None)
+        header = next((value for name, value in scope["headers"] if name == b"authorization"), None)
+        sent = None if header is None else hashlib.sha256(header).digest()
         share = self._share_of(sent, scope.get("client"))
         if (wait := self._wait(share)) > 0:
             await self._refuse(wait, scope, receive, send)
@@ -249,47 +252,67 @@ def remember(request: Request, again: Again) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class _Poll:
+class _Place:
+    """What a path leads to."""
+
     route: Any
     clutch_id: str | None
-    again: Again
 
 
 class Polls:
-    """Answers what was asked before without looking at anything else, for the addresses that were asked for last."""
+    """Answers what was asked before without looking at anything else, for what was asked for last.
+
+    An answer is found by its path and its arguments as they were checked: however a number is written, it is one entry.
+    """
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
-        self._polls: OrderedDict[tuple[str, bytes], _Poll] = OrderedDict()
+        self._places: OrderedDict[str, _Place] = OrderedDict()
+        self._polls: OrderedDict[tuple[str, Hashable], Again] = OrderedDict()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http" or scope["method"] != "GET":
             await self.app(scope, receive, send)
             return
-        address = (scope["path"], scope["query_string"])
-        poll = self._polls.get(address)
-        if poll is not None and (response := await self._answered(poll, scope)) is not None:
-            await response(scope, receive, send)
-            return
+        path, query = scope["path"], scope["query_string"]
+        place = self._places.get(path)
+        if place is not None:
+            again = self._polls.get((path, _arguments(place.route, query)))
+            if again is not None and (response := await self._answered(place, again, scope)) is not None:
+                await response(scope, receive, send)
+                return
         await self.app(scope, receive, send)
         again = scope.get(_REMEMBERED)
         if again is not None:
-            self._polls[address] = _Poll(scope["route"], clutch_of(Request(scope)), again)
-            while len(self._polls) > limits.MOST_POLLED:
-                self._polls.popitem(last=False)
+            self._places[path] = _Place(scope["route"], clutch_of(Request(scope)))
+            self._polls[path, _arguments(scope["route"], query)] = again
+            for index in (self._places, self._polls):
+                while len(index) > limits.MOST_POLLED:
+                    index.popitem(last=False)
 
-    async def _answered(self, poll: _Poll, scope: Scope) -> Response | None:
+    async def _answered(self, place: _Place, again: Again, scope: Scope) -> Response | None:
         request = Request(scope)
         try:
             context, caller = context_of(request), caller_of(request)
-            glance = await glance_at(request, caller, poll.clutch_id)
-            grant = authorise(glance, caller, "read", poll.clutch_id)
+            glance = await glance_at(request, caller, place.clutch_id)
+            grant = authorise(glance, caller, "read", place.clutch_id)
             request.state.grant = grant
-            response = poll.again(request)
+            response = again(request)
         except (ServiceError, StorageError):  # the usual way says what is wrong
             return None
         if response is not None:
-            scope["route"] = poll.route  # by which requests are counted
+            scope["route"] = place.route  # by which requests are counted
             if grant.key_id is not None:
                 context.key_uses.note(context.database, grant.key_id)
         return response
+
+
+def _arguments(route: Any, query: bytes) -> Hashable:
+    """A query's arguments as the route checks them; None where they are wrong, which the usual way says."""
+    if not query:
+        return ()
+    sent, fields = QueryParams(query), route.dependant.query_params
+    values, errors = request_params_to_args(fields, sent)
+    if errors or not sent.keys() <= {field.alias for field in fields}:
+        return None
+    return tuple(values.values())

@@ -42,7 +42,7 @@ class _Entry:
     @property
     def size(self) -> int:
         """Bytes of the answer."""
-        return 0 if self.answer is None else len(self.answer.body)
+        return 0 if self.answer is None else self.answer.size
 
 
 class Revalidation:

@@ -86,7 +86,9 @@ def _change(
 ) -> None:
     """Compute under the new model and store, again where the clutch has changed meanwhile."""
     diagnosis_id = None if adoption is None else adoption.diagnosis_id
+    attempts = records.attempts(clutch_id)
     while True:
+        next(attempts)
         state, results = _computed(database, clutch_id, adoption)
         with database.writing(of=clutch_id) as connection:
             if not records.unchanged(connection, clutch_id, state.revision):

@@ -105,7 +105,9 @@ def correct(
 
 
 def _change(database: Database, request: _Request) -> Receipt:
+    attempts = records.attempts(request.clutch_id)
     while True:
+        next(attempts)
         loaded = _load(database, request)
         row = _as_asked(database, loaded, request)
         if (row.state, row.cycles) == (loaded.row.state, loaded.row.cycles):

@@ -45,7 +45,9 @@ def edit(
 
     What is so already is not changed. Raises NotFoundError.
     """
+    attempts = records.attempts(clutch_id)
     while True:
+        next(attempts)
         edited = _computed(database, clutch_id, fields, archived)
         if not _entries(edited):
             return

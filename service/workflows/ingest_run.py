@@ -99,7 +99,9 @@ def ingest(
     if columns.is_long:
         columns = stored_runs.placed(database, columns)
     arrival = Arrival(run=run, sampled=sampled, analysis=analysis, received_at=received_at)
+    attempts = records.attempts(clutch_id)
     while True:
+        next(attempts)
         with database.reading() as connection:  # one state: the same run may come in beside this one at any moment
             stored = runs.get(connection, clutch_id, run.run_id)
             if stored is not None:

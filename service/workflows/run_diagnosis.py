@@ -27,11 +27,11 @@ def ask(
         last_run_key = diagnoses.last_run_key(connection, clutch_id)
         changed = changes.last_of_history(connection, clutch_id)
         diagnosis_id = diagnoses.running(connection, clutch_id, last_run_key, since=changed)
-        if diagnosis_id is not None:
-            job = jobs.get(connection, diagnosis_id)
-            if job is not None and adopt and job.arguments["adopt_by"] is None:
-                jobs.set_arguments(connection, diagnosis_id, job.arguments | {"adopt_by": by})
-            return diagnosis_id, False
+        job = None if diagnosis_id is None else jobs.get(connection, diagnosis_id)
+        if job is not None and job.state in jobs.OPEN:  # else its end could not be stored
+            if adopt and job.arguments["adopt_by"] is None:
+                jobs.set_arguments(connection, job.job_id, job.arguments | {"adopt_by": by})
+            return job.job_id, False
         waiting = jobs.count_open(connection, DIAGNOSIS)
         if waiting >= most:
             raise BusyError(f"{waiting} diagnoses wait already: ask again in a little while")
@@ -73,7 +73,9 @@ def finish(
     Where somebody wants what it found adopted, `adopt` does both at once; it returns False where there is nothing to adopt.
     A job that is no longer the claimer's was cancelled, or is made by another: then nothing is stored.
     """
+    attempts = records.attempts(job.clutch_id or "")
     while True:
+        next(attempts)
         with database.reading() as connection:
             newest = jobs.get(connection, job.job_id)
         if newest is None or newest.clutch_id is None:

@@ -86,3 +86,55 @@ def test_of_a_group_one_is_done_at_a_time_and_other_groups_do_not_wait(
         queue.close()
     assert not queue.is_working()
     assert states(in_file) == {"r": "cancelled", "f": "waiting", "d": "failed", "other": "waiting"}, "given back"
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        "dies",
+        "raises",
+        "writes garbage",
+        "writes a list",
+        "says nothing",
+        "cannot start",
+        "cannot be stored",
+        "cannot end",
+    ],
+)
+def test_a_job_that_fails_in_any_way_is_marked_failed_and_the_next_one_runs(
+    in_file: Database, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, how: str
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
+
+    def finish(job: JobRow, ended: Mapping[str, Any]) -> None:
+        problem = ended.get("problem")
+        if job.job_id == "bad" and (how == "cannot end" or (how == "cannot be stored" and problem is None)):
+            raise KeyError("adopt_by")
+        with in_file.writing() as connection:
+            state = jobs.FINISHED if problem is None else jobs.FAILED
+            jobs.end(connection, job.job_id, state, AT, problem=problem, claimer=job.claimed_by)
+
+    def work(job: JobRow, _: Settings) -> Work:
+        if job.job_id == "bad" and how == "cannot start":
+            raise OSError("no process can be started")
+        task = {"how": how if job.job_id == "bad" else "ends well"}
+        return Work(modules=("tests.service.jobs.failing",), task=task, longest=60.0)
+
+    ask(in_file, "bad", jobs.REPLAY)
+    ask(in_file, "next", jobs.REPLAY)
+    queue = JobQueue(in_file, Settings(job_lease_seconds=1), [{jobs.REPLAY: Kind(work, finish)}])
+    queue.start()
+    try:
+        deadline = time.monotonic() + 60
+        while states(in_file) != {"bad": "failed", "next": "finished"}:
+            assert time.monotonic() < deadline, states(in_file)
+            time.sleep(0.05)
+        assert queue.is_working()
+    finally:
+        queue.close()
+    with in_file.reading() as connection:
+        row = jobs.get(connection, "bad")
+    assert row is not None
+    assert row.problem
+    if how not in ("dies",):
+        assert any(record.levelname == "ERROR" for record in caplog.records), "it is logged"

@@ -20,6 +20,12 @@ from storage.engine.shared_answers import SharedAnswer, SharedAnswers
 from tests.storage.samples import clutch_row
 
 
+@pytest.fixture(autouse=True)
+def bodies_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Count bodies of a few bytes as what they are."""
+    monkeypatch.setattr(caches, "KEPT_BESIDE_BYTES", 0)
+
+
 def made(cache: AnswerCache, name: str, body: bytes) -> bool:
     """Whether the answer had to be made."""
     calls = []
@@ -47,6 +53,14 @@ def test_an_answer_larger_than_all_may_be_together_is_given_and_not_kept() -> No
     assert [made(cache, "large", b"l" * 11) for _ in range(2)] == [True, True]
     assert not made(cache, "small", b"s")
     assert MOST_CACHED_BYTES < 2**27
+
+
+def test_answers_without_a_body_take_room_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(caches, "KEPT_BESIDE_BYTES", 10)
+    cache = AnswerCache(100)
+    for number in range(50):
+        made(cache, str(number), b"")
+    assert sum(cache.held(str(number), 1) is not None for number in range(50)) == 10
 
 
 def test_of_several_that_ask_at_once_one_computes() -> None:

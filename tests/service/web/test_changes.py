@@ -3,6 +3,7 @@
 import pytest
 from fastapi.testclient import TestClient
 
+from service import records
 from service.web.auth import make_key
 from storage import keys
 from storage.engine.opening import open_database
@@ -126,3 +127,22 @@ def test_an_archived_clutch_refuses_runs(client: TestClient) -> None:
     assert client.post(f"{RUN}/withdraw", json={"reason": "x"}).status_code == 200
     answer = client.patch(RUN, json={"cycles": 3, "reason": "x"})
     assert (answer.status_code, answer.json()["type"]) == (409, "urn:clutchlife:problem:not-possible-now")
+
+
+def test_a_clutch_that_others_change_all_the_time_is_busy_and_not_computed_for_ever(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert client.post("/v1/clutches/c1/runs", json=stationary(0.0, run_id="r")).status_code == 201
+    asked: list[int] = []
+    monkeypatch.setattr(records, "unchanged", lambda *_: asked.append(1))
+    monkeypatch.setattr(records, "MAX_ATTEMPTS", 3)
+    for method, path, body in (
+        ("POST", "/runs", stationary(1000.0)),
+        ("POST", "/runs/r/withdraw", {"reason": "slipped"}),
+        ("PATCH", "/runs/r", {"cycles": 50, "reason": "mistyped"}),
+        ("PATCH", "", {"reason": "drawing", "end_of_life": {"cof_fraction": 0.4}}),
+    ):
+        asked.clear()
+        answer = client.request(method, f"/v1/clutches/c1{path}", json=body)
+        assert (answer.status_code, "Retry-After" in answer.headers, len(asked)) == (503, True, 3), path
+        assert "was changed by others 3 times" in answer.json()["detail"]

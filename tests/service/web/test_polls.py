@@ -1,16 +1,22 @@
 """What was asked before is answered before routing: only to who may read, and only what the clutch's revision still says."""
 
-from typing import NoReturn
+from functools import partial
+from pathlib import Path
+from typing import Any, NoReturn
+from urllib.parse import quote
 
 import pytest
 from fastapi import Request
 from fastapi.testclient import TestClient
+from httpx2 import Client
 
 from service.web import auth
 from service.web.context import Context
+from service.web.middleware import Polls
 from storage import keys
 from storage.engine.errors import DatabaseBusy
-from tests.support import stationary
+from tests.service.test_connections import resident
+from tests.support import serving, stationary
 
 POLLED = (
     "/v1/clutches", "/v1/clutches/c1/remaining-useful-life", "/v1/clutches/c1/degradation", "/v1/clutches/c1/runs",
@@ -87,6 +93,56 @@ def test_nobody_is_answered_who_may_not_read(polled: TestClient) -> None:
         keys.insert(connection, auth.make_key("read", "another", created_at=AT)[1])
     for address in POLLED:
         assert polled.get(address, headers={"Authorization": f"Bearer {text}"}).status_code == 401
+
+
+def test_a_number_is_one_entry_however_it_is_written(polled: TestClient) -> None:
+    """3,000 spellings of one number added 142 MiB outside every bound."""
+    address = "/v1/clutches/c1/remaining-useful-life"
+    assert polled.get(f"{address}?at_cycles=0&method=particle").status_code == 200
+    index = polls_of(polled)
+    entries = len(index._polls)
+    routed(polled)
+    answers = set()
+    for spelled in ("0", "0.0", "0e9", "-0", "+0", "00", "0.000000000000000000000000", " 0"):
+        for query in (f"at_cycles={quote(spelled)}", f"method=particle&at_cycles={quote(spelled)}"):
+            answers.add(polled.get(f"{address}?{query}").content)
+    assert len(answers) == 1
+    assert (len(index._polls), routed(polled)) == (entries, [])
+
+
+@pytest.mark.parametrize(
+    "argument",
+    ["remaining-useful-life?at_cycles=", "remaining-useful-life?pressure_bar=", "runs?limit=", "scores?limit="],
+)
+def test_what_cannot_be_a_number_is_refused_by_its_length(polled: TestClient, argument: str) -> None:
+    answer = polled.get(f"/v1/clutches/c1/{argument}{'0' * 40}1")
+    assert answer.status_code == 422
+    assert "at most 32 characters" in answer.json()["detail"]
+
+
+@pytest.mark.slow
+def test_many_spellings_take_no_memory(tmp_path: Path) -> None:
+    """40 MB each of numbers, names and keys, of which one entry each was kept."""
+    with serving(tmp_path / "a.db", loaded=True) as server, Client(base_url=server.url, timeout=60) as http:
+        assert http.post("/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
+        assert http.post("/v1/clutches/c1/runs", json=stationary(1000.0)).status_code == 201
+        ask = partial(http.get, "/v1/clutches/c1/remaining-useful-life")
+        for _ in range(50):
+            assert ask().status_code == 200
+        before = resident(server.pid)
+        for number in range(1000):
+            assert ask(params={"at_cycles": f"1000.{'0' * (40_000 + number)}"}).status_code == 422
+            assert http.get(f"/v1/clutches/{'c' * 40_000}{number}").status_code == 404
+            assert ask(headers={"Authorization": f"Bearer{' ' * 40_000}{number}"}).status_code == 200
+        assert resident(server.pid) - before < 24 << 20
+
+
+def polls_of(client: TestClient) -> Polls:
+    """The index in the application's stack of middleware."""
+    layer: Any = client.app.middleware_stack  # type: ignore[attr-defined]
+    while not isinstance(layer, Polls):
+        layer = layer.app
+    return layer
 
 
 def test_other_arguments_are_another_address(polled: TestClient) -> None:
