@@ -37,6 +37,7 @@ from service.web.routes import (
     inspections,
     jobs,
     life,
+    rigs,
     runs,
 )
 from service.workflows import adopt_model, ask_job, raw_records, run_diagnosis
@@ -131,7 +132,7 @@ def create_app(settings: Settings) -> FastAPI:
         redoc_url=None,
     )
     problems.install(app)
-    for part in (health, clutches, files, runs, inspections, life, diagnoses, jobs, fleet):
+    for part in (health, clutches, files, runs, inspections, life, diagnoses, jobs, fleet, rigs):
         app.include_router(part.router)
     for beside in (clutches.fleet_router, exports.router, exports.fleet_router, description.router):
         app.include_router(beside)

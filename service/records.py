@@ -25,10 +25,12 @@ from service.lives.recomputation import Adoption, ClutchState, Results, Tracking
 from service.lives.run_analysis import LevelFit, Value
 from service.lives.tracks import CARRIED, States, Tracked
 from service.schemas.clutch import ClutchIn
+from service.schemas.rig import RigOut
 from service.settings import CODE_VERSION
-from storage import assumptions, clutches, diagnoses, results, runs
+from storage import assumptions, clutches, diagnoses, results, rigs, runs
 from storage.clutches import ClutchRow
 from storage.results import FilterStateRow, FitRow, PredictionRow
+from storage.rigs import RigRow
 from storage.runs import NewRun, RunInOrder
 
 #: How often what depends on a clutch's history is computed where others change it meanwhile. Derived: beside three services
@@ -44,6 +46,20 @@ def clutch(connection: Connection, clutch_id: str) -> ClutchRow:
     if row is None:
         raise NotFoundError(f"no clutch is known as {clutch_id!r}")
     return row
+
+
+def rig(connection: Connection, name: str) -> RigOut:
+    """A rig profile in force, or NotFoundError."""
+    row = rigs.get(connection, name)
+    if row is None:
+        raise NotFoundError(f"no rig is known as {name!r}")
+    return rig_out(row)
+
+
+def rig_out(row: RigRow) -> RigOut:
+    """A stored profile, with the defaults of fields that came after it."""
+    saved = {"version": row.version, "saved_at": row.saved_at, "saved_by": row.saved_by}
+    return RigOut.model_validate(row.content | saved)
 
 
 def record(row: ClutchRow) -> ClutchIn:

@@ -10,10 +10,11 @@ from storage.encoding.json_text import Json, to_object, to_text
 from storage.tables import change
 
 HOLD, CONFIRM, WITHDRAW, RESTORE, CORRECT = "hold", "confirm", "withdraw", "restore", "correct"
+REREAD = "reread"
 EDIT, ARCHIVE, UNARCHIVE, ADOPT = "edit", "archive", "unarchive", "adopt"
 WITHDRAW_INSPECTION, RESTORE_INSPECTION = "withdraw_inspection", "restore_inspection"
 #: What changes a clutch's history, and with it what a diagnosis was made of.
-OF_HISTORY = (CONFIRM, WITHDRAW, RESTORE, CORRECT, EDIT)
+OF_HISTORY = (CONFIRM, WITHDRAW, RESTORE, CORRECT, REREAD, EDIT)
 #: What the trail shows of a change.
 SHOWN = ("at", "by", "action", "run_id", "reason", "before", "after")
 

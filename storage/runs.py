@@ -119,6 +119,9 @@ _held = (
 _held_of_all = select(func.count()).select_from(run).where(HELD_ONLY)
 #: Of SQLite's keys none is left out: the greatest one counts the runs, for none is ever deleted.
 _number = select(Pair(func.coalesce(func.max(run.c.run_key), 0), func.count(run.c.run_key)))
+_read_again_as = select(run).where(
+    _of_clutch, json_text(run.c.details, "file", "content_sha256") == bindparam("of_content")
+)
 _keys = select(run.c.run_id, run.c.run_key).where(_of_clutch)
 _set_results = update(run).where(run.c.run_key == bindparam("wanted"))
 
@@ -136,6 +139,12 @@ def insert(connection: Connection, row: NewRun) -> int:
 def get(connection: Connection, clutch_id: str, run_id: str) -> RunRow | None:
     """The run, or None."""
     row = connection.execute(_by_id, {"of_clutch": clutch_id, "wanted": run_id}).first()
+    return None if row is None else _row(row)
+
+
+def read_again_as(connection: Connection, clutch_id: str, content_sha256: str) -> RunRow | None:
+    """The run whose file was read again since it was sent, with that content; or None."""
+    row = connection.execute(_read_again_as, {"of_clutch": clutch_id, "of_content": content_sha256}).first()
     return None if row is None else _row(row)
 
 

@@ -93,7 +93,8 @@ raw_removal = Table(
 #: The value stands in the text, as that of HELD_ONLY.
 IN_A_STORE = text("blob IS NOT NULL")
 
-#: An encoded column is in `data`, or it is the `blob` of that name (its SHA-256) in a store, and `data` is empty.
+#: An encoded column is in `data`, or it is the `blob` of that name (its SHA-256) in a store, and `data` is empty. The file
+#: that a run was read from is a row too, under a name that no channel has (`storage.channels.FILE`).
 channel = Table(
     "channel",
     metadata,
@@ -260,6 +261,15 @@ inspection_photograph = Table(
     Column("position", WHOLE, nullable=False),
     Column("received_at", TEXT, nullable=False),
     Column("received_by", TEXT, nullable=False),
+)
+
+#: Rig profiles: how the files of a rig are read. `content` is the profile (JSON) in force, `version` counts from 1 on.
+rig = Table(
+    "rig",
+    metadata,
+    Column("name", TEXT, primary_key=True),
+    Column("version", WHOLE, nullable=False),
+    *_required(TEXT, "content", "saved_at", "saved_by"),
 )
 
 #: The audit trail: who changed what of a clutch (`run_id` null) or of one of its runs, when and why, and the revision from

@@ -19,7 +19,12 @@ from service.lives.criteria import LEAST_TORQUE_SD, MOST_LEVELS
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IncomingRun:
-    """One run as the rig sent it. `channels` are in the units of their names, `details` is what else was said."""
+    """One run as the rig sent it. `channels` are in the units of their names, `details` is what else was said.
+
+    `file` describes the file that it was read from (None: it was sent otherwise): `filename`, `sha256`, `bytes`, the `rig`
+    whose profile was applied, `reading` (all by which it was read) and the `warnings` of reading. It is no part of the
+    content: the same channels sent another way are the same run.
+    """
 
     kind: str
     cycles: float
@@ -29,6 +34,7 @@ class IncomingRun:
     origin: str = "measured"
     channels: Mapping[str, FloatArray] = field(default_factory=dict)
     details: Mapping[str, Any] = field(default_factory=dict)
+    file: Mapping[str, Any] | None = None
 
 
 def name_run(

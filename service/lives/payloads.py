@@ -42,6 +42,10 @@ STATES = FAILURE, OUT_OF_SPECIFICATION, MAINTENANCE, CHECK, NORMAL = (
 RANK_UNKNOWN = 2 * HORIZON
 
 
+#: What a receipt says of the file that a run was read from.
+_OF_A_FILE = ("filename", "sha256", "bytes", "rig")
+
+
 def receipt(
     clutch_id: str,
     run: IncomingRun,
@@ -64,7 +68,8 @@ def receipt(
         "received_at": received_at,
         "content_sha256": run.content_sha256,
         "duplicate": False,
-        "warnings": notice_items(warnings),
+        "file": None if run.file is None else {name: run.file[name] for name in _OF_A_FILE},
+        "warnings": [*(run.file or {}).get("warnings", ()), *notice_items(warnings)],
         "fits": fit_items(levels, cofs),
         "loops": loop_items(loops),
         "engagement": None if engagement is None else engagement_item(engagement),

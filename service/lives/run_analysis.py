@@ -69,6 +69,8 @@ class Analysis:
         """What is kept beside a run's channels: what was sent with them, its range of speeds [rad/s] and its oil [K], the
         course of an engagement."""
         kept = dict(run.details) | {"origin": run.origin}
+        if run.file is not None:
+            kept["file"] = dict(run.file)
         if self.engagement is not None:
             return kept | course_item(self.engagement)
         if self.speed_range is not None:

@@ -55,3 +55,6 @@ MOST_BLOCKS = 1000
 LEAST_BLOCK_CYCLES, LEAST_PLANNED_KJ = 1, 1e-6
 #: Characters that a list is searched for, and items that it may pass over.
 LONGEST_SEARCH, MOST_OFFSET = 200, 10_000_000
+#: Characters of a column's title in a rig profile, columns of one, lines above its table, and words that stand for a kind of
+#: run. Derived: what the readers take as a title, and as many columns as they read; chosen: more than any rig has.
+LONGEST_TITLE, MOST_COLUMNS, MOST_SKIPPED, MOST_WORDS = 1000, 1000, 10_000, 20

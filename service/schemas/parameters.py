@@ -35,6 +35,7 @@ RunId = Annotated[str, Field(description="The run's name")]
 DiagnosisId = Annotated[str, Field(description="The diagnosis' name")]
 JobId = Annotated[str, Field(description="The job's name")]
 OfState = Annotated[JobState | None, Field(description="Jobs in this state only; left out, all")]
+RigName = Annotated[str, Field(description="The rig's name")]
 InspectionId = Annotated[str, Field(description="The inspection's name")]
 PhotographId = Annotated[str, Field(description="The photograph's name, the SHA-256 of its bytes")]
 Points = Annotated[
@@ -109,11 +110,23 @@ Offset = Annotated[
 
 # --- of a posted file: what a JSON run has in fields ---
 
-FileKind = Annotated[Literal["stationary_stribeck", "dynamic_stribeck"], Field(description="The kind of run")]
+FileKind = Annotated[
+    Literal["stationary_stribeck", "dynamic_stribeck"] | None,
+    Field(description="The kind of run; left out, as the rig's profile finds it"),
+]
 FileCycles = Annotated[
-    float,
+    float | None,
     SHORT,
-    Field(ge=0, le=MOST_CYCLES, allow_inf_nan=False, description="Duty cycles since new when the run is made"),
+    Field(
+        ge=0,
+        le=MOST_CYCLES,
+        allow_inf_nan=False,
+        description="Duty cycles since new when the run is made; left out, as the rig's profile finds them",
+    ),
+]
+FileRig = Annotated[
+    str | None,
+    Field(pattern=IDENTIFIER_PATTERN, description="The rig by whose profile the file is read; other arguments win"),
 ]
 FileMap = Annotated[
     str | None, Field(max_length=LONGEST_MAP, description="Columns of channels: torque_nm:Mz,speed_rpm:n")

@@ -1,8 +1,8 @@
 """Runs as they are posted, and the receipts that answer them."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, StringConstraints, TypeAdapter
+from pydantic import Field, StringConstraints, TypeAdapter, model_validator
 
 from service.schemas.base import (
     Answer,
@@ -147,10 +147,17 @@ class Confirmation(Schema):
 
 
 class Correction(Schema):
-    """The cycles at which a run was made, and why they are not those that were sent."""
+    """The cycles at which a run was made, or the rig by whose profile its file is read again; and why."""
 
-    cycles: Cycles = Field(description="Duty cycles since new when the run was made")
+    cycles: Cycles | None = Field(default=None, description="Duty cycles since new when the run was made")
+    rig: Identifier | None = Field(default=None, description="The rig profile that the kept file is read by")
     reason: GivenReason = Field(description="Why")
+
+    @model_validator(mode="after")
+    def _one_thing(self) -> Self:
+        if (self.cycles is None) == (self.rig is None):
+            raise ValueError("give either cycles or rig")
+        return self
 
 
 class Parameters(Answer):
@@ -216,6 +223,15 @@ State = Annotated[
 ]
 
 
+class ReceivedFile(Answer):
+    """The file that a run was read from; it is kept, and `/runs/{run_id}/file` gives it out."""
+
+    filename: str = Field(description="The sender's name for it")
+    sha256: str = Field(description="Hash of the file as it was sent")
+    bytes: int = Field(description="Its length as it was sent")
+    rig: str | None = Field(description="The rig profile that it was read by; null: by none that is stored")
+
+
 class Receipt(Answer):
     """The evaluation of a stored run."""
 
@@ -228,6 +244,7 @@ class Receipt(Answer):
     received_at: str = Field(description="When it was stored; UTC, ISO 8601")
     content_sha256: str = Field(description="Hash of everything but the name")
     duplicate: bool = Field(description="Whether the run was stored before this request")
+    file: ReceivedFile | None = Field(description="The file that it was read from; null for a run sent as JSON")
     warnings: list[Warned] = Field(description="Warnings")
     fits: list[Fit] = Field(description="The fitted curves of a stationary test, by pressure")
     loops: list[Loop] = Field(description="The friction loops of a dynamic test, by pressure")
@@ -247,8 +264,8 @@ class Receipt(Answer):
 
 
 Action = Literal[
-    "hold", "confirm", "withdraw", "restore", "correct", "edit", "archive", "unarchive", "adopt", "withdraw_inspection",
-    "restore_inspection",
+    "hold", "confirm", "withdraw", "restore", "correct", "reread", "edit", "archive", "unarchive", "adopt",
+    "withdraw_inspection", "restore_inspection",
 ]  # fmt: skip
 
 
@@ -276,6 +293,9 @@ class ChangePage(Answer):
 class RunOut(Receipt):
     """A receipt with the run's channels: as they were sent, or with `points` fewer samples of them for a plot."""
 
+    reading: dict[str, Any] | None = Field(
+        description="How its file was read: the profile in all that applied; null for a run sent as JSON"
+    )
     changes: list[Change] = Field(description="The run's entries of the audit trail, newest first")
     samples: int = Field(description="Samples of each channel as they were sent; 0 for a run without channels")
     channels: dict[str, list[float]] = Field(

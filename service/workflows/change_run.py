@@ -1,12 +1,16 @@
-"""A run is withdrawn, restored, confirmed or corrected: its clutch's history changes, and all that follows is computed anew.
+"""A run is withdrawn, restored, confirmed, corrected or read again: its clutch's history and all that follows change.
 
-Nothing is deleted: the raw data and the hash of what was sent stay, and the audit trail keeps who changed what and why. What
+Nothing is deleted: what was sent and its hash stay, and the audit trail keeps who changed what and why. Of a run that was
+sent as a file this is the file: its channels are replaced where it is read again by another profile. What
 is as it should be already is not changed. Everything is computed before the database is locked, and again where the clutch
 has changed meanwhile.
 """
 
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Connection
@@ -15,7 +19,10 @@ from service import records, stored_runs
 from service.columns import whole
 from service.errors import NotPossibleNowError
 from service.lives.history import STATIONARY, Event, order, stationary_tests_of
-from service.lives.payloads import notice_items
+from service.lives.incoming_run import IncomingRun
+from service.lives.late_run import Arrival, reader_with
+from service.lives.model_correction import RunReader
+from service.lives.payloads import notice_items, receipt
 from service.lives.plausibility.doubts import doubts
 from service.lives.prediction_notices import OF_HISTORY
 from service.lives.recomputation import (
@@ -28,8 +35,11 @@ from service.lives.recomputation import (
     computed_aside,
 )
 from service.lives.run_analysis import analyse
-from storage import changes, clutches, results, runs
+from service.run_files.upload import read_file_run
+from service.settings import CODE_VERSION
+from storage import changes, channels, clutches, results, runs
 from storage.changes import NewChange
+from storage.channels import Encoded
 from storage.engine.database import Database
 from storage.runs import RunRow
 
@@ -57,6 +67,12 @@ class _Loaded:
     levels: Levels
     receipts: Mapping[str, Receipt]
     withdrawn_from: str
+    again: Arrival | None = None
+
+    def reader(self, database: Database) -> RunReader:
+        """The clutch's runs, this one as its file is read again."""
+        stored = stored_runs.run_reader(database, self.row.clutch_id)
+        return stored if self.again is None else reader_with(stored, self.again)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,19 +120,87 @@ def correct(
     )
 
 
-def _change(database: Database, request: _Request) -> Receipt:
+def read_again(
+    database: Database, clutch_id: str, run_id: str, *, rig: str, reason: str, by: str, at: str, folder: Path
+) -> Receipt:
+    """Read a run's file again, by another rig's profile or by one that was mended, where doubts are asked anew; returns its
+    receipt. The file is unpacked below `folder`.
+
+    Raises NotFoundError, NotPossibleNowError for a run that is withdrawn or has no file, and as reading does.
+    """
+    with database.reading() as connection:
+        row = stored_runs.run(connection, clutch_id, run_id)
+        profile = records.rig(connection, rig)
+        stored = channels.file_of(connection, row.run_key)
+    if stored is None:
+        raise NotPossibleNowError(f"run {run_id!r} was not sent as a file: there is none to read again")
+    file, sent_cycles = row.details["file"], row.cycles if row.sent_cycles is None else row.sent_cycles
+    with tempfile.TemporaryDirectory(dir=folder) as place:
+        path = Path(place) / "run"
+        with path.open("wb") as unpacked:
+            stored.copy_to(unpacked)
+        run = read_file_run(
+            path,
+            filename=file["filename"],
+            kind=row.kind,
+            cycles=sent_cycles,
+            run_id=run_id,
+            started_at=None if row.started_at is None else datetime.fromisoformat(row.started_at),
+            origin=row.details["origin"],
+            profile=profile,
+            rig=rig,
+        )
+    read = {name: value for name, value in file.items() if name != "content_sha256"} | dict(run.file or {})
+    if run.content_sha256 != row.content_sha256:
+        read["content_sha256"] = run.content_sha256
+    run = replace(run, cycles=row.cycles, content_sha256=row.content_sha256, file=read)
+    if read == file:
+        return records.receipt(row)
+    request = _Request(clutch_id=clutch_id, run_id=run_id, action=changes.REREAD, reason=reason, by=by, at=at)
+    return _change(database, request, run, stored_runs.placed(database, channels.encoded(run.channels)))
+
+
+def _change(
+    database: Database, request: _Request, again: IncomingRun | None = None, columns: Encoded | None = None
+) -> Receipt:
     attempts = records.attempts(request.clutch_id)
     while True:
         next(attempts)
         loaded = _load(database, request)
+        if again is not None:
+            loaded = _with(loaded, again)
         row = _as_asked(database, loaded, request)
-        if (row.state, row.cycles) == (loaded.row.state, loaded.row.cycles):
+        if again is None and (row.state, row.cycles) == (loaded.row.state, loaded.row.cycles):
             return records.receipt(loaded.row)
         changed = _computed(database, loaded, row)
         with database.writing(of=request.clutch_id) as connection:
             if records.unchanged(connection, request.clutch_id, loaded.state.revision):
+                if columns is not None:
+                    channels.rewrite(connection, row.run_key, columns)
                 _store(connection, loaded, changed, request)
                 return records.receipt(changed.row)
+
+
+def _with(loaded: _Loaded, run: IncomingRun) -> _Loaded:
+    """A run and its clutch, the run as its file is read again. Raises InvalidError where it cannot be evaluated so."""
+    analysis = analyse(run, loaded.state.geometry, loaded.state.record.torque_filter)
+    run_id, received_at = run.run_id, loaded.row.received_at
+    answer = receipt(
+        loaded.row.clutch_id,
+        run,
+        received_at=received_at,
+        levels=analysis.fits,
+        cofs={},
+        warnings=analysis.warnings,
+        engagement=analysis.engagement,
+    )
+    return replace(
+        loaded,
+        event=replace(loaded.event, speed_range=analysis.speed_range, oil_temperature=analysis.oil_temperature),
+        levels={**loaded.levels, run_id: analysis.fits},
+        receipts={**loaded.receipts, run_id: answer},
+        again=Arrival(run=run, sampled="time_s" in run.channels, analysis=analysis, received_at=received_at),
+    )
 
 
 def _load(database: Database, request: _Request) -> _Loaded:
@@ -146,20 +230,23 @@ def _as_asked(database: Database, loaded: _Loaded, request: _Request) -> RunRow:
     if request.action == changes.CONFIRM:
         return replace(row, state=runs.ACCEPTED) if row.state == runs.HELD else row
     if row.state == runs.WITHDRAWN:
-        raise NotPossibleNowError(f"run {row.run_id!r} is withdrawn: restore it before it is corrected")
+        raise NotPossibleNowError(f"run {row.run_id!r} is withdrawn: restore it before it is changed")
+    if loaded.again is not None:
+        return _judged(database, loaded, row.cycles)
     if request.cycles is None or request.cycles == row.cycles:
         return row
-    return _corrected(database, loaded, request.cycles)
+    return _judged(database, loaded, request.cycles)
 
 
-def _corrected(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
+def _judged(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
     """The run at other cycles: accepted where it is plausible there, else held."""
     row, sent_cycles = loaded.row, loaded.row.cycles if loaded.row.sent_cycles is None else loaded.row.sent_cycles
     others = replace(loaded.state, events=_without(loaded.state.events, row.run_id))
-    sent = replace(stored_runs.run_reader(database, row.clutch_id).read(row.run_id), cycles=cycles)
+    sent = replace(loaded.reader(database).read(row.run_id), cycles=cycles)
     event = loaded.event.at(cycles)
     event = replace(event, cofs=cofs_among(others, event, loaded.levels.get(row.run_id, ())))
-    analysis = analyse(sent, others.geometry, others.record.torque_filter)
+    again = loaded.again
+    analysis = analyse(sent, others.geometry, others.record.torque_filter) if again is None else again.analysis
     if "time_s" in sent.channels and sent.kind == STATIONARY:  # as on arrival: its plateaus stand for a long record
         sent = replace(sent, channels={})
     doubtful = doubts(sent, analysis, event, others)
@@ -179,20 +266,22 @@ def _computed(database: Database, loaded: _Loaded, row: RunRow) -> _Changed:
     own = [event] if row.state == runs.ACCEPTED else []
     after = replace(before, events=order([*_without(before.events, run_id), *own]))
     receipts = {**loaded.receipts, run_id: loaded.receipts[run_id] | {"cycles": whole(row.cycles)}}
-    reader = stored_runs.run_reader(database, row.clutch_id)
+    reader = loaded.reader(database)
     computed = Results()
     if own or loaded.row.state == runs.ACCEPTED:
         tests = reader.stationary_tests(after.lives[-1]) if after.events else iter(())
         evaluated = stationary_tests_of(before.events)
+        if loaded.again is not None:  # its own loops, and those that are held against its curves
+            evaluated = {loop: test for loop, test in evaluated.items() if run_id not in (loop, test)}
         after, computed = computed_anew(after, loaded.levels, receipts, tests, reader, evaluated=evaluated)
     aside = None
     if not own:
         aside, parts = computed_aside(after, event, loaded.levels, reader)
         warnings = [warning for warning in receipts[run_id]["warnings"] if warning["code"] not in OF_HISTORY]
         receipts[run_id] |= parts | {"warnings": warnings}
-    receipt = computed.receipts.get(run_id, receipts[run_id])
-    computed = replace(computed, receipts={**computed.receipts, run_id: receipt})
-    return _Changed(row=replace(row, receipt=receipt), aside=aside, results=computed)
+    own_receipt = computed.receipts.get(run_id, receipts[run_id])
+    computed = replace(computed, receipts={**computed.receipts, run_id: own_receipt})
+    return _Changed(row=replace(row, receipt=own_receipt), aside=aside, results=computed)
 
 
 def _without(events: tuple[Event, ...], run_id: str) -> tuple[Event, ...]:
@@ -210,11 +299,16 @@ def _store(connection: Connection, loaded: _Loaded, changed: _Changed, request: 
         sent_cycles=row.sent_cycles,
         doubts=row.doubts,
     )
+    before, after = records.summary(loaded.row), records.summary(row)
+    if loaded.again is not None:
+        analysis, run = loaded.again.analysis, loaded.again.run
+        runs.set_results(connection, row.run_key, analysis.kept_beside(run), row.receipt, CODE_VERSION)
+        results.write_fits(connection, row.run_key, records.fit_rows(analysis.fits, {}))
+        before, after = before | _read_as(loaded.row.details["file"]), after | _read_as(run.file or {})
     if changed.aside is not None:
         fits = records.fit_rows(loaded.levels.get(row.run_id, ()), changed.aside)
         results.write_fits(connection, row.run_key, fits)
     records.store(connection, row.clutch_id, changed.results)
-    before, after = records.summary(loaded.row), records.summary(row)
     if before["doubts"] == after["doubts"]:
         del before["doubts"], after["doubts"]
     change = NewChange(
@@ -229,3 +323,8 @@ def _store(connection: Connection, loaded: _Loaded, changed: _Changed, request: 
         revision=clutches.bump_revision(connection, row.clutch_id),
     )
     changes.insert(connection, change)
+
+
+def _read_as(file: Mapping[str, Any]) -> dict[str, Any]:
+    """What the audit trail keeps of how a run's file was read."""
+    return {"rig": file["rig"], "reading": file["reading"]}

@@ -7,13 +7,14 @@ the history is computed again. A doubtful run is stored with its curves, held, a
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Connection
 
 from models.clutch import Geometry
 from service import records, stored_runs
-from service.errors import ArchivedError, BusyError, ConflictError
+from service.errors import ArchivedError, BusyError, ConflictError, TooLargeError
 from service.lives.history import (
     DYNAMIC,
     REBUILD,
@@ -43,8 +44,12 @@ from service.lives.run_analysis import LevelFit, Notice, analyse, loops_of
 from service.settings import CODE_VERSION
 from storage import changes, channels, clutches, results, runs
 from storage.changes import NewChange
+from storage.channels import PackedFile
 from storage.engine.database import Database
 from storage.runs import NewRun, RunRow
+
+#: Bytes of a packed file that are kept. Derived: a value of SQLite's has 1e9 at most.
+MOST_FILE_BYTES = 900_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,16 +70,36 @@ class _Outcome:
 
 
 def ingest_posted(
-    database: Database, clutch_id: str, read: Callable[[], IncomingRun], received_at: str, by: str
+    database: Database,
+    clutch_id: str,
+    read: Callable[[], IncomingRun],
+    received_at: str,
+    by: str,
+    path: Path | None = None,
 ) -> tuple[dict[str, Any], bool]:
-    """The same of a run that `read` makes of what was posted; also raises what that does."""
-    return ingest(database, clutch_id, read(), received_at=received_at, by=by)
+    """The same of a run that `read` makes of what was posted; a file, at `path`, is kept. Also raises what `read` does, and
+    TooLargeError where the file is too long to be kept."""
+    if path is None:
+        return ingest(database, clutch_id, read(), received_at=received_at, by=by)
+    with ThreadPoolExecutor(1) as beside:  # deflating lets the reader run
+        packing = beside.submit(channels.packed, path)
+        run, file = read(), packing.result()
+    if len(file.data) > MOST_FILE_BYTES:
+        raise TooLargeError(f"a file must be kept in at most {MOST_FILE_BYTES} bytes, its packed ones are more")
+    run = replace(run, file={**(run.file or {}), "sha256": file.sha256, "bytes": file.length})
+    return ingest(database, clutch_id, run, received_at=received_at, by=by, file=file)
 
 
 def ingest(
-    database: Database, clutch_id: str, run: IncomingRun, *, received_at: str, by: str = "local"
+    database: Database,
+    clutch_id: str,
+    run: IncomingRun,
+    *,
+    received_at: str,
+    by: str = "local",
+    file: PackedFile | None = None,
 ) -> tuple[dict[str, Any], bool]:
-    """Take in a run that `by` sent; returns its receipt and whether it is new.
+    """Take in a run that `by` sent, read from `file`; returns its receipt and whether it is new.
 
     The same run again gives the receipt as it is then, marked a duplicate. Raises NotFoundError for an unknown clutch,
     ArchivedError for one that takes in no more, ConflictError where other content is known under the run's name, and
@@ -82,18 +107,18 @@ def ingest(
     """
     with database.reading() as connection:
         clutch = records.clutch(connection, clutch_id)
-        stored = runs.get(connection, clutch_id, run.run_id)
+        stored = _stored(connection, clutch_id, run)
     if stored is not None:
         return _repeat(stored, run), False
     record, sampled = records.record(clutch), "time_s" in run.channels
     geometry, torque_filter = record.geometry.to_model(), record.torque_filter
     if sampled:
         with ThreadPoolExecutor(1) as beside:  # deflating a long record lets its cutting run
-            encoding = beside.submit(channels.encoded, run.channels)
+            encoding = beside.submit(channels.encoded, run.channels, file)
             analysis = analyse(run, geometry, torque_filter)
             columns = encoding.result()
     else:  # a thread takes longer to begin than a few plateaus to deflate
-        analysis, columns = analyse(run, geometry, torque_filter), channels.encoded(run.channels)
+        analysis, columns = analyse(run, geometry, torque_filter), channels.encoded(run.channels, file)
     if sampled and run.kind == STATIONARY:  # loops are yet to be fitted; another long record need not be held twice
         run = replace(run, channels={})
     if columns.is_long:
@@ -103,7 +128,7 @@ def ingest(
     while True:
         next(attempts)
         with database.reading() as connection:  # one state: the same run may come in beside this one at any moment
-            stored = runs.get(connection, clutch_id, run.run_id)
+            stored = _stored(connection, clutch_id, run)
             if stored is not None:
                 return _repeat(stored, run), False
             archived = records.clutch(connection, clutch_id).archived
@@ -116,8 +141,16 @@ def ingest(
                 return _store(connection, clutch_id, arrival, columns, outcome, by=by), True
 
 
+def _stored(connection: Connection, clutch_id: str, run: IncomingRun) -> RunRow | None:
+    """The run of that name; of a file, also the one that has the same content since it was read again."""
+    stored = runs.get(connection, clutch_id, run.run_id)
+    if stored is None and run.file is not None:
+        return runs.read_again_as(connection, clutch_id, run.content_sha256)
+    return stored
+
+
 def _repeat(stored: RunRow, run: IncomingRun) -> dict[str, Any]:
-    if stored.content_sha256 != run.content_sha256:
+    if run.content_sha256 not in (stored.content_sha256, stored.details.get("file", {}).get("content_sha256")):
         raise ConflictError(
             f"run_id {run.run_id!r} is known with other content: its sha256 is {stored.content_sha256}, "
             f"that of the content sent is {run.content_sha256}"

@@ -84,7 +84,7 @@ def move(database: Database, to: str, *, tell: Callable[[int], None]) -> int:
             with database.reading() as connection:
                 column = channels.stored(connection, run_key, name)
             data = column.encoded()
-            replace(column, data=data, blob=None).values()  # what is damaged stays where it is
+            replace(column, data=data, blob=None).require_whole()  # what is damaged stays where it is
             if store is not None:
                 open_store(store.address).put(name_of(data), data)
             with database.writing() as connection:

@@ -12,6 +12,7 @@ from typing import Any, BinaryIO, Literal
 
 from models.arrays import FloatArray
 from service import records, stored_runs
+from service.errors import NotFoundError
 from service.queries.raw_run.decimation import extreme_rows
 from service.queries.raw_run.formats import Values, parquet_writer, write_json, write_parquet
 from storage import changes, channels
@@ -42,7 +43,8 @@ class _Run:
         return max(self.lengths.values(), default=0)
 
     def tag(self, points: int | None, kind: Kind, compressed: bool) -> str:
-        """The entity tag of the answer: raw channels never change, so their hash in the receipt stands for them."""
+        """The entity tag of the answer: the hashes in the receipt and, where its file was read again,
+        in the audit trail stand for the channels."""
         writer = parquet_writer() if kind == "parquet" else "json"
         content = to_text([_FORM, self.head, points, writer, compressed])
         return f'"{hashlib.sha256(content.encode()).hexdigest()[:32]}"'
@@ -85,6 +87,25 @@ def write_run(
     return run.tag(points, kind, compressed)
 
 
+def file_sha256(database: Database, clutch_id: str, run_id: str) -> str:
+    """The hash of the file that a run was read from. Raises NotFoundError where there is none."""
+    with database.reading() as connection:
+        file = stored_runs.run(connection, clutch_id, run_id).details.get("file")
+    if file is None:
+        raise NotFoundError(f"run {run_id!r} was not sent as a file")
+    return str(file["sha256"])
+
+
+def copy_file(database: Database, clutch_id: str, run_id: str, path: Path) -> None:
+    """Write the file that a run was read from to `path`, as it was sent. Raises NotFoundError where there is none."""
+    with database.reading() as connection:
+        stored = channels.file_of(connection, stored_runs.run(connection, clutch_id, run_id).run_key)
+    if stored is None:
+        raise NotFoundError(f"run {run_id!r} was not sent as a file")
+    with path.open("wb") as file:
+        stored.copy_to(file)
+
+
 def _packed(file: BinaryIO) -> gzip.GzipFile:
     """What packs into an open file, the same bytes at all times."""
     return gzip.GzipFile(filename="", mode="wb", compresslevel=_LEVEL, fileobj=file, mtime=0)
@@ -96,6 +117,7 @@ def _look_up(database: Database, clutch_id: str, run_id: str) -> _Run:
         lengths = channels.lengths(connection, row.run_key)
         trail = changes.page(connection, clutch_id, run_id=run_id)
     head = records.receipt(row) | {
+        "reading": row.details.get("file", {}).get("reading"),
         "changes": [change.entry() for change in trail],
         "samples": max(lengths.values(), default=0),
     }

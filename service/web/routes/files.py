@@ -6,11 +6,14 @@ from functools import partial
 from pathlib import Path
 
 from fastapi import APIRouter, Request
+from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 from starlette.datastructures import UploadFile
 
 from service.errors import InvalidError, NoRoomError
 from service.jobs.workers import Lane
+from service.queries import rigs
+from service.queries.raw_run.answer import copy_file, file_sha256
 from service.run_files.upload import read_file_run
 from service.schemas.base import Origin
 from service.schemas.parameters import (
@@ -19,13 +22,16 @@ from service.schemas.parameters import (
     FileKind,
     FileMap,
     FileName,
+    FileRig,
     FileRunId,
     FileStartedAt,
+    RunId,
 )
 from service.schemas.run import Receipt
-from service.web.answers import JSON_TYPE, now
-from service.web.auth import Ingester, name_of_caller
-from service.web.problems import SENDING, described
+from service.web.answers import JSON_TYPE, now, unchanged
+from service.web.auth import Ingester, Reader, name_of_caller
+from service.web.files import streamed
+from service.web.problems import READING, SENDING, described
 from service.workflows.ingest_run import ingest_posted
 from storage.encoding.json_text import to_text
 
@@ -52,15 +58,17 @@ async def post_run_file(
     request: Request,
     context: Ingester,
     clutch_id: ClutchId,
-    kind: FileKind,
-    cycles: FileCycles,
+    kind: FileKind = None,
+    cycles: FileCycles = None,
+    rig: FileRig = None,
     map: FileMap = None,  # noqa: A002
     filename: FileName = "upload",
     run_id: FileRunId = None,
     started_at: FileStartedAt = None,
     origin: Origin = "measured",
 ) -> Response:
-    """Post a run as CSV, NI TDMS, ASAM MDF4 or Parquet, plain or gzipped."""
+    """Post a run as CSV, NI TDMS, ASAM MDF4 or Parquet, plain or gzipped. The file is kept as it was sent."""
+    profile = None if rig is None else await run_in_threadpool(rigs.of_name, context.database, rig)
     with tempfile.TemporaryDirectory(dir=context.folder) as folder:
         path = Path(folder) / "run"
         filename = await _save(request, path, filename)
@@ -71,16 +79,41 @@ async def post_run_file(
             kind=kind,
             cycles=cycles,
             mapping=map,
+            profile=profile,
+            rig=rig,
             run_id=run_id,
             started_at=started_at,
             origin=origin,
         )
         by = name_of_caller(request)
         # without a turn: a file that takes long to read would have the clutch's other runs wait
-        taken_in = context.workers.submit(Lane.FILES, ingest_posted, clutch_id, read, now(), by)
+        taken_in = context.workers.submit(Lane.FILES, ingest_posted, clutch_id, read, now(), by, path)
         receipt, new = await asyncio.wrap_future(taken_in)
     headers = {"Location": f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"}
     return Response(content=to_text(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
+
+
+_FILE_TYPE = "application/octet-stream"
+_READING_FILE = READING | {
+    200: {
+        "content": {_FILE_TYPE: {"schema": {"type": "string", "format": "binary"}}},
+        "description": "The file as it was sent",
+    }
+}
+
+
+@router.get("/{run_id}/file", response_class=Response, responses=_READING_FILE)
+async def read_run_file(request: Request, context: Reader, clutch_id: ClutchId, run_id: RunId) -> Response:
+    """The file that a run was read from, as it was sent."""
+    sha256 = await run_in_threadpool(file_sha256, context.database, clutch_id, run_id)
+    headers = {"Cache-Control": "no-cache", "ETag": f'"{sha256}"', "Content-Disposition": "attachment"}
+    if held := unchanged(request, headers):
+        return held
+    with tempfile.TemporaryDirectory(dir=context.folder) as folder:
+        path = Path(folder) / "file"
+        await asyncio.wrap_future(context.workers.submit(Lane.RECORDS, copy_file, clutch_id, run_id, path))
+        body = path.open("rb")  # its name goes with the folder, its content when it is closed
+    return streamed(body, _FILE_TYPE, headers)
 
 
 async def _save(request: Request, path: Path, filename: str) -> str:

@@ -118,8 +118,12 @@ async def read_run_with_channels(
     openapi_extra=described_body(Correction, {"cycles": 7000, "reason": "typed a zero too many"}),
 )
 async def correct_run(request: Request, context: Admin, clutch_id: ClutchId, run_id: RunId) -> Response:
-    """Correct a run's cycles; it counts where it is plausible there. What was sent stays stored."""
+    """Correct a run's cycles, or read its file again by a rig's profile; it counts where it is plausible so. What was sent
+    stays stored."""
     wanted = checked(Correction, await json_body(request))
+    if wanted.rig is not None:
+        again = partial(change_run.read_again, rig=wanted.rig, folder=context.folder)
+        return await _changed(again, request, context, clutch_id, run_id, reason=wanted.reason)
     return await _changed(
         change_run.correct, request, context, clutch_id, run_id, cycles=wanted.cycles, reason=wanted.reason
     )

@@ -379,6 +379,7 @@ export interface Receipt {
   origin: string;
   received_at: string;
   content_sha256: string;
+  file: { filename: string; sha256: string; bytes: number; rig: string | null } | null;
   duplicate: boolean;
   state: "accepted" | "held" | "withdrawn";
   doubts: Warned[];

@@ -27,6 +27,8 @@ NARROWED: dict[tuple[str, str], Scope] = {
     ("GET", "/v1/clutches"): "read",
     ("POST", "/v1/clutches"): "ingest",
     ("GET", "/v1/fleet/totals"): "read",
+    ("GET", "/v1/rigs"): "read",
+    ("GET", "/v1/rigs/{name}"): "read",
     ("GET", "/v1/jobs"): "read",
     ("POST", "/v1/jobs"): "admin",
     ("GET", "/v1/jobs/{job_id}"): "read",
@@ -36,9 +38,9 @@ NARROWED: dict[tuple[str, str], Scope] = {
 OF_ALL: dict[tuple[str, str], Scope] = {
     ("GET", path): "read"
     for path in ("/metrics", "/v1/fleet/priors", "/v1/fleet/priors.csv", "/v1/fleet/scores", "/v1/fleet/scores.csv")
-}
+} | {("POST", "/v1/rigs"): "ingest", ("PUT", "/v1/rigs/{name}"): "admin"}
 _READ = (
-    "", "/changes", "/changes.csv", "/runs", "/runs.csv", "/runs/{run_id}", "/remaining-useful-life",
+    "", "/changes", "/changes.csv", "/runs", "/runs.csv", "/runs/{run_id}", "/runs/{run_id}/file", "/remaining-useful-life",
     "/remaining-useful-life.csv", "/degradation", "/degradation.csv", "/stribeck", "/stribeck.csv", "/engagement",
     "/surfaces", "/surfaces.csv", "/scores", "/scores.csv", "/loops", "/loops.csv", "/series", "/series.csv", "/diagnoses",
     "/diagnoses/{diagnosis_id}", "/model", "/inspections", "/inspections.csv", "/inspections/{inspection_id}",

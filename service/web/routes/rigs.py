@@ -1,0 +1,91 @@
+"""Rig profiles, and the preview of a file before it is sent."""
+
+from functools import partial
+
+from fastapi import APIRouter, Request
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import Response
+
+from service.errors import FieldError, InvalidError
+from service.lists import from_cursor
+from service.queries import rigs
+from service.queries.cache import to_json
+from service.run_files.json_run import checked
+from service.run_files.rig_profile import require_usable
+from service.schemas.parameters import RigName
+from service.schemas.rig import RigIn, RigOut, RigPage
+from service.web.answers import JSON_TYPE, answer, described_body, json_body, now
+from service.web.auth import Admin, Ingester, OwnReader, name_of_caller
+from service.web.context import Context, Cursor, Limit
+from service.web.limits import USUAL_ITEMS
+from service.web.problems import CHANGING, READING, SENDING
+from service.workflows.save_rig import save
+
+router = APIRouter(prefix="/v1/rigs", tags=["rigs"])
+
+EXAMPLE = {
+    "name": "bench-3",
+    "columns": [
+        {"title": "Zeit", "channel": "time_s", "unit": "s"},
+        {"title": "Druck", "channel": "pressure_bar", "unit": "bar"},
+        {"title": "Drehzahl", "channel": "speed_rpm", "unit": "rpm"},
+        {"title": "Mz", "channel": "torque_nm", "unit": "Nm", "scale": -1},
+        {"title": "Bemerkung"},
+    ],
+    "decimal": ",",
+    "kind": "stationary_stribeck",
+    "file_name": "bench3_{cycles}_*.csv",
+}
+
+
+@router.get("", response_model=RigPage, responses=READING)
+async def list_rigs(
+    request: Request, context: OwnReader, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
+) -> Response:
+    """Rig profiles by name."""
+    after = from_cursor(cursor)
+    return await answer(request, lambda: rigs.page(context.database, limit=limit, after=after))
+
+
+@router.get("/{name}", response_model=RigOut, responses=READING)
+async def read_rig(request: Request, context: OwnReader, name: RigName) -> Response:
+    """A rig profile in force."""
+    return await answer(request, lambda: rigs.look_up(context.database, name))
+
+
+@router.post(
+    "",
+    status_code=201,
+    response_model=RigOut,
+    responses=SENDING | {200: {"model": RigOut, "description": "The profile is saved already"}},
+    openapi_extra=described_body(RigIn, EXAMPLE),
+)
+async def post_rig(request: Request, context: Ingester) -> Response:
+    """Save a new rig profile: how the files of a rig are read."""
+    return await _saved(request, context, None)
+
+
+@router.put(
+    "/{name}",
+    response_model=RigOut,
+    responses=CHANGING | {201: {"model": RigOut, "description": "The profile is new"}},
+    openapi_extra=described_body(RigIn, EXAMPLE),
+)
+async def put_rig(request: Request, context: Admin, name: RigName) -> Response:
+    """Replace a rig profile. Runs that were read by the former one stay as they are until they are read again."""
+    return await _saved(request, context, name)
+
+
+async def _saved(request: Request, context: Context, name: str | None) -> Response:
+    """Save the profile of the body, in the place of that of the name in the path."""
+    rig = checked(RigIn, await json_body(request))
+    require_usable(rig)
+    if name not in (None, rig.name):
+        message = f"name must be that of the address, {name!r}, got {rig.name!r}"
+        raise InvalidError(message, errors=[FieldError(pointer="/name", code="other_name", message=message)])
+    replacing = name is not None
+    made = partial(save, context.database, rig, by=name_of_caller(request), at=now(), replacing=replacing)
+    saved, new = await run_in_threadpool(made)
+    headers = {"Location": f"/v1/rigs/{saved.name}"}
+    content = to_json(saved.model_dump(mode="json"))
+    return Response(content=content, status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
