@@ -11,9 +11,10 @@ from typing import Any
 from sqlalchemy import Connection
 
 from service import records, stored_runs
+from service.identity import content_of
 from service.lives.history import stationary_tests_of
 from service.lives.recomputation import Results, computed_anew
-from service.schemas.clutch import ClutchIn, content_of
+from service.schemas.clutch import ClutchIn
 from service.stored_runs import Recomputed
 from storage import changes, clutches
 from storage.changes import NewChange
