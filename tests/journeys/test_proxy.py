@@ -43,7 +43,7 @@ def proxy(upstream: str) -> Iterator[str]:
         def _answer(self, status: int, headers: dict[str, str], body: bytes) -> None:
             self.send_response(status)
             for name, value in headers.items():
-                if name not in ("content-length", "content-encoding", "connection"):
+                if name not in ("content-length", "content-encoding", "transfer-encoding", "connection"):
                     self.send_header(name, value)
             self.send_header("Content-Length", str(len(body)))
             self.end_headers()

@@ -47,12 +47,12 @@ def page(host: str, port: int, root: str) -> str:
 
 def _addresses(host: str, port: int) -> list[tuple[int, int, int, str, tuple[str, ...]]]:
     try:
-        found: list[tuple[int, int, int, str, tuple[str, ...]]] = socket.getaddrinfo(  # type: ignore[assignment]
+        addresses: list[tuple[int, int, int, str, tuple[str, ...]]] = socket.getaddrinfo(  # type: ignore[assignment]
             host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
         )
     except OSError as error:
         raise OSError(f"--host {host}: no address of that name is known ({error.strerror})") from None
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(addresses))
 
 
 def _why(error: OSError, host: str, port: int) -> str:
