@@ -1,6 +1,6 @@
-"""Lives with all that was measured in them, out of the rows: curves, loops and engagements."""
+"""What was measured of a clutch, out of the rows: curves, receipts and engagements."""
 
-import itertools
+from dataclasses import replace
 from typing import Any
 
 from sqlalchemy import Connection
@@ -8,37 +8,38 @@ from sqlalchemy import Connection
 from service import records
 from service.columns import whole
 from service.lives.engagements.evaluation import DUTY_KINDS
-from service.lives.engagements.over_life import engagements_over_life, stored_engagement
-from service.lives.history import lives_of
-from service.lives.quantities.chosen_life import ChosenLife
-from service.lives.quantities.measured import MeasuredLife
+from service.lives.engagements.over_life import StoredEngagement, stored_engagement
+from service.lives.model_correction import RunReader
+from service.lives.outlook import Evidence, engagement_rows, needs_evidence
 from service.lives.recomputation import ClutchState
 from storage import runs
+from storage.engine.database import Database
 
 
-def measured_life(connection: Connection, state: ClutchState, chosen: ChosenLife) -> MeasuredLife | None:
-    """A life of a clutch with all that was measured in it, None where nothing was yet."""
-    if chosen.life is None:
-        return None
-    return MeasuredLife(
-        clutch_id=state.clutch_id,
-        life=chosen.life,
-        assumptions=chosen.assumptions,
-        geometry=state.geometry,
-        fraction=state.fraction,
-        levels=records.levels(connection, state.clutch_id),
-        receipts=records.receipts(connection, state.clutch_id),
-        engagements=engagements(connection, state.clutch_id),
+def evidence(connection: Connection, clutch_id: str) -> Evidence:
+    """What was measured of a clutch, of held runs too; without a reader of its runs."""
+    return Evidence(
+        levels=records.levels(connection, clutch_id),
+        receipts=records.receipts(connection, clutch_id),
+        engagements=_engagements(connection, clutch_id),
     )
+
+
+def evidence_for(database: Database, state: ClutchState, reader: RunReader) -> Evidence | None:
+    """What a clutch's summary follows from beside its tracks; None where these are enough."""
+    if not needs_evidence(state):
+        return None
+    with database.reading() as connection:
+        return replace(evidence(connection, state.clutch_id), reader=reader)
 
 
 def engagements(connection: Connection, clutch_id: str) -> list[dict[str, Any]]:
     """The accepted engagements of a clutch with all indicators, by life and cycles."""
-    rows = [row for kind in DUTY_KINDS for row in runs.page(connection, clutch_id, kind=kind, state=runs.ACCEPTED)]
-    stored = [stored_engagement(row.receipt | {"cycles": whole(row.cycles)}, row.details) for row in rows]
-    measured = [engagement for engagement in stored if engagement is not None]
-    if not measured:
-        return []
-    names = [[event.run_id for event in life.events] for life in lives_of(records.events(connection, clutch_id))]
-    places = {run_id: place for place, run_id in enumerate(itertools.chain.from_iterable(names))}
-    return engagements_over_life(sorted(measured, key=lambda engagement: places[engagement.run_id]), names)
+    stored = _engagements(connection, clutch_id)
+    return engagement_rows(records.events(connection, clutch_id), stored) if stored else []
+
+
+def _engagements(connection: Connection, clutch_id: str) -> dict[str, StoredEngagement]:
+    rows = [row for kind in DUTY_KINDS for row in runs.page(connection, clutch_id, kind=kind)]
+    stored = {row.run_id: stored_engagement(row.receipt | {"cycles": whole(row.cycles)}, row.details) for row in rows}
+    return {run_id: engagement for run_id, engagement in stored.items() if engagement is not None}

@@ -19,8 +19,8 @@ from models.prognosis.fleet import FleetPrior
 from service.columns import whole
 from service.errors import BusyError, NotFoundError
 from service.lives.assumptions import ALL_PRESSURES, FLEET, LearnedPrior, kind_of, severity_name, severity_under
+from service.lives.condition import rank_of, state_of
 from service.lives.history import REBUILD, ByPressure, Event, duty_block, moment_of, order
-from service.lives.payloads import state_of
 from service.lives.recomputation import Adoption, ClutchState, Results, Tracking, newest_adoption
 from service.lives.run_analysis import LevelFit, Value
 from service.lives.tracks import CARRIED, States, Tracked
@@ -97,6 +97,8 @@ def state(
         adoptions=adoptions,
         priors={severity: _learned_prior(connection, own, severity, tracked) for severity in severities},
         filters=_filters(connection, clutch_id) if carried else None,
+        held=tuple(_event(held, {}) for held in runs.held_of(connection, clutch_id)),
+        summary=row.summary,
     )
 
 
@@ -170,9 +172,9 @@ def receipts(connection: Connection, clutch_id: str) -> dict[str, dict[str, Any]
 
 
 def answers(connection: Connection, clutch_id: str) -> list[Any]:
-    """Receipts and predictions as they are stored of a clutch: whether they have changed decides on a new revision."""
+    """Receipts, predictions and summary as they are stored: whether they have changed decides on a new revision."""
     tracks = [results.predictions_of(connection, clutch_id, method, ALL_PRESSURES) for method in CARRIED]
-    return [receipts(connection, clutch_id), tracks]
+    return [receipts(connection, clutch_id), tracks, clutch(connection, clutch_id).summary]
 
 
 def unchanged(connection: Connection, clutch_id: str, revision: int) -> bool:
@@ -200,6 +202,16 @@ def store(connection: Connection, clutch_id: str, computed: Results) -> None:
         assumptions.write_corrected_cofs(connection, rows[run_id], cofs)
     if computed.tracking is not None:
         _store_tracking(connection, clutch_id, computed.tracking)
+    if computed.summary is not None:
+        clutches.set_summary(
+            connection,
+            clutch_id,
+            rank_of(computed.summary),
+            computed.summary,
+            life=computed.summary.get("life", ""),
+            state=state_of(computed.summary, disputed=False)["name"],
+            if_disputed=state_of(computed.summary, disputed=True)["name"],
+        )
 
 
 def _store_tracking(connection: Connection, clutch_id: str, tracking: Tracking) -> None:
@@ -218,15 +230,6 @@ def _store_tracking(connection: Connection, clutch_id: str, tracking: Tracking) 
     results.put_predictions(connection, clutch_id, rows)
     results.clear_filter_states(connection, clutch_id)
     results.put_filter_states(connection, clutch_id, _filter_rows(tracking.filters))
-    clutches.set_summary(
-        connection,
-        clutch_id,
-        tracking.rank,
-        tracking.summary,
-        life=tracking.summary.get("life", ""),
-        state=state_of(tracking.summary, disputed=False)["name"],
-        if_disputed=state_of(tracking.summary, disputed=True)["name"],
-    )
 
 
 def _filter_rows(filters: States) -> list[FilterStateRow]:

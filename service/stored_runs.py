@@ -11,11 +11,21 @@ from sqlalchemy import Connection
 
 from service import records
 from service.errors import InvalidError, NotFoundError
+from service.lives.engagements.over_life import stored_engagement
 from service.lives.history import ByPressure, Event, order
 from service.lives.incoming_run import IncomingRun
 from service.lives.model_correction import RunReader
+from service.lives.outlook import Evidence, summarised
 from service.lives.payloads import receipt
-from service.lives.recomputation import ClutchState, Levels, Receipt, Results, computed_anew, computed_aside
+from service.lives.recomputation import (
+    ClutchState,
+    Levels,
+    Receipt,
+    Results,
+    Tracking,
+    computed_anew,
+    computed_aside,
+)
 from service.lives.run_analysis import Analysis, analyse
 from service.schemas.clutch import ClutchIn
 from service.settings import CODE_VERSION
@@ -164,7 +174,8 @@ def recomputed(recorded: Recorded) -> Recomputed:
         receipts[row.run_id] = _receipt(row, analysis)
         levels[row.run_id] = analysis.fits
     events = order([replace(event, **measured[event.run_id]) for event in state.events])
-    state = replace(state, events=events)
+    held = tuple(replace(event, **measured[event.run_id]) for event in state.held)
+    state = replace(state, events=events, held=held)
     tests = reader.stationary_tests(state.lives[-1]) if events else iter(())
     final, computed = computed_anew(state, levels, receipts, tests, reader, evaluated={})
     cofs = {}
@@ -172,12 +183,21 @@ def recomputed(recorded: Recorded) -> Recomputed:
         event = replace(event, **measured[run_id])
         cofs[run_id], own = computed_aside(final, event, levels, reader)
         receipts[run_id] |= own
+    receipts |= computed.receipts
+    engagements = {row.run_id: stored_engagement(receipts[row.run_id], details[row.run_id]) for row in rows}
+    evidence = Evidence(
+        levels=levels,
+        receipts=receipts,
+        engagements={run_id: known for run_id, known in engagements.items() if known is not None},
+        reader=reader,
+    )
+    summary = summarised(final, computed.tracking or Tracking(), evidence)
     return Recomputed(
         details=details,
-        receipts=receipts | dict(computed.receipts),
+        receipts=receipts,
         aside=cofs,
         levels=levels,
-        results=replace(computed, receipts={}),
+        results=replace(computed, receipts={}, summary=summary),
     )
 
 

@@ -6,7 +6,7 @@ from typing import Any
 from sqlalchemy import Connection
 
 from service import records
-from service.lives.payloads import state_of
+from service.lives.condition import state_of
 from storage import clutches, verdicts
 from storage.clutches import ClutchRow
 from storage.verdicts import VerdictRow

@@ -111,6 +111,7 @@ _light_of_any = (
 _light = _light_of_any.where(run.c.state == ACCEPTED)
 _rebuilds = _light.where(json_text(run.c.details, "event") == "rebuild")
 _set_aside = _light_of_any.where(run.c.state != ACCEPTED)
+_held_of = _light_of_any.where(HELD_ONLY)
 _held = (
     select(run.c.clutch_id, func.count())
     .where(HELD_ONLY, run.c.clutch_id.in_(bindparam("wanted", expanding=True)))
@@ -200,6 +201,11 @@ def rebuilds(connection: Connection, clutch_id: str) -> list[RunInOrder]:
 def set_aside(connection: Connection, clutch_id: str) -> list[RunInOrder]:
     """The runs of a clutch that are held or were withdrawn, in order."""
     return _in_order(connection, _set_aside, clutch_id)
+
+
+def held_of(connection: Connection, clutch_id: str) -> list[RunInOrder]:
+    """The runs of a clutch that are held, in order."""
+    return _in_order(connection, _held_of, clutch_id)
 
 
 def held(connection: Connection, clutch_ids: Sequence[str]) -> dict[str, int]:

@@ -83,6 +83,13 @@ class Series:
         """How many measurements there were when `event` had happened."""
         return sum(1 for index in self.events if index <= event)
 
+    def as_measured(self, assumptions: Assumptions, index: int) -> tuple[float, Value]:
+        """Cycles since new, and value with deviation, of a measurement; the course of the model in force is put back on."""
+        measurement = self.measurements[index]
+        cycles = float(self.scale.cycles(measurement.progress))
+        added = float(assumptions.offset(self.quantity, self.pressure, np.array([cycles]))[0])
+        return cycles, (measurement.value + added, measurement.variance**0.5)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Life:
@@ -264,6 +271,28 @@ def moment_of(started_at: str | None, received_at: str) -> float:
     """
     earliest, latest = _MOMENTS
     return min(max(datetime.fromisoformat(started_at or received_at).timestamp(), earliest), latest)
+
+
+def pace_of(events: Sequence[Event]) -> float | None:
+    """Cycles a second between the first and the last dated run of a life, idle hours included; None where none is known."""
+    dated = [event for event in events if event.dated]
+    if len(dated) < 2:
+        return None
+    seconds, cycles = dated[-1].moment - dated[0].moment, dated[-1].cycles - dated[0].cycles
+    return cycles / seconds if seconds > 0.0 and cycles > 0.0 else None
+
+
+def moment_at(events: Sequence[Event], pace: float, cycles: float) -> float:
+    """When [s since 1970] so many cycles since new will have been run at a pace [1/s], from the newest dated run of a life
+    on, or from its newest where none is dated. There is at least one run."""
+    start = next((event for event in reversed(events) if event.dated), events[-1])
+    return start.moment + (cycles - start.cycles) / pace
+
+
+def date_of(moment: float) -> str | None:
+    """A moment [s since 1970] as text, UTC, ISO 8601; None outside of the years 1 to 9999."""
+    earliest, latest = _MOMENTS
+    return datetime.fromtimestamp(moment, UTC).isoformat(timespec="seconds") if earliest < moment < latest else None
 
 
 def pooled_value(reference: ByPressure, values: ByPressure) -> Value | None:

@@ -1,7 +1,6 @@
 """What goes out of runs and lives, in the public names and units: receipts, predictions, a list's summary, warnings."""
 
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
 from typing import Any
 
 from models.friction.identification import StribeckFit
@@ -12,9 +11,8 @@ from models.prognosis.criteria import HORIZON, QUANTILES
 from models.prognosis.first_passage import FirstPassage
 from service.columns import bar, whole
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions
-from service.lives.criteria import LOW_HEALTH, MOST_LINE_POINTS
 from service.lives.engagements.evaluation import Engagement, engagement_item
-from service.lives.history import ByPressure, Event, Life, Series, latest_before
+from service.lives.history import ByPressure, Life, Series, latest_before
 from service.lives.incoming_run import IncomingRun
 from service.lives.prediction_notices import OF_HISTORY, late_arrival, missed, not_eq_6, other_oil, other_pressures
 from service.lives.run_analysis import LevelFit, Notice, Value
@@ -28,18 +26,10 @@ PARAMETER_UNITS = {
     "viscous_coefficient": ("viscous_coefficient", "Nm/(m/s)^0.3"),
 }
 INSUFFICIENT = "insufficient_data"
-#: What a list shows of a clutch, out of the particle filter's prediction.
-SUMMARY = ("status", "as_of_cycles", "current", "remaining_cycles", "model")
-#: The states of a clutch after NAMUR NE 107, the worst first.
-STATES = FAILURE, OUT_OF_SPECIFICATION, MAINTENANCE, CHECK, NORMAL = (
-    "failure",
-    "out_of_specification",
-    "maintenance",
-    "check",
-    "normal",
-)
-#: A clutch without a prediction comes after all others in a list.
-RANK_UNKNOWN = 2 * HORIZON
+#: What is said of the present of a life.
+CURRENT = ("mean_cof", "mean_cof_sd", "measured_at_cycles", "fraction_of_initial", "health")
+#: The quantile of the end of life that is the safe bound.
+SAFE = min(QUANTILES)
 
 
 #: What a receipt says of the file that a run was read from.
@@ -139,9 +129,10 @@ def insufficient(assumptions: Assumptions, cycles: float | None, pressure: float
         "runs_used": 0,
         "status": INSUFFICIENT,
         "criterion": _criterion(fraction, pressure, None, None),
-        "current": {"mean_cof": None, "mean_cof_sd": None, "fraction_of_initial": None, "health": None},
+        "current": dict.fromkeys(CURRENT),
         "remaining_cycles": by_quantile({}),
         "end_of_life_cycles": by_quantile({}),
+        "at_least": None,
         "probability_of_reaching": None,
         "course": None,
         "back_cast": {"held": 0, "of": 0, "widening": 1.0},
@@ -167,23 +158,25 @@ def predicted(
     sample: Mapping[str, Any],
     warnings: Sequence[Notice],
 ) -> dict[str, Any]:
-    """A first passage in ζ, led back to cycles; without `enough` tests only where the clutch stands."""
-    mean, deviation = max(0.0, passage.current[0]), passage.current[1]
-    left = mean / passage.initial if passage.initial > 0 else None
+    """A first passage in ζ, led back to cycles. Without `enough` tests only the last of them and the safe bound are stated:
+    what else the prior makes of them is no finding."""
+    ends = {q: None if zeta is None else float(series.scale.cycles(zeta)) for q, zeta in passage.end_of_life.items()}
     present = {
         "runs_used": runs,
-        "criterion": _criterion(fraction, series.pressure, passage.initial, passage.threshold),
-        "current": {
-            "mean_cof": mean,
-            "mean_cof_sd": deviation,
-            "fraction_of_initial": left,
-            "health": None if left is None else min(1.0, max(0.0, (left - fraction) / (1 - fraction))),
-        },
+        "current": _measured_last(series, assumptions, runs),
+        "at_least": safe_bound(ends[SAFE], cycles, series.scale.origin),
         "warnings": notice_items([*warnings, *((*not_eq_6(courses), *missed(back_cast)) if enough else ())]),
     }
-    ends = {q: None if zeta is None else float(series.scale.cycles(zeta)) for q, zeta in passage.end_of_life.items()}
-    future = {
+    answer = insufficient(assumptions, cycles, series.pressure, fraction) | present
+    if not enough:
+        return answer
+    mean = max(0.0, passage.current[0])
+    left = mean / passage.initial if passage.initial > 0 else None
+    now = {"mean_cof": mean, "mean_cof_sd": passage.current[1], "fraction_of_initial": left}
+    return answer | {
         "status": passage.status.value,
+        "criterion": _criterion(fraction, series.pressure, passage.initial, passage.threshold),
+        "current": answer["current"] | now | {"health": None if left is None else share_of_way(left, 1.0, fraction)},
         "remaining_cycles": by_quantile(
             {q: None if end is None else max(0.0, end - cycles) for q, end in ends.items()}
         ),
@@ -194,7 +187,26 @@ def predicted(
         "sample": sample,
         "course": _course_item(courses[0]) | {"alternatives": [_course_item(share) for share in courses[1:]]},
     }
-    return insufficient(assumptions, cycles, series.pressure, fraction) | present | (future if enough else {})
+
+
+def _measured_last(series: Series, assumptions: Assumptions, runs: int) -> dict[str, Any]:
+    """The last of the first `runs` measurements of a series as the present mean COF, without health."""
+    cycles, (value, sd) = series.as_measured(assumptions, runs - 1)
+    measured = {"mean_cof": value, "mean_cof_sd": sd, "measured_at_cycles": whole(round(cycles, 3))}
+    return dict.fromkeys(CURRENT) | measured
+
+
+def share_of_way(value: float, initial: float, limit: float, *, rises: bool = False) -> float | None:
+    """Health by one criterion: the share, 0 to 1, that is left of the way from a quantity's initial value down to its limit
+    (up to it where it `rises`); None where it began at the limit or beyond."""
+    way, left = (limit - initial, limit - value) if rises else (initial - limit, value - limit)
+    return min(1.0, max(0.0, left / way)) if way > 0.0 else None
+
+
+def safe_bound(end: float | None, now: float, origin: float) -> float:
+    """Cycles from `now` that are left with 95 %, by the 5 % quantile of the end of life in cycles since new; None of that
+    lies beyond the horizon of the life that began at `origin`."""
+    return max(0.0, (origin + HORIZON if end is None else end) - now)
 
 
 def _course_item(share: CourseShare) -> dict[str, Any]:
@@ -230,49 +242,6 @@ def warned_anew(
         if after != before:
             changed[run_id] = receipts[run_id] | {"warnings": after}
     return changed
-
-
-def summary_of(payload: dict[str, Any]) -> tuple[dict[str, Any], float]:
-    """What a list shows of a clutch, and its rank: the fewer cycles remain, the earlier in the list."""
-    median = payload["remaining_cycles"]["0.5"]
-    remaining = HORIZON if median is None else float(median)
-    rank = RANK_UNKNOWN if payload["status"] == INSUFFICIENT else remaining
-    return {name: payload[name] for name in SUMMARY}, rank
-
-
-def state_of(summary: Mapping[str, Any], *, disputed: bool) -> dict[str, str]:
-    """A clutch's state after NAMUR NE 107 by its summary, and why; `disputed`: its newest diagnosis found that data and
-    model disagree, and nobody has acted on it. Its name is stored: another rule here needs a step of storage/migrations."""
-    if summary.get("status", INSUFFICIENT) == INSUFFICIENT:
-        return {"name": CHECK, "why": "fewer than three tests: no prognosis yet"}
-    if summary["status"] == "reached":
-        return {"name": FAILURE, "why": "end of life reached"}
-    if disputed:
-        return {"name": OUT_OF_SPECIFICATION, "why": "data and model disagree: see the diagnosis"}
-    health = summary["current"]["health"]
-    if health is not None and health < LOW_HEALTH:
-        return {"name": MAINTENANCE, "why": "near the end of its life"}
-    never = summary["status"] == "may_never_reach"
-    return {"name": NORMAL, "why": "may never reach end of life" if never else "ageing as modelled"}
-
-
-def recent(events: Sequence[Event], series: Series) -> dict[str, Any]:
-    """The run that was made last, and mean COF [-] of the present life as a short line, thinned evenly, its last value kept.
-
-    `events` is not empty; `series` is mean COF over the reference pressures, ordered by cycles.
-    """
-    last = max(events, key=lambda event: event.moment)
-    values = [measurement.value for measurement in series.measurements]
-    step = -(-len(values) // MOST_LINE_POINTS)  # rounded up
-    return {
-        "last_run": {
-            "run_id": last.run_id,
-            "kind": last.kind,
-            "cycles": whole(last.cycles),
-            "at": datetime.fromtimestamp(last.moment, UTC).isoformat(timespec="seconds"),
-        },
-        "mean_cof": [round(value, 6) for value in values[::-1][:: step or 1]][::-1],
-    }
 
 
 def _criterion(fraction: float, pressure: float, initial: float | None, threshold: float | None) -> dict[str, Any]:

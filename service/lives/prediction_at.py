@@ -9,7 +9,7 @@ from service.errors import NotFoundError
 from service.lives.assumptions import ALL_PRESSURES, Assumptions
 from service.lives.history import Event, Life, lives_of, nearest_pressure
 from service.lives.payloads import insufficient
-from service.lives.tracks import advance, predict
+from service.lives.tracks import Tracked, advance, predict
 
 
 def predict_at(
@@ -22,10 +22,12 @@ def predict_at(
     pressure_bar: float | None = None,
     at_cycles: float | None = None,
     back_cast: BackCast | None = None,
+    carried: Tracked | None = None,
 ) -> dict[str, Any]:
     """The prediction at one pressure of the reference test, or over all, as it would have been made at `at_cycles`.
 
-    A `back_cast` that is known is not made again: of the exact filter it takes most of the time. Raises NotFoundError where
+    A `back_cast` that is known is not made again: of the exact filter it takes most of the time. A filter that was `carried`
+    through the first of the measurements is carried on. Raises NotFoundError where
     the reference test did not measure that pressure.
     """
     lives = lives_of(events)
@@ -38,7 +40,7 @@ def predict_at(
     series = life.pooled(assumptions) if pressure_bar is None else life.at(assumptions, level)
     if not series.measurements:
         return insufficient(assumptions, cycles, level, fraction)
-    tracked = advance(clutch_id, method, series, assumptions, None, len(series.measurements), back_cast=back_cast)
+    tracked = advance(clutch_id, method, series, assumptions, carried, len(series.measurements), back_cast=back_cast)
     return predict(clutch_id, method, series, assumptions, tracked, cycles, fraction)
 
 

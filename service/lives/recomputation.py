@@ -13,6 +13,7 @@ from models.degradation.severity import Severity
 from models.diagnosis.campaign import StationaryRun
 from models.diagnosis.extension import Extension
 from service.lives.assumptions import Assumptions, LearnedPrior, ModelInForce, severity_under
+from service.lives.condition import SHOWN
 from service.lives.history import (
     ByPressure,
     Event,
@@ -25,7 +26,7 @@ from service.lives.history import (
     stationary_tests_of,
 )
 from service.lives.model_correction import RunReader, corrected_cofs, model_in_force
-from service.lives.payloads import RANK_UNKNOWN, fit_items, loop_items, recent, summary_of, warned_anew
+from service.lives.payloads import fit_items, loop_items, warned_anew
 from service.lives.prediction_notices import OFF_TRACK
 from service.lives.run_analysis import LevelFit, loops_of, mean_cofs
 from service.lives.tracks import CARRIED, Prediction, States, follow
@@ -34,8 +35,6 @@ from service.schemas.clutch import ClutchIn
 #: The levels of stationary tests by run_id.
 Levels = Mapping[str, Sequence[LevelFit]]
 Receipt = dict[str, Any]
-#: The filter whose predictions lists and receipts show.
-_SHOWN = "particle"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,9 +58,10 @@ def newest_adoption(adoptions: Iterable[Adoption | None], lives: Collection[str]
 class ClutchState:
     """What the next run's results depend on, at one revision.
 
-    `events` are all accepted runs in the order of the history, mean COF as the model in force corrects it; `adoptions` what
-    was adopted, newest first (None: the baseline); `priors` what fleets have taught for each severity that may come into
-    force; `filters` the filters' states after the last test, None where another release stored them.
+    `events` are all accepted runs in the order of the history, mean COF as the model in force corrects it; `held` those that
+    are held, their mean COFs yet to come; `adoptions` what was adopted, newest first (None: the baseline); `priors` what
+    fleets have taught for each severity that may come into force; `filters` the filters' states after the last test, None
+    where another release stored them; `summary` what is stored of the clutch's condition.
     """
 
     record: ClutchIn
@@ -70,6 +70,8 @@ class ClutchState:
     adoptions: tuple[Adoption | None, ...]
     priors: Mapping[Severity, LearnedPrior]
     filters: States | None = None
+    held: tuple[Event, ...] = ()
+    summary: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def clutch_id(self) -> str:
@@ -116,13 +118,11 @@ class ClutchState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tracking:
-    """Predictions after events, the filters' states after the last, the list's summary and rank, and by run_id the warnings
-    of the predictions right after tests; `anew` where all that was predicted before is replaced."""
+    """Predictions after events, the filters' states after the last, and by run_id the warnings of the predictions right
+    after tests; `anew` where all that was predicted before is replaced."""
 
     predictions: tuple[Prediction, ...] = ()
     filters: States = field(default_factory=dict)
-    summary: dict[str, Any] = field(default_factory=dict)
-    rank: float = RANK_UNKNOWN
     warnings: Mapping[str, list[dict[str, str]]] = field(default_factory=dict)
     anew: bool = True
 
@@ -130,7 +130,7 @@ class Tracking:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Results:
     """What is to be stored of a clutch: mean COFs by run_id beside their levels, receipts that change, corrected mean COFs
-    (in place of all where `corrected_anew`), and the tracking (None: it stays)."""
+    (in place of all where `corrected_anew`), the tracking and the summary (None: it stays)."""
 
     levels: Levels = field(default_factory=dict)
     cofs: Mapping[str, ByPressure] = field(default_factory=dict)
@@ -138,6 +138,7 @@ class Results:
     corrected: Mapping[str, ByPressure] = field(default_factory=dict)
     corrected_anew: bool = False
     tracking: Tracking | None = None
+    summary: dict[str, Any] | None = None
 
 
 def computed_anew(
@@ -154,13 +155,7 @@ def computed_anew(
     `levels` and `receipts` are those of all runs; `tests` the stationary tests of the present life, read only where a model
     is in force; `evaluated` as `loops_anew` takes it. Returns the state with its mean COFs, and what is to be stored.
     """
-    cofs = _all_cofs(state.lives, levels, state.geometry)
-    plain = replace(state, events=tuple(replace(event, cofs=cofs.get(event.run_id, {})) for event in state.events))
-    corrected = _corrected(plain, tests, reader)
-    final = replace(
-        plain,
-        events=tuple(replace(event, cofs=corrected.get(event.run_id, event.cofs)) for event in plain.events),
-    )
+    final, cofs, corrected = with_cofs(state, levels, tests, reader)
     fresh = {run_id: receipts[run_id] | {"fits": fit_items(levels[run_id], cofs[run_id])} for run_id in cofs}
     for run_id, items in loops_anew(final, levels, reader, evaluated).items():
         fresh[run_id] = receipts[run_id] | {"loops": items}
@@ -174,6 +169,18 @@ def computed_anew(
         tracking=tracking,
     )
     return final, results
+
+
+def with_cofs(
+    state: ClutchState, levels: Levels, tests: Iterable[StationaryRun], reader: RunReader
+) -> tuple[ClutchState, dict[str, ByPressure], dict[str, ByPressure]]:
+    """The state with the mean COFs of its events, those that the fits give by run_id, and those that the model in force
+    corrects; arguments as of `computed_anew`."""
+    cofs = _all_cofs(state.lives, levels, state.geometry)
+    plain = replace(state, events=tuple(replace(event, cofs=cofs.get(event.run_id, {})) for event in state.events))
+    corrected = _corrected(plain, tests, reader)
+    events = tuple(replace(event, cofs=corrected.get(event.run_id, event.cofs)) for event in plain.events)
+    return replace(plain, events=events), cofs, corrected
 
 
 def cofs_among(state: ClutchState, event: Event, levels: Sequence[LevelFit]) -> ByPressure:
@@ -250,20 +257,12 @@ def track(state: ClutchState, *, newest: Event | None = None) -> Tracking:
             filters = after_event
             predictions |= {(prediction.cycles, prediction.method): prediction for prediction in made}
             if index in measured:
-                shown = predictions[life.events[index].cycles, _SHOWN].payload
+                shown = predictions[life.events[index].cycles, SHOWN].payload
                 odd = [warning for warning in shown["warnings"] if warning["code"] == OFF_TRACK]
                 warnings[life.events[index].run_id] = odd
-    summary, rank = summary_of(predictions[state.events[-1].cycles, _SHOWN].payload)
-    summary |= {
-        "runs": len(state.events),
-        "recent": recent(state.events, last),
-        "life": lives[-1].name,
-    }
     return Tracking(
         predictions=tuple(predictions.values()),
         filters=filters,
-        summary=summary,
-        rank=rank,
         warnings=warnings,
         anew=carried is None,
     )

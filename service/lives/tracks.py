@@ -174,6 +174,8 @@ def _continues(tracked: Tracked, series: Series, priors: Mapping[str, Prior]) ->
     """Whether the states are those of the series' first measurements under these priors."""
     if tracked.states.keys() != priors.keys() or any(tracked.states[name].prior != p for name, p in priors.items()):
         return False
+    if tracked.runs > len(series.measurements):
+        return False
     measurements = series.measurements[: tracked.runs]
     for state in tracked.states.values():
         history = state.history

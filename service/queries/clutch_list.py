@@ -11,15 +11,12 @@ from sqlalchemy import Connection
 from models.prognosis.criteria import HORIZON
 from service import records, stored_verdicts
 from service.lists import Place, page_as_bytes
-from service.lives.assumptions import BASELINE
-from service.lives.payloads import STATES, SUMMARY
+from service.lives.condition import STATES, stated
 from service.queries.cache import AnswerCache, to_json
 from storage import clutches, runs, verdicts
 from storage.clutches import Choice, ClutchRow
 from storage.engine.database import Database
 
-#: What summaries did not hold that were stored before models could be adopted.
-_BEFORE = {"model": dict(BASELINE)}
 #: Share of the clutches whose bars fit, and the cycles at the bars' end where nothing is predicted. Chosen: one that lasts
 #: much longer than the others must not shorten their bars to nothing; a rig's usual life.
 _FITTING, _USUAL_SCALE = 0.9, 10_000.0
@@ -125,7 +122,7 @@ def _item(row: ClutchRow, held: int, diagnosis: dict[str, Any] | None, state: di
         "state": state,
         "runs": row.summary.get("runs", 0),
         "held": held,
-        "summary": {name: (_BEFORE | row.summary)[name] for name in SUMMARY} if row.summary else None,
+        "summary": stated(row.summary),
         "recent": row.summary.get("recent"),
         "diagnosis": diagnosis,
     }

@@ -16,8 +16,10 @@ from models.prognosis.first_passage import paths as track_paths
 from models.prognosis.from_parameters import CofPaths, Disagreement, disagreement, far_apart, mean_cof_paths
 from service import measured_lives, records
 from service.lives.assumptions import ALL_PRESSURES, Assumptions
+from service.lives.condition import held_notices
 from service.lives.criteria import SEVERITY_EXPONENTS
 from service.lives.history import Series, reference_velocities
+from service.lives.outlook import measured_life
 from service.lives.payloads import notice_items
 from service.lives.quantities.chosen_life import chosen_life
 from service.lives.quantities.items import COEFFICIENTS, paths_item, track_item, trajectory_cycles
@@ -59,10 +61,17 @@ def degradation(
     with database.reading() as connection:
         state = records.state(connection, clutch_id)
         chosen = chosen_life(state, life, at_cycles)
-        measured = measured_lives.measured_life(connection, state, chosen)
+        evidence = measured_lives.evidence(connection, clutch_id)
+    measured = measured_life(state, chosen, evidence)
+    held = held_notices(len(state.held))
     head = {"clutch_id": clutch_id, "revision": state.revision, "method": method, "life": chosen.item()}
     if measured is None or (wanted is None and not measured.life.reference):
-        nothing: dict[str, Any] = {"items": [], "rebuilt": None, "severity_estimate": None, "warnings": []}
+        nothing: dict[str, Any] = {
+            "items": [],
+            "rebuilt": None,
+            "severity_estimate": None,
+            "warnings": notice_items(held),
+        }
         return head | nothing | chosen.assumptions.named() | {"next": None}
     estimate = None
     if wanted is None:
@@ -75,7 +84,7 @@ def degradation(
         "items": items,
         "rebuilt": again,
         "severity_estimate": _severity_item(estimate),
-        "warnings": notice_items([*_disagreements(again), *doubted]),
+        "warnings": notice_items([*_disagreements(again), *doubted, *held]),
     }
     return head | answered | chosen.assumptions.named() | {"next": None}
 

@@ -11,9 +11,10 @@ from models.friction.criteria import Z90
 from service import measured_lives, records
 from service.columns import bar, whole
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF
+from service.lives.condition import SHOWN
 from service.lives.engagements.over_life import ALL_INDICATORS
 from service.lives.history import DYNAMIC, STATIONARY
-from service.lives.payloads import PARAMETER_UNITS
+from service.lives.payloads import INSUFFICIENT, PARAMETER_UNITS
 from service.lives.quantities.measured import LOOP_COLUMNS, curves_of, rounded_frequency, slope_of
 from service.lives.quantities.names import QUANTITIES, SLOPE, SLOPE_SPEEDS
 from service.lives.run_analysis import LevelFit
@@ -29,7 +30,7 @@ _NOWHERE = {"pressure_bar": None, "frequency_hz": None, "speed_rpm": None}
 
 def series(database: Database, clutch_id: str, quantity: str | None) -> list[dict[str, Any]]:
     """Each quantity of each test by cycles, the slopes of its curves, those of each friction loop, the indicators of each
-    engagement, then the remaining cycles as they were predicted; of one quantity, or of all.
+    engagement, then the remaining cycles as they were predicted, and how many runs are held; of one quantity, or of all.
 
     Raises NotFoundError.
     """
@@ -40,15 +41,17 @@ def series(database: Database, clutch_id: str, quantity: str | None) -> list[dic
         of_loops = quantity is None or quantity in LOOP_COLUMNS
         dynamic = runs.page(connection, clutch_id, kind=DYNAMIC, state=runs.ACCEPTED) if of_loops else []
         engaged = measured_lives.engagements(connection, clutch_id)
-        predicted = results.predictions_of(connection, clutch_id, "particle", ALL_PRESSURES)
+        predicted = results.predictions_of(connection, clutch_id, SHOWN, ALL_PRESSURES)
+        held = runs.held(connection, [clutch_id]).get(clutch_id, 0)
     measured = (item for row in rows for fit in row.receipt["fits"] for item in _measured(row.receipt, fit))
     slopes = _slopes(records.record(clutch), rows, levels)
     lags = (item for row in dynamic for loop in row.receipt["loops"] for item in _of_loop(row.receipt, loop))
     indicators = (item for row in engaged for item in _indicators(row))
     ahead = (item for row in predicted for item in _predicted(row))
+    waiting = [_ahead_row(predicted[-1].cycles if predicted else 0.0, "held_runs", "1", float(held))] if held else []
     return [
         item
-        for items in (measured, slopes, lags, indicators, ahead)
+        for items in (measured, slopes, lags, indicators, ahead, waiting)
         for item in items
         if quantity in (None, item["quantity"])
     ]
@@ -118,24 +121,34 @@ def _row(quantity: str, unit: str, value: float | None, sd: float) -> dict[str, 
 
 
 def _predicted(row: PredictionRow) -> Iterator[dict[str, Any]]:
-    current, remaining = row.payload["current"], row.payload["remaining_cycles"]
+    """What was predicted after a run; with too few tests the safe bound alone: mean COF stands among the measurements."""
+    payload = row.payload
+    current, remaining = payload["current"], payload["remaining_cycles"]
     mean, sd = current["mean_cof"], current["mean_cof_sd"]
-    bounds = (None, None) if mean is None else (mean - Z90 * sd, mean + Z90 * sd)
-    values = (
-        (MEAN_COF, "1", mean, *bounds),
-        ("health", "1", current["health"], None, None),
-        ("remaining_cycles", "cycles", remaining["0.5"], remaining["0.05"], remaining["0.95"]),
-        ("probability_of_reaching", "1", row.payload["probability_of_reaching"], None, None),
-    )
-    for quantity, unit, value, lower, upper in values:
-        yield {
-            "cycles": whole(row.cycles),
-            "time": None,
-            "run_id": None,
-            "quantity": quantity,
-            "unit": unit,
-            **_NOWHERE,
-            "value": value,
-            "lower": lower,
-            "upper": upper,
-        }
+    if mean is None or payload["status"] == INSUFFICIENT:
+        cof: tuple[float | None, ...] = (None, None, None)
+    else:
+        cof = (mean, mean - Z90 * sd, mean + Z90 * sd)
+    yield _ahead_row(row.cycles, MEAN_COF, "1", *cof)
+    yield _ahead_row(row.cycles, "health", "1", current["health"])
+    quantiles = (remaining[quantile] for quantile in ("0.5", "0.05", "0.95"))
+    yield _ahead_row(row.cycles, "remaining_cycles", "cycles", *quantiles)
+    yield _ahead_row(row.cycles, "at_least", "cycles", payload["at_least"])
+    yield _ahead_row(row.cycles, "probability_of_reaching", "1", payload["probability_of_reaching"])
+
+
+def _ahead_row(
+    cycles: float, quantity: str, unit: str, value: float | None, lower: float | None = None, upper: float | None = None
+) -> dict[str, Any]:
+    """A row of no test: over all pressures, at cycles since new."""
+    return {
+        "cycles": whole(cycles),
+        "time": None,
+        "run_id": None,
+        "quantity": quantity,
+        "unit": unit,
+        **_NOWHERE,
+        "value": value,
+        "lower": lower,
+        "upper": upper,
+    }

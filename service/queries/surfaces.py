@@ -14,6 +14,7 @@ from models.clutch import Geometry
 from models.friction.criteria import FEWEST_PRESSURES
 from models.friction.pressure_laws import over_pressure
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters, torque
+from models.prognosis.criteria import FEWEST_TESTS
 from models.prognosis.first_passage import weighted_quantiles
 from service import records
 from service.columns import RADIANS_PER_SECOND_PER_RPM, bar, whole
@@ -45,7 +46,8 @@ def surfaces(
     fits: Mapping[str, Sequence[LevelFit]],
     geometry: Geometry,
 ) -> dict[str, Any]:
-    """Parameters over cycles [k] by pressure [p], torque over cycles, pressure and speed [v], of the present life.
+    """Parameters over cycles [k] by pressure [p], torque over cycles, pressure and speed [v], of the present life; with too
+    few tests for a track at the cycles of these alone.
 
     Raises NotFoundError before the first stationary test that determines all four parameters.
     """
@@ -58,7 +60,9 @@ def surfaces(
     levels = sorted(level for level in life.reference if all((name, level) in tracks for name in PARAMETER_NAMES))
     if not levels:
         raise NotFoundError("no stationary test determines all four Stribeck parameters: there are no surfaces")
-    cycles = np.linspace(life.origin, life.events[-1].cycles, CYCLES if life.events[-1].cycles > life.origin else 1)
+    tested = np.unique([event.cycles for event in life.events if event.cofs])
+    enough = tested.size >= FEWEST_TESTS  # fewer say nothing of what lies between or behind them
+    cycles = np.linspace(life.origin, life.events[-1].cycles, CYCLES) if enough else tested
     tracked = np.array([[_medians(tracks[name, level], cycles) for level in levels] for name in PARAMETER_NAMES])
     pressures = np.array(levels)
     if len(levels) >= FEWEST_PRESSURES:

@@ -1,5 +1,8 @@
 """The clutch record: geometry, oil, end of life. Everything but the name defaults to the reference's clutch."""
 
+import hashlib
+import json
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
@@ -19,7 +22,6 @@ from service.schemas.base import (
     RunCycles,
     RunName,
     Schema,
-    WholeNumber,
 )
 from service.schemas.limits import (
     LEAST_LENGTH_MM,
@@ -34,7 +36,7 @@ from service.schemas.limits import (
     MOST_TORQUE_FILTER_MS,
 )
 from service.schemas.prognosis.criteria import CriterionIn
-from service.schemas.prognosis.life import Current, ModelName, Quantiles
+from service.schemas.prognosis.life import AtLeast, AtLeastAt, Criterion, Current, Held, ModelName, Quantiles, Statement
 
 Name = Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_NAME)]
 TorqueFilter = Annotated[
@@ -53,7 +55,7 @@ class GeometryIn(Schema):
 
     inner_diameter_mm: Length = Field(default=99.0, description="Inner diameter of the lining, mm")
     outer_diameter_mm: Length = Field(default=133.0, description="Outer diameter of the lining, mm")
-    friction_faces: Annotated[WholeNumber, Field(ge=1, le=MOST_FRICTION_FACES)] = Field(
+    friction_faces: Annotated[int, Field(ge=1, le=MOST_FRICTION_FACES, strict=True)] = Field(
         default=2, description="Number of friction faces"
     )
     mean_radius_mm: Length | None = Field(
@@ -145,6 +147,11 @@ class ClutchIn(Schema):
         return 0.0 if self.torque_filter_ms is None else self.torque_filter_ms / 1000
 
 
+def content_of(record: Mapping[str, Any]) -> str:
+    """The hash of a record whose defaults are filled in."""
+    return hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()
+
+
 #: The default of a field that may be left out and may not be null.
 _STAYS: Any = None
 
@@ -181,8 +188,17 @@ class ClutchSummary(Answer):
 
     status: str = Field(description="The status of `/remaining-useful-life`")
     as_of_cycles: float | None = Field(description="Duty cycles since new of the latest run")
+    runs_used: int = Field(description="Number of stationary tests that the prediction uses")
     current: Current = Field(description="The clutch's present state")
+    criterion: Criterion = Field(description="The end-of-life criterion that is reached first, most probably")
     remaining_cycles: Quantiles = Field(description="Quantiles of the remaining duty cycles, by probability")
+    at_least: AtLeast
+    at_least_at: AtLeastAt
+    held_runs: Held
+    statement: Statement
+    probability_of_reaching: float | None = Field(
+        description="Probability that the end of life is reached by the horizon"
+    )
     model: ModelName = Field(description="The model that the clutch is tracked under")
 
 
@@ -215,11 +231,12 @@ class LatestDiagnosis(Answer):
 class ClutchState(Answer):
     """The state of a clutch after NAMUR NE 107."""
 
-    name: Literal["failure", "out_of_specification", "maintenance", "check", "normal"] = Field(
-        description="The worst first: its end of life is reached; data and model disagree; its health is below 0.2; fewer "
-        "than three tests, so that nothing is predicted; none of these"
+    name: Literal["failure", "maintenance", "check", "out_of_specification", "normal"] = Field(
+        description="The first that holds: a criterion is reached; less than a fifth of the life may be left, at its safe "
+        "bound, or a quantity is near its limit; runs are held, or there are too few tests for a prediction; data and model "
+        "disagree; none of these"
     )
-    why: str = Field(description="The reason in words")
+    why: str = Field(description="The reason as a sentence, with the safe bound")
 
 
 class ClutchOut(Answer):

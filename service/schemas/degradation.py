@@ -59,18 +59,18 @@ class DegradationItem(Answer):
     speed_rpm: float | None = Field(description="Speed of a slope, rpm; null for all else")
     frequency_hz: float | None = Field(description="Frequency of a friction loop, Hz; null for all else")
     coefficients: Coefficients | None = Field(
-        description="The coefficients of eq. 6, where the quantity follows it; null where it surely does not, and of a "
-        "slope, which follows from the parameters"
+        description="The coefficients of eq. 6, where the quantity follows it; null where it surely does not, with too few "
+        "tests, and of a slope, which follows from the parameters"
     )
     correlations: list[list[float]] | None = Field(
         description="Correlations of ξ0, Δ, log φ and log ε, in this order; null where there are no coefficients"
     )
     eq6_probability: float | None = Field(
-        description="How probable it is that the quantity follows eq. 6; null of a slope"
+        description="How probable it is that the quantity follows eq. 6; null of a slope and with too few tests"
     )
     draws: CoefficientDraws | None = Field(description="Joint draws of the coefficients, where `draws` asked for them")
     measured: Measured = Field(description="The fitted values of the tests")
-    trajectory: Trajectory = Field(description="The course as tracked, with its 90 % band")
+    trajectory: Trajectory = Field(description="The course as tracked, with its 90 % band; empty with too few tests")
 
 
 class Disagreement(Answer):
@@ -113,7 +113,7 @@ class Degradation(Answer):
         description="The exponent of severity as the tests of this life have it; null where its duty states no work or "
         "hardly varies, with too few tests, and where one quantity was asked for"
     )
-    warnings: list[Warned] = Field(description="Warnings, such as tracks that disagree")
+    warnings: list[Warned] = Field(description="Warnings, such as tracks that disagree or runs that are held")
     model: Model
     prior: Prior
     severity: SeverityUsed

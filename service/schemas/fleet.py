@@ -148,9 +148,9 @@ class StateCounts(Answer):
     """Clutches by their state after NAMUR NE 107."""
 
     failure: int = Field(description="At their end of life")
-    out_of_specification: int = Field(description="Data and model disagree")
     maintenance: int = Field(description="Near the end of their lives")
-    check: int = Field(description="Without a prognosis yet")
+    check: int = Field(description="With held runs, or without a prognosis yet")
+    out_of_specification: int = Field(description="Data and model disagree")
     normal: int = Field(description="None of these")
 
 

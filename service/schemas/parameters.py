@@ -80,7 +80,7 @@ State = Annotated[
 ]
 Archived = Annotated[bool, Field(description="The archived clutches instead of those in use")]
 ClutchStateName = Annotated[
-    Literal["failure", "out_of_specification", "maintenance", "check", "normal"] | None,
+    Literal["failure", "maintenance", "check", "out_of_specification", "normal"] | None,
     Field(description="Clutches in this state only, after NAMUR NE 107; left out, all"),
 ]
 Held = Annotated[bool, Field(description="Clutches with runs that are held only")]

@@ -11,10 +11,11 @@ from typing import Any
 from sqlalchemy import Connection
 
 from models.diagnosis.extension import Extension
-from service import records, stored_runs, stored_verdicts
+from service import measured_lives, records, stored_runs, stored_verdicts
 from service.errors import NotFoundError, NothingToAdoptError
 from service.lives.history import stationary_tests_of
-from service.lives.recomputation import Adoption, ClutchState, Results, computed_anew
+from service.lives.outlook import summarised
+from service.lives.recomputation import Adoption, ClutchState, Results, Tracking, computed_anew
 from storage import assumptions, changes, clutches, diagnoses, jobs
 from storage.assumptions import AdoptedRow
 from storage.changes import NewChange
@@ -130,8 +131,9 @@ def _computed(database: Database, clutch_id: str, adoption: Adoption | None) -> 
     reader = stored_runs.run_reader(database, clutch_id)
     tests = reader.stationary_tests(state.lives[-1]) if state.events else iter(())
     evaluated = stationary_tests_of(state.events)
-    _, results = computed_anew(state, levels, receipts, tests, reader, evaluated=evaluated)
-    return state, results
+    final, results = computed_anew(state, levels, receipts, tests, reader, evaluated=evaluated)
+    evidence = measured_lives.evidence_for(database, final, reader)
+    return state, replace(results, summary=summarised(final, results.tracking or Tracking(), evidence))
 
 
 def _in_force(connection: Connection, clutch_id: str, diagnosis_id: str | None) -> bool:

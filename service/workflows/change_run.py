@@ -15,13 +15,14 @@ from typing import Any
 
 from sqlalchemy import Connection
 
-from service import records, stored_runs
+from service import measured_lives, records, stored_runs
 from service.columns import whole
 from service.errors import NotPossibleNowError
 from service.lives.history import STATIONARY, Event, order, stationary_tests_of
 from service.lives.incoming_run import IncomingRun
 from service.lives.late_run import Arrival, reader_with
 from service.lives.model_correction import RunReader
+from service.lives.outlook import held_part, summarised
 from service.lives.payloads import notice_items, receipt
 from service.lives.plausibility.doubts import doubts
 from service.lives.prediction_notices import OF_HISTORY
@@ -264,7 +265,8 @@ def _computed(database: Database, loaded: _Loaded, row: RunRow) -> _Changed:
     before, run_id = loaded.state, row.run_id
     event = loaded.event.at(row.cycles)
     own = [event] if row.state == runs.ACCEPTED else []
-    after = replace(before, events=order([*_without(before.events, run_id), *own]))
+    held = (*_without(before.held, run_id), *([event] if row.state == runs.HELD else []))
+    after = replace(before, events=order([*_without(before.events, run_id), *own]), held=held)
     receipts = {**loaded.receipts, run_id: loaded.receipts[run_id] | {"cycles": whole(row.cycles)}}
     reader = loaded.reader(database)
     computed = Results()
@@ -281,6 +283,14 @@ def _computed(database: Database, loaded: _Loaded, row: RunRow) -> _Changed:
         receipts[run_id] |= parts | {"warnings": warnings}
     own_receipt = computed.receipts.get(run_id, receipts[run_id])
     computed = replace(computed, receipts={**computed.receipts, run_id: own_receipt})
+    evidence = measured_lives.evidence_for(database, after, reader)
+    if evidence is not None:
+        evidence = replace(evidence, levels=loaded.levels, receipts={**receipts, **computed.receipts})
+    if computed.tracking is None:
+        summary = {**before.summary, **held_part(after, {}, evidence)}
+    else:
+        summary = summarised(after, computed.tracking, evidence)
+    computed = replace(computed, summary=summary)
     return _Changed(row=replace(row, receipt=own_receipt), aside=aside, results=computed)
 
 

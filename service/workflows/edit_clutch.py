@@ -5,16 +5,16 @@ record that was registered stays stored.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from sqlalchemy import Connection
 
-from service import records, stored_runs
-from service.identity import content_of
+from service import measured_lives, records, stored_runs
 from service.lives.history import stationary_tests_of
-from service.lives.recomputation import Results, computed_anew
-from service.schemas.clutch import ClutchIn
+from service.lives.outlook import summarised
+from service.lives.recomputation import Results, Tracking, computed_anew
+from service.schemas.clutch import ClutchIn, content_of
 from service.stored_runs import Recomputed
 from storage import changes, clutches
 from storage.changes import NewChange
@@ -81,7 +81,9 @@ def _results(database: Database, before: ClutchIn, record: ClutchIn) -> Results 
     reader = stored_runs.run_reader(database, record.clutch_id)
     tests = reader.stationary_tests(state.lives[-1]) if state.events else iter(())
     evaluated = stationary_tests_of(state.events)
-    return computed_anew(state, levels, receipts, tests, reader, evaluated=evaluated)[1]
+    state, results = computed_anew(state, levels, receipts, tests, reader, evaluated=evaluated)
+    evidence = measured_lives.evidence_for(database, state, reader)
+    return replace(results, summary=summarised(state, results.tracking or Tracking(), evidence))
 
 
 def _entries(edited: _Edited) -> list[tuple[str, dict[str, Any], dict[str, Any]]]:

@@ -13,8 +13,9 @@ from typing import Any
 from sqlalchemy import Connection
 
 from models.clutch import Geometry
-from service import records, stored_runs
+from service import measured_lives, records, stored_runs
 from service.errors import ArchivedError, BusyError, ConflictError, TooLargeError
+from service.lives.engagements.over_life import stored_engagement
 from service.lives.history import (
     DYNAMIC,
     REBUILD,
@@ -29,11 +30,13 @@ from service.lives.history import (
 )
 from service.lives.incoming_run import IncomingRun
 from service.lives.late_run import Arrival, reader_with, test_of, tests_with
+from service.lives.outlook import Evidence, held_part, needs_evidence, summarised
 from service.lives.payloads import history_warnings, notice_items, receipt, warned_anew
 from service.lives.plausibility.doubts import doubts
 from service.lives.recomputation import (
     ClutchState,
     Results,
+    Tracking,
     cofs_among,
     computed_anew,
     corrected_newest,
@@ -178,7 +181,12 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
     )
     doubtful = doubts(arrival.run, arrival.analysis, event, before)
     if doubtful:
-        return _Outcome(revision=before.revision, receipt=answer, cofs=event.cofs, results=Results(), doubts=doubtful)
+        held = replace(before, held=(*before.held, event))
+        part = held_part(held, before.filters or {}, _evidence(database, held, arrival, answer))
+        results_of_others = Results(summary={**before.summary, **part})
+        return _Outcome(
+            revision=before.revision, receipt=answer, cofs=event.cofs, results=results_of_others, doubts=doubtful
+        )
     computed = _among(database, before, state, event, levels, answer, arrival)
     answer = computed.receipts.get(event.run_id, answer)
     others = {run_id: other for run_id, other in computed.receipts.items() if run_id != event.run_id}
@@ -203,7 +211,8 @@ def _among(
         reader = reader_with(stored_runs.run_reader(database, state.clutch_id), arrival)
         tests = tests_with(reader, state.lives[-1], arrival)
         evaluated = _evaluated(before, state, event)
-        return computed_anew(state, levels, receipts, tests, reader, evaluated=evaluated)[1]
+        state, computed = computed_anew(state, levels, receipts, tests, reader, evaluated=evaluated)
+        return _summarised(database, state, computed, arrival, answer)
     corrected: dict[str, ByPressure] = {}
     if state.extension is not None and event is state.events[-1]:
         runs_before = stored_runs.run_reader(database, state.clutch_id)
@@ -225,7 +234,33 @@ def _among(
             changed |= {run_id: receipts[run_id] | {"loops": items} for run_id, items in loops.items()}
         if tracking.anew:
             changed |= warned_anew(state.lives, tracking.warnings, receipts | changed)
-    return Results(corrected=corrected, receipts=changed, tracking=tracking)
+    computed = Results(corrected=corrected, receipts=changed, tracking=tracking)
+    return _summarised(database, state, computed, arrival, answer)
+
+
+def _summarised(
+    database: Database, state: ClutchState, computed: Results, arrival: Arrival, answer: dict[str, Any]
+) -> Results:
+    """The results with the summary of the clutch that was tracked."""
+    tracking = computed.tracking or Tracking()
+    evidence = _evidence(database, state, arrival, answer) if needs_evidence(state) else None
+    return replace(computed, summary=summarised(state, tracking, evidence))
+
+
+def _evidence(database: Database, state: ClutchState, arrival: Arrival, answer: dict[str, Any]) -> Evidence:
+    """What was measured of the clutch, by the run that comes in too."""
+    name = arrival.run.run_id
+    with database.reading() as connection:
+        stored = measured_lives.evidence(connection, state.clutch_id)
+    reader = reader_with(stored_runs.run_reader(database, state.clutch_id), arrival)
+    engagement = stored_engagement(answer, arrival.analysis.kept_beside(arrival.run))
+    return Evidence(
+        levels={**stored.levels, name: arrival.analysis.fits},
+        receipts={**stored.receipts, name: answer},
+        engagements={**stored.engagements, **({} if engagement is None else {name: engagement})},
+        reader=reader,
+        tests=lambda life: tests_with(reader, life, arrival),
+    )
 
 
 def _evaluated(before: ClutchState, state: ClutchState, event: Event) -> dict[str, str | None]:

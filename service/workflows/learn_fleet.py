@@ -13,7 +13,7 @@ from models.prognosis.criteria import FEWEST_CLUTCHES, FEWEST_TESTS_TO_LEARN, HO
 from models.prognosis.ended_lives import EndedLife, ended_life, representative
 from models.prognosis.fleet import Taught, population, taught
 from models.prognosis.scoring import measured_end
-from service import records
+from service import measured_lives, records, stored_runs
 from service.background import AtOnce, directly
 from service.executors.executor import Executor
 from service.executors.in_process import InProcess
@@ -21,6 +21,7 @@ from service.executors.rounds import Ended, Ending, in_rounds
 from service.lives.assumptions import ALL_PRESSURES, Assumptions, kind_of
 from service.lives.criteria import MOST_ATTEMPTS
 from service.lives.history import Life
+from service.lives.outlook import Evidence, needs_evidence, summarised
 from service.lives.payloads import warned_anew
 from service.lives.recomputation import ClutchState, Receipt, Results, track
 from service.lives.tracks import CARRIED, offset_of
@@ -77,6 +78,7 @@ class _Tracked:
 
     state: ClutchState
     receipts: Mapping[str, Receipt]
+    evidence: Evidence | None
 
 
 def refresh(
@@ -244,7 +246,12 @@ def _brought_up(
             last = results.prediction_at(connection, clutch_id, CARRIED[0], ALL_PRESSURES)
             if last is None or last.payload.get("prior") == dict(state.assumptions().prior.name):
                 return None
-            return _Tracked(state=state, receipts=records.receipts(connection, clutch_id))
+            receipts = records.receipts(connection, clutch_id)
+        evidence = None
+        if needs_evidence(state):
+            reader = stored_runs.recorded(database, state, whole=executor.elsewhere).reader
+            evidence = measured_lives.evidence_for(database, state, reader)
+        return _Tracked(state=state, receipts=receipts, evidence=evidence)
 
     def store(tracked: _Tracked, retracked: Results) -> bool:
         return at_once(_replaced, database, tracked.state, retracked)
@@ -255,7 +262,11 @@ def _brought_up(
 def _retracked(tracked: _Tracked) -> Results:
     """A clutch's tracks anew."""
     state, tracking = tracked.state, track(tracked.state)
-    return Results(tracking=tracking, receipts=warned_anew(state.lives, tracking.warnings, tracked.receipts))
+    return Results(
+        tracking=tracking,
+        receipts=warned_anew(state.lives, tracking.warnings, tracked.receipts),
+        summary=summarised(state, tracking, tracked.evidence),
+    )
 
 
 def _replaced(database: Database, state: ClutchState, results: Results) -> bool:

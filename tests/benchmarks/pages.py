@@ -8,7 +8,7 @@ from pathlib import Path
 import httpx2
 from playwright.sync_api import Browser, Page
 
-from service.lives import payloads
+from service.lives import condition
 from storage import clutches
 from storage.engine.opening import open_database
 from tests.browser.driving import chromium, pointed_at
@@ -65,8 +65,13 @@ def _multiply(path: Path, http: httpx2.Client) -> None:
                 for q, value in {"0.05": 900, "0.25": 1000, "0.5": 1100, "0.75": 1200, "0.95": 1400}.items()
             }
             current = dict(row.summary["current"]) | {"health": index / CLUTCHES}
-            summary = dict(row.summary) | {"status": "predicted", "remaining_cycles": remaining, "current": current}
-            state = payloads.state_of(summary, disputed=False)["name"]
+            summary = dict(row.summary) | {
+                "status": "predicted",
+                "remaining_cycles": remaining,
+                "at_least": remaining["0.05"],
+                "current": current,
+            }
+            state = condition.state_of(summary, disputed=False)["name"]
             clutches.set_summary(
                 connection, f"bench-{index:03}", remaining["0.5"], summary, life="", state=state, if_disputed=state
             )

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from service.cli.answers.request import Arguments, AtCycles, Csv, Method, answered, arguments_of
-from service.cli.answers.tables import number, place, pressure, show_table, warn, with_deviation
+from service.cli.answers.tables import coefficient, number, place, pressure, show_table, warn
 from service.cli.options import URL, ClutchId, Json, Key, Patience, Url, out
 
 _COLUMNS = (
@@ -53,7 +53,7 @@ def degradation(
 def _row(item: Mapping[str, Any]) -> list[str]:
     coefficients = item["coefficients"]
     estimates = [None if coefficients is None else coefficients[name] for name in _COEFFICIENTS]
-    shown = ["-" if part is None else with_deviation(part["value"], part["sd"]) for part in estimates]
+    shown = ["-" if part is None else coefficient(part["value"], part["sd"]) for part in estimates]
     return [
         item["quantity"],
         pressure(item["pressure_bar"]),

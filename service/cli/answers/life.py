@@ -18,12 +18,6 @@ from service.cli.options import EX_USAGE, URL, ClutchId, Json, Key, Patience, Ur
 #: Quantiles that fit a line; `--json` has all of them.
 _SHOWN = ("0.05", "0.25", "0.5", "0.75", "0.95")
 _CRITERIA = ("criterion", "bar", "rpm", "Hz", "now", "limit", "end, 5 %", "50 %", "95 %", "is the first")
-_STATUS = {
-    "predicted": "predicted",
-    "reached": "the end of life is reached",
-    "may_never_reach": "may never reach its end of life",
-    "insufficient_data": "too few tests for a prediction",
-}
 
 
 def life(
@@ -83,11 +77,13 @@ def life(
 def show(answer: Mapping[str, Any]) -> None:
     """A prediction as a table: where the clutch stands, and the quantiles of what remains."""
     at = "" if answer["as_of_cycles"] is None else f" at {answer['as_of_cycles']:,.0f} cycles"
-    out.print(f"{answer['clutch_id']}{at}: {_STATUS[answer['status']]}", markup=False, style="bold")
+    out.print(f"{answer['clutch_id']}{at}: {answer['statement']}", markup=False, style="bold")
     for line in _lines(answer):
         out.print(line, markup=False, soft_wrap=True)
-    rows = [(name, *(shown(quantity.get(q)) for q in _SHOWN)) for name, quantity, shown in _rows(answer)]
-    show_table(["probability", *(f"{100 * float(q):g} %" for q in _SHOWN)], rows)
+    known = [row for row in _rows(answer) if any(row[1].get(q) is not None for q in _SHOWN)]
+    if known:
+        rows = [(name, *(shown(quantity.get(q)) for q in _SHOWN)) for name, quantity, shown in known]
+        show_table(["probability", *(f"{100 * float(q):g} %" for q in _SHOWN)], rows)
     criteria = answer.get("criteria", [])
     if len(criteria) > 1 or any(end["quantity"] != "mean_cof" for end in criteria):
         show_table(_CRITERIA, map(_criterion, criteria))
@@ -97,10 +93,13 @@ def show(answer: Mapping[str, Any]) -> None:
 def _lines(answer: Mapping[str, Any]) -> Iterator[str]:
     current, criterion = answer["current"], answer["criterion"]
     if current.get("mean_cof") is not None:
-        yield (
-            f"mean COF {with_deviation(current['mean_cof'], current['mean_cof_sd'])}, "
-            f"{100 * current['fraction_of_initial']:.0f} % of new" + _threshold(criterion)
-        )
+        cof, fraction = with_deviation(current["mean_cof"], current["mean_cof_sd"]), current["fraction_of_initial"]
+        if fraction is None:
+            yield f"mean COF {cof} as measured at {current['measured_at_cycles']:,.0f} cycles"
+        else:
+            yield f"mean COF {cof}, {100 * fraction:.0f} % of new{_threshold(criterion)}"
+    if answer["at_least_at"] is not None:
+        yield f"at the pace of the runs until {answer['at_least_at'][:10]} at least"
     course = answer.get("course")
     described = "" if course is None else f", course {course['name']} (probability {number(course['probability'], 2)})"
     effects = ", ".join(answer["model"]["effects"])
@@ -141,6 +140,9 @@ def _rows(answer: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any], A
     """(name, quantiles, how one is written) of each row."""
     yield "remaining cycles", answer["remaining_cycles"], cycles
     yield "end of life, cycles", answer["end_of_life_cycles"], cycles
+    held = answer.get("held_runs")
+    if held is not None:
+        yield f"with {held['count']} held", held["remaining_cycles"], cycles
     if "remaining_blocks" in answer:
         yield "remaining blocks", answer["remaining_blocks"], number
         yield "under recent duty", answer["recent_duty_cycles"], cycles

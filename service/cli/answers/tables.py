@@ -7,6 +7,7 @@ from typing import Any
 from service.cli.options import out
 
 BEYOND_HORIZON = "beyond the horizon"
+UNKNOWN = "unknown"
 
 
 def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], *, left: int = 1) -> None:
@@ -36,6 +37,11 @@ def with_deviation(value: float | None, deviation: float | None) -> str:
         return number(value)
     decimals = max(0, 1 - math.floor(math.log10(deviation)))
     return f"{value:,.{decimals}f} ± {deviation:,.{decimals}f}"
+
+
+def coefficient(value: float, deviation: float) -> str:
+    """A coefficient with its standard deviation; one that is less than this is not known."""
+    return UNKNOWN if deviation > abs(value) else with_deviation(value, deviation)
 
 
 def cycles(value: float | None) -> str:

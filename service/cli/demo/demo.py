@@ -136,7 +136,8 @@ def _row(prediction: dict[str, Any], end: float | None) -> str:
     cof = f"{current['mean_cof']:.4f} ± {current['mean_cof_sd']:.4f}"
     interval = f"{_count(remaining['0.05'])} … {_count(remaining['0.95'])}"
     left = "-" if end is None else f"{max(0.0, end - prediction['as_of_cycles']):.0f}"
-    share = f"{100 * current['fraction_of_initial']:.1f} %"
+    fraction = current["fraction_of_initial"]
+    share = "-" if fraction is None else f"{100 * fraction:.1f} %"
     if prediction["status"] == "reached":
         interval = "reached"
     return (

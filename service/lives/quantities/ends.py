@@ -26,7 +26,8 @@ Sample = tuple[FloatArray, FloatArray]
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CriterionEnd:
     """When a quantity reaches its limit: `ends` in cycles since new (inf: not by the horizon) with their weights; `current`
-    is mean and deviation of the quantity now, `initial` its mean when new. None of them with too few tests."""
+    is mean and deviation of the quantity now, `initial` its mean when new. With too few tests `current` is the last of them
+    as it was measured, and the others are None."""
 
     criterion: CriterionIn
     tests: int
@@ -43,23 +44,29 @@ class CriterionEnd:
 
 
 def criterion_end(measured: MeasuredLife, criterion: CriterionIn, method: str) -> CriterionEnd:
-    """The end of a life by a criterion and a filter. Raises NotFoundError where the quantity is not measured there."""
+    """The end of a life by a criterion; a share of mean COF by a filter, all else by the exact posterior on a lattice.
+
+    Raises NotFoundError where the quantity is not measured there.
+    """
     quantity = quantity_named(criterion.quantity)
     series = _series_at(measured, quantity, criterion)
     if series is None:
         return CriterionEnd(criterion=criterion, tests=0)
     count = len(series.measurements)
+    too_few = CriterionEnd(
+        criterion=criterion, tests=count, current=series.as_measured(measured.assumptions, count - 1)[1]
+    )
     if len({measurement.progress for measurement in series.measurements}) < FEWEST_TESTS:
-        return CriterionEnd(criterion=criterion, tests=count)
+        return too_few
     now = float(series.scale.progress(measured.life.events[-1].cycles))
     horizon = max(now, float(series.scale.progress(series.scale.origin + HORIZON)))
     at = places(now, horizon)
     if quantity.family is Family.MEAN_COF and criterion.fraction is not None:
         passages, paths = _mean_cof(measured, series, criterion.fraction, method, np.array([0.0, now]), horizon)
     else:
-        sample = _paths(measured, quantity, series, np.append(at, now), method)
+        sample = _paths(measured, quantity, series, np.append(at, now))
         if sample is None:
-            return CriterionEnd(criterion=criterion, tests=count)
+            return too_few
         limit = Limit(fraction=criterion.fraction, below=criterion.below, above=criterion.above)
         passages, paths = (limit.passages(sample[0][:-1], at), sample[1]), sample
     (ends, weight_of_ends), (values, weight) = passages, paths
@@ -100,22 +107,21 @@ def _mean_cof(
 ) -> tuple[Sample, Sample]:
     """The end by a share of mean COF as `/remaining-useful-life` states it, and mean COF [2, n] at progress `at` [2]."""
     assumptions, cycles = measured.assumptions, measured.life.events[-1].cycles
-    tracked = advance(measured.clutch_id, method, series, assumptions, None, len(series.measurements))
+    carried = measured.filters.get(method)
+    tracked = advance(measured.clutch_id, method, series, assumptions, carried, len(series.measurements))
     sample = drawn(measured.clutch_id, method, series, assumptions, tracked)
     end = end_of_life(sample, series, assumptions, tracked, cycles, fraction, horizon)
     return (end.ends, end.weight), (track_paths(sample, at, offset_of(series, assumptions)), sample.weight)
 
 
-def _paths(
-    measured: MeasuredLife, quantity: Quantity, series: Series, progress: FloatArray, method: str
-) -> Sample | None:
+def _paths(measured: MeasuredLife, quantity: Quantity, series: Series, progress: FloatArray) -> Sample | None:
     """The quantity at progress [k] in every draw [k, n], with the draws' weights [n]; None with too few tests."""
     clutch_id, assumptions = measured.clutch_id, measured.assumptions
     if quantity.family is not Family.SLOPE:
-        posterior = posterior_of(clutch_id, series, assumptions, method)
+        posterior = posterior_of(clutch_id, series, assumptions)
         return track_paths(posterior, progress, offset_of(series, assumptions)), posterior.weight
-    tracks = parameter_tracks(clutch_id, measured.life, assumptions, measured.tests, method, {series.pressure})
+    tracks = parameter_tracks(clutch_id, measured.life, assumptions, measured.tests, pressures={series.pressure})
     cof = measured.mean_cofs()[series.pressure]
-    direct = cof, posterior_of(clutch_id, cof, assumptions, method)
+    direct = cof, posterior_of(clutch_id, cof, assumptions)
     paths = slopes_along(measured, tracks, direct, series.speed_rpm or 0.0, progress)
     return None if paths is None else (paths, np.full(paths.shape[1], 1.0 / paths.shape[1]))

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from models.arrays import FloatArray
-from models.prognosis.criteria import BAND, QUANTILES
+from models.prognosis.criteria import BAND, FEWEST_TESTS, QUANTILES
 from models.prognosis.first_passage import weighted_quantiles
 from models.tracking.courses import Course
 from models.tracking.posterior import Posterior
@@ -32,7 +32,9 @@ def track_item(
     quantity: Quantity, series: Series, posterior: Posterior, assumptions: Assumptions, draws: int = 0
 ) -> dict[str, Any]:
     """A quantity that has a track of its own; the course of the model in force is put back on. `draws` > 0: with so many
-    joint draws of the coefficients."""
+    joint draws of the coefficients. With too few tests there is only what was measured."""
+    if len({measurement.progress for measurement in series.measurements}) < FEWEST_TESTS:
+        return paths_item(quantity, series, None, assumptions)
     cycles = trajectory_cycles(series)
     course = assumptions.offset(series.quantity, series.pressure, cycles)
     values = posterior.values(series.scale.progress(cycles)) + course[:, None]
@@ -47,13 +49,15 @@ def track_item(
     return _head(quantity, series) | item | _measured(series, assumptions) | _trajectory(cycles, band)
 
 
-def paths_item(quantity: Quantity, series: Series, paths: FloatArray | None) -> dict[str, Any]:
+def paths_item(
+    quantity: Quantity, series: Series, paths: FloatArray | None, assumptions: Assumptions | None = None
+) -> dict[str, Any]:
     """A quantity that follows from others' tracks, whose `paths` [k, n] over `trajectory_cycles` are equal draws (None: too
-    few tests): it has no coefficients of its own."""
+    few tests): it has no coefficients of its own. `assumptions` where the model in force has a course of it."""
     item = {"coefficients": None, "correlations": None, "eq6_probability": None, "draws": None}
     band = np.zeros((0, len(BAND))) if paths is None else np.quantile(paths, BAND, axis=1).T
     cycles = trajectory_cycles(series)[: band.shape[0]]
-    return _head(quantity, series) | item | _measured(series, Assumptions()) | _trajectory(cycles, band)
+    return _head(quantity, series) | item | _measured(series, assumptions or Assumptions()) | _trajectory(cycles, band)
 
 
 def _head(quantity: Quantity, series: Series) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from service.lives.history import DYNAMIC, Life, Series, nearest, nearest_pressu
 from service.lives.quantities.names import SLOPE, SLOPE_SPEEDS, Family, Quantity
 from service.lives.quantities.parameters import parameter_series, tests_of
 from service.lives.run_analysis import LevelFit, Value
+from service.lives.tracks import States
 
 #: What a receipt's loop calls the quantities of the lag and their deviations.
 LOOP_COLUMNS = {
@@ -31,7 +32,8 @@ _DIGITS = 2
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeasuredLife:
     """A life of a clutch with the fitted curves of its stationary tests and its receipts, both by run_id, and the rows of
-    its engagements (`engagements.over_life`); `fraction` of the initial mean COF ends it where nothing else is said."""
+    its engagements (`engagements.over_life`); `fraction` of the initial mean COF ends it where nothing else is said.
+    `filters` are those of mean COF over all pressures where they were carried along the life already."""
 
     clutch_id: str
     life: Life
@@ -41,6 +43,7 @@ class MeasuredLife:
     levels: Mapping[str, Sequence[LevelFit]]
     receipts: Mapping[str, dict[str, Any]]
     engagements: Sequence[Mapping[str, Any]] = ()
+    filters: States = field(default_factory=dict)
 
     @property
     def tests(self) -> list[Sequence[LevelFit]]:

@@ -6,7 +6,6 @@ cycles lead there. An adopted model's course over ζ is that of recent duty.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -19,10 +18,12 @@ from models.degradation.severity import Block, Severity, SeverityBasis, Severity
 from models.prognosis.criteria import HORIZON, QUANTILES
 from models.prognosis.first_passage import PassageStatus, weighted_quantiles
 from models.prognosis.stated_end import StatedEnd
-from service import records
+from service import measured_lives, records, stored_runs
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
-from service.lives.history import Event, Series
-from service.lives.payloads import INSUFFICIENT, by_quantile, notice_items
+from service.lives.condition import beside_held
+from service.lives.history import Event, Series, date_of, moment_at, pace_of
+from service.lives.outlook import with_held
+from service.lives.payloads import INSUFFICIENT, SAFE, by_quantile, notice_items
 from service.lives.prediction_at import predict_at
 from service.lives.recomputation import ClutchState
 from service.lives.run_analysis import Notice
@@ -31,8 +32,6 @@ from service.schemas.prognosis.programme import PlannedBlock, ProgrammeIn
 from storage.engine.database import Database
 
 _SECONDS_PER_HOUR = 3600.0
-#: The earliest and the latest moment that a date is given for.
-_MOMENTS = tuple(datetime(year, 1, 1, tzinfo=UTC).timestamp() for year in (1, 9999))
 #: Draws of what a plan leaves open, evenly spread, in another order for each block.
 _PLANS = 500
 _NORMALS = ndtri((np.arange(_PLANS) + 0.5) / _PLANS)
@@ -46,8 +45,17 @@ def planned_life(database: Database, clutch_id: str, method: str, planned: Progr
         state = records.state(connection, clutch_id, carried=True)
     events = state.lives[-1].events if state.events else ()
     stated = planned.pace_cycles_per_hour
-    pace = stated or _pace_of_runs(events)
+    of_runs = pace_of(events)
+    pace = stated or (None if of_runs is None else of_runs * _SECONDS_PER_HOUR)
     prediction = _prediction(state, method, planned)
+    among = None
+    if state.held:
+        evidence = measured_lives.evidence_for(database, state, stored_runs.run_reader(database, clutch_id))
+        among = None if evidence is None else _prediction(with_held(state, evidence), method, planned)
+    summary: dict[str, Any] = {"held": len(state.held)}
+    if pace is not None and events:
+        a_second = pace / _SECONDS_PER_HOUR
+        summary["pace"] = {"cycles_per_second": a_second, "moment": moment_at(events, a_second, events[-1].cycles)}
     return prediction | {
         "clutch_id": clutch_id,
         "method": method,
@@ -56,6 +64,7 @@ def planned_life(database: Database, clutch_id: str, method: str, planned: Progr
         "end_of_life_at": _dates(prediction["end_of_life_cycles"], events, pace),
         "pace_cycles_per_hour": pace,
         "pace_from": None if pace is None else "runs" if stated is None else "request",
+        **beside_held(prediction, summary, among),
     }
 
 
@@ -108,6 +117,7 @@ def _planned_answer(programme: Programme, end: StatedEnd, series: Series, *, now
             {q: None if x is None else programme.blocks_in(x) for q, x in remaining.items()}
         ),
         "block_severity": [float(median) for median in np.median(rates, axis=0)],
+        "at_least": most if remaining[SAFE] is None else remaining[SAFE],
         "probability_of_reaching": min(1.0, float(end.weight @ (left <= most))),
     }
 
@@ -165,31 +175,13 @@ class _Counted:
         return np.full(normals.size, energy)
 
 
-def _pace_of_runs(events: Sequence[Event]) -> float | None:
-    """Cycles an hour between the first and the last dated run of a life, idle hours included; None where none is known."""
-    dated = [event for event in events if event.dated]
-    if len(dated) < 2:
-        return None
-    hours = (dated[-1].moment - dated[0].moment) / _SECONDS_PER_HOUR
-    cycles = dated[-1].cycles - dated[0].cycles
-    return cycles / hours if hours > 0.0 and cycles > 0.0 else None
-
-
 def _dates(
     ends: Mapping[str, float | None], events: Sequence[Event], pace: float | None
 ) -> dict[str, str | None] | None:
-    """When cycles since new by quantile have been run, at a pace an hour from the newest dated run on, or from the newest
-    one where none is dated; None without a pace or a run."""
+    """When cycles since new by quantile have been run at a pace an hour; None without a pace or a run."""
     if pace is None or not events:
         return None
-    start = next((event for event in reversed(events) if event.dated), events[-1])
     return {
-        quantile: None if end is None else _date(start.moment + (end - start.cycles) / pace * _SECONDS_PER_HOUR)
+        quantile: None if end is None else date_of(moment_at(events, pace / _SECONDS_PER_HOUR, end))
         for quantile, end in ends.items()
     }
-
-
-def _date(moment: float) -> str | None:
-    """A moment [s since 1970] as text, UTC; None where no date is given for it."""
-    earliest, latest = _MOMENTS
-    return datetime.fromtimestamp(moment, UTC).isoformat(timespec="seconds") if earliest < moment < latest else None

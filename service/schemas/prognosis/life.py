@@ -39,7 +39,7 @@ class Criterion(CriterionPlace):
 
 
 class CriterionValue(Answer):
-    """A quantity as it is now; null with too few tests."""
+    """A quantity as it is now; with too few tests as it was measured last, null before."""
 
     value: float | None = Field(description="Its mean, as tracked")
     sd: float | None = Field(description="Its standard deviation")
@@ -66,12 +66,17 @@ class LifeNumber(Answer):
 
 
 class Current(Answer):
-    """The clutch's present state; null before the first measurement."""
+    """The clutch's present state; null before the first measurement. With too few tests for a prediction mean COF is the
+    last one as it was measured, and the others are null."""
 
     mean_cof: float | None = Field(description="Mean COF, as tracked")
     mean_cof_sd: float | None = Field(description="Its standard deviation")
+    measured_at_cycles: float | None = Field(description="Duty cycles since new at which it was measured last")
     fraction_of_initial: float | None = Field(description="Mean COF over its value when new")
-    health: float | None = Field(description="1 when new, 0 at the end of life")
+    health: float | None = Field(
+        description="1 when new, 0 at the end of life: the share that is left of the way to the limit, the least by any "
+        "criterion"
+    )
 
 
 class ModelName(Answer):
@@ -140,6 +145,40 @@ class Course(CourseShare):
     alternatives: list[CourseShare] = Field(description="The other kinds, the more probable first")
 
 
+class HeldRuns(Answer):
+    """What the runs that are held would make of the remaining life."""
+
+    count: int = Field(description="How many runs of the clutch are held")
+    status: str = Field(description="The status of the prediction with them")
+    remaining_cycles: Quantiles = Field(description="Quantiles of the remaining duty cycles with them, by probability")
+
+
+#: The safe bound.
+AtLeast = Annotated[
+    float | None,
+    Field(
+        description="Duty cycles that are left with a probability of 95 %, the lower of those with and without held runs; "
+        "up to the horizon where the end of life lies beyond it; null before the first test"
+    ),
+]
+AtLeastAt = Annotated[
+    str | None,
+    Field(
+        description="When these have been run, at the pace that the `started_at` of the present life's runs show; UTC, ISO "
+        "8601; null where they show none, or for an earlier time"
+    ),
+]
+Held = Annotated[
+    HeldRuns | None,
+    Field(
+        description="What held runs would make of the remaining life; null where none is held, or for an earlier time"
+    ),
+]
+
+
+Statement = Annotated[str, Field(description="What is known of the remaining life, as a sentence")]
+
+
 class RemainingLife(Answer):
     """The duty cycles that remain until mean COF has fallen to the criterion's fraction of its initial value."""
 
@@ -155,6 +194,10 @@ class RemainingLife(Answer):
     current: Current = Field(description="The clutch's present state")
     remaining_cycles: Quantiles = Field(description="Quantiles of the remaining duty cycles, by probability")
     end_of_life_cycles: Quantiles = Field(description="Quantiles of the duty cycles since new at the end of life")
+    at_least: AtLeast
+    at_least_at: AtLeastAt
+    held_runs: Held
+    statement: Statement
     probability_of_reaching: float | None = Field(
         description="Probability that the threshold is reached by the horizon"
     )

@@ -33,5 +33,7 @@ SeriesQuantity = Literal[
     EngagementQuantity,
     "health",
     "remaining_cycles",
+    "at_least",
     "probability_of_reaching",
+    "held_runs",
 ]

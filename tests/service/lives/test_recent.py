@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from service.lives.condition import recent
 from service.lives.criteria import MOST_LINE_POINTS
 from service.lives.history import Event, moment_of
-from service.lives.payloads import recent
 from service.queries import clutch_list
 from storage import clutches, diagnoses
 from storage.diagnoses import NewDiagnosis

@@ -77,7 +77,7 @@ def test_a_quantity_that_is_none_is_refused_with_those_that_are(client: TestClie
     assert answer.status_code == 422
     (error,) = answer.json()["errors"]
     known = {item["quantity"] for item in client.get(f"{BASE}/series").json()["items"]}
-    assert len(known) == 9
+    assert len(known) == 10
     assert all(f"'{name}'" in error["message"] for name in known)
     for name in known:
         assert client.get(f"{BASE}/series{suffix}?quantity={name}").status_code == 200

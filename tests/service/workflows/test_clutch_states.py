@@ -1,13 +1,14 @@
 """The stored state of a clutch is that which follows from all its rows, whatever was written in which order."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import pytest
 
 from service.queries import clutch_list
+from service.queries.life.remaining_life import remaining_life
 from service.workflows import replay, run_diagnosis
 from service.workflows.edit_clutch import edit
 from storage import clutches, diagnoses, jobs
@@ -35,7 +36,9 @@ class Written:
     def once(self) -> None:
         """One write."""
         often = (self.test, self.diagnose, self.adopt, self.baseline) * 2
-        write = self.one_of((*often, self.rebuild, self.withdraw, self.restore, self.correct, self.replay, self.edit))
+        write = self.one_of(
+            (*often, self.confirm, self.rebuild, self.withdraw, self.restore, self.correct, self.replay, self.edit)
+        )
         self.did.append(write.__name__)
         write()
 
@@ -49,7 +52,7 @@ class Written:
     def test(self) -> None:
         self.cycles += 2000.0
         wear = min(0.9, self.cycles / self.one_of((15_000, 60_000)))
-        self.bench.send(body("test", self.name(), self.cycles, wear=wear))
+        self.bench.send(body("test", self.name(), self.cycles, wear=wear, odd=self.rng.random() < 0.1))
 
     def rebuild(self) -> None:
         self.bench.send(body("rebuild", self.name(), self.cycles + 1.0))
@@ -77,6 +80,10 @@ class Written:
 
     def baseline(self) -> None:
         self.bench.adopt(None)
+
+    def confirm(self) -> None:
+        if runs := self.runs("held"):
+            self.bench.confirm(self.one_of(runs))
 
     def runs(self, state: str) -> list[str]:
         return [run_id for run_id, receipt in self.bench.receipts().items() if receipt["state"] == state]
@@ -108,15 +115,24 @@ class Written:
 def stated_anew(bench: Bench) -> str:
     """The state by the rules of the docs, from what the API says of the clutch."""
     item = clutch_list.look_up(bench.database, CLUTCH)
-    summary, found = item["summary"], item["diagnosis"]
-    if summary is None or summary["status"] == "insufficient_data":
-        return "check"
-    if summary["status"] == "reached":
+    life = remaining_life(bench.database, CLUTCH, "particle", None, None)
+    if life["status"] == "reached":
         return "failure"
+    if life["status"] != "insufficient_data":
+        rebuilds = [run["cycles"] for run in bench.receipts().values() if run["event"] == "rebuild" and counts(run)]
+        left, age = life["remaining_cycles"]["0.05"], life["as_of_cycles"] - max(rebuilds, default=0)
+        if (left is not None and left < 0.2 * (age + left)) or life["current"]["health"] < 0.1:
+            return "maintenance"
+    if item["held"] or life["status"] == "insufficient_data":
+        return "check"
+    found = item["diagnosis"]
     if found and not found["adopted"] and not found["earlier_life"] and found["verdict"] in DISAGREE:
         return "out_of_specification"
-    health = summary["current"]["health"]
-    return "maintenance" if health is not None and health < 0.2 else "normal"
+    return "normal"
+
+
+def counts(run: Mapping[str, Any]) -> bool:
+    return bool(run["state"] == "accepted")
 
 
 @pytest.fixture

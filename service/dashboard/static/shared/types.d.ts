@@ -492,7 +492,6 @@ export interface AdviceOut {
 export interface VisibleOut {
   effect: string;
   amplitude: number | null;
-  least: number | null;
   unit: string;
 }
 

@@ -1,0 +1,215 @@
+"""The condition of a clutch, stored beside it and stated by lists, pages and terminals alike: its remaining life in short,
+what held runs would make of it, and its state after NAMUR NE 107 with the reason as a sentence.
+
+`summary_of` makes what is stored; `state_of` is the only place where a state is decided.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+from models.prognosis.criteria import FEWEST_TESTS, HORIZON
+from models.prognosis.first_passage import PassageStatus
+from service.columns import whole
+from service.lives.criteria import MOST_LINE_POINTS, NEAR_LIMIT, SOON
+from service.lives.history import Event, Series, date_of
+from service.lives.payloads import INSUFFICIENT
+from service.lives.run_analysis import Notice
+
+#: The states of a clutch after NAMUR NE 107; the first that holds is its state.
+STATES = FAILURE, MAINTENANCE, CHECK, OUT_OF_SPECIFICATION, NORMAL = (
+    "failure",
+    "maintenance",
+    "check",
+    "out_of_specification",
+    "normal",
+)
+#: What of a prediction is stored with a clutch.
+SUMMARY = (
+    "status",
+    "as_of_cycles",
+    "runs_used",
+    "current",
+    "criterion",
+    "remaining_cycles",
+    "at_least",
+    "probability_of_reaching",
+    "model",
+)
+#: What is said beside a prediction.
+BESIDE = ("at_least", "at_least_at", "held_runs", "statement")
+REACHED = PassageStatus.REACHED.value
+#: The filter whose predictions lists and receipts show.
+SHOWN = "particle"
+#: The warning of an answer beside which runs are held.
+HELD_RUNS = "held_runs"
+#: A clutch without a prediction comes after all others in a list.
+RANK_UNKNOWN = 2 * HORIZON
+
+
+def rank_of(summary: Mapping[str, Any]) -> float:
+    """Where a clutch comes in a list: the fewer cycles remain, the earlier."""
+    if summary.get("status", INSUFFICIENT) == INSUFFICIENT:
+        return RANK_UNKNOWN
+    median = summary["remaining_cycles"]["0.5"]
+    return HORIZON if median is None else float(median)
+
+
+def beside_held(
+    payload: Mapping[str, Any], summary: Mapping[str, Any], among: Mapping[str, Any] | None
+) -> dict[str, Any]:
+    """What an answer says beside its prediction: `held_runs` with what these would make of it, which is `among` (None: none
+    is held), and the safe bound as the lower of both, with its date at the pace of the runs; `summary` is that of the
+    clutch, empty where the answer is of an earlier time."""
+    held, warnings = None, list(payload["warnings"])
+    if among is not None:
+        held = {"count": summary["held"]} | {name: among[name] for name in ("status", "remaining_cycles")}
+        warnings.append(_held_warning(payload, held))
+    at_least = lower_bound(payload["at_least"], among)
+    pace = summary.get("pace")
+    at = None if pace is None or at_least is None else date_of(pace["moment"] + at_least / pace["cycles_per_second"])
+    statement = statement_of(payload, at_least)
+    return {"at_least": at_least, "at_least_at": at, "held_runs": held, "statement": statement, "warnings": warnings}
+
+
+def stated(summary: Mapping[str, Any]) -> dict[str, Any] | None:
+    """A clutch's summary as lists show it; None before the first run that counts."""
+    if "status" not in summary:
+        return None
+    among = (summary.get("with_held") or {}).get(SHOWN)
+    beside = beside_held({**summary, "warnings": ()}, summary, among)
+    return {name: summary[name] for name in SUMMARY} | {name: beside[name] for name in BESIDE}
+
+
+def lower_bound(at_least: float | None, among: Mapping[str, Any] | None) -> float | None:
+    """The lower of a safe bound and that with the held runs, None where neither is known."""
+    bounds = [at_least, None if among is None else among["at_least"]]
+    return min((bound for bound in bounds if bound is not None), default=None)
+
+
+def _held_warning(payload: Mapping[str, Any], held: Mapping[str, Any]) -> dict[str, str]:
+    remaining = held["remaining_cycles"]
+    runs = held_in_words(held["count"])
+    if remaining == payload["remaining_cycles"]:
+        message = f"{runs}: the remaining life would be the same with them"
+    elif held["status"] == INSUFFICIENT:
+        message = f"{runs}: with them nothing could be predicted"
+    elif held["status"] == REACHED:
+        message = f"{runs}: with them the end of life would be reached"
+    else:
+        message = f"{runs}: with them {_interval_in_words(remaining)} cycles would remain"
+    return {"code": HELD_RUNS, "message": message}
+
+
+def held_notices(count: int) -> list[Notice]:
+    """The warning of an answer that is without so many held runs; none where none is held."""
+    return [Notice(code=HELD_RUNS, message=f"{held_in_words(count)}: this is without them")] if count else []
+
+
+def held_in_words(count: int) -> str:
+    """How many runs are held, as a clause."""
+    return "1 run is held and does not count" if count == 1 else f"{count} runs are held and do not count"
+
+
+def _interval_in_words(remaining: Mapping[str, float | None]) -> str:
+    low, median, high = (remaining[quantile] for quantile in ("0.05", "0.5", "0.95"))
+    if median is None:
+        return "an unknown number of" if low is None else f"at least {low:,.0f}"
+    upper = "beyond the horizon" if high is None else f"{high:,.0f}"
+    return f"{median:,.0f} (90 %: {low:,.0f} to {upper})"
+
+
+def state_of(summary: Mapping[str, Any], *, disputed: bool) -> dict[str, str]:
+    """A clutch's state after NAMUR NE 107 by its summary, and why; `disputed`: its newest diagnosis found that data and
+    model disagree, and nobody has acted on it. The name is stored with the clutch whenever the summary is."""
+    if "status" not in summary:
+        held = summary.get("held", 0)
+        return {"name": CHECK, "why": held_in_words(held) if held else "no run yet that counts"}
+    status, held, disagree = summary["status"], summary.get("held", 0), "data and model disagree, see the diagnosis"
+    among = summary.get("with_held")
+    says = statement_of(summary, lower_bound(summary["at_least"], among and among[SHOWN]))
+    near = None if status in (REACHED, INSUFFICIENT) else _near_end(summary)
+    rules = (
+        (FAILURE, says if status == REACHED else None),
+        (MAINTENANCE, near and f"{near}: {says}"),
+        (CHECK, f"{held_in_words(held)}: {says}" if held else None),
+        (CHECK, f"{_tests(summary['runs_used'])}: {says}" if status == INSUFFICIENT else None),
+        (OUT_OF_SPECIFICATION, f"{disagree}: {says}" if disputed else None),
+        (NORMAL, says),
+    )
+    return next({"name": name, "why": why} for name, why in rules if why is not None)
+
+
+def _tests(count: int) -> str:
+    return f"{count} of the {FEWEST_TESTS} tests that a prognosis needs"
+
+
+def _near_end(summary: Mapping[str, Any]) -> str | None:
+    """Why a predicted end of life is near, None where it is not: by the share of the life that is left, at its safe bound,
+    or by how near a quantity is to its limit."""
+    age = summary["as_of_cycles"] - summary["from_cycles"]
+    if summary["at_least"] < SOON * (age + summary["at_least"]):
+        return f"less than {100 * SOON:.0f} % of its life may be left"
+    health = summary["current"]["health"]
+    if health is not None and health < NEAR_LIMIT:
+        return f"near its limit, {limit_in_words(summary['criterion'])}"
+    return None
+
+
+def statement_of(payload: Mapping[str, Any], at_least: float | None) -> str:
+    """What is known of the remaining life as a sentence: its safe bound, and how probable an end is that is left open."""
+    bound = bound_in_words(at_least)
+    if payload["status"] == REACHED:
+        return f"the end of life is reached: {limit_in_words(payload['criterion'])}"
+    if payload["status"] == INSUFFICIENT:
+        return "the tests cannot tell yet" + (f": {bound}" if payload["runs_used"] else "")
+    if payload["status"] != PassageStatus.MAY_NEVER_REACH.value:
+        return bound
+    chance = chance_in_words(payload["probability_of_reaching"])
+    return f"{bound}; the end of life is reached within {HORIZON:,.0f} cycles with a probability of {chance}"
+
+
+def bound_in_words(at_least: float | None) -> str:
+    """The safe bound of the remaining cycles, rounded down to two digits."""
+    if at_least is None or at_least < 1.0:
+        return "nothing is certain of the cycles that are left"
+    unit = 10.0 ** max(0, math.floor(math.log10(at_least)) - 1)
+    return f"at least {math.floor(at_least / unit) * unit:,.0f} cycles are left with 95 %"
+
+
+def limit_in_words(criterion: Mapping[str, Any]) -> str:
+    """A criterion as part of a sentence, as `mean COF at 50 % of new`."""
+    units = (("speed_rpm", "rpm"), ("frequency_hz", "Hz"), ("pressure_bar", "bar"))
+    place = [f"{criterion[name]:g} {unit}" for name, unit in units if criterion.get(name) is not None]
+    name = ", ".join([criterion["quantity"].replace("_", " ").replace("cof", "COF"), *place])
+    if criterion["fraction"] is not None:
+        return f"{name} at {100 * criterion['fraction']:g} % of new"
+    word = "below" if criterion.get("below") is not None else "above"
+    return f"{name} {word} {criterion[word]:g}"
+
+
+def chance_in_words(probability: float) -> str:
+    """A probability in per cent, never rounded to certainty."""
+    if probability > 0.995:
+        return "more than 99 %"
+    return "less than 1 %" if probability < 0.005 else f"{100 * probability:.0f} %"
+
+
+def recent(events: Sequence[Event], series: Series) -> dict[str, Any]:
+    """The run that was made last, and mean COF [-] of the present life as a short line, thinned evenly, its last value kept.
+
+    `events` is not empty; `series` is mean COF over the reference pressures, ordered by cycles.
+    """
+    last = max(events, key=lambda event: event.moment)
+    values = [measurement.value for measurement in series.measurements]
+    step = -(-len(values) // MOST_LINE_POINTS)  # rounded up
+    return {
+        "last_run": {
+            "run_id": last.run_id,
+            "kind": last.kind,
+            "cycles": whole(last.cycles),
+            "at": datetime.fromtimestamp(last.moment, UTC).isoformat(timespec="seconds"),
+        },
+        "mean_cof": [round(value, 6) for value in values[::-1][:: step or 1]][::-1],
+    }

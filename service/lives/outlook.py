@@ -1,0 +1,133 @@
+"""What a clutch's runs say of its remaining life now: by its own criteria, and as it would be were its held runs accepted.
+
+Computed with the results of every run and change, and stored with them as the clutch's summary.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from models.diagnosis.campaign import StationaryRun
+from service.errors import NotFoundError
+from service.lives.condition import SHOWN, SUMMARY, recent
+from service.lives.engagements.over_life import StoredEngagement, engagements_over_life
+from service.lives.history import Event, Life, lives_of, moment_at, order, pace_of
+from service.lives.model_correction import RunReader
+from service.lives.prediction_at import predict_at
+from service.lives.quantities.answer import criteria_answer
+from service.lives.quantities.chosen_life import ChosenLife, chosen_life
+from service.lives.quantities.ends import CriterionEnd, criterion_end
+from service.lives.quantities.measured import MeasuredLife
+from service.lives.recomputation import ClutchState, Levels, Receipt, Tracking, with_cofs
+from service.lives.tracks import CARRIED, States
+from service.schemas.prognosis.criteria import CriterionIn
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evidence:
+    """What was measured of a clutch by run_id, of its held runs too; `tests` gives the stationary tests of a life, where not
+    the `reader` does."""
+
+    levels: Levels
+    receipts: Mapping[str, Receipt]
+    engagements: Mapping[str, StoredEngagement]
+    reader: RunReader | None = None
+    tests: Callable[[Life], Iterable[StationaryRun]] | None = None
+
+
+def needs_evidence(state: ClutchState) -> bool:
+    """Whether a clutch's summary follows from more than its tracks."""
+    return bool(state.held or state.record.end_of_life.criteria)
+
+
+def summarised(state: ClutchState, tracking: Tracking, evidence: Evidence | None) -> dict[str, Any]:
+    """The summary of a clutch that was tracked; `evidence` is needed where `needs_evidence` says so."""
+    if not state.events:
+        return held_part(state, {}, evidence)
+    last, life = state.events[-1].cycles, state.lives[-1]
+    payload = next(made.payload for made in tracking.predictions if (made.cycles, made.method) == (last, SHOWN))
+    if evidence is not None:
+        payload = payload | by_own_criteria(state, SHOWN, payload, evidence, tracking.filters)
+    pace = pace_of(life.events)
+    summary = {name: payload[name] for name in SUMMARY} | {
+        "runs": len(state.events),
+        "recent": recent(state.events, life.pooled(state.assumptions())),
+        "life": life.name,
+        "from_cycles": life.origin,
+        "pace": None if pace is None else {"cycles_per_second": pace, "moment": moment_at(life.events, pace, last)},
+    }
+    return summary | held_part(state, tracking.filters, evidence)
+
+
+def held_part(state: ClutchState, filters: States, evidence: Evidence | None) -> dict[str, Any]:
+    """What a summary says of the held runs: how many there are, and by each filter what would be predicted with them."""
+    if not state.held or evidence is None:
+        return {"held": len(state.held), "with_held": None}
+    among = with_held(state, evidence)
+    return {
+        "held": len(state.held),
+        "with_held": {method: outlook(among, method, evidence, filters) for method in CARRIED},
+    }
+
+
+def with_held(state: ClutchState, evidence: Evidence) -> ClutchState:
+    """The clutch as it would be were its held runs accepted."""
+    among = replace(state, events=order([*state.events, *state.held]), held=())
+    if evidence.reader is None:
+        raise ValueError("a history with held runs needs a reader of them")
+    tests = evidence.tests or evidence.reader.stationary_tests
+    return with_cofs(among, evidence.levels, tests(among.lives[-1]), evidence.reader)[0]
+
+
+def outlook(state: ClutchState, method: str, evidence: Evidence, filters: States) -> dict[str, Any]:
+    """The remaining life by a filter and the clutch's own criteria; `filters` of other measurements are not carried on."""
+    payload = predict_at(
+        state.clutch_id, state.events, state.assumptions(), state.fraction, method=method, carried=filters.get(method)
+    )
+    payload |= by_own_criteria(state, method, payload, evidence, filters)
+    return {name: payload[name] for name in ("status", "as_of_cycles", "remaining_cycles", "at_least")}
+
+
+def by_own_criteria(
+    state: ClutchState, method: str, payload: Mapping[str, Any], evidence: Evidence, filters: States
+) -> dict[str, Any]:
+    """What of a prediction is another by the criteria of the clutch's record; nothing where mean COF alone ends its life."""
+    criteria = state.record.end_of_life.criteria
+    measured = measured_life(state, chosen_life(state), evidence, filters) if criteria else None
+    if measured is None:
+        return {}
+    ends = [_end_where_measured(measured, criterion, method) for criterion in criteria]
+    return criteria_answer(measured, ends, payload["current"])
+
+
+def _end_where_measured(measured: MeasuredLife, criterion: CriterionIn, method: str) -> CriterionEnd:
+    try:
+        return criterion_end(measured, criterion, method)
+    except NotFoundError:  # measured, but not at the criterion's place: who asks for the remaining life is told so
+        return CriterionEnd(criterion=criterion, tests=0)
+
+
+def measured_life(
+    state: ClutchState, chosen: ChosenLife, evidence: Evidence, filters: States | None = None
+) -> MeasuredLife | None:
+    """A life of a clutch with all that was measured in it, None where nothing was yet."""
+    if chosen.life is None:
+        return None
+    return MeasuredLife(
+        clutch_id=state.clutch_id,
+        life=chosen.life,
+        assumptions=chosen.assumptions,
+        geometry=state.geometry,
+        fraction=state.fraction,
+        levels=evidence.levels,
+        receipts=evidence.receipts,
+        engagements=engagement_rows(state.events, evidence.engagements),
+        filters=filters or {},
+    )
+
+
+def engagement_rows(events: Sequence[Event], engagements: Mapping[str, StoredEngagement]) -> list[dict[str, Any]]:
+    """The engagements of a history with all indicators, by life and cycles."""
+    names = [[event.run_id for event in life.events] for life in lives_of(events)]
+    stored = [engagements[event.run_id] for event in events if event.run_id in engagements]
+    return engagements_over_life(stored, names) if stored else []
