@@ -162,8 +162,8 @@ LEAST_NOISE = 0.2
 
 # --- report --------------------------------------------------------------------------------------------------------------
 
-#: λ [nats] at which an effect is detected 90 % of the time (chosen; no table).
-DETECTED_NINE_IN_TEN = 11.0
+#: Probability with which a stated visible amplitude raises the alarm (chosen; `make visible` counts it at twice that).
+VISIBLE_POWER = 0.9
 #: Candidates below this probability are not listed (chosen).
 LEAST_LISTED = 1e-3
 #: A run is outlying that makes this share of all error beyond noise, among at least so many runs, with an RMS error beyond

@@ -115,10 +115,13 @@ class AdviceOut(Answer):
 
 
 class VisibleOut(Answer):
-    """The smallest amplitude of an effect that would be detected in these data with 90 % power, in its middle shape."""
+    """The smallest amplitude of an effect that would be detected in these data with 90 % power."""
 
     effect: str = Field(description="The effect's slug")
-    amplitude: Number = Field(description="The amplitude")
+    amplitude: Number = Field(
+        description="The amplitude, in whatever of the effect's shapes; null where one of them would be absorbed whole"
+    )
+    least: Number = Field(default=None, description="The same in the shape that shows best")
     unit: str = Field(description="Its unit")
 
 

@@ -38,7 +38,7 @@ def report_of(
         extended=_extended_misfit(investigation, judgement, validation),
         gain=validation.gain,
         advice=advice,
-        visible=visible_of(projected),
+        visible=visible_of(projected, investigation.alarms.effects.threshold),
         notes=notes,
         tests=len(problem.design.runs),
         states=int(problem.design.facts.states.size),

@@ -30,8 +30,8 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Visible:
-    """The smallest amplitude of an effect that these data would have shown with 90 % power in the middle one of its shapes;
-    `least` in the shape that shows best; and its usual size."""
+    """The smallest amplitude of an effect that these data would have shown with 90 % power: in whatever of its shapes
+    (infinite where one of them would be absorbed whole), `least` in the shape that shows best; and its usual size."""
 
     effect: str
     amplitude: float

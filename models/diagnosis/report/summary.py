@@ -83,8 +83,14 @@ def _adequate(findings: Findings) -> list[str]:
     catalogued = [visible for visible in findings.visible if visible.effect in BY_SLUG]
     shown = [visible for visible in catalogued if _within_reach(visible, visible.amplitude)]
     if shown:
-        sizes = "; ".join(_detectable(visible) for visible in shown[:VISIBLE_MENTIONED])
-        parts.append(f"These data would have shown, with 90 % power and in the middle one of its forms: {sizes}.")
+        sizes = "; ".join(_detectable(visible, visible.amplitude) for visible in shown[:VISIBLE_MENTIONED])
+        parts.append(f"These data would have shown, with 90 % power: {sizes}.")
+    partly = [
+        each for each in catalogued if _within_reach(each, each.least) and not _within_reach(each, each.amplitude)
+    ]
+    if partly:
+        sizes = "; ".join(_detectable(each, each.least) for each in partly[:VISIBLE_MENTIONED])
+        parts.append(f"Only in some of its forms, others being absorbed by the baseline: {sizes}.")
     hidden = [visible.effect for visible in catalogued if not _within_reach(visible, visible.least)]
     if hidden:
         names = conjunction([effect_name(slug) for slug in hidden])
@@ -109,8 +115,8 @@ def _within_reach(visible: Visible, amplitude: float) -> bool:
     return amplitude <= LARGE_AMPLITUDE * visible.usual
 
 
-def _detectable(visible: Visible) -> str:
-    size = with_unit(number(visible.amplitude), visible.unit)
+def _detectable(visible: Visible, amplitude: float) -> str:
+    size = with_unit(number(amplitude), visible.unit)
     return f"{effect_name(visible.effect)} ({BY_SLUG[visible.effect].amplitude}) from {size}"
 
 

@@ -71,7 +71,12 @@ def public(
             for test in report.advice
         ],
         "visible": [
-            {"effect": smallest.effect, "amplitude": finite(smallest.amplitude), "unit": smallest.unit}
+            {
+                "effect": smallest.effect,
+                "amplitude": finite(smallest.amplitude),
+                "least": finite(smallest.least),
+                "unit": smallest.unit,
+            }
             for smallest in report.visible
         ],
         "notes": [*notes, *report.notes],

@@ -194,19 +194,24 @@ function notes({ notes: all = [] }) {
 }
 
 const VISIBLE =
-  "The smallest amplitude that would have been detected, for each effect in the middle one of its shapes, computed before " +
-  "any residual was looked at.";
+  "The smallest amplitude that would have been detected, for each effect in whatever of its shapes, and in the one that shows " +
+  "best. Without a number: one of its shapes would be absorbed at any size.";
 
 /** @param {DiagnosisOut} diagnosis */
 function visible({ visible: all = [] }) {
   if (all.length === 0) return null;
-  const rows = all.map(({ effect, amplitude, unit }) => [words(effect), significant(amplitude, 3), unit ?? ""]);
+  const rows = all.map(({ effect, amplitude, least, unit }) => [
+    words(effect),
+    significant(amplitude, 3),
+    significant(least, 3),
+    unit ?? "",
+  ]);
   const label = "Smallest visible amplitudes";
   return h(
     "details",
     { class: "part" },
     h("summary", {}, "What these runs would show"),
     h("p", { class: "quiet" }, VISIBLE),
-    scrolling(label, table(label, ["Effect", "Amplitude", "Unit"], rows)),
+    scrolling(label, table(label, ["Effect", "In any shape", "In its best", "Unit"], rows)),
   );
 }

@@ -492,6 +492,7 @@ export interface AdviceOut {
 export interface VisibleOut {
   effect: string;
   amplitude: number | null;
+  least: number | null;
   unit: string;
 }
 
