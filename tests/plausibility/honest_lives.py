@@ -3,7 +3,7 @@
 `KINDS` has a function a kind: rng -> (cycles, share of the first COF) of its tests, and what is declared between them.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from datetime import timedelta
 from typing import Any
 
@@ -15,7 +15,7 @@ from tests.plausibility.blind import share_lives
 from tests.plausibility.simulated import BEGUN
 from tests.support import stationary
 
-#: COF of a fresh clutch over that of `stationary` when new.
+#: The runs of a life.
 Life = list[Body]
 
 
@@ -141,9 +141,6 @@ KINDS: dict[str, Callable[[np.random.Generator], Life]] = {
 }
 
 
-def drawn(seed: int, kind: str) -> Iterator[Life]:
-    """Lives of a kind without end."""
-    number = 0
-    while True:
-        yield KINDS[kind](np.random.default_rng([seed, 5, list(KINDS).index(kind), number]))
-        number += 1
+def life(seed: int, kind: str, number: int) -> Life:
+    """One of the lives of a kind."""
+    return KINDS[kind](np.random.default_rng([seed, 5, list(KINDS).index(kind), number]))
