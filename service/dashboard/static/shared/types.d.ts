@@ -447,6 +447,12 @@ export interface Amplitude {
   unit: string;
 }
 
+export interface ExplanationOut {
+  effects: string[];
+  probability: number | null;
+  sign_probability: number | null;
+}
+
 export interface CandidateOut {
   effect: string;
   title: string;
@@ -538,6 +544,7 @@ export interface DiagnosisListed {
   verdict: string | null;
   causes: string[];
   summary: string;
+  explanations: ExplanationOut[];
   candidates: CandidateOut[];
   baseline: MisfitOut;
   extended: MisfitOut;
