@@ -1,4 +1,4 @@
-"""The errors that a caller may get: one base, mapped to HTTP once (`service.web.problems`). Knows no web framework."""
+"""The errors that a caller may get: one base, mapped to HTTP once (`service.web.problems`); and notices."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,6 +18,14 @@ class FieldError:
     message: str
     row: int | None = None
     value: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Notice:
+    """A warning: something that was noticed and did not stop the run."""
+
+    code: str
+    message: str
 
 
 class ServiceError(Exception):

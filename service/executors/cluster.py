@@ -50,7 +50,7 @@ class Cluster(Closing):
             from distributed import Client, as_completed  # optional, and start-up time
         except ModuleNotFoundError as error:
             raise ExecutorUnavailableError(
-                f"{address}: a Dask cluster needs its library: pip install clutchlife[cluster]"
+                f"{address}: a Dask cluster needs its library: pip install -e '.[cluster]' in a checkout"
             ) from error
         self.address = address
         self._client: Any  # its library has no types

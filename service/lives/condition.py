@@ -12,10 +12,10 @@ from typing import Any
 from models.prognosis.criteria import FEWEST_TESTS, HORIZON
 from models.prognosis.first_passage import PassageStatus
 from service.columns import whole
+from service.errors import Notice
 from service.lives.criteria import MOST_LINE_POINTS, NEAR_LIMIT, SOON
 from service.lives.history import Event, Series, date_of
 from service.lives.payloads import INSUFFICIENT
-from service.lives.run_analysis import Notice
 
 #: The states of a clutch after NAMUR NE 107; the first that holds is its state.
 STATES = FAILURE, MAINTENANCE, CHECK, OUT_OF_SPECIFICATION, NORMAL = (

@@ -1,5 +1,7 @@
 """A run on its way in: what was sent, checked, with its channels bit for bit, and its step into the models' units."""
 
+import hashlib
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,9 +12,8 @@ from models.arrays import FloatArray
 from models.records.criteria import UNLOADED
 from models.records.pressure_levels import levels_of
 from models.records.runs import Plateaus, Record
-from service.columns import CHANNELS, PLATE_TEMPERATURES
+from service.columns import CHANNELS, PLATE_TEMPERATURES, whole
 from service.errors import FieldError, InvalidError
-from service.identity import content_with_columns, instant
 from service.lives.criteria import LEAST_TORQUE_SD, MOST_LEVELS
 
 
@@ -48,7 +49,8 @@ def name_run(
 ) -> IncomingRun:
     """A run with its content's hash, and its name derived from that where none was given.
 
-    Raises InvalidError where a stationary test holds neither a curve that could be fitted nor an open clutch.
+    Raises InvalidError where a stationary test holds neither a curve that could be fitted nor an open clutch, and where the
+    time of a dynamic test steps back.
     """
     content = content_hash(
         kind=kind, cycles=cycles, started_at=started_at, origin=origin, channels=channels, details=details
@@ -63,6 +65,8 @@ def name_run(
         channels=channels,
         details=details,
     )
+    if kind == "dynamic_stribeck":
+        _require_forward(channels["time_s"])
     if kind == "stationary_stribeck" and "time_s" not in channels:
         _require_readings(channels)
     return run
@@ -77,8 +81,13 @@ def content_hash(
     channels: Mapping[str, FloatArray],
     details: Mapping[str, Any],
 ) -> str:
-    """The sha256 of everything but the name: kind, cycles, instant, origin, details and every value of every channel."""
-    return content_with_columns([kind, cycles, instant(started_at), origin, dict(details)], channels)
+    """The sha256 of everything but the name: kind, cycles, time, origin, details and every bit of every channel."""
+    head = [kind, whole(cycles), started_at, origin, dict(details)]
+    digest = hashlib.sha256(json.dumps(head, sort_keys=True, allow_nan=False).encode())
+    for name in sorted(channels):
+        digest.update(f"\n{name}:{channels[name].size}\n".encode())
+        digest.update(np.ascontiguousarray(channels[name], dtype="<f8").data)
+    return digest.hexdigest()
 
 
 def sampled_record(channels: Mapping[str, FloatArray]) -> Record:
@@ -156,6 +165,25 @@ def stationary_plateaus(channels: Mapping[str, FloatArray]) -> Plateaus:
         oil_temperature=si.get("oil_temperature_c"),
         plate_temperature=_plate_temperature(si),
     )
+
+
+def _require_forward(time: FloatArray) -> None:
+    """Refuse a record whose time steps back: its end, its beginning or its order is not what it seems."""
+    back = np.flatnonzero(np.diff(time) < 0)
+    if back.size:
+        row = int(back[0]) + 1
+        message = (
+            f"time_s[{row}] must not step back, got {time[row]:.9g} s after {time[row - 1]:.9g} s: the recorder's clock "
+            "restarted or wrapped around, or two records stand in one; send each by itself"
+        )
+        error = FieldError(
+            pointer=f"/channels/time_s/{row}",
+            row=row + 1,
+            value=f"{time[row]:.9g}",
+            code="time_backwards",
+            message=message,
+        )
+        raise InvalidError(message, errors=[error])
 
 
 def _require_readings(channels: Mapping[str, FloatArray]) -> None:

@@ -10,12 +10,13 @@ from models.prognosis.course_shares import CourseShare
 from models.prognosis.criteria import HORIZON, QUANTILES
 from models.prognosis.first_passage import FirstPassage
 from service.columns import bar, whole
+from service.errors import Notice
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions
 from service.lives.engagements.evaluation import Engagement, engagement_item
 from service.lives.history import ByPressure, Life, Series, latest_before
 from service.lives.incoming_run import IncomingRun
 from service.lives.prediction_notices import OF_HISTORY, late_arrival, missed, not_eq_6, other_oil, other_pressures
-from service.lives.run_analysis import LevelFit, Notice, Value
+from service.lives.run_analysis import LevelFit, Value
 from service.settings import CODE_VERSION
 
 #: Public name and unit of each Stribeck parameter.

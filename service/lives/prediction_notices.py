@@ -11,9 +11,9 @@ from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import Prior
 from service.columns import ZERO_CELSIUS, bar
+from service.errors import Notice
 from service.lives.criteria import EQ_6_DOUBTED, OTHER_OIL
 from service.lives.history import ByPressure, Event, Life, nearest
-from service.lives.run_analysis import Notice
 
 #: The warning of a last test that lies far off what the tests before it predict.
 OFF_TRACK = "off_track"

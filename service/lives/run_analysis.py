@@ -21,21 +21,13 @@ from models.records.plateaus import cut_plateaus
 from models.records.runs import Plateaus, curves_by_pressure, loaded
 from models.records.torque_filter import filtered_as_torque
 from service.columns import PASCALS_PER_BAR
-from service.errors import FieldError, InvalidError
+from service.errors import FieldError, InvalidError, Notice
 from service.lives.criteria import FEWEST_SPEEDS, POOR_FIT, WIDE_LEVEL
 from service.lives.engagements.evaluation import Engagement, course_item, engagement_notes, evaluated
 from service.lives.incoming_run import IncomingRun, SampledChannels, sampled_record, stationary_plateaus
 
 #: A value and its deviation.
 Value = tuple[float, float]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Notice:
-    """A warning: something that was noticed and did not stop the run."""
-
-    code: str
-    message: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +89,9 @@ def analyse(run: IncomingRun, geometry: Geometry, torque_filter: float) -> Analy
     try:
         cut = cut_plateaus(SampledChannels(run.channels), torque_filter)
     except ValueError as error:
-        message = f"time_s, pressure_bar, speed_rpm, torque_nm: {error}"
+        message = (
+            f"time_s, pressure_bar, speed_rpm, torque_nm: {error} Where each row of a file is a plateau: time=none."
+        )
         errors = [FieldError(pointer="/channels/torque_nm", code="no_plateau", message=message)]
         raise InvalidError(message, errors=errors) from None
     notices = [Notice(code=code, message=message) for code, message in cut.notes]

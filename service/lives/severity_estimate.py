@@ -15,10 +15,10 @@ from models.arrays import FloatArray
 from models.degradation.severity import Block, Severity, SeverityBasis
 from models.prognosis.criteria import FEWEST_TESTS
 from models.tracking.filters.grid import Grid
+from service.errors import Notice
 from service.lives.assumptions import WEAK, Assumptions
 from service.lives.criteria import SEVERITY_DOUBTED, SEVERITY_EXPONENTS, VARIED_WORK
 from service.lives.history import Life
-from service.lives.run_analysis import Notice
 
 _GRID = Grid()
 

@@ -15,6 +15,7 @@ from models.prognosis.first_passage import ends_of_life
 from models.prognosis.first_passage import paths as track_paths
 from models.prognosis.from_parameters import CofPaths, Disagreement, disagreement, far_apart, mean_cof_paths
 from service import measured_lives, records
+from service.errors import Notice
 from service.lives.assumptions import ALL_PRESSURES, Assumptions
 from service.lives.condition import held_notices
 from service.lives.criteria import SEVERITY_EXPONENTS
@@ -27,7 +28,6 @@ from service.lives.quantities.levels import ParameterTracks, pressure_level, slo
 from service.lives.quantities.measured import MeasuredLife
 from service.lives.quantities.names import QUANTITIES, Family, Quantity, quantity_named
 from service.lives.quantities.parameters import Track, parameter_tracks, posterior_of
-from service.lives.run_analysis import Notice
 from service.lives.severity_estimate import SeverityEstimate, severity_estimate
 from service.lives.tracks import offset_of, step_rng
 from storage.engine.database import Database

@@ -2,31 +2,31 @@
 
 import re
 import unicodedata
-from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 from service.columns import CHANNELS
 from service.errors import MOST_QUOTED, FieldError, InvalidError
 from service.readers.limits import LONGEST_MAP, LONGEST_NAME, LONGEST_TITLE, LONGEST_UNIT
+from service.readers.table import NO_TIME, Choice, Column, Reading
 from service.readers.unit_table import Conversion, conversion, is_unit, spellings
 
 #: Single letters have their meaning in mechanics: capitals count (M is a torque, n a speed, p a pressure, t a time).
 _LETTERS = {"M": "torque_nm", "n": "speed_rpm", "p": "pressure_bar", "t": "time_s"}
 
 _WORDS = {
-    "time_s": "time zeit timestamp zeitstempel elapsed_time elapsed messzeit time_stamp",
+    "time_s": "time zeit timestamp timestamps zeitstempel elapsed_time elapsed messzeit time_stamp x_value 时间",
     "pressure_bar": "pressure druck line_pressure leitungsdruck anpressdruck kolbendruck "
-    "clutch_pressure kupplungsdruck piston_pressure druck_ist pressure_actual p_ist p_line",
+    "clutch_pressure kupplungsdruck piston_pressure druck_ist pressure_actual p_ist p_line 压力 油压",
     "speed_rpm": "speed drehzahl rotational_speed rotation_speed shaft_speed differential_speed slip_speed motor_speed "
     "relative_speed drehgeschwindigkeit winkelgeschwindigkeit angular_velocity angular_speed differenzdrehzahl "
-    "schlupfdrehzahl motordrehzahl drehzahl_ist n_ist n_motor n_rel n_diff omega speed_actual rpm",
+    "schlupfdrehzahl motordrehzahl drehzahl_ist n_ist n_motor n_rel n_diff omega speed_actual rpm 转速",
     "torque_nm": "torque drehmoment moment friction_torque reibmoment clutch_torque kupplungsmoment "
-    "drehmoment_ist torque_actual m_ist m_d md m_r",
+    "drehmoment_ist torque_actual m_ist m_d md m_r 扭矩 转矩",
     "torque_sd_nm": "torque_sd torque_std torque_deviation standard_deviation_of_torque "
     "drehmoment_standardabweichung standardabweichung_drehmoment",
     "oil_temperature_c": "oil_temperature oil_temp oiltemperature oiltemp öltemperatur öltemp t_oil t_öl toil töl "
-    "temperature_oil temperatur_öl theta_oil theta_öl sump_temperature sumpftemperatur oil_sump_temperature",
+    "temperature_oil temperatur_öl theta_oil theta_öl sump_temperature sumpftemperatur oil_sump_temperature 油温",
     "plate_temperature_front_c": "plate_temperature_front front_plate_temperature plate_temp_front t_plate_front "
     "temperature_plate_front theta_plate_front plattentemperatur_vorn plattentemperatur_vorne lamellentemperatur_vorn "
     "lamellentemperatur_vorne t_platte_vorn t_lamelle_vorn plate_temperature plate_temp t_plate plattentemperatur "
@@ -35,25 +35,11 @@ _WORDS = {
     "temperature_plate_rear theta_plate_rear plattentemperatur_hinten lamellentemperatur_hinten t_platte_hinten "
     "t_lamelle_hinten",
 }
+#: Times whose program writes seconds and no unit: LabVIEW's text files, asammdf's exports.
+_SECONDS = frozenset({"x_value", "timestamps"})
 
 #: Columns that one message names.
 _MOST_NAMED = 10
-
-
-@dataclass(frozen=True, slots=True)
-class Header:
-    """One column of a file: its name without a unit, and the unit that the file states (None: it states none).
-
-    `group` distinguishes equal names in files that have groups; a map may use `group/name`.
-    """
-
-    name: str
-    unit: str | None = None
-    group: str = ""
-
-    def shown(self) -> str:
-        """The name for a message."""
-        return f"{self.group}/{self.name}"[:MOST_QUOTED] if self.group else self.name[:MOST_QUOTED]
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +52,7 @@ class Taken:
 
 
 def _key(name: str) -> str:
-    """Names that differ in case, blanks, dashes or in ö for oe are one name.
+    """Names that differ in case, blanks, dashes, width or in ö for oe are one name.
 
     Composing letters takes time with the square of the length where accents are piled up: only short names are composed.
     """
@@ -77,10 +63,10 @@ def _key(name: str) -> str:
 
 _BY_KEY = {_key(word): channel for channel, words in _WORDS.items() for word in words.split()}
 _BY_KEY |= {name: name for name in CHANNELS}
-_BRACKETED = re.compile(r"(?P<name>[^\[\](){}<>]*)[\[({<](?P<unit>[^\[\](){}<>]*)[\])}>]\s*")
-_PER = re.compile(r"(?P<name>[^/]+)/\s*(?P<unit>.+)")
-_IN = re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>\S.*)")
-_MARK = re.compile(r"[\s_]+")
+_WIDE = str.maketrans("（）［］｛｝，／：", "()[]{},/:")
+_BRACKETED = re.compile(r"(?P<name>.*?)[\[({<](?P<unit>[^\[\](){}<>]*)[\])}>]\s*", re.DOTALL)
+#: What may stand between a name and its unit: a comma, a slash, "in", blanks or underscores.
+_BETWEEN = re.compile(r"\s*[,;:|]\s*|\s*/\s*|\s+in\s+|[\s_]+")
 
 
 def known_channel(name: str) -> str | None:
@@ -89,57 +75,78 @@ def known_channel(name: str) -> str | None:
     return _LETTERS.get(bare) or (_BY_KEY.get(_key(bare)) if 1 < len(bare) <= LONGEST_NAME else None)
 
 
-def header_of(text: str) -> Header:
-    """A column's title -> name and unit: `torque [Nm]`, `torque (Nm)`, `M / Nm`, `Druck in bar`, `speed_rad_s`.
+def is_counter(column: Column) -> bool:
+    """Whether a time column's title is LabVIEW's, which may count samples."""
+    return _key(column.name) == "x_value"
 
-    Raises InvalidError on a text that is too long for a title.
+
+def column_of(text: str, unit: str | None = None, group: str = "") -> Column:
+    """A column's title -> name and unit: `torque [Nm]`, `torque (Nm)`, `M / Nm`, `Druck in bar`, `Time, ms`, `speed_rad_s`.
+
+    `unit` is what the file states beside the title. Raises InvalidError on a text that is too long for a title, and where
+    the title states another unit.
     """
     title = text.strip()
     if len(title) > LONGEST_TITLE:
-        raise _long_title(title)
+        shown = title[:MOST_QUOTED]
+        message = (
+            f"a column's title must not be longer than {LONGEST_TITLE} characters, got {len(title)}: {shown!r} ..."
+        )
+        raise InvalidError(
+            message, errors=[FieldError(pointer="", code="title_too_long", message=message, value=shown)]
+        )
+    name, own = _taken_apart(" ".join(title.translate(_WIDE).split()))
+    column = Column(name, own, group, title)
+    return column if unit is None else with_unit(column, unit)
+
+
+def _taken_apart(title: str) -> tuple[str, str | None]:
     if known_channel(title):
-        return Header(title)
+        return title, None
     if match := _BRACKETED.fullmatch(title):
-        return Header(match["name"].strip(), bare_unit(match["unit"]))
-    for pattern in (_PER, _IN):
-        match = pattern.fullmatch(title)
-        if match and (known_channel(match["name"]) or is_unit(match["unit"])):
-            return Header(match["name"].strip(), bare_unit(match["unit"]))
-    for mark in _MARK.finditer(title, max(0, len(title) - LONGEST_UNIT - 1)):
-        name, unit = title[: mark.start()], title[mark.end() :]
-        if known_channel(name) and is_unit(unit):
-            return Header(name, unit)
-    return Header(title)
+        return match["name"].strip(), bare_unit(match["unit"])
+    for name, unit in _endings(title):
+        if is_unit(unit) and (known_channel(name) or _stands_apart(title, name, unit)):
+            return name, unit
+    return title, None
 
 
-def _long_title(title: str) -> InvalidError:
-    shown = title[:MOST_QUOTED]
-    message = f"a column's title must not be longer than {LONGEST_TITLE} characters, got {len(title)}: {shown!r} ..."
-    return InvalidError(message, errors=[FieldError(pointer="", code="title_too_long", message=message, value=shown)])
+def _stands_apart(title: str, name: str, unit: str) -> bool:
+    """Whether what parts a name that is not known from its unit is a sign, which a mere word does not have before it."""
+    between = title[len(name) : len(title) - len(unit)].strip()
+    return between not in ("", "_") or between == "in"
+
+
+def _endings(title: str) -> Iterator[tuple[str, str]]:
+    """Where a title may be parted into a name and a unit, the longest unit first."""
+    for mark in _BETWEEN.finditer(title, max(0, len(title) - LONGEST_UNIT - 4)):
+        name, unit = title[: mark.start()].strip(), title[mark.end() :]
+        if name and unit:
+            yield name, unit
 
 
 def bare_unit(text: str) -> str | None:
     """A unit without its brackets; None where nothing is stated."""
-    unit = text.strip().strip("[](){}<>").strip()
+    unit = text.translate(_WIDE).strip().strip("[](){}<>").strip()
     return None if unit in ("", "-", "--", "_", "?") else unit
 
 
-def with_unit(header: Header, unit: str | None) -> Header:
-    """A header with the unit that the file states beside the name; raises InvalidError where the name states another."""
+def with_unit(column: Column, unit: str | None) -> Column:
+    """A column with the unit that the file states beside the name; raises InvalidError where the name states another."""
     stated = bare_unit(unit or "")
-    if stated and header.unit and stated != header.unit:
-        channel = known_channel(header.name)
-        if channel is None or conversion(channel, stated) != conversion(channel, header.unit):
-            both = f"{header.unit[:MOST_QUOTED]!r} and {stated[:MOST_QUOTED]!r}"
-            message = f"column {header.shown()!r} must be in one unit, got {both}"
+    if stated and column.unit and stated != column.unit:
+        channel = known_channel(column.name)
+        if channel is None or conversion(channel, stated) != conversion(channel, column.unit):
+            both = f"{column.unit[:MOST_QUOTED]!r} and {stated[:MOST_QUOTED]!r}"
+            message = f"column {column.shown()!r} must be in one unit, got {both}"
             raise InvalidError(
                 message, errors=[FieldError(pointer="", code="mixed_units", message=message, value=both)]
             )
-    return Header(header.name, stated or header.unit, header.group)
+    return replace(column, unit=stated or column.unit)
 
 
-def parse_map(mapping: str | None) -> dict[str, str]:
-    """`torque_nm:Mz,pressure_bar:p1` -> {channel: column's name}. Names may hold commas and colons themselves.
+def parse_map(mapping: str | None) -> dict[str, Choice]:
+    """`torque_nm:Mz,pressure_bar:p1` -> {channel: its column}. Names may hold commas and colons themselves.
 
     Raises InvalidError where the text is no such list, or a channel in it is unknown or named twice.
     """
@@ -147,7 +154,7 @@ def parse_map(mapping: str | None) -> dict[str, str]:
         return {}
     if len(mapping) > LONGEST_MAP:
         raise _wrong_map(mapping, f"must not be longer than {LONGEST_MAP} characters")
-    names: dict[str, str] = {}
+    choices: dict[str, Choice] = {}
     for part in re.split(rf",(?=\s*(?:{'|'.join(CHANNELS)})\s*:)", mapping):
         channel, colon, name = part.partition(":")
         channel, name = channel.strip(), name.strip()
@@ -155,10 +162,10 @@ def parse_map(mapping: str | None) -> dict[str, str]:
             raise _wrong_map(part, "must be a list such as torque_nm:Mz,pressure_bar:p1")
         if channel not in CHANNELS:
             raise _wrong_map(channel, f"must name channels from {', '.join(CHANNELS)}")
-        if channel in names:
+        if channel in choices:
             raise _wrong_map(channel, "must name each channel once")
-        names[channel] = name
-    return names
+        choices[channel] = Choice(column=name)
+    return choices
 
 
 def _wrong_map(value: str, rule: str) -> InvalidError:
@@ -168,112 +175,141 @@ def _wrong_map(value: str, rule: str) -> InvalidError:
     )
 
 
-def choose(headers: Sequence[Header], mapping: str | None) -> list[Taken]:
-    """Which columns are taken, in the order of the file.
+def choices_of(reading: Reading) -> dict[str, Choice]:
+    """The columns that a caller names, the time column among them."""
+    named = dict(reading.mapping)
+    if reading.time and reading.time != NO_TIME:
+        named.setdefault("time_s", Choice(column=reading.time))
+    return named
 
-    Without a map every column must be a known channel. With a map, columns that are neither in it nor known are left out.
-    Raises InvalidError where a column is unknown, two are the same channel, or a unit is unknown or not stated.
+
+def recognised(titles: Sequence[str], named: Sequence[str]) -> int:
+    """How many titles are those of channels or are `named`: by it the row of titles is found."""
+    wanted = {_key(name) for name in named} | {_key(column_of(name).name) for name in named}
+    channels: set[str] = set()
+    for title in titles:
+        if 0 < len(title) <= LONGEST_TITLE:
+            name = column_of(title).name
+            channel = known_channel(name)
+            keys = {_key(title), _key(name)} & wanted
+            channels |= keys or ({channel} if channel else set())
+    return len(channels)
+
+
+def choose(columns: Sequence[Column], reading: Reading) -> list[Taken]:
+    """Which columns are taken, in the order of the file; all others are left out. The time may be taken several times.
+
+    Raises InvalidError where two columns are the same channel, or a unit is unknown or not stated.
     """
-    mapped_names = parse_map(mapping)
-    by_map = {_find(headers, channel, name): channel for channel, name in mapped_names.items()}
-    if len(by_map) < len(mapped_names):
-        raise _wrong_map(str(mapping), "must not name one column for two channels")
-    indices: dict[str, int] = {}
-    unknown = []
-    for index, header in enumerate(headers):
-        channel = by_map.get(index) or known_channel(header.name)
-        if channel is None:
-            unknown.append(header)
-        elif index in by_map or channel not in mapped_names:
-            if channel in indices:
-                raise _twice(channel, headers[indices[channel]], header)
-            indices[channel] = index
-    if unknown and not mapped_names:
-        raise _unknown(headers, unknown)
+    named = choices_of(reading)
+    if reading.time == NO_TIME:
+        named.pop("time_s", None)
+    by_map = {_find(columns, channel, choice.column): channel for channel, choice in named.items()}
+    if len(by_map) < len(named):
+        shown = ",".join(f"{name}:{choice.column}" for name, choice in named.items())
+        raise _wrong_map(shown, "must not name one column for two channels")
+    indices: dict[str, list[int]] = {}
+    for index, column in enumerate(columns):
+        channel = by_map.get(index) or (None if reading.only_named else known_channel(column.name))
+        if channel is None or (channel in named and index not in by_map):
+            continue
+        if channel == "time_s" and reading.time == NO_TIME:
+            continue
+        indices.setdefault(channel, []).append(index)
+    for channel, found in indices.items():
+        if len(found) > 1 and channel != "time_s":
+            raise _twice(channel, *(columns[index] for index in found))
     if not indices:
-        raise InvalidError(f"the file holds no known channel: it has {_list(headers)}")
+        raise InvalidError(f"the file holds no known channel: it has {_list(columns)}; {remedy(columns)}")
     taken = [
-        Taken(name, index, _conversion(name, headers[index], mapped=index in by_map)) for name, index in indices.items()
+        Taken(name, index, _conversion(name, columns[index], named.get(name) if index in by_map else None))
+        for name, found in indices.items()
+        for index in found
     ]
     return sorted(taken, key=lambda column: column.index)
 
 
-def _find(headers: Sequence[Header], channel: str, name: str) -> int:
-    """The index of the column that a map names: by its exact name, else whatever its case, blanks and unit."""
-    wanted = header_of(name).name
-    exact = [index for index, header in enumerate(headers) if name in (header.name, f"{header.group}/{header.name}")]
-    alike = [index for index, header in enumerate(headers) if _key(wanted) == _key(header.name)]
+def remedy(columns: Sequence[Column]) -> str:
+    """How to name the columns of channels."""
+    example = columns[0].shown() if columns else "NAME"
+    return f"map=torque_nm:{example},... names the columns of the channels, which are {', '.join(CHANNELS)}"
+
+
+def _find(columns: Sequence[Column], channel: str, name: str) -> int:
+    """The index of the column that a map names: by its exact title or name, else whatever its case, blanks and unit."""
+    wanted = column_of(name)
+    exact = [
+        i for i, column in enumerate(columns) if name in (column.title, column.name, f"{column.group}/{column.name}")
+    ]
+    alike = [i for i, column in enumerate(columns) if _key(wanted.name) == _key(column.name)]
     for matches in (exact, alike):
         if len(matches) == 1:
             return matches[0]
         if matches:
-            raise _twice(channel, *(headers[index] for index in matches))
+            raise _twice(channel, *(columns[index] for index in matches))
     message = (
-        f"map names for {channel} the column {name[:MOST_QUOTED]!r}, which is not there; there are {_list(headers)}"
+        f"map names for {channel} the column {name[:MOST_QUOTED]!r}, which is not there; there are {_list(columns)}"
     )
     raise InvalidError(
         message, errors=[FieldError(pointer="/map", code="no_such_column", message=message, value=name[:MOST_QUOTED])]
     )
 
 
-def _twice(channel: str, *headers: Header) -> InvalidError:
-    shown = " and ".join(header.shown() for header in headers[:_MOST_NAMED])
-    message = f"{channel} must be one column, got {shown}; map={channel}:NAME chooses one"
+def _twice(channel: str, *columns: Column) -> InvalidError:
+    shown = " and ".join(column.shown() for column in columns[:_MOST_NAMED])
+    distinct = len({column.shown() for column in columns}) == len(columns)
+    way = f"map={channel}:NAME chooses one" if distinct else "their names must differ"
+    message = f"{channel} must be one column, got {shown}; {way}"
     return InvalidError(
         message, errors=[FieldError(pointer=f"/channels/{channel}", code="ambiguous", message=message, value=shown)]
     )
 
 
-def _unknown(headers: Sequence[Header], unknown: Sequence[Header]) -> InvalidError:
-    """The error that lists every unknown column, and equal names: a map cannot distinguish those either."""
-    repeated = [name for name, times in Counter(header.shown() for header in headers).items() if times > 1]
-    more = f"; {', '.join(repeated[:_MOST_NAMED])} is there more than once" if repeated else ""
-    errors = [
-        FieldError(
-            pointer=f"/channels/{header.shown().replace('~', '~0').replace('/', '~1')}",
-            code="unknown_channel",
-            message=f"{header.shown()!r} is not a known channel",
-            value=header.shown(),
-        )
-        for header in unknown
-    ]
-    detail = (
-        f"{_list(unknown)}: not known as a channel; the channels are {', '.join(CHANNELS)}{more}; "
-        "map=CHANNEL:NAME,... names the columns to take; unknown columns that it does not name are left out"
-    )
-    return InvalidError(detail, errors=errors)
+def _list(columns: Sequence[Column]) -> str:
+    shown = ", ".join(repr(column.shown()) for column in columns[:_MOST_NAMED])
+    return shown if len(columns) <= _MOST_NAMED else f"{shown} and {len(columns) - _MOST_NAMED} more"
 
 
-def _list(headers: Sequence[Header]) -> str:
-    shown = ", ".join(repr(header.shown()) for header in headers[:_MOST_NAMED])
-    return shown if len(headers) <= _MOST_NAMED else f"{shown} and {len(headers) - _MOST_NAMED} more"
-
-
-def _conversion(channel: str, header: Header, *, mapped: bool) -> Conversion:
+def _conversion(channel: str, column: Column, choice: Choice | None) -> Conversion:
     """The conversion to the channel's unit. A public name states its unit: another unit beside it is a contradiction.
 
-    A column without a unit that a map names is taken to be in the channel's unit.
+    A column that a map names may end in its unit, whatever parts them; one without a unit is in the channel's unit.
     """
-    own, public = CHANNELS[channel].unit, _key(header.name) == channel
-    if header.unit is None:
-        if public or mapped:
-            return Conversion()
-        rule = f"must be stated ({spellings(channel)}), in brackets or in a unit row; or map={channel}:{header.name}"
-        raise _wrong_unit(channel, header, "missing_unit", rule, "none")
-    converted = conversion(channel, header.unit)
+    key = _key(column.name)
+    own, public, unit = CHANNELS[channel].unit, key == channel, column.unit
+    if choice is not None:
+        ending = next((text for _, text in _endings(column.name) if conversion(channel, text)), None)
+        stated = unit or (None if public else ending)
+        other = choice.unit and stated not in (None, choice.stated)
+        if other and conversion(channel, stated or "") != conversion(channel, choice.unit or ""):
+            rule = f"must be {choice.unit}, as its profile says"
+            raise _wrong_unit(channel, column, "mixed_units", rule, repr((stated or "")[:MOST_QUOTED]))
+        unit = choice.unit or stated
+    elif unit is None and key in _SECONDS:
+        unit = "s"
+    if unit is None:
+        converted: Conversion | None = Conversion()
+        if not public and choice is None:
+            rule = f"must be stated ({spellings(channel)}), in brackets or in a unit row"
+            rule += f"; map={channel}:{column.title or column.name} takes it for {own}"
+            raise _wrong_unit(channel, column, "missing_unit", rule, "none")
+    else:
+        converted = conversion(channel, unit)
     if converted is None:
         rule = f"must be a known one ({spellings(channel)})"
-        raise _wrong_unit(channel, header, "unknown_unit", rule, repr(header.unit[:MOST_QUOTED]))
-    if public and not mapped and not converted.is_identity():
+        raise _wrong_unit(channel, column, "unknown_unit", rule, repr((unit or "")[:MOST_QUOTED]))
+    if public and not converted.is_identity() and choice is None:
         rule = f"is in {own} by its name"
-        raise _wrong_unit(channel, header, "mixed_units", rule, repr(header.unit[:MOST_QUOTED]))
+        raise _wrong_unit(channel, column, "mixed_units", rule, repr((unit or "")[:MOST_QUOTED]))
+    if choice is not None:
+        converted = Conversion(converted.factor * choice.factor, converted.offset * choice.factor + choice.offset)
     return converted
 
 
-def _wrong_unit(channel: str, header: Header, code: str, rule: str, got: str) -> InvalidError:
-    column = channel if _key(header.name) == channel else f"{channel} (column {header.shown()!r})"
-    message = f"{column}: the unit {rule}, got {got}"
+def _wrong_unit(channel: str, column: Column, code: str, rule: str, got: str) -> InvalidError:
+    shown = channel if _key(column.name) == channel else f"{channel} (column {column.shown()!r})"
+    message = f"{shown}: the unit {rule}, got {got}"
     error = FieldError(
-        pointer=f"/channels/{channel}", code=code, message=message, value=(header.unit or "")[:MOST_QUOTED]
+        pointer=f"/channels/{channel}", code=code, message=message, value=(column.unit or "")[:MOST_QUOTED]
     )
     return InvalidError(message, errors=[error])

@@ -99,6 +99,7 @@ def close_files(*, readable: Sequence[Path], writable: Sequence[Path]) -> None:
         Path(sys.base_prefix),
         *map(Path, site.getsitepackages()),
         Path(site.getusersitepackages()),
+        *(Path(path) for path in sys.path if path.endswith(("site-packages", "dist-packages", ".zip"))),
     ]
     ours = [Path(__file__).parents[1], *(Path(__file__).parents[2] / name for name in ("models", "storage"))]
     for path in (*map(Path, _SYSTEM), *code, *ours):

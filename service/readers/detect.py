@@ -1,6 +1,7 @@
 """The format of a file, by its first bytes and its suffix; and its bytes, unpacked where it is packed with gzip."""
 
 import gzip
+import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,10 +16,18 @@ from service.readers.limits import Limits
 class Format(StrEnum):
     """The formats that are read."""
 
-    CSV = "CSV"
+    TEXT = "CSV"
     TDMS = "TDMS"
     MDF4 = "MDF4"
     PARQUET = "Parquet"
+    WORKBOOK = "workbook"
+    MATLAB = "MATLAB"
+    HDF5 = "HDF5"
+    ZIP = "ZIP"
+
+
+#: The formats by the names that people know them by, for messages.
+FORMATS = "CSV, XLSX, ODS, TDMS, MDF4, MATLAB, HDF5, Parquet or a ZIP archive of one"
 
 
 class ByteSource(Protocol):
@@ -29,13 +38,23 @@ class ByteSource(Protocol):
 
 
 _GZIP = b"\x1f\x8b"
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+_ARCHIVE = b"PK\x03\x04"
 _MAGIC = {
     b"TDSm": Format.TDMS,
     b"MDF     ": Format.MDF4,
     b"UnFinMF ": Format.MDF4,
     b"PAR1": Format.PARQUET,
+    b"MATLAB 5": Format.MATLAB,
+    b"MATLAB 7": Format.HDF5,
+    _HDF5: Format.HDF5,
+    b"\xd0\xcf\x11\xe0": Format.WORKBOOK,
+    _ARCHIVE: Format.ZIP,
 }
-_SUFFIXES = {".tdms": Format.TDMS, ".mf4": Format.MDF4, ".mdf": Format.MDF4, ".parquet": Format.PARQUET}
+_SUFFIXES = {
+    ".tdms": Format.TDMS, ".mf4": Format.MDF4, ".mdf": Format.MDF4, ".parquet": Format.PARQUET, ".xlsx": Format.WORKBOOK,
+    ".ods": Format.WORKBOOK, ".h5": Format.HDF5, ".hdf5": Format.HDF5, ".mat": Format.MATLAB, ".zip": Format.ZIP,
+}  # fmt: skip
 _FOREIGN = {
     b"\x89PNG": "a PNG picture",
     b"\xff\xd8\xff": "a JPEG picture",
@@ -43,12 +62,10 @@ _FOREIGN = {
     b"BM": "a BMP picture",
     b"II*\0": "a TIFF picture",
     b"%PDF": "a PDF document",
-    b"PK\x03\x04": "a ZIP archive or an Excel workbook (export it as CSV)",
-    b"\xd0\xcf\x11\xe0": "an old Excel workbook (export it as CSV)",
-    b"\x89HDF": "an HDF5 file",
-    b"MATLAB 5": "a MATLAB file",
     b"SQLite f": "a database",
     b"\x7fELF": "a program",
+    b"7z\xbc\xaf": "a 7z archive (ZIP and gzip are accepted)",
+    b"Rar!": "a RAR archive (ZIP and gzip are accepted)",
     b"\x28\xb5\x2f\xfd": "a Zstandard archive (gzip is accepted)",
     b"BZh": "a bzip2 archive (gzip is accepted)",
     b"\xfd7zXZ": "an xz archive (gzip is accepted)",
@@ -104,15 +121,30 @@ def sniff(path: Path, filename: str, limits: Limits) -> Format:
     with opened(path, limits) as source:
         head = source.read(_HEAD)
     shown = repr(filename[-MOST_QUOTED:])
+    suffix = PurePath(filename.lower().removesuffix(".gz")).suffix
     if not head:
         raise InvalidError(f"{shown} must not be empty")
     for magic, kind in _MAGIC.items():
         if head.startswith(magic):
-            return kind
+            return _of_archive(path) if magic == _ARCHIVE else kind
+    if _HDF5 in (head[512:520], head[1024:1032], head[2048:2056]):
+        return Format.HDF5
+    if suffix == ".mat" and head[:2] in (b"\0\0", b"\n\0", b"\x14\0", b"\x1e\0"):
+        return Format.MATLAB  # of version 4, which has no magic number
     for magic, foreign in _FOREIGN.items():
-        if head.startswith(magic):
-            raise InvalidError(f"{shown} must be CSV, TDMS, MDF4 or Parquet, got {foreign}")
-    by_suffix = _SUFFIXES.get(PurePath(filename.lower().removesuffix(".gz")).suffix)
-    if by_suffix:
+        if head.startswith(magic) and not (magic == b"BM" and head.isascii()):
+            raise InvalidError(f"{shown} must be {FORMATS}, got {foreign}")
+    if by_suffix := _SUFFIXES.get(suffix):
         raise InvalidError(f"{shown} is named as {by_suffix} but does not begin as one")
-    return Format.CSV
+    return Format.TEXT
+
+
+def _of_archive(path: Path) -> Format:
+    """A workbook or any other ZIP archive, by the names in it; what is packed with gzip besides is no archive here."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+    except (OSError, ValueError, zipfile.BadZipFile, NotImplementedError):
+        return Format.ZIP
+    workbook = "[Content_Types].xml" in names or {"mimetype", "content.xml"} <= set(names)
+    return Format.WORKBOOK if workbook else Format.ZIP

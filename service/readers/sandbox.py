@@ -1,45 +1,53 @@
-"""TDMS, MDF4 and Parquet files are read in a process of their own, with limits on its memory, time, output and reach.
+"""Formats with a library of their own are read in a process of their own, with limits on its memory, time, output and reach.
 
-The libraries that read them are large, and a broken or malicious file may make them loop, exhaust memory or crash: that
-ends the reading process only. It can open the file, our code and a folder of its own, and no socket (`confinement`). It
-returns one file: a line of JSON (the columns' lengths, or an error), then the columns as raw little-endian float64. Nothing
-that came from the file is ever unpickled or evaluated.
+The libraries are large, and a broken or malicious file may make them loop, exhaust memory or crash: that ends the reading
+process only. It loads its library first, and from then on it can open the file, our code and a folder of its own, and no
+socket (`confinement`). It returns one file: a line of JSON (the columns' lengths and notices, a preview, or an error), then
+the columns as raw little-endian float64. Nothing that came from the file is ever unpickled or evaluated.
 """
 
 import importlib
 import json
 import math
 import os
+import re
 import resource
 import signal
 import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
-from models.arrays import FloatArray
 from service.columns import CHANNELS
-from service.errors import BusyError, FieldError, InvalidError, ServiceError, TooLargeError
+from service.errors import BusyError, FieldError, InvalidError, Notice, ServiceError, TooLargeError
+from service.readers.channels import Channels, to_channels
 from service.readers.confinement import close_files, close_network_and_processes
 from service.readers.detect import Format, is_packed, opened
 from service.readers.limits import Limits
+from service.readers.preview import preview
+from service.readers.table import Choice, Reading
 
-#: The module that reads each format, the package it needs, and the extra of ours that installs that package.
+#: The module that reads each format, the package it needs, and the extra of ours that installs it ("": always there).
 READERS = {
-    Format.TDMS: ("service.readers.tdms", "nptdms", "tdms"),
+    Format.TDMS: ("service.readers.tdms", "nptdms", ""),
+    Format.WORKBOOK: ("service.readers.workbook", "python_calamine", ""),
+    Format.MATLAB: ("service.readers.matlab", "scipy", ""),
+    Format.HDF5: ("service.readers.hdf5", "h5py", ""),
     Format.MDF4: ("service.readers.mdf4", "asammdf", "mdf"),
     Format.PARQUET: ("service.readers.parquet", "pyarrow", "parquet"),
 }
 
 #: Bytes of the line of JSON that the reading process answers with.
-_LONGEST_ANSWER = 1 << 16
+_LONGEST_ANSWER = 1 << 20
 _BLOCK = 1 << 20
+#: What the reading process writes first, when its library is loaded.
+_STARTED = b"started\n"
 #: Characters of a foreign library's message that ours quotes, and of a whole message.
 _MOST_QUOTED, _LONGEST_DETAIL = 200, 4000
 #: Files that the reading process has open at once. Chosen: importing the libraries takes a dozen.
@@ -58,34 +66,54 @@ _ENVIRONMENT = (
 )
 
 
-def read_isolated(kind: Format, path: Path, *, mapping: str | None, limits: Limits) -> dict[str, FloatArray]:
-    """The channels [n] of a TDMS, MDF4 or Parquet file in their own units, read in a process of its own.
+def read_isolated(kind: Format, path: Path, *, reading: Reading, limits: Limits) -> Channels:
+    """The channels [n] of a file in their own units, read in a process of its own.
 
     What is unpacked is kept beside the file meanwhile.
-    Raises InvalidError where the file cannot be read, needs an extra that is not installed, or makes its reader crash or
-    take too long; TooLargeError where it needs more memory than is allowed or holds more values; BusyError where somebody
-    else ended its reader.
+    Raises InvalidError where the file cannot be read, or makes its reader crash or take too long; TooLargeError where it
+    needs more memory than is allowed or holds more values; BusyError where its reader is not installed or cannot start, or
+    somebody else ended it.
     """
-    _require(kind)
+    channels: Channels = _unpacked(kind, path, "channels", reading, limits)
+    return channels
+
+
+def preview_isolated(kind: Format, path: Path, *, reading: Reading, limits: Limits) -> dict[str, Any]:
+    """The preview of a file (`preview.preview`); raises as `read_isolated` does."""
+    shown: dict[str, Any] = _unpacked(kind, path, "preview", reading, limits)
+    return shown
+
+
+def not_installed(kind: Format, what: str) -> str | None:
+    """None where a format's package is installed, else how to install it, after `what` (a format is not read here)."""
+    _, package, extra = READERS[kind]
+    if find_spec(package) is not None:
+        return None
+    command = f"pip install -e '.[{extra}]'" if extra else "pip install -e ."
+    return f"{what}: its library is missing, install it in the checkout where the service runs: {command}"
+
+
+def _unpacked(kind: Format, path: Path, answer: str, reading: Reading, limits: Limits) -> Any:
+    if missing := not_installed(kind, f"{kind} is not read here"):
+        raise BusyError(missing, errors=[FieldError(pointer="", code="format_not_installed", message=missing)])
     if not is_packed(path):
-        return _run(kind, path, mapping, limits)
+        return _run(kind, path, answer, reading, limits)
     with tempfile.NamedTemporaryFile(dir=path.parent) as plain:
         with opened(path, limits) as source:
             while block := source.read(_BLOCK):
                 plain.write(block)
         plain.flush()
-        return _run(kind, Path(plain.name), mapping, limits)
+        return _run(kind, Path(plain.name), answer, reading, limits)
 
 
-def _require(kind: Format) -> None:
-    _, package, extra = READERS[kind]
-    if find_spec(package) is None:
-        message = f"{kind} is not read here: install clutchlife[{extra}]"
-        raise InvalidError(message, errors=[FieldError(pointer="", code="format_not_installed", message=message)])
-
-
-def _run(kind: Format, path: Path, mapping: str | None, limits: Limits) -> dict[str, FloatArray]:
-    request = {"kind": kind, "path": str(path.resolve()), "mapping": mapping, "limits": asdict(limits)}
+def _run(kind: Format, path: Path, answer: str, reading: Reading, limits: Limits) -> Any:
+    request = {
+        "kind": kind,
+        "path": str(path.resolve()),
+        "answer": answer,
+        "reading": asdict(reading),
+        "limits": asdict(limits),
+    }
     environment = {name: os.environ[name] for name in _ENVIRONMENT if name in os.environ}
     # Further threads would only reserve memory: the limit is on reserved memory.
     environment |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "NUMEXPR_MAX_THREADS": "1"}
@@ -109,14 +137,19 @@ def _run(kind: Format, path: Path, mapping: str | None, limits: Limits) -> dict[
             )
         except subprocess.TimeoutExpired:
             raise _too_slow(kind, limits) from None
+        result.seek(0)
+        if result.read(len(_STARTED)) != _STARTED and ended.returncode != -signal.SIGTERM:
+            why = f"it ended with {_ending(ended.returncode)} before it looked at the file"
+            raise BusyError(f"the reader of {kind} files cannot start here, which is not the file's fault: {why}")
         if ended.returncode == -signal.SIGXCPU:
             raise _too_slow(kind, limits)
         if ended.returncode == -signal.SIGTERM:
             raise BusyError("the service is ending: send the file again in a little while")
+        if ended.returncode == -signal.SIGABRT and kind is Format.WORKBOOK:  # how a library in Rust ends without memory
+            raise _too_much(kind)
         if ended.returncode:
             raise _unreadable(kind, f"its reader ended with {_ending(ended.returncode)}")
-        result.seek(0)
-        return _answer(result, kind, limits)
+        return _answer(result, kind, answer, limits)
 
 
 def _too_slow(kind: Format, limits: Limits) -> InvalidError:
@@ -135,13 +168,22 @@ def _ending(code: int) -> str:
         return f"signal {-code}"
 
 
-def _answer(result: BinaryIO, kind: Format, limits: Limits) -> dict[str, FloatArray]:
-    """The columns that the reading process wrote; its answer is checked before it is used."""
+def _too_much(kind: Format) -> TooLargeError:
+    return TooLargeError(f"the {kind} file needs more memory than reading a file may take")
+
+
+def _answer(result: BinaryIO, kind: Format, wanted: str, limits: Limits) -> Any:
+    """What the reading process wrote; its answer is checked before it is used."""
     try:
         answer = json.loads(result.readline(_LONGEST_ANSWER))
         if "error" in answer:
             raise _error(answer["error"])
+        if wanted == "preview":
+            return dict(answer["preview"])
         lengths = {str(name): int(length) for name, length in answer["channels"].items()}
+        notices = tuple(Notice(code=str(item["code"]), message=str(item["message"])) for item in answer["notices"])
+        counts = bool(answer["counts"])
+        labels = {str(name): str(text) for name, text in answer["labels"].items()}
     except (ValueError, KeyError, TypeError, AttributeError):
         raise _unreadable(kind, "its reader gave no answer") from None
     if not lengths.keys() <= CHANNELS.keys() or not 0 <= sum(lengths.values()) <= limits.most_values:
@@ -150,7 +192,7 @@ def _answer(result: BinaryIO, kind: Format, limits: Limits) -> dict[str, FloatAr
     for column in columns.values():
         if result.readinto(column.data) != column.nbytes:  # type: ignore[attr-defined]
             raise _unreadable(kind, "its reader gave no answer")
-    return columns
+    return Channels(columns=columns, notices=notices, counts=counts, labels=labels)
 
 
 def _error(answer: Mapping[str, Any]) -> ServiceError:
@@ -166,29 +208,61 @@ def main() -> None:
     """Read the file that standard input names; write the answer to the open file whose number is the first argument."""
     request = json.load(sys.stdin)
     kind, limits = Format(request["kind"]), Limits(**request["limits"])
+    reading = Reading(**request["reading"])
+    reading = replace(
+        reading, mapping={name: Choice(**choice) for name, choice in request["reading"]["mapping"].items()}
+    )
     with os.fdopen(int(sys.argv[1]), "wb") as result:
-        _limit(limits)
+        reader = importlib.import_module(
+            READERS[kind][0]
+        )  # whatever it loads, and asks of the system, before the doors close
         path = Path(request["path"])
         close_files(readable=[path], writable=[Path(tempfile.gettempdir())])
+        close_network_and_processes()
+        _limit(limits)
+        result.write(_STARTED)
+        result.flush()
         try:
-            reader = importlib.import_module(READERS[kind][0])  # whose libraries ask programs about the processor
-            close_network_and_processes()
-            columns: dict[str, FloatArray] = reader.read(path, request["mapping"], limits)
-            _write(result, {"channels": {name: column.size for name, column in columns.items()}})
-            for column in columns.values():
+            table = reader.read_table(path, reading, limits)
+            if request["answer"] == "preview":
+                _write(result, {"preview": preview(table, reading)})
+                return
+            channels = to_channels(table, reading, limits)
+            _write(result, _described(channels))
+            for column in channels.columns.values():
                 result.write(np.ascontiguousarray(column, dtype="<f8").data)
         except ServiceError as error:
             _write_error(result, error)
         except MemoryError:
-            _write_error(result, TooLargeError(f"the {kind} file needs more memory than reading a file may take"))
-        except Exception as error:  # noqa: BLE001 (whatever a foreign library raises on a foreign file)
-            _write_error(result, _unreadable(kind, f"{type(error).__name__}: {str(error)[:_MOST_QUOTED]}"))
+            _write_error(result, _too_much(kind))
+        except BaseException as error:  # noqa: BLE001 (whatever a foreign library raises on a foreign file, Rust's panics too)
+            _write_error(result, _unreadable(kind, f"{type(error).__name__}: {_without_paths(str(error))}"))
+
+
+def _described(channels: Channels) -> dict[str, Any]:
+    return {
+        "channels": {name: column.size for name, column in channels.columns.items()},
+        "notices": [asdict(notice) for notice in channels.notices],
+        "counts": channels.counts,
+        "labels": dict(channels.labels),
+    }
+
+
+def _without_paths(message: str) -> str:
+    """A foreign message without the places of this machine."""
+    return re.sub(r"(/[\w.~+-]+)+/", "", message)[:_MOST_QUOTED]
 
 
 def _limit(limits: Limits) -> None:
+    spent = resource.getrusage(resource.RUSAGE_SELF)
+    loaded = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
     for which, most, over in (
-        (resource.RLIMIT_AS, limits.memory_bytes, 0),
-        (resource.RLIMIT_CPU, math.ceil(limits.seconds), 1),  # first SIGXCPU, which names the cause, then SIGKILL
+        (resource.RLIMIT_AS, loaded + limits.memory_bytes, 0),
+        (
+            resource.RLIMIT_CPU,
+            math.ceil(limits.seconds + spent.ru_utime + spent.ru_stime),
+            1,
+        ),  # first SIGXCPU, which names the cause, then SIGKILL
         (resource.RLIMIT_FSIZE, 8 * limits.most_values + _LONGEST_ANSWER, 0),
         (resource.RLIMIT_CORE, 0, 0),
         (resource.RLIMIT_NOFILE, _MOST_OPEN_FILES, 0),
@@ -201,7 +275,7 @@ def _write(result: BinaryIO, answer: Mapping[str, Any]) -> None:
 
 
 def _write_error(result: BinaryIO, error: ServiceError) -> None:
-    result.seek(0)
+    result.seek(len(_STARTED))
     result.truncate()
     answer = {
         "too_large": isinstance(error, TooLargeError),

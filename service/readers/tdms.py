@@ -1,73 +1,95 @@
-"""NI TDMS -> columns, by npTDMS: channels of all groups, scaled, units from `unit_string`, time from the waveform.
+"""NI TDMS -> a table, by npTDMS: channels of all groups, scaled, units from `unit_string`, each with its waveform's clock.
 
-Runs in the reading process of `sandbox`. Source: NI, TDMS File Format Internal Structure.
+Runs in the reading process of `sandbox`. Source: NI, TDMS File Format Internal Structure; Waveform properties (wf_*).
 """
 
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from nptdms import TdmsFile  # type: ignore[import-untyped]
+from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from service.errors import FieldError, InvalidError
-from service.readers.column_names import Taken, choose
+from service.errors import MOST_QUOTED, FieldError, InvalidError
+from service.readers.column_names import column_of
 from service.readers.limits import Limits
-from service.readers.recorder_columns import numbers, place, recorded_header, require_one_length
+from service.readers.numerals import column_values
+from service.readers.table import Clock, Column, Reading, Table, cut_short
+from service.readers.unit_table import conversion
 
-_UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit")
+_UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units", "Units")
+_SECOND = np.timedelta64(1, "s")
 
 
-def read(path: Path, mapping: str | None, limits: Limits) -> dict[str, FloatArray]:
-    """The channels [n] that the map and the names choose, in their own units.
+def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
+    """The channels of all groups, or of the one that is named. Raises InvalidError on a file that is cut off."""
+    file = TdmsFile.open(path)
+    if file.file_status.incomplete_final_segment:
+        raise cut_short("its last TDMS segment is not complete")
+    groups = [group for group in file.groups() if not reading.table or group.name == reading.table]
+    channels = [channel for group in groups for channel in group.channels() if len(channel)]
+    if len(channels) > limits.most_columns:
+        raise InvalidError(f"a file must not have more than {limits.most_columns} channels, got {len(channels)}")
+    clocks = _clocks(channels)
 
-    A waveform's time, wf_start_offset + k · wf_increment, becomes `time_s` where the file has no time channel.
-    """
-    with TdmsFile.open(path) as file:
-        if file.file_status.incomplete_final_segment:
-            message = "the TDMS file is cut off: its last segment is not complete"
-            raise InvalidError(message, errors=[FieldError(pointer="", code="truncated", message=message)])
-        groups = file.groups()
-        channels = [channel for group in groups for channel in group.channels() if len(channel)]
-        if len(channels) > limits.most_columns:
-            raise InvalidError(f"a file must not have more than {limits.most_columns} channels, got {len(channels)}")
-        headers = [
-            recorded_header(channel.name, _unit(channel), channel.group_name if len(groups) > 1 else "")
-            for channel in channels
+    def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
+        values = [channels[index][:] for index in taken]
+        return [
+            column_values([name], [list(column)], reading.decimal)[0] if column.dtype.kind in "OUS" else column
+            for name, column in zip(taken.values(), values, strict=True)
         ]
-        taken = choose(headers, mapping)
-        require_one_length({place(headers, column): len(channels[column.index]) for column in taken}, limits)
-        columns = {}
-        for column in taken:
-            values = numbers(column.channel, channels[column.index][:])
-            if channels[column.index].dtype.kind != "M":
-                column.conversion.apply(values)
-            columns[column.channel] = values
-        if "time_s" not in columns:
-            columns |= _waveform_time(channels, taken)
-        return columns
+
+    return Table(
+        columns=tuple(
+            _column(channel, len(groups) > 1, clock) for channel, clock in zip(channels, clocks, strict=True)
+        ),
+        read=read,
+        name=reading.table,
+        others=tuple(group.name for group in file.groups()),
+    )
 
 
-def _unit(channel: Any) -> str | None:
-    """The unit that a channel's properties state; points in time need none."""
-    if channel.dtype is not None and channel.dtype.kind == "M":
-        return "s"
-    return next((str(channel.properties[name]) for name in _UNITS if channel.properties.get(name)), None)
+def _column(channel: Any, grouped: bool, clock: Clock | None) -> Column:
+    stated = next((str(channel.properties[name]) for name in _UNITS if channel.properties.get(name)), None)
+    moments = channel.dtype is not None and channel.dtype.kind == "M"
+    column = column_of(channel.name, None if moments else stated, channel.group_name if grouped else "")
+    return Column(column.name, "s" if moments else column.unit, column.group, column.title, len(channel), clock)
 
 
-def _waveform_time(channels: list[Any], taken: list[Taken]) -> dict[str, FloatArray]:
-    """`time_s` of waveforms that share one clock; empty where there are none. Raises InvalidError on several clocks."""
-    clocks = {
-        (
-            float(channels[column.index].properties.get("wf_start_offset", 0.0)),
-            float(channels[column.index].properties.get("wf_increment", 0.0)),
-        )
-        for column in taken
-    }
-    if len(clocks) > 1:
-        shown = ", ".join(f"{step:g} s" for step in sorted({step for _, step in clocks}))
-        raise InvalidError(
-            f"all channels must be sampled by one clock, got different offsets or steps (wf_increment): {shown}"
-        )
-    offset, step = clocks.pop()
-    return {"time_s": offset + step * np.arange(len(channels[taken[0].index]), dtype=np.float64)} if step > 0 else {}
+def _clocks(channels: list[Any]) -> list[Clock | None]:
+    """The clock of each waveform: wf_start_time + wf_start_offset + k · wf_increment, in s after the earliest start.
+
+    One whose properties say that it has a single sample a waveform (wf_samples 1), or whose axis is no time, has none.
+    """
+    starts = [channel.properties.get("wf_start_time") for channel in channels]
+    earliest = min((start for start in starts if start is not None), default=None)
+    return [_clock(channel, start, earliest) for channel, start in zip(channels, starts, strict=True)]
+
+
+def _clock(channel: Any, start: Any, earliest: Any) -> Clock | None:
+    properties = channel.properties
+    step, offset = (float(properties.get(name, 0.0)) for name in ("wf_increment", "wf_start_offset"))
+    if not step > 0 or (properties.get("wf_samples") == 1 and step == 1.0) or channel.dtype is None:
+        return None
+    unit = str(properties.get("wf_xunit_string") or "s").strip()
+    converted = conversion("time_s", unit)
+    if converted is None:
+        if str(properties.get("wf_xname") or "").strip().lower() in ("", "time"):
+            name, shown = channel.name[:MOST_QUOTED], unit[:MOST_QUOTED]
+            message = f"{name}: the unit of the waveform's time must be known, got {shown!r}"
+            raise InvalidError(message, errors=[FieldError(pointer="", code="unknown_unit", message=message)])
+        return None
+    shift = 0.0 if start is None else float((np.datetime64(start) - np.datetime64(earliest)) / _SECOND)
+    rows, factor = len(channel), converted.factor
+    # a waveform without a start cannot be told from the others' start: its own key keeps it from passing for theirs
+    key = (None if start is None and earliest is not None else shift, offset * factor, step * factor, rows)
+    return Clock(
+        key, partial(_times, shift + offset * factor, step * factor, rows), counts=step == 1.0 and offset == 0.0
+    )
+
+
+def _times(start: float, step: float, rows: int) -> FloatArray:
+    return start + step * np.arange(rows, dtype=np.float64)

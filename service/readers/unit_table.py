@@ -28,43 +28,66 @@ class Conversion:
 
 
 _PASCALS_PER_PSI = 6894.757293168361
+_NEWTONS_PER_KILOPOND = 9.80665
 _NEWTON_METRES_PER_POUND_FOOT = 1.3558179483314004
+_NEWTON_METRES_PER_POUND_INCH = _NEWTON_METRES_PER_POUND_FOOT / 12
 _SAME = Conversion()
 
 
-def _spelled(conversion: Conversion, *spellings: str) -> dict[str, Conversion]:
-    return dict.fromkeys(spellings, conversion)
+def _spelled(factor: float, spellings: str, offset: float = 0.0) -> dict[str, Conversion]:
+    """Spellings apart by blanks, all of one conversion."""
+    return dict.fromkeys(spellings.split(), Conversion(factor, offset))
 
 
 _TIME = (
-    _spelled(_SAME, "s", "S", "sec", "Sec", "secs", "second", "seconds", "Sekunde", "Sekunden")
-    | _spelled(Conversion(1e-3), "ms", "msec", "milliseconds")
-    | _spelled(Conversion(1e-6), "us", "µs")
-    | _spelled(Conversion(1e-9), "ns")
-    | _spelled(Conversion(60.0), "min", "minutes", "Minuten")
-    | _spelled(Conversion(3600.0), "h", "hours", "Stunden")
+    _spelled(1.0, "s S sec Sec secs second seconds Sekunde Sekunden 秒")
+    | _spelled(1e-3, "ms msec millisecond milliseconds Millisekunden 毫秒")
+    | _spelled(1e-6, "us µs usec µsec microseconds")
+    | _spelled(1e-9, "ns nsec nanoseconds")
+    | _spelled(60.0, "min mins minutes Minuten 分")
+    | _spelled(3600.0, "h hr hrs hours Stunden")
+    | _spelled(86400.0, "d days")
 )
 _PRESSURE = (
-    _spelled(_SAME, "bar", "Bar", "BAR")
-    | _spelled(Conversion(1e-3), "mbar", "hPa")
-    | _spelled(Conversion(1 / PASCALS_PER_BAR), "Pa", "N/m2", "N/m^2", "pascal")
-    | _spelled(Conversion(1e3 / PASCALS_PER_BAR), "kPa", "KPa", "kpa")
-    | _spelled(Conversion(1e6 / PASCALS_PER_BAR), "MPa", "N/mm2", "N/mm^2")
-    | _spelled(Conversion(_PASCALS_PER_PSI / PASCALS_PER_BAR), "psi", "PSI", "Psi", "lbf/in2", "lbf/in^2")
+    _spelled(1.0, "bar Bar BAR barg bar_g")
+    | _spelled(1e-3, "mbar hPa")
+    | _spelled(1 / PASCALS_PER_BAR, "Pa N/m2 N/m^2 pascal")
+    | _spelled(1e3 / PASCALS_PER_BAR, "kPa KPa kpa")
+    | _spelled(1e6 / PASCALS_PER_BAR, "MPa N/mm2 N/mm^2")
+    | _spelled(_PASCALS_PER_PSI / PASCALS_PER_BAR, "psi PSI Psi psig lbf/in2 lbf/in^2")
+    | _spelled(_NEWTONS_PER_KILOPOND * 1e4 / PASCALS_PER_BAR, "kgf/cm2 kgf/cm^2 kg/cm2 kg/cm^2 kp/cm2 kp/cm^2")
 )
-_SPEED = _spelled(
-    _SAME, "rpm", "RPM", "Rpm", "1/min", "min-1", "min^-1", "/min", "U/min", "u/min", "r/min", "rev/min", "Upm"
-) | _spelled(Conversion(1 / RADIANS_PER_SECOND_PER_RPM), "rad/s", "rad/sec", "rad_s", "rad.s-1", "rad*s^-1", "rad*s-1")
+_SPEED = (
+    _spelled(1.0, "rpm RPM Rpm 1/min min-1 min^-1 /min U/min u/min r/min R/min rev/min Upm revolutions/min tr/min")
+    | _spelled(1e3, "krpm")
+    | _spelled(60.0, "U/s r/s rev/s rps")
+    | _spelled(1 / RADIANS_PER_SECOND_PER_RPM, "rad/s rad/sec rad_s rad.s-1 rad*s^-1 rad*s-1")
+    | _spelled(1 / 6, "deg/s °/s")
+)
 _TORQUE = (
-    _spelled(_SAME, "Nm", "N.m", "N*m", "N-m", "NM", "nm", "newtonmeter")
-    | _spelled(Conversion(1e3), "kNm", "kN.m", "kN*m", "knm")
-    | _spelled(Conversion(1e-3), "mNm", "mN.m", "mN*m")
-    | _spelled(Conversion(_NEWTON_METRES_PER_POUND_FOOT), "lbf.ft", "lbf*ft", "ft.lbf", "ft*lbf", "lbfft", "ftlbf")
+    _spelled(1.0, "Nm N.m N*m N-m NM nm newtonmeter")
+    | _spelled(1e3, "kNm kN.m kN*m kN-m knm")
+    | _spelled(1e-3, "mNm mN.m mN*m mN-m Nmm N*mm N.mm N-mm")
+    | _spelled(1e-2, "Ncm N*cm N.cm N-cm")
+    | _spelled(_NEWTONS_PER_KILOPOND, "kgfm kgf.m kgf*m kgf-m kpm kp*m")
+    | _spelled(
+        _NEWTON_METRES_PER_POUND_FOOT,
+        "lbf.ft lbf*ft lbf-ft lb.ft lb*ft lb-ft lbft lbfft ft.lbf ft*lbf ft-lbf ftlbf ft.lb ft*lb ft-lb ft-lbs ftlb",
+    )
+    | _spelled(
+        _NEWTON_METRES_PER_POUND_INCH,
+        "lbf.in lbf*in lbf-in lb.in lb*in lb-in lbin lbfin in.lbf in*lbf in-lbf in.lb in*lb in-lb in-lbs inlb",
+    )
 )
 _TEMPERATURE = (
-    _spelled(_SAME, "°C", "degC", "DegC", "deg C", "degreeC", "C", "°c", "Celsius", "celsius")
-    | _spelled(Conversion(1.0, -ZERO_CELSIUS), "K", "kelvin", "Kelvin")
-    | _spelled(Conversion(5 / 9, -160 / 9), "°F", "degF", "DegF", "deg F", "F", "Fahrenheit", "fahrenheit")
+    _spelled(1.0, "°C degC DegC degreeC C °c Celsius celsius Cel")
+    | _spelled(1.0, "K kelvin Kelvin", -ZERO_CELSIUS)
+    | _spelled(5 / 9, "°F degF DegF F Fahrenheit fahrenheit", -160 / 9)
+)
+#: Units of no channel, and 1/s, which may be turns or radians: a title that ends in one is not taken for another.
+_FOREIGN = frozenset(
+    "V mV A mA N kN lbf W kW J kJ % ‰ m mm µm cm inch kg g deg ° rad l/min L/min l/h m/s mm/s m/s2 m/s^2 bara psia atm Hz "  # noqa: SIM905
+    "kHz 1/s s-1 s^-1".split()
 )
 
 #: By the channel's unit: the spellings that may be stated; capitals count (mPa is not MPa).
@@ -84,22 +107,27 @@ _AS_WRITTEN = str.maketrans(
         "º": "°",
         "μ": "µ",
         "℃": "°C",
+        "℉": "°F",
+        "／": "/",
     }
 )
 
 
 def conversion(channel: str, unit: str) -> Conversion | None:
     """From a stated unit to the channel's own; None where the unit is not in the table."""
-    if len(unit) > LONGEST_UNIT:
-        return None
     table = UNITS[CHANNELS[channel].unit]
-    written = unicodedata.normalize("NFC", unit).translate(_AS_WRITTEN).strip()
-    return table.get(written) or table.get(written.replace(" ", ""))
+    written = _written(unit)
+    return table.get(written) or table.get(written.replace(" ", "")) if written else None
 
 
 def is_unit(text: str) -> bool:
-    """Whether a text is the spelling of any unit of any channel."""
-    return any(conversion(name, text) is not None for name in CHANNELS)
+    """Whether a text is the spelling of a unit, of any channel or of another quantity."""
+    return _written(text) in _FOREIGN or any(conversion(name, text) is not None for name in CHANNELS)
+
+
+def _written(unit: str) -> str:
+    """One spelling of what is written in several ways; empty for what is too long for a unit."""
+    return unicodedata.normalize("NFC", unit).translate(_AS_WRITTEN).strip() if len(unit) <= LONGEST_UNIT else ""
 
 
 def spellings(channel: str) -> str:

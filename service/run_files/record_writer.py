@@ -6,7 +6,6 @@ Names and units are the public ones. TDMS and MDF4 need the packages of the extr
 import warnings
 from collections.abc import Mapping
 from enum import StrEnum
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ import numpy as np
 from models.arrays import FloatArray
 from service.columns import CHANNELS
 from service.readers.detect import Format
-from service.readers.sandbox import READERS
+from service.readers.sandbox import not_installed
 
 _ROWS = 50_000
 _GROUP = "rig"
@@ -42,9 +41,8 @@ def require_writer(kind: RecordFormat) -> None:
     """Raises ValueError where the package that writes a format is not installed; names the extra that installs it."""
     if kind not in _NEEDING:
         return
-    _, package, extra = READERS[_NEEDING[kind]]
-    if find_spec(package) is None:
-        raise ValueError(f"{_NEEDING[kind]} is not written here: install clutchlife[{extra}]")
+    if missing := not_installed(_NEEDING[kind], f"{_NEEDING[kind]} is not written here"):
+        raise ValueError(missing)
 
 
 def write_record(path: Path, kind: RecordFormat, channels: Mapping[str, FloatArray], head: Mapping[str, Any]) -> None:

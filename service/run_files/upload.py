@@ -1,14 +1,19 @@
 """A run posted as a file -> `IncomingRun`: the file holds the channels, the request or the rig's profile everything else."""
 
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
-from service.columns import PLATE_TEMPERATURES
-from service.errors import FieldError, InvalidError
-from service.lives.incoming_run import IncomingRun, name_run
+from models.arrays import FloatArray
+from models.records.cleaning import UnusableRecordError
+from models.records.plateaus import cut_plateaus
+from service.columns import PLATE_TEMPERATURES, check_arrays
+from service.errors import FieldError, InvalidError, Notice
+from service.lives.incoming_run import IncomingRun, SampledChannels, name_run
+from service.readers.channels import LEFT_OUT
 from service.readers.read_file import read_file
+from service.readers.table import Choice, Reading
 from service.run_files.rig_profile import Named, named
 from service.schemas.rig import RigProfile
 
@@ -32,7 +37,7 @@ def read_file_run(
     run_id: str | None = None,
     started_at: datetime | None = None,
     origin: str = "measured",
-    mapping: str | None = None,
+    reading: Reading | None = None,
     profile: RigProfile | None = None,
     rig: str | None = None,
 ) -> IncomingRun:
@@ -40,8 +45,10 @@ def read_file_run(
 
     Raises InvalidError or TooLargeError naming what is wrong.
     """
-    columns = read_file(path, filename=filename, mapping=_mapping(profile, mapping))
-    stated = Named() if profile is None else named(profile, filename, {})
+    reading = reading_with(profile, reading or Reading())
+    read = read_file(path, filename=filename, reading=reading)
+    columns, notices = read.columns, list(read.notices)
+    stated = Named() if profile is None else named(profile, filename, read.labels)
     kind, cycles = kind or stated.kind, stated.cycles if cycles is None else cycles
     if kind is None or cycles is None:
         name = "kind" if kind is None else "cycles"
@@ -55,9 +62,16 @@ def read_file_run(
             for name in missing
         ]
         present = ", ".join(columns) or "none"
-        raise InvalidError(f"a {kind} run needs {', '.join(missing)}; channels found: {present}", errors=errors)
+        raise InvalidError(
+            f"a {kind} run needs {', '.join(missing)}; channels found: {present}{_way_out(missing[0], notices)}",
+            errors=errors,
+        )
+    if kind == "stationary_stribeck" and read.counts and _holds_no_dwell(columns):
+        message = "the recorder's clock counts a second a row, its default: each row was taken for a plateau"
+        notices.append(Notice(code="counting_clock", message=message))
+        columns = {name: column for name, column in columns.items() if name != "time_s"}
+        check_arrays(columns)  # a plateau has no negative pressure, which a sample may have
     accepted = (*NEEDED[kind], *_ALLOWED[kind])
-    reading: dict[str, Any] = {} if profile is None else profile.model_dump(mode="json", include=_OF_READING)
     run = name_run(
         kind=kind,
         cycles=cycles,
@@ -67,14 +81,41 @@ def read_file_run(
         channels={name: column for name, column in columns.items() if name in accepted},
         details={},
     )
-    return replace(run, file={"filename": filename, "rig": rig, "reading": reading | {"map": mapping}, "warnings": []})
+    warnings = [asdict(notice) for notice in notices]
+    return replace(run, file={"filename": filename, "rig": rig, "reading": asdict(reading), "warnings": warnings})
 
 
-#: What a profile says of reading the table itself.
-_OF_READING = {"columns", "decimal", "table", "skip_rows"}
+def reading_with(profile: RigProfile | None, reading: Reading) -> Reading:
+    """How a file is read by a profile; what `reading` says itself wins."""
+    if profile is None:
+        return reading
+    choices: dict[str, Choice] = {
+        column.channel: Choice(
+            column=column.title, unit=column.unit, stated=column.stated, factor=column.scale, offset=column.offset
+        )
+        for column in profile.columns
+        if column.channel
+    }
+    return replace(
+        reading,
+        mapping=reading.mapping or choices,
+        only_named=not reading.mapping,
+        table=reading.table or profile.table or "",
+        decimal=reading.decimal or profile.decimal or "",
+        skip_rows=reading.skip_rows or profile.skip_rows,
+    )
 
 
-def _mapping(profile: RigProfile | None, mapping: str | None) -> str | None:
-    if profile is None or mapping is not None:
-        return mapping
-    return ",".join(f"{column.channel}:{column.title}" for column in profile.columns if column.channel)
+def _way_out(channel: str, notices: Sequence[Notice]) -> str:
+    """What helps where a column that was left out may be the missing channel."""
+    left_out = next((notice.message for notice in notices if notice.code == LEFT_OUT), "")
+    return f"; {left_out}; map={channel}:NAME takes one of them" if left_out else ""
+
+
+def _holds_no_dwell(columns: Mapping[str, FloatArray]) -> bool:
+    """Whether a record by its times is no test: nothing in it stays as it is for a while."""
+    try:
+        cut_plateaus(SampledChannels(columns))
+    except UnusableRecordError:
+        return True
+    return False

@@ -17,6 +17,7 @@ from service.schemas.limits import (
     MOST_DRAWS,
     MOST_OFFSET,
     MOST_POINTS,
+    MOST_SKIPPED,
 )
 from service.schemas.prognosis.quantities import SeriesQuantity
 
@@ -130,6 +131,19 @@ FileRig = Annotated[
 ]
 FileMap = Annotated[
     str | None, Field(max_length=LONGEST_MAP, description="Columns of channels: torque_nm:Mz,speed_rpm:n")
+]
+FileTable = Annotated[
+    str,
+    Field(max_length=LONGEST_FILENAME, description="The sheet, group or archived file, where there are several"),
+]
+FileTime = Annotated[
+    str, Field(max_length=LONGEST_FILENAME, description="The time column; `none` where each row is a plateau")
+]
+FileDecimal = Annotated[
+    Literal["", ".", ","], Field(description="The decimal sign; needed where 1.100 may be 1.1 or 1100")
+]
+FileSkipRows = Annotated[
+    int, SHORT, Field(ge=0, le=MOST_SKIPPED, description="Lines above the table that are not looked at")
 ]
 FileName = Annotated[str, Field(max_length=LONGEST_FILENAME, description="The sender's name for the file")]
 FileRunId = Annotated[

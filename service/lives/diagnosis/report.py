@@ -22,7 +22,6 @@ def empty() -> dict[str, Any]:
         "verdict": None,
         "causes": [],
         "summary": "",
-        "explanations": [],
         "candidates": [],
         "baseline": _misfit(None),
         "extended": _misfit(None),
@@ -47,14 +46,6 @@ def public(
         "verdict": report.verdict.value,
         "causes": list(report.causes),
         "summary": report.summary,
-        "explanations": [
-            {
-                "effects": list(one.effects),
-                "probability": finite(one.probability),
-                "sign_probability": None if one.sign_probability is None else finite(one.sign_probability),
-            }
-            for one in report.explanations
-        ],
         "candidates": [
             {
                 "effect": candidate.effect,
@@ -80,12 +71,7 @@ def public(
             for test in report.advice
         ],
         "visible": [
-            {
-                "effect": smallest.effect,
-                "amplitude": finite(smallest.amplitude),
-                "least": finite(smallest.least),
-                "unit": smallest.unit,
-            }
+            {"effect": smallest.effect, "amplitude": finite(smallest.amplitude), "unit": smallest.unit}
             for smallest in report.visible
         ],
         "notes": [*notes, *report.notes],

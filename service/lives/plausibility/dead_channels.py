@@ -6,10 +6,10 @@ from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.records.criteria import UNLOADED
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS
+from service.errors import Notice
 from service.lives.history import DYNAMIC, STATIONARY
 from service.lives.plausibility import criteria
 from service.lives.plausibility.reading import Columns
-from service.lives.run_analysis import Notice
 
 DEAD = "dead_channel"
 

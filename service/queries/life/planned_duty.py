@@ -20,13 +20,13 @@ from models.prognosis.first_passage import PassageStatus, weighted_quantiles
 from models.prognosis.stated_end import StatedEnd
 from service import measured_lives, records, stored_runs
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
+from service.errors import Notice
 from service.lives.condition import beside_held
 from service.lives.history import Event, Series, date_of, moment_at, pace_of
 from service.lives.outlook import with_held
 from service.lives.payloads import INSUFFICIENT, SAFE, by_quantile, notice_items
 from service.lives.prediction_at import predict_at
 from service.lives.recomputation import ClutchState
-from service.lives.run_analysis import Notice
 from service.lives.tracks import advance, drawn, end_of_life, predict, step_rng
 from service.schemas.prognosis.programme import PlannedBlock, ProgrammeIn
 from storage.engine.database import Database

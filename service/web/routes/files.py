@@ -14,17 +14,22 @@ from service.errors import InvalidError, NoRoomError
 from service.jobs.workers import Lane
 from service.queries import rigs
 from service.queries.raw_run.answer import copy_file, file_sha256
+from service.readers.read_file import reading_of
 from service.run_files.upload import read_file_run
 from service.schemas.base import Origin
 from service.schemas.parameters import (
     ClutchId,
     FileCycles,
+    FileDecimal,
     FileKind,
     FileMap,
     FileName,
     FileRig,
     FileRunId,
+    FileSkipRows,
     FileStartedAt,
+    FileTable,
+    FileTime,
     RunId,
 )
 from service.schemas.run import Receipt
@@ -62,12 +67,19 @@ async def post_run_file(
     cycles: FileCycles = None,
     rig: FileRig = None,
     map: FileMap = None,  # noqa: A002
+    table: FileTable = "",
+    time: FileTime = "",
+    decimal: FileDecimal = "",
+    skip_rows: FileSkipRows = 0,
     filename: FileName = "upload",
     run_id: FileRunId = None,
     started_at: FileStartedAt = None,
     origin: Origin = "measured",
 ) -> Response:
-    """Post a run as CSV, NI TDMS, ASAM MDF4 or Parquet, plain or gzipped. The file is kept as it was sent."""
+    """Post a run as CSV, XLSX, ODS, TDMS, MDF4, MATLAB, HDF5 or Parquet, plain, gzipped or in a ZIP archive.
+
+    The file is kept as it was sent.
+    """
     profile = None if rig is None else await run_in_threadpool(rigs.of_name, context.database, rig)
     with tempfile.TemporaryDirectory(dir=context.folder) as folder:
         path = Path(folder) / "run"
@@ -78,7 +90,7 @@ async def post_run_file(
             filename=filename,
             kind=kind,
             cycles=cycles,
-            mapping=map,
+            reading=reading_of(map, table=table, time=time, decimal=decimal, skip_rows=skip_rows),
             profile=profile,
             rig=rig,
             run_id=run_id,

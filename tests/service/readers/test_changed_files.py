@@ -107,7 +107,7 @@ def test_a_changed_file_is_read_or_refused(
     for index in range(number):
         path.write_bytes(changed(content, rng) if index % 3 else with_a_bit_flipped(content, rng))
         try:
-            check_arrays(read_file(path, filename=name, limits=SOON))
+            check_arrays(read_file(path, filename=name, limits=SOON).columns)
         except (InvalidError, TooLargeError) as error:
             refused += 1
             if is_of_the_reader(error):
@@ -120,6 +120,6 @@ def test_a_changed_file_is_read_or_refused(
 
 def test_what_is_not_changed_is_read(tmp_path: Path) -> None:
     for name, write in WRITERS.items():
-        columns = read_file(write(tmp_path / name, COLUMNS, units=UNITS), filename=name)
+        columns = read_file(write(tmp_path / name, COLUMNS, units=UNITS), filename=name).columns
         for channel, values in COLUMNS.items():
             np.testing.assert_allclose(columns[channel], values, rtol=0, atol=1e-5)

@@ -3,7 +3,9 @@
 import pytest
 
 from service.errors import InvalidError
-from service.readers.column_names import Header, choose, header_of, known_channel, parse_map
+from service.readers.column_names import choose, column_of, known_channel, parse_map
+from service.readers.read_file import reading_of
+from service.readers.table import Choice, Column, Reading
 
 
 @pytest.mark.parametrize(
@@ -37,22 +39,25 @@ def test_names_are_known(name: str, channel: str | None) -> None:
     ],
 )  # fmt: skip
 def test_titles_hold_names_and_units(title: str, name: str, unit: str | None) -> None:
-    assert header_of(title) == Header(name, unit)
+    column = column_of(title)
+    assert (column.name, column.unit, column.title) == (name, unit, title)
 
 
 def test_a_map_may_name_what_holds_commas_and_colons() -> None:
-    assert parse_map("torque_nm:a,b:c, time_s:t") == {"torque_nm": "a,b:c", "time_s": "t"}
+    assert parse_map("torque_nm:a,b:c, time_s:t") == {"torque_nm": Choice(column="a,b:c"), "time_s": Choice(column="t")}
 
 
 def test_a_map_wins_over_names_and_states_the_unit() -> None:
-    headers = [Header("torque_nm"), Header("Mz"), Header("other")]
-    assert [(column.channel, column.index) for column in choose(headers, "torque_nm:Mz")] == [("torque_nm", 1)]
+    headers = [Column("torque_nm"), Column("Mz"), Column("other")]
+    assert [(column.channel, column.index) for column in choose(headers, reading_of("torque_nm:Mz"))] == [
+        ("torque_nm", 1)
+    ]
 
 
 def test_equal_names_are_distinguished_by_their_group() -> None:
-    headers = [Header("M", "Nm", "fast"), Header("M", "Nm", "slow")]
+    headers = [Column("M", "Nm", "fast"), Column("M", "Nm", "slow")]
     with pytest.raises(InvalidError, match="torque_nm must be one column, got fast/M and slow/M"):
-        choose(headers, None)
+        choose(headers, Reading())
     with pytest.raises(InvalidError, match="torque_nm must be one column"):
-        choose(headers, "torque_nm:M")
-    assert [column.index for column in choose(headers, "torque_nm:slow/M")] == [1]
+        choose(headers, reading_of("torque_nm:M"))
+    assert [column.index for column in choose(headers, reading_of("torque_nm:slow/M"))] == [1]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from service.errors import InvalidError
-from service.readers.read_file import read_file
+from service.readers.read_file import read_file, reading_of
 
 #: Writes files of 20 rows and three channels into a folder, a channel (`time`: the clock) with a conversion.
 _WRITE = """
@@ -52,7 +52,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(("name", "where"), [("formula", "torque_nm"), ("clock", "time"), ("ranges", "torque_nm")])
 def test_a_formula_in_a_file_is_refused_and_named(folder: Path, name: str, where: str) -> None:
     with pytest.raises(InvalidError, match="converted by a formula") as caught:
-        read_file(folder / f"{name}.mf4", filename=f"{name}.mf4", mapping="torque_nm:torque_nm")
+        read_file(folder / f"{name}.mf4", filename=f"{name}.mf4", reading=reading_of("torque_nm:torque_nm"))
     assert where in caught.value.detail
     assert caught.value.errors[0].code == "algebraic_conversion"
 
@@ -65,6 +65,8 @@ def test_other_conversions_are_applied_and_other_channels_hinder_nothing(
     folder: Path, name: str, expected: np.ndarray
 ) -> None:
     assert (
-        read_file(folder / f"{name}.mf4", filename=f"{name}.mf4", mapping="torque_nm:torque_nm")["torque_nm"].tolist()
+        read_file(folder / f"{name}.mf4", filename=f"{name}.mf4", reading=reading_of("torque_nm:torque_nm"))
+        .columns["torque_nm"]
+        .tolist()
         == expected.tolist()
     )

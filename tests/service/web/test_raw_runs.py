@@ -89,7 +89,7 @@ def test_without_the_extra_parquet_is_406(
     monkeypatch.setattr("service.queries.raw_run.formats.version", missing)
     problem = client.get(f"{RUNS}/raw", headers={"Accept": PARQUET})
     assert (problem.status_code, problem.headers["content-type"]) == (406, "application/problem+json")
-    assert "clutchlife[parquet]" in problem.json()["detail"]
+    assert "pip install -e '.[parquet]'" in problem.json()["detail"]
     assert client.get(f"{RUNS}/raw", headers={"Accept": f"{PARQUET};q=0.5, application/json"}).status_code == 200
 
 

@@ -447,12 +447,6 @@ export interface Amplitude {
   unit: string;
 }
 
-export interface ExplanationOut {
-  effects: string[];
-  probability: number | null;
-  sign_probability: number | null;
-}
-
 export interface CandidateOut {
   effect: string;
   title: string;
@@ -498,7 +492,6 @@ export interface AdviceOut {
 export interface VisibleOut {
   effect: string;
   amplitude: number | null;
-  least: number | null;
   unit: string;
 }
 
@@ -544,7 +537,6 @@ export interface DiagnosisListed {
   verdict: string | null;
   causes: string[];
   summary: string;
-  explanations: ExplanationOut[];
   candidates: CandidateOut[];
   baseline: MisfitOut;
   extended: MisfitOut;

@@ -14,7 +14,7 @@ with tempfile.TemporaryDirectory() as folder:
     path = Path(folder) / "run.toy"
     rows = np.array(list(columns.values()), dtype="<f8").T
     path.write_bytes(f"TOY1 {','.join(columns)}\n".encode() + rows.tobytes())
-    read = read_file(path, filename="run.toy")
+    read = read_file(path, filename="run.toy").columns
     assert {name: column.tolist() for name, column in read.items()} == {
         "pressure_bar": [4.0, 4.0],
         "speed_rpm": [100.0, 200.0],

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from models.arrays import FloatArray
 from service.errors import InvalidError, ServiceError, TooLargeError
 from service.readers.limits import LIMITS
-from service.readers.read_file import read_file
+from service.readers.read_file import read_file, reading_of
 from tests.service.readers.sample_files import csv_text, record
 
 HEADER = "time_s,pressure_bar,speed_rpm,torque_nm"
@@ -27,7 +27,7 @@ ROWS = "0,5,100,20\n0.1,5,101,21\n"
 def read(path: Path, content: str | bytes, mapping: str | None = None, name: str = "run.csv") -> dict[str, FloatArray]:
     file = path / "posted"
     file.write_bytes(content.encode() if isinstance(content, str) else content)
-    return read_file(file, filename=name, mapping=mapping)
+    return read_file(file, filename=name, reading=reading_of(mapping)).columns
 
 
 def refused(path: Path, content: str | bytes, mapping: str | None = None, name: str = "run.csv") -> InvalidError:
@@ -124,11 +124,8 @@ WRONG = [
         "time_s;torque_nm\n0,5;1,5\n1.5;2\n",
         r"time_s\[1\] \(line 3\) must have the decimal sign ',' as before, got '1.5'",
     ),
-    ("time_s;torque_nm\n0,5;1.234,5\n", r"torque_nm\[0\] \(line 2\) must be a number, got '1.234,5'"),
     ("time_s,time_s,torque_nm\n0,0,1\n", "time_s must be one column"),
     ("time_s,torque_nm,M [Nm]\n0,0,1\n", "torque_nm must be one column, got torque_nm and M"),
-    ("time_s,p1 [bar],p1 [bar]\n0,0,1\n", "p1 is there more than once"),
-    ("time_s,torque_nm,voltage\n0,0,1\n", "'voltage': not known"),
     ("time_s,Drehmoment\n0,1\n", r"torque_nm \(column 'Drehmoment'\): the unit must be stated"),
     ("time_s,Drehmoment [furlong]\n0,1\n", "torque_nm .*the unit must be a known one.*'furlong'"),
     ("time_s,n [mPa]\n0,1\n", "speed_rpm .*'mPa'"),
@@ -139,7 +136,7 @@ WRONG = [
     (f"{HEADER}\n" + "1" * 100_000 + "\n", "line 2 must have 4 cells, got 1"),
     (b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 40, "PNG picture"),
     (bytes(range(256)) * 400, "NUL"),
-    (b"PK\x03\x04" + bytes(100), "export it as CSV"),
+    (b"PK\x03\x04" + bytes(100), "ZIP archive cannot be read"),
     (gzip.compress(HEADER.encode(), mtime=0)[:-6], "cannot be unpacked"),
     (gzip.compress(gzip.compress(HEADER.encode(), mtime=0), mtime=0), "gzip twice"),
     ("\ufeff".encode("utf-16-le") + b"\x00\xd8" * 4000, "UTF-16"),

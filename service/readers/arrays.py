@@ -1,0 +1,245 @@
+"""Named arrays, in folders of each other as MATLAB and HDF5 have them -> a table.
+
+A vector is a column; a matrix is several, with the names that a list of as many texts beside it gives. Units and a clock are
+what stands beside an array under the usual names: attributes of HDF5, fields and variables of MATLAB.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from service.errors import FieldError, InvalidError, Notice
+from service.readers.column_names import column_of, known_channel
+from service.readers.limits import Limits
+from service.readers.numerals import column_values
+from service.readers.table import Clock, Column, Reading, Table, only
+
+_UNITS = ("unit", "units", "unit_string", "yunit", "einheit")
+_NAMES = (
+    "names",
+    "name",
+    "labels",
+    "header",
+    "headers",
+    "colheaders",
+    "channels",
+    "columns",
+    "titles",
+    "variablenames",
+)
+_DATA = ("data", "values", "value", "y", "samples")
+_STEPS = (
+    "dt",
+    "ts",
+    "delta_t",
+    "delta_x",
+    "wf_increment",
+    "sample_interval",
+    "sampling_interval",
+    "sample_time",
+    "t_s",
+)
+_RATES = ("fs", "sample_rate", "sampling_rate", "samplerate", "samplingrate", "sampling_frequency", "rate", "f_s")
+_STARTS = ("t0", "x0", "wf_start_offset")
+_CHARACTERS = "SUO"
+#: Folders in folders, at most. Chosen: recorders have three.
+_DEEPEST = 8
+_MOST_MATRIX_COLUMNS = 200
+
+Tree = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Leaf:
+    """An array that is read by slicing, and what is attached to it."""
+
+    data: Any
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class _Source:
+    """A column and how its values are read."""
+
+    column: Column
+    leaf: Leaf
+    index: Any
+
+
+def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ...] = ()) -> Table:
+    """The table of a tree of arrays, or of the folder that is named; `unread` are names of what only their program reads.
+
+    Raises InvalidError where it holds no array that could be a channel.
+    """
+    sources = list(_sources(tree, "", 0))
+    groups = tuple(dict.fromkeys(source.column.group for source in sources))
+    if reading.table:
+        chosen = groups[only(groups, reading.table, "group")]
+        sources = [source for source in sources if source.column.group == chosen]
+    elif len(knowing := _complete(sources)) > 1:
+        only(knowing, "", "group")
+    if not sources:
+        what = (
+            f": {', '.join(unread[:10])} can be read by MATLAB alone; save columns as arrays or in a struct"
+            if unread
+            else ""
+        )
+        message = f"the file holds no array of numbers that could be a channel{what}"
+        raise InvalidError(message, errors=[FieldError(pointer="", code="no_arrays", message=message)])
+    if len(sources) > limits.most_columns:
+        raise InvalidError(f"a file must not have more than {limits.most_columns} arrays, got {len(sources)}")
+    if len({source.column.group for source in sources}) == 1:
+        sources = [replace(source, column=replace(source.column, group="")) for source in sources]
+
+    def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
+        return [_values(sources[index], channel, reading) for index, channel in taken.items()]
+
+    notices = (Notice(code="not_read", message=f"only MATLAB reads {', '.join(unread[:10])}"),) if unread else ()
+    return Table(
+        columns=tuple(source.column for source in sources),
+        read=read,
+        name=reading.table,
+        others=groups,
+        notices=notices,
+    )
+
+
+def _complete(sources: list[_Source]) -> list[str]:
+    """The groups that each hold a torque, a speed and a pressure: tests of their own."""
+    known: dict[str, set[str | None]] = {}
+    for source in sources:
+        known.setdefault(source.column.group, set()).add(known_channel(source.column.name))
+    return [group for group, names in known.items() if {"torque_nm", "speed_rpm", "pressure_bar"} <= names]
+
+
+def _sources(tree: Tree, group: str, depth: int) -> Iterator[_Source]:
+    """The columns of a folder and of those in it."""
+    for name, node in tree.items():
+        path = f"{group}/{name}" if group else name
+        if isinstance(node, Mapping):
+            lowered = {key.lower(): value for key, value in node.items()}
+            data = next((lowered[key] for key in _DATA if isinstance(lowered.get(key), Leaf)), None)
+            rest = [
+                key for key, value in lowered.items() if isinstance(value, Leaf) and _rows(value) and value is not data
+            ]
+            if data is not None and not [key for key in rest if known_channel(key) != "time_s"]:
+                label = _text(lowered.get("label")) or _text(lowered.get("name")) or name
+                times = [_source(key, node[key], path, node) for key in node if known_channel(key) == "time_s"]
+                yield from (time for time in times if time is not None)
+                yield from _columns(label, data, path if times else group, node)
+            elif depth < _DEEPEST:
+                yield from _sources(node, path, depth + 1)
+        elif isinstance(node, Leaf):
+            yield from _columns(name, node, group, tree)
+
+
+def _columns(name: str, leaf: Leaf, group: str, beside: Tree) -> Iterator[_Source]:
+    """The columns of one array: a vector, the fields of a compound one, or those of a matrix."""
+    if leaf.data.dtype.names:
+        for part in leaf.data.dtype.names:
+            yield _Source(Column(**_titled(part, None, group), rows=leaf.data.shape[0]), leaf, part)
+        return
+    source = _source(name, leaf, group, beside)
+    if source is not None:
+        yield source
+        return
+    shape = tuple(size for size in leaf.data.shape if size > 1)
+    if len(shape) != 2 or leaf.data.dtype.kind not in "iuf" or min(shape) > _MOST_MATRIX_COLUMNS:
+        return
+    across = 0 if shape[0] < shape[1] else 1
+    width = shape[across]
+    lists = {key.lower(): _texts(value) for key, value in {**beside, **leaf.attributes}.items()}
+    names = next((lists[key] for key in _NAMES if len(lists.get(key, ())) == width), [])
+    units = next((lists[key] for key in _UNITS if len(lists.get(key, ())) == width), [])
+    for index in range(width):
+        title = names[index] if names else f"{name}[{index + 1}]"
+        place = (index, slice(None)) if across == 0 else (slice(None), index)
+        column = (
+            Column(title, None, group, title) if not names else column_of(title, units[index] if units else None, group)
+        )
+        yield _Source(
+            replace(column, rows=shape[1 - across], clock=_clock(leaf, beside, shape[1 - across])), leaf, place
+        )
+
+
+def _titled(title: str, unit: str | None, group: str) -> dict[str, Any]:
+    column = column_of(title, unit, group)
+    return {"name": column.name, "unit": column.unit, "group": column.group, "title": column.title}
+
+
+def _source(name: str, node: Any, group: str, beside: Tree) -> _Source | None:
+    """A vector as a column; None for any other array."""
+    if not isinstance(node, Leaf) or not (rows := _rows(node)):
+        return None
+    lowered = {key.lower(): value for key, value in node.attributes.items()}
+    stated = next((_text(lowered[key]) for key in _UNITS if _text(lowered.get(key))), None)
+    if stated is None and any(key.lower() in _DATA for key in beside):
+        stated = next((_text(value) for key, value in beside.items() if key.lower() in _UNITS and _text(value)), None)
+    moments = node.data.dtype.kind in "Mm"
+    column = Column(**_titled(name, None if moments else stated, group))
+    unit = "s" if moments else column.unit
+    return _Source(replace(column, unit=unit, rows=rows, clock=_clock(node, beside, rows)), node, Ellipsis)
+
+
+def _rows(leaf: Leaf) -> int:
+    """The length of a vector of numbers, points in time or texts; 0 for a single value and any other array."""
+    shape = leaf.data.shape
+    vector = len(shape) >= 1 and max(shape) > 1 and int(np.prod(shape)) == max(shape)
+    return int(max(shape)) if vector and leaf.data.dtype.kind in "iufMm" else 0
+
+
+def _clock(leaf: Leaf, beside: Tree, rows: int) -> Clock | None:
+    """A clock that is stated as a step or a rate, at the array or beside it."""
+    stated = {
+        key.lower(): number
+        for key, value in {**beside, **leaf.attributes}.items()
+        if (number := _number(value)) is not None
+    }
+    step = next((stated[key] for key in _STEPS if key in stated), None)
+    rate = next((stated[key] for key in _RATES if key in stated), None)
+    if step is None and rate:
+        step = 1.0 / rate
+    if step is None or not step > 0:
+        return None
+    start = next((stated[key] for key in _STARTS if key in stated), 0.0)
+    return Clock((start, step, rows), partial(_times, start, step, rows), counts=step == 1.0 and start == 0.0)
+
+
+def _times(start: float, step: float, rows: int) -> FloatArray:
+    return start + step * np.arange(rows, dtype=np.float64)
+
+
+def _number(value: Any) -> float | None:
+    """A single number."""
+    array = np.asarray(
+        value.data[()] if isinstance(value, Leaf) and value.data.size == 1 else value if np.isscalar(value) else ()
+    )
+    return float(array.reshape(-1)[0]) if array.size == 1 and array.dtype.kind in "iuf" else None
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    if isinstance(value, np.ndarray) and value.size == 1 and value.dtype.kind in _CHARACTERS:
+        return _text(value.reshape(-1)[0])
+    return value if isinstance(value, str) else ""
+
+
+def _texts(value: Any) -> list[str]:
+    if isinstance(value, Leaf):
+        value = value.data
+    array = np.asarray(value if isinstance(value, list | tuple | np.ndarray) else ())
+    return [_text(item) for item in array.reshape(-1)] if array.dtype.kind in _CHARACTERS else []
+
+
+def _values(source: _Source, channel: str, reading: Reading) -> NDArray[Any]:
+    values = np.asarray(source.leaf.data[source.index])
+    values = values.reshape(-1) if values.ndim != 1 else values
+    if values.dtype.kind in _CHARACTERS:
+        return column_values([channel], [[_text(item) for item in values.tolist()]], reading.decimal)[0]
+    return values

@@ -1,0 +1,279 @@
+"""A table as read -> a run's channels: columns chosen, units converted, all on one clock, invalid samples left out.
+
+What was left out or resampled is in the notices. Each column has its own time: the time column before it in its group, else
+its recorder's clock, else the one time column of the table.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from service.columns import LineOf, check_arrays
+from service.errors import MOST_QUOTED, FieldError, InvalidError, Notice, TooLargeError
+from service.readers.column_names import Taken, choose, is_counter, known_channel
+from service.readers.limits import Limits
+from service.readers.table import NO_TIME, Clock, Column, Reading, Table
+
+#: The code of the notice that lists unused columns.
+LEFT_OUT = "columns_left_out"
+_SECOND = np.timedelta64(1, "s")
+#: The channel on whose clock the others are brought, the first that is there.
+_LEADING = ("torque_nm", "speed_rpm", "pressure_bar")
+#: Columns that one notice names.
+_MOST_NAMED = 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Channels:
+    """Channels [n] by public name in their units. `counts`: the time may be a recorder's default that counts samples;
+    `labels`: words above the table -> what stands beside them."""
+
+    columns: dict[str, FloatArray]
+    notices: tuple[Notice, ...] = ()
+    counts: bool = False
+    line_of: LineOf | None = None
+    labels: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class _Series:
+    """A channel: its values, its times (None: none stated), which samples are valid, and whose times they are."""
+
+    values: FloatArray
+    valid: NDArray[np.bool_] | None
+    clock: object
+    times: FloatArray | None
+
+
+def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
+    """The channels that the names and `reading` choose.
+
+    Raises InvalidError where a unit or a clock is not clear, a value is no number, or nothing is known; TooLargeError on too
+    many values.
+    """
+    taken = choose(table.columns, reading)
+    clocks = {} if reading.time == NO_TIME else _clocks(table.columns, taken)
+    series, counts = _read(table, taken, clocks, limits)
+    notices = [*table.notices, *_left_out(table.columns, taken, reading)]
+    columns = _on_one_clock(series, notices)
+    check_arrays(columns, line_of=table.line_of)
+    return Channels(columns=columns, notices=tuple(notices), counts=counts, line_of=table.line_of, labels=labels(table))
+
+
+def labels(table: Table) -> dict[str, str]:
+    """What the lines above the table say: `label: value`, `label = value` or a label and its value in two cells."""
+    found: dict[str, str] = {}
+    for row in table.above:
+        cells = [cell for cell in row if cell]
+        if len(cells) == 1:
+            cells = [part.strip() for part in re.split(r"[:=]", cells[0], maxsplit=1)]
+        if len(cells) > 1:
+            found.setdefault(cells[0][:MOST_QUOTED], cells[1][:MOST_QUOTED])
+    return found
+
+
+def _clocks(columns: Sequence[Column], taken: Sequence[Taken]) -> dict[int, int | Clock | None]:
+    """For each column that is taken and is no time, what times it: a column's index, a recorder's clock, or nothing."""
+    times = [column.index for column in taken if column.channel == "time_s"]
+    clocks: dict[int, int | Clock | None] = {}
+    for column in taken:
+        if column.channel == "time_s":
+            continue
+        own = [index for index in times if columns[index].group == columns[column.index].group]
+        before = [index for index in own if index < column.index]
+        if own:
+            clocks[column.index] = before[-1] if before else own[0]
+        else:
+            clocks[column.index] = columns[column.index].clock or (times[0] if len(times) == 1 else None)
+    unused = [index for index in times if index not in clocks.values()]
+    if unused and len(times) > 1:
+        shown = " and ".join(columns[index].shown() for index in times[:_MOST_NAMED])
+        message = f"time_s must be one column, got {shown}; time=NAME chooses one"
+        raise InvalidError(message, errors=[FieldError(pointer="/time", code="ambiguous", message=message)])
+    return clocks
+
+
+def _read(
+    table: Table, taken: Sequence[Taken], clocks: Mapping[int, int | Clock | None], limits: Limits
+) -> tuple[dict[str, _Series], bool]:
+    """The channels' values and times; and whether their one clock may only count."""
+    indices = [column.index for column in taken]
+    stated = sum(table.columns[index].rows or 0 for index in indices)
+    if stated > limits.most_values:
+        raise TooLargeError(f"a file must not hold more than {limits.most_values} values, got {stated}")
+    read = dict(zip(indices, table.read({column.index: column.channel for column in taken}), strict=True))
+    values: dict[int, FloatArray] = {}
+    valid: dict[int, NDArray[np.bool_] | None] = {}
+    for column in taken:
+        values[column.index], valid[column.index] = _numbers(column, read.pop(column.index))
+    used = [clock for clock in clocks.values() if isinstance(clock, Clock)]
+    times: dict[object, FloatArray] = {}
+    for one in used:
+        if one.key not in times:
+            times[one.key] = one.read()
+    series = {}
+    for column in taken:
+        if column.channel != "time_s":
+            clock = clocks.get(column.index)
+            key = clock.key if isinstance(clock, Clock) else clock
+            own = times[key] if isinstance(clock, Clock) else None if clock is None else values[clock]
+            mask = valid[column.index]
+            series[column.channel] = _Series(values[column.index], mask, key, own)
+    if not series:  # a time alone: shown as such, and refused for what it lacks
+        series = {"time_s": _Series(values[indices[0]], None, None, None)}
+    counts = bool(used) and len(times) == 1 and used[0].counts
+    for index in {clock for clock in clocks.values() if isinstance(clock, int)}:
+        # LabVIEW's text files count where they have no clock
+        counts = is_counter(table.columns[index]) and np.array_equal(values[index], np.arange(values[index].size))
+    return series, counts
+
+
+def _numbers(column: Taken, values: NDArray[Any]) -> tuple[FloatArray, NDArray[np.bool_] | None]:
+    """Values in the channel's unit and which of them are valid; points in time as seconds since the first.
+
+    Raises InvalidError on any other type.
+    """
+    mask = np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else None
+    valid = ~mask if mask is not None and mask.any() else None
+    values = np.asarray(values)
+    if column.channel == "time_s" and values.dtype.kind in "Mm":
+        since = values - values[:1] if values.dtype.kind == "M" else values
+        return np.where(np.isnat(since), np.nan, since / _SECOND), valid
+    if values.dtype.kind not in "iuf" or values.ndim != 1:
+        shown = f"values of type {values.dtype}" if values.ndim == 1 else f"{values.ndim} dimensions"
+        message = f"{column.channel} must be numbers, got {shown}"
+        raise InvalidError(
+            message,
+            errors=[FieldError(pointer=f"/channels/{column.channel}", code="not_a_number", message=message)],
+        )
+    numbers = np.array(values, dtype=np.float64) if values.dtype != np.float64 or not values.flags.writeable else values
+    column.conversion.apply(numbers)
+    return numbers, valid
+
+
+def _left_out(columns: Sequence[Column], taken: Sequence[Taken], reading: Reading) -> list[Notice]:
+    """What of the table is not used."""
+    used = {column.index for column in taken}
+    others = [
+        column.shown()
+        for index, column in enumerate(columns)
+        if index not in used and (column.title or column.name) and not (reading.time == NO_TIME and _is_time(column))
+    ]
+    if not others:
+        return []
+    more = f" and {len(others) - _MOST_NAMED} more" if len(others) > _MOST_NAMED else ""
+    message = f"columns that are no channel were left out: {', '.join(others[:_MOST_NAMED])}{more}"
+    return [Notice(code=LEFT_OUT, message=message)]
+
+
+def _is_time(column: Column) -> bool:
+    return known_channel(column.name) == "time_s"
+
+
+def _on_one_clock(series: Mapping[str, _Series], notices: list[Notice]) -> dict[str, FloatArray]:
+    """The channels with one `time_s` where they have times; invalid samples left out."""
+    if "time_s" in series:
+        return {"time_s": series["time_s"].values}
+    leading = next((name for name in _LEADING if name in series), next(iter(series)))
+    lead = series[leading]
+    lengths = {name: own.values.size for name, own in series.items()}
+    same = all(_same_clock(own, lead) for own in series.values())
+    if not same and any(own.times is None for own in series.values()):
+        _refuse_lengths(series, lengths)
+    if same and len(set(lengths.values())) > 1:
+        _refuse_lengths(series, lengths)
+    for name, own in series.items():
+        if own.times is not None and own.times.size != own.values.size:
+            message = f"{name} has {own.values.size} rows and its times {own.times.size}"
+            raise InvalidError(
+                message, errors=[FieldError(pointer=f"/channels/{name}", code="ragged", message=message)]
+            )
+    columns: dict[str, FloatArray] = {} if lead.times is None else {"time_s": lead.times}
+    kept = np.ones(lead.values.size, dtype=np.bool_)
+    invalid: dict[str, int] = {}
+    for name, own in series.items():
+        valid = own.valid
+        if own is lead or _same_clock(own, lead):
+            columns[name] = own.values
+        else:
+            columns[name], valid, inside = _resampled(name, own, lead)
+            kept &= inside
+        if valid is not None:
+            invalid[name] = int(np.count_nonzero(~valid))
+            kept &= valid
+    if not same:
+        notices.append(_brought(series, leading, kept))
+    if invalid:
+        shown = ", ".join(f"{name} {count}" for name, count in invalid.items())
+        message = f"samples that the recorder marks invalid were left out, with all channels at their times: {shown}"
+        notices.append(Notice(code="invalid_samples", message=message))
+    if kept.all():
+        return columns
+    if not kept.any():
+        message = "no sample is left: the channels have no time in common at which all are valid"
+        raise InvalidError(message, errors=[FieldError(pointer="/channels", code="empty", message=message)])
+    return {name: column[kept] for name, column in columns.items()}
+
+
+def _same_clock(one: _Series, other: _Series) -> bool:
+    if one.times is None or other.times is None:
+        return one.times is other.times
+    return one.clock == other.clock or np.array_equal(one.times, other.times)
+
+
+def _refuse_lengths(series: Mapping[str, _Series], lengths: Mapping[str, int]) -> None:
+    """Raise InvalidError: lengths or clocks differ and a channel has no times by which it could be brought to the others."""
+    timeless = [name for name, own in series.items() if own.times is None]
+    shown = ", ".join(f"{name} has {rows}" for name, rows in lengths.items())
+    if len(set(lengths.values())) > 1:
+        message = f"all channels must have one number of rows, or times of their own, got: {shown}"
+    else:
+        message = (
+            f"all channels must be sampled by one clock, or each have its own; without a time: {', '.join(timeless)}"
+        )
+    raise InvalidError(message, errors=[FieldError(pointer="", code="ragged", message=message)])
+
+
+def _resampled(
+    name: str, own: _Series, lead: _Series
+) -> tuple[FloatArray, NDArray[np.bool_] | None, NDArray[np.bool_]]:
+    """A channel at the leading channel's times, straight between its samples: values, which are valid, which lie inside."""
+    assert own.times is not None  # noqa: S101 (seen to by the caller)
+    assert lead.times is not None  # noqa: S101
+    if own.times.size == 0 or not (np.diff(own.times) > 0).all():
+        message = f"{name} is sampled by a clock of its own, whose times must increase"
+        raise InvalidError(
+            message, errors=[FieldError(pointer=f"/channels/{name}", code="time_backwards", message=message)]
+        )
+    after = np.clip(np.searchsorted(own.times, lead.times), 1, max(own.times.size - 1, 1))
+    valid = None
+    if own.valid is not None and own.times.size > 1:
+        valid = own.valid[after - 1] & own.valid[after]
+    # a sample of a slower channel stands until the next one is due
+    reach = max(0.0, _step(own.times) - _step(lead.times))
+    inside = (lead.times >= own.times[0] - reach) & (lead.times <= own.times[-1] + reach)
+    return np.interp(lead.times, own.times, own.values), valid, inside
+
+
+def _step(times: FloatArray) -> float:
+    """How far apart samples are [s]."""
+    return float(np.median(np.diff(times))) if times.size > 1 else 0.0
+
+
+def _brought(series: Mapping[str, _Series], leading: str, kept: NDArray[np.bool_]) -> Notice:
+    lead = series[leading]
+    rates = []
+    for name, own in series.items():
+        if name != leading and not _same_clock(own, lead) and own.times is not None:
+            step = _step(own.times)
+            rates.append(f"{name} ({own.values.size} samples, {step:.6g} s apart, from {own.times[0]:.9g} s)")
+    shown = ", ".join(rates)[: 5 * MOST_QUOTED]
+    cut = int(np.count_nonzero(~kept))
+    more = f"; {cut} of {kept.size} samples outside the time that all have in common were left out" if cut else ""
+    message = f"brought to the times of {leading} by straight lines between their own samples: {shown}{more}"
+    return Notice(code="brought_to_one_clock", message=message)

@@ -1,0 +1,200 @@
+"""The table in a grid of cells: which rows are titles, units and data, whatever stands above them.
+
+Cells are text (CSV) or what a workbook holds. The data are the longest run of rows with numbers or times in the same
+columns, under the row of titles that knows most channels; a row of units, titles over two rows (merged cells), and a group's
+name over several columns may stand there too.
+"""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import zip_longest
+from typing import Any
+
+from service.errors import MOST_QUOTED, FieldError, InvalidError
+from service.readers.column_names import bare_unit, column_of, recognised
+from service.readers.limits import LONGEST_TITLE
+from service.readers.table import Column
+from service.readers.unit_table import is_unit
+
+Row = Sequence[Any]
+
+#: Rows that are looked at for the table's beginning. Chosen: no recorder writes as many lines above it.
+MOST_ROWS = 500
+#: Rows of a run by which two candidates are compared; longer ones count the same. Chosen: more than header blocks have.
+_LONG_RUN = 8
+#: Rows of titles and units above the data, at most; blank rows between them do not count.
+_MOST_TITLE_ROWS = 4
+#: What a row begins with that names the units of the columns beside it.
+_UNIT_LABELS = re.compile(r"(y_)?units?(_label)?s?:?|einheit(en)?:?|单位", re.IGNORECASE)
+NUMERIC = re.compile(
+    r"[+-]?(\d[\d.,'’\u00a0\u202f\u2009]*+|[.,]\d++)( ?[eE][+-]?\d{1,4})?|[+-]?(nan|inf|infinity)",
+    re.IGNORECASE | re.ASCII,
+)
+#: A point in time or a duration, with a clock's colon or a date's marks.
+TIMELIKE = re.compile(
+    r"[+-]?\d[\d./T ,+-]*:[\d:.,+Z -]*([AaPp][Mm])?|\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ].*)?|\d+ days? .*"
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layout:
+    """Where a table is: of each column the title, unit, group and first cell; the row of its titles, the first row of data,
+    and a score by which layouts of other separators or encodings compare."""
+
+    headings: tuple[tuple[str, str, str, Any], ...]
+    titles: int
+    start: int
+    score: tuple[int, int, int, int]
+
+    def columns(self) -> tuple[Column, ...]:
+        """The columns. Raises InvalidError on a title that is too long, or beside whose unit another is stated."""
+        return tuple(
+            replace(column_of(title, group=group), unit="s") if _is_moment(cell) else column_of(title, unit, group)
+            for title, unit, group, cell in self.headings
+        )
+
+
+def find_table(rows: Sequence[Row], comments: frozenset[int], named: Sequence[str]) -> Layout | None:
+    """The table in the first rows of a grid; None where no row of titles stands over numbers.
+
+    `comments` are rows that may hold titles and no data; `named` are titles that the caller names.
+    """
+    runs = list(_runs(rows, comments)) or [(len(rows), 0)]  # titles without data are a table too
+    layouts = [_layout([*rows, ()], comments, start, length, named) for start, length in runs]
+    return max((layout for layout in layouts if layout), key=lambda layout: layout.score, default=None)
+
+
+def _runs(rows: Sequence[Row], comments: frozenset[int]) -> Iterator[tuple[int, int]]:
+    """Runs of rows with a number or a time in them: where each starts and how many rows it has."""
+    start, length = 0, 0
+    for index, row in enumerate(rows):
+        if index in comments or is_blank(row):
+            continue
+        if any(map(is_value, row)):
+            start, length = (start, length + 1) if length else (index, 1)
+        elif length:
+            yield start, length
+            length = 0
+    if length:
+        yield start, length
+
+
+def is_blank(row: Row) -> bool:
+    """Whether a row holds nothing."""
+    return all(cell is None or cell == "" for cell in row)
+
+
+def is_value(cell: Any) -> bool:
+    """Whether a cell is a number or a point in time."""
+    if isinstance(cell, str):
+        return bool(cell) and (NUMERIC.fullmatch(cell) or TIMELIKE.fullmatch(cell)) is not None
+    return cell is not None and not isinstance(cell, bool)
+
+
+def _is_moment(cell: Any) -> bool:
+    """Whether a cell is a point in time or a duration, which needs no unit."""
+    return TIMELIKE.fullmatch(cell) is not None if isinstance(cell, str) else hasattr(cell, "resolution")
+
+
+def _layout(
+    rows: Sequence[Row], comments: frozenset[int], start: int, length: int, named: Sequence[str]
+) -> Layout | None:
+    """The layout of the data from row `start` on: the row above them that knows most channels has the titles."""
+    width = max((index + 1 for index, cell in enumerate(rows[start]) if cell not in (None, "")), default=0)
+    above = _text_rows_above(rows, comments, start)
+    best: tuple[tuple[int, int, int], list[str], int] | None = None
+    for place, at in enumerate(above):
+        for titles in _titles(rows, above[place:], width):
+            filled = sum(map(bool, titles))
+            known = recognised(titles, named)
+            enough = filled >= width if at in comments else filled >= min(2, width) or known
+            rank = (
+                known,
+                int(len(titles) == width and max(map(len, titles), default=0) <= LONGEST_TITLE),
+                int(not _are_units(titles)),
+            )
+            if enough and (best is None or rank > best[0]):
+                best = rank, titles, at
+    if best is None:
+        return None
+    rank, titles, at = best
+    units = _units(rows, [row for row in above if row > at], at, start)
+    groups = _filled([_text(cell) for cell in rows[at - 1]], len(titles)) if at - 1 in above else []
+    twice = len(set(filter(None, titles))) < sum(map(bool, titles))
+    headings = zip_longest(
+        titles, units[: len(titles)], groups if twice else (), rows[start][: len(titles)], fillvalue=""
+    )
+    score = (rank[0], rank[1], min(length, _LONG_RUN), sum(map(is_value, rows[start])))
+    return Layout(headings=tuple(headings), titles=at, start=start, score=score)
+
+
+def _text_rows_above(rows: Sequence[Row], comments: frozenset[int], start: int) -> list[int]:
+    """The nearest rows of text above the data, the lowest first."""
+    found: list[int] = []
+    for index in range(start - 1, -1, -1):
+        if index not in comments and any(map(is_value, rows[index])):
+            break
+        if not is_blank(rows[index]):
+            found.append(index)
+        if len(found) == _MOST_TITLE_ROWS:
+            break
+    return found
+
+
+def _titles(rows: Sequence[Row], upwards: Sequence[int], width: int) -> Iterator[list[str]]:
+    """The titles that a row may give: its own texts, its gaps filled from above, and both rows' texts joined."""
+    own = [_text(cell) for cell in rows[upwards[0]]]
+    while own and not own[-1]:
+        own.pop()
+    yield own
+    if len(upwards) < 2 or len(own) < 2:
+        return
+    above = [_text(cell) for cell in rows[upwards[1]]]
+    if sum(map(bool, above)) < 2:
+        return
+    size = max(len(own), min(len(above), width))
+    own += [""] * (size - len(own))
+    above += [""] * (size - len(above))
+    yield [name or other for name, other in zip(own, above, strict=False)]
+    yield [f"{other} {name}".strip() for name, other in zip(own, _filled(above, size), strict=False)]
+
+
+def _filled(texts: Sequence[str], size: int) -> list[str]:
+    """The texts of merged cells, each over the empty ones after it."""
+    filled: list[str] = []
+    for text in texts[:size]:
+        filled.append(text or (filled[-1] if filled else ""))
+    return filled + [filled[-1] if filled else ""] * (size - len(filled))
+
+
+def _text(cell: Any) -> str:
+    return "" if cell is None else str(cell).strip()
+
+
+def _are_units(texts: Sequence[str]) -> bool:
+    """Whether all that is there are units."""
+    stated = [unit for unit in map(bare_unit, texts) if unit]
+    return bool(stated) and all(map(is_unit, stated))
+
+
+def _units(rows: Sequence[Row], below: Sequence[int], at: int, start: int) -> list[str]:
+    """The units beside the titles in row `at`: a row of them under it or above it, or a row that is labelled so."""
+    texts = {index: [_text(cell) for cell in rows[index]] for index in range(max(0, start - MOST_ROWS), start)}
+    candidates = [index for index in below if texts[index] != texts[at]]
+    best = max(candidates, key=lambda index: sum(map(is_unit, filter(None, texts[index]))), default=None)
+    if best is None and at and _are_units(texts[at - 1]):
+        best = at - 1
+    labelled = [index for index, row in texts.items() if row and _UNIT_LABELS.fullmatch(row[0]) and index != at]
+    if best is None and labelled:
+        best = labelled[-1]
+    if best is None:
+        return []
+    return ["" if _UNIT_LABELS.fullmatch(unit) else unit for unit in texts[best]]
+
+
+def no_table(line: int, got: str) -> InvalidError:
+    """The error of a text or sheet without a row of titles over numbers."""
+    shown = got.strip()[:MOST_QUOTED]
+    message = f"line {line} must be a header with the channels' names, above rows of numbers, got {shown!r}"
+    return InvalidError(message, errors=[FieldError(pointer="", code="no_header", message=message, value=shown)])

@@ -1,0 +1,127 @@
+"""A table as it stands in a file, and how a caller wants it read: what every reader makes and `channels` takes.
+
+A reader finds the table and says what the file says: titles, units, clocks. It decides nothing of channels.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from service.errors import MOST_QUOTED, FieldError, InvalidError, Notice
+
+#: Row of a table, from 0 -> its line in the file, from 1.
+LineOf = Callable[[int], int]
+#: The time option that takes no clock: each row is a plateau.
+NO_TIME = "none"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """The column of a channel: its title, and its unit; value = factor · converted + offset, in the channel's unit.
+
+    `unit` takes the place of what the file states, which must be that unit or `stated`; None: the file's own.
+    """
+
+    column: str
+    unit: str | None = None
+    stated: str | None = None
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reading:
+    """How to read a file; empty where the file says it all. A rig profile keeps one.
+
+    `mapping`: channel -> its column; `only_named`: no other column is taken. `table`: the sheet, group or archived file.
+    `time`: the title of the time column, or NO_TIME. `decimal`: the decimal sign, "." or ",". `skip_rows`: lines above that
+    are not looked at.
+    """
+
+    mapping: Mapping[str, Choice] = field(default_factory=dict)
+    only_named: bool = False
+    table: str = ""
+    time: str = ""
+    decimal: str = ""
+    skip_rows: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """The times of a column by the recorder's own clock. Columns whose `key` is equal share it; `read` gives [n] s.
+
+    `counts`: the clock may be a default that only counts samples, a second each.
+    """
+
+    key: object
+    read: Callable[[], FloatArray]
+    counts: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column of a file: its name without a unit, and the unit that the file states (None: it states none).
+
+    `group` distinguishes equal names in files that have groups; a map may use `group/name`. `title` is the text of the
+    file; `rows` is None where the length is known only when the values are read.
+    """
+
+    name: str
+    unit: str | None = None
+    group: str = ""
+    title: str = ""
+    rows: int | None = None
+    clock: Clock | None = None
+
+    def shown(self) -> str:
+        """The name for a message."""
+        return f"{self.group}/{self.name}"[:MOST_QUOTED] if self.group else self.name[:MOST_QUOTED]
+
+
+#: Reads columns [n] by their index, each with the channel that it is for: `time_s` may be points in time, and errors name
+#: it. Numbers come as any numeric type, points in time as datetime64 or timedelta64; a masked array marks the samples that
+#: the recorder says are invalid.
+Values = Callable[[Mapping[int, str]], Sequence[NDArray[Any]]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """A table as read. `above`: the lines over it; `first_line`: where its data begin (None: the format has no lines);
+    `head`: its first rows as text; `line_of` holds once the values are read."""
+
+    columns: tuple[Column, ...]
+    read: Values
+    name: str = ""
+    others: tuple[str, ...] = ()
+    above: tuple[tuple[str, ...], ...] = ()
+    first_line: int | None = None
+    head: tuple[tuple[str, ...], ...] = ()
+    line_of: LineOf | None = None
+    notices: tuple[Notice, ...] = ()
+
+
+def only(names: Sequence[str], wanted: str, what: str) -> int:
+    """The index of the table that is read among those of a file, by name or by number from 1.
+
+    Raises InvalidError where none is named and there are several, or the named one is not there.
+    """
+    if wanted:
+        if wanted in names:
+            return names.index(wanted)
+        if wanted.isdecimal() and 1 <= int(wanted) <= len(names):
+            return int(wanted) - 1
+    elif len(names) == 1:
+        return 0
+    shown = ", ".join(repr(name[:MOST_QUOTED]) for name in names[:10]) + (" ..." if len(names) > 10 else "")
+    missing = f"has no {what} {wanted[:MOST_QUOTED]!r}" if wanted else f"holds {len(names)} {what}s with channels"
+    message = f"the file {missing}: table=NAME chooses one of {shown}"
+    raise InvalidError(message, errors=[FieldError(pointer="/table", code="which_table", message=message)])
+
+
+def cut_short(what: str) -> InvalidError:
+    """The error of a file whose end is missing."""
+    message = f"the file is cut off: {what}"
+    return InvalidError(message, errors=[FieldError(pointer="", code="truncated", message=message)])
