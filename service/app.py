@@ -1,5 +1,6 @@
 """The application: its parts put together, nothing made at import."""
 
+import math
 import shutil
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
@@ -14,7 +15,7 @@ from service.dashboard import pages as dashboard
 from service.jobs import kinds
 from service.jobs.kinds import Kind
 from service.jobs.queue import JobQueue
-from service.jobs.workers import Lane, Workers, in_processes, in_threads
+from service.jobs.workers import CHANGE_SECONDS, Lane, Workers, in_processes, in_threads
 from service.queries.cache import AnswerCache
 from service.settings import CODE_VERSION, Settings
 from service.web import openapi, problems
@@ -60,7 +61,10 @@ def _kinds(database: Database, workers: Workers) -> Sequence[Mapping[str, Kind]]
     def adopt(job: JobRow, ended: Mapping[str, Any]) -> bool:
         function = partial(adopt_model.finish_and_adopt, claimer=job.claimed_by or "")
         arguments = (job.clutch_id, job.job_id, dict(ended), now(), job.arguments["adopt_by"])
-        return bool(workers.submit(Lane.ANSWERS, function, *arguments, turn=job.clutch_id).result())
+        adopting = workers.submit(
+            Lane.ANSWERS, function, *arguments, turn=job.clutch_id, seconds=CHANGE_SECONDS, patience=math.inf
+        )
+        return bool(adopting.result())
 
     def finish_diagnosis(job: JobRow, ended: Mapping[str, Any]) -> None:
         run_diagnosis.finish(database, job, ended, at=now(), adopt=adopt)
@@ -91,7 +95,10 @@ def create_app(settings: Settings) -> FastAPI:
         raw_records.use(database, settings.raw)
         folder = emptied_folder(database.path)
         log = (settings.log_format, settings.log_level)
-        workers = in_processes(database, settings.workers, log) if settings.workers else in_threads(database)
+        note = metrics.note_calls
+        workers = (
+            in_processes(database, settings.workers, log, note) if settings.workers else in_threads(database, note)
+        )
         queue = JobQueue(database, settings, _kinds(database, workers))
         readiness = Readiness(database, workers, queue, Needs(disk=settings.least_free, memory=settings.least_memory))
         try:

@@ -13,13 +13,14 @@ def score(
     """Score the prediction at every test of every life that has ended."""
     from service.lives.tracks import METHODS  # start-up time
     from service.queries import scores  # start-up time
-    from service.queries.cache import AnswerCache  # start-up time
-    from service.web.limits import MOST_CACHED_BYTES  # start-up time
+    from storage import clutches  # start-up time
 
     if method not in METHODS:
         fail(f"method must be one of {', '.join(METHODS)}, got {method!r}", EX_USAGE)
     with read_only(database) as opened:
-        fleet = scores.of_fleet(opened, AnswerCache(MOST_CACHED_BYTES), method=method)
+        with opened.reading() as connection:
+            clutch_ids = clutches.all_ids(connection)
+        fleet = scores.of_fleet((scores.of_clutch(opened, name, method) for name in clutch_ids), method=method)
     for life in fleet["lives"]:
         out.print(f"{life['clutch_id']}: ended at {life['end_of_life_cycles']:.0f} cycles", markup=False)
     if not fleet["lives"]:

@@ -3,9 +3,14 @@
 import gc
 import importlib
 import os
+import pickle
 import signal
 import threading
-from collections.abc import Callable, Sequence
+import time
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from multiprocessing.connection import Connection
 from typing import Any
 
 from service import logging
@@ -24,6 +29,9 @@ LOADED_EARLY = (
 
 #: Seconds after a SIGTERM until which a worker works on. Chosen: longer than the service waits for requests when it stops.
 _LAST_SECONDS = 15.0
+
+#: [s] Between two signs of life. Chosen: a tenth of the silence after which a process is ended.
+_BEAT = 1.0
 
 _opened: list[Database] = []
 
@@ -48,10 +56,47 @@ def begin(database_url: str, nice: int | None, log: tuple[logging.LogFormat, log
     _opened.append(open_database(database_url))
 
 
-def call(function: Callable[..., Any], arguments: Sequence[Any], request: str) -> Any:
-    """What `function(database, *arguments)` returns or raises; what it logs is of the `request` with that id."""
-    logging.request_id.set(request)
-    return function(_opened[0], *arguments)
+def main(
+    line: Connection, database_url: str, nice: int | None, log: tuple[logging.LogFormat, logging.LogLevel]
+) -> None:
+    """Make the calls that come over the line and answer with what each returns or raises, until its other end is closed.
+
+    Each second, and once it is ready, it says that it is there, whatever it does.
+    """
+    sending = threading.Lock()
+
+    def send(message: Any) -> None:
+        with sending:
+            line.send(message)
+
+    threading.Thread(target=_beat, args=(send,), daemon=True).start()
+    begin(database_url, nice, log)
+    with suppress(EOFError, OSError):  # the service has closed the line, or has ended
+        send(())
+        while True:
+            answer = _answered(line.recv_bytes())
+            try:
+                send(answer)
+            except (TypeError, AttributeError, ValueError, pickle.PicklingError) as error:
+                send((None, RuntimeError(f"the result cannot be sent: {error}")))
+
+
+def _answered(asked: bytes) -> tuple[Any, BaseException | None]:
+    """What a call returns, or raises with where it was raised."""
+    try:
+        function, arguments, request = pickle.loads(asked)  # noqa: S301  (of our own service)
+        logging.request_id.set(request)
+        return function(_opened[0], *arguments), None
+    except BaseException as error:  # noqa: BLE001  (raised again for who asked)
+        error.add_note("".join(traceback.format_exception(error)))
+        return None, error
+
+
+def _beat(send: Callable[[None], None]) -> None:
+    with suppress(OSError):
+        while True:
+            time.sleep(_BEAT)
+            send(None)
 
 
 def load(_: Database) -> None:

@@ -5,9 +5,8 @@ criterion's fraction of the initial mean COF, as the exact filter has it from al
 made of the tests up to then. Shares are of the whole life, from its origin to its end.
 """
 
-import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,9 +21,7 @@ from service.lives.history import Event, Life
 from service.lives.payloads import INSUFFICIENT
 from service.lives.prediction_at import predict_at
 from service.lives.tracks import CARRIED
-from service.queries.cache import AnswerCache
-from storage import clutches, results
-from storage.encoding.json_text import to_text
+from storage import results
 from storage.engine.database import Database
 
 #: α of the α-λ accuracy, of remaining life, and of the prognostic horizon, of the whole life.
@@ -50,15 +47,9 @@ def of_clutch(database: Database, clutch_id: str, method: str) -> dict[str, Any]
     return {"clutch_id": clutch_id, "method": method, "revision": state.revision, "items": items, "next": None}
 
 
-def of_fleet(database: Database, cache: AnswerCache, *, method: str) -> dict[str, Any]:
-    """All lives that came to their end, together and by stage of life."""
-    with database.reading() as connection:
-        revisions = clutches.revisions(connection)
-    lives = [
-        life | {"clutch_id": clutch_id}
-        for clutch_id, revision in revisions.items()
-        for life in _items(database, cache, clutch_id, revision, method)
-    ]
+def of_fleet(scored: Iterable[Mapping[str, Any]], *, method: str) -> dict[str, Any]:
+    """All lives that came to their end, together and by stage of life, of what `of_clutch` gives for each clutch."""
+    lives = [life | {"clutch_id": clutch["clutch_id"]} for clutch in scored for life in clutch["items"]]
     tests = [test for life in lives for test in life["predictions"]]
     stages = [
         {"share_of_life": stage} | summary([test for test in tests if abs(test["share_of_life"] - stage) <= HALF_STAGE])
@@ -73,14 +64,6 @@ def of_fleet(database: Database, cache: AnswerCache, *, method: str) -> dict[str
         "stages": stages,
         "pit_histogram": _histogram(tests),
     }
-
-
-def _items(database: Database, cache: AnswerCache, clutch_id: str, revision: int, method: str) -> list[dict[str, Any]]:
-    """A clutch's scored lives, kept by its revision."""
-    key = (clutch_id, "scores", method)
-    answer = cache.answer(key, revision, lambda: to_text(of_clutch(database, clutch_id, method)).encode())
-    items: list[dict[str, Any]] = json.loads(answer.body)["items"]
-    return items
 
 
 def end_of_life(clutch_id: str, life: Life, assumptions: Assumptions, fraction: float) -> float | None:

@@ -4,6 +4,7 @@ Other bodies that are JSON come in here too. Whatever is sent, memory stays with
 """
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import pydantic
@@ -54,6 +55,11 @@ def read_run(body: bytes) -> IncomingRun:
         channels=check_columns(columns) if columns else {},
         details=details,
     )
+
+
+def read_run_on_disk(path: Path) -> IncomingRun:
+    """The same of a body that was kept as a file while it waited."""
+    return read_run(path.read_bytes())
 
 
 def checked(schema: type[Body], body: bytes) -> Body:

@@ -17,6 +17,7 @@ from fastapi.responses import Response
 from pydantic import BaseModel
 from starlette.datastructures import MutableHeaders
 from starlette.middleware.gzip import GZipMiddleware
+from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.errors import NotFoundError, UnsupportedMediaTypeError
@@ -32,6 +33,7 @@ from service.web.problems import refused
 from service.web.revalidation import Made
 from service.web.tables import Rows, RowsAndNext, encode_page, sliced_rows
 from service.web.unpacking import Unpacked
+from storage import clutches
 
 JSON_TYPE = "application/json"
 CSV_TYPE = "text/csv; charset=utf-8"
@@ -116,7 +118,8 @@ async def computed_answer(
     """A GET's answer that takes long: `query(database, clutch_id, *arguments)`, computed by a worker of that lane; a page of
     its items where one was asked for. `prefer` is what the sender prefers. Raises NotFoundError."""
     after = from_cursor(cursor)
-    revision, whole = await _computed(request, context, clutch_id, query, arguments, prefer, lane)
+    revision = _revision(request, clutch_id)
+    revision, whole = await _computed(request, context, clutch_id, revision, query, arguments, prefer, lane)
     if limit == ALL_ITEMS and after is None:
         remember(request, _computed_again(context, clutch_id, query, arguments))
         return tagged(request, whole, JSON_TYPE, revision)
@@ -143,7 +146,8 @@ async def computed_table(
 ) -> Response:
     """The CSV export of the same: a page of the `rows` of its JSON, which may be a page itself. Raises NotFoundError."""
     after = from_cursor(cursor)
-    revision, whole = await _computed(request, context, clutch_id, query, arguments, prefer)
+    revision = _revision(request, clutch_id)
+    revision, whole = await _computed(request, context, clutch_id, revision, query, arguments, prefer)
 
     def one_page() -> Page:
         items, following = sliced_rows(rows(json.loads(whole.body)), limit, after)
@@ -153,10 +157,33 @@ async def computed_table(
     return tagged(request, await kept(context, key, revision, one_page), CSV_TYPE, revision)
 
 
+async def computed_of_each(
+    request: Request, context: Context, query: Callable[..., dict[str, Any]], *arguments: Hashable
+) -> list[dict[str, Any]]:
+    """The newest answers of a query about each clutch, one after the other: the same that are given for the clutch alone.
+
+    Raises ClientDisconnect where nobody waits for them any more.
+    """
+
+    def newest() -> dict[str, int]:
+        with context.database.reading() as connection:
+            return clutches.revisions(connection)
+
+    made = []
+    for clutch_id, revision in (await run_in_threadpool(newest)).items():
+        if await request.is_disconnected():
+            raise ClientDisconnect
+        wait = f"wait={LONGEST_WAIT_SECONDS}"
+        _, whole = await _computed(request, context, clutch_id, revision, query, arguments, wait)
+        made.append(await run_in_threadpool(json.loads, whole.body))
+    return made
+
+
 async def _computed(
     request: Request,
     context: Context,
     clutch_id: str,
+    revision: int,
     query: Callable[..., dict[str, Any]],
     arguments: tuple[Hashable, ...],
     prefer: str | None,
@@ -171,7 +198,6 @@ async def _computed(
         return context.workers.submit(among, revision_and_json, query, clutch_id, arguments, turn=turn)
 
     key = (clutch_id, name_of(query), *arguments)
-    revision = _revision(request, clutch_id)
     if not arguments and not context.revalidation.knows(key):
         shared = await run_in_threadpool(shared_answer, context.database, query, clutch_id)
         if shared is not None:
@@ -243,10 +269,15 @@ def unchanged(request: Request, headers: Mapping[str, str]) -> Response | None:
 
 async def json_body(request: Request) -> bytes:
     """The body of a request that says it is JSON; a browser cannot send such a one across sites unasked."""
+    require_json(request)
+    return await request.body()
+
+
+def require_json(request: Request) -> None:
+    """Raise UnsupportedMediaTypeError where a request does not say that its body is JSON."""
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind != "application/json" and not kind.endswith("+json"):
         raise UnsupportedMediaTypeError(f"send the body as application/json, not as {kind[:80]!r}")
-    return await request.body()
 
 
 def described_body(schema: type[BaseModel] | dict[str, Any], example: dict[str, Any]) -> dict[str, Any]:

@@ -4,12 +4,15 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import AsyncIterable, AsyncIterator, Iterator, Mapping, Sequence
+from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import IO, BinaryIO
 
 from fastapi import Request
 from fastapi.responses import Response, StreamingResponse
+
+from service.web.limits import MAX_BYTES_IN_MEMORY
 
 PARQUET_TYPE = "application/vnd.apache.parquet"
 #: Bytes of a file that are sent at once. Chosen: a few writes to the socket.
@@ -28,6 +31,31 @@ def emptied_folder(database: Path | None) -> Path:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(mode=0o700, exist_ok=True)
     return folder
+
+
+@asynccontextmanager
+async def kept_body(request: Request, folder: Path) -> AsyncIterator[bytes | Path]:
+    """A request's body: in memory where it is short, else as a file in the folder, which is removed in the end."""
+    pieces, taken = request.stream(), bytearray()
+    async for piece in pieces:
+        taken += piece
+        if len(taken) > MAX_BYTES_IN_MEMORY:
+            break
+    else:
+        yield bytes(taken)
+        return
+    with tempfile.NamedTemporaryFile(dir=folder) as file:
+        file.write(taken)
+        taken.clear()
+        await written(pieces, file)
+        yield Path(file.name)
+
+
+async def written(pieces: AsyncIterable[bytes], file: IO[bytes]) -> None:
+    """Write what arrives to a file as it does."""
+    async for piece in pieces:
+        file.write(piece)
+    file.flush()
 
 
 def preferred(request: Request, media_types: Sequence[str]) -> str:

@@ -5,6 +5,11 @@ MOST_CACHED_BYTES = 96 << 20
 #: Bytes of JSON from which a run waits among files, lest it hold up short ones. Chosen: plateaus take some 10 kB, a dynamic
 #: test 300.
 LARGE_BODY_BYTES = 1 << 17
+#: Bytes of a JSON run that stay in memory while it waits; a longer one is a file meanwhile. And bytes that the bodies of all
+#: requests may have in memory together; those on disk twice what the largest file may have. More are refused with 503.
+#: Chosen: plateaus and dynamic tests are shorter; a container of 1 GiB has 300 MiB of processes, and a body is there up to
+#: three times while it is passed on.
+MAX_BYTES_IN_MEMORY, MAX_BODIES_IN_MEMORY = 1 << 20, 64 << 20
 #: Bytes of any other body. Chosen: four times a plan of 1,000 blocks; checking the worst takes some 20 ms.
 MOST_SHORT_BODY_BYTES = 1 << 18
 #: Bytes of answers that are kept as they were while newer ones are computed. Chosen: some hundred `/degradation`.

@@ -3,53 +3,99 @@
 They cost the same however many clutches are stored; series of every clutch are there only where they are asked for.
 """
 
+import os
 from collections.abc import Iterator
+from functools import partial
+from operator import add
+from pathlib import Path
 
-from prometheus_client import CollectorRegistry, Counter, Histogram, ProcessCollector, generate_latest
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector, generate_latest
 from prometheus_client.core import GaugeMetricFamily, Metric
+from prometheus_client.multiprocess import MultiProcessCollector, mark_process_dead
 from prometheus_client.registry import Collector
 
-from service.jobs.workers import Workers
+from service.jobs.workers import Lane
 from service.queries import clutch_list
 from service.queries.totals import totals
 from service.web.limits import METRICS_PAGE
 from storage.engine.database import Database
 
+#: Where several processes keep their numbers, for prometheus_client, which reads it when it is imported.
+FOLDER_VARIABLE = "PROMETHEUS_MULTIPROC_DIR"
 MEDIA_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 
 
 class Metrics:
     """One service's metrics; nothing is shared between services in one process.
 
-    `each_clutch`: with series of every clutch.
+    `each_clutch`: with series of every clutch. Where several processes answer at one port, each keeps its numbers in files
+    of one folder, and whichever is asked adds up those of all.
     """
 
     def __init__(self, *, each_clutch: bool = False) -> None:
         self._each_clutch = each_clutch
         self._registry = CollectorRegistry()
-        ProcessCollector(registry=self._registry)
         labels = ("method", "route", "status")
         self.requests = Counter("clutchlife_requests", "Requests answered", labels, registry=self._registry)
         self.seconds = Histogram("clutchlife_request_seconds", "Time to answer", labels[:2], registry=self._registry)
+        text = "Calls that wait or run"
+        self._calls = Gauge(
+            "clutchlife_worker_calls", text, ["lane"], registry=self._registry, multiprocess_mode="livesum"
+        )
+        for lane in Lane:
+            self.note_calls(lane, 0)
 
-    def exposition(self, database: Database, workers: Workers) -> bytes:
+    def note_calls(self, lane: Lane, count: int) -> None:
+        """So many calls of a lane wait or run in this process."""
+        self._calls.labels(lane.name.lower()).set(count)
+
+    def exposition(self, database: Database) -> bytes:
         """All metrics as text, the clutches as they stand now."""
         present = CollectorRegistry()
-        present.register(Present(database, workers))
+        present.register(Present(database))
         if self._each_clutch:
             present.register(Clutches(database))
-        return generate_latest(self._registry) + generate_latest(present)
+        folder = os.environ.get(FOLDER_VARIABLE)
+        if folder is None:
+            ProcessCollector(registry=present)
+            return generate_latest(self._registry) + generate_latest(present)
+        present.register(Processes(Path(folder)))
+        MultiProcessCollector(present, folder)  # type: ignore[no-untyped-call]
+        return generate_latest(present)
+
+
+class Processes(Collector):
+    """What the processes that write into a folder take of the machine together; of one that has ended only counts stay."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def collect(self) -> Iterator[Metric]:
+        """The sums, and when the first of them was started."""
+        found: dict[str, Metric] = {}
+        for number in {path.stem.rpartition("_")[2] for path in self._folder.glob("*.db")}:
+            if not Path("/proc", number).exists():
+                mark_process_dead(int(number), str(self._folder))  # type: ignore[no-untyped-call]
+                continue
+            own = CollectorRegistry()
+            ProcessCollector(registry=own, pid=partial(int, number))
+            for metric in own.collect():
+                sum_up = min if metric.name == "process_start_time_seconds" else add
+                kept = found.setdefault(metric.name, metric)
+                if kept is not metric:
+                    pairs = zip(kept.samples, metric.samples, strict=True)
+                    kept.samples = [one._replace(value=sum_up(one.value, other.value)) for one, other in pairs]
+        yield from found.values()
 
 
 class Present(Collector):
     """What is there now and what waits, in numbers of all clutches together."""
 
-    def __init__(self, database: Database, workers: Workers) -> None:
+    def __init__(self, database: Database) -> None:
         self._database = database
-        self._workers = workers
 
     def collect(self) -> Iterator[Metric]:
-        """The gauges, from a few statements that give a row each, and from the queues."""
+        """The gauges, from a few statements that give a row each."""
         numbers = totals(self._database)
         yield GaugeMetricFamily("clutchlife_clutches", "Clutches, archived ones too", value=numbers.clutches)
         text = "Clutches in use that have at most so many cycles left (the median); 0: at their end of life"
@@ -61,10 +107,6 @@ class Present(Collector):
         yield GaugeMetricFamily("clutchlife_runs_held", "Runs that wait to be confirmed", value=numbers.held)
         text = "Ended lives that the priors of fleets know of"
         yield GaugeMetricFamily("clutchlife_ended_lives", text, value=numbers.ended_lives)
-        calls = GaugeMetricFamily("clutchlife_worker_calls", "Calls that wait or run", labels=["lane"])
-        for lane, count in self._workers.calls().items():
-            calls.add_metric([lane.name.lower()], count)
-        yield calls
         text = "Diagnoses that wait or run"
         yield GaugeMetricFamily("clutchlife_diagnoses_waiting", text, value=numbers.diagnoses)
 

@@ -22,7 +22,7 @@ from starlette.datastructures import MutableHeaders, QueryParams
 from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.errors import ServiceError, TooLargeError, TooManyError, TooSlowError
+from service.errors import BusyError, ServiceError, TooLargeError, TooManyError, TooSlowError
 from service.logging import access, log_request, request_id, sane
 from service.web import limits
 from service.web.auth import UNMATCHED, authorise, caller_of, clutch_of, context_of, glance_at, route_of
@@ -111,50 +111,124 @@ class _Share:
     running: int = 0
 
 
+class Room:
+    """Bytes that all requests share; used from the event loop alone."""
+
+    def __init__(self, most: int) -> None:
+        self._left = most
+
+    def take(self, size: int) -> bool:
+        """Whether there is room for so many more, which are then taken."""
+        if size > self._left:
+            return False
+        self._left -= size
+        return True
+
+    def give_back(self, size: int) -> None:
+        """So many are gone."""
+        self._left += size
+
+
+@dataclass(frozen=True, slots=True)
+class _Bound:
+    """Bytes of a body at an address, and how many of them stay in memory where the rest is kept on disk."""
+
+    most: int
+    in_memory: int
+
+
 class BodyLimit:
     """Refuses a body over the bytes of its address with 413, announced or grown so far, and one that takes longer than
-    `seconds`, and the time that its bytes so far may take, with 408."""
+    `seconds`, and the time that its bytes so far may take, with 408.
+
+    One for which the bodies that are here leave no room is refused with 503. It is read to its end first, and thrown away:
+    a sender hears of it only then.
+    """
 
     def __init__(self, app: ASGIApp, most: int, most_file: int, seconds: float) -> None:
         self.app = app
-        self.most = {
-            "/runs/file": most_file,
-            "/runs": most,
-            "/photographs": most,
-            "": min(most, limits.MOST_SHORT_BODY_BYTES),
+        short = min(most, limits.MOST_SHORT_BODY_BYTES)
+        self.bounds = {
+            "/runs/file": _Bound(most_file, 0),
+            "/runs": _Bound(most, limits.MAX_BYTES_IN_MEMORY),
+            "/photographs": _Bound(most, most),
+            "": _Bound(short, short),
         }
+        self.memory, self.disk = Room(limits.MAX_BODIES_IN_MEMORY), Room(2 * max(most, most_file))
         self.seconds = seconds
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        most = next(most for end, most in self.most.items() if scope["path"].endswith(end))
-        detail = f"a request may hold at most {most} bytes here"
+        bound = next(bound for end, bound in self.bounds.items() if scope["path"].endswith(end))
+        detail = f"a request may hold at most {bound.most} bytes here"
         announced = dict(scope["headers"]).get(b"content-length", b"0")
-        if announced.isdigit() and int(announced) > most:
+        if announced.isdigit() and int(announced) > bound.most:
             await refused(TooLargeError, detail)(scope, receive, send)
             return
-        taken, whole, clock = 0, False, asyncio.get_running_loop().time
-        begun = clock()
+        body = _Body(self, bound)
+        clock = asyncio.get_running_loop().time
+        begun, whole = clock(), False
 
-        async def counted() -> Message:
-            nonlocal taken, whole
-            if whole:  # what comes now is that the caller has gone
-                return await receive()
-            left = begun + self.seconds + taken / limits.SLOWEST_BODY_BYTES_PER_SECOND - clock()
+        async def arrived() -> Message:
+            left = begun + self.seconds + body.taken / limits.SLOWEST_BODY_BYTES_PER_SECOND - clock()
             try:
                 async with asyncio.timeout(left):
-                    message = await receive()
+                    return await receive()
             except TimeoutError:
-                raise TooSlowError(f"{taken} bytes of the body arrived in {clock() - begun:.0f} s") from None
-            taken += len(message.get("body", b""))
-            whole = not message.get("more_body", False)
-            if taken > most:
-                raise TooLargeError(detail)
-            return message
+                raise TooSlowError(f"{body.taken} bytes of the body arrived in {clock() - begun:.0f} s") from None
 
-        await self.app(scope, counted, send)
+        async def counted() -> Message:
+            nonlocal whole
+            if whole:  # what comes now is that the caller has gone
+                return await receive()
+            while True:
+                message = await arrived()
+                whole = not message.get("more_body", False)
+                has_room = body.grow(len(message.get("body", b"")))
+                if body.taken > bound.most:
+                    raise TooLargeError(detail)
+                if has_room:
+                    return message
+                if whole:
+                    raise BusyError(
+                        "the bodies of other requests take all room that there is: send it again in a while"
+                    )
+
+        try:
+            await self.app(scope, counted, send)
+        finally:
+            body.leave()
+
+
+class _Body:
+    """The body of a request as far as it has arrived, and the room that it takes."""
+
+    def __init__(self, limit: BodyLimit, bound: _Bound) -> None:
+        self.taken = 0
+        self._limit, self._bound = limit, bound
+        self._held = {limit.memory: 0, limit.disk: 0}
+        self._has_room = True
+
+    def grow(self, size: int) -> bool:
+        """Whether so many bytes more have room; what has none takes none any more."""
+        self.taken += size
+        in_memory = min(self.taken, self._bound.in_memory)
+        needed = {self._limit.memory: in_memory, self._limit.disk: self.taken - in_memory}
+        for room, most in needed.items():
+            if self._has_room and most > self._held[room]:
+                self._has_room = room.take(most - self._held[room])
+                self._held[room] = most if self._has_room else self._held[room]
+        if not self._has_room:
+            self.leave()
+        return self._has_room
+
+    def leave(self) -> None:
+        """Give back what it takes."""
+        for room, size in self._held.items():
+            room.give_back(size)
+            self._held[room] = 0
 
 
 class Heads:

@@ -9,7 +9,6 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from service.errors import BusyError
 from service.jobs.queue import JobQueue
 from service.jobs.workers import Workers
 from service.web.limits import LONGEST_LOOK_SECONDS, LONGEST_RAW_LOOK_SECONDS, RAW_LOOK_SECONDS
@@ -105,10 +104,7 @@ class Readiness:
     def _fault_of_workers(self) -> str | None:
         if not self._jobs.is_working():
             return "a thread that does jobs has ended"
-        try:
-            ended = self._workers.ended()
-        except BusyError:
-            return "the service is ending"
+        ended = self._workers.ended()
         if not ended:
             return None
         lanes = ", ".join(lane.name.lower() for lane in ended)

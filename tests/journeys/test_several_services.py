@@ -15,6 +15,7 @@ from typing import Any
 import httpx2
 import pytest
 
+from tests.service.test_connections import resident
 from tests.service.web.test_stopping import family
 from tests.service.workflows import stand_in_engine
 from tests.storage.engine.postgresql.server import PostgresServer
@@ -150,11 +151,20 @@ def test_processes_behind_one_port_answer_are_replaced_and_stop(address: str, mo
         for cycles in range(0, 5000, 500):
             ONCE.post(f"{url}{CLUTCH}/runs", json=stationary(cycles)).raise_for_status()
             assert len(ONCE.get(f"{url}{CLUTCH}/runs").json()["items"]) == cycles // 500 + 1
+        for _ in range(5):  # whichever is asked, all that was answered by either is counted
+            text = ONCE.get(f"{url}/metrics").text
+            posted = 'clutchlife_requests_total{method="POST",route="/v1/clutches/{clutch_id}/runs",status="201"} 10.0'
+            assert posted in text
+            assert 'clutchlife_worker_calls{lane="runs"} 0.0' in text
+            both = sum(resident(pid) for pid in answering(service.pid))
+            together = float(text.partition("\nprocess_resident_memory_bytes ")[2].partition("\n")[0])
+            assert 0.8 * both < together < 1.2 * both
         killed = answering(service.pid).pop()
         os.kill(killed, signal.SIGKILL)
         answering(service.pid, killed)
         wait_until_ready(url, lambda: service.poll() is not None)
         assert len(ONCE.get(f"{url}{CLUTCH}/runs").json()["items"]) == 10
+        assert posted in ONCE.get(f"{url}/metrics").text, "what the killed one has answered stays counted"
         service.send_signal(signal.SIGTERM)
         assert service.wait(60) == 0
     finally:

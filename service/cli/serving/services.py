@@ -4,6 +4,7 @@ import gc
 import multiprocessing
 import os
 import signal
+import tempfile
 import threading
 from typing import Any
 
@@ -17,6 +18,7 @@ from service.app import create_app
 from service.connections import allow_many, bounded
 from service.logging import configure
 from service.settings import Settings
+from service.web.metrics import FOLDER_VARIABLE
 
 #: [s] After which a process that does not answer its parent is taken for hung, and replaced. Chosen: one that starts loads
 #: the libraries first, beside all others on a busy machine.
@@ -54,7 +56,9 @@ def serve_several(settings: Settings, processes: int, options: dict[str, Any]) -
         **options,
     )
     supervisor = Multiprocess(config, [config.bind_socket()])
-    supervisor.run()
+    with tempfile.TemporaryDirectory(prefix="clutchlife-metrics-") as folder:
+        os.environ[FOLDER_VARIABLE] = folder
+        supervisor.run()
     return all(process.exitcode != STARTUP_FAILURE for process in supervisor.processes)
 
 

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
-from service.jobs.workers import Lane
+from service.jobs.workers import CHANGE_SECONDS, Lane
 from service.lists import from_cursor, page
 from service.queries import clutch_list, runs
 from service.queries.cache import to_json
@@ -155,7 +155,10 @@ async def edit_clutch(request: Request, context: Admin, clutch_id: ClutchId) -> 
     """Edit a clutch's record, each given field as a whole, and archive it or bring it back; results are computed anew."""
     wanted = checked(ClutchEdit, await json_body(request))
     made = partial(edit, archived=wanted.archived, reason=wanted.reason, by=name_of_caller(request), at=now())
-    await asyncio.wrap_future(context.workers.submit(Lane.RUNS, made, clutch_id, wanted.fields(), turn=clutch_id))
+    editing = context.workers.submit(
+        Lane.RUNS, made, clutch_id, wanted.fields(), turn=clutch_id, seconds=CHANGE_SECONDS
+    )
+    await asyncio.wrap_future(editing)
     clutch = await run_in_threadpool(clutch_list.look_up, context.database, clutch_id)
     return Response(content=to_json(clutch), media_type=JSON_TYPE)
 

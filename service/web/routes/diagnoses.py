@@ -8,7 +8,7 @@ from fastapi import APIRouter, Header, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
-from service.jobs.workers import Lane
+from service.jobs.workers import CHANGE_SECONDS, Lane
 from service.lists import from_cursor, page
 from service.logging import request_id
 from service.queries import diagnoses, model
@@ -96,7 +96,14 @@ async def put_model(request: Request, context: Admin, clutch_id: ClutchId) -> Re
     """Adopt what a diagnosis found, or return to the baseline; all is tracked anew before this is answered."""
     wanted = checked(ModelIn, await json_body(request))
     adopting = context.workers.submit(
-        Lane.RUNS, adopt_model.adopt, clutch_id, wanted.diagnosis_id, now(), name_of_caller(request), turn=clutch_id
+        Lane.RUNS,
+        adopt_model.adopt,
+        clutch_id,
+        wanted.diagnosis_id,
+        now(),
+        name_of_caller(request),
+        turn=clutch_id,
+        seconds=CHANGE_SECONDS,
     )
     await asyncio.wrap_future(adopting)
     answered = await run_in_threadpool(model.model, context.database, clutch_id)

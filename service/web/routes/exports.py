@@ -12,7 +12,7 @@ from service.queries.life import remaining_life
 from service.schemas.curves import LoopItem, SeriesItem
 from service.schemas.parameters import ClutchId, LifeNumber, Quantity, State, TrackedQuantity
 from service.schemas.prognosis.life import Method
-from service.web.answers import clutch_table, computed_table, table
+from service.web.answers import clutch_table, computed_of_each, computed_table, table
 from service.web.auth import Reader
 from service.web.context import AtCycles, Cursor, Prefer, PressureBar, Whole
 from service.web.problems import READING
@@ -204,9 +204,10 @@ async def fleet_scores_csv(
 ) -> Response:
     """How right the predictions of all were, a row a stage of life, the last one all of them."""
     after = from_cursor(cursor)
+    scored = await computed_of_each(request, context, scores.of_clutch, method)
 
     def make() -> RowsAndNext:
-        payload = scores.of_fleet(context.database, context.cache, method=method)
+        payload = scores.of_fleet(scored, method=method)
         return sliced_rows([*payload["stages"], {"share_of_life": None} | payload["overall"]], limit, after)
 
     return await table(request, ("share_of_life",), make)

@@ -35,7 +35,7 @@ from service.schemas.parameters import (
 from service.schemas.run import Receipt
 from service.web.answers import JSON_TYPE, now, unchanged
 from service.web.auth import Ingester, Reader, name_of_caller
-from service.web.files import streamed
+from service.web.files import streamed, written
 from service.web.problems import READING, SENDING, described
 from service.workflows.ingest_run import ingest_posted
 from storage.encoding.json_text import to_text
@@ -132,8 +132,7 @@ async def _save(request: Request, path: Path, filename: str) -> str:
     """Write the file to disk as it arrives; returns what its sender calls it."""
     if not request.headers.get("content-type", "").startswith("multipart/form-data"):
         with path.open("wb") as file:
-            async for chunk in request.stream():
-                file.write(chunk)
+            await written(request.stream(), file)
         return filename
     async with request.form(max_files=1, max_fields=8) as form:
         sent = next((part for part in form.values() if isinstance(part, UploadFile)), None)

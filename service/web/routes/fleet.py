@@ -7,7 +7,7 @@ from service.lists import ALL_ITEMS, from_cursor, sliced
 from service.queries import fleet_priors, scores
 from service.schemas.fleet import FleetPriorPage, FleetScores
 from service.schemas.prognosis.life import Method
-from service.web.answers import answer
+from service.web.answers import answer, computed_of_each
 from service.web.auth import Reader
 from service.web.context import Cursor, Whole
 from service.web.problems import READING
@@ -25,4 +25,5 @@ async def priors(request: Request, context: Reader, limit: Whole = ALL_ITEMS, cu
 @router.get("/scores", response_model=FleetScores, responses=READING)
 async def fleet_scores(request: Request, context: Reader, method: Method = "particle") -> Response:
     """How right the predictions of all lives were that came to their end."""
-    return await answer(request, lambda: scores.of_fleet(context.database, context.cache, method=method))
+    scored = await computed_of_each(request, context, scores.of_clutch, method)
+    return await answer(request, lambda: scores.of_fleet(scored, method=method))

@@ -12,17 +12,17 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
 from service.errors import NotAcceptableError, NotFoundError
-from service.jobs.workers import Lane
+from service.jobs.workers import CHANGE_SECONDS, Lane
 from service.lists import from_cursor
 from service.queries import runs
 from service.queries.raw_run.answer import Kind, entity_tag, write_run
-from service.run_files.json_run import checked, read_run
+from service.run_files.json_run import checked, read_run, read_run_on_disk
 from service.schemas.parameters import ClutchId, Points, RunId, State
 from service.schemas.run import RUN_IN, Confirmation, Correction, Receipt, RunOut, RunPage, Withdrawal
-from service.web.answers import JSON_TYPE, clutch_answer, described_body, json_body, now, unchanged
+from service.web.answers import JSON_TYPE, clutch_answer, described_body, json_body, now, require_json, unchanged
 from service.web.auth import Admin, Ingester, Reader, name_of_caller
 from service.web.context import Context, Cursor, Limit
-from service.web.files import PARQUET_TYPE, preferred, streamed
+from service.web.files import PARQUET_TYPE, kept_body, preferred, streamed
 from service.web.limits import LARGE_BODY_BYTES, USUAL_ITEMS
 from service.web.problems import CHANGING, READING, SENDING, described
 from service.workflows import change_run
@@ -59,13 +59,20 @@ EXAMPLE = {
 )
 async def post_run(request: Request, context: Ingester, clutch_id: ClutchId) -> Response:
     """Post a run, in any order of cycles. The receipt says what was made of it; by then it is stored for good."""
-    body = await json_body(request)
+    require_json(request)
     by = name_of_caller(request)
-    lane = Lane.RUNS if len(body) <= LARGE_BODY_BYTES else Lane.RECORDS
-    taken_in = context.workers.submit(
-        lane, ingest_posted, clutch_id, partial(read_run, body), now(), by, turn=clutch_id
-    )
-    receipt, new = await asyncio.wrap_future(taken_in)
+    async with kept_body(request, context.folder) as body:
+        is_short = isinstance(body, bytes) and len(body) <= LARGE_BODY_BYTES
+        taken_in = context.workers.submit(
+            Lane.RUNS if is_short else Lane.RECORDS,
+            ingest_posted,
+            clutch_id,
+            partial(read_run, body) if isinstance(body, bytes) else partial(read_run_on_disk, body),
+            now(),
+            by,
+            turn=clutch_id,
+        )
+        receipt, new = await asyncio.wrap_future(taken_in)
     headers = {"Location": f"/v1/clutches/{clutch_id}/runs/{receipt['run_id']}"}
     return Response(content=to_text(receipt), status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
 
@@ -175,5 +182,5 @@ async def _changed(
 ) -> Response:
     """The receipt after a change."""
     made = partial(change, **wanted, by=name_of_caller(request), at=now())
-    changing = context.workers.submit(Lane.RUNS, made, clutch_id, run_id, turn=clutch_id)
+    changing = context.workers.submit(Lane.RUNS, made, clutch_id, run_id, turn=clutch_id, seconds=CHANGE_SECONDS)
     return Response(content=to_text(await asyncio.wrap_future(changing)), media_type=JSON_TYPE)

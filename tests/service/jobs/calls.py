@@ -1,6 +1,7 @@
 """What the tests of the workers have called; each takes the database first."""
 
 import os
+import signal
 import time
 from pathlib import Path
 from typing import NoReturn
@@ -53,3 +54,17 @@ def dies(_: Database, mark: Path, times: int) -> str:
     if len(mark.read_text()) <= times:
         os._exit(9)
     return "alive"
+
+
+def stops(_: Database, mark: Path, times: int) -> str:
+    """Have the process stand still, as often as said; then answer."""
+    with mark.open("a") as file:
+        file.write("x")
+    if len(mark.read_text()) <= times:
+        os.kill(os.getpid(), signal.SIGSTOP)
+    return "alive"
+
+
+def unsendable(_: Database) -> object:
+    """What cannot be pickled."""
+    return lambda: None

@@ -3,6 +3,7 @@
 import multiprocessing
 import multiprocessing.connection
 import os
+import pickle
 import signal
 import time
 from collections.abc import Iterator
@@ -143,6 +144,83 @@ def test_a_lane_whose_processes_end_at_a_call_again_and_again_is_told_until_one_
         assert time.monotonic() < deadline, "no other process came up"
         time.sleep(0.05)
     assert isinstance(processes.submit(Lane.RUNS, calls.pid).result(IN_TIME), int)
+
+
+def test_a_process_that_stops_is_replaced_and_its_call_made_once_more(
+    processes: Workers, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "_SILENCE", 3.0)
+    stopped = processes.submit(Lane.RUNS, calls.pid).result(IN_TIME)
+    os.kill(stopped, signal.SIGSTOP)
+    assert processes.submit(Lane.RUNS, calls.pid).result(IN_TIME) != stopped
+    assert processes.submit(Lane.RUNS, calls.stops, tmp_path / "once", 1).result(IN_TIME) == "alive"
+    with pytest.raises(BusyError, match="has ended"):
+        processes.submit(Lane.RUNS, calls.stops, tmp_path / "twice", 2).result(IN_TIME)
+    assert processes.submit(Lane.RUNS, calls.ids).result(IN_TIME) == ["c1"]
+
+
+def test_an_idle_process_that_stops_is_told_and_replaced(processes: Workers, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_SILENCE", 3.0)
+    stopped = processes.submit(Lane.RUNS, calls.pid).result(IN_TIME)
+    os.kill(stopped, signal.SIGSTOP)
+    deadline = time.monotonic() + IN_TIME
+    while processes.ended() != [Lane.RUNS]:
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    while processes.ended():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    assert processes.submit(Lane.RUNS, calls.pid).result(IN_TIME) != stopped
+
+
+def test_what_starts_processes_is_replaced_where_it_stops(processes: Workers, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_SILENCE", 3.0)
+    stopped = processes.submit(Lane.RUNS, calls.pid).result(IN_TIME)
+    starter = int(Path(f"/proc/{stopped}/stat").read_text().rpartition(")")[2].split()[1])
+    for pid in (starter, stopped):
+        os.kill(pid, signal.SIGSTOP)
+    assert processes.submit(Lane.RUNS, calls.ids, patience=IN_TIME).result(IN_TIME) == ["c1"]
+    assert processes.submit(Lane.ANSWERS, calls.ids, patience=IN_TIME).result(IN_TIME) == ["c1"]
+    assert not Path(f"/proc/{starter}").exists() or "Z" in _state(starter)
+
+
+def test_a_call_that_takes_too_long_is_ended_with_its_process(processes: Workers, tmp_path: Path) -> None:
+    before = processes.submit(Lane.RUNS, calls.pid).result(IN_TIME)
+    with pytest.raises(BusyError, match=r"took longer than 0\.5 s"):
+        processes.submit(Lane.RUNS, calls.logged, tmp_path / "log", "a", tmp_path / "never", seconds=0.5).result(
+            IN_TIME
+        )
+    assert processes.submit(Lane.RUNS, calls.pid).result(IN_TIME) != before
+    assert (tmp_path / "log").read_text() == "+a "
+
+
+def test_a_call_that_waits_too_long_is_refused_and_never_begun(workers: Workers, tmp_path: Path) -> None:
+    gate, log = tmp_path / "gate", tmp_path / "log"
+    held = workers.submit(Lane.ANSWERS, calls.logged, log, "a", gate, turn="c1")
+    late = [
+        workers.submit(Lane.ANSWERS, calls.logged, log, "b", gate, turn=turn, patience=0.5) for turn in ("c1", "c2")
+    ]
+    for call in late:
+        with pytest.raises(BusyError, match="waited for"):
+            call.result(IN_TIME)
+    oldest = workers.oldest()
+    assert oldest is not None
+    assert oldest[0] is Lane.ANSWERS
+    assert 0 < oldest[1] < IN_TIME
+    gate.touch()
+    assert held.result(IN_TIME) == "a"
+    assert workers.submit(Lane.ANSWERS, calls.logged, log, "c", gate, turn="c1").result(IN_TIME) == "c"
+    assert log.read_text() == "+a -a +c -c "
+    assert (workers.are_idle(), workers.oldest()) == (True, None)
+
+
+def test_what_cannot_be_sent_is_an_error_and_ends_no_process(processes: Workers) -> None:
+    before = processes.submit(Lane.RUNS, calls.pid).result(IN_TIME)
+    with pytest.raises((AttributeError, TypeError, pickle.PicklingError)):
+        processes.submit(Lane.RUNS, lambda _: 1).result(IN_TIME)
+    with pytest.raises(RuntimeError, match="cannot be sent"):
+        processes.submit(Lane.RUNS, calls.unsendable).result(IN_TIME)
+    assert processes.submit(Lane.RUNS, calls.pid).result(IN_TIME) == before
 
 
 def test_nothing_is_begun_after_the_end(database: Database, tmp_path: Path) -> None:

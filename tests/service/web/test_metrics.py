@@ -1,8 +1,12 @@
 """Metrics count what happened, by route and not by name; of every clutch they speak only where that is asked for."""
 
+import os
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
@@ -128,3 +132,56 @@ def test_series_of_every_clutch_are_there_where_they_are_asked_for(database_url:
     health = next(line for line in lines if line.startswith('clutchlife_clutch_health{clutch="c1"}'))
     assert 0 < float(health.split()[-1]) <= 1
     assert any(line.startswith('clutchlife_clutch_remaining_cycles{clutch="c1",quantile="0.5"}') for line in lines)
+
+
+#: One of several processes at a port: it counts two requests and a call, then says all metrics.
+ONE_OF_SEVERAL = """
+import sys
+from service.jobs.workers import Lane
+from service.web.metrics import Metrics
+from storage.engine.opening import open_database
+metrics = Metrics()
+metrics.requests.labels("GET", "/a", "200").inc(2)
+metrics.note_calls(Lane.RUNS, 3)
+print(metrics.exposition(open_database(sys.argv[1])).decode() + "\\n", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_of_several_processes_at_a_port_all_are_counted(database_url: str, tmp_path: Path) -> None:
+    """Calls that wait are those of processes that are there; what one has answered that ended stays counted."""
+    folder = tmp_path / "metrics"
+    folder.mkdir()
+    environment = os.environ | {"PROMETHEUS_MULTIPROC_DIR": str(folder)}
+
+    def started() -> "subprocess.Popen[str]":
+        command = [sys.executable, "-c", ONE_OF_SEVERAL, database_url]
+        return subprocess.Popen(command, env=environment, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+
+    def said(process: "subprocess.Popen[str]") -> dict[str, float]:
+        assert process.stdout is not None
+        values = {}
+        for line in iter(process.stdout.readline, "\n"):
+            if not line.startswith("#"):
+                name, _, value = line.rpartition(" ")
+                values[name] = float(value)
+        return values
+
+    processes = [started()]
+    alone = said(processes[0])
+    processes.append(started())
+    both = said(processes[1])
+    processes[0].communicate()
+    processes.append(started())
+    after = said(processes[2])
+    for process in processes[1:]:
+        process.communicate()
+    asked, runs = (
+        'clutchlife_requests_total{method="GET",route="/a",status="200"}',
+        'clutchlife_worker_calls{lane="runs"}',
+    )
+    assert [seen[asked] for seen in (alone, both, after)] == [2, 4, 6]
+    assert [seen[runs] for seen in (alone, both, after)] == [3, 6, 6]
+    memory = "process_resident_memory_bytes"
+    assert 1.5 < both[memory] / alone[memory] < 2.5
+    assert 1.5 < after[memory] / alone[memory] < 2.5

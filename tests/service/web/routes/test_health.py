@@ -40,7 +40,7 @@ def service(database_url: str, **settings: Any) -> Iterator[TestClient]:
 def test_a_service_that_can_work_says_so(client: TestClient) -> None:
     answer = client.get("/readyz")
     assert answer.status_code == 200
-    assert answer.json() == {"status": "ready", "journal_mode": "wal", "checks": WHOLE}
+    assert answer.json() == {"status": "ready", "journal_mode": "wal", "checks": WHOLE, "oldest_call": None}
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,176 @@
+"""Whoever sends much, and whatever hangs, takes the service from nobody: bodies share room, hung processes are replaced."""
+
+import os
+import signal
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+from fastapi.testclient import TestClient
+
+from service.queries import scores
+from service.web import limits
+from storage.encoding.json_text import to_text
+from tests.service.clients import client_on
+from tests.service.test_connections import resident
+from tests.service.web.routes.granting import context_of
+from tests.service.web.test_stopping import family
+from tests.support import ONCE, serving, stationary
+
+RUNS = "/v1/clutches/c1/runs"
+
+
+def padded(cycles: float, size: int) -> bytes:
+    """A run of that many bytes."""
+    return to_text(stationary(cycles)).encode().ljust(size)
+
+
+@pytest.mark.slow
+def test_twelve_bodies_of_18_mib_raise_the_service_by_160_mib_at_most(tmp_path: Path) -> None:
+    """They raised it by 435 MiB."""
+    with serving(tmp_path / "a.db") as server:
+        with httpx2.Client(base_url=server.url, timeout=120) as http:
+            assert http.post("/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
+            assert (
+                http.post(RUNS, content=padded(0.0, 0), headers={"Content-Type": "application/json"}).status_code == 201
+            )
+        before, peak, ended = resident(server.pid), 0, threading.Event()
+
+        def look() -> None:
+            nonlocal peak
+            while not ended.wait(0.01):
+                peak = max(peak, resident(server.pid))
+
+        def post(number: int) -> httpx2.Response:
+            body = padded(1000.0 * (number + 1), 18 << 20)
+            with httpx2.Client(base_url=server.url, timeout=300) as http:
+                return http.post(RUNS, content=body, headers={"Content-Type": "application/json"})
+
+        looking = threading.Thread(target=look)
+        looking.start()
+        with ThreadPoolExecutor(12) as pool:
+            answers = list(pool.map(post, range(12)))
+        ended.set()
+        looking.join()
+        assert peak - before < 160 << 20, f"{(peak - before) >> 20} MiB"
+        assert {answer.status_code for answer in answers} <= {201, 503}
+        assert all("Retry-After" in answer.headers for answer in answers if answer.status_code == 503)
+        assert sum(answer.status_code == 201 for answer in answers) > 6
+        assert list((tmp_path / "a.db-files").iterdir()) == [], "no body is left on disk"
+
+
+@pytest.fixture
+def small(database_url: str, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """A service in which a body of 50 kB is long, and all together may have 100 kB in memory."""
+    monkeypatch.setattr(limits, "MAX_BODIES_IN_MEMORY", 100_000)
+    monkeypatch.setattr(limits, "MAX_BYTES_IN_MEMORY", 50_000)
+    monkeypatch.setattr("service.web.files.MAX_BYTES_IN_MEMORY", 50_000)
+    with client_on(database_url) as client:
+        assert client.post("/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
+        yield client
+
+
+def test_a_long_run_waits_on_disk_and_is_read_as_a_short_one_is(
+    small: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sent = {"Content-Type": "application/json"}
+    seen: list[list[str]] = []
+    submit = context_of(small).workers.submit
+
+    def noted(*arguments: Any, **more: Any) -> Any:
+        seen.append([path.name for path in context_of(small).folder.iterdir()])
+        return submit(*arguments, **more)
+
+    monkeypatch.setattr(context_of(small).workers, "submit", noted)
+    short, long = padded(0.0, 0), padded(1000.0, 200_000)
+    assert small.post(RUNS, content=short, headers=sent).status_code == 201
+    assert small.post(RUNS, content=long, headers=sent).status_code == 201
+    assert small.post(RUNS, content=long.rstrip(), headers=sent).json()["duplicate"]
+    assert [len(names) for names in seen[:2]] == [0, 1]
+    assert list(context_of(small).folder.iterdir()) == []
+    refused = small.post(RUNS, content=b"{" + long, headers=sent)
+    assert (refused.status_code, refused.json()["errors"][0]["code"]) == (422, "json_invalid")
+    assert list(context_of(small).folder.iterdir()) == []
+
+
+def test_bodies_for_which_there_is_no_room_are_refused_with_503_and_room_comes_back(small: TestClient) -> None:
+    sent = {"Content-Type": "application/json"}
+    for _ in range(5):
+        refused = small.post("/v1/clutches", content=b"{}".ljust(150_000), headers=sent)
+        assert (refused.status_code, refused.headers["Retry-After"]) == (503, "1")
+        assert "all room" in refused.json()["detail"]
+    for number in range(5):
+        body = to_text({"clutch_id": f"d{number}"}).encode().ljust(90_000)
+        assert small.post("/v1/clutches", content=body, headers=sent).status_code == 201
+
+
+def test_scores_of_the_fleet_are_computed_by_workers(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the exact filter they took a minute of the process that answers."""
+    assert client.post("/v1/clutches", json={"clutch_id": "c2"}).status_code == 201
+    for number in range(4):
+        assert client.post(RUNS, json=stationary(1000.0 * number, wear=0.2 * number)).status_code == 201
+    submit, submitted = context_of(client).workers.submit, []
+
+    def noted(lane: Any, function: Any, *arguments: Any, **more: Any) -> Any:
+        submitted.append(arguments[:2])
+        return submit(lane, function, *arguments, **more)
+
+    monkeypatch.setattr(context_of(client).workers, "submit", noted)
+    for address in ("/v1/fleet/scores?method=grid", "/v1/fleet/scores?method=grid", "/v1/fleet/scores.csv?method=grid"):
+        assert client.get(address).status_code == 200
+    assert submitted == [(scores.of_clutch, "c1"), (scores.of_clutch, "c2")], "and once"
+    own = client.get("/v1/clutches/c1/scores?method=grid").json()
+    fleet = client.get("/v1/fleet/scores?method=grid").json()
+    assert len(submitted) == 2
+    assert fleet["overall"]["predictions"] == sum(len(life["predictions"]) for life in own["items"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("at_work", [False, True], ids=["idle", "at work"])
+def test_every_post_is_answered_within_a_minute_where_every_child_is_stopped(tmp_path: Path, at_work: bool) -> None:
+    """The workers and what starts them: every POST hung for ever, and `/readyz` said ok."""
+    with serving(tmp_path / "a.db") as server, httpx2.Client(base_url=server.url, timeout=65) as http:
+        assert http.post("/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
+        assert http.post(RUNS, json=stationary(0.0)).status_code == 201
+        if at_work:
+            with suppress(httpx2.TimeoutException):
+                http.post(
+                    f"{RUNS}/{http.get(RUNS).json()['items'][0]['run_id']}/confirm", json={"reason": "a"}, timeout=0.01
+                )
+        children = [pid for pid in family(server.pid) if pid != server.pid]
+        assert len(children) > 3
+        for pid in children:
+            os.kill(pid, signal.SIGSTOP)
+        seen: set[str] = set()
+        ended = threading.Event()
+
+        def look() -> None:
+            while not ended.wait(0.2):
+                answer = ONCE.get(f"{server.url}/readyz").json()
+                seen.add(answer["checks"]["workers"])
+                if answer["oldest_call"] is not None:
+                    seen.add(answer["oldest_call"]["lane"])
+
+        def post(number: int) -> tuple[int, float]:
+            begun = time.monotonic()
+            status = ONCE.post(f"{server.url}{RUNS}", json=stationary(1000.0 + number), timeout=90).status_code
+            return status, time.monotonic() - begun
+
+        looking = threading.Thread(target=look)
+        looking.start()
+        with ThreadPoolExecutor(8) as pool:
+            answers = list(pool.map(post, range(8)))
+        ended.set()
+        looking.join()
+        assert max(seconds for _, seconds in answers) < 60
+        assert {status for status, _ in answers} <= {201, 503}
+        assert {"runs", "a worker process has ended and is being started again: runs"} <= seen
+        deadline = time.monotonic() + 60
+        while post(100)[0] not in (200, 201):
+            assert time.monotonic() < deadline, "it takes in no runs any more"
+        assert server.stop() == 0
