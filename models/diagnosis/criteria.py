@@ -178,6 +178,8 @@ WEAK_EVIDENCE, MODERATE_EVIDENCE, STRONG_EVIDENCE = 1.0, 3.0, 5.0
 RIVALS_MENTIONED, RIVAL_FROM, RIVAL_BELOW, VISIBLE_MENTIONED = 3, 0.001, 0.1, 3
 #: Probability from which an effect that was fitted beside a cause and is not named is mentioned (chosen).
 COMPANION_FROM = 0.3
+#: Held-out errors of so many times the fit's are explained in the paragraph (chosen: less is what gains make).
+FAR_FROM_FIT = 5.0
 #: An amplitude beyond so many prior deviations is larger than expected (chosen).
 LARGE_AMPLITUDE = 2.0
 #: Fewer states of use say little of a course over life (chosen).

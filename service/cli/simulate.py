@@ -39,6 +39,10 @@ def simulate(
         list[str] | None,
         typer.Option(metavar="EFFECT[:SIZE]", help="Hide an effect, to rehearse a diagnosis; may be repeated"),
     ] = None,
+    film: Annotated[
+        bool,
+        typer.Option("--film", help="Friction lags by the reference's ageing film as well; answer.json says so"),
+    ] = False,
     plate_rise: Annotated[
         float | None,
         typer.Option(
@@ -57,13 +61,12 @@ def simulate(
 
     The lining's roughness and skewness at each stationary test are written too, into a folder of inspections.
 
-    What --hide hides is in answer.json beside the runs, which push does not send; friction lags speed then as in the
-    service's own model, so that nothing else is there to be found. An unknown effect lists all of them.
+    Friction lags speed as in the service's own model, so that a diagnosis finds nothing. What --hide hides, and the film of
+    --film, is in answer.json beside the runs, which push does not send. An unknown effect lists all of them.
 
     Run-in and duty blocks are JSON whatever the format. Tests in another format are listed in runs.json, which push reads.
     """
     from models.rig import campaign, hidden, plate, stationary, surface  # start-up time
-    from models.rig.hysteresis import ATTRACTOR  # start-up time
     from models.rig.simulated_runs import RunKind  # start-up time
     from service.run_files import record_writer, simulated  # start-up time
 
@@ -74,11 +77,11 @@ def simulate(
         sizes = _sizes(hide or [])
         out_folder.mkdir(parents=True, exist_ok=True)
         clutch, clutch_id = campaign.simulated_clutch(seed), f"sim-{seed}"
+        if film:
+            sizes.setdefault("squeeze_film", clutch.lag.film_time)
+        clutch = hidden.clutch_for(clutch, sizes)
         if sizes:
-            clutch = hidden.clutch_for(clutch, sizes)
             manifest.write(out_folder / manifest.ANSWER, {"seed": seed, "hidden": hidden.described(sizes)})
-        else:
-            clutch = replace(clutch, lag=replace(clutch.lag, attractor=ATTRACTOR))
         manifest.write(out_folder / manifest.CLUTCH_FILE, simulated.simulated_clutch_body(clutch_id))
         wear_and_cycles: list[tuple[float, float]] = []
         listed: list[dict[str, Any]] = []

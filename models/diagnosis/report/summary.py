@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from models.diagnosis.attribution.verdict import Verdict
 from models.diagnosis.criteria import (
     COMPANION_FROM,
+    FAR_FROM_FIT,
     FEW_STATES,
     LARGE_AMPLITUDE,
     LEAST_NAMED,
@@ -16,6 +17,7 @@ from models.diagnosis.criteria import (
     WEAK_EVIDENCE,
     WORTHWHILE,
 )
+from models.diagnosis.design.axes import PRESSURE
 from models.diagnosis.detection.lack_of_fit import Misfit
 from models.diagnosis.detection.structure_axes import Where
 from models.diagnosis.effects.catalogue import BY_SLUG
@@ -218,6 +220,7 @@ def _gained(findings: Findings) -> list[str]:
         f"{number(gain.rmse_before)} Nm RMS ({change} {way}), noise and the scatter of gains included"
         f"{beyond if max(gain.excess_after, gain.excess_before) > 0 else ''}."
     )
+    error += _hardest(gain, findings.extended)
     if gain.rmse_after > gain.rmse_before and gain.log_score_gain < 0:
         error += " So it does not improve predictions there."
     ahead = (
@@ -226,6 +229,25 @@ def _gained(findings: Findings) -> list[str]:
         else "It predicts the last states from the first ones no better: it does not improve remaining life."
     )
     return [error, ahead]
+
+
+def _hardest(gain: Gain, extended: Misfit | None) -> str:
+    """Where held-out runs are predicted far worse than they were fitted, and how far from what was kept that is."""
+    hardest = gain.hardest
+    if hardest is None or extended is None or gain.rmse_after < FAR_FROM_FIT * extended.rmse:
+        return ""
+    pressed = hardest.axis == PRESSURE
+    size, unit = (1e-5, "bar") if pressed else (1.0, "cycles")
+    place = f"{'at' if pressed else 'after'} {number(size * hardest.value)} {unit}"
+    kept = (
+        f"{number(size * hardest.beyond)} {unit} beyond all that were kept"
+        if hardest.beyond > 0.0
+        else "between others that were kept"
+    )
+    return (
+        f" The model fits all runs together to {number(extended.rmse)} Nm. Held out, it errs most {place}, {kept}: by "
+        f"{number(hardest.rmse)} Nm RMS, with no gain of those runs known."
+    )
 
 
 def _next(findings: Findings) -> list[str]:

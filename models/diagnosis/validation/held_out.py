@@ -25,6 +25,7 @@ from models.diagnosis.criteria import (
     PRESSURE_FOLDS,
     STATE_FOLDS,
 )
+from models.diagnosis.design.axes import CYCLES, PRESSURE
 from models.diagnosis.design.design import Design
 from models.diagnosis.effects.fitted_effect import effect_columns, effect_precisions
 from models.diagnosis.noise.covariance import Noise, gains_of, whitened, without_gains
@@ -41,12 +42,23 @@ BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Hardest:
+    """Where the extended model's error on held-out rows is largest: `axis` (cycles, or pressure in Pa), the value there, RMS
+    error [Nm], and by how much the value is beyond all that were kept (0: it is among them)."""
+
+    axis: str
+    value: float
+    rmse: float
+    beyond: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Gain:
     """What the extension gains on runs held out by state and by pressure; rmse [Nm], log score [nats].
 
     `reduction_sd` [%] is the paired uncertainty of `reduction_percent`. `excess` [Nm] is the error beyond noise. MSE is
     eq. 5's percentage. `forecast_log_score_gain` [nats] is the gain of log score when the last states are predicted from the
-    first ones.
+    first ones. `hardest` is where the error after is largest.
     """
 
     held_out_runs: tuple[str, ...]
@@ -60,6 +72,7 @@ class Gain:
     mse_percent_after: float
     log_score_gain: float
     forecast_log_score_gain: float
+    hardest: Hardest | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,7 +114,23 @@ def measure_gain(problem: FitProblem, baseline: Fit, extended: Fit, rng: np.rand
         mse_percent_after=100 * float(np.mean(after**2)) / max(total, 1e-300),
         log_score_gain=sum(fold.score for fold in held) * design.torque.size / rows.size,
         forecast_log_score_gain=forecast,
+        hardest=max((one for fold in held for one in _groups(design, fold)), key=lambda one: one.rmse),
     )
+
+
+def _groups(design: Design, fold: _Held) -> list[Hardest]:
+    """The error after by the states, or the pressures, that a fold left out."""
+    groups = []
+    out = np.zeros(design.torque.size, dtype=np.bool_)
+    out[fold.rows] = True
+    for axis, values in ((CYCLES, design.rows.cycles), (PRESSURE, design.level)):
+        kept = np.unique(values[design.closed & ~out])
+        left = np.setdiff1d(values[out], kept)  # none along the other axis
+        for value in left.tolist():
+            beyond = max(value - float(kept[-1]), float(kept[0]) - value, 0.0)
+            error = _rms(fold.after[values[fold.rows] == value])
+            groups.append(Hardest(axis=axis, value=value, rmse=error, beyond=beyond))
+    return groups
 
 
 def _folds(design: Design) -> list[BoolArray]:

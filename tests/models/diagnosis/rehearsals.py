@@ -7,7 +7,6 @@ from typing import Any
 from models.diagnosis.campaign import Campaign, DutyRun, DynamicRun, StationaryRun
 from models.rig import campaign as rig
 from models.rig.hidden import clutch_for, hidden_in
-from models.rig.hysteresis import ATTRACTOR
 from models.rig.programme import Programme
 from models.rig.sampled import DynamicTest
 from models.rig.stationary import SHARP
@@ -23,8 +22,7 @@ def rehearsal(
 ) -> Campaign:
     """A simulated campaign; without `hidden` (sizes by slug) the one of `clutchlife simulate --seed SEED`."""
     sizes = hidden or {}
-    clutch = rig.simulated_clutch(seed)
-    clutch = clutch_for(clutch, sizes) if sizes else replace(clutch, lag=replace(clutch.lag, attractor=ATTRACTOR))
+    clutch = clutch_for(rig.simulated_clutch(seed), sizes)
     runs = rig.simulate(
         seed,
         clutch=clutch,

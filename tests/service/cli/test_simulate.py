@@ -58,3 +58,15 @@ def test_the_plate_is_measured_where_that_is_asked_for(tmp_path: Path) -> None:
 def test_what_cannot_be_hidden_is_refused_with_what_can(tmp_path: Path, arguments: tuple[str, ...], words: str) -> None:
     assert words in " ".join(simulated(tmp_path, *arguments, code=64).split())
     assert not (tmp_path / "answer.json").exists()
+
+
+def test_a_film_is_in_the_loops_only_where_it_is_asked_for_and_stated(tmp_path: Path) -> None:
+    """A plain campaign held one that nothing mentioned, and its clutch was out of specification."""
+    torques = []
+    for folder, options in ((tmp_path / "plain", ()), (tmp_path / "film", ("--film",))):
+        simulated(folder, *options)
+        torques.append(json.loads((folder / "sim-3-dynamic-00000.json").read_bytes())["channels"]["torque_nm"])
+    assert not (tmp_path / "plain" / "answer.json").exists()
+    (stated,) = json.loads((tmp_path / "film" / "answer.json").read_bytes())["hidden"]
+    assert stated["effect"] == "squeeze_film"
+    assert max(abs(a - b) for a, b in zip(*torques, strict=True)) > 0.1

@@ -14,7 +14,7 @@ from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.pooled_fit.run_scatter import RunScatter
 from models.diagnosis.report.report import Candidate, Visible
 from models.diagnosis.report.summary import Findings, summarise
-from models.diagnosis.validation.held_out import Gain
+from models.diagnosis.validation.held_out import Gain, Hardest
 
 MISFIT = Misfit(
     rmse=0.15234,
@@ -286,3 +286,26 @@ def test_how_much_runs_scatter_is_told_where_the_model_is_adequate() -> None:
     silent = summarise(replace(found, scatter=replace(scatter, information=0.1)))
     assert "from run to run (assumed to be 2.1 % of the torque, 1.5 to 3 %: these data hardly show it)" in silent
     assert "from run to run: the model" in summarise(found)
+
+
+@pytest.mark.parametrize(
+    ("hardest", "told"),
+    [
+        (
+            Hardest(axis="cycles", value=10000.0, rmse=2.5, beyond=1000.0),
+            "after 10,000 cycles, 1,000 cycles beyond all",
+        ),
+        (
+            Hardest(axis="pressure_bar", value=5e5, rmse=2.5, beyond=0.0),
+            "at 5 bar, between others that were kept: by 2.5",
+        ),
+    ],
+)
+def test_held_out_errors_far_beyond_the_fit_are_explained(hardest: Hardest, told: str) -> None:
+    """1.52 Nm were stated beside a fit of 0.0217 Nm, and nothing more."""
+    found = findings(Verdict.CAUSE_NAMED, "oil_change")
+    far = replace(GAIN, rmse_after=1.52, rmse_before=1.9, hardest=hardest)
+    said = summarise(replace(found, gain=far, extended=replace(MISFIT, rmse=0.0217)))
+    assert f"Held out, it errs most {told}" in said
+    assert "The model fits all runs together to 0.0217 Nm." in said
+    assert "errs most" not in summarise(replace(found, gain=replace(GAIN, hardest=hardest)))
