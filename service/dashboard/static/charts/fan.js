@@ -1,7 +1,7 @@
 // @ts-check
 // Mean COF, its law with the 90 % band, the threshold and when it is reached; behind it the earlier predictions.
 
-import { cycles, fixed, interval, withSd } from "../shared/format.js";
+import { cycles, estimate, fixed, interval, probability } from "../shared/format.js";
 import { column, CYCLES, KIND, measuredAndLaw } from "./columns.js";
 import { eventMarks } from "./layout.js";
 import { faint } from "./palette.js";
@@ -52,15 +52,15 @@ export function fan({ life, pooled, predictions, events }) {
 function noteOf(life) {
   const { current, criterion, end_of_life_cycles: end } = life;
   if (life.status === "insufficient_data") {
-    return "Too few tests for a prediction: three at different cycles are needed.";
+    return `Three tests at different cycles are needed for a prediction: ${life.statement}.`;
   }
   const median = end["0.5"];
   const when =
     median === null
-      ? "perhaps never"
+      ? `with a probability of ${probability(life.probability_of_reaching)} within ${fixed(life.horizon_cycles)} cycles`
       : `at about ${cycles(median, end["0.05"], end["0.95"])} cycles (90 %: ${interval(end)})`;
   const reaches = median !== null && life.status === "reached" ? "reached" : "reaches";
-  const value = `Mean COF ${withSd(current.mean_cof, current.mean_cof_sd)}`;
+  const value = `Mean COF ${estimate(current.mean_cof, current.mean_cof_sd)}`;
   if (criterion.threshold_mean_cof === null || criterion.fraction === null)
     return `${value}; no criterion of the clutch is on it.`;
   const limit = `${fixed(criterion.threshold_mean_cof, 4)}, ${fixed(100 * criterion.fraction)} % of new`;

@@ -1,7 +1,7 @@
 // @ts-check
 // The four Stribeck parameters over cycles: eq. 6 with its band at one pressure (fig. 10), and over all of them (fig. 11).
 
-import { significant, withSd } from "../shared/format.js";
+import { estimate } from "../shared/format.js";
 import { CYCLES, digitsColumn, KIND, measuredAndLaw, PRESSURE } from "./columns.js";
 import { eventMarks } from "./layout.js";
 import { scaleOf } from "./palette.js";
@@ -62,15 +62,16 @@ function rangeOf({ measured, trajectory }) {
  */
 export function parameter({ items, name, pressure, events }) {
   const item = items.find(({ quantity, pressure_bar: level }) => quantity === name && level === pressure);
-  if (!item?.coefficients) return { empty: "The tests at this pressure do not determine it." };
+  if (!item?.coefficients)
+    return { empty: "The tests at this pressure do not determine its course: three at different cycles are needed." };
   const { measured, trajectory, coefficients: k } = item;
   const { unit } = PARAMETERS[name];
   const inUnit = unit && ` ${unit.replace("^0.3", "⁰·³")}`;
-  const [initial, change] = [k.initial, k.change].map(({ value, sd }) => `${withSd(value, sd)}${inUnit}`);
-  const scale = significant(k.scale_cycles.value, 2);
+  const [initial, change] = [k.initial, k.change].map(({ value, sd }) => inWords(value, sd, inUnit));
+  const scale = inWords(k.scale_cycles.value, k.scale_cycles.sd, " cycles");
   const x = trajectory.cycles;
   return {
-    note: `Eq. 6: ${initial} when new, a change of ${change} in the end, on a scale of ${scale} cycles.`,
+    note: `Eq. 6: value when new ${initial}, change in the end ${change}, scale ${scale}.`,
     columns: COLUMNS,
     rows: rowsOf(item),
     figure: (c) => ({
@@ -101,6 +102,17 @@ export function parameter({ items, name, pressure, events }) {
       },
     }),
   };
+}
+
+/**
+ * A coefficient with its unit, where it is known.
+ * @param {number} value
+ * @param {number} sd
+ * @param {string} unit
+ */
+function inWords(value, sd, unit) {
+  const text = estimate(value, sd);
+  return text === "unknown" ? text : `${text}${unit}`;
 }
 
 /**

@@ -3,7 +3,7 @@
 
 import { limitText, placeText } from "../quantities/criteria.js";
 import { h } from "../shared/dom.js";
-import { cycles, fixed, interval, percent, probability, withSd, words } from "../shared/format.js";
+import { aboutCycles, atLeast, estimate, fixed, interval, percent, probability, words } from "../shared/format.js";
 import { healthBar } from "../shared/sparkline.js";
 import { heldText, stateIcon, STATES } from "../shared/state.js";
 
@@ -56,9 +56,13 @@ function description({ friction_material: material, reaction_plate: plate, fluid
 function tiles(clutch, life) {
   const { current, model, status } = life;
   const { health } = current;
-  const [cof, deviation] = withSd(current.mean_cof, current.mean_cof_sd).split(" ± ");
+  const [cof, deviation] = estimate(current.mean_cof, current.mean_cof_sd).split(" ± ");
   const spread = deviation ? `± ${deviation}; ` : "";
-  const quantiles = status === "predicted" ? `90 %: ${interval(life.remaining_cycles)}` : words(status);
+  const certain = status === "reached" ? "the end of life is reached" : atLeast(life.at_least);
+  const quantiles =
+    status === "insufficient_data" || status === "reached" ? "" : `90 %: ${interval(life.remaining_cycles)}; `;
+  const share = current.fraction_of_initial;
+  const at = current.mean_cof === null ? "" : `as measured at ${fixed(current.measured_at_cycles)} cycles`;
   const used = `${life.runs_used} ${life.runs_used === 1 ? "test" : "tests"} used, ${clutch.runs} runs`;
   const effects = model.effects.length > 0 ? model.effects.map(words).join(", ") : "without extension";
   return [
@@ -66,9 +70,9 @@ function tiles(clutch, life) {
     tile(
       "Remaining cycles",
       remaining(life),
-      small(quantiles + backCast(life.back_cast) + endedLives(life.ended_lives)),
+      small(quantiles + certain + heldRuns(life.held_runs) + backCast(life.back_cast) + endedLives(life.ended_lives)),
     ),
-    tile("Mean COF", cof, small(`${spread}${percent(current.fraction_of_initial, 1)} of new`)),
+    tile("Mean COF", cof, small(spread + (share === null ? at : `${percent(share, 1)} of new`))),
     tile("Duty cycles so far", fixed(life.as_of_cycles), small(used)),
     tile(
       "Reaches end of life",
@@ -83,6 +87,9 @@ function tiles(clutch, life) {
     tile("Model", words(model.name), small(effects)),
   ];
 }
+
+/** @param {RemainingLife["held_runs"]} held */
+const heldRuns = (held) => (held ? `; ${aboutCycles(held.remaining_cycles)} with ${heldText(held.count)}` : "");
 
 const COURSES = { eq6: "As eq. 6", slowing: "Slowing down", accelerating: "Accelerating" };
 
@@ -111,5 +118,5 @@ const tile = (name, value, more) =>
 function remaining({ status, remaining_cycles: q }) {
   if (status === "insufficient_data") return "–";
   if (status === "reached") return "0";
-  return q["0.5"] === null ? "may never end" : cycles(q["0.5"], q["0.05"], q["0.95"]);
+  return aboutCycles(q);
 }

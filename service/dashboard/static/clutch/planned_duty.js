@@ -3,7 +3,7 @@
 
 import { clutchPath, Problem, sendJson } from "../shared/api.js";
 import { field, h, scrolling, table } from "../shared/dom.js";
-import { fixed, significant } from "../shared/format.js";
+import { fixed, significant, sentence } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 
 /** @import { PlannedLife, ProblemError, Quantiles } from "../shared/types.js" */
@@ -194,7 +194,7 @@ function shown(life) {
       const value = quantiles[quantile] ?? null;
       return value === null ? "beyond the horizon" : fixed(value, decimals);
     });
-  if (life.status === "insufficient_data") return [h("p", { class: "notice" }, "Too few tests for a prediction.")];
+  if (life.status === "insufficient_data") return [h("p", { class: "notice" }, sentence(life.statement))];
   const rows = [
     ["Remaining cycles", ...numbers(cycles, 0)],
     ["Remaining blocks", ...numbers(blocks, 1)],

@@ -4,7 +4,7 @@
 import { sentence } from "../diagnosis/report.js";
 import { byMeanCof } from "../quantities/criteria.js";
 import { h, table } from "../shared/dom.js";
-import { cycles, fixed, interval, moment, percent, probability, withSd, words } from "../shared/format.js";
+import { aboutCycles, estimate, fixed, interval, moment, percent, probability, words } from "../shared/format.js";
 import { stateIcon, STATES } from "../shared/state.js";
 
 /** @import { ClutchOut, DiagnosisOut, Receipt, RemainingLife, StribeckItem } from "../shared/types.js" */
@@ -64,13 +64,17 @@ function diagnosisText(latest) {
 function facts(life, runs) {
   const { current, model, remaining_cycles: q } = life;
   const { criterion } = byMeanCof(life);
-  const predicted = `${cycles(q["0.5"], q["0.05"], q["0.95"])} (90 %: ${interval(q)})`;
+  const predicted = `${aboutCycles(q)} (90 %: ${interval(q)})`;
   const chance = probability(life.probability_of_reaching);
-  const cof = withSd(current.mean_cof, current.mean_cof_sd);
+  const cof = estimate(current.mean_cof, current.mean_cof_sd);
   return [
-    ["Remaining cycles", life.status === "predicted" ? predicted : words(life.status)],
+    ["Remaining cycles", ["predicted", "may_never_reach"].includes(life.status) ? predicted : words(life.status)],
+    ["What is certain", life.statement],
     ["Health", percent(current.health)],
-    ["Mean COF", `${cof} (${percent(current.fraction_of_initial, 1)} of new)`],
+    [
+      "Mean COF",
+      current.fraction_of_initial === null ? cof : `${cof} (${percent(current.fraction_of_initial, 1)} of new)`,
+    ],
     ["Threshold", `${fixed(criterion.threshold_mean_cof, 4)} (${percent(criterion.fraction)} of new)`],
     ["Duty cycles so far", fixed(life.as_of_cycles)],
     ["Tests and runs", `${life.runs_used} tests, ${runs.length} runs`],

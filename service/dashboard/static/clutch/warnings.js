@@ -27,6 +27,10 @@ const CODES = {
     title: "Earlier forecasts missed",
     help: "The clutch does not keep to one course. Remaining life is stated wider until it does.",
   },
+  held_runs: {
+    title: "Runs are held",
+    help: "They do not count until someone confirms, corrects or withdraws them. Cycles that are certain are the fewer of both.",
+  },
   tracks_disagree: {
     title: "Two predictions disagree",
     help: "Mean COF is predicted in two ways: directly, and from the four Stribeck parameters. They differ by more than their uncertainty. A diagnosis may show why.",

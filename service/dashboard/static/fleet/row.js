@@ -2,7 +2,7 @@
 // One clutch in the fleet's table.
 
 import { h } from "../shared/dom.js";
-import { age, cycles, fixed, interval, kindName, percent, words } from "../shared/format.js";
+import { aboutCycles, age, atLeast, cycles, fixed, interval, kindName, percent, words } from "../shared/format.js";
 import { healthBar, intervalBar, sparkline } from "../shared/sparkline.js";
 import { heldText, stateIcon, STATES, VERDICTS } from "../shared/state.js";
 
@@ -73,11 +73,12 @@ function health(summary, state) {
  * @param {number} scale
  */
 function remaining(summary, scale) {
-  if (summary === null || summary.status === "insufficient_data") return ["–", small("after three tests")];
+  if (summary === null) return ["–", small("after three tests")];
+  const certain = small(atLeast(summary.at_least));
+  if (summary.status === "insufficient_data") return ["–", certain];
   if (summary.status === "reached") return [number("0"), small("reached")];
   const q = summary.remaining_cycles;
-  const median = q["0.5"] === null ? "may never end" : cycles(q["0.5"], q["0.05"], q["0.95"]);
-  return [number(median), intervalBar(q, scale), small(interval(q))];
+  return [number(aboutCycles(q)), intervalBar(q, scale), small(interval(q)), certain];
 }
 
 /** @param {ClutchOut} clutch */
@@ -88,7 +89,12 @@ function meanCof({ summary, recent, end_of_life: end }) {
   const threshold = share ? (end.cof_fraction * cof) / share : null;
   return [
     sparkline(recent?.mean_cof ?? [], threshold),
-    h("span", { class: "beside" }, number(fixed(cof, 4)), small(`${percent(share)} of new`)),
+    h(
+      "span",
+      { class: "beside" },
+      number(fixed(cof, 4)),
+      small(share === null ? `at ${fixed(summary?.current.measured_at_cycles)} cycles` : `${percent(share)} of new`),
+    ),
   ];
 }
 

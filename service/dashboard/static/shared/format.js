@@ -8,6 +8,7 @@
 
 const MINUS = "−";
 const NONE = "–";
+const UNKNOWN = "unknown";
 
 /** @type {Record<string, string>} */
 const UNITS = { c: "°C", bar: "bar", rpm: "rpm", nm: "Nm", s: "s", hz: "Hz" };
@@ -67,6 +68,14 @@ export function withSd(value, sd) {
 }
 
 /**
+ * An estimate and its deviation; one that is less than its deviation is not known.
+ * @param {Maybe} value
+ * @param {Maybe} sd
+ */
+export const estimate = (value, sd) =>
+  isNumber(value) && isNumber(sd) && sd > Math.abs(value) ? UNKNOWN : withSd(value, sd);
+
+/**
  * Cycles, rounded to a twentieth of the interval that they lie in, but to no fewer than two digits.
  * @param {Maybe} value
  * @param {number | null} [low]
@@ -89,6 +98,23 @@ export function interval(quantiles) {
   if (low === null && high === null) return NONE;
   if (high === null) return `over ${cycles(low)}`;
   return `${cycles(low, low, high)} to ${cycles(high, low, high)}`;
+}
+
+/**
+ * The median of remaining cycles, or that it lies beyond the horizon.
+ * @param {Quantiles} quantiles
+ */
+export const aboutCycles = (quantiles) =>
+  quantiles["0.5"] === null ? "beyond the horizon" : cycles(quantiles["0.5"], quantiles["0.05"], quantiles["0.95"]);
+
+/**
+ * The safe bound of remaining cycles, rounded down to two digits.
+ * @param {number | null} bound
+ */
+export function atLeast(bound) {
+  if (bound === null || bound < 1) return "none is certain";
+  const unit = 10 ** Math.max(0, Math.floor(Math.log10(bound)) - 1);
+  return `at least ${fixed(Math.floor(bound / unit) * unit)} with 95 %`;
 }
 
 /**

@@ -10,9 +10,9 @@ import { svg } from "./dom.js";
 /** @type {Record<StateName, { order: number, word: string }>} */
 export const STATES = {
   failure: { order: 0, word: "Failure" },
-  out_of_specification: { order: 1, word: "Out of specification" },
-  maintenance: { order: 2, word: "Maintenance required" },
-  check: { order: 3, word: "Function check" },
+  maintenance: { order: 1, word: "Maintenance required" },
+  check: { order: 2, word: "Function check" },
+  out_of_specification: { order: 3, word: "Out of specification" },
   normal: { order: 4, word: "Normal" },
 };
 

@@ -36,6 +36,7 @@ export interface ClutchSummary {
   status: string;
   current: Current;
   remaining_cycles: Quantiles;
+  at_least: number | null;
 }
 
 export interface LastRun {
@@ -135,6 +136,7 @@ export interface Current {
   mean_cof_sd: number | null;
   fraction_of_initial: number | null;
   health: number | null;
+  measured_at_cycles: number | null;
 }
 
 export interface ModelName {
@@ -148,6 +150,11 @@ export interface CourseShare {
   order: number | null;
 }
 
+export interface HeldRuns {
+  count: number;
+  remaining_cycles: Quantiles;
+}
+
 export interface RemainingLife {
   revision: number;
   as_of_cycles: number | null;
@@ -157,6 +164,9 @@ export interface RemainingLife {
   current: Current;
   remaining_cycles: Quantiles;
   end_of_life_cycles: Quantiles;
+  at_least: number | null;
+  held_runs: HeldRuns | null;
+  statement: string;
   probability_of_reaching: number | null;
   criteria: CriterionOutcome[];
   course: (CourseShare & { alternatives: CourseShare[] }) | null;
@@ -171,6 +181,7 @@ export interface RemainingLife {
 
 export interface PlannedLife {
   status: string;
+  statement: string;
   remaining_cycles: Quantiles;
   recent_duty_cycles: Quantiles;
   remaining_blocks: Quantiles;
