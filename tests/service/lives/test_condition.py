@@ -1,0 +1,195 @@
+"""What a list, a page and a terminal say of a clutch: its state with the reason, its safe bound, its held runs."""
+
+from collections.abc import Iterator
+from itertools import permutations
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from models.prognosis.criteria import QUANTILES
+from service.lives.condition import STATES, bound_in_words, state_of
+from service.queries import clutch_list, degradation, series
+from service.queries.life.criteria import life_by_criteria
+from service.queries.life.planned_duty import planned_life
+from service.queries.life.remaining_life import remaining_life, rows
+from service.schemas.prognosis.programme import ProgrammeIn
+from service.workflows.replay import replay_clutch
+from tests.service.workflows.benches import CLUTCH, Bench, body, stood_in
+
+#: The present, as the answers state it.
+PRESENT = ("mean_cof", "mean_cof_sd", "measured_at_cycles", "fraction_of_initial", "health")
+METHODS = ("particle", "ukf", "grid")
+SLOPE = {"quantity": "slope", "speed_rpm": 100, "pressure_bar": 4.0, "below": -1.0}
+PLAN = ProgrammeIn.model_validate({"programme": [{"cycles": 5000}]})
+
+
+@pytest.fixture
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
+    with stood_in(monkeypatch):
+        made = Bench(tmp_path / "a.db")
+        yield made
+        made.close()
+
+
+def now(bench: Bench, method: str = "particle", pressure: float | None = None) -> dict[str, Any]:
+    return remaining_life(bench.database, CLUTCH, method, pressure, None)
+
+
+def item(bench: Bench) -> dict[str, Any]:
+    return clutch_list.look_up(bench.database, CLUTCH)
+
+
+def test_after_one_test_and_a_block_of_duty_health_is_unknown_and_mean_cof_is_the_measured_one(bench: Bench) -> None:
+    fit = bench.send(body("test", "a", 100.0))["fits"]
+    bench.send(body("duty", "d", 5000.0))
+    measured = sum(level["mean_cof"] for level in fit) / len(fit)
+    for answer in (*(now(bench, method) for method in METHODS), item(bench)["summary"]):
+        assert answer["status"] == "insufficient_data"
+        assert answer["as_of_cycles"] == 5000
+        current = answer["current"]
+        assert current["mean_cof"] == pytest.approx(measured)
+        assert 0.0 < current["mean_cof_sd"] < 0.05 * measured
+        assert [current[name] for name in PRESENT[2:]] == [100, None, None]
+        assert set(answer["remaining_cycles"].values()) == {None}
+    for tracked in degradation.degradation(bench.database, CLUTCH)["items"]:
+        assert tracked["measured"]["cycles"] == [100]
+        assert (tracked["coefficients"], tracked["trajectory"]["cycles"]) == (None, [])
+    stated = {row["quantity"]: row["value"] for row in series.series(bench.database, CLUTCH, None) if not row["run_id"]}
+    assert stated == dict.fromkeys(stated) | {"at_least": 0.0}
+    assert item(bench)["state"]["name"] == "check"
+
+
+def test_two_tests_say_at_least_how_many_cycles_are_left(bench: Bench) -> None:
+    for cycles in (0.0, 2000.0):
+        bench.send(body("test", f"n{cycles:g}", cycles, wear=cycles / 28_000))
+    life = now(bench)
+    assert life["at_least"] > 100.0
+    assert life["statement"] == f"the tests cannot tell yet: {bound_in_words(life['at_least'])}"
+    assert life["statement"] in item(bench)["state"]["why"]
+
+
+@pytest.mark.parametrize("record", [{}, {"end_of_life": {"criteria": [{"quantity": "mean_cof"}, SLOPE]}}], ids=str)
+def test_no_answer_stands_without_a_word_while_two_runs_are_held(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, record: dict[str, Any]
+) -> None:
+    with stood_in(monkeypatch):
+        bench = Bench(tmp_path / "a.db", record)
+        for cycles in (0.0, 2000.0, 4000.0, 6000.0):
+            bench.send(body("test", f"n{cycles:g}", cycles, wear=cycles / 40_000))
+        alone = now(bench) if not record else life_by_criteria(bench.database, CLUTCH, "particle")
+        for cycles in (7000.0, 8000.0):
+            bench.send(body("test", f"h{cycles:g}", cycles, wear=0.8, odd=True))
+        answers = [planned_life(bench.database, CLUTCH, "particle", PLAN)]
+        if record:
+            answers += [life_by_criteria(bench.database, CLUTCH, method) for method in ("particle", "grid")]
+            answers += [life_by_criteria(bench.database, CLUTCH, "particle", quantity="mean_cof")]
+        else:
+            answers += [*(now(bench, method) for method in METHODS), now(bench, pressure=4.0)]
+        for answer in answers:
+            assert answer["held_runs"]["count"] == 2
+            assert "held_runs" in [warning["code"] for warning in answer["warnings"]]
+            held = answer["held_runs"]["remaining_cycles"]["0.05"]
+            assert answer["at_least"] == min(held, answer["remaining_cycles"]["0.05"] or held)
+        assert answers[1]["remaining_cycles"] == alone["remaining_cycles"]
+        assert (answers[1]["at_least"], alone["held_runs"]) == (
+            answers[1]["held_runs"]["remaining_cycles"]["0.05"],
+            None,
+        )
+        assert {row["held_runs"] for row in rows(answers[1])} == {2}
+        assert (item(bench)["state"]["name"], item(bench)["held"]) == ("check", 2)
+        assert item(bench)["state"]["why"].startswith("2 runs are held")
+        assert {name: item(bench)["summary"][name] for name in ("at_least", "held_runs")} == {
+            name: answers[1][name] for name in ("at_least", "held_runs")
+        }
+        tracks = degradation.degradation(bench.database, CLUTCH)
+        assert "held_runs" in [warning["code"] for warning in tracks["warnings"]]
+        waiting = [row["value"] for row in series.series(bench.database, CLUTCH, "held_runs")]
+        assert waiting == [2.0]
+        before = item(bench)["summary"]
+        replay_clutch(bench.database, CLUTCH)
+        assert item(bench)["summary"] == before, "a replay states something else"
+        for run_id in ("h7000", "h8000"):
+            bench.confirm(run_id)
+        confirmed = now(bench) if not record else life_by_criteria(bench.database, CLUTCH, "particle")
+        assert confirmed["held_runs"] is None
+        assert confirmed["remaining_cycles"] == answers[1]["held_runs"]["remaining_cycles"], (
+            "not what it would have been"
+        )
+        bench.close()
+
+
+def test_what_is_said_of_held_runs_does_not_depend_on_the_order_of_arrival(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tests = [body("test", f"n{cycles:g}", cycles, wear=cycles / 40_000) for cycles in (0.0, 2000.0, 4000.0)]
+    held = [body("test", "h1", 1000.0, wear=0.1, odd=True), body("test", "h2", 5000.0, wear=0.5, odd=True)]
+    sent = [*tests, *held]
+    said = []
+    with stood_in(monkeypatch):
+        for number, order in enumerate(list(permutations(range(5)))[::24]):
+            bench = Bench(tmp_path / f"{number}.db")
+            for index in order:
+                bench.send(sent[index])
+            said.append({name: now(bench)[name] for name in ("at_least", "held_runs", "remaining_cycles")})
+            said[-1]["state"] = item(bench)["state"]
+            bench.close()
+    assert said.count(said[0]) == len(said) > 4
+
+
+def summary(left: float | None, **other: Any) -> dict[str, Any]:
+    """A clutch 10,000 cycles old with so many left at every quantile."""
+    quantiles = {f"{level:g}": left for level in QUANTILES}
+    criterion = {
+        "quantity": "slope",
+        "speed_rpm": 100,
+        "pressure_bar": 5,
+        "fraction": None,
+        "below": 0.0,
+        "above": None,
+    }
+    return {
+        "status": "predicted", "as_of_cycles": 10_000, "from_cycles": 0, "runs_used": 9, "at_least": left,
+        "remaining_cycles": quantiles, "current": {"health": 0.5}, "criterion": criterion, "held": 0, "with_held": None,
+        "probability_of_reaching": 0.94, **other,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("known", "disputed", "name", "words"),
+    [
+        (summary(0.0, status="reached"), True, "failure", "slope, 100 rpm, 5 bar below 0"),
+        (summary(2000.0, held=2), True, "maintenance", "less than 20 % of its life may be left: at least 2,000 cycles"),
+        (summary(9000.0, current={"health": 0.05}), True, "maintenance", "near its limit, slope, 100 rpm, 5 bar below 0"),
+        (summary(9000.0, held=1, with_held={"particle": {"at_least": 3149.0}}), True, "check", "at least 3,100 cycles"),
+        (summary(800.0, status="insufficient_data", runs_used=2), True, "check", "2 of the 3 tests"),
+        (summary(9000.0), True, "out_of_specification", "data and model disagree"),
+        (summary(9000.0, status="may_never_reach", current={"health": 0.27}), False, "normal", "probability of 94 %"),
+        ({}, False, "check", "no run yet"),
+    ],
+    ids=str,
+)  # fmt: skip
+def test_the_first_state_that_holds_is_the_state(known: dict[str, Any], disputed: bool, name: str, words: str) -> None:
+    state = state_of(known, disputed=disputed)
+    assert state["name"] == name
+    assert words in state["why"]
+    assert "may never" not in state["why"]
+
+
+def test_the_states_stand_in_the_order_of_the_contract() -> None:
+    assert STATES == ("failure", "maintenance", "check", "out_of_specification", "normal")
+
+
+def test_a_clutch_that_shudders_is_no_longer_normal(tmp_path: Path) -> None:
+    """Its record ends the life where the slope rises above a value that it has long passed; mean COF has hardly changed."""
+    criteria = [{"quantity": "mean_cof"}, SLOPE | {"below": None, "above": -1e-9}]
+    states = []
+    for number, record in enumerate(({}, {"end_of_life": {"criteria": criteria}})):
+        bench = Bench(tmp_path / f"{number}.db", record)
+        for cycles in (0.0, 500.0, 1000.0, 1500.0):
+            bench.send(body("test", f"n{cycles:g}", cycles, wear=cycles / 4_000))
+        states.append(item(bench)["state"])
+        bench.close()
+    print(states)
+    assert states[0]["name"] == "normal"
+    assert states[1]["name"] in ("failure", "maintenance")
