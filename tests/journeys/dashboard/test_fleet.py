@@ -66,11 +66,14 @@ def test_the_worst_comes_first_with_all_that_is_asked_of_a_row(watched: Watched)
     page = watched.open("/")
     assert rows(page) == ["worn-out", "ageing", "new", "waiting"]
     first = page.locator("tr[data-clutch='worn-out']")
-    assert first.locator(".state").inner_text().split("\n") == ["Failure", "end of life reached"]
+    worn = ONCE.get(f"{watched.url}/v1/clutches/worn-out").json()
+    assert first.locator(".state").inner_text().split("\n") == ["Failure", worn["state"]["why"]]
+    assert worn["state"]["why"] == "the end of life is reached: mean COF at 50 % of new"
     ageing = page.locator("tr[data-clutch='ageing']")
     said = ONCE.get(f"{watched.url}/v1/clutches/ageing").json()
     assert f"{100 * said['summary']['current']['health']:.0f} %" in ageing.inner_text()
     assert " to " in ageing.locator("td[data-label='Remaining']").inner_text()
+    assert re.search(r"at least [\d,]+ with 95 %", ageing.locator("td[data-label='Remaining']").inner_text())
     for drawing in (".spark polyline", ".interval .median", ".health .fill"):
         assert ageing.locator(drawing).count() == 1, drawing
     assert "ago" in ageing.locator("time").inner_text() or "now" in ageing.locator("time").inner_text()
