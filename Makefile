@@ -9,6 +9,7 @@
 # make score   how good the prognosis is, on simulated lives: the tables of docs/prognosis.md  (SEED= SIZE= PARTS= ARGS=--write)
 # make rivals  the same beside other packages, in an environment of their own                (SEED= SIZE=)
 # make blind   hides effects and wants them found: the table of docs/diagnosis.md      (SEED= SIZE=small|full ONLY= ARGS=)
+# make visible hides effects at twice the amplitude that a report calls visible, and counts alarms (SEED= COUNT= STORE=)
 # make load     rigs and clients against a running service, what they wait and what is lost: a table of docs/benchmarks.md
 #              (ARGS="--seconds 60 --no-raw"; "--services 4 --database postgresql --rigs 16 --clients 40 --no-raw"); a few
 #              minutes, on a machine that does nothing else
@@ -33,7 +34,7 @@ UNUSED := matplotlib contourpy cycler fonttools kiwisolver pillow
 LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --exclude-newer "7 days" \
 	--custom-compile-command "make lock" $(foreach name,$(UNUSED),--no-emit-package $(name))
 
-.PHONY: demo test slow faults check lowest benchmark load scale real figures architecture blind plausibility score rivals picture lock clean
+.PHONY: demo test slow faults check lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
@@ -90,6 +91,9 @@ architecture: $(VENV)/.tests
 
 blind: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.blind $(ARGS)
+
+visible: $(VENV)/.tests
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.visible
 
 plausibility: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.plausibility $(if $(SEED),--seed $(SEED)) $(if $(CAMPAIGNS),--campaigns $(CAMPAIGNS)) $(if $(HONEST),--honest $(HONEST)) $(ARGS)

@@ -27,6 +27,7 @@ from service.web.metrics import Metrics
 from service.web.middleware import BodyLimit, Edge, Heads, Polls, Shares
 from service.web.readiness import Needs, Readiness
 from service.web.revalidation import Revalidation
+from service.web.root_path import RootPath
 from service.web.routes import (
     clutches,
     description,
@@ -144,7 +145,7 @@ def create_app(settings: Settings) -> FastAPI:
     for beside in (clutches.fleet_router, exports.router, exports.fleet_router, description.router):
         app.include_router(beside)
     app.include_router(dashboard.router(assets.load()))
-    openapi.install(app)
+    openapi.install(app, settings.root_path)
     app.add_middleware(Polls)
     app.add_middleware(
         BodyLimit,
@@ -160,4 +161,5 @@ def create_app(settings: Settings) -> FastAPI:
         at_once=settings.requests_at_once,
     )
     app.add_middleware(Edge, metrics=metrics)
+    app.add_middleware(RootPath, root=settings.root_path)
     return app

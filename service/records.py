@@ -3,7 +3,9 @@
 A workflow reads a `ClutchState`, computes outside any transaction, and stores with `unchanged` and `store`.
 """
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,14 +22,17 @@ from service.columns import whole
 from service.errors import BusyError, NotFoundError
 from service.lives.assumptions import ALL_PRESSURES, FLEET, LearnedPrior, kind_of, severity_name, severity_under
 from service.lives.condition import rank_of, state_of
-from service.lives.history import REBUILD, ByPressure, Event, duty_block, moment_of, order
-from service.lives.recomputation import Adoption, ClutchState, Results, Tracking, newest_adoption
+from service.lives.history import REBUILD, ByPressure, Event, Shown, duty_block, moment_of, order
+from service.lives.payloads import notice_items
+from service.lives.plausibility.doubts import Judged
+from service.lives.recomputation import Adoption, ClutchState, Levels, Results, Tracking, newest_adoption
 from service.lives.run_analysis import LevelFit, Value
 from service.lives.tracks import CARRIED, States, Tracked
 from service.schemas.clutch import ClutchIn
 from service.schemas.rig import RigOut
 from service.settings import CODE_VERSION
-from storage import assumptions, clutches, diagnoses, results, rigs, runs
+from storage import assumptions, changes, clutches, diagnoses, results, rigs, runs
+from storage.changes import NewChange
 from storage.clutches import ClutchRow
 from storage.results import FilterStateRow, FitRow, PredictionRow
 from storage.rigs import RigRow
@@ -36,6 +41,8 @@ from storage.runs import NewRun, RunInOrder
 #: How often what depends on a clutch's history is computed where others change it meanwhile. Derived: beside three services
 #: that change it all the time, each as often as this one, one in a hundred gives up (0.75^16).
 MAX_ATTEMPTS = 16
+#: Who changes the state of a run where other runs do.
+BY_EVIDENCE = "evidence"
 #: Columns of a stored fit that are a fit's own.
 _FIT_COLUMNS = ("pressure", "undetermined", "noise", "mse_percent", "rmse", "points", "message")
 
@@ -97,7 +104,7 @@ def state(
         adoptions=adoptions,
         priors={severity: _learned_prior(connection, own, severity, tracked) for severity in severities},
         filters=_filters(connection, clutch_id) if carried else None,
-        held=tuple(_event(held, {}) for held in runs.held_of(connection, clutch_id)),
+        held=held(connection, clutch_id),
         summary=row.summary,
     )
 
@@ -138,9 +145,16 @@ def events(connection: Connection, clutch_id: str) -> tuple[Event, ...]:
     return order([_event(row, cofs.get(row.run_key, {})) for row in runs.in_order(connection, clutch_id)])
 
 
+def held(connection: Connection, clutch_id: str) -> tuple[Event, ...]:
+    """The runs that are held, ordered, with the mean COFs that they would have in the history."""
+    rows = runs.held_of(connection, clutch_id)
+    cofs = results.cofs_of(connection, clutch_id) if rows else {}
+    return order([replace(_event(row, cofs.get(row.run_key, {})), confirmed=False) for row in rows])
+
+
 def set_aside(connection: Connection, clutch_id: str) -> dict[str, Event]:
     """The runs that are held or were withdrawn by run_id, as the history would see them; their mean COFs yet to come."""
-    return {row.run_id: _event(row, {}) for row in runs.set_aside(connection, clutch_id)}
+    return {row.run_id: replace(_event(row, {}), confirmed=False) for row in runs.set_aside(connection, clutch_id)}
 
 
 def levels(connection: Connection, clutch_id: str) -> dict[str, list[LevelFit]]:
@@ -175,6 +189,50 @@ def answers(connection: Connection, clutch_id: str) -> list[Any]:
     """Receipts, predictions and summary as they are stored: whether they have changed decides on a new revision."""
     tracks = [results.predictions_of(connection, clutch_id, method, ALL_PRESSURES) for method in CARRIED]
     return [receipts(connection, clutch_id), tracks, clutch(connection, clutch_id).summary]
+
+
+def store_judged(
+    connection: Connection,
+    clutch_id: str,
+    judged: Judged,
+    aside: Mapping[str, ByPressure],
+    levels: Levels,
+    *,
+    at: str,
+    revision: int,
+) -> None:
+    """The states of runs that the evidence of others has changed, with the audit trail's entries; the mean COFs of those
+    that are held now stand `aside` the history."""
+    states = [(event, runs.ACCEPTED, changes.ACCEPT) for event in judged.accepted]
+    states += [(event, runs.HELD, changes.DOUBT) for event in judged.held]
+    for event, new_state, action in states:
+        row = runs.get(connection, clutch_id, event.run_id)
+        if row is None:
+            raise LookupError(f"run {event.run_id!r} of clutch {clutch_id!r} is not stored")
+        doubts = tuple(notice_items(judged.doubts.get(event.run_id, ())))
+        after = replace(row, state=new_state, doubts=doubts)
+        runs.set_state(
+            connection,
+            row.run_key,
+            state=new_state,
+            cycles=row.cycles,
+            sent_cycles=row.sent_cycles,
+            doubts=doubts,
+        )
+        if event.run_id in aside:
+            results.write_fits(connection, row.run_key, fit_rows(levels.get(event.run_id, ()), aside[event.run_id]))
+        change = NewChange(
+            clutch_id=clutch_id,
+            run_id=event.run_id,
+            at=at,
+            by=BY_EVIDENCE,
+            action=action,
+            reason=judged.reasons[event.run_id],
+            before=summary(row),
+            after=summary(after),
+            revision=revision,
+        )
+        changes.insert(connection, change)
 
 
 def unchanged(connection: Connection, clutch_id: str, revision: int) -> bool:
@@ -285,6 +343,8 @@ def _event(row: RunInOrder, cofs: ByPressure) -> Event:
         shift=row.event not in (None, REBUILD),
         duty=duty_block(row.cycles, row.duty_cycles, row.duty_energy_kj, row.duty_speed_rpm, row.duty_duration_s),
         dated=row.started_at is not None,
+        shown=None if row.shown is None else Shown.from_list(json.loads(row.shown)),
+        confirmed=bool(row.doubted),
     )
 
 

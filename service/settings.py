@@ -7,7 +7,7 @@ from difflib import get_close_matches
 from importlib.metadata import version
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, ValidationError
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from service.defaults import DEFAULT_DATABASE
@@ -24,6 +24,22 @@ _MIB = 2**20
 _ALIKE = 0.9
 #: A password in an address, greedy for one that holds an @ itself; and all options, which may hold one.
 _SECRETS = ((re.compile(r"://([^:/@]*):.*@"), r"://\1:***@"), (re.compile(r"\?.*"), "?***"))
+
+
+#: What the service's own addresses begin with: a path that a proxy adds and takes off again must be told from them.
+_OWN = ("v1", "clutches", "assets", "docs", "openapi.json", "static-offline-docs", "livez", "readyz", "metrics")
+_SEGMENTS = re.compile(r"(?:/[A-Za-z0-9._~-]+)*")
+
+
+def _below(path: str) -> str:
+    """The path as `/clutch`, without a slash at its end; empty where there is none. Raises ValueError."""
+    path = path.strip("/")
+    path = path and f"/{path}"
+    if not _SEGMENTS.fullmatch(path) or {".", ".."} & set(path.split("/")):
+        raise ValueError("a path of letters, digits, -, ., _ and ~, such as /clutch")
+    if path.split("/")[1:2] and path.split("/")[1] in _OWN:
+        raise ValueError(f"a path that begins with none of the service's own addresses ({', '.join(_OWN)})")
+    return path
 
 
 class Settings(BaseSettings):
@@ -108,6 +124,9 @@ class Settings(BaseSettings):
     log_level: Annotated[LogLevel, BeforeValidator(str.lower)] = Field(
         default="info", description="the least that is logged: `debug`, `info`, `warning`, `error` or `critical`"
     )
+    root_path: Annotated[str, AfterValidator(_below)] = Field(
+        default="", description="the path that a proxy adds before the service's own addresses, as `/clutch`"
+    )
     insecure_local: bool = Field(
         default=False, description="without keys, answer also what a proxy on this machine passes on"
     )
@@ -190,5 +209,5 @@ def _wrong(kind: str, details: Any) -> str:
     """One wrong variable, the rule and its value."""
     least = details.get("ctx", {}).get("ge")
     rules = {"int_parsing": "a whole number", "greater_than_equal": f"a whole number of at least {least}"}
-    rule = rules.get(kind, details["msg"].removeprefix("Input should be "))
+    rule = rules.get(kind, details["msg"].removeprefix("Input should be ").removeprefix("Value error, "))
     return f"{PREFIX}{details['loc'][0].upper()} must be {rule}, got {details['input']!r}"

@@ -1,11 +1,12 @@
 """Stored inspections as they are answered, with their photographs."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from sqlalchemy import Connection
 
 from service.errors import NotFoundError
+from service.identity import content_of, instant
 from storage import inspections
 from storage.inspections import InspectionRow, PhotographRow
 
@@ -16,6 +17,11 @@ def inspection(connection: Connection, clutch_id: str, inspection_id: str) -> In
     if row is None:
         raise NotFoundError(f"clutch {clutch_id!r} has no inspection {inspection_id!r}")
     return row
+
+
+def content_hash(content: Mapping[str, Any]) -> str:
+    """The sha256 of what an inspection states."""
+    return content_of({**content, "performed_at": instant(content["performed_at"])})
 
 
 def answers(connection: Connection, rows: Sequence[InspectionRow]) -> list[dict[str, Any]]:

@@ -17,6 +17,7 @@ from service.lives.incoming_run import IncomingRun
 from service.lives.model_correction import RunReader
 from service.lives.outlook import Evidence, summarised
 from service.lives.payloads import receipt
+from service.lives.plausibility.doubts import doubts_alone
 from service.lives.recomputation import (
     ClutchState,
     Levels,
@@ -170,7 +171,8 @@ def recomputed(recorded: Recorded) -> Recomputed:
         except InvalidError as error:
             raise InvalidError(f"run {row.run_id!r} is refused: {error}", errors=error.errors) from error
         measured[row.run_id] = {"speed_range": analysis.speed_range, "oil_temperature": analysis.oil_temperature}
-        details[row.run_id] = analysis.kept_beside(sent)
+        shown, _ = doubts_alone(sent, analysis, state.geometry)
+        details[row.run_id] = analysis.kept_beside(sent) | ({} if shown is None else {"shown": shown.to_list()})
         receipts[row.run_id] = _receipt(row, analysis)
         levels[row.run_id] = analysis.fits
     events = order([replace(event, **measured[event.run_id]) for event in state.events])

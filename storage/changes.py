@@ -11,10 +11,12 @@ from storage.tables import change
 
 HOLD, CONFIRM, WITHDRAW, RESTORE, CORRECT = "hold", "confirm", "withdraw", "restore", "correct"
 REREAD = "reread"
+#: What the evidence of other runs does: a held run is accepted, an accepted one held.
+ACCEPT, DOUBT = "accept", "doubt"
 EDIT, ARCHIVE, UNARCHIVE, ADOPT = "edit", "archive", "unarchive", "adopt"
 WITHDRAW_INSPECTION, RESTORE_INSPECTION = "withdraw_inspection", "restore_inspection"
 #: What changes a clutch's history, and with it what a diagnosis was made of.
-OF_HISTORY = (CONFIRM, WITHDRAW, RESTORE, CORRECT, REREAD, EDIT)
+OF_HISTORY = (ACCEPT, DOUBT, CONFIRM, WITHDRAW, RESTORE, CORRECT, REREAD, EDIT)
 #: What the trail shows of a change.
 SHOWN = ("at", "by", "action", "run_id", "reason", "before", "after")
 

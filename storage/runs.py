@@ -61,8 +61,9 @@ class ReceiptRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunInOrder:
-    """As much of a run as tracking needs; a stationary test has the range of its speeds and the
-    mean temperature of its oil [K], maintenance its event, a block of duty its load (in the units in which it was sent)."""
+    """As much of a run as tracking and doubts need; a stationary test has the range of its speeds and the mean temperature
+    of its oil [K], maintenance its event, a block of duty its load (in the units in which it was sent). `doubted`: there are
+    or were doubts; `shown` is what it shows of friction, as JSON text."""
 
     run_key: int
     run_id: str
@@ -73,6 +74,8 @@ class RunInOrder:
     lowest_speed: float | None
     highest_speed: float | None
     event: str | None
+    doubted: bool = False
+    shown: str | None = None
     oil_temperature: float | None = None
     duty_cycles: float | None = None
     duty_energy_kj: float | None = None
@@ -99,6 +102,8 @@ _light_of_any = (
         json_value(run.c.details, "speed_range", 0),
         json_value(run.c.details, "speed_range", 1),
         json_value(run.c.details, "event"),
+        run.c.doubts != "[]",
+        json_text(run.c.details, "shown"),
         json_value(run.c.details, "oil_temperature"),
         json_value(run.c.details, "duty", "cycles"),
         json_value(run.c.details, "duty", "energy_per_cycle_kj"),

@@ -120,6 +120,11 @@ STRUCTURE_SHARE, STRUCTURE_FROM = 0.05, 20.0
 AXES_LOG_ODDS = 2.0
 #: Probability from which a cause is named, and from which the second of two is (chosen; no table).
 LEAST_NAMED, LEAST_SECOND_NAMED = 0.85, 0.8
+#: Probability that the explanations hold among which an ambiguous case leaves the choice (chosen; no table), that below
+#: which one is left out, and that of a doubt where what a cause leaves is no noise (chosen: it must stay below a half).
+CREDIBLE_MASS, LEAST_EXPLANATION, DOUBT = 0.95, 1e-4, 0.4
+#: Prior probability that anything is wrong, by which an alarm's p-value counts where the model is adequate (chosen).
+WRONG = 0.1
 #: A cause whose remainder would be this odd by chance in fewer cases (p-value) is not named; however large λ, the right
 #: template explains no more than so many nats of that (chosen; no table).
 LEAST_REMAINDER_P_VALUE, MOST_LEFT = 0.05, 3.0
@@ -162,8 +167,8 @@ LEAST_NOISE = 0.2
 
 # --- report --------------------------------------------------------------------------------------------------------------
 
-#: λ [nats] at which an effect is detected 90 % of the time (chosen; no table).
-DETECTED_NINE_IN_TEN = 11.0
+#: Probability with which a stated visible amplitude raises the alarm (chosen; `make visible` counts it at twice that).
+VISIBLE_POWER = 0.9
 #: Candidates below this probability are not listed (chosen).
 LEAST_LISTED = 1e-3
 #: A run is outlying that makes this share of all error beyond noise, among at least so many runs, with an RMS error beyond

@@ -16,8 +16,8 @@ _Table = list[list[float | None]]
 _VERDICTS = {
     "model_adequate": ("The model is adequate", "green"),
     "cause_named": ("The cause is named", "yellow"),
-    "cause_ambiguous": ("One of these causes", "yellow"),
-    "unexplained_structure": ("Structure that no effect of the catalogue explains", "red"),
+    "cause_ambiguous": ("The cause cannot be distinguished", "yellow"),
+    "unexplained_structure": ("A pattern that no effect of the catalogue explains", "red"),
     "insufficient_data": ("Too little data", "cyan"),
 }
 #: Candidates that are less probable, or come after this many, are shown by `--json` only. Chosen: a screenful.

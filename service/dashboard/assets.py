@@ -67,10 +67,17 @@ class Assets:
     by_name: dict[str, Asset]
     digest: str
 
-    def page(self, name: str) -> Asset:
-        """A page with the addresses of its assets filled in, and before its module those of all that this imports."""
+    def page(self, name: str, root: str) -> Asset:
+        """A page with the addresses of its assets filled in, and before its module those of all that this imports.
+
+        `root` leads from the page to the service's root: relative, so that a proxy may add a path.
+        """
         raw = self.by_name[name]
-        text = _MODULE.sub(self._announced, raw.body.decode()).replace("{assets}", f"/assets/{self.digest}")
+        text = (
+            _MODULE.sub(self._announced, raw.body.decode())
+            .replace("{assets}", f"{root}assets/{self.digest}")
+            .replace("{root}", root)
+        )
         return Asset(name=name, media_type=raw.media_type, body=text.encode())
 
     def _announced(self, script: re.Match[str]) -> str:

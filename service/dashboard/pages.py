@@ -12,7 +12,7 @@ _REVALIDATE = "no-cache"
 
 def router(assets: Assets) -> APIRouter:
     """`/`, `/clutches/{clutch_id}` and `/assets/...`."""
-    pages = {name: assets.page(name) for name in ("fleet.html", "clutch.html")}
+    pages = {name: assets.page(name, root) for name, root in (("fleet.html", "./"), ("clutch.html", "../"))}
     routes = APIRouter(include_in_schema=False)
 
     @routes.get("/")

@@ -10,7 +10,7 @@ import bisect
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, fields, replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -36,13 +36,35 @@ _MOMENTS = tuple(moment.replace(tzinfo=UTC).timestamp() for moment in (datetime.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Shown:
+    """What the rows of a run show of friction: mean COF over the speeds [-], of either sign, the highest pressure [Pa] and
+    speed [rad/s], the median of the oil's temperature [K]; of an open clutch the median torque [Nm]. None: not shown."""
+
+    cof: float | None = None
+    pressure: float | None = None
+    speed: float | None = None
+    oil: float | None = None
+    open_torque: float | None = None
+
+    def to_list(self) -> list[float | None]:
+        """The numbers in the order of the fields."""
+        return list(astuple(self))
+
+    @classmethod
+    def from_list(cls, numbers: Sequence[float | None]) -> "Shown":
+        """The inverse."""
+        return cls(**{field.name: number for field, number in zip(fields(cls), numbers, strict=True)})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Event:
     """A run as the history sees it.
 
     `moment` is when it was made [s], `dated` whether the rig said so, `arrived` its place in the order of arrival, infinite
     while it comes in. A stationary test has the range of its speeds [rad/s], its mean oil temperature [K], and mean COF with
     its deviation by pressure [Pa] where its curves determine it; `duty` is the block that ends with the run, `shift` an
-    event that may have shifted the level.
+    event that may have shifted the level; `shown` what its rows show (None: a channel is dead, so that no other run bears
+    on whether it is held), `confirmed` whether somebody confirmed it.
     """
 
     run_id: str
@@ -57,6 +79,8 @@ class Event:
     shift: bool = False
     duty: Block | None = None
     dated: bool = False
+    shown: Shown | None = None
+    confirmed: bool = False
 
     def at(self, cycles: float) -> "Event":
         """The same run at other cycles since new."""

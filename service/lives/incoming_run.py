@@ -1,7 +1,5 @@
 """A run on its way in: what was sent, checked, with its channels bit for bit, and its step into the models' units."""
 
-import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,8 +10,9 @@ from models.arrays import FloatArray
 from models.records.criteria import UNLOADED
 from models.records.pressure_levels import levels_of
 from models.records.runs import Plateaus, Record
-from service.columns import CHANNELS, PLATE_TEMPERATURES, whole
+from service.columns import CHANNELS, PLATE_TEMPERATURES
 from service.errors import FieldError, InvalidError
+from service.identity import content_with_columns, instant
 from service.lives.criteria import LEAST_TORQUE_SD, MOST_LEVELS
 
 
@@ -81,13 +80,8 @@ def content_hash(
     channels: Mapping[str, FloatArray],
     details: Mapping[str, Any],
 ) -> str:
-    """The sha256 of everything but the name: kind, cycles, time, origin, details and every bit of every channel."""
-    head = [kind, whole(cycles), started_at, origin, dict(details)]
-    digest = hashlib.sha256(json.dumps(head, sort_keys=True, allow_nan=False).encode())
-    for name in sorted(channels):
-        digest.update(f"\n{name}:{channels[name].size}\n".encode())
-        digest.update(np.ascontiguousarray(channels[name], dtype="<f8").data)
-    return digest.hexdigest()
+    """The sha256 of everything but the name: kind, cycles, instant, origin, details and every value of every channel."""
+    return content_with_columns([kind, cycles, instant(started_at), origin, dict(details)], channels)
 
 
 def sampled_record(channels: Mapping[str, FloatArray]) -> Record:

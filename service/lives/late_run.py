@@ -2,13 +2,12 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 from models.diagnosis.campaign import StationaryRun
+from service.errors import Notice
 from service.lives.diagnosis.campaign import tested
-from service.lives.history import (
-    STATIONARY,
-    Life,
-)
+from service.lives.history import STATIONARY, Life, Shown
 from service.lives.incoming_run import IncomingRun
 from service.lives.model_correction import RunReader
 from service.lives.run_analysis import Analysis
@@ -16,12 +15,20 @@ from service.lives.run_analysis import Analysis
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arrival:
-    """A run by itself: as it came in, whether it is a sampled record, its own results, and when it was received."""
+    """A run by itself: as it came in, whether it is a sampled record, its own results, what its rows show of friction and
+    what is odd about them, and when it was received."""
 
     run: IncomingRun
     sampled: bool
     analysis: Analysis
+    shown: Shown | None
+    odd: tuple[Notice, ...]
     received_at: str
+
+    @property
+    def kept(self) -> dict[str, Any]:
+        """What is kept beside the run's channels."""
+        return self.analysis.kept_beside(self.run) | ({} if self.shown is None else {"shown": self.shown.to_list()})
 
 
 def test_of(arrival: Arrival, life: Life) -> StationaryRun | None:

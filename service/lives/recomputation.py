@@ -27,7 +27,7 @@ from service.lives.history import (
 )
 from service.lives.model_correction import RunReader, corrected_cofs, model_in_force
 from service.lives.payloads import fit_items, loop_items, warned_anew
-from service.lives.prediction_notices import OFF_TRACK
+from service.lives.prediction_notices import OF_HISTORY, OFF_TRACK
 from service.lives.run_analysis import LevelFit, loops_of, mean_cofs
 from service.lives.tracks import CARRIED, Prediction, States, follow
 from service.schemas.clutch import ClutchIn
@@ -59,9 +59,9 @@ class ClutchState:
     """What the next run's results depend on, at one revision.
 
     `events` are all accepted runs in the order of the history, mean COF as the model in force corrects it; `held` those that
-    are held, their mean COFs yet to come; `adoptions` what was adopted, newest first (None: the baseline); `priors` what
-    fleets have taught for each severity that may come into force; `filters` the filters' states after the last test, None
-    where another release stored them; `summary` what is stored of the clutch's condition.
+    are held, with the mean COFs that they would have in it; `adoptions` what was adopted, newest first (None: the baseline);
+    `priors` what fleets have taught for each severity that may come into force; `filters` the filters' states after the last
+    test, None where another release stored them; `summary` what is stored of the clutch's condition.
     """
 
     record: ClutchIn
@@ -203,6 +203,15 @@ def computed_aside(state: ClutchState, event: Event, levels: Levels, reader: Run
     cofs = cofs_among(state, event, own)
     loops = loops_anew(among, levels, reader, evaluated)
     return cofs, {"fits": fit_items(own, cofs), "loops": loops.get(event.run_id, [])}
+
+
+def set_aside(
+    state: ClutchState, event: Event, levels: Levels, receipt: Receipt, reader: RunReader
+) -> tuple[ByPressure, Receipt]:
+    """The same of a run that is taken out of the history, with its whole receipt: without what the history noticed."""
+    cofs, parts = computed_aside(state, event, levels, reader)
+    warnings = [warning for warning in receipt["warnings"] if warning["code"] not in OF_HISTORY]
+    return cofs, receipt | parts | {"warnings": warnings}
 
 
 def _all_cofs(lives: Sequence[Life], levels: Levels, geometry: Geometry) -> dict[str, ByPressure]:

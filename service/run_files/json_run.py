@@ -3,6 +3,7 @@
 Other bodies that are JSON come in here too. Whatever is sent, memory stays within some ten times its size.
 """
 
+import codecs
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -19,6 +20,14 @@ from service.schemas.run import RUN_IN, Duty, DutyRunIn, DynamicRunIn, Maintenan
 
 #: Items of a list and characters of a name that are checked by a schema: more than a message quotes.
 _MOST_SHOWN = 100
+
+#: Byte order marks that are not UTF-8's; that of UTF-16 in little-endian order begins that of UTF-32.
+_MARKS = (
+    (codecs.BOM_UTF32_LE, "UTF-32"),
+    (codecs.BOM_UTF32_BE, "UTF-32"),
+    (codecs.BOM_UTF16_LE, "UTF-16"),
+    (codecs.BOM_UTF16_BE, "UTF-16"),
+)
 
 Answer = TypeVar("Answer")
 Body = TypeVar("Body", bound=pydantic.BaseModel)
@@ -69,12 +78,44 @@ def checked(schema: type[Body], body: bytes) -> Body:
 
 def _parsed(body: bytes, fields: Fields) -> Any:
     """What the body says, in memory of some ten times its size. Raises InvalidError."""
+    body = _in_utf8(body)
     if sum(map(body.count, (b'"', b"[", b"{"))) > MOST_MARKS:
         raise too_many_marks(body, fields)
     try:
         return pydantic_core.from_json(body)
     except ValueError as error:
+        _require_utf8(body)
         raise invalid_json(str(error)) from None
+
+
+def _in_utf8(body: bytes) -> bytes:
+    """The body without the byte order mark of UTF-8. Raises InvalidError where it begins as JSON in another encoding does.
+
+    JSON begins with two characters of ASCII: a zero among its first bytes is of UTF-16 or UTF-32 (RFC 4627, section 3).
+    """
+    for mark, name in _MARKS:
+        if body.startswith(mark):
+            raise _other_encoding(f"it begins with the byte order mark of {name}")
+    body = body.removeprefix(codecs.BOM_UTF8)
+    if (zero := body[:4].find(0)) >= 0:
+        raise _other_encoding(f"its byte {zero + 1} is zero, as in UTF-{32 if body[:4].count(0) == 3 else 16}")
+    return body
+
+
+def _require_utf8(body: bytes) -> None:
+    """Raise InvalidError where the body is not UTF-8 throughout."""
+    try:
+        body.decode()
+    except UnicodeDecodeError as error:
+        wrong = body[error.start]
+        raise _other_encoding(
+            f"byte {error.start + 1} is 0x{wrong:02x}, which is {bytes([wrong]).decode('latin-1')!r} in Latin-1"
+        ) from None
+
+
+def _other_encoding(why: str) -> InvalidError:
+    message = f"the body: JSON must be sent as UTF-8; {why}"
+    return InvalidError(message, errors=[FieldError(pointer="", code="encoding", message=message)])
 
 
 def _validated(validate: Callable[[bytes], Answer], sent: object) -> Answer:

@@ -1,8 +1,5 @@
 """The clutch record: geometry, oil, end of life. Everything but the name defaults to the reference's clutch."""
 
-import hashlib
-import json
-from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
@@ -22,6 +19,7 @@ from service.schemas.base import (
     RunCycles,
     RunName,
     Schema,
+    WholeNumber,
 )
 from service.schemas.limits import (
     LEAST_LENGTH_MM,
@@ -55,7 +53,7 @@ class GeometryIn(Schema):
 
     inner_diameter_mm: Length = Field(default=99.0, description="Inner diameter of the lining, mm")
     outer_diameter_mm: Length = Field(default=133.0, description="Outer diameter of the lining, mm")
-    friction_faces: Annotated[int, Field(ge=1, le=MOST_FRICTION_FACES, strict=True)] = Field(
+    friction_faces: Annotated[WholeNumber, Field(ge=1, le=MOST_FRICTION_FACES)] = Field(
         default=2, description="Number of friction faces"
     )
     mean_radius_mm: Length | None = Field(
@@ -145,11 +143,6 @@ class ClutchIn(Schema):
     def torque_filter(self) -> float:
         """Time constant of the torque channel's low-pass [s], 0 where none is declared."""
         return 0.0 if self.torque_filter_ms is None else self.torque_filter_ms / 1000
-
-
-def content_of(record: Mapping[str, Any]) -> str:
-    """The hash of a record whose defaults are filled in."""
-    return hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()
 
 
 #: The default of a field that may be left out and may not be null.

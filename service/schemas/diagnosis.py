@@ -40,6 +40,19 @@ class Amplitude(Answer):
     unit: str = Field(description="Its unit")
 
 
+class ExplanationOut(Answer):
+    """What may be at work, all of it: explanations exclude each other, and their probabilities sum to one."""
+
+    effects: list[str] = Field(
+        description="Slugs of the effects; `uncatalogued` for something that no effect of the catalogue is; empty: nothing"
+    )
+    probability: Number = Field(description="Probability that these and no others are at work")
+    sign_probability: Number = Field(
+        default=None,
+        description="Probability that the signs of the estimated amplitudes are right; null where there is none",
+    )
+
+
 class CandidateOut(Answer):
     """An effect that competed with the others and with the baseline."""
 
@@ -115,10 +128,13 @@ class AdviceOut(Answer):
 
 
 class VisibleOut(Answer):
-    """The smallest amplitude of an effect that would be detected in these data with 90 % power, in its middle shape."""
+    """The smallest amplitude of an effect that would be detected in these data with 90 % power."""
 
     effect: str = Field(description="The effect's slug")
-    amplitude: Number = Field(description="The amplitude")
+    amplitude: Number = Field(
+        description="The amplitude, in whatever of the effect's shapes; null where one of them would be absorbed whole"
+    )
+    least: Number = Field(default=None, description="The same in the shape that shows best")
     unit: str = Field(description="Its unit")
 
 
@@ -179,9 +195,13 @@ class DiagnosisListed(Answer):
         Literal["model_adequate", "cause_named", "cause_ambiguous", "unexplained_structure", "insufficient_data"] | None
     ) = Field(description="The result in a word")
     causes: list[str] = Field(
-        description="The named causes, or those that these data cannot distinguish, by their slugs"
+        description="The named causes, or those that these data cannot distinguish, by their slugs; `uncatalogued` among "
+        "the latter stands for something that no effect of the catalogue is"
     )
     summary: str = Field(description="The result in a paragraph")
+    explanations: list[ExplanationOut] = Field(
+        default_factory=list, description="What may be at work, most probable first; verdict and causes are read off it"
+    )
     candidates: list[CandidateOut] = Field(description="The effects that competed, most probable first")
     baseline: MisfitOut = Field(description="The baseline's error")
     extended: MisfitOut = Field(description="The extended model's error")

@@ -264,8 +264,8 @@ class Receipt(Answer):
 
 
 Action = Literal[
-    "hold", "confirm", "withdraw", "restore", "correct", "reread", "edit", "archive", "unarchive", "adopt",
-    "withdraw_inspection", "restore_inspection",
+    "hold", "accept", "doubt", "confirm", "withdraw", "restore", "correct", "reread", "edit", "archive", "unarchive",
+    "adopt", "withdraw_inspection", "restore_inspection",
 ]  # fmt: skip
 
 
@@ -273,8 +273,12 @@ class Change(Answer):
     """An entry of the audit trail."""
 
     at: str = Field(description="When; UTC, ISO 8601")
-    by: str = Field(description="Who: `key:` with the key's id and note, or `local` where no keys are configured")
-    action: Action = Field(description="What was done; `adopt`: another model is tracked under")
+    by: str = Field(
+        description="Who: `key:` with the key's id and note, `local` without keys, or `evidence`: other runs"
+    )
+    action: Action = Field(
+        description="What was done; `accept` and `doubt`: other runs agree with a held run, or contradict an accepted one"
+    )
     run_id: str | None = Field(
         description="The run; null where the clutch's record was changed, or an inspection, which `after` names"
     )

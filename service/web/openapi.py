@@ -60,10 +60,11 @@ _UNCHANGED = {
 }
 
 
-def install(app: FastAPI) -> None:
-    """Have the application describe itself so."""
+def install(app: FastAPI, root: str) -> None:
+    """Have the application, which is reached below the path `root`, describe itself so."""
     plain = app.openapi
-    app.openapi = cache(lambda: completed(plain()))  # type: ignore[method-assign]
+    servers = {"servers": [{"url": root}]} if root else {}
+    app.openapi = cache(lambda: completed(plain()) | servers)  # type: ignore[method-assign]
 
 
 def completed(api: Json) -> Json:

@@ -18,14 +18,13 @@ from sqlalchemy import Connection
 from service import measured_lives, records, stored_runs
 from service.columns import whole
 from service.errors import NotPossibleNowError
-from service.lives.history import STATIONARY, Event, order, stationary_tests_of
+from service.lives.history import STATIONARY, ByPressure, Event, order, stationary_tests_of
 from service.lives.incoming_run import IncomingRun
 from service.lives.late_run import Arrival, reader_with
 from service.lives.model_correction import RunReader
 from service.lives.outlook import held_part, summarised
 from service.lives.payloads import notice_items, receipt
-from service.lives.plausibility.doubts import doubts
-from service.lives.prediction_notices import OF_HISTORY
+from service.lives.plausibility.doubts import Judged, doubts_alone, doubts_together
 from service.lives.recomputation import (
     ClutchState,
     Levels,
@@ -33,7 +32,7 @@ from service.lives.recomputation import (
     Results,
     cofs_among,
     computed_anew,
-    computed_aside,
+    set_aside,
 )
 from service.lives.run_analysis import analyse
 from service.run_files.upload import read_file_run
@@ -78,10 +77,12 @@ class _Loaded:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Changed:
-    """The run as it is to be, its mean COFs where it is not accepted, and the results of the clutch's history."""
+    """The run as it is to be, what that changes in the doubts about others, the mean COFs of those of them that are then
+    not accepted, by run_id, and the results of the clutch's history."""
 
     row: RunRow
-    aside: Mapping[float, Any] | None
+    judged: Judged
+    aside: Mapping[str, ByPressure]
     results: Results
 
 
@@ -195,12 +196,22 @@ def _with(loaded: _Loaded, run: IncomingRun) -> _Loaded:
         warnings=analysis.warnings,
         engagement=analysis.engagement,
     )
+    shown, odd = doubts_alone(run, analysis, loaded.state.geometry)
     return replace(
         loaded,
-        event=replace(loaded.event, speed_range=analysis.speed_range, oil_temperature=analysis.oil_temperature),
+        event=replace(
+            loaded.event, speed_range=analysis.speed_range, oil_temperature=analysis.oil_temperature, shown=shown
+        ),
         levels={**loaded.levels, run_id: analysis.fits},
         receipts={**loaded.receipts, run_id: answer},
-        again=Arrival(run=run, sampled="time_s" in run.channels, analysis=analysis, received_at=received_at),
+        again=Arrival(
+            run=run,
+            sampled="time_s" in run.channels,
+            analysis=analysis,
+            shown=shown,
+            odd=odd,
+            received_at=received_at,
+        ),
     )
 
 
@@ -242,7 +253,7 @@ def _as_asked(database: Database, loaded: _Loaded, request: _Request) -> RunRow:
 def _judged(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
     """The run at other cycles: accepted where it is plausible there, else held."""
     row, sent_cycles = loaded.row, loaded.row.cycles if loaded.row.sent_cycles is None else loaded.row.sent_cycles
-    others = replace(loaded.state, events=_without(loaded.state.events, row.run_id))
+    others = _others(loaded)
     sent = replace(loaded.reader(database).read(row.run_id), cycles=cycles)
     event = loaded.event.at(cycles)
     event = replace(event, cofs=cofs_among(others, event, loaded.levels.get(row.run_id, ())))
@@ -250,7 +261,9 @@ def _judged(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
     analysis = analyse(sent, others.geometry, others.record.torque_filter) if again is None else again.analysis
     if "time_s" in sent.channels and sent.kind == STATIONARY:  # as on arrival: its plateaus stand for a long record
         sent = replace(sent, channels={})
-    doubtful = doubts(sent, analysis, event, others)
+    shown, doubtful = doubts_alone(sent, analysis, others.geometry)
+    if not doubtful:
+        doubtful = _together(others, replace(event, shown=shown, confirmed=False)).doubts.get(row.run_id, ())
     return replace(
         row,
         cycles=cycles,
@@ -260,38 +273,57 @@ def _judged(database: Database, loaded: _Loaded, cycles: float) -> RunRow:
     )
 
 
+def _others(loaded: _Loaded) -> ClutchState:
+    """The clutch without the run."""
+    events, held = (_without(events, loaded.row.run_id) for events in (loaded.state.events, loaded.state.held))
+    return replace(loaded.state, events=events, held=held)
+
+
+def _together(others: ClutchState, asked: Event | None) -> Judged:
+    corrected = others.extension is not None
+    return doubts_together(others.events, others.held, asked, others.geometry, corrected=corrected)
+
+
+def _judged_with(loaded: _Loaded, row: RunRow) -> Judged:
+    """What becomes of the other runs; the run itself is as it was asked for."""
+    others, event = _others(loaded), loaded.event.at(row.cycles)
+    if row.state == runs.ACCEPTED:
+        event = replace(event, cofs=cofs_among(others, event, loaded.levels.get(row.run_id, ())), confirmed=True)
+        others = replace(others, events=order([*others.events, event]))
+    return _together(others, None)
+
+
 def _computed(database: Database, loaded: _Loaded, row: RunRow) -> _Changed:
     """All that follows from the run as it is to be."""
     before, run_id = loaded.state, row.run_id
+    judged = _judged_with(loaded, row)
     event = loaded.event.at(row.cycles)
     own = [event] if row.state == runs.ACCEPTED else []
-    held = (*_without(before.held, run_id), *([event] if row.state == runs.HELD else []))
-    after = replace(before, events=order([*_without(before.events, run_id), *own]), held=held)
+    held = judged.aside(_without(before.held, run_id), [event] if row.state == runs.HELD else [])
+    after = replace(before, events=judged.settled(_without(before.events, run_id), own), held=held)
     receipts = {**loaded.receipts, run_id: loaded.receipts[run_id] | {"cycles": whole(row.cycles)}}
     reader = loaded.reader(database)
     computed = Results()
-    if own or loaded.row.state == runs.ACCEPTED:
+    if own or loaded.row.state == runs.ACCEPTED or judged.changes:
         tests = reader.stationary_tests(after.lives[-1]) if after.events else iter(())
         evaluated = stationary_tests_of(before.events)
         if loaded.again is not None:  # its own loops, and those that are held against its curves
             evaluated = {loop: test for loop, test in evaluated.items() if run_id not in (loop, test)}
         after, computed = computed_anew(after, loaded.levels, receipts, tests, reader, evaluated=evaluated)
-    aside = None
-    if not own:
-        aside, parts = computed_aside(after, event, loaded.levels, reader)
-        warnings = [warning for warning in receipts[run_id]["warnings"] if warning["code"] not in OF_HISTORY]
-        receipts[run_id] |= parts | {"warnings": warnings}
-    own_receipt = computed.receipts.get(run_id, receipts[run_id])
-    computed = replace(computed, receipts={**computed.receipts, run_id: own_receipt})
+    aside = {}
+    for other in [*judged.held, *([] if own else [event])]:
+        name = other.run_id
+        aside[name], receipts[name] = set_aside(after, other, loaded.levels, receipts[name], reader)
+    changed = {name: receipts[name] for name in (run_id, *aside)} | dict(computed.receipts)
     evidence = measured_lives.evidence_for(database, after, reader)
     if evidence is not None:
-        evidence = replace(evidence, levels=loaded.levels, receipts={**receipts, **computed.receipts})
+        evidence = replace(evidence, levels=loaded.levels, receipts={**receipts, **changed})
     if computed.tracking is None:
         summary = {**before.summary, **held_part(after, {}, evidence)}
     else:
         summary = summarised(after, computed.tracking, evidence)
-    computed = replace(computed, summary=summary)
-    return _Changed(row=replace(row, receipt=own_receipt), aside=aside, results=computed)
+    computed = replace(computed, receipts=changed, summary=summary)
+    return _Changed(row=replace(row, receipt=changed[run_id]), judged=judged, aside=aside, results=computed)
 
 
 def _without(events: tuple[Event, ...], run_id: str) -> tuple[Event, ...]:
@@ -311,14 +343,18 @@ def _store(connection: Connection, loaded: _Loaded, changed: _Changed, request: 
     )
     before, after = records.summary(loaded.row), records.summary(row)
     if loaded.again is not None:
-        analysis, run = loaded.again.analysis, loaded.again.run
-        runs.set_results(connection, row.run_key, analysis.kept_beside(run), row.receipt, CODE_VERSION)
-        results.write_fits(connection, row.run_key, records.fit_rows(analysis.fits, {}))
+        run = loaded.again.run
+        runs.set_results(connection, row.run_key, loaded.again.kept, row.receipt, CODE_VERSION)
+        results.write_fits(connection, row.run_key, records.fit_rows(loaded.again.analysis.fits, {}))
         before, after = before | _read_as(loaded.row.details["file"]), after | _read_as(run.file or {})
-    if changed.aside is not None:
-        fits = records.fit_rows(loaded.levels.get(row.run_id, ()), changed.aside)
+    if row.run_id in changed.aside:
+        fits = records.fit_rows(loaded.levels.get(row.run_id, ()), changed.aside[row.run_id])
         results.write_fits(connection, row.run_key, fits)
     records.store(connection, row.clutch_id, changed.results)
+    revision = clutches.bump_revision(connection, row.clutch_id)
+    records.store_judged(
+        connection, row.clutch_id, changed.judged, changed.aside, loaded.levels, at=request.at, revision=revision
+    )
     if before["doubts"] == after["doubts"]:
         del before["doubts"], after["doubts"]
     change = NewChange(
@@ -330,7 +366,7 @@ def _store(connection: Connection, loaded: _Loaded, changed: _Changed, request: 
         reason=request.reason,
         before=before,
         after=after,
-        revision=clutches.bump_revision(connection, row.clutch_id),
+        revision=revision,
     )
     changes.insert(connection, change)
 

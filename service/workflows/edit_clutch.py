@@ -11,10 +11,11 @@ from typing import Any
 from sqlalchemy import Connection
 
 from service import measured_lives, records, stored_runs
+from service.identity import content_of
 from service.lives.history import stationary_tests_of
 from service.lives.outlook import summarised
 from service.lives.recomputation import Results, Tracking, computed_anew
-from service.schemas.clutch import ClutchIn, content_of
+from service.schemas.clutch import ClutchIn
 from service.stored_runs import Recomputed
 from storage import changes, clutches
 from storage.changes import NewChange

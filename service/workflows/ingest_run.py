@@ -6,7 +6,7 @@ the history is computed again. A doubtful run is stored with its curves, held, a
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,15 +32,17 @@ from service.lives.incoming_run import IncomingRun
 from service.lives.late_run import Arrival, reader_with, test_of, tests_with
 from service.lives.outlook import Evidence, held_part, needs_evidence, summarised
 from service.lives.payloads import history_warnings, notice_items, receipt, warned_anew
-from service.lives.plausibility.doubts import doubts
+from service.lives.plausibility.doubts import Judged, doubts_alone, doubts_together
 from service.lives.recomputation import (
     ClutchState,
+    Levels,
     Results,
     Tracking,
     cofs_among,
     computed_anew,
     corrected_newest,
     loops_anew,
+    set_aside,
     track,
 )
 from service.lives.run_analysis import LevelFit, analyse, loops_of
@@ -57,14 +59,17 @@ MOST_FILE_BYTES = 900_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Outcome:
-    """What a run changes in a clutch at a revision: its receipt and mean COFs, doubts about it, and the results of what was
-    there before."""
+    """What a run changes in a clutch at a revision: its receipt and mean COFs, doubts about it and what it changes in the
+    doubts about others (with the mean COFs of those that are held now), and the results of what was there before."""
 
     revision: int
     receipt: dict[str, Any]
     cofs: ByPressure
     results: Results
     doubts: tuple[Notice, ...] = ()
+    judged: Judged = field(default_factory=Judged)
+    aside: Mapping[str, ByPressure] = field(default_factory=dict)
+    levels: Levels = field(default_factory=dict)
 
     @property
     def state(self) -> str:
@@ -126,7 +131,8 @@ def ingest(
         run = replace(run, channels={})
     if columns.is_long:
         columns = stored_runs.placed(database, columns)
-    arrival = Arrival(run=run, sampled=sampled, analysis=analysis, received_at=received_at)
+    shown, odd = doubts_alone(run, analysis, geometry)
+    arrival = Arrival(run=run, sampled=sampled, analysis=analysis, shown=shown, odd=odd, received_at=received_at)
     attempts = records.attempts(clutch_id)
     while True:
         next(attempts)
@@ -179,7 +185,13 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
         warnings=arrival.analysis.warnings,
         engagement=arrival.analysis.engagement,
     )
-    doubtful = doubts(arrival.run, arrival.analysis, event, before)
+    judged = Judged()
+    if not arrival.odd:
+        corrected = before.extension is not None
+        judged = doubts_together(before.events, before.held, event, before.geometry, corrected=corrected)
+    doubtful = arrival.odd or judged.doubts.get(event.run_id, ())
+    if judged.changes:
+        return _with_others(database, before, event, answer, arrival, judged)
     if doubtful:
         held = replace(before, held=(*before.held, event))
         part = held_part(held, before.filters or {}, _evidence(database, held, arrival, answer))
@@ -192,6 +204,44 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
     others = {run_id: other for run_id, other in computed.receipts.items() if run_id != event.run_id}
     return _Outcome(
         revision=before.revision, receipt=answer, cofs=event.cofs, results=replace(computed, receipts=others)
+    )
+
+
+def _with_others(
+    database: Database, before: ClutchState, event: Event, answer: dict[str, Any], arrival: Arrival, judged: Judged
+) -> _Outcome:
+    """What follows where the run is evidence for or against others: they are accepted or held, and all is computed again."""
+    doubtful = judged.doubts.get(event.run_id, ())
+    state = replace(
+        before,
+        events=judged.settled(before.events, [] if doubtful else [event]),
+        held=judged.aside(before.held, [event] if doubtful else []),
+    )
+    own = {event.run_id: arrival.analysis.fits} if arrival.analysis.fits else {}
+    with database.reading() as connection:
+        receipts = records.receipts(connection, before.clutch_id) | {event.run_id: answer}
+        levels = records.levels(connection, before.clutch_id) | own
+    reader = reader_with(stored_runs.run_reader(database, before.clutch_id), arrival)
+    tests = tests_with(reader, state.lives[-1], arrival) if state.events else iter(())
+    evaluated = stationary_tests_of(before.events)
+    final, computed = computed_anew(state, levels, receipts, tests, reader, evaluated=evaluated)
+    computed = _summarised(database, final, computed, arrival, answer)
+    aside, changed = {}, dict(computed.receipts)
+    for other in judged.held:
+        aside[other.run_id], changed[other.run_id] = set_aside(final, other, levels, receipts[other.run_id], reader)
+    return _Outcome(
+        revision=before.revision,
+        receipt=changed.pop(event.run_id, answer),
+        cofs=computed.cofs.get(event.run_id, event.cofs),
+        results=replace(
+            computed,
+            receipts=changed,
+            levels={run_id: fits for run_id, fits in computed.levels.items() if run_id != event.run_id},
+        ),
+        doubts=doubtful,
+        judged=judged,
+        aside=aside,
+        levels=levels,
     )
 
 
@@ -297,7 +347,7 @@ def _store(
         started_at=run.started_at,
         received_at=arrival.received_at,
         content_sha256=run.content_sha256,
-        details=arrival.analysis.kept_beside(run),
+        details=arrival.kept,
         receipt=outcome.receipt,
         code_version=CODE_VERSION,
         state=outcome.state,
@@ -309,6 +359,9 @@ def _store(
     results.write_fits(connection, run_key, records.fit_rows(arrival.analysis.fits, outcome.cofs))
     records.store(connection, clutch_id, outcome.results)
     revision = clutches.bump_revision(connection, clutch_id)
+    records.store_judged(
+        connection, clutch_id, outcome.judged, outcome.aside, outcome.levels, at=arrival.received_at, revision=revision
+    )
     if outcome.doubts:
         change = NewChange(
             clutch_id=clutch_id,
@@ -341,6 +394,7 @@ def _event_of(arrival: Arrival) -> Event:
         shift=maintenance not in (None, REBUILD),
         duty=duty_block(run.cycles, *(duty.get(name) for name in names)),
         dated=run.started_at is not None,
+        shown=arrival.shown,
     )
 
 

@@ -10,10 +10,9 @@ from sqlalchemy import Connection
 
 from service import records
 from service.errors import FieldError, InvalidError, NotPossibleNowError
-from service.schemas.clutch import content_of
 from service.schemas.inspection import InspectionIn, MediaType
 from service.schemas.limits import MOST_PHOTOGRAPHS
-from service.stored_inspections import answers, inspection, photograph_answer
+from service.stored_inspections import answers, content_hash, inspection, photograph_answer
 from storage import changes, clutches, inspections
 from storage.changes import NewChange
 from storage.engine.database import Database
@@ -30,7 +29,7 @@ def inspect(database: Database, clutch_id: str, sent: InspectionIn, *, by: str, 
     Raises NotFoundError. An archived clutch takes inspections too: it may be taken apart when all tests are made.
     """
     content = sent.model_dump(mode="json")
-    content_sha256 = content_of(content)
+    content_sha256 = content_hash(content)
     with database.writing(of=clutch_id) as connection:
         records.clutch(connection, clutch_id)
         row = NewInspection(

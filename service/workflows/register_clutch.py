@@ -1,8 +1,9 @@
 """A clutch is registered; what is known already is not changed by posting."""
 
 from service.errors import ConflictError
+from service.identity import content_of
 from service.lives.condition import RANK_UNKNOWN
-from service.schemas.clutch import ClutchIn, content_of
+from service.schemas.clutch import ClutchIn
 from storage import clutches
 from storage.clutches import ClutchRow
 from storage.engine.database import Database

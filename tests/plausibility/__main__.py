@@ -4,17 +4,26 @@ Plausibility was developed on the simulated rig with other seeds; the blind rig 
 """
 
 import argparse
+import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from tests.blind.rows import wilson
 from tests.plausibility import slips, trials
 from tests.plausibility.ablation import WITHOUT
+from tests.plausibility.bench import Answer
+from tests.plausibility.honest_lives import KINDS
 from tests.plausibility.trials import Outcome
 
 #: The demand: of runs with a slip so many are held at least, of honest ones so many at most.
 LEAST_HELD, MOST_FALSE = 0.95, 0.005
+#: Of the runs of honest lives that are no eq. 6 so many are held in the end at most; of slips so many are out of the track
+#: after ten further runs at least.
+MOST_IN_THE_END, LEAST_AFTER = 0.01, 0.93
 DOCUMENT = Path(__file__).parents[2] / "docs" / "plausibility.md"
 BEGIN, END = "<!-- plausibility -->", "<!-- end of plausibility -->"
 
@@ -71,6 +80,49 @@ def by_mechanism(wrong: Sequence[Outcome], honest: Sequence[Outcome]) -> Iterato
         yield f"| {name} | {of_wrong} of {len(wrong)} | {of_honest} of {len(judged)} |"
 
 
+def by_life(lives: Mapping[str, Sequence[Mapping[str, int]]]) -> Iterator[str]:
+    """A row a kind of honest lives that are no eq. 6."""
+    yield "| honest lives | runs | held when they came in | held in the end |"
+    yield "|---|---|---|---|"
+    for kind, mine in lives.items():
+        runs, arrived, end = (sum(one[name] for one in mine) for name in ("runs", "held", "end"))
+        yield f"| {kind} | {runs} | {arrived} | {end} |"
+    every = [one for mine in lives.values() for one in mine]
+    runs, arrived, end = (sum(one[name] for one in every) for name in ("runs", "held", "end"))
+    yield f"| **all** (demand: ≤ 1 % in the end) | {runs} | {percent(arrived, runs)} | {percent(end, runs)} |"
+
+
+class Store:
+    """What was computed, a line each, so that a run that was ended goes on where it ended; in memory without a file."""
+
+    def __init__(self, path: Path | None) -> None:
+        self.path, self.known = path, dict[str, Any]()
+        if path is not None and path.exists():
+            self.known = dict(json.loads(line) for line in path.read_text(encoding="utf-8").splitlines())
+
+    def get(self, name: str, make: Callable[[], Any]) -> Any:
+        """What is known by a name, or is made and noted."""
+        if name not in self.known:
+            self.known[name] = make()
+            if self.path is not None:
+                with self.path.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps([name, self.known[name]]) + "\n")
+        return self.known[name]
+
+    def outcome(self, name: str, make: Callable[[], Outcome]) -> Outcome:
+        """The same of an outcome."""
+        return _outcome(self.get(name, lambda: asdict(make())))
+
+    def outcomes(self, name: str, make: Callable[[], Sequence[Outcome]]) -> list[Outcome]:
+        """The same of several."""
+        return [_outcome(one) for one in self.get(name, lambda: [asdict(outcome) for outcome in make()])]
+
+
+def _outcome(known: Mapping[str, Any]) -> Outcome:
+    answer = dict(known["answer"])
+    return Outcome(**{**known, "answer": Answer(**{**answer, "codes": tuple(answer["codes"])})})
+
+
 def _counted(title: str, outcomes: Sequence[Outcome]) -> str:
     held = sum(one.held for one in outcomes)
     return f"| {title} | {len(outcomes)} | {held} | {percent(held, len(outcomes))} | |"
@@ -82,15 +134,40 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--campaigns", type=int, default=200, help="campaigns with one slip each, half of them a rig")
     parser.add_argument("--honest", type=int, default=2000, help="honest runs")
+    parser.add_argument("--lives", type=int, default=20, help="honest lives that are no eq. 6, of each kind")
+    parser.add_argument("--store", type=Path, help="a file of what was computed, to go on where a run was ended")
     parser.add_argument("--failures", action="store_true", help="list what was missed and what was held wrongly")
     parser.add_argument("--write", action="store_true", help=f"put the tables into {DOCUMENT.name}")
     chosen = parser.parse_args()
-    rigs = {rig: trials.slipped(chosen.seed, chosen.campaigns // len(trials.RIGS), rig) for rig in trials.RIGS}
+    store, seed = Store(chosen.store), chosen.seed
+    lives = {
+        kind: [
+            store.get(f"life {seed} {kind} {n}", partial(trials.honest_life, seed, kind, n))
+            for n in range(chosen.lives)
+        ]
+        for kind in KINDS
+    }
+    rigs = {
+        rig: [
+            store.outcome(f"slip {seed} {rig} {n}", partial(trials.slipped, seed, rig, n))
+            for n in range(chosen.campaigns // len(trials.RIGS))
+        ]
+        for rig in trials.RIGS
+    }
     wrong = [one for outcomes in rigs.values() for one in outcomes]
-    aside = [one for rig in trials.RIGS for one in trials.aside(chosen.seed, chosen.campaigns // 5, rig)]
-    honest = list(trials.honest(chosen.seed, chosen.honest))
+    aside = [
+        store.outcome(f"aside {seed} {rig} {n}", partial(trials.aside, seed, rig, n))
+        for rig in trials.RIGS
+        for n in range(chosen.campaigns // 5)
+    ]
+    honest = store.outcomes(f"honest {seed} {chosen.honest}", lambda: list(trials.honest(seed, chosen.honest)))
     held, false = sum(one.held for one in wrong), sum(one.held for one in honest)
+    followed = [one for one in wrong if one.out_after is not None]
+    out = sum(bool(one.out_after) for one in followed)
+    every = [one for mine in lives.values() for one in mine]
+    in_the_end, of_lives = sum(one["end"] for one in every), sum(one["runs"] for one in every)
     met = held >= LEAST_HELD * len(wrong) and false <= MOST_FALSE * len(honest)
+    met = met and in_the_end <= MOST_IN_THE_END * of_lives and out >= LEAST_AFTER * len(followed)
     times = sorted(one.answer.seconds for one in honest if one.kind == "stationary_stribeck")
     lines = [
         f"`make plausibility SEED={chosen.seed} CAMPAIGNS={chosen.campaigns} HONEST={chosen.honest}`:",
@@ -100,10 +177,14 @@ def main() -> int:
         *(_counted(f"one slip, {rig}", outcomes) for rig, outcomes in rigs.items()),
         f"| **one slip** | {len(wrong)} | {held} | {percent(held, len(wrong))} | ≥ 95 % |",
         f"| **honest** | {len(honest)} | {false} | {percent(false, len(honest))} | ≤ 0.5 % |",
+        f"| **out after ten further runs** | {len(followed)} | {out} | {percent(out, len(followed))} | ≥ 93 % |",
+        f"| **honest lives, in the end** | {of_lives} | {in_the_end} | {percent(in_the_end, of_lives)} | ≤ 1 % |",
         "",
         *by_slip([*wrong, *aside]),
         "",
         *by_source(honest),
+        "",
+        *by_life(lives),
         "",
         *by_mechanism([*wrong, *(one for one in aside if one.slip not in slips.ALIKE)], honest),
         "",

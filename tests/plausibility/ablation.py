@@ -8,50 +8,34 @@ from unittest.mock import patch
 import numpy as np
 
 from models.arrays import FloatArray
-from service.lives.plausibility import course, criteria, doubts, pace, slips
-from service.lives.plausibility.course import Predicted
-from service.lives.plausibility.likelihood import History
-from service.lives.plausibility.pace import Pace
+from models.plausibility import criteria, judgement, pace, slips
+from service.lives.plausibility import doubts, reading
 
 
-def _nothing(*_: object) -> Iterator[Any]:
-    return iter(())
+def _slips_but(*names: str) -> Any:
+    def some(*arguments: Any) -> Iterator[Any]:
+        return (slip for slip in slips.slips_of(*arguments) if slip.name not in names)
+
+    return some
 
 
-def _zero(*_: object) -> float:
-    return 0.0
-
-
-def _anywhere(_: Pace, cycles: float) -> float:
-    return pace.log_anywhere(cycles)
-
-
-def _level_alone(own: course.Course, cycles: FloatArray) -> FloatArray:
-    return np.full((1, cycles.size), own.level)
-
-
-def _of_any(history: History, reading: Any) -> float:
-    return slips.log_cof_of_any(reading, history) or 0.0
-
-
-def _unlimited(log_weight: FloatArray, mean: FloatArray, variance: FloatArray) -> Predicted:
-    return Predicted(log_weight=log_weight, mean=mean, variance=variance)
+def _anywhere(cycles: FloatArray, *_: Any) -> FloatArray:
+    there = np.isfinite(cycles)
+    return np.where(there, pace.log_anywhere(np.where(there, cycles, 1.0)), 0.0).sum(axis=1)
 
 
 #: What is replaced by what, by the mechanism that this leaves out or changes.
 WITHOUT: dict[str, tuple[tuple[object, str, Any], ...]] = {
-    "the pace of cycles": ((Pace, "log_probability", _anywhere),),
-    "equal blocks": ((Pace, "_blocks", _zero),),
-    "order in time": ((History, "of_time", _zero),),
-    "physics of COF": ((course, "_possible", _unlimited),),
-    "the course of COF": ((History, "of_cof", _of_any),),
-    "the life before": ((course.Course, "_means", _level_alone),),
-    "pressure, speed, oil": ((History, "of_protocol", _zero),),
-    "slip: digits": ((slips, "digit_slips", _nothing),),
-    "slip: other cycles": ((slips, "other_cycles", _nothing),),
-    "slip: units": ((slips, "other_units", _nothing),),
-    "slip: another clutch": ((slips, "other_clutches", _nothing),),
-    "slip: dead pressure": ((slips, "dead_pressure", _nothing),),
+    "the pace of cycles": ((pace, "log_probability", _anywhere),),
+    "order in time": ((pace, "log_order", lambda start, _: np.zeros(start.shape[0])),),
+    "physics of COF": ((judgement, "log_physics", lambda _: 0.0),),
+    "pressure, speed, oil": ((reading._Known, "_log_protocol", lambda *_: 0.0),),
+    "slip: digits": ((judgement, "slips_of", _slips_but(*slips.OF_CYCLES[:3])),),
+    "slip: other cycles": ((judgement, "slips_of", _slips_but(slips.OTHER_CYCLES)),),
+    "slip: units": ((judgement, "slips_of", _slips_but("pressure", "torque", "speed", "oil")),),
+    "slip: another clutch": ((judgement, "slips_of", _slips_but(*slips.OF_CLUTCH)),),
+    "slip: dead pressure": ((judgement, "slips_of", _slips_but(reading.DEAD_PRESSURE)),),
+    "new levels": ((criteria, "LEVEL_UNDECLARED", 1e-30), (criteria, "LEVEL_AFTER_EVENT", 1e-30)),
     "held from half the odds on": ((criteria, "HELD", 0.5 * criteria.HELD),),
     "held from twice the odds on": ((criteria, "HELD", 2.0 * criteria.HELD),),
     "dead channels": ((doubts, "dead_channels", lambda *_: []),),

@@ -19,8 +19,7 @@ from service.lives.history import (
     reference_velocities,
 )
 from service.lives.incoming_run import IncomingRun
-from service.lives.plausibility.doubts import doubts
-from service.lives.recomputation import ClutchState
+from service.lives.plausibility import doubts
 from service.lives.run_analysis import Analysis, analyse, mean_cofs
 from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
@@ -45,10 +44,11 @@ class Answer:
 
 @dataclass
 class Bench:
-    """One clutch: its record, and the runs that were accepted."""
+    """One clutch: its record, the runs that were accepted, and those that are held."""
 
     record: Mapping[str, Any] = field(default_factory=dict)
     events: tuple[Event, ...] = ()
+    held: tuple[Event, ...] = ()
     _analyses: dict[str, Analysis] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -56,31 +56,47 @@ class Bench:
         self.geometry = self.clutch.geometry.to_model()
 
     def accept(self, body: Body) -> None:
-        """The run becomes part of the history, whatever is doubted about it."""
-        self._accept(self._read(body)[2])
+        """Somebody confirms the run, whatever is doubted about it."""
+        event = self._read(body)[2]
+        self.held = tuple(one for one in self.held if one.run_id != event.run_id)
+        self._settle(order([*self.events, replace(event, confirmed=True)]))
 
     def answer(self, body: Body, *, ablated: bool = False) -> Answer:
-        """What is doubted; a run without doubts is accepted."""
+        """What is doubted; all runs are then accepted or held as the judgement has them."""
         try:
             run, analysis, event = self._read(body)
         except InvalidError as error:
             return Answer(codes=(REFUSED,), message=str(error), without=dict.fromkeys(WITHOUT, True))
-        before = ClutchState(record=self.clutch, revision=0, events=self.events, adoptions=(), priors={})
         began = process_time()
-        notices = doubts(run, analysis, event, before)
+        shown, notices = doubts.doubts_alone(run, analysis, self.geometry)
+        event = replace(event, shown=shown)
+        together = {} if notices else self._together(event).doubts
         seconds = process_time() - began
-        held = {}
+        left_out = {}
         for name in WITHOUT if ablated else ():
             with without(name):
-                held[name] = bool(doubts(run, analysis, event, before))
-        if not notices:
-            self._accept(event)
+                lone = doubts.doubts_alone(run, analysis, self.geometry)
+                asked = replace(event, shown=lone[0])
+                left_out[name] = bool(lone[1]) or event.run_id in self._together(asked).doubts
+        if notices:
+            self.held = (*self.held, event)
+        else:
+            every = [*self.events, *self.held, event]
+            self.held = tuple(
+                one for one in every if one.run_id in together or (one.shown is None and not one.confirmed)
+            )
+            aside = {one.run_id for one in self.held}
+            self._settle(order([one for one in every if one.run_id not in aside]))
+        notices = notices or together.get(event.run_id, ())
         return Answer(
             codes=tuple(notice.code for notice in notices),
             message=" ".join(notice.message for notice in notices),
             seconds=seconds,
-            without=held,
+            without=left_out,
         )
+
+    def _together(self, event: Event) -> doubts.Judged:
+        return doubts.doubts_together(self.events, self.held, event, self.geometry, corrected=False)
 
     def _read(self, body: Body) -> tuple[IncomingRun, Analysis, Event]:
         run = read_run(json.dumps(body).encode())
@@ -88,10 +104,14 @@ class Bench:
         self._analyses[run.run_id] = analysis
         event = _event(run, analysis)
         life = life_with(order([*self.events, event]), event)
-        return run, analysis, replace(event, cofs=self._cofs(life, event))
+        return (
+            run,
+            analysis,
+            replace(event, cofs=self._cofs(life, event), shown=doubts.doubts_alone(run, analysis, self.geometry)[0]),
+        )
 
-    def _accept(self, event: Event) -> None:
-        self.events = order([*self.events, event])
+    def _settle(self, events: tuple[Event, ...]) -> None:
+        self.events = events
         # under one protocol the means that were computed already hold
         if all(one.speed_range in (None, life.speed_range) for life in lives_of(self.events) for one in life.events):
             return

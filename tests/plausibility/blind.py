@@ -3,6 +3,7 @@
 import csv
 import zlib
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -62,6 +63,30 @@ def real() -> Iterator[Campaign]:
         for number, history in enumerate(histories):
             sent = [_test(f"{name}-{number}-{k}", cycles, share) for k, (cycles, share) in enumerate(history)]
             yield Campaign(source=f"real: {name}", runs=sent, record={})
+
+
+@cache
+def share_lives() -> dict[str, list[list[tuple[float, float]]]]:
+    """Measured lives as cycles and the share of the first COF, by what was measured; none where the folder is not there."""
+    if not loaders.FOLDER.is_dir():
+        return {}
+    return {
+        "filters": list(_filters()),
+        "lasers": list(_lasers()),
+        "cracks": list(_cracks()),
+        "batteries": list(_batteries()),
+    }
+
+
+def _batteries() -> Iterator[list[tuple[float, float]]]:
+    """Capacity as what friction is left: a half at the threshold; some fifteen tests along each life."""
+    rows = _rows("battery_lives", "battery_lives.csv")
+    lives: dict[str, list[tuple[float, float]]] = {}
+    for row in rows:
+        left = 1.0 - 0.5 * (1.0 - float(row["relative_capacity"])) / (1.0 - float(row["threshold"]))
+        lives.setdefault(f"{row['group']}/{row['life']}", []).append((float(row["cycle"]), left))
+    for history in lives.values():
+        yield history[:: max(len(history) // 15, 1)]
 
 
 def _test(run_id: str, cycles: float, share: float) -> Body:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tests.plausibility import blind, simulated, slips
+from tests.plausibility import blind, honest_lives, simulated, slips
 from tests.plausibility.bench import REFUSED, Answer, Bench, Body
 from tests.plausibility.simulated import Campaign
 
@@ -14,13 +14,16 @@ Draw = Callable[[np.random.Generator], Campaign]
 
 #: Another clutch's test is tried once a clutch has a course: after so many tests.
 TESTS_BEFORE = 3
+#: After so many further runs it is looked whether a slip is still out of the track.
+FURTHER = 10
 #: So many honest runs of each source are judged without each mechanism too.
 ABLATED = 100
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """A run that was sent: whence, which slip ("" for an honest run), its kind, stationary tests before it, the answer."""
+    """A run that was sent: whence, which slip ("" for an honest run), its kind, stationary tests before it, the answer, and
+    whether it was out of the track after FURTHER more honest runs (None: so many did not follow)."""
 
     source: str
     slip: str
@@ -28,6 +31,7 @@ class Outcome:
     cycles: float
     before: int
     answer: Answer
+    out_after: bool | None = None
 
     @property
     def held(self) -> bool:
@@ -48,24 +52,17 @@ def of_blind(rng: np.random.Generator) -> Campaign:
 RIGS: dict[str, Draw] = {"simulated rig": of_simulated, "blind rig": of_blind}
 
 
-def slipped(seed: int, count: int, rig: str) -> list[Outcome]:
-    """So many campaigns of a rig, each with one slip; the groups of slips take turns."""
-    outcomes = []
-    for number in range(count):
-        group = slips.GROUPS[number % len(slips.GROUPS)]
-        rng = np.random.default_rng([seed, 1, list(RIGS).index(rig), number])
-        outcomes.append(one_slip(rng, RIGS[rig], rig, group))
-    return outcomes
+def slipped(seed: int, rig: str, number: int) -> Outcome:
+    """A campaign of a rig with one slip; the groups of slips take turns."""
+    rng = np.random.default_rng([seed, 1, list(RIGS).index(rig), number])
+    return one_slip(rng, RIGS[rig], rig, slips.GROUPS[number % len(slips.GROUPS)])
 
 
-def aside(seed: int, count: int, rig: str) -> list[Outcome]:
-    """Slips beyond the demand, and one that cannot be told."""
-    outcomes = []
-    for number in range(count):
-        rng = np.random.default_rng([seed, 2, list(RIGS).index(rig), number])
-        names = (*slips.OTHERS, *slips.ALIKE)
-        outcomes.append(one_slip(rng, RIGS[rig], rig, names[number % len(names)]))
-    return outcomes
+def aside(seed: int, rig: str, number: int) -> Outcome:
+    """A slip beyond the demand, or one that cannot be told."""
+    rng = np.random.default_rng([seed, 2, list(RIGS).index(rig), number])
+    names = (*slips.OTHERS, *slips.ALIKE)
+    return one_slip(rng, RIGS[rig], rig, names[number % len(names)])
 
 
 def one_slip(rng: np.random.Generator, draw: Draw, source: str, group: str) -> Outcome:
@@ -105,7 +102,14 @@ def _sent(made: Campaign, k: int, wrong: Body, source: str, name: str) -> Outcom
         bench.accept(run)
     before = sum(1 for event in bench.events if event.cofs)
     answer = bench.answer(wrong, ablated=True)
-    return Outcome(source, name, str(wrong["kind"]), float(wrong["cycles"]), before, answer)
+    further = made.runs[k + 1 : k + 1 + FURTHER]
+    out_after = None
+    if len(further) == FURTHER:
+        for run in further:
+            bench.answer(run)
+        refused = REFUSED in answer.codes
+        out_after = refused or any(event.run_id == wrong["run_id"] for event in bench.held)
+    return Outcome(source, name, str(wrong["kind"]), float(wrong["cycles"]), before, answer, out_after)
 
 
 def honest(seed: int, count: int) -> Iterator[Outcome]:
@@ -134,6 +138,14 @@ def _honest_of(rng: np.random.Generator, draw: Draw, count: int) -> Iterator[Out
             if sent < count:
                 yield outcome
             sent += 1
+
+
+def honest_life(seed: int, kind: str, number: int) -> dict[str, int]:
+    """An honest life that is no eq. 6: how many runs it has, how many were held when they came in, how many in the end."""
+    life = honest_lives.life(seed, kind, number)
+    bench = Bench({})
+    arrived = sum(bool(bench.answer(run).codes) for run in life)
+    return {"runs": len(life), "held": arrived, "end": len(bench.held)}
 
 
 def everything(made: Campaign, *, ablated: bool = False) -> Iterator[Outcome]:

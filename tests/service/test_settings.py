@@ -16,6 +16,7 @@ OPERATIONS = Path(__file__).parents[2] / "docs" / "operations.md"
 #: Names of earlier releases, which services are started with.
 EARLIER = {
     "CLUTCHLIFE_DATABASE": ("sqlite:///other.db", "database", "sqlite:///other.db"),
+    "CLUTCHLIFE_ROOT_PATH": ("a/clutch/", "root_path", "/a/clutch"),
     "CLUTCHLIFE_WORKERS": ("0", "workers", 0),
     "CLUTCHLIFE_MAX_BODY_MB": ("3", "most_body_bytes", 3 << 20),
     "CLUTCHLIFE_BODY_SECONDS": ("7", "body_seconds", 7),
@@ -105,7 +106,16 @@ def test_passwords_are_not_shown(address: str, shown: str) -> None:
 
 
 def test_a_start_prints_the_settings_without_the_password() -> None:
-    command = [sys.executable, "-m", "service.cli.main", "serve", "--database", "postgresql://rig:s3cr3t@host/db"]
+    command = [
+        sys.executable,
+        "-m",
+        "service.cli.main",
+        "serve",
+        "--port",
+        "0",
+        "--database",
+        "postgresql://rig:s3cr3t@host/db",
+    ]
     environment = os.environ | {"CLUTCHLIFE_LOG_FORMAT": "json", "CLUTCHLIFE_WORKERS": "1"}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 64

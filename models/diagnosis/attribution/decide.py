@@ -12,27 +12,29 @@ ambiguous; an extension that predicts worse is withheld.
 Templates have a model discrepancy (`effects.template_discrepancy`), so evidence includes what they err by.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from models.diagnosis.attribution.check import Checks
 from models.diagnosis.attribution.evidence import Hypothesis, HypothesisStatus
+from models.diagnosis.attribution.explanations import read, reconciled
 from models.diagnosis.attribution.posterior import (
     PriorOdds,
     kept_share,
-    probabilities_of,
     unshared,
+    weights_of,
     with_unmeasured,
 )
 from models.diagnosis.attribution.search import SearchResult
-from models.diagnosis.attribution.verdict import Comparison, HeldOut, Judgement, Proposal, Verdict
+from models.diagnosis.attribution.verdict import UNCATALOGUED, Comparison, HeldOut, Judgement, Proposal, Verdict
 from models.diagnosis.criteria import (
     AXES_LOG_ODDS,
     CREDIBLE_MARGIN,
     CREDIBLE_MARGIN_PAIRS,
     CREDIBLE_MARGIN_SHARE,
+    DOUBT,
     LEAST_EVIDENCE,
     LEAST_LINE,
     LEAST_NAMED,
@@ -50,6 +52,7 @@ from models.diagnosis.criteria import (
     VIBRATION_PROBABILITY,
     VIBRATION_TRACE,
     VIBRATION_TRACE_UNEXPLAINED,
+    WRONG,
 )
 from models.diagnosis.design.facts import Facts
 from models.diagnosis.detection.alarm import Alarms
@@ -57,6 +60,8 @@ from models.diagnosis.detection.raw_records.evidence import FIXED_LINE, RawEvide
 from models.diagnosis.effects.catalogue import BY_SLUG, CATALOGUE
 from models.diagnosis.effects.catalogued import oil_temperature
 from models.diagnosis.effects.effect import Kind, Resemblance
+
+_UNKNOWN = (UNCATALOGUED,)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,12 +85,21 @@ def calls_for_search(alarms: Alarms, raw: Iterable[RawEvidence]) -> bool:
 
 def decide(case: CaseEvidence, checks: Checks) -> Judgement:
     """The judgement before validation."""
-    judgement = Judgement(verdict=Verdict.MODEL_ADEQUATE)
+    judgement = _adequate(case.alarms)
     if case.search is not None and confirmed(case.alarms, case.search.hypotheses, max(case.structure, case.unmeasured)):
         imitable = like_temperature(case.facts) if case.unmeasured > -np.inf else frozenset()
         judgement = judge(case.search.hypotheses, case.structure, case.unmeasured, imitable, checks)
     judgement = with_vibrations(judgement, case.raw)
     return judgement if case.search is None else replace(judgement, fault=_fault_as_good(case.search))
+
+
+def _adequate(alarms: Alarms) -> Judgement:
+    """Nothing is wrong, up to what the rarest alarm says against it: a p-value is a Bayes factor of 1/(-e p ln p) at most
+    (Sellke, Bayarri and Berger, Am. Stat. 55 (2001) 62)."""
+    p_value = min(max(min(each.p_value for each in (alarms.effects, alarms.contrasts, alarms.lines)), 1e-300), 1 / np.e)
+    against = WRONG / (1.0 - WRONG) / (-np.e * p_value * np.log(p_value))
+    weights = {(): 1.0, _UNKNOWN: float(against)}
+    return judged(Verdict.MODEL_ADEQUATE, weights, {(): 1.0})
 
 
 def revise(judgement: Judgement, held_out: HeldOut | None) -> Judgement:
@@ -129,7 +143,7 @@ def judge(
     usable = [hypothesis for hypothesis in hypotheses if hypothesis.usable]
     singles = [hypothesis for hypothesis in usable if len(hypothesis.effects) == 1]
     if not singles:
-        return Judgement(verdict=Verdict.UNEXPLAINED_STRUCTURE)
+        return judged(Verdict.UNEXPLAINED_STRUCTURE, {}, {_UNKNOWN: 1.0})
     best, odds = _best(singles, [hypothesis for hypothesis in usable if len(hypothesis.effects) == 2], checks)
     credible = credible_set(best, usable, odds, checks)
     leader = credible[0] if credible else best  # the best may have failed its check, and another be promoted
@@ -140,34 +154,54 @@ def judge(
         credible=len(credible),
         check=checks(leader),
     )
-    probabilities = probabilities_of(hypotheses, best, odds, checks.excess, structure)
+    weights = weights_of(hypotheses, best, odds, checks.excess, structure)
     causes = tuple(dict.fromkeys(slug for hypothesis in credible for slug in hypothesis.slugs))
     temperature = oil_temperature.EFFECT.slug
     imitated = unmeasured > max(best.evidence - CREDIBLE_MARGIN - best.tolerance, LEAST_EVIDENCE)
     if imitated:
-        probabilities = with_unmeasured(probabilities, unmeasured, best)
+        weights = with_unmeasured(weights, unmeasured, best)
         causes = tuple(dict.fromkeys((temperature, *causes)))
         comparison = replace(comparison, unmeasured=unmeasured)
     elif not credible or not _leads(leader, odds, structure):
         share = kept_share(best, checks(best))
-        return Judgement(
-            verdict=Verdict.UNEXPLAINED_STRUCTURE,
-            probabilities={slug: share * probability for slug, probability in probabilities.items()},
-            comparison=comparison,
-        )
+        weights = {effects: share * weight for effects, weight in weights.items()}
+        weights[_UNKNOWN] = weights.get(_UNKNOWN, 0.0) + 1.0 - share
+        return judged(Verdict.UNEXPLAINED_STRUCTURE, weights, {_UNKNOWN: 1.0}, comparison=comparison)
     elif imitable & set(causes):
         imitated, causes = True, (*causes, temperature)
     unfinished = leader.status is HypothesisStatus.OUT_OF_STEPS
     doubtful = imitated or unfinished or len(credible) > 1 or not _remainder_is_noise(leader, comparison)
+    probabilities = {slug: sum(w for effects, w in weights.items() if slug in effects) for slug in causes}
     likely = () if doubtful else _likely(causes, probabilities)
-    named = bool(likely) and probabilities[likely[0]] >= LEAST_NAMED
-    return Judgement(
-        verdict=Verdict.CAUSE_NAMED if named else Verdict.CAUSE_AMBIGUOUS,
-        causes=likely if named else causes,
-        credible=credible,
-        probabilities=probabilities,
-        comparison=comparison,
-    )
+    if likely and probabilities[likely[0]] >= LEAST_NAMED:
+        return judged(Verdict.CAUSE_NAMED, weights, {likely: 1.0}, credible=credible, comparison=comparison)
+    rival: dict[tuple[str, ...], float]
+    if imitated:
+        rival = {(temperature,): DOUBT, **({leader.slugs: 1.0 - DOUBT} if credible else {_UNKNOWN: DOUBT})}
+    elif len(credible) > 1:
+        rival = {hypothesis.slugs: 1.0 for hypothesis in credible}
+    else:
+        rival = _with_a_doubt(leader)
+    return judged(Verdict.CAUSE_AMBIGUOUS, weights, rival, credible=credible, comparison=comparison)
+
+
+def judged(
+    verdict: Verdict,
+    weights: Mapping[tuple[str, ...], float],
+    target: Mapping[tuple[str, ...], float],
+    *,
+    credible: tuple[Hypothesis, ...] = (),
+    comparison: Comparison | None = None,
+) -> Judgement:
+    """A judgement whose explanations are the weights, as far as they read as the verdict, and tend to `target` else."""
+    explanations = reconciled(weights, target, verdict)
+    reads, causes = read(explanations)
+    return Judgement(verdict=reads, causes=causes, credible=credible, explanations=explanations, comparison=comparison)
+
+
+def _with_a_doubt(leader: Hypothesis) -> dict[tuple[str, ...], float]:
+    """A hypothesis alone, or beside something that is not in the catalogue."""
+    return {leader.slugs: 1.0 - DOUBT, (*leader.slugs, UNCATALOGUED): DOUBT}
 
 
 def like_temperature(facts: Facts) -> frozenset[str]:
@@ -244,11 +278,11 @@ def with_vibrations(judgement: Judgement, raw: Iterable[RawEvidence]) -> Judgeme
     unexplained = judgement.verdict is Verdict.UNEXPLAINED_STRUCTURE
     share = VIBRATION_TRACE_UNEXPLAINED if unexplained else VIBRATION_TRACE
     if 0.0 < (max(comparison.best_drop, comparison.structure) if comparison else 0.0) < share * loudest:
-        judgement = Judgement(verdict=Verdict.MODEL_ADEQUATE, comparison=comparison)
+        judgement = judged(Verdict.MODEL_ADEQUATE, {}, {(): 1.0}, comparison=comparison)
     judgement = _joined(judgement, tuple(record.effect for record in vibrations))
     lined = any(record.effect == FIXED_LINE and record.log_evidence > LEAST_LINE for record in clear)
     if lined and judgement.verdict is Verdict.MODEL_ADEQUATE:
-        return replace(judgement, verdict=Verdict.UNEXPLAINED_STRUCTURE)
+        return judged(Verdict.UNEXPLAINED_STRUCTURE, {}, {_UNKNOWN: 1.0}, comparison=comparison)
     return judgement
 
 
@@ -260,11 +294,15 @@ def _joined(judgement: Judgement, vibrations: tuple[str, ...]) -> Judgement:
     """With vibrations that raw records show: they are causes beside the others, or the only ones."""
     if not vibrations:
         return judgement
-    probabilities = {**dict.fromkeys(vibrations, VIBRATION_PROBABILITY), **judgement.probabilities}
-    if judgement.verdict is Verdict.UNEXPLAINED_STRUCTURE:
-        return replace(judgement, causes=(), probabilities=probabilities)
-    verdict = Verdict.CAUSE_NAMED if judgement.verdict is Verdict.MODEL_ADEQUATE else judgement.verdict
-    return replace(judgement, verdict=verdict, causes=(*judgement.causes, *vibrations), probabilities=probabilities)
+    before = {one.effects: one.probability for one in judgement.explanations}
+    after = {(*effects, *vibrations): weight for effects, weight in before.items()}
+    weights = {effects: (1.0 - VIBRATION_PROBABILITY) * weight for effects, weight in before.items()}
+    for effects, weight in after.items():
+        weights[effects] = weights.get(effects, 0.0) + VIBRATION_PROBABILITY * weight
+    verdict = judgement.verdict
+    if verdict in {Verdict.MODEL_ADEQUATE, Verdict.CAUSE_NAMED}:
+        verdict, after = Verdict.CAUSE_NAMED, {(*judgement.causes, *vibrations): 1.0}
+    return judged(verdict, weights, after, credible=judgement.credible, comparison=judgement.comparison)
 
 
 def _fault_as_good(search: SearchResult) -> str | None:
@@ -281,4 +319,8 @@ def _unsure(judgement: Judgement) -> Judgement:
     both = judgement.credible[0].slugs if judgement.credible else ()
     pair = judgement.verdict is Verdict.CAUSE_NAMED and len(both) > 1 and set(both) <= set(judgement.causes)
     uneven = judgement.comparison is not None and judgement.comparison.check.parts.p_value < LEAST_REMAINDER_P_VALUE
-    return replace(judgement, verdict=Verdict.CAUSE_AMBIGUOUS) if pair and uneven else judgement
+    if not (pair and uneven):
+        return judgement
+    weights = {one.effects: one.probability for one in judgement.explanations}
+    doubted = judged(Verdict.CAUSE_AMBIGUOUS, weights, _with_a_doubt(judgement.credible[0]))
+    return replace(judgement, verdict=doubted.verdict, causes=doubted.causes, explanations=doubted.explanations)

@@ -1,4 +1,4 @@
-"""Probabilities: evidences weighed against each other, at their prior odds and less what a check has against them.
+"""Weights of explanations: evidences weighed against each other, at their prior odds and less what a check has against them.
 
     p_h ∝ exp((evidence_h - odds_h - excess_h - those of the best)/(1 + ½ TOLERANCE λ))
 
@@ -14,6 +14,7 @@ from scipy.special import logsumexp
 
 from models.diagnosis.attribution.check import Check
 from models.diagnosis.attribution.evidence import Hypothesis
+from models.diagnosis.attribution.verdict import UNCATALOGUED
 from models.diagnosis.criteria import PAIR_LOG_ODDS, SAME_FAMILY_LOG_ODDS, TOLERANCE
 from models.diagnosis.effects.catalogued import oil_temperature
 
@@ -39,16 +40,15 @@ def unshared(best: Hypothesis, other: Hypothesis, singles: Sequence[Hypothesis])
     return max(best.drop - alone, 0.0)
 
 
-def probabilities_of(
+def weights_of(
     hypotheses: Sequence[Hypothesis],
     best: Hypothesis,
     odds: PriorOdds,
     excess: Callable[[Hypothesis], float],
     structure: float,
-) -> dict[str, float]:
-    """The probability that an effect is at work, by slug, largest first; `excess` [nats] is what a check has against a
-    hypothesis. Hypotheses, structure without a name [nats] and nothing at all exclude each other and no effect is twice in
-    one, so no probability is beyond 1."""
+) -> dict[tuple[str, ...], float]:
+    """The weight of each explanation: the hypotheses by their slugs, structure without a name [nats], nothing at all. They
+    sum to one. `excess` [nats] is what a check has against a hypothesis."""
     singles = [hypothesis for hypothesis in hypotheses if hypothesis.usable and len(hypothesis.effects) == 1]
 
     def value(hypothesis: Hypothesis) -> float:
@@ -57,30 +57,26 @@ def probabilities_of(
     def cooled(lead: float, differing: float) -> float:
         return lead / (1.0 + 0.5 * TOLERANCE * differing)
 
-    logs = [cooled(max(structure, 0.0) - value(best), best.drop)]
-    logs += [cooled(value(other) - value(best), unshared(best, other, singles)) for other in hypotheses]
-    weights = np.exp(np.array(logs) - logsumexp(logs))
-    by_slug: dict[str, float] = {}
-    for weight, hypothesis in zip(weights[1:].tolist(), hypotheses, strict=True):
-        for slug in hypothesis.slugs:
-            by_slug[slug] = by_slug.get(slug, 0.0) + weight
-    return _largest_first(by_slug)
+    logs: dict[tuple[str, ...], float] = {(): cooled(-value(best), best.drop)}
+    if structure > 0.0:
+        logs[(UNCATALOGUED,)] = cooled(structure - value(best), best.drop)
+    logs |= {other.slugs: cooled(value(other) - value(best), unshared(best, other, singles)) for other in hypotheses}
+    total = float(logsumexp(list(logs.values())))
+    return {effects: float(np.exp(log - total)) for effects, log in logs.items()}
 
 
-def with_unmeasured(probabilities: dict[str, float], unmeasured: float, best: Hypothesis) -> dict[str, float]:
-    """The probabilities with an unmeasured oil temperature of evidence `unmeasured` [nats] beside the others."""
+def with_unmeasured(
+    weights: dict[tuple[str, ...], float], unmeasured: float, best: Hypothesis
+) -> dict[tuple[str, ...], float]:
+    """The weights with an unmeasured oil temperature of evidence `unmeasured` [nats] beside the others."""
     lead = (unmeasured - best.evidence) / (1.0 + 0.5 * best.tolerance)
     share = float(1 / (1 + np.exp(-np.clip(lead, -500, 500))))
     temperature = oil_temperature.EFFECT.slug
-    others = {slug: (1 - share) * value for slug, value in probabilities.items() if slug != temperature}
-    return _largest_first({**others, temperature: share})
+    others = {effects: (1 - share) * weight for effects, weight in weights.items() if temperature not in effects}
+    return {**others, (temperature,): share}
 
 
 def kept_share(best: Hypothesis, check: Check) -> float:
     """The share of its probability that a hypothesis keeps where it fails its check: something else competes."""
     cooled = check.excess / (1.0 + 0.5 * best.tolerance)
     return float(0.5 / (1.0 + np.exp(np.clip(cooled, 0.0, 500.0)))) if check.excess > 0 else 1.0
-
-
-def _largest_first(probabilities: dict[str, float]) -> dict[str, float]:
-    return dict(sorted(probabilities.items(), key=lambda item: -item[1]))

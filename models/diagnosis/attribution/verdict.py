@@ -1,6 +1,7 @@
 """The verdict and the judgement that it is part of, as values; `decide` makes them."""
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass
 from enum import StrEnum
 
 from models.diagnosis.attribution.check import Check
@@ -15,6 +16,33 @@ class Verdict(StrEnum):
     CAUSE_AMBIGUOUS = "cause_ambiguous"
     UNEXPLAINED_STRUCTURE = "unexplained_structure"
     INSUFFICIENT_DATA = "insufficient_data"
+
+
+#: Stands for something that no effect of the catalogue is.
+UNCATALOGUED = "uncatalogued"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Explanation:
+    """Slugs of the effects at work (UNCATALOGUED among them, or none), the probability that these and no others are, and
+    the probability that the estimated amplitudes have the right signs (None where nothing was estimated)."""
+
+    effects: tuple[str, ...]
+    probability: float
+    sign_probability: float | None = None
+
+
+def probability_of(explanations: Iterable[Explanation], slug: str) -> float:
+    """The probability that an effect is at work, alone or beside others."""
+    return min(sum(one.probability for one in explanations if slug in one.effects), 1.0)
+
+
+def probabilities_by_slug(explanations: Iterable[Explanation]) -> dict[str, float]:
+    """The probability of each effect of the catalogue, largest first."""
+    listed = tuple(explanations)
+    slugs = dict.fromkeys(slug for one in listed for slug in one.effects if slug != UNCATALOGUED)
+    found = {slug: probability_of(listed, slug) for slug in slugs}
+    return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
 class Proposal(StrEnum):
@@ -55,19 +83,24 @@ class HeldOut:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judgement:
-    """The verdict, its causes, the credible set (hypotheses that the data do not distinguish from the best, best first), the
-    probability of each effect, the numbers of the comparison (None where nothing was compared), the slug of an uncatalogued
-    rig fault that does about as well as the best; after validation, what is proposed and whether effects of use are followed
-    beyond the data."""
+    """The verdict and its causes, both read off the explanations (`attribution.explanations`), the credible set (hypotheses
+    that the data do not distinguish from the best, best first), the explanations, most probable first, the numbers of the
+    comparison (None where nothing was compared), the slug of an uncatalogued rig fault that does about as well as the best;
+    after validation, what is proposed and whether effects of use are followed beyond the data."""
 
     verdict: Verdict
     causes: tuple[str, ...] = ()
     credible: tuple[Hypothesis, ...] = ()
-    probabilities: dict[str, float] = field(default_factory=dict)
+    explanations: tuple[Explanation, ...] = ()
     comparison: Comparison | None = None
     fault: str | None = None
     proposal: Proposal = Proposal.NONE
     follow_courses: bool = False
+
+    @property
+    def probabilities(self) -> dict[str, float]:
+        """The probability of each effect of the catalogue, largest first."""
+        return probabilities_by_slug(self.explanations)
 
     @property
     def open(self) -> bool:

@@ -91,14 +91,16 @@ class Design:
         return max(float(np.median(np.abs(self.torque[self.closed]))) if self.closed.any() else 0.0, 1e-12)
 
     def to_rows(self, at_points: FloatArray) -> FloatArray:
-        """[P, ...] at points -> [N, ...] at rows: bins lie between their two points, where their samples do."""
+        """[P, ...] at points -> [N, ...] at rows: bins lie among their points, where their samples do."""
         if not self.loops:
             return at_points
         out = np.empty((self.torque.size, *at_points.shape[1:]))
         out[: self.plateaus] = at_points[: self.plateaus]
-        first, second = (at_points[self.plateaus + k :: PHASES // BINS][self.bins] for k in range(PHASES // BINS))
-        later = (0.5 + 2.0 * self.bin_offset).reshape(-1, *(1,) * (at_points.ndim - 1))
-        out[self.plateaus :] = first + later * (second - first)
+        per_bin = PHASES // BINS
+        place = (np.arange(per_bin) + 0.5) / per_bin - 0.5
+        weights = 1.0 / per_bin + self.bin_offset[:, None] * place / (place**2).sum()  # a line through a bin's points
+        within = at_points[self.plateaus :].reshape(-1, per_bin, *at_points.shape[1:])[self.bins]
+        out[self.plateaus :] = np.einsum("bk,bk...->b...", weights, within)
         return out
 
 

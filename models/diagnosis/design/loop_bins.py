@@ -28,10 +28,12 @@ from models.records.periods import Cycle, fit_cycle, harmonics
 from models.records.pressure_stretches import pressure_stretches
 from models.records.runs import Record, plate_rise
 
-#: Phases at which a loop is computed, and bins in which it is compared; a bin holds a whole number of phases.
-PHASES, BINS = 120, 60
+#: Phases at which a loop is computed, and bins in which it is compared; a bin holds a whole number of phases. With two a bin
+#: the torque next to rest is off by up to 0.013 % of the clutch's, which passed for a delay of 2 ms on a rig of 0.1 % noise;
+#: with three by 0.003 %.
+PHASES, BINS = 180, 60
 #: Phases over which v^γ is averaged about each phase.
-_FINE = 10
+_FINE = 6
 #: Speeds below this share of the highest are taken for this share, lest v^γ meets 0.
 _STANDSTILL = 1e-5
 

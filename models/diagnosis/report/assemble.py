@@ -11,7 +11,7 @@ from models.diagnosis.detection.structure_axes import axes_of
 from models.diagnosis.effects.uncatalogued.catalogue import UNCATALOGUED_BY_SLUG
 from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.pooled_fit.run_scatter import run_scatter
-from models.diagnosis.report.candidates import candidates_of
+from models.diagnosis.report.candidates import candidates_of, with_signs
 from models.diagnosis.report.maps import loop_traces, residual_maps
 from models.diagnosis.report.outlying_run import outlying_run
 from models.diagnosis.report.proposed_extension import proposed_extension, withheld_note
@@ -30,15 +30,17 @@ def report_of(
     hypotheses: Sequence[Hypothesis] = () if investigation.search is None else investigation.search.hypotheses
     notes = _notes(investigation, judgement, validation)
     scatter = run_scatter(projected.projections)
+    candidates = candidates_of(problem, judgement, hypotheses, investigation.raw)
     findings = Findings(
         verdict=judgement.verdict,
         causes=judgement.causes,
-        candidates=candidates_of(problem, judgement, hypotheses, investigation.raw),
+        explanations=with_signs(judgement.explanations, candidates),
+        candidates=candidates,
         baseline=misfit_of(problem, projected.fit, investigation.where),
         extended=_extended_misfit(investigation, judgement, validation),
         gain=validation.gain,
         advice=advice,
-        visible=visible_of(projected),
+        visible=visible_of(projected, investigation.alarms.effects.threshold),
         notes=notes,
         tests=len(problem.design.runs),
         states=int(problem.design.facts.states.size),
@@ -49,6 +51,7 @@ def report_of(
         verdict=judgement.verdict,
         causes=judgement.causes,
         summary=summarise(findings),
+        explanations=findings.explanations,
         candidates=findings.candidates,
         baseline=findings.baseline,
         extended=findings.extended,
@@ -69,6 +72,7 @@ def insufficient(missing: str, design: Design) -> Report:
         verdict=Verdict.INSUFFICIENT_DATA,
         causes=(),
         summary=f"Too little data for a pooled baseline: {missing}",
+        explanations=(),
         candidates=(),
         baseline=None,
         extended=None,

@@ -1,11 +1,12 @@
 """The candidates of a report: each effect that competed, with its probability, evidence and estimated amplitude."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from models.diagnosis.attribution.evidence import Hypothesis
-from models.diagnosis.attribution.verdict import Judgement
+from models.diagnosis.attribution.verdict import Explanation, Judgement
 from models.diagnosis.criteria import LEAST_LISTED
 from models.diagnosis.detection.raw_records.evidence import RawEvidence
 from models.diagnosis.effects.catalogue import BY_SLUG
@@ -61,11 +62,24 @@ def _estimate(slug: str, amplitude: float, deviation: float) -> Estimate:
         value=_finite(amplitude * effect.scale),
         sd=_finite(deviation * effect.scale),
         unit=effect.unit,
+        one_sided=effect.positive,
     )
 
 
 def _finite_estimate(estimate: Estimate) -> Estimate:
     return Estimate(name=estimate.name, value=_finite(estimate.value), sd=_finite(estimate.sd), unit=estimate.unit)
+
+
+def with_signs(explanations: Iterable[Explanation], candidates: Iterable[Candidate]) -> tuple[Explanation, ...]:
+    """Explanations with the probability that the least certain of their effects' signs is right."""
+    signs = {candidate.effect: candidate.estimate.sign_probability for candidate in candidates}
+    return tuple(
+        replace(
+            one,
+            sign_probability=min((sign for slug in one.effects if (sign := signs.get(slug)) is not None), default=None),
+        )
+        for one in explanations
+    )
 
 
 def _finite(value: float) -> float:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from models.arrays import FloatArray
 from models.diagnosis.attribution.evidence import HypothesisStatus
-from models.diagnosis.attribution.verdict import Verdict
+from models.diagnosis.attribution.verdict import Explanation, Verdict
 from models.diagnosis.detection.lack_of_fit import Misfit
 from models.diagnosis.effects.estimate import Estimate
 from models.diagnosis.experiments.test_plan import Advice
@@ -30,8 +30,8 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Visible:
-    """The smallest amplitude of an effect that these data would have shown with 90 % power in the middle one of its shapes;
-    `least` in the shape that shows best; and its usual size."""
+    """The smallest amplitude of an effect that these data would have shown with 90 % power: in whatever of its shapes
+    (infinite where one of them would be absorbed whole), `least` in the shape that shows best; and its usual size."""
 
     effect: str
     amplitude: float
@@ -71,11 +71,13 @@ class LoopTrace:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
-    """A finished diagnosis. `extension` is what may be adopted, None where there is nothing to adopt."""
+    """A finished diagnosis. `explanations`, most probable first, exclude each other and sum to one; none where nothing could
+    be judged. `extension` is what may be adopted, None where there is nothing to adopt."""
 
     verdict: Verdict
     causes: tuple[str, ...]
     summary: str
+    explanations: tuple[Explanation, ...]
     candidates: tuple[Candidate, ...]
     baseline: Misfit | None
     extended: Misfit | None

@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from models.diagnosis.attribution.verdict import Verdict
+from models.diagnosis.attribution.explanations import credible_explanations
+from models.diagnosis.attribution.verdict import UNCATALOGUED, Explanation, Verdict
 from models.diagnosis.criteria import (
     COMPANION_FROM,
     FAR_FROM_FIT,
     FEW_STATES,
     LARGE_AMPLITUDE,
-    LEAST_NAMED,
     RIVAL_BELOW,
     RIVAL_FROM,
     RIVALS_MENTIONED,
@@ -29,10 +29,10 @@ from models.diagnosis.report.wording import (
     conjunction,
     count_of,
     effect_name,
-    estimated,
     evidence_in_words,
     number,
     probability,
+    signed,
     with_unit,
 )
 from models.diagnosis.validation.held_out import Gain
@@ -48,6 +48,7 @@ class Findings:
 
     verdict: Verdict
     causes: tuple[str, ...]
+    explanations: tuple[Explanation, ...]
     candidates: tuple[Candidate, ...]
     baseline: Misfit | None
     extended: Misfit | None
@@ -85,8 +86,14 @@ def _adequate(findings: Findings) -> list[str]:
     catalogued = [visible for visible in findings.visible if visible.effect in BY_SLUG]
     shown = [visible for visible in catalogued if _within_reach(visible, visible.amplitude)]
     if shown:
-        sizes = "; ".join(_detectable(visible) for visible in shown[:VISIBLE_MENTIONED])
-        parts.append(f"These data would have shown, with 90 % power and in the middle one of its forms: {sizes}.")
+        sizes = "; ".join(_detectable(visible, visible.amplitude) for visible in shown[:VISIBLE_MENTIONED])
+        parts.append(f"These data would have shown, with 90 % power: {sizes}.")
+    partly = [
+        each for each in catalogued if _within_reach(each, each.least) and not _within_reach(each, each.amplitude)
+    ]
+    if partly:
+        sizes = "; ".join(_detectable(each, each.least) for each in partly[:VISIBLE_MENTIONED])
+        parts.append(f"Only in some of its forms, others being absorbed by the baseline: {sizes}.")
     hidden = [visible.effect for visible in catalogued if not _within_reach(visible, visible.least)]
     if hidden:
         names = conjunction([effect_name(slug) for slug in hidden])
@@ -111,8 +118,8 @@ def _within_reach(visible: Visible, amplitude: float) -> bool:
     return amplitude <= LARGE_AMPLITUDE * visible.usual
 
 
-def _detectable(visible: Visible) -> str:
-    size = with_unit(number(visible.amplitude), visible.unit)
+def _detectable(visible: Visible, amplitude: float) -> str:
+    size = with_unit(number(amplitude), visible.unit)
     return f"{effect_name(visible.effect)} ({BY_SLUG[visible.effect].amplitude}) from {size}"
 
 
@@ -121,12 +128,16 @@ def _named(findings: Findings) -> list[str]:
     chosen = [candidate for candidate in findings.candidates if candidate.effect in causes]
     others = [candidate for candidate in findings.candidates if candidate.effect not in causes]
     names = " together with ".join(effect_name(slug) for slug in findings.causes)
-    parts = [_error(findings), f"The cause{'s are' if len(findings.causes) > 1 else ' is'} {names}."]
-    parts += [f"{_physics(candidate)} Here: {estimated(candidate.estimate)}." for candidate in chosen]
+    exactly = sum(one.probability for one in findings.explanations if causes <= set(one.effects))
+    parts = [
+        _error(findings),
+        f"The cause{'s are' if len(findings.causes) > 1 else ' is'} {names} (probability {probability(exactly)}).",
+    ]
+    parts += [f"{_physics(candidate)} Here: {signed(candidate.estimate)}." for candidate in chosen]
     companions = [
         f"{effect_name(candidate.effect)} (probability {probability(candidate.probability)})"
         for candidate in others
-        if set(candidate.beside) & causes and candidate.probability >= COMPANION_FROM
+        if candidate.probability >= COMPANION_FROM
     ]
     if companions:
         parts.append(
@@ -146,34 +157,32 @@ def _named(findings: Findings) -> list[str]:
 
 
 def _ambiguous(findings: Findings) -> list[str]:
-    candidates = {candidate.effect: candidate for candidate in findings.candidates}
-    sized = {slug: candidate for slug, candidate in candidates.items() if candidate.estimate.value != 0.0}
-    causes = []
-    for slug in sorted(findings.causes, key=lambda slug: -candidates[slug].probability if slug in candidates else 0.0):
-        if slug in sized:
-            chance, size = probability(sized[slug].probability), estimated(sized[slug].estimate)
-            causes.append(f"{effect_name(slug)} (probability {chance}; {size})")
-        else:
-            causes.append(f"{effect_name(slug)} (not measured, so it cannot be excluded)")
-    sure = {slug for slug, candidate in sized.items() if candidate.probability >= LEAST_NAMED}
-    if set(findings.causes) <= sure:
-        left = "what that leaves is not quite noise, or parts of the data ask for different sizes"
-        return [
-            _error(findings),
-            f"It looks like {' together with '.join(causes)}, but {left}: something else may be at work too.",
+    """The explanations among which the choice is, each with its probability, and each effect's size where it first comes."""
+    sized = {candidate.effect: candidate.estimate for candidate in findings.candidates}
+    alternatives = []
+    for one in credible_explanations(findings.explanations):
+        names = [_alternative(slug, findings.resembles) for slug in one.effects] or ["nothing at all"]
+        sizes = [
+            signed(estimate) if estimate.value != 0.0 else "not measured, so it cannot be excluded"
+            for slug in one.effects
+            if (estimate := sized.pop(slug, None)) is not None
         ]
-    if len(causes) == 1:
-        such = f", such as {findings.resembles}" if findings.resembles else ""
-        return [_error(findings), f"The cause may be {causes[0]}, or something that is not in the catalogue{such}."]
-    none = f" It may be none of them: {findings.resembles} would fit as well." if findings.resembles else ""
-    which = "These data cannot distinguish which of these is the cause, the most probable first"
-    return [_error(findings), f"{which}: {', '.join(causes)}.{none}"]
+        inside = "; ".join([f"probability {probability(one.probability)}", *sizes])
+        alternatives.append(f"{' together with '.join(names)} ({inside})")
+    said = f"{', '.join(alternatives[:-1])}, or {alternatives[-1]}"
+    return [_error(findings), f"These data cannot distinguish what explains it, the most probable first: {said}."]
+
+
+def _alternative(slug: str, resembles: str) -> str:
+    if slug != UNCATALOGUED:
+        return effect_name(slug)
+    return f"something that is not in the catalogue{f', such as {resembles}' if resembles else ''}"
 
 
 def _unexplained(findings: Findings) -> list[str]:
     return [
         _error(findings),
-        "No effect of the catalogue explains it, alone or with another: structure beyond noise would be left, parts of the "
+        "No effect of the catalogue explains it, alone or with another: a pattern beyond noise would be left, parts of the "
         "data would ask for different sizes of the effect, or two effects would have to cancel each other. So no cause is "
         "named.",
         f"It most resembles {findings.resembles}." if findings.resembles else "",
@@ -185,7 +194,7 @@ def _insufficient(_: Findings) -> list[str]:
 
 
 def _error(findings: Findings) -> str:
-    """The baseline's error, and where it lives."""
+    """The baseline's error, and what it depends on."""
     misfit = findings.baseline
     if misfit is None:
         return ""
@@ -195,9 +204,9 @@ def _error(findings: Findings) -> str:
         along = f" along {where}" if where else ""
         return f"{error}, no more than noise alone, but its residuals are not random: they are correlated{along}."
     percent = 100 * misfit.unexplained_share
-    share = f"{'less than 0.1' if percent < _LEAST_PERCENT else number(percent)} % of the squared residual"
-    lives = f" and lives on {where}" if where else ""
-    return f"{error} (noise alone: {number(misfit.noise)} Nm); {share} is structure{lives}."
+    share = f"{'less than 0.1' if percent < _LEAST_PERCENT else number(percent)} % of its square is no noise"
+    depends = f", and depends on {where}" if where else ""
+    return f"{error} (noise alone: {number(misfit.noise)} Nm); {share}{depends}."
 
 
 def _axes(where: Sequence[Where]) -> str:

@@ -72,6 +72,15 @@ def estimated(estimate: Estimate) -> str:
     return with_unit(f"{estimate.name} {value} ± {estimate.sd:.{digits}f}", estimate.unit)
 
 
+def signed(estimate: Estimate) -> str:
+    """Value and deviation, and where the sign is open its probability."""
+    sign = None if estimate.one_sided else estimate.sign_probability
+    if sign is None:
+        return estimated(estimate)
+    way = "negative" if estimate.value < 0 else "positive"
+    return f"{estimated(estimate)}, {way} with probability {probability(sign)}"
+
+
 def number(value: float) -> str:
     """Three digits, without an exponent where that is readable."""
     if 100 <= abs(value) < 1e6:

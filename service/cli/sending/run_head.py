@@ -5,6 +5,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import Any
 
 #: Fields of a JSON body that describe the run; all others are what was measured or done.
@@ -25,7 +26,7 @@ class RunHead:
 def of_body(body: bytes) -> RunHead:
     """The head of a JSON body; an empty one where it is not a run: the service will say so."""
     try:
-        run = json.loads(body)
+        run = json.loads(body, parse_int=float)  # 7000 is 7000.0
     except (ValueError, RecursionError):
         return RunHead()
     if not isinstance(run, dict):
@@ -66,6 +67,14 @@ def same_run(older: RunHead, newer: RunHead, *, same_file: bool) -> bool:
     """
     if older.run_id is not None and newer.run_id is not None:
         return older.run_id == newer.run_id
-    if older.started_at is not None and newer.started_at is not None and older.started_at != newer.started_at:
+    if older.started_at is not None and newer.started_at is not None and _instant(older) != _instant(newer):
         return same_file and older.measurements == newer.measurements
     return same_file
+
+
+def _instant(head: RunHead) -> datetime | str | None:
+    """The start, the same in every time zone; as stated where it is no time with one: the service will say so."""
+    try:
+        return datetime.fromisoformat(head.started_at or "").astimezone(UTC)
+    except (ValueError, OverflowError):
+        return head.started_at

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn, get_args
 import typer
 
 from service.cli.options import DATABASE, EX_USAGE, Database, errors_in_a_line, fail
+from service.cli.serving import listening
+from service.defaults import LOOPBACK
 from service.logging import LogLevel, configure, start
 
 if TYPE_CHECKING:
     from service.settings import Settings
 
-LOOPBACK = "127.0.0.1"
 #: Seconds that requests on their way have once the service is to stop. Chosen: less than `docker stop` waits.
 STOP_SECONDS = 10
 LOG_LEVELS = get_args(LogLevel)
@@ -33,6 +34,12 @@ def serve(
             help="Where long raw records go: database, folder:///path or s3://bucket/prefix; else where they went before",
         ),
     ] = None,
+    root_path: Annotated[
+        str | None,
+        typer.Option(
+            envvar="CLUTCHLIFE_ROOT_PATH", help="The path that a proxy adds before the service's own, as /clutch"
+        ),
+    ] = None,
     insecure_local: Annotated[
         bool, typer.Option("--insecure-local", help="Without keys, answer also what a proxy on this machine passes on")
     ] = False,
@@ -47,26 +54,37 @@ def serve(
     signal.signal(signal.SIGTERM, _end)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})  # whoever has started it may be deaf to it
     from service.settings import Settings  # start-up time
+    from service.web.auth import is_loopback  # start-up time
+    from storage.engine.opening import database_exists  # start-up time
     from storage.engine.postgresql.connect import is_on_server  # start-up time
 
-    given = {"insecure_local": insecure_local or None, "log_level": log_level, "raw": raw}
+    given = {"insecure_local": insecure_local or None, "log_level": log_level, "raw": raw, "root_path": root_path}
     with errors_in_a_line():
         settings = Settings.from_environment(database, **{name: value for name, value in given.items() if value})
         configure(settings.log_format, settings.log_level)
-        start.info("settings", extra={"fields": settings.shown()})
-        for line in Settings.misspelt():
-            start.warning(line)
         if processes > 1 and not is_on_server(settings.database):
             raise ValueError(
                 f"--processes {processes} needs a database on a PostgreSQL server: one service uses a file at a time, which "
                 "CLUTCHLIFE_WORKERS gives more processes that take in runs"
             )
+        # a port that is not free ends the start before anything is made; without a database there are no keys
+        first = host if is_loopback(host) or database_exists(settings.database) else LOOPBACK
+        sockets = listening.bound(first, port)
+        start.info("settings", extra={"fields": settings.shown()})
+        for line in Settings.misspelt():
+            start.warning(line)
         host = _allowed(host, settings)
+        if host != first:
+            for taken in sockets:
+                taken.close()
+            sockets = listening.bound(host, port)
+        shown = (listening.page(host, listening.port_of(sockets), settings.root_path), _place(settings.database))
     from service.cli.serving import services  # start-up time
 
+    def announce() -> None:
+        start.info("the page is at %s, the database at %s", *shown)
+
     options: dict[str, Any] = {
-        "host": host,
-        "port": port,
         "log_config": None,
         "log_level": settings.log_level,
         "access_log": False,
@@ -74,10 +92,20 @@ def serve(
         "timeout_graceful_shutdown": STOP_SECONDS,
     }
     if processes > 1:
-        if not services.serve_several(settings, processes, options):
+        announce()
+        if not services.serve_several(settings, processes, sockets, options):
             fail("a process could not start: see the log")
-    else:
-        services.serve_one(settings, options)
+    elif not services.serve_one(settings, sockets, options, announce):
+        fail("the service could not start: see the log")
+
+
+def _place(database: str) -> str:
+    """The database as an operator finds it: the file's whole path, or the server's address without its password."""
+    from service.settings import redacted  # start-up time
+    from storage.engine.postgresql.connect import is_on_server  # start-up time
+    from storage.engine.sqlite.connect import path_of  # start-up time
+
+    return redacted(database) if is_on_server(database) else str(path_of(database).absolute())
 
 
 def _allowed(host: str, settings: "Settings") -> str:

@@ -4,8 +4,11 @@ import gc
 import multiprocessing
 import os
 import signal
+import socket
 import tempfile
 import threading
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import uvicorn
@@ -38,12 +41,30 @@ def prepared(settings: Settings) -> FastAPI:
     return app
 
 
-def serve_one(settings: Settings, options: dict[str, Any]) -> None:
-    """Serve in this process."""
-    uvicorn.run(prepared(settings), http=bounded(settings.connections_at_once), **options)
+class _Server(uvicorn.Server):
+    """A server that calls `announce` once it answers."""
+
+    def __init__(self, config: uvicorn.Config, announce: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._announce = announce
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        self._announce()
 
 
-def serve_several(settings: Settings, processes: int, options: dict[str, Any]) -> bool:
+def serve_one(
+    settings: Settings, sockets: list[socket.socket], options: dict[str, Any], announce: Callable[[], None]
+) -> bool:
+    """Serve in this process; `announce` is called once the service answers. Whether it could start."""
+    config = uvicorn.Config(prepared(settings), http=bounded(settings.connections_at_once), **options)
+    server = _Server(config, announce)
+    with suppress(KeyboardInterrupt):  # the server has stopped on it already
+        server.run(sockets)
+    return server.started
+
+
+def serve_several(settings: Settings, processes: int, sockets: list[socket.socket], options: dict[str, Any]) -> bool:
     """Serve in so many processes, which share the port; one that ends is replaced. Whether all could start."""
     settings.to_environment()
     application = f"{__name__}:{one_of_several.__name__}"
@@ -55,7 +76,7 @@ def serve_several(settings: Settings, processes: int, options: dict[str, Any]) -
         timeout_worker_healthcheck=_HUNG_SECONDS,
         **options,
     )
-    supervisor = Multiprocess(config, [config.bind_socket()])
+    supervisor = Multiprocess(config, sockets)
     with tempfile.TemporaryDirectory(prefix="clutchlife-metrics-") as folder:
         os.environ[FOLDER_VARIABLE] = folder
         supervisor.run()

@@ -22,6 +22,7 @@ def empty() -> dict[str, Any]:
         "verdict": None,
         "causes": [],
         "summary": "",
+        "explanations": [],
         "candidates": [],
         "baseline": _misfit(None),
         "extended": _misfit(None),
@@ -46,6 +47,14 @@ def public(
         "verdict": report.verdict.value,
         "causes": list(report.causes),
         "summary": report.summary,
+        "explanations": [
+            {
+                "effects": list(one.effects),
+                "probability": finite(one.probability),
+                "sign_probability": None if one.sign_probability is None else finite(one.sign_probability),
+            }
+            for one in report.explanations
+        ],
         "candidates": [
             {
                 "effect": candidate.effect,
@@ -71,7 +80,12 @@ def public(
             for test in report.advice
         ],
         "visible": [
-            {"effect": smallest.effect, "amplitude": finite(smallest.amplitude), "unit": smallest.unit}
+            {
+                "effect": smallest.effect,
+                "amplitude": finite(smallest.amplitude),
+                "least": finite(smallest.least),
+                "unit": smallest.unit,
+            }
             for smallest in report.visible
         ],
         "notes": [*notes, *report.notes],

@@ -1,48 +1,12 @@
-"""The numbers by which a run is doubted.
+"""The numbers of reading a run: how it is compared with the reference test of its life, and when a channel is dead.
 
-A run is doubted where the slips of `slips.py` together are more probable than the run as it was sent: prior odds of a
-slip, times how much better the history and physics predict the run without it.
+Those of the judgement are in `models.plausibility.criteria`.
 """
 
-# How often which slip is made: prior odds against the run as it was sent [-]. Chosen: people mistype about one number in
-# some hundred; `make plausibility` shows what it achieves.
+import math
 
-#: A zero too many, a zero lost, two digits swapped: of each.
-DIGIT_SLIP = 4e-3
-#: Any other wrong number of cycles.
-OTHER_CYCLES = 1e-3
-#: A channel in another unit, shared among the units of `slips.UNITS`.
-OTHER_UNIT = 1e-2
-#: Another clutch's file under this clutch's name: with its own cycles, and with those expected here.
-OTHER_CLUTCH, OTHER_TEST = 1e-2, 2e-2
-#: Odds of a slip from which a run is held. Chosen: of 0.2, 0.1, 0.07 and 0.05 the lowest that holds less than half of one
-#: honest run in 200; `make plausibility` shows a half and twice of it.
-HELD = 0.1
+# Mean COF of runs that are no stationary tests
 
-# Mean COF that is possible at all (`course`, `slips`)
-
-#: Median of a wet clutch's mean COF [-], and the deviation of its logarithm: two deviations cover 0.03 to 0.33. Chosen:
-#: paper, sintered and carbon linings in oil run at 0.05 to 0.2, worn ones at half of that.
-COF, LOG_COF_SD = 0.1, 0.6
-
-# The course of mean COF over cycles (`course`)
-
-#: Progress s is SPAN at the latest test of a life [-], whatever its cycles; deviation of the slope of log COF over s [-].
-#: Chosen: half of COF is lost over what was measured within two deviations.
-SPAN, SLOPE_SD = 2.0, 0.15
-#: What the history chooses among: φ as a share of the cycles of the latest test, the deviation by which the slope changes in
-#: a unit of s, and the scatter from run to run of log COF. Chosen: courses that slow down, go evenly and accelerate; sensors
-#: of 0.3 to 5 %.
-SCALES, BENDS, SCATTERS = (0.03, 0.3, 10.0), (0.03, 0.15, 1.0), (0.003, 0.012, 0.05)
-#: One honest test in so many is off by more than its scatter, and the deviation of that. Chosen: gains that are misread, oil
-#: that nobody logged; the blind rig's hidden effects are honest.
-OUTLYING_SHARE, OUTLYING_SD = 0.02, 0.06
-#: Deviation of the level's step at an event of maintenance. As in `models.tracking.criteria`.
-STEP_SD = 0.05
-#: Deviation of the first level of a rebuilt clutch from that of the life before. Chosen.
-REBUILT_SD = 0.3
-#: So many tests of a life are looked at, those nearest to the cycles in question. Chosen: what they cost, 2 ms.
-MOST_TESTS = 40
 #: Deviation of a dynamic test's and of an engagement's COF from a stationary test's mean. Chosen.
 DYNAMIC_SD, ENGAGEMENT_SD = 0.03, 0.35
 #: The same of a COF taken from the rows, where no curve was fitted. Chosen: on the rigs it is off by 1 to 3 %.
@@ -53,28 +17,7 @@ OTHER_PRESSURE_SD = 0.35
 #: makes of the simulated rig's oil, 0.05 to 0.15 % a kelvin, for linings and additives differ.
 OTHER_OIL_SD = 0.004
 
-# Cycles (`pace`): weights of what the next cycles may be. Chosen; only their orders of magnitude matter.
-
-#: At the latest cycles, where this kind is still to come; at other known ones where it is; where this kind was made already.
-JOINS_LATEST, JOINS, REPEATS_TEST = 0.4, 0.05, 0.02
-#: A block that begins where the last known run ended; where any did.
-TILES, TILES_EARLIER = 0.6, 0.1
-#: The end of any of the equal blocks that fill a life from its start. Chosen: as a late run; with 0.1 a shuffled campaign of
-#: them that began with its tenth block had odds of a slip above 0.1.
-BLOCKS = 0.2
-#: The very gap that was between two runs before; a gap like those before, a gap of another order, a late run.
-SAME_GAP, LIKE_GAP, OTHER_GAP, LATE = 0.2, 0.15, 0.2, 0.2
-#: Anything.
-ANYWHERE = 0.03
-#: Deviation of log gap around earlier ones, and of one of another order. Chosen.
-LIKE_GAP_SD, OTHER_GAP_SD = 0.3, 2.0
-#: Median and deviation of log(1 + cycles) of a run of which nothing else is known. Chosen: a test of 3·10⁹ cycles is none.
-CYCLES, LOG_CYCLES_SD = 5_000.0, 2.5
-#: Probability that an honest run's `started_at` is out of order with its cycles. Chosen: clocks are set wrongly at
-#: times.
-OUT_OF_ORDER = 2e-3
-
-# Protocols (`likelihood`)
+# Pressures, speeds and oil
 
 #: Share of tests made at other pressures or speeds than the reference test, deviation of the same and of others' logarithm.
 #: Chosen: a diagnosis advises such tests.
@@ -102,5 +45,7 @@ NO_FRICTION = 0.004
 #: Oil temperatures [K] that no sensor in oil shows: below what pours, above what K under the name of °C may be.
 COLDEST, HOTTEST = 273.15 - 60.0, 273.15 + 450.0
 
-#: An open clutch's drag over the torque of the pressed one [-], and the deviation of its logarithm. Chosen: a few per cent.
-DRAG, LOG_DRAG_SD = 0.03, 1.2
+#: An open clutch's drag as a COF: the mean of its logarithm, and the deviation. Chosen: some 3 % of a pressed one's torque.
+LOG_DRAG = (math.log(0.003), 1.4)
+#: Deviation of log COF of a torque that was measured while the pressure sensor was dead, for the pressure is not known.
+PRESSED_SD = 0.5

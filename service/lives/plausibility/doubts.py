@@ -1,59 +1,98 @@
-"""The doubts about a run: whether a slip explains it better than that it is what it says.
+"""The doubts about a clutch's runs: those of a run by itself, and the joint judgement over all of them in words.
 
-    odds = Σ_k P(slip k) L(run without slip k | history) / L(run as sent | history)
-
-summed over what may have gone wrong (`slips`); from `criteria.HELD` on the run is doubted, and the most probable slip says
-how. Dead channels are found in the run by itself before. Pure, and a few milliseconds at most.
+Dead channels are found in a run by itself, and nothing that other runs show takes them back. All else is one question,
+`models.plausibility.judgement`, asked again whenever a run comes in or is changed.
 """
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from models.clutch import Geometry
+from models.plausibility.judgement import judge
 from service.errors import Notice
-from service.lives.history import Event
+from service.lives.history import Event, Shown, order
 from service.lives.incoming_run import IncomingRun
-from service.lives.plausibility import criteria
 from service.lives.plausibility.dead_channels import dead_channels
-from service.lives.plausibility.likelihood import History, history_of
-from service.lives.plausibility.reading import Reading, columns_of, reading_of
-from service.lives.plausibility.slips import Slip, mistyped, slips_of
+from service.lives.plausibility.reading import columns_of, runs_of, shown_by
 from service.lives.plausibility.wording import doubt, negative
-from service.lives.recomputation import ClutchState
 from service.lives.run_analysis import Analysis
 
+#: So many runs are named as the evidence of a change.
+_NAMED = 3
 
-def doubts(run: IncomingRun, analysis: Analysis, event: Event, before: ClutchState) -> tuple[Notice, ...]:
-    """What is odd about a run that comes to a clutch; nothing for most.
 
-    `event` is the run as the history sees it, with its mean COFs; `before` the clutch's state without it.
-    """
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judged:
+    """What the joint judgement says: the doubts about each run that is to be held, by run_id; the runs that were held and
+    are now accepted, those that were accepted and are now held, and why, by run_id."""
+
+    doubts: Mapping[str, tuple[Notice, ...]] = field(default_factory=dict)
+    accepted: tuple[Event, ...] = ()
+    held: tuple[Event, ...] = ()
+    reasons: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def changes(self) -> bool:
+        """Whether the state of a run changes that was there already."""
+        return bool(self.accepted or self.held)
+
+    def settled(self, events: Sequence[Event], further: Sequence[Event] = ()) -> tuple[Event, ...]:
+        """The accepted runs as they are from now on: `events` were accepted before, `further` come in accepted."""
+        gone = {event.run_id for event in self.held}
+        return order([*(event for event in events if event.run_id not in gone), *self.accepted, *further])
+
+    def aside(self, held: Sequence[Event], further: Sequence[Event] = ()) -> tuple[Event, ...]:
+        """The held runs as they are from now on: `held` were before, `further` come in held."""
+        back = {event.run_id for event in self.accepted}
+        return order([*(event for event in held if event.run_id not in back), *self.held, *further])
+
+
+def doubts_alone(run: IncomingRun, analysis: Analysis, geometry: Geometry) -> tuple[Shown | None, tuple[Notice, ...]]:
+    """What the rows of a run show, and what is odd about them whatever other runs show; None and why where a channel is
+    dead."""
     columns = columns_of(run, analysis)
-    odd = [] if columns is None else dead_channels(event.kind, columns, before.geometry)
+    odd = [] if columns is None else dead_channels(run.kind, columns, geometry)
     if odd:
-        return tuple(odd)
-    reading = reading_of(event, columns, before.geometry)
-    if reading.cof is not None and reading.cof <= 0:
-        return (negative(reading),)
-    history = history_of(before.events, event, corrected=before.extension is not None)
-    slips = weighed(reading, history, before.geometry)
-    if log_odds(slips) < math.log(criteria.HELD):
-        return ()
-    return (doubt(max(slips, key=lambda slip: slip.log_weight), reading, history),)
+        return None, tuple(odd)
+    shown = shown_by(columns, geometry)
+    if shown.cof is not None and shown.cof <= 0:
+        return None, (negative(shown.cof),)
+    return shown, ()
 
 
-def weighed(reading: Reading, history: History, geometry: Geometry) -> list[Slip]:
-    """All slips that may have been made, with their weights over that of the run as it was sent."""
-    if reading.cof is not None:
-        typed = [cycles for values in mistyped(reading.cycles).values() for cycles in values]
-        history.predict([reading.cycles, history.pace.expected(), *typed])
-    as_sent = history.log_likelihood(reading)
-    return [slip.against(as_sent) for slip in slips_of(reading, history, geometry)]
+def doubts_together(
+    accepted: Sequence[Event], held: Sequence[Event], asked: Event | None, geometry: Geometry, *, corrected: bool
+) -> Judged:
+    """Which runs are to be held, all of them weighed together.
+
+    `accepted` and `held` are the runs as they stand, `asked` one that comes in or was changed (None: none is new). Held runs
+    with a dead channel are no part of the question. `corrected`: a model in force corrects the mean COFs of tests.
+    """
+    doubted = [event for event in held if event.shown is not None]
+    if asked is None and not doubted:
+        return Judged()
+    new = [] if asked is None else [asked]
+    events = order([*accepted, *doubted, *new])
+    aside = {event.run_id for event in doubted}
+    runs = runs_of(events, aside, geometry, corrected=corrected)
+    place = {run.name: index for index, run in enumerate(runs)}
+    in_question = [place[event.run_id] for event in [*doubted, *new]]
+    verdicts = judge(runs, in_question, [place[name] for name in aside])
+    doubts = {
+        runs[index].name: (doubt(verdict, runs[index].sent, events[index].shown or Shown()),)
+        for index, verdict in verdicts.items()
+    }
+    back = tuple(event for event in doubted if event.run_id not in doubts)
+    gone = tuple(event for event in accepted if event.run_id in doubts)
+    counted = [event for event in events if event.run_id not in doubts]
+    reasons = {event.run_id: f"agrees with {_beside(event, counted)}" for event in back}
+    reasons |= {event.run_id: f"does not agree with {_beside(event, counted)}" for event in gone}
+    return Judged(doubts=doubts, accepted=back, held=gone, reasons=reasons)
 
 
-def log_odds(slips: Sequence[Slip]) -> float:
-    """log of the odds that any of the slips was made."""
-    most = max((slip.log_weight for slip in slips), default=-math.inf)
-    if most == -math.inf:
-        return most
-    return most + math.log(math.fsum(math.exp(slip.log_weight - most) for slip in slips))
+def _beside(event: Event, counted: Sequence[Event]) -> str:
+    """The runs nearest to one in the history, of its kind where there are any, by their names."""
+    others = [other for other in counted if other.run_id != event.run_id]
+    alike = [other for other in others if other.kind == event.kind] or others
+    nearest = sorted(alike, key=lambda other: (abs(other.cycles - event.cycles), other.run_id))[:_NAMED]
+    return ", ".join(other.run_id for other in nearest) or "no other run"

@@ -1,15 +1,23 @@
-"""What a run shows of friction, in the few numbers that a slip would change: COF, pressures, speeds, oil temperature."""
+"""Runs as the joint judgement sees them: what each shows as it was sent, and without each slip of its channels.
+
+What a run shows of friction is taken from its rows when it comes in (`shown_by`) and stored beside it; all else follows from
+the history.
+"""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
+from models.plausibility import criteria as odds
+from models.plausibility.runs import Reading, Run, Slip
 from models.records.criteria import UNLOADED
-from service.lives.history import DYNAMIC, STATIONARY, Event
+from service.columns import RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS
+from service.lives.criteria import OTHER_OIL
+from service.lives.history import DYNAMIC, STATIONARY, Event, Life, Shown, lives_of, pooled_value
 from service.lives.incoming_run import IncomingRun, SampledChannels
 from service.lives.plausibility import criteria
 from service.lives.run_analysis import Analysis
@@ -50,44 +58,6 @@ class Columns:
         return mean[rows > 0], np.sqrt(square[rows > 0])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Reading:
-    """A run as its likelihood is computed from; None where it does not show a value.
-
-    `cof` [-] is the mean over the speeds, of either sign; `pressure` [Pa] and `speed` [rad/s] the highest, `oil` [K] the
-    median; `torque` [Nm] the median where the clutch is open. `mean_cof`: by pressure, as the history compares it; `spread`:
-    how far log COF of this kind of run is off a stationary test's. `declared_speed` [rad/s] is what a block of duty says of
-    its engagements.
-    """
-
-    cycles: float
-    cof: float | None = None
-    mean_cof: Mapping[float, tuple[float, float]] | None = None
-    spread: float = 0.0
-    pressure: float | None = None
-    speed: float | None = None
-    oil: float | None = None
-    torque: float | None = None
-    declared_speed: float | None = None
-
-    def scaled(self, *, pressure: float = 1.0, torque: float = 1.0, speed: float = 1.0) -> "Reading":
-        """The run if its channels were so many times too large."""
-        return replace(
-            self,
-            cof=None if self.cof is None else self.cof * pressure / torque,
-            mean_cof=None if speed != 1.0 or self.mean_cof is None else _scaled(self.mean_cof, pressure, torque),
-            pressure=None if self.pressure is None else self.pressure / pressure,
-            speed=None if self.speed is None else self.speed / speed,
-        )
-
-
-def _scaled(
-    values: Mapping[float, tuple[float, float]], pressure: float, torque: float
-) -> dict[float, tuple[float, float]]:
-    factor = pressure / torque
-    return {level / pressure: (cof * factor, sd * factor) for level, (cof, sd) in values.items()}
-
-
 def columns_of(run: IncomingRun, analysis: Analysis) -> Columns | None:
     """The rows of a run: the plateaus of a stationary test, the samples of another; None for a run without channels."""
     rows = analysis.plateaus
@@ -106,30 +76,185 @@ def columns_of(run: IncomingRun, analysis: Analysis) -> Columns | None:
     )
 
 
-def reading_of(event: Event, columns: Columns | None, geometry: Geometry) -> Reading:
-    """The reading of a run from its rows."""
+def shown_by(columns: Columns | None, geometry: Geometry) -> Shown:
+    """What the rows of a run show."""
     if columns is None:
-        return Reading(cycles=event.cycles)
+        return Shown()
     oil = None if columns.oil_temperature is None else float(np.median(columns.oil_temperature))
     if float(columns.pressure.max()) < UNLOADED:
-        return Reading(cycles=event.cycles, oil=oil, torque=float(np.median(np.abs(columns.torque))))
+        return Shown(oil=oil, open_torque=float(np.median(np.abs(columns.torque))))
     rows = columns.loaded()
     if rows.torque.size == 0:
-        return Reading(cycles=event.cycles, oil=oil)
-    is_test = event.kind in (STATIONARY, DYNAMIC)
-    declared_speed = None if event.duty is None else event.duty.speed
-    return Reading(
-        cycles=event.cycles,
+        return Shown(oil=oil)
+    return Shown(
         cof=float(rows.cof_by_speed(geometry)[0].mean()),
-        mean_cof=dict(event.cofs) or None,
-        spread={STATIONARY: 0.0, DYNAMIC: criteria.DYNAMIC_SD}.get(event.kind, criteria.ENGAGEMENT_SD),
-        pressure=float(rows.pressure.max()) if is_test else None,
-        speed=float(np.abs(rows.speed).max()) if is_test or declared_speed else None,
-        declared_speed=declared_speed,
+        pressure=float(rows.pressure.max()),
+        speed=float(np.abs(rows.speed).max()),
         oil=oil,
     )
 
 
-def log_or_none(value: float | None) -> float | None:
-    """The logarithm of a positive value, else None."""
-    return math.log(value) if value is not None and value > 0 else None
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Known:
+    """What the runs of a life are compared with: its first test that has mean COFs, and the range of its speeds."""
+
+    reference: Event | None
+    life: Life
+    geometry: Geometry
+    corrected: bool
+
+    def reading(self, event: Event, shown: Shown, cofs: Mapping[float, tuple[float, float]] | None) -> Reading:
+        """The reading of a run that shows this."""
+        compared = self._compared(event, shown, cofs)
+        log_cof, spread = (None, 0.0) if compared is None else compared
+        return Reading(
+            cycles=event.cycles, log_cof=log_cof, spread=spread, log_protocol=self._log_protocol(event, shown)
+        )
+
+    def _compared(
+        self, event: Event, shown: Shown, mean_cof: Mapping[float, tuple[float, float]] | None
+    ) -> tuple[float, float] | None:
+        """log COF of a run as the tests of its life show it, and its deviation; None where it shows none."""
+        own = {STATIONARY: 0.0, DYNAMIC: criteria.DYNAMIC_SD}.get(event.kind, criteria.ENGAGEMENT_SD)
+        spread = math.hypot(own, odds.STEP_SD if self.corrected else 0.0)
+        first = self.reference
+        if first is not None and first.oil_temperature is not None and shown.oil is not None:
+            beyond = max(abs(shown.oil - first.oil_temperature) - OTHER_OIL, 0.0)
+            spread = math.hypot(spread, criteria.OTHER_OIL_SD * beyond)
+        pooled = pooled_value(first.cofs, mean_cof) if mean_cof and first is not None else None
+        if pooled is not None and pooled[0] > 0:
+            return math.log(pooled[0]), math.hypot(spread, pooled[1] / pooled[0])
+        if mean_cof:
+            cof = math.fsum(cof for cof, _ in mean_cof.values()) / len(mean_cof)
+        else:
+            cof, spread = shown.cof or 0.0, math.hypot(spread, criteria.ROWS_SD)
+        if first is not None and shown.pressure is not None and event.kind in (STATIONARY, DYNAMIC):
+            apart = math.log(shown.pressure / max(first.cofs))
+            spread = math.hypot(spread, criteria.OTHER_PRESSURE_SD * apart)
+        return (math.log(cof), spread) if cof > 0 else None
+
+    def _log_protocol(self, event: Event, shown: Shown) -> float:
+        """log density of pressures, speeds and oil temperature: those of the reference test, or others."""
+        is_test = event.kind in (STATIONARY, DYNAMIC)
+        declared = None if event.duty is None else event.duty.speed
+        speeds = self.life.speed_range
+        pressure, speed = max(self.life.reference, default=None), None if speeds is None else speeds[1]
+        usual_pressure = (criteria.PRESSURE, criteria.LOG_PRESSURE_SD)
+        total = _log_of(shown.pressure if is_test else None, pressure, usual_pressure)
+        shown_speed = shown.speed if is_test or declared else None
+        total += _log_of(shown_speed, declared or speed, (criteria.SPEED, criteria.LOG_SPEED_SD))
+        if shown.oil is not None:
+            total += _log_normal(shown.oil, criteria.OIL, criteria.OIL_SD)
+        if shown.open_torque is not None and shown.open_torque > 0:  # an open clutch's drag
+            total += _log_normal(self._pressed(shown), *criteria.LOG_DRAG)
+        return total
+
+    def _pressed(self, shown: Shown) -> float:
+        """log COF of the torque of an open clutch if it were pressed as in the reference test."""
+        levels = list(self.life.reference) or [criteria.PRESSURE]
+        return math.log((shown.open_torque or 0.0) / self.geometry.torque_per_cof(sum(levels) / len(levels)))
+
+    def slips(self, event: Event, shown: Shown) -> Iterator[Slip]:
+        """The slips of a run's channels: another unit, a pressure that is dead."""
+        share = math.log(odds.OTHER_UNIT / len(UNITS))
+        if shown.cof is not None:
+            for channel, _, unit, factor in UNITS:
+                cofs = None if channel == "speed" else _scaled(event.cofs, channel, factor)
+                likely = self.reading(event, _in_unit(shown, channel, factor), cofs)
+                yield Slip(name=channel, log_prior=share, likely=likely, unit=unit)
+        if shown.oil is not None:
+            celsius = shown.oil - ZERO_CELSIUS
+            for unit, oil in (("K", celsius), ("°F", (celsius - 32.0) / 1.8 + ZERO_CELSIUS)):
+                likely = self.reading(event, replace(shown, oil=oil), event.cofs)
+                yield Slip(name="oil", log_prior=share, likely=likely, unit=unit)
+        if shown.open_torque is not None and shown.open_torque > 0:
+            likely = self.reading(event, replace(shown, open_torque=None), None)
+            pressed = replace(likely, log_cof=self._pressed(shown), spread=criteria.PRESSED_SD)
+            yield Slip(name=DEAD_PRESSURE, log_prior=math.log(odds.OTHER_TEST), likely=pressed)
+
+
+#: A pressure that says the clutch is open while it is pressed.
+DEAD_PRESSURE = "dead_pressure"
+#: Units in which a channel may have been sent: channel, its unit here, the unit, and how many of it are one of ours.
+UNITS = (
+    ("pressure", "bar", "psi", 14.503_774),
+    ("pressure", "bar", "kPa", 100.0),
+    ("pressure", "bar", "MPa", 0.1),
+    ("torque", "Nm", "lbf ft", 0.737_562),
+    ("torque", "Nm", "lbf in", 8.850_746),
+    ("torque", "Nm", "kNm", 1e-3),
+    ("torque", "Nm", "kgf m", 0.101_972),
+    ("torque", "Nm", "Nmm", 1e3),
+    ("speed", "rpm", "rad/s", RADIANS_PER_SECOND_PER_RPM),
+    ("speed", "rpm", "1/s", 1 / 60),
+)
+
+
+def runs_of(events: Sequence[Event], held: Collection[str], geometry: Geometry, *, corrected: bool) -> list[Run]:
+    """All runs of a clutch in the order of their history, those that are `held` among them.
+
+    `corrected`: a model in force corrects the mean COFs of tests.
+    """
+    runs: list[Run] = []
+    rebuilds = {event.run_id for event in events if event.rebuild}
+    for life in lives_of([replace(event, rebuild=event.rebuild and event.run_id not in held) for event in events]):
+        tests = [event for event in life.events if event.cofs]
+        reference = next((event for event in tests if event.run_id not in held), tests[0] if tests else None)
+        known = _Known(reference=reference, life=life, geometry=geometry, corrected=corrected)
+        for event in life.events:
+            shown = event.shown or Shown()
+            sent = known.reading(event, shown, event.cofs)
+            runs.append(
+                Run(
+                    name=event.run_id,
+                    kind=event.kind,
+                    sent=sent,
+                    slips=tuple(known.slips(event, shown)) if event.shown is not None else (),
+                    tests=bool(event.cofs) and sent.log_cof is not None and not life.in_other_oil(event),
+                    block=None if event.duty is None or event.kind == RUN_IN else event.duty.cycles,
+                    moment=event.moment if event.dated else None,
+                    shift=event.shift,
+                    rebuild=event.run_id in rebuilds,
+                    fixed=event.confirmed,
+                )
+            )
+    return runs
+
+
+RUN_IN = "run_in"
+
+
+def _in_unit(shown: Shown, channel: str, factor: float) -> Shown:
+    """What a run would show if a channel were so many times too large."""
+    if channel == "speed":
+        return replace(shown, speed=None if shown.speed is None else shown.speed / factor)
+    if channel == "torque":
+        return replace(shown, cof=None if shown.cof is None else shown.cof / factor)
+    return replace(
+        shown,
+        cof=None if shown.cof is None else shown.cof * factor,
+        pressure=None if shown.pressure is None else shown.pressure / factor,
+    )
+
+
+def _scaled(
+    values: Mapping[float, tuple[float, float]], channel: str, factor: float
+) -> dict[float, tuple[float, float]]:
+    level, cof = (factor, factor) if channel == "pressure" else (1.0, 1.0 / factor)
+    return {pressure / level: (value * cof, sd * cof) for pressure, (value, sd) in values.items()}
+
+
+def _log_of(value: float | None, reference: float | None, usual: tuple[float, float]) -> float:
+    """log density of a test's highest pressure or speed: the reference test's, or another."""
+    if value is None or value <= 0:
+        return 0.0
+    if reference is None or reference <= 0:
+        return _log_normal(math.log(value), math.log(usual[0]), usual[1])
+    off = math.log(value / reference)
+    same = math.log1p(-criteria.OTHER_PROTOCOL) + _log_normal(off, 0.0, criteria.SAME_PROTOCOL_SD)
+    other = math.log(criteria.OTHER_PROTOCOL) + _log_normal(off, 0.0, criteria.OTHER_PROTOCOL_SD)
+    return max(same, other) + math.log1p(math.exp(-abs(same - other)))
+
+
+def _log_normal(value: float, mean: float, deviation: float) -> float:
+    return -0.5 * ((value - mean) / deviation) ** 2 - math.log(deviation * math.sqrt(2 * math.pi))

@@ -3,7 +3,7 @@
 import hashlib
 from dataclasses import dataclass
 
-from service.schemas.clutch import content_of
+from service.stored_inspections import content_hash
 from storage import inspections
 from storage.engine.database import Database
 from storage.inspections import InspectionRow, PhotographRow
@@ -34,7 +34,7 @@ def check_inspections(database: Database, clutch_id: str) -> CheckedInspections:
 
 
 def _inspection_finding(row: InspectionRow) -> str | None:
-    sha256 = content_of(row.content)
+    sha256 = content_hash(row.content)
     if sha256 == row.content_sha256 and row.cycles == row.content["cycles"]:
         return None
     return (

@@ -16,7 +16,12 @@ def written(folder: Path, files: dict[str, str]) -> Path:
     return folder
 
 
-TREE = {"page.html": "<p>{assets}</p>", "shared/dom.js": "1", "fleet/dom.js": "2", "fleet/deep/er.css": "a{}"}
+TREE = {
+    "page.html": '<a href="{root}">{assets}</a>',
+    "shared/dom.js": "1",
+    "fleet/dom.js": "2",
+    "fleet/deep/er.css": "a{}",
+}
 
 
 def test_a_file_is_named_by_its_path_in_the_tree(tmp_path: Path) -> None:
@@ -29,7 +34,7 @@ def test_a_file_is_named_by_its_path_in_the_tree(tmp_path: Path) -> None:
 
 def test_a_page_names_the_folder_of_this_version(tmp_path: Path) -> None:
     loaded = assets.load(written(tmp_path, TREE))
-    assert loaded.page("page.html").body.decode() == f"<p>/assets/{loaded.digest}</p>"
+    assert loaded.page("page.html", "../").body.decode() == f'<a href="../">../assets/{loaded.digest}</a>'
 
 
 def test_a_page_names_all_modules_that_it_loads(tmp_path: Path) -> None:
@@ -41,8 +46,8 @@ def test_a_page_names_all_modules_that_it_loads(tmp_path: Path) -> None:
         "shared/deep/y.js": 'import { page } from "../../fleet/page.js";\n',
     }
     loaded = assets.load(written(tmp_path, files))
-    lines = loaded.page("page.html").body.decode().splitlines()
-    folder = f"/assets/{loaded.digest}"
+    lines = loaded.page("page.html", "./").body.decode().splitlines()
+    folder = f"./assets/{loaded.digest}"
     assert lines == [
         *(
             f'<link rel="modulepreload" href="{folder}/{name}">'

@@ -130,7 +130,7 @@ def test_other_bodies_know_their_own_fields() -> None:
 
 
 def test_what_is_no_json_is_named() -> None:
-    for body in (b"", b"{", b'{"a":}', b"\xff", b'{"kind":"maintenance",}'):
+    for body in (b"", b"{", b'{"a":}', b'{"kind":"maintenance",}'):
         found = refused(body)
         assert found.errors[0].code == "json_invalid"
         assert found.errors[0].message.startswith("the body: Invalid JSON: ")

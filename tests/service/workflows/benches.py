@@ -15,6 +15,8 @@ import pytest
 
 from models.diagnosis.extension import Extension
 from service.errors import Notice
+from service.lives.history import Shown
+from service.lives.plausibility.doubts import Judged
 from service.queries import clutch_list, degradation, runs, scores, series, stribeck
 from service.queries.life import remaining_life
 from service.run_files.json_run import read_run
@@ -38,13 +40,19 @@ EXTENSION = Extension(effects=("torque_zero_shift",), content={"shift_nm": 0.5, 
 #: What only the audit knows of a run.
 OF_THE_AUDIT = ("state", "doubts", "sent_cycles", "content_sha256")
 #: The second of the start of a run that is doubted.
-ODD = ":59+00:00"
+ODD = 59
 
 
-def doubts(run: Any, *_: Any) -> tuple[Notice, ...]:
-    """A stand-in: what carries the mark is held."""
-    odd = run.started_at is not None and run.started_at.endswith(ODD) and run.cycles < 50_000
-    return (Notice(code="odd", message="it carries the mark"),) if odd else ()
+def doubts_together(_: Any, __: Any, asked: Any, *___: Any, **____: Any) -> Judged:
+    """A stand-in: what carries the mark is held, and no other run changes that."""
+    odd = asked is not None and asked.moment % 60 == ODD and asked.cycles < 50_000
+    notice = Notice(code="odd", message="it carries the mark")
+    return Judged(doubts={asked.run_id: (notice,)} if odd else {})
+
+
+def doubts_alone(*_: Any) -> tuple[Shown, tuple[Notice, ...]]:
+    """A stand-in: nothing is odd about a run by itself."""
+    return Shown(), ()
 
 
 @contextmanager
@@ -54,13 +62,18 @@ def stood_in(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         for name, method in stand_in_engine.METHODS.items():
             patched.setattr(Extension, name, method)
         for workflow in (ingest_run, change_run):
-            patched.setattr(workflow, "doubts", doubts)
+            patched.setattr(workflow, "doubts_alone", doubts_alone)
+            patched.setattr(workflow, "doubts_together", doubts_together)
         yield
 
 
 def body(kind: str, run_id: str, cycles: float, *, wear: float | None = None, odd: bool = False) -> dict[str, Any]:
     """A run as it is sent: `test`, `other` (pressures), `few` (speeds), `loop`, `duty`, `rebuild`, `oil_change`."""
-    head = {"run_id": run_id, "cycles": cycles, "started_at": f"2026-01-01T00:00{ODD if odd else ':00+00:00'}"}
+    head = {
+        "run_id": run_id,
+        "cycles": cycles,
+        "started_at": f"2026-01-01T00:00{f':{ODD}+00:00' if odd else ':00+00:00'}",
+    }
     if kind in ("test", "other", "few"):
         return (
             stationary(

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from models.diagnosis.attribution.verdict import Verdict
+from models.diagnosis.attribution.verdict import Explanation, Verdict
 from models.diagnosis.campaign import Campaign, StationaryRun
 from models.diagnosis.detection.lack_of_fit import Misfit
 from models.diagnosis.detection.structure_axes import Where
@@ -59,6 +59,7 @@ def _report(campaign: Campaign, extension: Extension | None) -> Report:
         verdict=Verdict.CAUSE_NAMED if extension else Verdict.MODEL_ADEQUATE,
         causes=extension.effects if extension else (),
         summary=f"A stand-in looked at {tests} tests.",
+        explanations=(Explanation(effects=extension.effects if extension else (), probability=1.0),),
         candidates=(
             Candidate(
                 effect="torque_zero_shift",

@@ -277,7 +277,8 @@ def test_a_zero_too_many_is_held_and_corrected_by_the_rules_in_force(
     slipped, right = benches
     with monkeypatch.context() as in_force:  # taken back before the benches take back what they stand in for
         for workflow in (change_run, ingest_run):
-            in_force.setattr(workflow, "doubts", rules.doubts)
+            in_force.setattr(workflow, "doubts_alone", rules.doubts_alone)
+            in_force.setattr(workflow, "doubts_together", rules.doubts_together)
         for cycles in range(0, 7000, 1000):
             for bench in benches:
                 assert bench.send(body("test", f"r{cycles}", cycles))["state"] == "accepted"

@@ -14,10 +14,13 @@ const COLUMNS = ["When", "What", "Run", "Who", "Why"];
 /** @type {Record<string, string>} */
 const ACTIONS = {
   hold: "Held on arrival",
+  accept: "Accepted: other runs agree",
+  doubt: "Held: other runs disagree",
   confirm: "Confirmed",
   withdraw: "Withdrawn",
   restore: "Restored",
   correct: "Cycles corrected",
+  reread: "Read again",
   edit: "Clutch edited",
   archive: "Archived",
   unarchive: "Brought back",

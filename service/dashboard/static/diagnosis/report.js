@@ -14,7 +14,7 @@ const SENTENCES = {
   model_adequate: () => "Nothing is left beyond noise and run-to-run scatter: the model is adequate.",
   cause_named: (causes) =>
     `The data disagree with the model, and ${causes} ${causes.includes(" and ") ? "account" : "accounts"} for it.`,
-  cause_ambiguous: (causes) => `The data disagree with the model; ${causes} cannot be distinguished with these runs.`,
+  cause_ambiguous: (causes) => `The data disagree with the model; what explains it may be ${causes}: these runs cannot distinguish.`,
   unexplained_structure: () => "The data disagree with the model, and no cause in the catalogue accounts for it.",
   insufficient_data: () => "There is too little data for a verdict.",
 };
@@ -68,9 +68,12 @@ function outdated({ earlier_life: earlier, stale }) {
  * @param {{ verdict: string | null, causes?: string[] }} diagnosis
  */
 export function sentence({ verdict, causes = [] }) {
-  const names = causes.map((cause) => words(cause).toLowerCase());
+  const names = causes.map((cause) =>
+    cause === "uncatalogued" ? "something that is not in the catalogue" : words(cause).toLowerCase(),
+  );
   const last = names.at(-1) ?? "the named cause";
-  const joined = names.length > 1 ? `${names.slice(0, -1).join(", ")} and ${last}` : last;
+  const between = verdict === "cause_ambiguous" ? "or" : "and";
+  const joined = names.length > 1 ? `${names.slice(0, -1).join(", ")} ${between} ${last}` : last;
   return SENTENCES[verdict ?? ""]?.(joined) ?? "";
 }
 
@@ -194,19 +197,24 @@ function notes({ notes: all = [] }) {
 }
 
 const VISIBLE =
-  "The smallest amplitude that would have been detected, for each effect in the middle one of its shapes, computed before " +
-  "any residual was looked at.";
+  "The smallest amplitude that would have been detected, for each effect in whatever of its shapes, and in the one that shows " +
+  "best. Without a number: one of its shapes would be absorbed at any size.";
 
 /** @param {DiagnosisOut} diagnosis */
 function visible({ visible: all = [] }) {
   if (all.length === 0) return null;
-  const rows = all.map(({ effect, amplitude, unit }) => [words(effect), significant(amplitude, 3), unit ?? ""]);
+  const rows = all.map(({ effect, amplitude, least, unit }) => [
+    words(effect),
+    significant(amplitude, 3),
+    significant(least, 3),
+    unit ?? "",
+  ]);
   const label = "Smallest visible amplitudes";
   return h(
     "details",
     { class: "part" },
     h("summary", {}, "What these runs would show"),
     h("p", { class: "quiet" }, VISIBLE),
-    scrolling(label, table(label, ["Effect", "Amplitude", "Unit"], rows)),
+    scrolling(label, table(label, ["Effect", "In any shape", "In its best", "Unit"], rows)),
   );
 }

@@ -5,6 +5,7 @@
 
 import { register } from "../sending/registration.js";
 import { sender } from "../sending/sending.js";
+import { at } from "../shared/address.js";
 import { read } from "../shared/api.js";
 import { byId, h } from "../shared/dom.js";
 import { age } from "../shared/format.js";
@@ -122,6 +123,6 @@ const live = new Live(withKey(poll), liveBar(byId("live")), INTERVAL);
 sender(byId("send"), { sent: () => live.now() });
 byId("register").addEventListener("click", async () => {
   const id = await register("");
-  if (id !== null) location.assign(`/clutches/${encodeURIComponent(id)}`);
+  if (id !== null) location.assign(at(`/clutches/${encodeURIComponent(id)}`));
 });
 live.start();

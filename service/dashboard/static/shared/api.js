@@ -3,6 +3,8 @@
 // chapter. Open this file first (the reader's key, entity tags, errors as values), then dom.js and format.js; the shapes of
 // the API's answers are in types.d.ts.
 
+import { at, own } from "./address.js";
+
 /** @import { ListPage, ProblemError, RunOut } from "./types.js" */
 
 const KEY = "clutchlife-key";
@@ -57,7 +59,7 @@ async function request(path, options = {}) {
   if (secret) headers.set("Authorization", `Bearer ${secret}`);
   let answer;
   try {
-    answer = await fetch(path, { cache: "no-store", ...options, headers });
+    answer = await fetch(at(path), { cache: "no-store", ...options, headers });
   } catch (error) {
     if (error instanceof DOMException && error.name === "AbortError") throw error;
     throw new Problem(0, { title: "The service does not answer" });
@@ -137,7 +139,8 @@ export async function readAll(path) {
 export async function send(method, path, body, headers = {}) {
   const answer = await request(path, { method, body, headers });
   const text = await answer.text();
-  return { status: answer.status, location: answer.headers.get("Location"), body: text ? JSON.parse(text) : null };
+  const location = answer.headers.get("Location");
+  return { status: answer.status, location: location && own(location), body: text ? JSON.parse(text) : null };
 }
 
 /**

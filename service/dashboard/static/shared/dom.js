@@ -5,8 +5,10 @@
  * @typedef {Node | string | null | undefined | false} Child left out where it is null, undefined or false
  * @typedef {Child | readonly (Child | readonly Child[])[]} Content
  * @typedef {string | number | boolean | null | undefined | ((event: any) => unknown) | Record<string, string>} Value
- * @typedef {Record<string, Value>} Attributes `on…` are listeners, `style` its properties; null and false are left out
+ * @typedef {Record<string, Value>} Attributes `on…` are listeners, `style` its properties, `href` may be the service's own address; null and false are left out
  */
+
+import { at } from "./address.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -46,7 +48,8 @@ function filled(element, attributes, children) {
     if (typeof value === "function") element.addEventListener(key.slice(2), value);
     else if (typeof value === "object") {
       for (const [property, set] of Object.entries(value)) element.style.setProperty(property, set);
-    } else element.setAttribute(key, value === true ? "" : String(value));
+    } else if (key === "href") element.setAttribute(key, at(String(value)));
+    else element.setAttribute(key, value === true ? "" : String(value));
   }
   const flat = /** @type {Child[]} */ (children.flat(2));
   element.append(...flat.filter((child) => child !== null && child !== undefined && child !== false));

@@ -458,6 +458,12 @@ export interface Amplitude {
   unit: string;
 }
 
+export interface ExplanationOut {
+  effects: string[];
+  probability: number | null;
+  sign_probability: number | null;
+}
+
 export interface CandidateOut {
   effect: string;
   title: string;
@@ -503,6 +509,7 @@ export interface AdviceOut {
 export interface VisibleOut {
   effect: string;
   amplitude: number | null;
+  least: number | null;
   unit: string;
 }
 
@@ -548,6 +555,7 @@ export interface DiagnosisListed {
   verdict: string | null;
   causes: string[];
   summary: string;
+  explanations: ExplanationOut[];
   candidates: CandidateOut[];
   baseline: MisfitOut;
   extended: MisfitOut;

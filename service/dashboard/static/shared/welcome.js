@@ -1,9 +1,8 @@
 // @ts-check
 // What a first visitor sees: what to do next, and the command for it.
 
+import { here } from "./address.js";
 import { copyable, h } from "./dom.js";
-
-const here = () => location.origin;
 
 /** @param {string} id */
 const registration = (id) =>

@@ -43,10 +43,11 @@ def test_white_samples_give_white_differences_and_a_loop_gives_none() -> None:
 
 
 def designed(seed: int, memory: float, noise: float) -> Design:
-    """Four tests of five pressures, three periods each; noise is autocorrelated over `memory` s."""
+    """Four tests of five pressures, four periods each, two and a half of them settled; noise is autocorrelated over
+    `memory` s."""
     rng = np.random.default_rng(seed)
-    time = np.arange(round(5 * 3 * PERIOD * RATE)) / RATE
-    within = np.mod(time, 3 * PERIOD)
+    time = np.arange(round(5 * 4 * PERIOD * RATE)) / RATE
+    within = np.mod(time, 4 * PERIOD)
     speed = (1000 - 960 * np.cos(2 * np.pi * within / PERIOD)) * RPM
     runs = []
     for number in range(4):

@@ -8,6 +8,7 @@ import pytest
 from models.diagnosis.attribution.check import Checks
 from models.diagnosis.attribution.decide import revise
 from models.diagnosis.attribution.evidence import Hypothesis
+from models.diagnosis.attribution.explanations import explanations_of
 from models.diagnosis.attribution.investigate import Investigation
 from models.diagnosis.attribution.search import SearchResult
 from models.diagnosis.attribution.verdict import Comparison, Judgement, Proposal, Verdict
@@ -56,7 +57,7 @@ def test_two_causes_that_predict_worse_than_none_are_not_named(
         verdict=Verdict.CAUSE_NAMED,
         causes=hypothesis.slugs,
         credible=(hypothesis,),
-        probabilities=dict.fromkeys(hypothesis.slugs, 0.9),
+        explanations=explanations_of({hypothesis.slugs: 0.9, (): 0.1}),
         comparison=Comparison(best_drop=40.0, structure=0.0, tolerance=2.0, credible=1, check=check),
     )
     investigation = Investigation(
@@ -70,8 +71,10 @@ def test_two_causes_that_predict_worse_than_none_are_not_named(
     validation = Validation(extended=fit, gain=gain)
     report = report_of(investigation, revise(judgement, validation.held_out), validation, ())
     assert report.verdict is verdict
-    assert report.causes == hypothesis.slugs
-    assert ("something else may be at work too" in report.summary) == (verdict is Verdict.CAUSE_AMBIGUOUS)
+    assert (report.causes == hypothesis.slugs) == (verdict is Verdict.CAUSE_NAMED)
+    assert set(hypothesis.slugs) <= set(report.causes)
+    beside = "together with something that is not in the catalogue" in report.summary
+    assert beside == (verdict is Verdict.CAUSE_AMBIGUOUS)
     assert (report.extension is None) == (gain is WORSE)
     assert report.statistics["lambda"] == 40.0
     assert report.statistics["parts_p_value"] == 0.001

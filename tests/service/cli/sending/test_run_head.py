@@ -47,3 +47,14 @@ def test_what_is_no_run_has_an_empty_head(text: bytes) -> None:
 def test_cycles_that_are_no_number_are_not_stated() -> None:
     assert of_body(b'{"cycles": NaN}').cycles is None
     assert of_body(b'{"cycles": 1e999}').cycles is None
+
+
+def test_a_version_that_states_its_start_in_another_time_zone_is_of_the_same_run() -> None:
+    in_germany = head(started_at="2026-01-01T09:00:00+01:00", torque=2, cycles=7000)
+    assert same_run(head(started_at=MORNING, cycles=7000.0), in_germany, same_file=True)
+    assert not same_run(head(started_at=NOON), in_germany, same_file=True)
+
+
+def test_measurements_are_the_same_however_their_numbers_are_written() -> None:
+    texts = [b'{"started_at": "%s", "channels": {"torque_nm": [%s]}}' % (MORNING.encode(), n) for n in (b"1", b"1.0")]
+    assert of_body(texts[0]).measurements == of_body(texts[1]).measurements

@@ -2,6 +2,8 @@
 
 import json
 import os
+import re
+import socket
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -61,3 +63,30 @@ def test_the_level_is_that_of_the_option_or_else_of_the_environment_and_a_start_
     assert " WARNING clutchlife.start: CLUTCHLIFE_MAX_BODY is no setting" in misspelt
     assert misspelt.endswith("is CLUTCHLIFE_MAX_BODY_MB meant?")
     assert " WARNING clutchlife.start: no keys are configured" in open_to_all
+
+
+def test_a_busy_port_is_one_line_before_anything_is_made(tmp_path: Path) -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = str(other.getsockname()[1])
+        every = "0.0.0.0"  # noqa: S104  (without keys it listens at this machine only)
+        for host in ("127.0.0.1", "localhost", every):
+            command = [sys.executable, "-m", "service.cli.main", "serve", "--port", port, "--host", host]
+            command += ["--database", f"sqlite:///{tmp_path / 'a.db'}"]
+            ended = subprocess.run(command, capture_output=True, text=True, check=False)
+            assert ended.returncode == 64
+            said = (ended.stdout + ended.stderr).splitlines()
+            assert said == [
+                f"clutchlife: port {port} at {'127.0.0.1' if host == every else host} is in use, perhaps by another "
+                "service: stop it, or give another with --port"
+            ]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_start_says_where_the_page_and_the_database_are(tmp_path: Path) -> None:
+    environment = {"CLUTCHLIFE_LOG_FORMAT": "text", "CLUTCHLIFE_WORKERS": "0", "CLUTCHLIFE_ROOT_PATH": "/clutch"}
+    said, _ = served(tmp_path, environment)
+    found = re.search(r"the page is at (http://127\.0\.0\.1:\d+/clutch/), the database at (.*)", said)
+    assert found is not None
+    assert found[2] == str(tmp_path / "a.db")

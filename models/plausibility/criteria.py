@@ -1,0 +1,70 @@
+"""The numbers by which a run is doubted. `make plausibility` leaves each mechanism out in turn.
+
+A run is doubted where it is improbable as it was sent and a slip explains it: prior odds of a slip, times how much better
+the other runs predict it without the slip.
+"""
+
+import math
+
+# How often which slip is made: prior odds against the run as it was sent [-]. Chosen: people mistype about one number in
+# some hundred.
+
+#: A zero too many, a zero lost, two digits swapped: of each.
+DIGIT_SLIP = 4e-3
+#: Any other wrong number of cycles.
+OTHER_CYCLES = 1e-3
+#: A channel in another unit, shared among the units.
+OTHER_UNIT = 1e-2
+#: Another clutch's file under this clutch's name: with its own cycles, and with those expected here.
+OTHER_CLUTCH, OTHER_TEST = 1e-2, 2e-2
+#: How much more seldom a run slipped that somebody confirmed [-].
+CONFIRMED = 1e-2
+#: Odds of a slip from which a run is held.
+HELD = 0.1
+
+# Mean COF that is possible at all
+
+#: Median of a wet clutch's mean COF [-], and the deviation of its logarithm: two deviations cover 0.03 to 0.33. Chosen:
+#: paper, sintered and carbon linings in oil run at 0.05 to 0.2, worn ones at half of that.
+COF, LOG_COF_SD = 0.1, 0.6
+#: Deviations from the median within which COF is usual, whatever the others show: 0.04 to 0.25.
+USUAL = 1.5
+
+# The course of mean COF (`course`)
+
+#: What the runs choose among: φ as a share of the cycles of the latest test; the discrepancy of log COF at the latest test;
+#: the scatter from run to run of log COF. Chosen: courses that slow down, go evenly and accelerate; sensors of 0.3 to 5 %.
+SCALES, SIZES, SCATTERS = (0.03, 0.3, 10.0), (0.05, 0.25, 1.5), (0.003, 0.012, 0.05)
+#: Deviation of the change of log COF up to the latest test. Chosen: half of COF is lost within some two deviations.
+CHANGE_SD = 0.3
+#: One honest test in so many is off by more than its scatter, and the deviation of that. Chosen: gains that are misread, oil
+#: that nobody logged.
+OUTLYING_SHARE, OUTLYING_SD = 0.02, 0.06
+#: Deviation of the level's step at an event of maintenance. As in `models.tracking.criteria`.
+STEP_SD = 0.05
+#: A new level from some test on: how often after an event that was declared (or a pause or gap of PAUSE times the usual),
+#: how often without one, and the deviation of log COF that it steps by. Chosen: an oil change may move COF by a fifth.
+LEVEL_AFTER_EVENT, LEVEL_UNDECLARED, LEVEL_SD = 0.3, 3e-3, 0.3
+#: Deviation of the first level of a rebuilt clutch from that of the life before. Chosen.
+REBUILT_SD = 0.3
+#: So many tests and so many runs are looked at, those nearest to the runs in question. Chosen: what they cost, 2 ms.
+MAX_TESTS, MAX_RUNS = 40, 80
+
+# Cycles (`pace`): weights of how a run comes to its cycles. Chosen; only their orders of magnitude matter.
+
+#: At the cycles of another kind's run; a block that begins where another run was made, at the start of the life, or that
+#: is any of the equal blocks that fill a life.
+JOINS, TILES, STARTS, EQUALS = 0.5, 0.5, 0.05, 0.25
+#: A gap of exactly one of the last ones, a gap like one of them, a gap of their order; what is left: of any size.
+SAME_GAP, LIKE_GAP, SIMILAR_GAP = 0.3, 0.3, 0.2
+#: Deviation of log gap about an earlier one, and of one of their order [-]; how many gaps back.
+LIKE_GAP_SD, SIMILAR_GAP_SD, MEMORY = 0.3, 1.5, 5
+#: A life's first run is made at its start; a run repeats another of its kind at the same cycles.
+AT_START, REPEATS = 0.5, 0.02
+#: Maintenance, or one of equal blocks, within the cycles that are known, and within as many again.
+WITHIN, BEYOND = 0.5, 0.4
+#: The most cycles that clutches see, with the deviation of the logarithm beyond, and the logarithm of their range: a life
+#: may be counted in kilometres or in slips. Chosen: 10 to 1e8; a test of 3·10⁹ cycles is none.
+MAX_CYCLES, BEYOND_SD, LOG_CYCLES = 1e8, 0.7, math.log(1e8 / 1e1)
+#: Prior of runs out of order with their dates: so many wrong among so many right. Chosen: clocks are set wrongly at times.
+OUT_OF_ORDER = (2e-3, 1.0)

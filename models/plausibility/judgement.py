@@ -1,0 +1,478 @@
+"""Which runs of a clutch slipped: one question over all of them.
+
+A belief says of every run whether it is as it was sent, outlying, or slipped, and from which tests on COF has a new level.
+Its log probability is the sum of
+
+    log p(COF of the tests that are as sent | course, outlying ones, new levels)      `course`
+    log P(cycles), log P(dates)                                                       `pace`
+    log density of pressures, speeds and oil temperature
+    of each slipped run: log Σ over slips  P(slip) L(the run without it | the others)
+    the prior of outlying runs and of new levels
+
+From the belief that all runs are as sent, and from the one that keeps the doubtful ones out, the search takes the best
+single change until none helps. A run's probability of a slip is summed over the beliefs that it met: where two runs agree,
+that both slipped is far less probable than that neither did. The judgement is a function of the runs alone: the order of
+their arrival and what was thought before decide only where the search begins.
+"""
+
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.arrays import FloatArray
+from models.plausibility import criteria, pace
+from models.plausibility.course import Fit, Predicted, Tests, log_outlying, log_physics
+from models.plausibility.runs import Reading, Run, Slip
+from models.plausibility.slips import OF_CLUTCH, OTHER_CLUTCH, OTHER_CYCLES, slips_of
+
+#: No slip is proved by a number that underflows.
+_LEAST = math.log(1e-250)
+#: A change of belief that gains less is none.
+_WORTH = 1e-6
+#: Changes that a search makes at most, and suspects among accepted runs that it looks at.
+_MOVES, _SUSPECTS = 16, 4
+#: An accepted run is a suspect where its COF or its cycles are less probable than this, log density.
+_SUSPICIOUS_COF, _SUSPICIOUS_CYCLES = 0.0, -9.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Belief:
+    """Indices of the runs that slipped, of outlying tests, and of tests from which on COF has a new level."""
+
+    slipped: frozenset[int] = frozenset()
+    outlying: frozenset[int] = frozenset()
+    levels: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """Of a run: the odds that it slipped, the most probable slip, COF where the others put it [-, -] (None: it shows none)
+    at the cycles as sent, and whether its date is out of order with theirs."""
+
+    log_odds: float
+    slip: Slip
+    expected: tuple[float, float] | None
+    expected_then: tuple[float, float] | None
+    against_time: bool
+    usual_gap: float | None
+    before: float | None
+    latest: float | None
+
+
+def judge(runs: Sequence[Run], asked: Collection[int], doubted: Collection[int]) -> dict[int, Verdict]:
+    """The runs that are to be held, by index.
+
+    `runs` in the order of the history; `asked`: those in question, the others are looked at where they surprise; `doubted`:
+    those that are held now, from which one search begins.
+    """
+    clutch = _Clutch(runs=tuple(runs), asked=frozenset(asked))
+    weighed: dict[Belief, float] = {}
+    best: _Weighed | None = None
+    for slipped in (frozenset[int](), frozenset(doubted), frozenset(asked)):
+        if best is not None and not (best.belief.slipped or doubted or best.doubts):
+            break  # nothing surprises
+        found = _searched(clutch, Belief(slipped=slipped))
+        weighed[found.belief] = found.log_probability
+        if best is None or found.log_probability > best.log_probability:
+            best = found
+    if best is None:
+        return {}
+    for index, log_odds in best.log_odds.items():
+        other = replace(best.belief, slipped=best.belief.slipped ^ {index})
+        sign = -1.0 if index in best.belief.slipped else 1.0
+        weighed.setdefault(other, best.log_probability + sign * log_odds)
+    total = np.logaddexp.reduce(list(weighed.values()))
+    verdicts = {}
+    for index in sorted(set().union(*(belief.slipped for belief in weighed))):
+        with_it = [value for belief, value in weighed.items() if index in belief.slipped]
+        log_share = min(float(np.logaddexp.reduce(with_it) - total), -1e-12)
+        log_odds = log_share - math.log(-math.expm1(log_share))
+        if log_odds >= math.log(criteria.HELD) and not runs[index].fixed:
+            verdicts[index] = best.verdict(index, log_odds)
+    return verdicts
+
+
+def _searched(clutch: "_Clutch", start: Belief) -> "_Weighed":
+    """The belief that no single change improves, from a first one."""
+    now, tried = _Weighed(clutch=clutch, belief=start), {start}
+    for _ in range(_MOVES):
+        moves = sorted(
+            ((gain, moved) for moved, gain in now.moves() if gain > _WORTH and moved not in tried),
+            key=lambda move: -move[0],
+        )
+        for _, moved in moves[:3]:
+            tried.add(moved)
+            then = _Weighed(clutch=clutch, belief=moved)
+            if then.log_probability > now.log_probability + _WORTH:
+                now = then
+                break
+        else:
+            return now
+    return now
+
+
+@dataclass(frozen=True)
+class _Clutch:
+    """All runs, and what depends on no belief."""
+
+    runs: tuple[Run, ...]
+    asked: frozenset[int]
+    fits: dict[tuple[Any, ...], Fit] = field(default_factory=dict)
+
+    @cached_property
+    def cycles(self) -> FloatArray:
+        """As sent [n]."""
+        return np.array([run.sent.cycles for run in self.runs])
+
+    @cached_property
+    def centres(self) -> FloatArray:
+        """The cycles about which runs are looked at."""
+        return np.append(self.cycles[sorted(self.asked)], self.cycles.max(initial=0.0))
+
+    @cached_property
+    def near(self) -> list[int]:
+        """The runs whose cycles are looked at, in the order of the history."""
+        return self._nearest(range(len(self.runs)), criteria.MAX_RUNS)
+
+    @cached_property
+    def tests(self) -> list[int]:
+        """The tests that are looked at."""
+        return self._nearest([i for i, run in enumerate(self.runs) if run.tests], criteria.MAX_TESTS)
+
+    def _nearest(self, indices: Sequence[int], most: int) -> list[int]:
+        if len(indices) <= most:
+            return list(indices)
+        apart = np.abs(self.cycles[list(indices)][:, None] - self.centres).min(axis=1)
+        return sorted(indices[k] for k in np.argsort(apart, kind="stable")[:most].tolist())
+
+    @cached_property
+    def rank(self) -> NDArray[np.intp]:
+        return np.array([pace.rank_of(self.runs[i].kind) for i in self.near], dtype=np.intp)
+
+    @cached_property
+    def block(self) -> FloatArray:
+        return np.array([math.nan if (own := self.runs[i].block) is None else own for i in self.near])
+
+    @cached_property
+    def dated(self) -> list[int]:
+        """Places in `near` of the runs with a date."""
+        return [k for k, i in enumerate(self.near) if self.runs[i].moment is not None]
+
+    @cached_property
+    def moments(self) -> FloatArray:
+        return np.array([self.runs[self.near[k]].moment for k in self.dated], dtype=np.float64)
+
+    def log_cycles(self, sets: FloatArray) -> FloatArray:
+        """log P [h] of cycles and dates of `near`; [h, n]."""
+        total = pace.log_probability(sets, self.rank, self.block)
+        if self.dated:
+            start = sets[:, self.dated] - np.nan_to_num(self.block[self.dated])
+            total = total + pace.log_order(start, self.moments)
+        return total
+
+
+@dataclass(frozen=True)
+class _Weighed:
+    """A belief, its log probability, and what single changes of it would gain."""
+
+    clutch: _Clutch
+    belief: Belief
+
+    @cached_property
+    def kept(self) -> list[int]:
+        """The runs that are as sent."""
+        return [i for i in range(len(self.clutch.runs)) if i not in self.belief.slipped]
+
+    @cached_property
+    def origins(self) -> list[float]:
+        """The cycles at which lives begin."""
+        rebuilds = [self.clutch.runs[i].sent.cycles for i in self.kept if self.clutch.runs[i].rebuild]
+        return [0.0, *rebuilds]
+
+    @cached_property
+    def life_of(self) -> dict[int, int]:
+        """The life of every run, by its place in the history."""
+        lives, life = {}, 0
+        for i, run in enumerate(self.clutch.runs):
+            life += run.rebuild and i not in self.belief.slipped
+            lives[i] = life
+        return lives
+
+    @cached_property
+    def fits(self) -> list[tuple[Fit, list[int]]]:
+        """The course of every life, and the indices of its tests."""
+        fits: list[tuple[Fit, list[int]]] = []
+        level, level_sd = math.log(criteria.COF), criteria.LOG_COF_SD
+        for life in range(len(self.origins)):
+            own = [i for i in self.clutch.tests if self.life_of[i] == life and i not in self.belief.slipped]
+            fit = self._fit(own, life, level, level_sd)
+            fits.append((fit, own))
+            if own:
+                level, level_sd = float(fit.tests.log_cof[np.argmin(fit.tests.cycles)]), criteria.REBUILT_SD
+        return fits
+
+    def _fit(self, own: Sequence[int], life: int, level: float, level_sd: float) -> Fit:
+        """The course of a life by these of its tests."""
+        origin, belief = self.origins[life], self.belief
+        shifts = self._shifts(life)
+        outlying, levels = (tuple(i for i in own if i in chosen) for chosen in (belief.outlying, belief.levels))
+        key = (tuple(own), outlying, levels, shifts.tobytes(), origin, level, level_sd)
+        if key not in self.clutch.fits:
+            sent = [self.clutch.runs[i].sent for i in own]
+            cycles = np.array([max(one.cycles - origin, 0.0) for one in sent])
+            further = np.array([criteria.OUTLYING_SD**2 if i in outlying else 0.0 for i in own])
+            tests = Tests(
+                cycles=cycles,
+                log_cof=np.array([one.log_cof for one in sent], dtype=np.float64),
+                variance=np.array([one.spread**2 for one in sent]) + further,
+                epoch=_epoch(shifts, cycles + origin),
+                levels=np.array([c for i, c in zip(own, cycles.tolist(), strict=True) if i in levels]),
+                level=level,
+                level_sd=level_sd,
+            )
+            self.clutch.fits[key] = Fit(tests)
+        return self.clutch.fits[key]
+
+    def _without(self, index: int, life: int) -> Fit:
+        """The course of a life without one of its tests."""
+        fit, own = self.fits[life]
+        if index not in own:
+            return fit
+        return self._fit([i for i in own if i != index], life, fit.tests.level, fit.tests.level_sd)
+
+    def _shifts(self, life: int) -> FloatArray:
+        """The cycles of the events of a life that may have shifted its level."""
+        runs = self.clutch.runs
+        return np.array([runs[i].sent.cycles for i in self.kept if runs[i].shift and self.life_of[i] == life])
+
+    @cached_property
+    def log_probability(self) -> float:
+        """log probability of the belief with all runs, up to a constant of the runs."""
+        total = self.base
+        for i in self.kept:
+            run = self.clutch.runs[i]
+            total += run.sent.log_protocol
+            if run.sent.log_cof is not None:
+                total += log_physics(run.sent.log_cof) if run.tests else self.log_cof(i, [run.sent])[0]
+        return total + sum(self.slips[i][1] for i in self.belief.slipped)
+
+    @cached_property
+    def base(self) -> float:
+        """The part of the tests' course, of cycles and dates, and the prior of the belief."""
+        total = sum(fit.log_evidence for fit, own in self.fits if own)
+        total += len(self.belief.outlying) * (math.log(criteria.OUTLYING_SHARE) - math.log1p(-criteria.OUTLYING_SHARE))
+        total += sum(self._log_level(i) for i in self.belief.levels)
+        return total + float(self.clutch.log_cycles(self._sets([]))[0])
+
+    def _sets(self, changes: Sequence[Mapping[int, float]]) -> FloatArray:
+        """The cycles of `near` as the belief has them, and with each of the changes; infinite: none. [1 + h, n]."""
+        place = {i: k for k, i in enumerate(self.clutch.near)}
+        now = self.clutch.cycles[self.clutch.near].copy()
+        now[[k for i, k in place.items() if i in self.belief.slipped]] = math.inf
+        sets = np.tile(now, (1 + len(changes), 1))
+        for row, change in zip(sets[1:], changes, strict=True):
+            for i, cycles in change.items():
+                row[place[i]] = cycles
+        return sets
+
+    def _log_level(self, test: int) -> float:
+        """log prior that a new level begins with a test."""
+        return math.log(self._level_share(self.life_of[test], test, self.clutch.runs[test].sent.cycles))
+
+    def _level_share(self, life: int, index: int, cycles: float) -> float:
+        """Prior probability that a new level begins with a test of a life at these cycles: after an event, or without."""
+        runs, own = self.clutch.runs, self.fits[life][1]
+        before = max((runs[i].sent.cycles for i in own if i != index and runs[i].sent.cycles <= cycles), default=0.0)
+        shifts = self._shifts(life)
+        declared = bool(((shifts >= before) & (shifts <= cycles)).any())
+        return criteria.LEVEL_AFTER_EVENT if declared else criteria.LEVEL_UNDECLARED
+
+    def _new_level(self, index: int, life: int, cycles: float) -> float:
+        """The same where no other test comes later: else they would have the new level too. 0 before the first test."""
+        runs = self.clutch.runs
+        others = [runs[i].sent.cycles for i in self.fits[life][1] if i != index]
+        return self._level_share(life, index, cycles) if others and max(others) < cycles else 0.0
+
+    def log_cof(self, index: int, readings: Sequence[Reading]) -> list[float]:
+        """log density of the COF of readings of a run by the course of the others; 0 for one that shows none."""
+        run, life = self.clutch.runs[index], self.life_of[index]
+        shown = [reading for reading in readings if reading.log_cof is not None]
+        if not shown:
+            return [0.0] * len(readings)
+        by_life: dict[int, list[Reading]] = {}
+        for reading in shown:
+            at = life if reading.cycles == run.sent.cycles else self._life_at(reading.cycles)
+            by_life.setdefault(at, []).append(reading)
+        values: dict[int, float] = {}
+        for at, those in by_life.items():
+            cycles = np.array([reading.cycles for reading in those])
+            predicted = self._predicted(index, at, cycles)
+            for column, reading in enumerate(those):
+                log_cof = reading.log_cof or 0.0
+                new_level = self._new_level(index, at, reading.cycles)
+                density = predicted.log_density(column, log_cof, reading.spread, new_level) + log_physics(log_cof)
+                values[id(reading)] = max(density, _LEAST)
+        return [values.get(id(reading), 0.0) for reading in readings]
+
+    def _predicted(self, index: int, life: int, cycles: FloatArray) -> Predicted:
+        """log COF at cycles [m] of a life by the tests without that run."""
+        epoch = _epoch(self._shifts(life), cycles)
+        return self._without(index, life).predict(np.maximum(cycles - self.origins[life], 0.0), epoch)
+
+    def _life_at(self, cycles: float) -> int:
+        return max((life for life, origin in enumerate(self.origins) if origin <= cycles), default=0)
+
+    def expected(self, index: int) -> float:
+        """The cycles at which a run that mistook them was most likely made: one gap after the last of its kind, or where
+        its block ends after the last run."""
+        run = self.clutch.runs[index]
+        others = [self.clutch.runs[i].sent.cycles for i in self.clutch.near if i in set(self.kept) and i != index]
+        latest = max(others, default=0.0)
+        if run.block is not None:
+            return latest + run.block
+        gaps = np.diff(self._of_kind(index))
+        return latest + (float(gaps[-1]) if gaps.size else 0.0)
+
+    def _of_kind(self, index: int) -> FloatArray:
+        kind, kept = self.clutch.runs[index].kind, set(self.kept)
+        own = [i for i in self.clutch.near if i in kept and i != index and self.clutch.runs[i].kind == kind]
+        return np.unique(self.clutch.cycles[own]) if own else np.zeros(0)
+
+    @cached_property
+    def slips(self) -> dict[int, tuple[float, float, Slip]]:
+        """Of every run in question: log L as sent, log Σ P(slip) L without it, and the most probable slip."""
+        weighed = {}
+        for i in sorted(self.suspects | self.belief.slipped):
+            run = self.clutch.runs[i]
+            slips = list(slips_of(run, self.expected(i)))
+            if all(own in ([], [i]) for _, own in self.fits):
+                slips = [slip for slip in slips if slip.name not in OF_CLUTCH]
+            readings = [run.sent, *(slip.likely for slip in slips)]
+            of_cof = self.log_cof(i, readings)
+            of_cycles = self._log_cycles(i, [reading.cycles for reading in readings])
+            as_sent = of_cof[0] + of_cycles[0] + run.sent.log_protocol
+            weights = []
+            for slip, cof, cycles in zip(slips, of_cof[1:], of_cycles[1:], strict=True):
+                cof = 0.0 if slip.name in OF_CLUTCH else cof
+                cycles = 0.0 if slip.name in (OTHER_CYCLES, OTHER_CLUTCH) else cycles
+                weights.append(slip.log_prior + cof + cycles + slip.likely.log_protocol)
+            most = int(np.argmax(weights)) if weights else -1
+            if weights:
+                confirmed = math.log(criteria.CONFIRMED) if run.fixed else 0.0
+                weighed[i] = (as_sent, float(np.logaddexp.reduce(weights)) + confirmed, slips[most])
+        return weighed
+
+    def _log_cycles(self, index: int, cycles: Sequence[float]) -> list[float]:
+        """log P of a run's cycles given the others."""
+        if index not in self.clutch.near:
+            return [0.0] * len(cycles)
+        sets = self._sets([{index: math.inf}, *({index: value} for value in cycles)])
+        made = self.clutch.log_cycles(sets[1:])
+        return [float(value) for value in made[1:] - made[0]]
+
+    @cached_property
+    def suspects(self) -> frozenset[int]:
+        """Runs that are in question, and others that surprise."""
+        surprise: dict[int, float] = {}
+        for fit, own in self.fits:
+            if len(own) > 1:
+                mean, variance, log_weight = fit.without()
+                of_cof = log_outlying(fit.tests.log_cof - mean, variance, log_weight)
+                for i, value in zip(own, of_cof.tolist(), strict=True):
+                    surprise[i] = min(value - _SUSPICIOUS_COF, 0.0)
+        near = [i for i in self.clutch.near if i not in self.belief.slipped]
+        made = self.clutch.log_cycles(self._sets([{i: math.inf} for i in near]))
+        for i, without in zip(near, made[1:].tolist(), strict=True):
+            surprise[i] = surprise.get(i, 0.0) + min(float(made[0]) - without - _SUSPICIOUS_CYCLES, 0.0)
+        odd = [i for i, value in sorted(surprise.items(), key=lambda item: item[1]) if value < 0.0]
+        return self.clutch.asked.union(odd[:_SUSPECTS])
+
+    @property
+    def doubts(self) -> bool:
+        """Whether any run in question may have slipped."""
+        return any(log_odds >= math.log(criteria.HELD) for log_odds in self.log_odds.values())
+
+    @cached_property
+    def log_odds(self) -> dict[int, float]:
+        """log odds of a slip for every run in question, all else as the belief has it."""
+        return {i: slipped - sent for i, (sent, slipped, _) in self.slips.items()}
+
+    def moves(self) -> Iterator[tuple[Belief, float]]:
+        """Single changes, and by how much they would change the log probability, about."""
+        belief = self.belief
+        for i, log_odds in self.log_odds.items():
+            gain = -log_odds if i in belief.slipped else log_odds
+            without = Belief(slipped=belief.slipped ^ {i}, outlying=belief.outlying - {i}, levels=belief.levels - {i})
+            yield without, gain
+        to_outlying = math.log(criteria.OUTLYING_SHARE) - math.log1p(-criteria.OUTLYING_SHARE)
+        for fit, own in self.fits:
+            if not own:
+                continue
+            mean, variance, log_weight = fit.without()
+            off = fit.tests.log_cof - mean
+            now = np.logaddexp.reduce(log_weight + _log_normal(off, variance), axis=0)
+            for k, i in enumerate(own):
+                sign = -1.0 if i in belief.outlying else 1.0
+                other = variance[:, k] + sign * criteria.OUTLYING_SD**2
+                then = np.logaddexp.reduce(log_weight[:, k] + _log_normal(off[:, k], other))
+                yield replace(belief, outlying=belief.outlying ^ {i}), float(then - now[k]) + sign * to_outlying
+            gains = fit.log_step_gains()
+            for k, i in enumerate(own):
+                if i not in belief.levels and fit.tests.cycles[k] > fit.tests.cycles.min():
+                    yield replace(belief, levels=belief.levels | {i}), float(gains[k]) + self._log_level(i)
+
+    def verdict(self, index: int, log_odds: float) -> Verdict:
+        """What is said of a run that is doubted."""
+        sent = self.clutch.runs[index].sent
+        slip = self.slips[index][2] if index in self.slips else Slip(name=OTHER_CYCLES, log_prior=0.0, likely=sent)
+        made = self._of_kind(index)
+        if made.size == 0:
+            made = np.unique(self.clutch.cycles[[i for i in self.kept if i != index]])
+        before = made[made < sent.cycles - 0.5]
+        gaps = np.diff(made)
+        return Verdict(
+            log_odds=log_odds,
+            slip=slip,
+            expected=self._interval(index, sent),
+            expected_then=self._interval(index, slip.likely),
+            against_time=self._against_time(index),
+            usual_gap=float(np.median(gaps[-5:])) if gaps.size else None,
+            before=float(before[-1]) if before.size else None,
+            latest=float(made[-1]) if made.size else None,
+        )
+
+    def _interval(self, index: int, reading: Reading) -> tuple[float, float] | None:
+        life = self._life_at(reading.cycles)
+        if all(own in ([], [index]) for _, own in self.fits):
+            return None
+        return self._predicted(index, life, np.array([reading.cycles])).interval(0, reading.spread)
+
+    def _against_time(self, index: int) -> bool:
+        run = self.clutch.runs[index]
+        if run.moment is None:
+            return False
+        start = run.sent.cycles - (run.block or 0.0)
+        for i in self.kept:
+            other = self.clutch.runs[i]
+            if i == index or other.moment is None:
+                continue
+            begun = other.sent.cycles - (other.block or 0.0)
+            if (begun < start - 0.5 and other.moment > run.moment + 1.0) or (
+                begun > start + 0.5 and other.moment < run.moment - 1.0
+            ):
+                return True
+        return False
+
+
+def _epoch(shifts: FloatArray, cycles: FloatArray) -> FloatArray:
+    """How many events come before cycles [m]; [m]."""
+    return np.asarray((shifts[None, :] <= cycles[:, None]).sum(axis=1), dtype=np.float64)
+
+
+def _log_normal(off: FloatArray, variance: FloatArray) -> FloatArray:
+    return np.asarray(-0.5 * (np.log(2.0 * math.pi * variance) + off**2 / variance))

@@ -1,0 +1,151 @@
+"""At which cycles runs are made: the probability of a set of cycles, whatever the order in which the runs arrived.
+
+Runs are taken by ascending cycles, kind by kind. Each is made at the cycles of a run of another kind, or ends a block of
+duty that begins where another run was made or is one of equal blocks, or comes a gap after the one before of its kind:
+
+    p(g) = a Σ r_k [g = g_k] + b Σ r_k LN(g; g_k, σ) + c LN(g; ḡ, Σ) + d / (g log(1e8/1e1))
+
+with g_k the last few gaps, r_k how recent they are, ḡ their geometric mean, and LN the log normal density. No scale of
+cycles is assumed: the last term gives every gap from 10 to 1e8 its share. Maintenance comes at any time of the life.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import betaln
+
+from models.arrays import FloatArray
+from models.plausibility import criteria
+
+#: Kinds in the order in which they are made at the same cycles; others come last.
+ORDER = ("run_in", "duty_cycles", "maintenance", "stationary_stribeck", "dynamic_stribeck")
+_FREE = ORDER.index("maintenance")
+_RECENCY = 0.7 ** np.arange(criteria.MEMORY)
+#: The least probability of a run's cycles.
+_LEAST = 1e-30
+
+
+def rank_of(kind: str) -> int:
+    """The place of a kind in `ORDER`."""
+    return ORDER.index(kind) if kind in ORDER else len(ORDER)
+
+
+def log_anywhere(cycles: FloatArray | float) -> FloatArray:
+    """log density of a number of cycles of which nothing is known, any shape: even over its logarithm, and falling beyond
+    what clutches last."""
+    at = np.maximum(cycles, 1.0)
+    beyond = np.maximum(np.log(at / criteria.MAX_CYCLES), 0.0) / criteria.BEYOND_SD
+    return np.asarray(-np.log(at * criteria.LOG_CYCLES) - 0.5 * beyond**2)
+
+
+def log_probability(cycles: FloatArray, rank: NDArray[np.intp], block: FloatArray) -> FloatArray:
+    """log P [h] of h sets of cycles [h, n] of runs of a kind `rank` [n] whose blocks are so long (nan: none) [n].
+
+    Cycles are infinite where a run is not among a set.
+    """
+    there = np.isfinite(cycles)
+    finite = np.where(there, cycles, -1.0)
+    with np.errstate(invalid="ignore"):
+        apart = np.abs(cycles[:, :, None] - cycles[:, None, :]) < 0.5
+    joined = (apart & (rank[None, :, None] > rank[None, None, :])).any(axis=2)
+    begin = finite - np.nan_to_num(block)
+    tiled = (np.abs(begin[:, :, None] - finite[:, None, :]) < 0.5) & there[:, None, :]
+    tiled[:, np.arange(rank.size), np.arange(rank.size)] = False
+    equal = np.abs(begin - np.nan_to_num(block, nan=1.0) * np.round(begin / np.nan_to_num(block, nan=1.0))) < 0.5
+    in_life = _anywhere_in_life(finite)
+    of_blocks = criteria.TILES * tiled.any(axis=2) + criteria.STARTS * (np.abs(begin) < 0.5)
+    of_blocks += criteria.EQUALS * equal * np.minimum(np.nan_to_num(block) * in_life, 1.0)
+    is_block = np.isfinite(block)
+    meets = np.where(is_block, of_blocks, criteria.JOINS * joined)
+    left = np.where(is_block, 1.0 - criteria.TILES - criteria.STARTS - criteria.EQUALS, 1.0 - criteria.JOINS)
+    total = np.zeros(cycles.shape[0])
+    for kind in set(rank.tolist()):
+        own = np.flatnonzero(rank == kind)
+        law = in_life[:, own] if kind == _FREE else _by_gaps(cycles[:, own])
+        p = meets[:, own] + left[own] * law
+        total += np.where(there[:, own], np.log(np.maximum(p, _LEAST)), 0.0).sum(axis=1)
+    return total
+
+
+def _anywhere_in_life(finite: FloatArray) -> FloatArray:
+    """Density [h, n] of cycles that may be any of those up to the latest of the other runs, or as many again."""
+    ordered = np.sort(finite, axis=1)
+    latest = np.where(finite >= ordered[:, -1:], ordered[:, -2:-1] if finite.shape[1] > 1 else 0.0, ordered[:, -1:])
+    share = np.where(finite <= latest, criteria.WITHIN, np.where(finite <= 2.0 * latest, criteria.BEYOND, 0.0))
+    rest = np.where(latest >= 1.0, 1.0 - criteria.WITHIN - criteria.BEYOND, 1.0)
+    return np.asarray(share / np.maximum(latest, 1.0) + rest * np.exp(log_anywhere(finite)))
+
+
+def _by_gaps(cycles: FloatArray) -> FloatArray:
+    """p [h, k] of each run's gap to the one before of its kind, in the places of the runs."""
+    order = np.argsort(cycles, axis=1)
+    ascending = np.take_along_axis(cycles, order, axis=1)
+    count = ascending.shape[1]
+    law = np.empty(ascending.shape)
+    first = ascending[:, 0]
+    law[:, 0] = criteria.AT_START * (first < 0.5) + (1.0 - criteria.AT_START) * np.exp(log_anywhere(first))
+    if count > 1:
+        with np.errstate(invalid="ignore"):
+            gaps = np.nan_to_num(np.diff(ascending, axis=1), nan=0.0, posinf=0.0)
+        law[:, 1:] = _of_gaps(gaps)
+    back = np.empty(law.shape)
+    np.put_along_axis(back, order, law, axis=1)
+    return back
+
+
+def _of_gaps(gaps: FloatArray) -> FloatArray:
+    """p [h, k] of gaps [h, k], each after those before it."""
+    sets, count = gaps.shape
+    padded = np.concatenate([np.zeros((sets, criteria.MEMORY)), gaps], axis=1)
+    places = np.arange(count)[:, None] + criteria.MEMORY - 1 - np.arange(criteria.MEMORY)
+    before = padded[:, places]  # [h, k, memory], the last one first
+    known = before >= 0.5
+    weight = known * _RECENCY
+    total = weight.sum(axis=2, keepdims=True)
+    weight = weight / np.maximum(total, 1e-12)
+    log_gap = np.log(np.maximum(gaps, 0.5))
+    log_before = np.log(np.maximum(before, 0.5))
+    same = (weight * (np.abs(before - gaps[:, :, None]) < 0.5)).sum(axis=2)
+    like = (weight * _log_normal(log_gap[:, :, None], log_before, criteria.LIKE_GAP_SD)).sum(axis=2)
+    growing = known[:, :, 0] & known[:, :, 1] if criteria.MEMORY > 1 else np.zeros(gaps.shape, dtype=bool)
+    grown = 2.0 * log_before[:, :, 0] - log_before[:, :, 1]
+    like = np.where(growing, 0.8 * like + 0.2 * _log_normal(log_gap, grown, criteria.LIKE_GAP_SD), like)
+    similar = _log_normal(log_gap, (weight * log_before).sum(axis=2), criteria.SIMILAR_GAP_SD)
+    anything = np.exp(log_anywhere(gaps))
+    told = criteria.SAME_GAP * same + criteria.LIKE_GAP * like + criteria.SIMILAR_GAP * similar
+    rest = 1.0 - criteria.SAME_GAP - criteria.LIKE_GAP - criteria.SIMILAR_GAP
+    law = np.where(total[:, :, 0] > 0, told + rest * anything, anything)
+    return np.where(gaps < 0.5, criteria.REPEATS, law)
+
+
+def _log_normal(log_gap: FloatArray, centre: FloatArray, deviation: float) -> FloatArray:
+    """Density a cycle of a gap whose logarithm is normal."""
+    z = (log_gap - centre) / deviation
+    return np.asarray(np.exp(-0.5 * z * z - log_gap) / (deviation * math.sqrt(2 * math.pi)))
+
+
+def log_order(start: FloatArray, moment: FloatArray) -> FloatArray:
+    """log P [h] of the dates [n] of runs that begin at cycles [h, n], infinite where a run is not among a set.
+
+    How often a rig's runs are out of order is learned from them: a beta prior on it is integrated out.
+    """
+    if moment.size < 2:
+        return np.zeros(start.shape[0])
+    by_moment = np.argsort(moment, kind="stable")
+    begun = start[:, by_moment]
+    there = np.isfinite(begun)
+    # a run is out of order where it lies below its predecessor: one misplaced run makes one or two such steps
+    last = _last_seen(begun)
+    wrong = (there[:, 1:] & (begun[:, 1:] < last[:, :-1] - 0.5)).sum(axis=1)
+    count = there.sum(axis=1)
+    a, b = criteria.OUT_OF_ORDER
+    return np.asarray(betaln(a + wrong, b + np.maximum(count - wrong, 0)) - betaln(a, b))
+
+
+def _last_seen(values: FloatArray) -> FloatArray:
+    """Each value [h, n], or the last finite one before it; -inf before the first."""
+    there = np.isfinite(values)
+    index = np.maximum.accumulate(np.where(there, np.arange(values.shape[1]), -1), axis=1)
+    seen = np.take_along_axis(values, np.maximum(index, 0), axis=1)
+    return np.where(index >= 0, seen, -np.inf)

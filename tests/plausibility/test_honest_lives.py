@@ -1,0 +1,99 @@
+"""Honest lives are not shut out: whatever is asked about on the way, nothing is held in the end."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.plausibility import slips
+from tests.plausibility.bench import Bench
+from tests.plausibility.honest_lives import KINDS, life
+from tests.real import loaders
+from tests.support import stationary
+
+Body = dict[str, Any]
+
+
+def even(step: float, share: float = 0.96, count: int = 8, start: float = 0.0) -> list[Body]:
+    """Tests a step of cycles apart, COF lower by the same share each time."""
+    runs = []
+    for k in range(count):
+        body = stationary(start + k * step, run_id=f"t{k}", wear=0.0, pressures=(4.0, 6.0))
+        torque = [share**k * value for value in body["channels"]["torque_nm"]]
+        runs.append(body | {"channels": body["channels"] | {"torque_nm": torque}})
+    return runs
+
+
+def sent(runs: list[Body]) -> tuple[Bench, str]:
+    """A bench to which runs were sent, and which of them were held when they came in (h)."""
+    bench, states = Bench({}), ""
+    for run in runs:
+        states += "h" if bench.answer(run).codes else "a"
+    return bench, states
+
+
+@pytest.mark.parametrize("step", [10.0, 1000.0, 50_000.0, 1e6, 1e7])
+def test_any_scale_of_cycles_is_accepted(step: float) -> None:
+    bench, states = sent(even(step))
+    assert states.count("h") <= 1
+    assert bench.held == ()
+
+
+@pytest.mark.parametrize("start", [5000.0, 50_000.0, 2e6])
+def test_a_first_test_that_comes_late_shuts_nothing_out(start: float) -> None:
+    bench, states = sent(even(0.02 * start, start=start, share=0.99))
+    assert states.count("h") <= 1
+    assert bench.held == ()
+
+
+@pytest.mark.parametrize("share", [0.75, 0.85, 1.2, 1.3])
+def test_a_new_level_is_asked_about_at_most_once(share: float) -> None:
+    """After a declared oil change, and with nothing declared."""
+    before = even(1000.0, share=0.99, count=14)
+    after = [
+        run | {"channels": run["channels"] | {"torque_nm": [share * t for t in run["channels"]["torque_nm"]]}}
+        for run in before[7:]
+    ]
+    for declared in (True, False):
+        event: list[Body] = [{"kind": "maintenance", "event": "oil_change", "run_id": "m", "cycles": 6500}]
+        bench, states = sent([*before[:7], *(event if declared else []), *after])
+        assert states.count("h") <= 1
+        assert bench.held == ()
+
+
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_an_honest_life_is_not_shut_out(kind: str) -> None:
+    if kind.startswith("filters") and not loaders.FOLDER.is_dir():
+        pytest.skip(f"{loaders.FOLDER} is not there")
+    bench, _ = sent(life(17, kind, 0))
+    assert bench.held == ()
+
+
+def test_the_order_of_arrival_does_not_matter() -> None:
+    """Nine tests and one with a zero too many, in several orders: the same run is held in the end."""
+    runs = even(1000.0, share=0.97, count=10)
+    slipped = slips.CYCLES["cycles x 10"](np.random.default_rng(1), runs[4])
+    assert slipped is not None
+    runs[4] = slipped
+    for seed in range(4):
+        order = np.random.default_rng(seed).permutation(10)
+        bench, _ = sent([json.loads(json.dumps(runs[k])) for k in order])
+        assert [event.run_id for event in bench.held] == ["t4"]
+
+
+def test_a_slip_that_was_accepted_is_held_once_others_contradict_it() -> None:
+    """The second test of a life, ten times too many cycles: nothing speaks against it yet."""
+    runs = even(1000.0, share=0.95, count=10)
+    slipped = runs[1] | {"cycles": 10_000.0}
+    bench, _ = sent([runs[0], slipped, *runs[2:8]])
+    assert [event.run_id for event in bench.held] == ["t1"]
+
+
+def test_a_slip_stays_held_among_honest_runs() -> None:
+    runs = even(1000.0, share=0.98, count=18)
+    slipped = slips.OTHERS["torque at a wrong gain"](np.random.default_rng(3), runs[7])
+    assert slipped is not None
+    bench, states = sent([*runs[:7], slipped, *runs[8:]])
+    assert states[7] == "h"
+    assert [event.run_id for event in bench.held] == ["t7"]

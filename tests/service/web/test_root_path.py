@@ -1,0 +1,98 @@
+"""Behind a proxy that adds a path, every address that an answer names leads back through it."""
+
+import re
+from collections.abc import Iterator
+
+import pytest
+from fastapi.testclient import TestClient
+
+from service.app import create_app
+from service.settings import Settings
+from tests.support import stationary
+
+ROOT = "/rigs/clutch"
+
+
+@pytest.fixture(params=["", ROOT], ids=["the proxy takes the path off", "the proxy leaves the path"])
+def proxied(request: pytest.FixtureRequest, database_url: str) -> Iterator[tuple[TestClient, str]]:
+    """A service below `ROOT`, and what a request's path begins with when it comes from the proxy."""
+    app = create_app(Settings(workers=0, database=database_url, root_path=ROOT))
+    with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000), follow_redirects=False) as client:
+        yield client, request.param
+
+
+def test_what_is_stored_is_named_as_the_proxy_finds_it(proxied: tuple[TestClient, str]) -> None:
+    client, before = proxied
+    clutch = client.post(f"{before}/v1/clutches", json={"clutch_id": "c1"})
+    run = client.post(f"{before}/v1/clutches/c1/runs", json=stationary(0, run_id="r", pressures=(5.0,)))
+    assert (clutch.headers["Location"], run.headers["Location"]) == (
+        f"{ROOT}/v1/clutches/c1", f"{ROOT}/v1/clutches/c1/runs/r",
+    )  # fmt: skip
+    assert client.get(run.headers["Location"]).json()["run_id"] == "r"
+
+
+def test_the_next_page_is_named_as_the_proxy_finds_it(proxied: tuple[TestClient, str]) -> None:
+    client, before = proxied
+    for name in ("c1", "c2"):
+        client.post(f"{before}/v1/clutches", json={"clutch_id": name})
+    link = client.get(f"{before}/v1/clutches?limit=1&sort=name").headers["Link"]
+    found = re.fullmatch(r'<([^>]*)>; rel="next"', link)
+    assert found is not None
+    assert found[1].startswith(f"{ROOT}/v1/clutches?")
+    assert [item["clutch_id"] for item in client.get(found[1]).json()["items"]] == ["c2"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "leads_to"),
+    [("/v1/clutches/", "/v1/clutches"), ("/clutches/c1/", "/clutches/c1"), ("/docs/", "/docs")],
+)
+def test_a_redirect_keeps_the_path_and_names_no_host(
+    proxied: tuple[TestClient, str], asked: str, leads_to: str
+) -> None:
+    client, before = proxied
+    answer = client.get(before + asked)
+    assert (answer.status_code, answer.headers["Location"]) == (307, ROOT + leads_to)
+
+
+def test_the_path_without_a_slash_leads_to_the_page(proxied: tuple[TestClient, str]) -> None:
+    answer = proxied[0].get(ROOT)
+    assert (answer.status_code, answer.headers["Location"]) == (308, f"{ROOT}/")
+
+
+def test_the_description_names_the_path(proxied: tuple[TestClient, str]) -> None:
+    client, before = proxied
+    assert client.get(f"{before}/openapi.json").json()["servers"] == [{"url": ROOT}]
+
+
+def test_pages_and_what_they_load_are_addressed_from_where_they_are(proxied: tuple[TestClient, str]) -> None:
+    client, before = proxied
+    for page, up in (("/", "./"), ("/clutches/c1", "../"), ("/docs", "")):
+        addresses = re.findall(r'(?:href|src)="([^"#]+)"', client.get(before + page).text)
+        assert addresses
+        for address in addresses:
+            assert address.startswith(up)
+            assert not address.startswith(("/", "http")), address
+            assert client.get(f"{before}/{address.removeprefix(up)}").status_code == 200, address
+
+
+def test_without_a_proxy_addresses_are_as_they_were(client: TestClient) -> None:
+    assert client.post("/v1/clutches", json={"clutch_id": "c9"}).headers["Location"] == "/v1/clutches/c9"
+    assert "servers" not in client.get("/openapi.json").json()
+    redirected = client.get("/v1/clutches/", follow_redirects=False)
+    assert redirected.headers["Location"] == "/v1/clutches"
+
+
+@pytest.mark.parametrize("path", ["/v1", "clutches/x", "/a b", "/../a", "/a//b", "//", "/ä"])
+def test_a_path_that_cannot_be_told_from_the_service_s_own_is_refused(path: str) -> None:
+    if path == "//":
+        assert Settings.from_environment(root_path=path).root_path == ""
+        return
+    with pytest.raises(ValueError, match="CLUTCHLIFE_ROOT_PATH must be a path"):
+        Settings.from_environment(root_path=path)
+
+
+def test_every_address_of_the_service_begins_as_the_settings_know(client: TestClient) -> None:
+    routes = [getattr(route, "path", "/") for route in client.app.routes]  # type: ignore[attr-defined]
+    for first in {path.split("/")[1] for path in routes} - {""}:
+        with pytest.raises(ValueError, match="CLUTCHLIFE_ROOT_PATH"):
+            Settings.from_environment(root_path=first)
