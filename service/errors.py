@@ -22,10 +22,11 @@ class FieldError:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Notice:
-    """A warning: something that was noticed and did not stop the run."""
+    """A warning: something that was noticed and did not stop the run; of a doubt the cycles that it asks about."""
 
     code: str
     message: str
+    likely_cycles: float | None = None
 
 
 class ServiceError(Exception):

@@ -25,7 +25,8 @@ _GRID = np.array(
     [(scale, size, scatter) for scale in criteria.SCALES for size in criteria.SIZES for scatter in criteria.SCATTERS]
 )
 _SCALES = np.log(np.array(criteria.SCALES))
-_BY_SCALE = len(criteria.SIZES) * len(criteria.SCATTERS)
+#: A probability of nothing.
+_NEVER = 1e-300
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -182,16 +183,13 @@ class Predicted:
     mean: FloatArray
     variance: FloatArray
 
-    def log_density(self, index: int, log_cof: float, spread: float, new_level: float) -> float:
-        """log density of a test's log COF, whose own deviation is `spread`, at the cycles of that index; with probability
-        `new_level` COF has a new level there."""
-        off = log_cof - self.mean[:, index : index + 1]
-        variance, weight = self.variance[:, index : index + 1] + spread**2, self.log_weight[:, None]
-        same = math.log1p(-new_level) + float(log_outlying(off, variance, weight)[0])
-        if new_level == 0.0:
-            return same
+    def log_density(self, log_cof: FloatArray, spread: FloatArray, new_level: FloatArray) -> FloatArray:
+        """log density [m] of log COF [m] whose own deviation is `spread` [m], at the cycles of the prediction; with
+        probability `new_level` [m] COF has a new level there."""
+        off, variance, weight = log_cof - self.mean, self.variance + spread**2, self.log_weight[:, None]
+        same = np.log1p(-new_level) + log_outlying(off, variance, weight)
         stepped = np.logaddexp.reduce(weight + _log_normal(off, variance + criteria.LEVEL_SD**2), axis=0)
-        return float(np.logaddexp(same, math.log(new_level) + float(stepped[0])))
+        return np.asarray(np.logaddexp(same, np.log(np.maximum(new_level, _NEVER)) + stepped))
 
     def interval(self, index: int, spread: float) -> tuple[float, float]:
         """COF two deviations below and above its mean at the cycles of that index."""
@@ -214,10 +212,10 @@ def _diagonal(features: tuple[FloatArray, FloatArray]) -> FloatArray:
     return np.asarray(np.repeat(both.reshape(-1, plain.shape[1]), len(criteria.SCATTERS), axis=0))
 
 
-def log_physics(log_cof: float) -> float:
-    """log of how far physics allows a COF: 0 for what wet clutches have, less beyond."""
-    beyond = abs(log_cof - math.log(criteria.COF)) / criteria.LOG_COF_SD - criteria.USUAL
-    return -0.5 * max(beyond, 0.0) ** 2
+def log_physics(log_cof: FloatArray) -> FloatArray:
+    """log of how far physics allows a COF, any shape: 0 for what wet clutches have, less beyond."""
+    beyond = np.abs(log_cof - math.log(criteria.COF)) / criteria.LOG_COF_SD - criteria.USUAL
+    return np.asarray(-0.5 * np.maximum(beyond, 0.0) ** 2)
 
 
 def _log_normal(off: FloatArray, variance: FloatArray) -> FloatArray:

@@ -167,6 +167,17 @@ class _Clutch:
     def moments(self) -> FloatArray:
         return np.array([self.runs[self.near[k]].moment for k in self.dated], dtype=np.float64)
 
+    def surprise(self, cycles: FloatArray) -> FloatArray:
+        """log P [n] of the cycles and dates of each run of `near` given the others."""
+        total = pace.log_given_others(cycles, self.rank, self.block)
+        if self.dated:
+            start = cycles[self.dated] - np.nan_to_num(self.block[self.dated])
+            without = np.tile(start, (1 + start.size, 1))
+            without[1:][np.diag_indices(start.size)] = math.inf
+            made = pace.log_order(without, self.moments)
+            total[self.dated] += made[0] - made[1:]
+        return total
+
     def log_cycles(self, sets: FloatArray) -> FloatArray:
         """log P [h] of cycles and dates of `near`; [h, n]."""
         total = pace.log_probability(sets, self.rank, self.block)
@@ -258,7 +269,8 @@ class _Weighed:
             run = self.clutch.runs[i]
             total += run.sent.log_protocol
             if run.sent.log_cof is not None:
-                total += log_physics(run.sent.log_cof) if run.tests else self.log_cof(i, [run.sent])[0]
+                own = float(log_physics(np.array(run.sent.log_cof))) if run.tests else self.log_cof(i, [run.sent])[0]
+                total += own
         return total + sum(self.slips[i][1] for i in self.belief.slipped)
 
     @cached_property
@@ -312,11 +324,13 @@ class _Weighed:
         for at, those in by_life.items():
             cycles = np.array([reading.cycles for reading in those])
             predicted = self._predicted(index, at, cycles)
-            for column, reading in enumerate(those):
-                log_cof = reading.log_cof or 0.0
-                new_level = self._new_level(index, at, reading.cycles)
-                density = predicted.log_density(column, log_cof, reading.spread, new_level) + log_physics(log_cof)
-                values[id(reading)] = max(density, _LEAST)
+            log_cof = np.array([reading.log_cof for reading in those], dtype=np.float64)
+            spread = np.array([reading.spread for reading in those])
+            new_level = np.array([self._new_level(index, at, value) for value in cycles.tolist()])
+            density = predicted.log_density(log_cof, spread, new_level) + log_physics(log_cof)
+            values |= {
+                id(reading): value for reading, value in zip(those, np.maximum(density, _LEAST).tolist(), strict=True)
+            }
         return [values.get(id(reading), 0.0) for reading in readings]
 
     def _predicted(self, index: int, life: int, cycles: FloatArray) -> Predicted:
@@ -385,10 +399,8 @@ class _Weighed:
                 of_cof = log_outlying(fit.tests.log_cof - mean, variance, log_weight)
                 for i, value in zip(own, of_cof.tolist(), strict=True):
                     surprise[i] = min(value - _SUSPICIOUS_COF, 0.0)
-        near = [i for i in self.clutch.near if i not in self.belief.slipped]
-        made = self.clutch.log_cycles(self._sets([{i: math.inf} for i in near]))
-        for i, without in zip(near, made[1:].tolist(), strict=True):
-            surprise[i] = surprise.get(i, 0.0) + min(float(made[0]) - without - _SUSPICIOUS_CYCLES, 0.0)
+        for i, value in zip(self.clutch.near, self.clutch.surprise(self._sets([])[0]).tolist(), strict=True):
+            surprise[i] = surprise.get(i, 0.0) + min(value - _SUSPICIOUS_CYCLES, 0.0)
         odd = [i for i, value in sorted(surprise.items(), key=lambda item: item[1]) if value < 0.0]
         return self.clutch.asked.union(odd[:_SUSPECTS])
 

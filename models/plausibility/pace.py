@@ -46,19 +46,7 @@ def log_probability(cycles: FloatArray, rank: NDArray[np.intp], block: FloatArra
     """
     there = np.isfinite(cycles)
     finite = np.where(there, cycles, -1.0)
-    with np.errstate(invalid="ignore"):
-        apart = np.abs(cycles[:, :, None] - cycles[:, None, :]) < 0.5
-    joined = (apart & (rank[None, :, None] > rank[None, None, :])).any(axis=2)
-    begin = finite - np.nan_to_num(block)
-    tiled = (np.abs(begin[:, :, None] - finite[:, None, :]) < 0.5) & there[:, None, :]
-    tiled[:, np.arange(rank.size), np.arange(rank.size)] = False
-    equal = np.abs(begin - np.nan_to_num(block, nan=1.0) * np.round(begin / np.nan_to_num(block, nan=1.0))) < 0.5
-    in_life = _anywhere_in_life(finite)
-    of_blocks = criteria.TILES * tiled.any(axis=2) + criteria.STARTS * (np.abs(begin) < 0.5)
-    of_blocks += criteria.EQUALS * equal * np.minimum(np.nan_to_num(block) * in_life, 1.0)
-    is_block = np.isfinite(block)
-    meets = np.where(is_block, of_blocks, criteria.JOINS * joined)
-    left = np.where(is_block, 1.0 - criteria.TILES - criteria.STARTS - criteria.EQUALS, 1.0 - criteria.JOINS)
+    meets, left, in_life = _meets(cycles, finite, rank, block)
     total = np.zeros(cycles.shape[0])
     for kind in set(rank.tolist()):
         own = np.flatnonzero(rank == kind)
@@ -66,6 +54,48 @@ def log_probability(cycles: FloatArray, rank: NDArray[np.intp], block: FloatArra
         p = meets[:, own] + left[own] * law
         total += np.where(there[:, own], np.log(np.maximum(p, _LEAST)), 0.0).sum(axis=1)
     return total
+
+
+def log_given_others(cycles: FloatArray, rank: NDArray[np.intp], block: FloatArray) -> FloatArray:
+    """log P [n] of each run's cycles [n] given those of its kind; 0 for a run that meets one of another kind, or is not
+    there."""
+    there = np.isfinite(cycles)
+    finite = np.where(there, cycles, -1.0)
+    meets, _, in_life = _meets(cycles[None], finite[None], rank, block)
+    total = np.zeros(cycles.size)
+    for kind in set(rank.tolist()):
+        own = np.flatnonzero(rank == kind)
+        if kind == _FREE:
+            total[own] = np.log(in_life[0, own])
+            continue
+        sets = np.tile(cycles[own], (1 + own.size, 1))
+        sets[1:][np.diag_indices(own.size)] = math.inf
+        made = np.where(np.isfinite(sets), np.log(np.maximum(_by_gaps(sets), _LEAST)), 0.0).sum(axis=1)
+        total[own] = made[0] - made[1:]
+    return np.where((meets[0] > 0.0) | ~there, 0.0, total)
+
+
+def _meets(
+    cycles: FloatArray, finite: FloatArray, rank: NDArray[np.intp], block: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """P [h, n] of runs that meet others, the share [n] that is left for those that do not, and the density [h, n] of cycles
+    anywhere in the life."""
+    is_block = np.isfinite(block)
+    length = np.where(is_block, block, 1.0)
+    with np.errstate(invalid="ignore"):
+        apart = np.abs(cycles[:, :, None] - cycles[:, None, :]) < 0.5
+    joined = (apart & (rank[:, None] > rank)).any(axis=2)
+    in_life = _anywhere_in_life(finite)
+    meets = np.asarray(criteria.JOINS * joined, dtype=np.float64)
+    if is_block.any():
+        begin = (finite - length)[:, is_block]
+        tiled = ((np.abs(begin[:, :, None] - finite[:, None, :]) < 0.5) & np.isfinite(cycles)[:, None, :]).any(axis=2)
+        equal = np.abs(begin - length[is_block] * np.round(begin / length[is_block])) < 0.5
+        of_blocks = criteria.TILES * tiled + criteria.STARTS * (np.abs(begin) < 0.5)
+        of_blocks += criteria.EQUALS * equal * np.minimum(length[is_block] * in_life[:, is_block], 1.0)
+        meets[:, is_block] = of_blocks
+    left = np.where(is_block, 1.0 - criteria.TILES - criteria.STARTS - criteria.EQUALS, 1.0 - criteria.JOINS)
+    return meets, left, in_life
 
 
 def _anywhere_in_life(finite: FloatArray) -> FloatArray:

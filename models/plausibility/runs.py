@@ -1,7 +1,7 @@
 """Runs as the judgement sees them: numbers alone, as sent and as they would be without each slip."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,9 +28,14 @@ class Slip:
     unit: str = ""
 
 
+def none() -> tuple[Slip, ...]:
+    """No slips."""
+    return ()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
-    """A run: `sent` as it came in, and the `slips` of its channels that are possible.
+    """A run: `sent` as it came in, and the `slips` of its channels that are possible, made when they are asked for.
 
     `tests` says whether its COF is evidence of the course (a stationary test); `block` [cycles] what a block of duty says it
     ran; `moment` [s] when it was started, None where it does not say; `shift` an event that may move the level of COF,
@@ -40,7 +45,7 @@ class Run:
     name: str
     kind: str
     sent: Reading
-    slips: Sequence[Slip] = field(default=())
+    slips: Callable[[], Iterable[Slip]] = none
     tests: bool = False
     block: float | None = None
     moment: float | None = None

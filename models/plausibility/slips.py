@@ -29,7 +29,7 @@ def slips_of(run: Run, expected: float) -> Iterator[Slip]:
         log_prior=math.log(criteria.OTHER_CYCLES) + float(log_anywhere(sent.cycles)),
         likely=replace(sent, cycles=expected),
     )
-    yield from run.slips
+    yield from run.slips()
     if sent.log_cof is not None:
         off = (sent.log_cof - math.log(criteria.COF)) / criteria.LOG_COF_SD
         of_any = -0.5 * off * off - math.log(criteria.LOG_COF_SD * math.sqrt(2 * math.pi))

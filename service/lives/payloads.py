@@ -81,9 +81,13 @@ def loop_items(loops: Sequence[Loop]) -> list[dict[str, Any]]:
     return [_loop_item(loop) for loop in loops]
 
 
-def notice_items(notices: Sequence[Notice]) -> list[dict[str, str]]:
-    """Warnings in the public shape."""
-    return [{"code": notice.code, "message": notice.message} for notice in notices]
+def notice_items(notices: Sequence[Notice]) -> list[dict[str, Any]]:
+    """Warnings and doubts in the public shape."""
+    return [
+        {"code": notice.code, "message": notice.message}
+        | ({} if notice.likely_cycles is None else {"likely_cycles": whole(notice.likely_cycles)})
+        for notice in notices
+    ]
 
 
 def _fit_item(fit: StribeckFit, cof: Value | None) -> dict[str, Any]:

@@ -134,6 +134,14 @@ class Warned(Answer):
     message: str = Field(description="The warning in a sentence")
 
 
+class Doubt(Warned):
+    """Why a run is held."""
+
+    likely_cycles: float | None = Field(
+        default=None, description="The cycles that the doubt asks about; left out where it asks about none"
+    )
+
+
 class Withdrawal(Schema):
     """Why a run or an inspection is withdrawn or restored."""
 
@@ -256,7 +264,7 @@ class Receipt(Answer):
     note: str | None = Field(description="The maintenance note; null for other kinds")
     code_version: str = Field(description="The release that evaluated the run")
     state: State
-    doubts: list[Warned] = Field(description="Why the run is, or was, held; empty where nothing was odd")
+    doubts: list[Doubt] = Field(description="Why the run is, or was, held; empty where nothing was odd")
     sent_cycles: float = Field(description="Cycles as they were sent; `cycles` is what holds now")
     received_by: str | None = Field(
         description="Who posted it: `key:` with the key's id and note, or `local`; null where an earlier release stored it"

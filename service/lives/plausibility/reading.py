@@ -7,13 +7,14 @@ the history.
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.plausibility import criteria as odds
-from models.plausibility.runs import Reading, Run, Slip
+from models.plausibility.runs import Reading, Run, Slip, none
 from models.records.criteria import UNLOADED
 from service.columns import RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS
 from service.lives.criteria import OTHER_OIL
@@ -209,7 +210,7 @@ def runs_of(events: Sequence[Event], held: Collection[str], geometry: Geometry, 
                     name=event.run_id,
                     kind=event.kind,
                     sent=sent,
-                    slips=tuple(known.slips(event, shown)) if event.shown is not None else (),
+                    slips=none if event.shown is None else partial(known.slips, event, shown),
                     tests=bool(event.cofs) and sent.log_cof is not None and not life.in_other_oil(event),
                     block=None if event.duty is None or event.kind == RUN_IN else event.duty.cycles,
                     moment=event.moment if event.dated else None,

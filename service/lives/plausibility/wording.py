@@ -52,7 +52,8 @@ def _of_cycles(verdict: Verdict, sent: Reading) -> Notice:
     guessed = verdict.slip.name != OTHER_CYCLES and verdict.latest is not None
     ask = f"Is it {_number(verdict.slip.likely.cycles)}? " if guessed else ""
     message = " ".join([*sentences, f"{ask}Confirm or correct it."])
-    return Notice(code=AGAINST_TIME if verdict.against_time else OFF_PACE, message=message)
+    likely = verdict.slip.likely.cycles if guessed else None
+    return Notice(code=AGAINST_TIME if verdict.against_time else OFF_PACE, message=message, likely_cycles=likely)
 
 
 def _gap(verdict: Verdict, cycles: float) -> str:

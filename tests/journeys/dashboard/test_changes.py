@@ -116,6 +116,31 @@ def test_a_typo_is_seen_corrected_and_undone(watched: Watched, server: Server, r
     assert answers(server.url) == references["after"]
 
 
+def test_a_doubt_is_answered_with_one_click(watched: Watched, server: Server, references: dict[str, Any]) -> None:
+    page = opened(watched)
+    post_typed(server)
+    page.reload()
+    settled(page, 1)
+    held = page.locator("#held .held > li")
+    held.get_by_role("button", name="It is another clutch").click()
+    done(page, "is withdrawn")
+    page.locator(".done").get_by_role("button", name="Undo").click()
+    done(page, "is restored")
+    held.get_by_role("button", name="Correct the cycles").click()
+    expect(page.get_by_label("Duty cycles since new")).to_have_value(str(LAST))
+    page.keyboard.press("Escape")
+    held.get_by_role("button", name="It is 7,000").click()
+    done(page, "Corrected from 70,000 to 7,000 cycles.")
+    settled(page, 0)
+    assert answers(server.url) == references["after"]
+
+
+def post_typed(server: Server) -> None:
+    """The last test, with a zero too many."""
+    with httpx2.Client(base_url=server.url, timeout=60) as http:
+        post(http, "bench", typed())
+
+
 def test_a_held_run_is_confirmed_and_withdrawn_and_restored(
     watched: Watched, server: Server, references: dict[str, Any]
 ) -> None:

@@ -3,7 +3,7 @@
 // a question that says what will happen; nothing is ever deleted, and most of it can be undone at once.
 
 import { doubtList } from "../sending/receipt.js";
-import { clutchPath, sendJson } from "../shared/api.js";
+import { clutchPath, Problem, sendJson } from "../shared/api.js";
 import { field, h } from "../shared/dom.js";
 import { fixed, kindName } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
@@ -108,6 +108,60 @@ async function restore(run, reason) {
   return { text, undo: () => withdraw(after, "the restoration is undone") };
 }
 
+/**
+ * The cycles that a doubt about a run asks about.
+ * @param {Receipt} run
+ * @returns {number | undefined}
+ */
+export const likelyCycles = ({ doubts }) => doubts.find((doubt) => doubt.likely_cycles !== undefined)?.likely_cycles;
+
+/** @typedef {"right" | "likely" | "other"} Answer the run is right, its cycles are those asked about, or it is another clutch's */
+
+/**
+ * What can be said of a held run with one click: the button's words.
+ * @param {Receipt} run
+ * @returns {[Answer, string][]}
+ */
+export function answersOf(run) {
+  const likely = likelyCycles(run);
+  /** @type {[Answer, string][]} */
+  const answers = [["right", "It is right"]];
+  if (likely !== undefined) answers.push(["likely", `It is ${fixed(likely)}`]);
+  return [...answers, ["other", "It is another clutch’s"]];
+}
+
+/**
+ * Answer the doubts about held runs, one after the other.
+ * @param {Answer} answer
+ * @param {Receipt[]} runs
+ * @returns {Promise<Done>} what was done; where one was refused, how far it came
+ */
+export async function answerDoubts(answer, runs) {
+  /** @type {Done[]} */
+  const all = [];
+  try {
+    for (const run of runs) all.push(await answerDoubt(answer, run));
+  } catch (problem) {
+    if (!(problem instanceof Problem)) throw problem;
+    return { text: `${all.length} of ${runs.length} runs were changed: ${problem.detail}`, undo: null };
+  }
+  const [first] = all;
+  return first && runs.length === 1 ? first : { text: `${runs.length} runs were changed.`, undo: null };
+}
+
+/**
+ * @param {Answer} answer
+ * @param {Receipt} run
+ * @returns {Promise<Done>}
+ */
+async function answerDoubt(answer, run) {
+  if (answer === "other") return withdraw(run, "another clutch's run");
+  const likely = likelyCycles(run);
+  if (answer === "likely" && likely !== undefined) return correct(run, likely, "a slip, as the doubt asks");
+  await post(run, "confirm", "");
+  return { text: `${named(run)} is confirmed.`, undo: null };
+}
+
 /** @type {Record<RunAction, (run: Receipt) => Omit<Question, "lines"> & { lines: Question["lines"] }>} */
 const QUESTIONS = {
   confirm: (run) => ({
@@ -127,7 +181,7 @@ const QUESTIONS = {
       "The measured data stay as they were sent. Everything is computed again with the cycles that you give here.",
     ],
     action: "Correct",
-    cycles: run.cycles,
+    cycles: likelyCycles(run) ?? run.cycles,
     send: (reason, cycles) => correct(run, cycles, reason),
   }),
   withdraw: (run) => ({

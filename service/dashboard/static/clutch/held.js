@@ -4,20 +4,21 @@
 import { doubtList } from "../sending/receipt.js";
 import { h } from "../shared/dom.js";
 import { moment } from "../shared/format.js";
-import { actionsOf, LABELS } from "./changes.js";
+import { actionsOf, answersOf, LABELS } from "./changes.js";
 import { runLink } from "./warnings.js";
 
 /** @import { Receipt } from "../shared/types.js" */
-/** @import { RunAction } from "./changes.js" */
+/** @import { Answer, RunAction } from "./changes.js" */
+/** @typedef {(answer: Answer, runs: Receipt[]) => unknown} Say */
 
 /** Held runs that are shown at the top; the others are in the list of runs. */
 const MOST_SHOWN = 5;
 
 /**
  * @param {Receipt[]} runs
- * @param {{ act: (action: RunAction, run: Receipt) => unknown, reveal: (runId: string) => void }} page
+ * @param {{ act: (action: RunAction, run: Receipt) => unknown, say: Say, reveal: (runId: string) => void }} page
  */
-export function heldView(runs, { act, reveal }) {
+export function heldView(runs, { act, say, reveal }) {
   const count = runs.length === 1 ? "1 run is held" : `${runs.length} runs are held`;
   const rest = runs.length - MOST_SHOWN;
   return h(
@@ -27,23 +28,45 @@ export function heldView(runs, { act, reveal }) {
     h(
       "p",
       {},
-      "A held run is stored but does not count: something about it is odd. Confirm it, correct it or withdraw it.",
+      "A held run is stored but does not count: something about it is odd. Say what it is; runs that agree with later ones " +
+        "are accepted by themselves.",
     ),
+    together(runs, say),
     h(
       "ul",
       { class: "held" },
-      runs.slice(0, MOST_SHOWN).map((run) => item(run, act, reveal)),
+      runs.slice(0, MOST_SHOWN).map((run) => item(run, { act, say, reveal })),
     ),
     rest > 0 ? h("p", { class: "quiet" }, `${rest} more in the list of runs.`) : "",
   );
 }
 
 /**
- * @param {Receipt} run
- * @param {(action: RunAction, run: Receipt) => unknown} act
- * @param {(runId: string) => void} reveal
+ * Several runs that are held for the same cause, answered together.
+ * @param {Receipt[]} runs
+ * @param {Say} say
  */
-function item(run, act, reveal) {
+function together(runs, say) {
+  const causes = [...new Set(runs.map((run) => run.doubts[0]?.code))];
+  return causes
+    .map((cause) => runs.filter((run) => run.doubts[0]?.code === cause))
+    .filter((alike) => alike.length > 1)
+    .map((alike) =>
+      h(
+        "div",
+        { class: "buttons start" },
+        h("span", {}, `${alike.length} of one cause:`),
+        h("button", { type: "button", onclick: () => say("right", alike) }, `All ${alike.length} are right`),
+        h("button", { type: "button", onclick: () => say("other", alike) }, `All ${alike.length} are another clutch’s`),
+      ),
+    );
+}
+
+/**
+ * @param {Receipt} run
+ * @param {{ act: (action: RunAction, run: Receipt) => unknown, say: Say, reveal: (runId: string) => void }} page
+ */
+function item(run, { act, say, reveal }) {
   return h(
     "li",
     {},
@@ -54,6 +77,13 @@ function item(run, act, reveal) {
       h("span", { class: "quiet" }, ` · received ${moment(run.received_at)}`),
     ),
     doubtList(run),
+    h(
+      "div",
+      { class: "buttons start" },
+      answersOf(run).map(([answer, words]) =>
+        h("button", { type: "button", class: "main", onclick: () => say(answer, [run]) }, words),
+      ),
+    ),
     buttons(run, act),
   );
 }

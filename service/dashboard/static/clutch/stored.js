@@ -3,14 +3,14 @@
 
 import { byId, h, within } from "../shared/dom.js";
 import { AuditTrail } from "./audit.js";
-import { askArchive, askInspection, askRun, askUndo } from "./changes.js";
+import { answerDoubts, askArchive, askInspection, askRun, askUndo } from "./changes.js";
 import { showDone } from "./done.js";
 import { heldView } from "./held.js";
 import { RunList } from "./runs.js";
 import { lifeWarnings, warningsView } from "./warnings.js";
 
 /** @import { ClutchOut, InspectionOut, Receipt, StribeckItem, Warned } from "../shared/types.js" */
-/** @import { RunAction } from "./changes.js" */
+/** @import { Answer, RunAction } from "./changes.js" */
 
 export class Stored {
   /**
@@ -27,6 +27,9 @@ export class Stored {
 
   /** @type {(action: RunAction, run: Receipt) => Promise<void>} */
   act = async (action, run) => showDone(await askRun(action, run), this.refresh);
+
+  /** @type {(answer: Answer, runs: Receipt[]) => Promise<void>} */
+  say = async (answer, runs) => showDone(await answerDoubts(answer, runs), this.refresh);
 
   /** @type {(run: Receipt) => Promise<void>} */
   undo = async (run) => showDone(await askUndo(run), this.refresh);

@@ -393,7 +393,7 @@ export interface Receipt {
   file: { filename: string; sha256: string; bytes: number; rig: string | null } | null;
   duplicate: boolean;
   state: "accepted" | "held" | "withdrawn";
-  doubts: Warned[];
+  doubts: (Warned & { likely_cycles?: number })[];
   sent_cycles: number;
   warnings: Warned[];
   fits: Fit[];
