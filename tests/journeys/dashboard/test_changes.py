@@ -127,7 +127,7 @@ def test_a_doubt_is_answered_with_one_click(watched: Watched, server: Server, re
     page.locator(".done").get_by_role("button", name="Undo").click()
     done(page, "is restored")
     held.get_by_role("button", name="Correct the cycles").click()
-    expect(page.get_by_label("Duty cycles since new")).to_have_value(str(LAST))
+    expect(page.get_by_role("dialog").get_by_label("Duty cycles since new")).to_have_value(str(LAST))
     page.keyboard.press("Escape")
     held.get_by_role("button", name="It is 7,000").click()
     done(page, "Corrected from 70,000 to 7,000 cycles.")
