@@ -476,7 +476,7 @@ class _Starter:
     def __init__(self) -> None:
         self._context = multiprocessing.get_context("forkserver")
         self._context.set_forkserver_preload([worker.__name__, *worker.LOADED_EARLY])
-        self._limit, self._stopped = _LOADING, -math.inf
+        self._limit, self._moved = _LOADING, -math.inf  # when it was last seen to move, or begun
         self.begin()
 
     def begin(self) -> None:
@@ -501,13 +501,13 @@ class _Starter:
             raise
         finally:
             theirs.close()
-        self._limit = _START
+        self._moved, self._limit = time.monotonic(), _START
         return process, ours
 
     def check(self, starting: float, now: float) -> None:
         """End what starts processes where one is `starting` since then, and it has had its time."""
-        if now - max(starting, self._stopped) > self._limit:
-            self._limit, self._stopped = _LOADING, now
+        if now - max(starting, self._moved) > self._limit:
+            self._limit, self._moved = _LOADING, now
             self.stop()
 
     def stop(self) -> None:
