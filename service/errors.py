@@ -74,6 +74,13 @@ class ArchivedError(ConflictError):
     title = "The clutch is archived"
 
 
+class LifeEndedError(ConflictError):
+    """The life was declared ended: it takes in no later duty or tests, and no other end."""
+
+    slug = "life-ended"
+    title = "The life has ended"
+
+
 class NotPossibleNowError(ConflictError):
     """What is asked for makes no sense in the state that the thing is in."""
 

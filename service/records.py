@@ -4,6 +4,7 @@ A workflow reads a `ClutchState`, computes outside any transaction, and stores w
 """
 
 import json
+import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -22,18 +23,20 @@ from service.columns import whole
 from service.errors import BusyError, NotFoundError
 from service.lives.assumptions import ALL_PRESSURES, FLEET, LearnedPrior, kind_of, severity_name, severity_under
 from service.lives.condition import rank_of, state_of
-from service.lives.history import REBUILD, ByPressure, Event, Shown, duty_block, moment_of, order
+from service.lives.history import ByPressure, Event, Shown, duty_block, moment_of, of_maintenance, order
 from service.lives.payloads import notice_items
 from service.lives.plausibility.doubts import Judged
 from service.lives.recomputation import Adoption, ClutchState, Levels, Results, Tracking, newest_adoption
 from service.lives.run_analysis import LevelFit, Value
 from service.lives.tracks import CARRIED, States, Tracked
+from service.logging import request_id
 from service.schemas.clutch import ClutchIn
 from service.schemas.rig import RigOut
 from service.settings import CODE_VERSION
-from storage import assumptions, changes, clutches, diagnoses, results, rigs, runs
+from storage import assumptions, changes, clutches, diagnoses, jobs, results, rigs, runs
 from storage.changes import NewChange
 from storage.clutches import ClutchRow
+from storage.jobs import NewJob
 from storage.results import FilterStateRow, FitRow, PredictionRow
 from storage.rigs import RigRow
 from storage.runs import NewRun, RunInOrder
@@ -272,6 +275,21 @@ def store(connection: Connection, clutch_id: str, computed: Results) -> None:
         )
 
 
+def ask_fleet_refresh(connection: Connection, *, by: str, at: str) -> None:
+    """Have fleets learn again, for what an ended life teaches has changed; unless a job that will see it waits already."""
+    if jobs.any_waiting(connection, jobs.FLEET_REFRESH):
+        return
+    job = NewJob(
+        job_id=secrets.token_hex(8),
+        kind=jobs.FLEET_REFRESH,
+        clutch_id=None,
+        asked_at=at,
+        asked_by=by,
+        arguments={"request": request_id.get()},
+    )
+    jobs.insert(connection, job)
+
+
 def _store_tracking(connection: Connection, clutch_id: str, tracking: Tracking) -> None:
     if tracking.anew:
         results.clear_predictions(connection, clutch_id)
@@ -322,7 +340,7 @@ def _learned_prior(
     if row is None:
         return LearnedPrior()
     fleet = FleetPrior.from_dict(row.content)
-    ended = tuple(EndedLife.from_dict(life) for life in row.content.get("ended", ()))
+    ended = tuple(EndedLife.from_dict(life) for name in ("ended", "censored") for life in row.content.get(name, ()))
     return LearnedPrior(
         fleet=fleet, ended=ended, name={"name": FLEET, "version": row.version, "clutches": fleet.clutches}
     )
@@ -339,8 +357,7 @@ def _event(row: RunInOrder, cofs: ByPressure) -> Event:
         speed_range=None if low is None or high is None else (low, high),
         oil_temperature=row.oil_temperature,
         cofs=cofs,
-        rebuild=row.event == REBUILD,
-        shift=row.event not in (None, REBUILD),
+        **of_maintenance(row.event, row.reason),
         duty=duty_block(row.cycles, row.duty_cycles, row.duty_energy_kj, row.duty_speed_rpm, row.duty_duration_s),
         dated=row.started_at is not None,
         shown=None if row.shown is None else Shown.from_list(json.loads(row.shown)),

@@ -119,7 +119,7 @@ def incoming(row: RunRow, columns: Mapping[str, NDArray[np.float64]]) -> Incomin
         started_at=row.started_at,
         origin=row.details["origin"],
         channels=columns,
-        details={name: row.details[name] for name in ("duty", "event", "note") if name in row.details},
+        details={name: row.details[name] for name in ("duty", "event", "reason", "note") if name in row.details},
         file=row.details.get("file"),
     )
 

@@ -71,6 +71,9 @@ _same = (
     .limit(1)
 )
 _count = select(func.count()).select_from(job).where(OPEN_ONLY, job.c.kind == bindparam("of_kind"))
+_any_waiting = select(
+    sa.exists(select(job.c.job_key).where(OPEN_ONLY, job.c.kind == bindparam("of_kind"), job.c.state == WAITING))
+)
 _free = and_(
     OPEN_ONLY, among(job.c.kind, "of_kinds"), or_(job.c.state == WAITING, job.c.leased_until < now_in_seconds())
 )
@@ -158,6 +161,11 @@ def find_open(connection: Connection, kind: str, clutch_id: str | None) -> JobRo
     """The job of a kind and a clutch that waits or runs, the first of them; `clutch_id` None: of no single clutch."""
     row = connection.execute(_same, {"of_kind": kind, "of": clutch_id}).first()
     return None if row is None else _row(row)
+
+
+def any_waiting(connection: Connection, kind: str) -> bool:
+    """Whether a job of a kind waits: it will find all that is stored by then."""
+    return bool(connection.execute(_any_waiting, {"of_kind": kind}).scalar_one())
 
 
 def any_free(connection: Connection, kinds: Collection[str]) -> bool:

@@ -76,6 +76,7 @@ class RunInOrder:
     event: str | None
     doubted: bool = False
     shown: str | None = None
+    reason: str | None = None
     oil_temperature: float | None = None
     duty_cycles: float | None = None
     duty_energy_kj: float | None = None
@@ -104,6 +105,7 @@ _light_of_any = (
         json_value(run.c.details, "event"),
         run.c.doubts != "[]",
         json_text(run.c.details, "shown"),
+        json_value(run.c.details, "reason"),
         json_value(run.c.details, "oil_temperature"),
         json_value(run.c.details, "duty", "cycles"),
         json_value(run.c.details, "duty", "energy_per_cycle_kj"),

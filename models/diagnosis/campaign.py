@@ -20,6 +20,7 @@ class EventKind(StrEnum):
     REST = "rest"
     SENSOR_ZERO = "sensor_zero"
     REBUILD = "rebuild"
+    END_OF_LIFE = "end_of_life"
     OTHER = "other"
 
 

@@ -50,5 +50,5 @@ def stated_end(
     return StatedEnd(
         ends=np.concatenate([ends[behind], ahead]),
         weight=np.concatenate([posterior.weight[behind], (1.0 - passed) * weight]),
-        lives=len(alive),
+        lives=sum(not life.censored for life in alive),
     )

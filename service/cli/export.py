@@ -18,7 +18,7 @@ from service.run_files import manifest
 
 #: The folder of what was sent and does not count so.
 AS_SENT = "as-sent"
-_SENT = ("run_id", "kind", "cycles", "started_at", "origin", "duty", "event", "note", "channels")
+_SENT = ("run_id", "kind", "cycles", "started_at", "origin", "duty", "event", "reason", "note", "channels")
 
 
 def export(

@@ -14,8 +14,8 @@ from models.prognosis.first_passage import PassageStatus
 from service.columns import whole
 from service.errors import Notice
 from service.lives.criteria import MOST_LINE_POINTS, NEAR_LIMIT, SOON
-from service.lives.history import Event, Series, date_of
-from service.lives.payloads import INSUFFICIENT
+from service.lives.history import WORN, Event, Series, date_of
+from service.lives.payloads import ENDED, INSUFFICIENT
 
 #: The states of a clutch after NAMUR NE 107; the first that holds is its state.
 STATES = FAILURE, MAINTENANCE, CHECK, OUT_OF_SPECIFICATION, NORMAL = (
@@ -36,6 +36,7 @@ SUMMARY = (
     "at_least",
     "probability_of_reaching",
     "model",
+    "ended",
 )
 #: What is said beside a prediction.
 BESIDE = ("at_least", "at_least_at", "held_runs", "statement")
@@ -129,13 +130,14 @@ def state_of(summary: Mapping[str, Any], *, disputed: bool) -> dict[str, str]:
     status, held, disagree = summary["status"], summary.get("held", 0), "data and model disagree, see the diagnosis"
     among = summary.get("with_held")
     says = statement_of(summary, lower_bound(summary["at_least"], among and among[SHOWN]))
-    near = None if status in (REACHED, INSUFFICIENT) else _near_end(summary)
+    worn = status == ENDED and summary["ended"]["reason"] == WORN
+    near = None if status in (REACHED, INSUFFICIENT, ENDED) else _near_end(summary)
     rules = (
-        (FAILURE, says if status == REACHED else None),
+        (FAILURE, says if status == REACHED or worn else None),
         (MAINTENANCE, near and f"{near}: {says}"),
         (CHECK, f"{held_in_words(held)}: {says}" if held else None),
         (CHECK, f"{_tests(summary['runs_used'])}: {says}" if status == INSUFFICIENT else None),
-        (OUT_OF_SPECIFICATION, f"{disagree}: {says}" if disputed else None),
+        (OUT_OF_SPECIFICATION, f"{disagree}: {says}" if disputed and status != ENDED else None),
         (NORMAL, says),
     )
     return next({"name": name, "why": why} for name, why in rules if why is not None)
@@ -160,6 +162,10 @@ def _near_end(summary: Mapping[str, Any]) -> str | None:
 def statement_of(payload: Mapping[str, Any], at_least: float | None) -> str:
     """What is known of the remaining life as a sentence: its safe bound, and how probable an end is that is left open."""
     bound = bound_in_words(at_least)
+    if (end := payload.get("ended")) is not None:
+        return f"ended at {end['cycles']:,.0f} cycles" + (
+            "" if end["reason"] == WORN else ", taken out before it was worn"
+        )
     if payload["status"] == REACHED:
         return f"the end of life is reached: {limit_in_words(payload['criterion'])}"
     if payload["status"] == INSUFFICIENT:

@@ -12,6 +12,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, field, fields, replace
 from datetime import UTC, datetime
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from models.friction.speed_protocol import protocol_speeds
 from models.records.criteria import LEVEL_GAP, LEVEL_GAP_SHARE
 from models.tracking.measurement import Measurement
 from service.columns import RADIANS_PER_SECOND_PER_RPM
+from service.errors import LifeEndedError
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions, Scale
 from service.lives.criteria import OTHER_OIL
 from service.lives.run_analysis import Value
@@ -30,7 +32,9 @@ ByPressure = Mapping[float, Value]
 
 #: Kinds of runs.
 STATIONARY, DYNAMIC, MAINTENANCE = "stationary_stribeck", "dynamic_stribeck", "maintenance"
-REBUILD = "rebuild"
+REBUILD, END_OF_LIFE = "rebuild", "end_of_life"
+#: Why a life was declared ended: it is worn, or it was taken out before its end, which is later then.
+WORN, OTHER_REASON = "worn", "other"
 #: The first and the last moment that have a date [s since 1970].
 _MOMENTS = tuple(moment.replace(tzinfo=UTC).timestamp() for moment in (datetime.min, datetime(9999, 12, 31)))
 
@@ -63,8 +67,8 @@ class Event:
     `moment` is when it was made [s], `dated` whether the rig said so, `arrived` its place in the order of arrival, infinite
     while it comes in. A stationary test has the range of its speeds [rad/s], its mean oil temperature [K], and mean COF with
     its deviation by pressure [Pa] where its curves determine it; `duty` is the block that ends with the run, `shift` an
-    event that may have shifted the level; `shown` what its rows show (None: a channel is dead, so that no other run bears
-    on whether it is held), `confirmed` whether somebody confirmed it.
+    event that may have shifted the level, `end` why the life was declared ended with it; `shown` what its rows show (None: a
+    channel is dead, so that no other run bears on whether it is held), `confirmed` whether somebody confirmed it.
     """
 
     run_id: str
@@ -77,6 +81,7 @@ class Event:
     cofs: ByPressure = field(default_factory=dict)
     rebuild: bool = False
     shift: bool = False
+    end: str | None = None
     duty: Block | None = None
     dated: bool = False
     shown: Shown | None = None
@@ -126,6 +131,11 @@ class Life:
     def name(self) -> str:
         """The run_id of the rebuild that began it, "" where there was none."""
         return self.events[0].run_id if self.events[0].rebuild else ""
+
+    @property
+    def end(self) -> Event | None:
+        """The event by which it was declared ended; None while it goes on."""
+        return next((event for event in self.events if event.end is not None), None)
 
     @property
     def speed_range(self) -> Value | None:
@@ -220,6 +230,40 @@ def lives_of(events: Sequence[Event]) -> list[Life]:
     starts = [index for index, event in enumerate(events) if event.rebuild and index > 0]
     parts = [tuple(events[a:b]) for a, b in itertools.pairwise([0, *starts, len(events)]) if b > a]
     return [Life(origin=part[0].cycles if part[0].rebuild else 0.0, events=part) for part in parts]
+
+
+def of_maintenance(event: str | None, reason: str | None) -> dict[str, Any]:
+    """What maintenance of that kind is in the history; of a run that is none, nothing."""
+    return {
+        "rebuild": event == REBUILD,
+        "shift": event not in (None, REBUILD, END_OF_LIFE),
+        "end": reason if event == END_OF_LIFE else None,
+    }
+
+
+def require_within_ends(events: Sequence[Event]) -> None:
+    """Raise LifeEndedError where a life of an ordered history has duty or tests after its declared end, or two ends."""
+    beyond = beyond_end(events)
+    if beyond is not None:
+        end, event = beyond
+        later = "second end" if event.end else f"{event.kind} {event.run_id!r} at {event.cycles:g} cycles"
+        raise LifeEndedError(
+            f"a life that was declared ended at {end.cycles:g} cycles (run {end.run_id!r}) has no {later}: "
+            "post a rebuild, correct the cycles, or withdraw the declared end"
+        )
+
+
+def beyond_end(events: Sequence[Event]) -> tuple[Event, Event] | None:
+    """A declared end of an ordered history, and duty or a test after it in its life, or a second end; None without any."""
+    for life in lives_of(events):
+        end = life.end
+        if end is None:
+            continue
+        for event in life.events:
+            second = event.end is not None and event is not end
+            if second or (event.kind != MAINTENANCE and event.cycles > end.cycles):
+                return end, event
+    return None
 
 
 def life_with(events: Sequence[Event], event: Event) -> Life:

@@ -13,6 +13,7 @@ from service.lives.condition import SHOWN, SUMMARY, recent
 from service.lives.engagements.over_life import StoredEngagement, engagements_over_life
 from service.lives.history import Event, Life, lives_of, moment_at, order, pace_of
 from service.lives.model_correction import RunReader
+from service.lives.payloads import ended
 from service.lives.prediction_at import predict_at
 from service.lives.quantities.answer import criteria_answer
 from service.lives.quantities.chosen_life import ChosenLife, chosen_life
@@ -97,7 +98,8 @@ def by_own_criteria(
     if measured is None:
         return {}
     ends = [_end_where_measured(measured, criterion, method) for criterion in criteria]
-    return criteria_answer(measured, ends, payload["current"])
+    by_criteria = criteria_answer(measured, ends, payload["current"])
+    return ended({"current": payload["current"], **by_criteria}, measured.life.end)
 
 
 def _end_where_measured(measured: MeasuredLife, criterion: CriterionIn, method: str) -> CriterionEnd:

@@ -13,7 +13,7 @@ from service.columns import bar, whole
 from service.errors import Notice
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions
 from service.lives.engagements.evaluation import Engagement, engagement_item
-from service.lives.history import ByPressure, Life, Series, latest_before
+from service.lives.history import WORN, ByPressure, Event, Life, Series, latest_before
 from service.lives.incoming_run import IncomingRun
 from service.lives.prediction_notices import OF_HISTORY, late_arrival, missed, not_eq_6, other_oil, other_pressures
 from service.lives.run_analysis import LevelFit, Value
@@ -26,7 +26,7 @@ PARAMETER_UNITS = {
     "stribeck_velocity": ("stribeck_velocity_m_s", "m/s"),
     "viscous_coefficient": ("viscous_coefficient", "Nm/(m/s)^0.3"),
 }
-INSUFFICIENT = "insufficient_data"
+INSUFFICIENT, ENDED = "insufficient_data", "ended"
 #: What is said of the present of a life.
 CURRENT = ("mean_cof", "mean_cof_sd", "measured_at_cycles", "fraction_of_initial", "health")
 #: The quantile of the end of life that is the safe bound.
@@ -66,6 +66,7 @@ def receipt(
         "engagement": None if engagement is None else engagement_item(engagement),
         "duty": run.details.get("duty"),
         "event": run.details.get("event"),
+        "reason": run.details.get("reason"),
         "note": run.details.get("note"),
         "code_version": CODE_VERSION,
     }
@@ -142,6 +143,7 @@ def insufficient(assumptions: Assumptions, cycles: float | None, pressure: float
         "course": None,
         "back_cast": {"held": 0, "of": 0, "widening": 1.0},
         "ended_lives": 0,
+        "ended": None,
         "sample": None,
         "horizon_cycles": whole(HORIZON),
         "warnings": [],
@@ -212,6 +214,28 @@ def safe_bound(end: float | None, now: float, origin: float) -> float:
     """Cycles from `now` that are left with 95 %, by the 5 % quantile of the end of life in cycles since new; None of that
     lies beyond the horizon of the life that began at `origin`."""
     return max(0.0, (origin + HORIZON if end is None else end) - now)
+
+
+def ended(payload: Mapping[str, Any], end: Event | None) -> dict[str, Any]:
+    """A prediction after the declared `end` of its life (None: it goes on): nothing remains of a worn one.
+
+    One that was taken out for another reason has no remaining life either; where it would have ended stays predicted.
+    """
+    if end is None:
+        return dict(payload)
+    at = whole(end.cycles)
+    declared = {"status": ENDED, "ended": {"cycles": at, "reason": end.end, "run_id": end.run_id}}
+    if end.end != WORN:
+        return {**payload, **declared, "remaining_cycles": by_quantile({}), "at_least": None}
+    return {
+        **payload,
+        **declared,
+        "current": {**payload["current"], "health": 0.0},
+        "remaining_cycles": by_quantile(dict.fromkeys(QUANTILES, 0.0)),
+        "at_least": 0.0,
+        "end_of_life_cycles": by_quantile(dict.fromkeys(QUANTILES, float(at))),
+        "probability_of_reaching": 1.0,
+    }
 
 
 def _course_item(share: CourseShare) -> dict[str, Any]:

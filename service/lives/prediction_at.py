@@ -8,7 +8,7 @@ from service.columns import PASCALS_PER_BAR, bar
 from service.errors import NotFoundError
 from service.lives.assumptions import ALL_PRESSURES, Assumptions
 from service.lives.history import Event, Life, lives_of, nearest_pressure
-from service.lives.payloads import insufficient
+from service.lives.payloads import ended, insufficient
 from service.lives.tracks import Tracked, advance, predict
 
 
@@ -39,9 +39,9 @@ def predict_at(
     cycles = happened[-1].cycles
     series = life.pooled(assumptions) if pressure_bar is None else life.at(assumptions, level)
     if not series.measurements:
-        return insufficient(assumptions, cycles, level, fraction)
+        return ended(insufficient(assumptions, cycles, level, fraction), life.end)
     tracked = advance(clutch_id, method, series, assumptions, carried, len(series.measurements), back_cast=back_cast)
-    return predict(clutch_id, method, series, assumptions, tracked, cycles, fraction)
+    return ended(predict(clutch_id, method, series, assumptions, tracked, cycles, fraction), life.end)
 
 
 def _level(life: Life | None, pressure_bar: float) -> float:

@@ -27,7 +27,7 @@ from models.tracking.prior import Prior
 from service.lives.assumptions import WEAK, Assumptions
 from service.lives.criteria import PREDICTION_DRAWS
 from service.lives.history import Life, Series
-from service.lives.payloads import insufficient, predicted
+from service.lives.payloads import ended, insufficient, predicted
 from service.lives.prediction_notices import off_track
 
 FilterState = ParticleState | UkfState | GridState
@@ -107,7 +107,7 @@ def follow(
     for index in range(first_event, len(life.events)):
         series = whole if assumptions.counts_cycles else life.until(index).pooled(assumptions)
         runs = series.until(index)
-        cycles = life.events[index].cycles
+        cycles, end = life.events[index].cycles, life.until(index).end
         if runs:
             states = {
                 method: advance(clutch_id, method, series, assumptions, states.get(method), runs) for method in CARRIED
@@ -118,7 +118,9 @@ def follow(
                 Prediction(
                     cycles=cycles,
                     method=method,
-                    payload=predict(clutch_id, method, series, assumptions, states.get(method), cycles, fraction),
+                    payload=ended(
+                        predict(clutch_id, method, series, assumptions, states.get(method), cycles, fraction), end
+                    ),
                 )
                 for method in CARRIED
             ],

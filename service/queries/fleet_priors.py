@@ -15,7 +15,7 @@ from storage.assumptions import FleetPriorRow
 from storage.engine.database import Database
 
 _KINDS = ("friction_material", "reaction_plate", "fluid", "origin")
-_OWN = ("version", "created_at", "clutches", "ended_lives")
+_OWN = ("version", "created_at", "clutches", "ended_lives", "censored_lives")
 COLUMNS = (*_KINDS, "severity", *_OWN)
 
 
@@ -48,6 +48,7 @@ def _item(row: FleetPriorRow) -> dict[str, Any]:
         "members": list(row.members),
         "population": _population(FleetPrior.from_dict(row.content)),
         "ended_lives": len(row.content.get("ended", ())),
+        "censored_lives": len(row.content.get("censored", ())),
         "severity_exponent": _severity_exponent(row),
     }
 

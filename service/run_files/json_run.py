@@ -13,6 +13,7 @@ import pydantic_core
 
 from service.columns import CHANNELS, check_columns
 from service.errors import MOST_ERRORS, MOST_QUOTED, FieldError, InvalidError
+from service.lives.history import END_OF_LIFE, WORN
 from service.lives.incoming_run import IncomingRun, name_run
 from service.run_files.json_marks import Fields, invalid_json, too_many_marks
 from service.schemas.limits import LONGEST_NOTE, MOST_MARKS
@@ -55,6 +56,8 @@ def read_run(body: bytes) -> IncomingRun:
         details["duty"] = run.duty.model_dump(exclude=absent)
     if isinstance(run, MaintenanceRunIn):
         details |= {"event": run.event, "note": run.note}
+        if run.event == END_OF_LIFE:
+            details["reason"] = run.reason or WORN
     return name_run(
         kind=run.kind,
         cycles=run.cycles,

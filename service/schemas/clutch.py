@@ -34,7 +34,17 @@ from service.schemas.limits import (
     MOST_TORQUE_FILTER_MS,
 )
 from service.schemas.prognosis.criteria import CriterionIn
-from service.schemas.prognosis.life import AtLeast, AtLeastAt, Criterion, Current, Held, ModelName, Quantiles, Statement
+from service.schemas.prognosis.life import (
+    AtLeast,
+    AtLeastAt,
+    Criterion,
+    Current,
+    DeclaredEnd,
+    Held,
+    ModelName,
+    Quantiles,
+    Statement,
+)
 
 Name = Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_NAME)]
 TorqueFilter = Annotated[
@@ -193,6 +203,7 @@ class ClutchSummary(Answer):
         description="Probability that the end of life is reached by the horizon"
     )
     model: ModelName = Field(description="The model that the clutch is tracked under")
+    ended: DeclaredEnd | None = Field(description="The declared end of the present life; null while it goes on")
 
 
 class LastRun(Answer):

@@ -186,6 +186,7 @@ EXAMPLES: dict[str, Any] = {
     "end_of_life_at": {"0.5": "2027-03-01T00:00:00+00:00"},
     "end_of_life_cycles": _QUANTILES,
     "end_of_life_sd": 900,
+    "censored_lives": 1,
     "ended_lives": 4,
     "effective_draws": 812.0,
     "eq6_probability": 0.93,

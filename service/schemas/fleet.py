@@ -56,6 +56,9 @@ class FleetPriorOut(Answer):
     members: list[str] = Field(description="Their names")
     population: Population = Field(description="The coefficients among them")
     ended_lives: int = Field(description="Lives of theirs that have ended: they calibrate what is stated of the next")
+    censored_lives: int = Field(
+        description="Lives of theirs that were taken out before their end, which was later then"
+    )
     severity_exponent: SeverityEstimate | None = Field(
         description="By which power of a duty cycle's energy these lives were shorter; null where they cannot tell"
     )

@@ -33,6 +33,7 @@ FrontTemperature = Annotated[
 RearTemperature = Annotated[Column | None, Field(description="Temperature of the reaction plate at its rear, °C")]
 
 
+EndReason = Literal["worn", "other"]
 GivenReason = Annotated[Reason, StringConstraints(min_length=1)]
 
 
@@ -118,8 +119,20 @@ class MaintenanceRunIn(RunBase):
     """Maintenance of the clutch or the rig."""
 
     kind: Literal["maintenance"] = Field(description="The kind of run")
-    event: Literal["oil_change", "rest", "sensor_zero", "rebuild", "other"] = Field(description="What was done")
+    event: Literal["oil_change", "rest", "sensor_zero", "rebuild", "other", "end_of_life"] = Field(
+        description="What was done; `end_of_life`: the life has ended, and takes in no later duty or tests until a rebuild"
+    )
+    reason: EndReason | None = Field(
+        default=None,
+        description="Why a life has ended: `worn` (also where it is left out), or `other`: taken out before its end",
+    )
     note: Annotated[str, StringConstraints(max_length=LONGEST_NOTE)] = Field(default="", description="A remark")
+
+    @model_validator(mode="after")
+    def _reason_is_of_an_end(self) -> Self:
+        if self.reason is not None and self.event != "end_of_life":
+            raise ValueError(f"reason goes with the event end_of_life only, not with {self.event}")
+        return self
 
 
 RunIn = Annotated[StationaryRunIn | DynamicRunIn | DutyRunIn | MaintenanceRunIn, Field(discriminator="kind")]
@@ -261,6 +274,7 @@ class Receipt(Answer):
     )
     duty: Duty | None = Field(description="The block of engagements; null for other kinds")
     event: str | None = Field(description="The maintenance event; null for other kinds")
+    reason: EndReason | None = Field(description="Why the life has ended; null where the run declares no end")
     note: str | None = Field(description="The maintenance note; null for other kinds")
     code_version: str = Field(description="The release that evaluated the run")
     state: State

@@ -18,7 +18,15 @@ from sqlalchemy import Connection
 from service import measured_lives, records, stored_runs
 from service.columns import whole
 from service.errors import NotPossibleNowError
-from service.lives.history import STATIONARY, ByPressure, Event, order, stationary_tests_of
+from service.lives.history import (
+    STATIONARY,
+    ByPressure,
+    Event,
+    life_with,
+    order,
+    require_within_ends,
+    stationary_tests_of,
+)
 from service.lives.incoming_run import IncomingRun
 from service.lives.late_run import Arrival, reader_with
 from service.lives.model_correction import RunReader
@@ -78,12 +86,14 @@ class _Loaded:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Changed:
     """The run as it is to be, what that changes in the doubts about others, the mean COFs of those of them that are then
-    not accepted, by run_id, and the results of the clutch's history."""
+    not accepted, by run_id, and the results of the clutch's history; whether that changes what an ended life
+    `teaches` its fleet."""
 
     row: RunRow
     judged: Judged
     aside: Mapping[str, ByPressure]
     results: Results
+    teaches: bool = False
 
 
 def withdraw(database: Database, clutch_id: str, run_id: str, *, reason: str, by: str, at: str) -> Receipt:
@@ -299,6 +309,7 @@ def _computed(database: Database, loaded: _Loaded, row: RunRow) -> _Changed:
     judged = _judged_with(loaded, row)
     event = loaded.event.at(row.cycles)
     own = [event] if row.state == runs.ACCEPTED else []
+    require_within_ends(order([*_without(before.events, run_id), *own]))
     held = judged.aside(_without(before.held, run_id), [event] if row.state == runs.HELD else [])
     after = replace(before, events=judged.settled(_without(before.events, run_id), own), held=held)
     receipts = {**loaded.receipts, run_id: loaded.receipts[run_id] | {"cycles": whole(row.cycles)}}
@@ -323,7 +334,16 @@ def _computed(database: Database, loaded: _Loaded, row: RunRow) -> _Changed:
     else:
         summary = summarised(after, computed.tracking, evidence)
     computed = replace(computed, receipts=changed, summary=summary)
-    return _Changed(row=replace(row, receipt=changed[run_id]), judged=judged, aside=aside, results=computed)
+    teaches = any(
+        life_with(state.events, mended).end is not None
+        for state in (before, after)
+        for mended in state.events
+        if mended.run_id == run_id
+    )
+    own_receipt = changed[run_id]
+    return _Changed(
+        row=replace(row, receipt=own_receipt), judged=judged, aside=aside, results=computed, teaches=teaches
+    )
 
 
 def _without(events: tuple[Event, ...], run_id: str) -> tuple[Event, ...]:
@@ -355,6 +375,8 @@ def _store(connection: Connection, loaded: _Loaded, changed: _Changed, request: 
     records.store_judged(
         connection, row.clutch_id, changed.judged, changed.aside, loaded.levels, at=request.at, revision=revision
     )
+    if changed.teaches:
+        records.ask_fleet_refresh(connection, by=request.by, at=request.at)
     if before["doubts"] == after["doubts"]:
         del before["doubts"], after["doubts"]
     change = NewChange(

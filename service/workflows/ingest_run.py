@@ -18,14 +18,15 @@ from service.errors import ArchivedError, BusyError, ConflictError, Notice, TooL
 from service.lives.engagements.over_life import stored_engagement
 from service.lives.history import (
     DYNAMIC,
-    REBUILD,
     STATIONARY,
     ByPressure,
     Event,
     duty_block,
     life_with,
     moment_of,
+    of_maintenance,
     order,
+    require_within_ends,
     stationary_tests_of,
 )
 from service.lives.incoming_run import IncomingRun
@@ -60,7 +61,8 @@ MOST_FILE_BYTES = 900_000_000
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Outcome:
     """What a run changes in a clutch at a revision: its receipt and mean COFs, doubts about it and what it changes in the
-    doubts about others (with the mean COFs of those that are held now), and the results of what was there before."""
+    doubts about others (with the mean COFs of those that are held now), and the results of what was there before; whether
+    it changes what an ended life `teaches` its fleet."""
 
     revision: int
     receipt: dict[str, Any]
@@ -70,6 +72,7 @@ class _Outcome:
     judged: Judged = field(default_factory=Judged)
     aside: Mapping[str, ByPressure] = field(default_factory=dict)
     levels: Levels = field(default_factory=dict)
+    teaches: bool = False
 
     @property
     def state(self) -> str:
@@ -174,6 +177,7 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
     event = _event_of(arrival)
     event = replace(event, cofs=cofs_among(before, event, arrival.analysis.fits))
     state = replace(before, events=order([*before.events, event]))
+    require_within_ends(state.events)
     levels = _levels(database, state, event, arrival)
     answer = receipt(
         before.clutch_id,
@@ -203,7 +207,11 @@ def _computed(database: Database, before: ClutchState, arrival: Arrival, read_wi
     answer = computed.receipts.get(event.run_id, answer)
     others = {run_id: other for run_id, other in computed.receipts.items() if run_id != event.run_id}
     return _Outcome(
-        revision=before.revision, receipt=answer, cofs=event.cofs, results=replace(computed, receipts=others)
+        revision=before.revision,
+        receipt=answer,
+        cofs=event.cofs,
+        results=replace(computed, receipts=others),
+        teaches=life_with(state.events, event).end is not None,
     )
 
 
@@ -233,6 +241,7 @@ def _with_others(
         revision=before.revision,
         receipt=changed.pop(event.run_id, answer),
         cofs=computed.cofs.get(event.run_id, event.cofs),
+        teaches=not doubtful and life_with(state.events, event).end is not None,
         results=replace(
             computed,
             receipts=changed,
@@ -362,6 +371,8 @@ def _store(
     records.store_judged(
         connection, clutch_id, outcome.judged, outcome.aside, outcome.levels, at=arrival.received_at, revision=revision
     )
+    if outcome.teaches:
+        records.ask_fleet_refresh(connection, by=by, at=arrival.received_at)
     if outcome.doubts:
         change = NewChange(
             clutch_id=clutch_id,
@@ -382,7 +393,6 @@ def _event_of(arrival: Arrival) -> Event:
     run = arrival.run
     duty = run.details.get("duty") or {}
     names = ("cycles", "energy_per_cycle_kj", "initial_speed_rpm", "engagement_duration_s")
-    maintenance = run.details.get("event")
     return Event(
         run_id=run.run_id,
         kind=run.kind,
@@ -390,8 +400,7 @@ def _event_of(arrival: Arrival) -> Event:
         moment=moment_of(run.started_at, arrival.received_at),
         speed_range=arrival.analysis.speed_range,
         oil_temperature=arrival.analysis.oil_temperature,
-        rebuild=maintenance == REBUILD,
-        shift=maintenance not in (None, REBUILD),
+        **of_maintenance(run.details.get("event"), run.details.get("reason")),
         duty=duty_block(run.cycles, *(duty.get(name) for name in names)),
         dated=run.started_at is not None,
         shown=arrival.shown,

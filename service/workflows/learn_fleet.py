@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from models.prognosis.criteria import FEWEST_CLUTCHES, FEWEST_TESTS_TO_LEARN, HORIZON
-from models.prognosis.ended_lives import EndedLife, ended_life, representative
+from models.prognosis.ended_lives import EndedLife, declared_end, ended_life, representative
 from models.prognosis.fleet import Taught, population, taught
 from models.prognosis.scoring import measured_end
 from service import measured_lives, records, stored_runs
@@ -20,7 +20,7 @@ from service.executors.in_process import InProcess
 from service.executors.rounds import Ended, Ending, in_rounds
 from service.lives.assumptions import ALL_PRESSURES, Assumptions, kind_of
 from service.lives.criteria import MOST_ATTEMPTS
-from service.lives.history import Life
+from service.lives.history import WORN, Life
 from service.lives.outlook import Evidence, needs_evidence, summarised
 from service.lives.payloads import warned_anew
 from service.lives.recomputation import ClutchState, Receipt, Results, track
@@ -56,9 +56,12 @@ class Fleet:
         if len(left) < FEWEST_CLUTCHES:
             return None
         lessons = [lesson for own in left for lesson in own]
-        ended = representative([lesson.ended for lesson in lessons if lesson.ended is not None])
+        ended = [lesson.ended for lesson in lessons if lesson.ended is not None]
+        parts = {
+            name: [life for life in ended if life.censored is (name == "censored")] for name in ("ended", "censored")
+        }
         return population([lesson.taught for lesson in lessons]).to_dict() | {
-            "ended": [life.to_dict() for life in ended]
+            name: [life.to_dict() for life in representative(lives)] for name, lives in parts.items()
         }
 
 
@@ -173,13 +176,18 @@ def _lesson(life: Life, assumptions: Assumptions, fraction: float) -> Lesson | N
     if offset is not None:
         values = values + offset(progress)
         initial += float(offset(np.zeros(1))[0])
-    end = measured_end(progress, values, fraction * initial)
-    if end is None:
-        return Lesson(taught=lesson, ended=None)
+    end, deviation, censored = measured_end(progress, values, fraction * initial), 0.0, False
     horizon = float(series.scale.progress(series.scale.origin + HORIZON))
+    if end is None and life.end is not None:  # stopped before any test passed the threshold
+        end, censored = float(series.scale.progress(life.end.cycles)), life.end.end != WORN
+        if not censored and end > 0.0:
+            end, deviation = declared_end(measurements, end, fraction=fraction, horizon=horizon, offset=offset)
+    if not end:
+        return Lesson(taught=lesson, ended=None)
     ended = ended_life(measurements, end, fraction=fraction, horizon=horizon, offset=offset)
     if ended is None:
         return Lesson(taught=lesson, ended=None)
+    ended = replace(ended, deviation=deviation, censored=censored)
     duty = [event.duty for event in life.events if event.duty is not None and event.duty.energy is not None]
     worked, done = sum(block.cycles for block in duty), sum(block.cycles * (block.energy or 0.0) for block in duty)
     return Lesson(taught=lesson, ended=replace(ended.in_unit(1.0 / unit), energy=done / worked if worked else None))

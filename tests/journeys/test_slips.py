@@ -1,6 +1,7 @@
 """Slips on the command line: seen, mended, exported; and a life that was mended is answered as one without slips."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -52,13 +53,22 @@ def test_slips_are_seen_and_mended_in_the_terminal(server: Server, tmp_path: Pat
     assert life(server, "c1")["criterion"]["fraction"] == 0.4
     assert "FIELD=VALUE" in clutchlife("edit", "c1", "--set", "fluid", "--reason", "x", *at, code=64)
     assert "no clutch is known" in clutchlife("archive", "nobody", *at, code=65)
+    ended = clutchlife("end", "c1", "--note", "squeals", *at)
+    assert "c1: ended at 4,000 cycles (worn)" in ended
+    assert "ended at 4,000 cycles" in clutchlife("life", "c1", *at)
+    run = re.search(r"clutchlife withdraw c1 (\S+) --reason", ended)
+    assert run is not None
+    assert "at 4000 cycles" in clutchlife("end", "c1", "--cycles", "5000", *at, code=65)
+    assert "worn or other" in clutchlife("end", "c1", "--reason", "tired", *at, code=64)
+    assert "withdrawn" in clutchlife("withdraw", "c1", run[1], "--reason", "it does not squeal", *at)
+    assert "ended at" not in clutchlife("life", "c1", *at)
     assert "archived" in clutchlife("archive", "c1", "--reason", "worn out", *at)
     assert "in use" in clutchlife("archive", "c1", "--undo", *at)
     trail = clutchlife("changes", "c1", *at)
     assert "local  correct typo (cycles 4001 -> 4000): a slip" in trail
     actions = [item["action"] for item in json.loads(clutchlife("changes", "c1", "--json", *at))]
     assert actions == [
-        "unarchive", "archive", "edit", "correct", "withdraw", "confirm", "restore", "withdraw", "hold",
+        "unarchive", "archive", "withdraw", "edit", "correct", "withdraw", "confirm", "restore", "withdraw", "hold",
     ]  # fmt: skip
     exported_and_pushed_elsewhere(server, tmp_path)
 

@@ -7,7 +7,7 @@ import typer
 
 from service.cli.changes.runs import run_line
 from service.cli.connection import service_at
-from service.cli.options import URL, ClutchId, Key, Patience, Url, out
+from service.cli.options import EX_USAGE, URL, ClutchId, Key, Patience, Url, fail, out
 
 RunId = Annotated[str, typer.Argument(metavar="RUN")]
 Reason = Annotated[str, typer.Option("--reason", help="Why; the audit trail keeps it")]
@@ -25,6 +25,40 @@ def restore(
 ) -> None:
     """Take a withdrawal back."""
     _post(clutch, run, "restore", reason, url, key, patience)
+
+
+def end(
+    clutch: ClutchId,
+    cycles: Annotated[
+        float | None, typer.Option(min=0, help="Duty cycles since new at the end; left out, those of the last run")
+    ] = None,
+    reason: Annotated[
+        str, typer.Option(help="worn, or other: taken out before its end, which would have come later")
+    ] = "worn",
+    note: Annotated[str, typer.Option(help="A remark")] = "",
+    url: Url = URL,
+    key: Key = None,
+    patience: Patience = 10.0,
+) -> None:
+    """Declare that a clutch's life has ended: no more duty or tests until a rebuild, and its fleet learns from it."""
+    if reason not in ("worn", "other"):
+        fail(f"--reason must be worn or other, got {reason!r}", EX_USAGE)
+    with service_at(url, key, patience) as service:
+        if cycles is None:
+            summary = service.get(f"/v1/clutches/{clutch}")["summary"]
+            cycles = None if summary is None else summary["as_of_cycles"]
+        if cycles is None:
+            fail(f"{clutch} has no run yet: give --cycles", EX_USAGE)
+        declared = {"kind": "maintenance", "event": "end_of_life", "cycles": cycles, "reason": reason, "note": note}
+        receipt = service.post(f"/v1/clutches/{clutch}/runs", json.dumps(declared).encode())
+    _show(receipt)
+    if receipt["state"] == "accepted":
+        undo = f"clutchlife withdraw {clutch} {receipt['run_id']} --reason ..."
+        out.print(
+            f"{clutch}: ended at {receipt['cycles']:,.0f} cycles ({reason}); taken back by: {undo}",
+            markup=False,
+            soft_wrap=True,
+        )
 
 
 def confirm(

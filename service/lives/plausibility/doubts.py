@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from models.clutch import Geometry
 from models.plausibility.judgement import judge
 from service.errors import Notice
-from service.lives.history import Event, Shown, order
+from service.lives.history import Event, Shown, beyond_end, order
 from service.lives.incoming_run import IncomingRun
 from service.lives.plausibility.dead_channels import dead_channels
 from service.lives.plausibility.reading import columns_of, runs_of, shown_by
@@ -66,12 +66,15 @@ def doubts_together(
     """Which runs are to be held, all of them weighed together.
 
     `accepted` and `held` are the runs as they stand, `asked` one that comes in or was changed (None: none is new). Held runs
-    with a dead channel are no part of the question. `corrected`: a model in force corrects the mean COFs of tests.
+    with a dead channel are no part of the question, nor are those after the declared end of their life. `corrected`: a
+    model in force corrects the mean COFs of tests.
     """
-    doubted = [event for event in held if event.shown is not None]
+    new = [] if asked is None else [asked]
+    doubted = [
+        event for event in held if event.shown is not None and beyond_end(order([*accepted, *new, event])) is None
+    ]
     if asked is None and not doubted:
         return Judged()
-    new = [] if asked is None else [asked]
     events = order([*accepted, *doubted, *new])
     aside = {event.run_id for event in doubted}
     runs = runs_of(events, aside, geometry, corrected=corrected)

@@ -10,6 +10,7 @@ from service.errors import NotFoundError
 from service.lives.assumptions import MEAN_COF
 from service.lives.condition import beside_held
 from service.lives.outlook import Evidence, measured_life, with_held
+from service.lives.payloads import ended
 from service.lives.prediction_at import predict_at
 from service.lives.quantities.answer import criteria_answer
 from service.lives.quantities.chosen_life import ChosenLife, chosen_life
@@ -78,7 +79,7 @@ def _by_criteria(state: ClutchState, chosen: ChosenLife, evidence: Evidence, ask
     if all(criterion_in.quantity != MEAN_COF for criterion_in in wanted):
         answer |= _NOT_OF_MEAN_COF
     ends = [criterion_end(measured, criterion_in, asked.method) for criterion_in in wanted]
-    return answer | criteria_answer(measured, ends, answer["current"])
+    return ended(answer | criteria_answer(measured, ends, answer["current"]), measured.life.end)
 
 
 def _wanted(

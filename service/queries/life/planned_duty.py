@@ -24,7 +24,7 @@ from service.errors import Notice
 from service.lives.condition import beside_held
 from service.lives.history import Event, Series, date_of, moment_at, pace_of
 from service.lives.outlook import with_held
-from service.lives.payloads import INSUFFICIENT, SAFE, by_quantile, notice_items
+from service.lives.payloads import ENDED, INSUFFICIENT, SAFE, by_quantile, ended, notice_items
 from service.lives.prediction_at import predict_at
 from service.lives.recomputation import ClutchState
 from service.lives.tracks import advance, drawn, end_of_life, predict, step_rng
@@ -80,9 +80,9 @@ def _prediction(state: ClutchState, method: str, planned: ProgrammeIn) -> dict[s
     tracked = advance(clutch_id, method, series, assumptions, (state.filters or {}).get(method), runs)
     sample = drawn(clutch_id, method, series, assumptions, tracked)
     tracked = replace(tracked, sample=sample)
-    recent = predict(clutch_id, method, series, assumptions, tracked, now, fraction)
+    recent = ended(predict(clutch_id, method, series, assumptions, tracked, now, fraction), state.lives[-1].end)
     recent["recent_duty_cycles"] = recent["remaining_cycles"]
-    if recent["status"] == INSUFFICIENT:
+    if recent["status"] in (INSUFFICIENT, ENDED):
         return recent | unknown
     duty = _Counted(severity=assumptions.severity, scale=series.scale.severity, geometry=state.geometry)
     rng = step_rng(clutch_id, f"{method}-programme", series, runs)

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from service.schemas.base import Answer, ClutchName, Origin, Revision
 from service.schemas.prognosis.quantities import QuantityName
-from service.schemas.run import Warned
+from service.schemas.run import EndReason, Warned
 
 MethodName = Literal["particle", "ukf", "grid"]
 Method = Annotated[
@@ -179,6 +179,16 @@ Held = Annotated[
 Statement = Annotated[str, Field(description="What is known of the remaining life, as a sentence")]
 
 
+class DeclaredEnd(Answer):
+    """The end of a life as it was declared, by maintenance with the event `end_of_life`."""
+
+    cycles: float = Field(description="Duty cycles since new at the end")
+    reason: EndReason = Field(
+        description="`worn`: nothing remains; `other`: it was taken out before, and would have ended later"
+    )
+    run_id: str = Field(description="The run that declares it: withdrawn, the life goes on")
+
+
 class RemainingLife(Answer):
     """The duty cycles that remain until mean COF has fallen to the criterion's fraction of its initial value."""
 
@@ -187,9 +197,11 @@ class RemainingLife(Answer):
     as_of_cycles: float | None = Field(description="Duty cycles since new from which the remaining ones count")
     runs_used: int = Field(description="Number of stationary tests that the prediction uses")
     revision: Revision
-    status: Literal["predicted", "reached", "may_never_reach", "insufficient_data"] = Field(
-        description="Predicted; reached already, more likely than not; some quantile is beyond the horizon; too few tests"
+    status: Literal["predicted", "reached", "may_never_reach", "insufficient_data", "ended"] = Field(
+        description="Predicted; reached already, more likely than not; some quantile is beyond the horizon; too few tests; "
+        "declared ended"
     )
+    ended: DeclaredEnd | None = Field(default=None, description="The declared end of the life; null while it goes on")
     criterion: Criterion = Field(description="The end-of-life criterion")
     current: Current = Field(description="The clutch's present state")
     remaining_cycles: Quantiles = Field(description="Quantiles of the remaining duty cycles, by probability")

@@ -275,3 +275,24 @@ def test_runs_are_listed_page_by_page_the_latest_first(watched: Watched, server:
     assert page.evaluate("document.activeElement.tagName") == "SUMMARY"
     pager.get_by_role("button", name="Later runs").click()
     expect(listed).to_have_count(25)
+
+
+def test_an_end_is_declared_and_taken_back(watched: Watched, server: Server) -> None:
+    page = opened(watched)
+    page.get_by_role("button", name="End of life …").click()
+    dialog = page.get_by_role("dialog", name="End of life of bench")
+    dialog.get_by_label("Why it has ended").select_option(label="It is worn")
+    dialog.get_by_label("Note").fill("squeals")
+    at = float(dialog.get_by_label("Duty cycles since new").input_value())
+    dialog.get_by_role("button", name="Declare the end").click()
+    done(page, f"bench is declared ended at {at:,.0f} cycles.")
+    expect(page.locator("#head .verdict")).to_contain_text(f"ended at {at:,.0f} cycles")
+    page.goto(server.url)
+    expect(page.locator("tr[data-clutch='bench']")).to_contain_text(f"ended at {at:,.0f}")
+    page = opened(watched)
+    page.get_by_role("button", name="Take the end back …").click()
+    back = page.get_by_role("dialog", name="Take the end back")
+    back.get_by_label("Reason").fill("it was the oil")
+    back.get_by_role("button", name="Take it back").click()
+    done(page, "The declared end is taken back.")
+    page.get_by_role("button", name="End of life …").wait_for()

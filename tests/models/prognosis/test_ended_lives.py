@@ -1,11 +1,13 @@
 """What ended lives say: where they ended, and how right forecasts of them were."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import log_ndtr
 
-from models.prognosis.ended_lives import EndedLife, calibrated, ended_life, representative
+from models.prognosis.ended_lives import EndedLife, calibrated, declared_end, ended_life, representative
 from models.prognosis.first_passage import weighted_quantiles
 from models.tracking.measurement import Measurement
 
@@ -107,3 +109,96 @@ def test_an_ended_life_has_forecasts_of_its_own_end() -> None:
     low, _, high = life.forecasts[-1]
     assert low < math.log(1_000.0) < high
     assert ended_life(history[:2], 1_000.0, fraction=0.5, horizon=1e6) is None
+
+
+def by_draws(lives: list[EndedLife], own: EndedLife, as_of: float) -> list[float]:
+    """The same by brute force: means and deviations drawn from their priors, weighted by all that is known of every life."""
+    rng = np.random.default_rng(5)
+    deviations = np.array(
+        [0.05 if life.forecasts[0, 2] - life.forecasts[0, 0] < 0.2 else 0.3 for life in [*lives, own]]
+    )
+    size = np.sqrt(deviations) * math.exp(np.log(np.sqrt(deviations)).mean())
+    log_ends = np.array([math.log(life.end) for life in lives])
+    centre = float(np.median([math.log(life.end) for life in lives if not life.censored]))
+    median = np.array([life.forecasts[0, 1] for life in [*lives, own]])
+    log_end = np.linspace(math.log(as_of), math.log(10_000.0), 4_001)[1:]
+    log_density = np.zeros(log_end.size)
+    for values, unit, of_value, vague, (shape, rate) in (
+        (log_ends - centre, np.ones(len(lives)), log_end - centre, 10.0, (1.0, 0.01)),
+        ((log_ends - median[:-1]) / size[:-1], size[:-1], (log_end - median[-1]) / size[-1], 1.0, (1.0, 1.0)),
+    ):
+        sigma = np.sqrt(rate / rng.gamma(shape, size=400_000))
+        mean = vague * sigma * rng.standard_normal(sigma.size)
+        log_weight = np.zeros(sigma.size)
+        for life, value, one in zip(lives, values, unit, strict=True):
+            if life.censored:
+                log_weight += log_ndtr((mean - value) / sigma)
+            else:
+                squares = (value - mean) ** 2 + (life.deviation / one) ** 2
+                log_weight += -0.5 * squares / sigma**2 - np.log(sigma)
+        best = np.argsort(log_weight)[-20_000:]
+        weight = np.exp(log_weight[best] - log_weight[best].max())
+        chosen = rng.choice(best, 2_000, p=weight / weight.sum())
+        off = (of_value[:, None] - mean[chosen]) / sigma[chosen]
+        log_density += np.log((np.exp(-0.5 * off**2) / sigma[chosen]).mean(axis=1) + 1e-300)
+    share = np.exp(log_density - log_density.max())
+    return [float(np.exp(log_end[np.searchsorted(np.cumsum(share) / share.sum(), q)])) for q in (0.05, 0.5, 0.95)]
+
+
+def some_censored() -> list[EndedLife]:
+    """Ten lives of which three were taken out at four fifths of their end, and two are known to a tenth."""
+    lives = [ended(end, off) for end, off in zip(ENDS, np.exp(0.1 * np.sin(np.arange(10.0))), strict=True)]
+    for number in (6, 8, 9):
+        lives[number] = replace(lives[number], end=0.8 * lives[number].end, censored=True)
+    return [replace(life, deviation=0.1) if number < 2 else life for number, life in enumerate(lives)]
+
+
+def test_uncertain_and_censored_ends_are_weighed_as_by_brute_force() -> None:
+    """Within 2 %: the other way is drawn."""
+    own = ended(1_050.0, 1.0, 0.3)
+    assert quantiles(own, some_censored()) == pytest.approx(by_draws(some_censored(), own, 400.0), rel=0.02)
+
+
+def test_a_life_that_was_taken_out_says_that_its_end_was_later() -> None:
+    """Not that it was then; and one that was taken out early says next to nothing."""
+    own = ended(1_050.0, 22.0, 0.3)
+    known = [ended(end, 22.0 * math.exp(0.9 * math.cos(3.0 * n)), 0.3) for n, end in enumerate(ENDS[:7])]
+    out = [replace(life, end=1_100.0, censored=True) for life in known[:3]]
+    without, with_these = quantiles(own, known), quantiles(own, known + out)
+    as_ends = quantiles(own, known + [replace(life, censored=False) for life in out])
+    assert with_these[1] > as_ends[1] > without[1]
+    early = quantiles(own, known + [replace(life, end=500.0) for life in out])
+    assert early == pytest.approx(without, rel=0.01)
+
+
+def test_lives_that_were_taken_out_are_not_counted_as_ends() -> None:
+    lives = [ended(end) for end in ENDS]
+    assert calibrated(lives[0].forecasts[0], 400.0, lives[:3]) is not None
+    assert calibrated(lives[0].forecasts[0], 400.0, [*lives[:2], replace(lives[2], censored=True)]) is None
+
+
+def accelerating(until: float) -> list[Measurement]:
+    """Mean COF that passes half of its 0.1 at ζ = 1000, ever faster, at 25 even tests of that life up to `until`."""
+    at = np.arange(0.0, until + 1e-9, 40.0)
+    return [Measurement(progress=x, value=0.1 - 0.05 * (x / 1_000.0) ** 2, variance=1e-8) for x in at.tolist()]
+
+
+@pytest.mark.parametrize("stopped", [960.0, 880.0])
+def test_a_life_that_is_declared_worn_before_its_threshold_ends_near_it(stopped: float) -> None:
+    end, deviation = declared_end(accelerating(stopped), stopped, fraction=0.5, horizon=1e6)
+    assert stopped < end < 1_060.0
+    assert abs(math.log(end / 1_000.0)) < 3.0 * deviation + 0.01
+    assert deviation < 0.06
+
+
+def test_a_life_without_wear_that_is_declared_worn_ended_then() -> None:
+    """Nothing in its tests says so, so its end is uncertain, and not ten times as late."""
+    level = [Measurement(progress=x, value=0.1, variance=1e-8) for x in np.arange(0.0, 1_000.0, 50.0).tolist()]
+    end, deviation = declared_end(level, 1_000.0, fraction=0.5, horizon=1e6)
+    assert 1_000.0 <= end < 1_500.0
+    assert 0.0 < deviation < 0.5
+
+
+def test_uncertain_and_censored_ends_are_stored_exactly() -> None:
+    for life in some_censored():
+        assert EndedLife.from_dict(life.to_dict()).to_dict() == life.to_dict()

@@ -54,13 +54,14 @@ function noteOf(life) {
   if (life.status === "insufficient_data") {
     return `Three tests at different cycles are needed for a prediction: ${life.statement}.`;
   }
+  const value = `Mean COF ${estimate(current.mean_cof, current.mean_cof_sd)}`;
+  if (life.ended) return `${value}; the life was declared ended at ${fixed(life.ended.cycles)} cycles.`;
   const median = end["0.5"];
   const when =
     median === null
       ? `with a probability of ${probability(life.probability_of_reaching)} within ${fixed(life.horizon_cycles)} cycles`
       : `at about ${cycles(median, end["0.05"], end["0.95"])} cycles (90 %: ${interval(end)})`;
   const reaches = median !== null && life.status === "reached" ? "reached" : "reaches";
-  const value = `Mean COF ${estimate(current.mean_cof, current.mean_cof_sd)}`;
   if (criterion.threshold_mean_cof === null || criterion.fraction === null)
     return `${value}; no criterion of the clutch is on it.`;
   const limit = `${fixed(criterion.threshold_mean_cof, 4)}, ${fixed(100 * criterion.fraction)} % of new`;

@@ -9,7 +9,7 @@ import { fixed, kindName } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { isCorrected } from "./states.js";
 
-/** @import { InspectionOut, Receipt } from "../shared/types.js" */
+/** @import { DeclaredEnd, InspectionOut, Receipt } from "../shared/types.js" */
 
 /** @typedef {"confirm" | "correct" | "withdraw" | "restore"} RunAction */
 /** @typedef {{ text: string, undo: (() => Promise<Done>) | null }} Done what was done, in a sentence, and how it is undone */
@@ -21,7 +21,8 @@ import { isCorrected } from "./states.js";
  * @property {string} action the button's word
  * @property {boolean} [optional] whether it goes without a reason
  * @property {number} [cycles] asked for, and their value at first
- * @property {(reason: string, cycles: number) => Promise<Done>} send
+ * @property {boolean} [ends] whether it asks why a life has ended; the reason is then a note
+ * @property {(reason: string, cycles: number, why: string) => Promise<Done>} send
  */
 
 const LONGEST_REASON = 500;
@@ -295,14 +296,59 @@ async function archive(id, archived, reason) {
 }
 
 /**
+ * Declare that a clutch's life has ended.
+ * @param {string} id
+ * @param {number} cycles of its last run
+ * @returns {Promise<Done | null>}
+ */
+export const askEnd = (id, cycles) =>
+  ask({
+    title: `End of life of ${id}`,
+    lines: ["It takes no more duty or tests at later cycles until a rebuild, and its fleet learns from it."],
+    action: "Declare the end",
+    optional: true,
+    cycles,
+    ends: true,
+    send: async (note, at, reason) => {
+      const end = { kind: "maintenance", event: "end_of_life", cycles: at, reason, note };
+      /** @type {{ body: Receipt }} */
+      const { body } = await sendJson("POST", `${clutchPath(id)}/runs`, end);
+      const text = `${id} is declared ended at ${fixed(body.cycles)} cycles.${held(body)}`;
+      return { text, undo: () => withdraw(body, "the declaration is undone") };
+    },
+  });
+
+/**
+ * Take a declared end back.
+ * @param {string} id
+ * @param {DeclaredEnd} end
+ * @returns {Promise<Done | null>}
+ */
+export const askTakeBack = (id, end) =>
+  ask({
+    title: "Take the end back",
+    lines: [`The life goes on after ${fixed(end.cycles)} cycles, and everything is computed again.`],
+    action: "Take it back",
+    send: async (reason) => {
+      const address = `${clutchPath(id)}/runs/${encodeURIComponent(end.run_id)}/withdraw`;
+      /** @type {{ body: Receipt }} */
+      const { body } = await sendJson("POST", address, { reason });
+      return { text: "The declared end is taken back.", undo: () => restore(body, "the end holds again") };
+    },
+  });
+
+/**
  * The question in a dialog.
  * @param {Question} question
  * @returns {Promise<Done | null>}
  */
-function ask({ title, lines, action, optional = false, cycles, send }) {
+function ask({ title, lines, action, optional = false, cycles, ends = false, send }) {
   const numeric = { type: "number", min: 0, step: "any", required: true, inputmode: "decimal" };
   const number = h("input", { id: "changed-cycles", value: cycles, ...numeric });
   const reason = h("input", { id: "reason", required: !optional, maxlength: LONGEST_REASON, autocomplete: "off" });
+  const worn = h("option", { value: "worn" }, "It is worn");
+  const other = h("option", { value: "other" }, "Another reason: it would have lasted longer");
+  const why = h("select", { id: "end-reason" }, worn, other);
   const answer = h("div", { class: "answer", "aria-live": "polite" });
   const go = h("button", { class: "main" }, action);
   const dialog = h("dialog", { class: "narrow", "aria-labelledby": "change-title" });
@@ -313,7 +359,7 @@ function ask({ title, lines, action, optional = false, cycles, send }) {
     go.disabled = true;
     answer.replaceChildren(h("p", { class: "quiet" }, "Computing …"));
     try {
-      result = await send(reason.value.trim(), Number(number.value));
+      result = await send(reason.value.trim(), Number(number.value), why.value);
       dialog.close();
     } catch (problem) {
       answer.replaceChildren(problemView(problem, "Nothing was changed. "));
@@ -331,7 +377,8 @@ function ask({ title, lines, action, optional = false, cycles, send }) {
         "div",
         { class: "fields" },
         cycles === undefined ? null : field(number, "Duty cycles since new"),
-        field(reason, optional ? "Reason (may be left out)" : "Reason"),
+        ends ? field(why, "Why it has ended") : null,
+        field(reason, ends ? "Note (may be left out)" : optional ? "Reason (may be left out)" : "Reason"),
       ),
       answer,
       h("div", { class: "buttons" }, h("button", { type: "button", onclick: () => dialog.close() }, "Cancel"), go),

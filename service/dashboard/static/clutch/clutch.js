@@ -195,7 +195,12 @@ function drawHead() {
   const place = byId("head");
   if (place.dataset.shown === text) return;
   place.dataset.shown = text;
-  place.replaceChildren(...head(clutch, life, () => store.archive(true)));
+  place.replaceChildren(
+    ...head(clutch, life, {
+      archive: () => store.archive(true),
+      end: () => store.end(life?.ended ?? null, life?.as_of_cycles ?? 0),
+    }),
+  );
 }
 
 function showUnregistered() {

@@ -13,10 +13,10 @@ import { heldText, stateIcon, STATES } from "../shared/state.js";
 /**
  * @param {ClutchOut} clutch
  * @param {RemainingLife | null} life null before the first run
- * @param {() => unknown} archive asks whether the clutch is to be archived
+ * @param {{ archive: () => unknown, end: () => unknown }} asks whether the clutch is to be archived; about its end
  * @returns {HTMLElement[]}
  */
-export function head(clutch, life, archive) {
+export function head(clutch, life, { archive, end }) {
   const { state } = clutch;
   const simulated = clutch.origin === "simulated" && h("span", { class: "tag" }, "simulated");
   const title = h(
@@ -32,7 +32,18 @@ export function head(clutch, life, archive) {
       clutch.held > 0 && h("a", { href: "#held", class: "mark-held" }, heldText(clutch.held)),
     ),
     h("p", { class: "quiet" }, description(clutch)),
-    clutch.archived ? null : h("button", { type: "button", class: "small", onclick: archive }, "Archive …"),
+    h(
+      "div",
+      { class: "buttons start" },
+      clutch.archived || life === null
+        ? null
+        : h(
+            "button",
+            { type: "button", class: "small", onclick: end },
+            life.ended ? "Take the end back …" : "End of life …",
+          ),
+      clutch.archived ? null : h("button", { type: "button", class: "small", onclick: archive }, "Archive …"),
+    ),
   );
   return life === null ? [title] : [title, h("dl", { class: "tiles" }, tiles(clutch, life))];
 }
@@ -58,9 +69,10 @@ function tiles(clutch, life) {
   const { health } = current;
   const [cof, deviation] = estimate(current.mean_cof, current.mean_cof_sd).split(" ± ");
   const spread = deviation ? `± ${deviation}; ` : "";
-  const certain = status === "reached" ? "the end of life is reached" : atLeast(life.at_least);
+  const lasts = status === "reached" ? "the end of life is reached" : atLeast(life.at_least);
+  const certain = life.ended ? `ended at ${fixed(life.ended.cycles)} cycles` : lasts;
   const quantiles =
-    status === "insufficient_data" || status === "reached" ? "" : `90 %: ${interval(life.remaining_cycles)}; `;
+    ["insufficient_data", "reached", "ended"].includes(status) ? "" : `90 %: ${interval(life.remaining_cycles)}; `;
   const share = current.fraction_of_initial;
   const at = current.mean_cof === null ? "" : `as measured at ${fixed(current.measured_at_cycles)} cycles`;
   const used = `${life.runs_used} ${life.runs_used === 1 ? "test" : "tests"} used, ${clutch.runs} runs`;
@@ -115,7 +127,8 @@ const tile = (name, value, more) =>
   h("div", { class: "tile" }, h("dt", {}, name), h("dd", {}, h("span", { class: "big" }, value), more));
 
 /** @param {RemainingLife} life */
-function remaining({ status, remaining_cycles: q }) {
+function remaining({ status, remaining_cycles: q, ended }) {
+  if (ended) return ended.reason === "worn" ? "0" : "–";
   if (status === "insufficient_data") return "–";
   if (status === "reached") return "0";
   return aboutCycles(q);

@@ -3,13 +3,13 @@
 
 import { byId, h, within } from "../shared/dom.js";
 import { AuditTrail } from "./audit.js";
-import { answerDoubts, askArchive, askInspection, askRun, askUndo } from "./changes.js";
+import { answerDoubts, askArchive, askEnd, askInspection, askRun, askTakeBack, askUndo } from "./changes.js";
 import { showDone } from "./done.js";
 import { heldView } from "./held.js";
 import { RunList } from "./runs.js";
 import { lifeWarnings, warningsView } from "./warnings.js";
 
-/** @import { ClutchOut, InspectionOut, Receipt, StribeckItem, Warned } from "../shared/types.js" */
+/** @import { ClutchOut, DeclaredEnd, InspectionOut, Receipt, StribeckItem, Warned } from "../shared/types.js" */
 /** @import { Answer, RunAction } from "./changes.js" */
 
 export class Stored {
@@ -44,6 +44,16 @@ export class Stored {
 
   /** @type {(runId: string) => void} */
   reveal = (runId) => this.list.reveal(runId);
+
+  /**
+   * Declare the end of the present life, or take back what was declared.
+   * @param {DeclaredEnd | null} ended
+   * @param {number} cycles of its last run
+   */
+  async end(ended, cycles) {
+    const asked = ended === null ? askEnd(this.clutchId, cycles) : askTakeBack(this.clutchId, ended);
+    await showDone(await asked, this.refresh);
+  }
 
   /** @param {ClutchOut} clutch */
   showArchived(clutch) {

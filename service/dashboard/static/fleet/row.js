@@ -74,6 +74,8 @@ function health(summary, state) {
  */
 function remaining(summary, scale) {
   if (summary === null) return ["–", small("after three tests")];
+  const { ended } = summary;
+  if (ended) return [ended.reason === "worn" ? number("0") : "–", small(`ended at ${fixed(ended.cycles)}`)];
   const certain = small(atLeast(summary.at_least));
   if (summary.status === "insufficient_data") return ["–", certain];
   if (summary.status === "reached") return [number("0"), small("reached")];

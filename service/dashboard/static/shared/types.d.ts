@@ -37,6 +37,7 @@ export interface ClutchSummary {
   current: Current;
   remaining_cycles: Quantiles;
   at_least: number | null;
+  ended: DeclaredEnd | null;
 }
 
 export interface LastRun {
@@ -155,6 +156,12 @@ export interface HeldRuns {
   remaining_cycles: Quantiles;
 }
 
+export interface DeclaredEnd {
+  cycles: number;
+  reason: string;
+  run_id: string;
+}
+
 export interface RemainingLife {
   revision: number;
   as_of_cycles: number | null;
@@ -172,6 +179,7 @@ export interface RemainingLife {
   course: (CourseShare & { alternatives: CourseShare[] }) | null;
   back_cast: { held: number; of: number; widening: number } | null;
   ended_lives: number;
+  ended: DeclaredEnd | null;
   horizon_cycles: number;
   model: ModelName;
   warnings: Warned[];

@@ -1,0 +1,165 @@
+"""A life is declared ended: it reads so, takes in nothing later, can be taken back, and teaches its fleet."""
+
+from contextlib import closing
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from service.errors import LifeEndedError
+from service.lives.history import Event, require_within_ends
+from service.workflows.learn_fleet import refresh
+from storage.engine.opening import open_database
+from tests.support import stationary
+
+RUNS, LIFE = "/v1/clutches/c1/runs", "/v1/clutches/c1/remaining-useful-life"
+END = {"kind": "maintenance", "event": "end_of_life", "cycles": 3000}
+REBUILD = {"kind": "maintenance", "event": "rebuild", "cycles": 3000, "run_id": "rebuilt"}
+FEW = {"pressures": (5.0,), "speeds": (20, 120, 320, 520, 1020, 1320, 1620, 1970)}
+
+
+def post(client: TestClient, body: dict[str, Any], status: int = 201, path: str = RUNS) -> Any:
+    """The answer to a run that is sent."""
+    answer = client.post(path, json=body)
+    assert answer.status_code == status, answer.json()
+    return answer.json()
+
+
+@pytest.fixture
+def tested(client: TestClient) -> TestClient:
+    """A clutch with four tests up to 3000 cycles, half of the way to its end."""
+    for cycles in (0, 1000, 2000, 3000):
+        post(client, stationary(cycles, run_id=f"test-{cycles}", **FEW))  # type: ignore[arg-type]
+    return client
+
+
+def life(client: TestClient, **query: Any) -> Any:
+    """What the clutch's remaining life is now."""
+    return client.get(LIFE, params=query).json()
+
+
+@pytest.mark.parametrize("method", ["particle", "ukf", "grid"])
+def test_a_worn_clutch_reads_ended_and_nothing_remains(tested: TestClient, method: str) -> None:
+    before = life(tested, method=method)
+    assert (before["status"] != "ended", before["ended"]) == (True, None)
+    receipt = post(tested, END | {"note": "squeals"})
+    assert (receipt["event"], receipt["reason"], receipt["note"]) == ("end_of_life", "worn", "squeals")
+    now = life(tested, method=method)
+    assert now["status"] == "ended"
+    assert now["ended"] == {"cycles": 3000, "reason": "worn", "run_id": receipt["run_id"]}
+    assert set(now["remaining_cycles"].values()) == {0}
+    assert set(now["end_of_life_cycles"].values()) == {3000}
+    assert (now["probability_of_reaching"], now["current"]["health"]) == (1, 0)
+    assert now["current"]["mean_cof"] == before["current"]["mean_cof"]
+    (listed,) = tested.get("/v1/clutches").json()["items"]
+    assert (listed["summary"]["status"], listed["summary"]["ended"]["cycles"]) == ("ended", 3000)
+    assert listed["state"] == {"name": "failure", "why": "ended at 3,000 cycles"}
+    assert life(tested, method=method, at_cycles=2000)["ended"] is None
+
+
+def test_a_clutch_that_was_taken_out_is_no_failure_and_its_end_lies_ahead(tested: TestClient) -> None:
+    before = life(tested)
+    post(tested, END | {"reason": "other"})
+    now = life(tested)
+    assert (now["status"], now["ended"]["reason"]) == ("ended", "other")
+    assert set(now["remaining_cycles"].values()) == {None}
+    assert now["end_of_life_cycles"] == before["end_of_life_cycles"]
+    (listed,) = tested.get("/v1/clutches").json()["items"]
+    assert listed["state"] == {"name": "normal", "why": "ended at 3,000 cycles, taken out before it was worn"}
+
+
+def test_by_any_quantity_and_under_planned_duty_it_has_ended_too(tested: TestClient) -> None:
+    post(tested, END)
+    assert life(tested, quantity="static_torque_nm")["status"] == "ended"
+    plan = {"programme": [{"cycles": 100, "energy_per_cycle_kj": 10}]}
+    planned = tested.post(f"{LIFE}/forecast", json=plan).json()
+    assert (planned["status"], set(planned["remaining_cycles"].values())) == ("ended", {0})
+
+
+def test_nothing_later_is_taken_in_until_a_rebuild_and_what_is_earlier_still_is(tested: TestClient) -> None:
+    end = post(tested, END)
+    late = stationary(4000, run_id="late", **FEW)  # type: ignore[arg-type]
+    duty = {"kind": "duty_cycles", "cycles": 4000, "duty": {"cycles": 1000}}
+    for body in (late, duty, END | {"cycles": 2500}, END | {"reason": "other"}):
+        problem = post(tested, body, 409)
+        assert problem["type"].endswith("life-ended")
+        declared = 2500 if body.get("cycles") == 2500 else 3000
+        assert f"ended at {declared} cycles" in problem["detail"]
+        if declared == 3000:
+            assert end["run_id"] in problem["detail"]
+    assert post(tested, END, 200)["duplicate"]
+    assert tested.patch(f"{RUNS}/test-3000", json={"cycles": 3500, "reason": "typo"}).status_code == 409
+    assert post(tested, stationary(1500, run_id="early", **FEW))["state"] == "accepted"  # type: ignore[arg-type]
+    assert life(tested)["status"] == "ended"
+    post(tested, {"kind": "maintenance", "event": "other", "cycles": 4000})
+    assert life(tested)["status"] == "ended"
+    post(tested, REBUILD)
+    post(tested, late)
+    assert life(tested)["status"] == "insufficient_data"
+    assert life(tested, life=1)["status"] == "ended"
+    problem = post(tested, {"reason": "none was made"}, 409, f"{RUNS}/rebuilt/withdraw")
+    assert "late" in problem["detail"]
+
+
+def test_an_end_before_runs_that_count_is_refused(tested: TestClient) -> None:
+    problem = post(tested, END | {"cycles": 2500}, 409)
+    assert "'test-3000' at 3000 cycles" in problem["detail"]
+    assert life(tested)["ended"] is None
+
+
+def test_a_declared_end_is_taken_back_and_all_is_as_it_was(tested: TestClient) -> None:
+    before = life(tested)
+    end = post(tested, END)
+    post(tested, {"reason": "the wrong clutch"}, 200, f"{RUNS}/{end['run_id']}/withdraw")
+    after = life(tested)
+    assert {**after, "revision": 0} == {**before, "revision": 0}
+    later = post(tested, stationary(4000, run_id="later", **FEW))  # type: ignore[arg-type]
+    assert later["state"] == "accepted"
+    assert post(tested, {"reason": "ended after all"}, 409, f"{RUNS}/{end['run_id']}/restore")
+
+
+def test_a_reason_goes_with_an_end_alone(client: TestClient) -> None:
+    problem = post(client, {"kind": "maintenance", "event": "rest", "cycles": 1, "reason": "worn"}, 422)
+    assert "end_of_life" in problem["detail"]
+    assert post(client, END | {"reason": "broken"}, 422)["errors"][0]["pointer"] == "/reason"
+
+
+def test_a_worn_end_is_the_same_whether_its_reason_is_said(tested: TestClient) -> None:
+    assert post(tested, END)["run_id"] == post(tested, END | {"reason": "worn"}, 200)["run_id"]
+
+
+def test_declared_ends_teach_the_fleet_by_themselves(client: TestClient, database_url: str) -> None:
+    """Stopped at 95 % of the way to the threshold; four ends and one clutch that was taken out."""
+    for number in range(5):
+        path = f"/v1/clutches/w{number}"
+        post(client, {"clutch_id": f"w{number}"}, path="/v1/clutches")
+        end = 4000 + 200 * number
+        for part in range(6):
+            body = stationary(end * part / 5, run_id=f"t{part}", wear=0.095 * part, noise=0.001, **FEW)  # type: ignore[arg-type]
+            assert post(client, body, path=f"{path}/runs")["state"] == "accepted"
+        stopped = END | {"cycles": end, "reason": "other" if number == 4 else "worn"}
+        assert post(client, stopped, path=f"{path}/runs")["state"] == "accepted"
+    jobs = client.get("/v1/jobs").json()["items"]
+    assert {item["kind"] for item in jobs} == {"fleet_refresh"}
+    # the job has the least priority of all: on a busy machine it is not waited for
+    with closing(open_database(database_url)) as database:
+        refresh(database, now="2026-11-26T00:00:00+00:00")
+    (prior,) = client.get("/v1/fleet/priors").json()["items"]
+    assert (prior["ended_lives"], prior["censored_lives"]) == (4, 1)
+    post(client, {"reason": "it goes on"}, 200, f"/v1/clutches/w0/runs/{_declared(client, 'w0')}/withdraw")
+    with closing(open_database(database_url)) as database:
+        refresh(database, now="2026-11-26T00:00:01+00:00")
+    (prior,) = client.get("/v1/fleet/priors").json()["items"]
+    assert (prior["ended_lives"], prior["censored_lives"]) == (3, 1)
+
+
+def _declared(client: TestClient, clutch_id: str) -> str:
+    """The run that declares the end of a clutch."""
+    return str(client.get(f"/v1/clutches/{clutch_id}").json()["summary"]["ended"]["run_id"])
+
+
+def test_a_life_has_one_end() -> None:
+    events = [Event(run_id=str(n), kind="maintenance", cycles=n, moment=n, end="worn") for n in (1.0, 2.0)]
+    require_within_ends(events[:1])
+    with pytest.raises(LifeEndedError, match="no second end"):
+        require_within_ends(events)
