@@ -142,7 +142,7 @@ def create_app(settings: Settings) -> FastAPI:
     problems.install(app)
     for part in (health, clutches, files, runs, inspections, life, diagnoses, jobs, fleet, rigs):
         app.include_router(part.router)
-    for beside in (clutches.fleet_router, exports.router, exports.fleet_router, description.router):
+    for beside in (clutches.fleet_router, exports.router, exports.fleet_router, description.router, rigs.import_router):
         app.include_router(beside)
     app.include_router(dashboard.router(assets.load()))
     openapi.install(app, settings.root_path)

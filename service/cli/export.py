@@ -1,7 +1,7 @@
 """`clutchlife export`: all that is stored of a clutch, raw data included, in files that `push` sends again.
 
 What `push` sends are the runs that count, at the cycles that hold now: another service then gives the same answers. Runs
-that are held, withdrawn or corrected are beside them as they were sent.
+that are held, withdrawn or corrected are beside them as they were sent, and so are the files that runs were read from.
 """
 
 import json
@@ -18,6 +18,8 @@ from service.run_files import manifest
 
 #: The folder of what was sent and does not count so.
 AS_SENT = "as-sent"
+#: The folder of the files that runs were read from.
+FILES = "files"
 _SENT = ("run_id", "kind", "cycles", "started_at", "origin", "duty", "event", "reason", "note", "channels")
 
 
@@ -49,6 +51,10 @@ def export(
                 if corrected or not counts:
                     (out_folder / AS_SENT).mkdir(exist_ok=True)
                     manifest.write(out_folder / AS_SENT / name, _as_sent(run | {"cycles": run["sent_cycles"]}))
+                if run["file"] is not None:
+                    (out_folder / FILES).mkdir(exist_ok=True)
+                    sent = service.file(f"/v1/clutches/{clutch}/runs/{receipt['run_id']}/file")
+                    (out_folder / FILES / f"{count:05d}-{_safe(run['file']['filename'])}").write_bytes(sent)
                 count += 1
                 progress.advance(task)
             _results(service, clutch, results)

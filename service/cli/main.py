@@ -2,7 +2,7 @@
 
 import typer
 
-from service.cli import diagnose, export, fleet, inspections, key, model, score, simulate
+from service.cli import diagnose, export, fleet, importing, inspections, key, model, score, simulate
 from service.cli.answers import degradation, engagement, life, loops
 from service.cli.changes import clutch_changes, run_changes, trail
 from service.cli.changes import runs as run_list
@@ -22,6 +22,7 @@ app.command()(serve.serve)
 app.command()(demo.demo)
 app.command()(simulate.simulate)
 app.command()(push.push)
+app.command("import")(importing.import_file)
 app.command()(life.life)
 app.command()(degradation.degradation)
 app.command()(loops.loops)

@@ -270,6 +270,11 @@ def _list(columns: Sequence[Column]) -> str:
     return shown if len(columns) <= _MOST_NAMED else f"{shown} and {len(columns) - _MOST_NAMED} more"
 
 
+def ending_unit(channel: str, name: str) -> str | None:
+    """The unit of the channel that a name ends in, whatever parts them; None where it ends in none."""
+    return next((text for _, text in _endings(name) if conversion(channel, text)), None)
+
+
 def _conversion(channel: str, column: Column, choice: Choice | None) -> Conversion:
     """The conversion to the channel's unit. A public name states its unit: another unit beside it is a contradiction.
 
@@ -278,7 +283,7 @@ def _conversion(channel: str, column: Column, choice: Choice | None) -> Conversi
     key = _key(column.name)
     own, public, unit = CHANNELS[channel].unit, key == channel, column.unit
     if choice is not None:
-        ending = next((text for _, text in _endings(column.name) if conversion(channel, text)), None)
+        ending = ending_unit(channel, column.name)
         stated = unit or (None if public else ending)
         other = choice.unit and stated not in (None, choice.stated)
         if other and conversion(channel, stated or "") != conversion(channel, choice.unit or ""):

@@ -4,6 +4,7 @@ from typing import Any
 
 from service.columns import CHANNELS
 from service.errors import MOST_QUOTED, InvalidError
+from service.readers.channels import labels
 from service.readers.column_names import choices_of, choose, known_channel
 from service.readers.table import Reading, Table
 from service.readers.unit_table import conversion
@@ -48,6 +49,7 @@ def preview(table: Table, reading: Reading) -> dict[str, Any]:
         "table": table.name,
         "tables": list(table.others),
         "above": [[cell[:MOST_QUOTED] for cell in row] for row in table.above[-_MOST_LINES:]],
+        "labels": labels(table),
         "first_line": table.first_line,
         "head": [[cell[:MOST_QUOTED] for cell in row] for row in table.head],
         "columns": columns,

@@ -5,7 +5,7 @@ and `*`; everything else stands for itself, whatever its case.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import PurePath
 
@@ -121,3 +121,12 @@ def _count(text: str | None) -> float | None:
         return None
     value = times * float(re.sub(r"\D", "", plain))
     return value if value <= MOST_CYCLES else None
+
+
+def fits(profile: RigProfile, titles: Collection[str]) -> bool:
+    """Whether a file has the profile's columns and no others, whatever their case and blanks."""
+    return {_plain(column.title) for column in profile.columns} == {_plain(title) for title in titles}
+
+
+def _plain(title: str) -> str:
+    return " ".join(title.split()).casefold()

@@ -11,7 +11,7 @@ from models.records.plateaus import cut_plateaus
 from service.columns import PLATE_TEMPERATURES, check_arrays
 from service.errors import FieldError, InvalidError, Notice
 from service.lives.incoming_run import IncomingRun, SampledChannels, name_run
-from service.readers.channels import LEFT_OUT
+from service.readers.channels import LEFT_OUT, Channels
 from service.readers.read_file import read_file
 from service.readers.table import Choice, Reading
 from service.run_files.rig_profile import Named, named
@@ -47,7 +47,6 @@ def read_file_run(
     """
     reading = reading_with(profile, reading or Reading())
     read = read_file(path, filename=filename, reading=reading)
-    columns, notices = read.columns, list(read.notices)
     stated = Named() if profile is None else named(profile, filename, read.labels)
     kind, cycles = kind or stated.kind, stated.cycles if cycles is None else cycles
     if kind is None or cycles is None:
@@ -55,6 +54,29 @@ def read_file_run(
         where = "no rig was named" if profile is None else f"the rig's profile finds none for {filename!r}"
         message = f"{name} must be given: {where}"
         raise InvalidError(message, errors=[FieldError(pointer=f"/query/{name}", code="missing", message=message)])
+    run = run_of(
+        read,
+        kind=kind,
+        cycles=cycles,
+        run_id=run_id or stated.run_id,
+        started_at=None if started_at is None else started_at.isoformat(),
+        origin=origin,
+    )
+    file = {"filename": filename, "rig": rig, "reading": asdict(reading)}
+    return replace(run, file=file | dict(run.file or {}))
+
+
+def run_of(
+    read: Channels,
+    *,
+    kind: str,
+    cycles: float,
+    run_id: str | None = None,
+    started_at: str | None = None,
+    origin: str = "measured",
+) -> IncomingRun:
+    """The run of that kind in channels as they were read. Raises InvalidError where they do not make one."""
+    columns, notices = read.columns, list(read.notices)
     missing = [name for name in NEEDED[kind] if name not in columns]
     if missing:
         errors = [
@@ -75,14 +97,13 @@ def read_file_run(
     run = name_run(
         kind=kind,
         cycles=cycles,
-        run_id=run_id or stated.run_id,
-        started_at=None if started_at is None else started_at.isoformat(),
+        run_id=run_id,
+        started_at=started_at,
         origin=origin,
         channels={name: column for name, column in columns.items() if name in accepted},
         details={},
     )
-    warnings = [asdict(notice) for notice in notices]
-    return replace(run, file={"filename": filename, "rig": rig, "reading": asdict(reading), "warnings": warnings})
+    return replace(run, file={"warnings": [asdict(notice) for notice in notices]})
 
 
 def reading_with(profile: RigProfile | None, reading: Reading) -> Reading:

@@ -129,6 +129,10 @@ FileRig = Annotated[
     str | None,
     Field(pattern=IDENTIFIER_PATTERN, description="The rig by whose profile the file is read; other arguments win"),
 ]
+OfClutch = Annotated[
+    str | None,
+    Field(pattern=IDENTIFIER_PATTERN, description="The clutch whose geometry and torque filter evaluate the file"),
+]
 FileMap = Annotated[
     str | None, Field(max_length=LONGEST_MAP, description="Columns of channels: torque_nm:Mz,speed_rpm:n")
 ]

@@ -1,12 +1,12 @@
 """Rig profiles: how the files that a rig's recorder writes are read; and the preview of a file before it is sent."""
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
 from service.schemas.base import Answer, Identifier, Next, Schema
 from service.schemas.limits import LARGEST_NUMBER, LONGEST_NAME, LONGEST_TITLE, MOST_COLUMNS, MOST_SKIPPED, MOST_WORDS
-from service.schemas.run import Warned
+from service.schemas.run import Fit, Warned
 
 FileKindName = Literal["stationary_stribeck", "dynamic_stribeck"]
 ChannelName = Literal[
@@ -105,14 +105,12 @@ class RigPage(Answer):
 class PreviewColumn(Answer):
     """A column of a file as it is read."""
 
-    title: str = Field(description="Its title in the file, as a profile names it")
+    title: str = Field(description="Its title, as a profile names it")
     stated_unit: str | None = Field(description="The unit that the file states; null: none")
-    unit: str | None = Field(description="The unit in which it is understood; null: that of the channel, or unknown")
-    channel: ChannelName | None = Field(description="The channel that it is read as, or suggested; null: left out")
+    unit: str | None = Field(description="The unit in which it is understood; null: none, or the column is left out")
+    channel: ChannelName | None = Field(description="The channel that it is read as; null: it is left out")
     scale: float = Field(description="The scale that is applied, in the channel's unit")
     offset: float = Field(description="The offset that is applied, in the channel's unit")
-    units: list[str] = Field(description="Units that may be chosen for the channel")
-    numeric: bool = Field(description="Whether its values are numbers or times")
 
 
 class PreviewPiece(Answer):
@@ -120,32 +118,33 @@ class PreviewPiece(Answer):
 
     start_s: float = Field(description="Its start, s")
     stop_s: float = Field(description="Its end, s")
-    pressure_bar: float = Field(description="Mean line pressure, bar")
-    speed_rpm: float | None = Field(description="Mean speed of a plateau, rpm; null for a stretch")
+    pressure_bar: float = Field(description="Line pressure, bar")
+    speed_rpm: float | None = Field(description="Speed of a plateau, rpm; null for a stretch")
 
 
 class Preview(Answer):
     """A file as it would be read and evaluated; nothing is stored."""
 
     filename: str = Field(description="The sender's name for it")
-    format: str = Field(description="The file's format")
-    rows: int = Field(description="Rows of the table")
+    above: list[list[str]] = Field(description="The lines above the table, cell by cell")
+    tables: list[str] = Field(description="The sheets, groups or tests of the file, where there are several")
     columns: list[PreviewColumn] = Field(description="Every column of the file")
     first_rows: list[list[str]] = Field(description="The first rows as the file has them, a text a column")
+    units: dict[str, list[str]] = Field(description="Units that a column of each channel may be in")
     rig: str | None = Field(description="The profile that was applied: the one asked for, or the one that fits")
-    profile: dict[str, Any] = Field(description="How it was read, as a profile that could be saved")
+    profile: RigProfile = Field(description="How it was read, as a profile that could be saved")
     kind: FileKindName | None = Field(
         description="The kind of run: asked for, by the profile, or the only one that fits"
     )
     cycles: float | None = Field(description="Cycles: asked for, or by the profile from the file's name or a cell")
-    run_id: str | None = Field(description="The run's name from the file's name, where the profile finds one there")
-    kinds: list[str] = Field(description="The kinds of run that the channels allow")
-    missing: list[str] = Field(
-        description="What must still be given before the file can be sent: channels, kind, cycles"
-    )
+    run_id: str | None = Field(description="The run's name, where the profile finds one in the file's name")
+    kinds: list[FileKindName] = Field(description="The kinds of run that the channels allow")
+    missing: list[str] = Field(description="What must still be given before it can be sent: channels, `kind`, `cycles`")
+    rows: int = Field(description="Samples of each channel")
     channels: dict[str, list[float]] = Field(description="The channels as they are read, thinned for a plot")
     pieces: list[PreviewPiece] = Field(description="What is cut from a sampled record")
-    fits: list[dict[str, Any]] = Field(description="The curves that are fitted, as a receipt has them")
-    warnings: list[Warned] = Field(description="Warnings of reading, cutting and fitting")
-    left_out: list[str] = Field(description="Titles of columns that are not read")
+    fits: list[Fit] = Field(description="The curves that are fitted, as a receipt has them")
+    warnings: list[Warned] = Field(
+        description="Warnings of reading, cutting and fitting; what was left out is among them"
+    )
     problem: str | None = Field(description="Why the file would be refused as it is; null: it would be taken")

@@ -11,12 +11,19 @@ from typing import IO, BinaryIO
 
 from fastapi import Request
 from fastapi.responses import Response, StreamingResponse
+from starlette.datastructures import UploadFile
 
+from service.errors import InvalidError
+from service.run_files.json_run import checked
+from service.run_files.rig_profile import require_usable
+from service.schemas.rig import RigProfile
 from service.web.limits import MAX_BYTES_IN_MEMORY
 
 PARQUET_TYPE = "application/vnd.apache.parquet"
 #: Bytes of a file that are sent at once. Chosen: a few writes to the socket.
 _PIECE = 1 << 18
+#: Bytes of a form's file that are written at once.
+_CHUNK = 1 << 20
 
 
 def emptied_folder(database: Path | None) -> Path:
@@ -56,6 +63,29 @@ async def written(pieces: AsyncIterable[bytes], file: IO[bytes]) -> None:
     async for piece in pieces:
         file.write(piece)
     file.flush()
+
+
+async def received(request: Request, path: Path, filename: str) -> tuple[str, RigProfile | None]:
+    """Write a body, or the file in a form, to disk as it arrives; returns its sender's name for it, and a form's `profile`.
+
+    Raises InvalidError where the form has no file or its profile cannot be used.
+    """
+    if not request.headers.get("content-type", "").startswith("multipart/form-data"):
+        with path.open("wb") as file:
+            await written(request.stream(), file)
+        return filename, None
+    async with request.form(max_files=1, max_fields=8) as form:
+        sent = next((part for part in form.values() if isinstance(part, UploadFile)), None)
+        if sent is None:
+            raise InvalidError("the form must hold one file")
+        with path.open("wb") as file:
+            while chunk := await sent.read(_CHUNK):
+                file.write(chunk)
+        text = form.get("profile")
+        profile = checked(RigProfile, text.encode()) if isinstance(text, str) else None
+    if profile is not None:
+        require_usable(profile)
+    return sent.filename or filename, profile
 
 
 def preferred(request: Request, media_types: Sequence[str]) -> str:

@@ -150,6 +150,7 @@ class BodyLimit:
         short = min(most, limits.MOST_SHORT_BODY_BYTES)
         self.bounds = {
             "/runs/file": _Bound(most_file, 0),
+            "/import/preview": _Bound(most_file, 0),
             "/runs": _Bound(most, limits.MAX_BYTES_IN_MEMORY),
             "/photographs": _Bound(most, most),
             "": _Bound(short, short),

@@ -1,6 +1,7 @@
 """Files dropped on a page, as a person would."""
 
 import base64
+from collections.abc import Mapping
 
 from playwright.sync_api import Page
 
@@ -13,6 +14,7 @@ _DROP = """(files) => {
 }"""
 
 
-def drop(page: Page, files: dict[str, str]) -> None:
-    """Drop text files, by their names, all at once."""
-    page.evaluate(_DROP, [[name, base64.b64encode(content.encode()).decode()] for name, content in files.items()])
+def drop(page: Page, files: Mapping[str, str | bytes]) -> None:
+    """Drop files, text or bytes, by their names, all at once."""
+    contents = {name: content.encode() if isinstance(content, str) else content for name, content in files.items()}
+    page.evaluate(_DROP, [[name, base64.b64encode(content).decode()] for name, content in contents.items()])

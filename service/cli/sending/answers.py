@@ -104,8 +104,9 @@ def csv(response: httpx2.Response) -> str | None:
 
 
 def image(response: httpx2.Response) -> bytes | None:
-    """The file of an answer that is a photograph; None where it is none."""
-    return response.content if response.headers.get("Content-Type", "").startswith("image/") else None
+    """The file of an answer that is a photograph or a run's file; None where it is none."""
+    media = response.headers.get("Content-Type", "")
+    return response.content if media.startswith(("image/", "application/octet-stream")) else None
 
 
 def problem(response: httpx2.Response) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """A client of the service: it waits while the service is away or busy, and raises what the service refuses."""
 
+import json
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -80,6 +81,13 @@ class Service:
             return self._answer("POST", path, file=file, wanted=wanted, headers=JSON)
         return self._answer("POST", path, file=file, wanted=wanted, params=dict(parameters))
 
+    def post_form(
+        self, path: str, file: Path, profile: Mapping[str, Any], parameters: Mapping[str, str]
+    ) -> dict[str, Any]:
+        """The answer to a file with the profile by which it is read; raises as `post` does."""
+        form = {"profile": json.dumps(profile)}
+        return self._answer("POST", path, file=file, params=dict(parameters), data=form)
+
     def post_photograph(self, path: str, file: Path, media_type: str) -> dict[str, Any]:
         """The answer to a photograph's file; raises as `post` does."""
         return self._answer("POST", path, file=file, headers={"Content-Type": media_type})
@@ -139,6 +147,8 @@ class Service:
         if file is None:
             return self.http.request(method, path, **request)
         with file.open("rb") as opened:
+            if "data" in request:
+                return self.http.request(method, path, files={"file": (file.name, opened)}, **request)
             return self.http.request(method, path, content=opened, **request)
 
 

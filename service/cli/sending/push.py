@@ -26,6 +26,9 @@ def push(
     patience: Patience = 60.0,
     kind: Annotated[str | None, typer.Option(help="For files that are not JSON: the kind of run")] = None,
     cycles: Annotated[float | None, typer.Option(help="For files that are not JSON: duty cycles since new")] = None,
+    rig: Annotated[
+        str | None, typer.Option(help="For files that are not JSON: the rig by whose profile they are read")
+    ] = None,
     channel_map: Annotated[str | None, typer.Option("--map", help="Channels by name: torque_nm:Mz,speed_rpm:n")] = None,
 ) -> None:
     """Send run files: JSON, or CSV, TDMS, MDF4 and Parquet, with their kind and cycles in a runs.json or in options.
@@ -40,10 +43,13 @@ def push(
             files = manifest.find(paths)
         except FileNotFoundError as error:
             fail(str(error), EX_DATAERR)
-        for record in manifest.unlisted(paths):
+        unlisted = manifest.unlisted(paths)
+        if rig is not None:
+            files += [manifest.RunFile(path=record) for record in unlisted]
+        for record in [] if rig else unlisted:
             say(f"{record} is not listed in {manifest.MANIFEST} and not sent")
         waiting = Spool.of(spool, url, clutch)
-        runs = [_request(file, kind, cycles, channel_map) for file in files if not file.of_inspection]
+        runs = [_request(file, kind, cycles, channel_map, rig) for file in files if not file.of_inspection]
         inspections = [(file.path, None) for file in files if file.of_inspection]
         digests: set[str] = set()
         for resource, requests in ((RUNS, runs), (INSPECTIONS, inspections)):
@@ -56,13 +62,13 @@ def push(
 
 
 def _request(
-    file: manifest.RunFile, kind: str | None, cycles: float | None, channel_map: str | None
+    file: manifest.RunFile, kind: str | None, cycles: float | None, channel_map: str | None, rig: str | None
 ) -> tuple[Path, dict[str, str] | None]:
     """A file and the parameters of its request; None for a JSON body."""
     if file.path.suffix == ".json":
         return file.path, None
-    mapped = {} if channel_map is None else {"map": channel_map}
-    return file.path, mapped | _parameters(file, kind, cycles)
+    given = {name: value for name, value in (("map", channel_map), ("rig", rig)) if value is not None}
+    return file.path, given | _parameters(file, kind, cycles, by_rig=rig is not None)
 
 
 def _replacement(spool: Spool, entry: Entry) -> str:
@@ -85,12 +91,15 @@ def _warn_of_others(spool: Spool, digests: set[str]) -> None:
         say(f"{', '.join(parts)}: see clutchlife spool list")
 
 
-def _parameters(file: manifest.RunFile, kind: str | None, cycles: float | None) -> dict[str, str]:
-    """The parameters of a record's request: from its manifest, else from the options."""
+def _parameters(file: manifest.RunFile, kind: str | None, cycles: float | None, *, by_rig: bool) -> dict[str, str]:
+    """The parameters of a record's request: from its manifest, else from the options; a rig's profile finds the others."""
     if file.parameters is not None:
         return dict(file.parameters)
+    if by_rig:
+        given = {"kind": kind, "cycles": None if cycles is None else repr(cycles), "filename": file.path.name}
+        return {name: value for name, value in given.items() if value is not None}
     if kind is None or cycles is None:
-        remedy = f"give --kind and --cycles, or list it in a {manifest.MANIFEST} beside it"
+        remedy = f"give --rig, or --kind and --cycles, or list it in a {manifest.MANIFEST} beside it"
         fail(f"{file.path} is no JSON file: {remedy}", EX_USAGE)
     return {"kind": kind, "cycles": repr(cycles), "filename": file.path.name}
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any, BinaryIO, Literal
 
 from models.arrays import FloatArray
+from models.records.decimation import extreme_rows
 from service import records, stored_runs
 from service.errors import NotFoundError
-from service.queries.raw_run.decimation import extreme_rows
 from service.queries.raw_run.formats import Values, parquet_writer, write_json, write_parquet
 from storage import changes, channels
 from storage.encoding.json_text import to_text

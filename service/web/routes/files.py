@@ -8,9 +8,8 @@ from pathlib import Path
 from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
-from starlette.datastructures import UploadFile
 
-from service.errors import InvalidError, NoRoomError
+from service.errors import NoRoomError
 from service.jobs.workers import Lane
 from service.queries import rigs
 from service.queries.raw_run.answer import copy_file, file_sha256
@@ -35,14 +34,13 @@ from service.schemas.parameters import (
 from service.schemas.run import Receipt
 from service.web.answers import JSON_TYPE, now, unchanged
 from service.web.auth import Ingester, Reader, name_of_caller
-from service.web.files import streamed, written
+from service.web.files import received, streamed
 from service.web.problems import READING, SENDING, described
 from service.workflows.ingest_run import ingest_posted
 from storage.encoding.json_text import to_text
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}/runs", tags=["runs"])
 
-_CHUNK = 1 << 20
 SENDING_FILE = SENDING | described(NoRoomError)
 _BODY = {
     "requestBody": {
@@ -78,12 +76,12 @@ async def post_run_file(
 ) -> Response:
     """Post a run as CSV, XLSX, ODS, TDMS, MDF4, MATLAB, HDF5 or Parquet, plain, gzipped or in a ZIP archive.
 
-    The file is kept as it was sent.
+    The file is kept as it was sent. A form may hold a `profile` beside it, as a rig's, by which this one file is read.
     """
     profile = None if rig is None else await run_in_threadpool(rigs.of_name, context.database, rig)
     with tempfile.TemporaryDirectory(dir=context.folder) as folder:
         path = Path(folder) / "run"
-        filename = await _save(request, path, filename)
+        filename, own = await received(request, path, filename)
         read = partial(
             read_file_run,
             path,
@@ -91,8 +89,8 @@ async def post_run_file(
             kind=kind,
             cycles=cycles,
             reading=reading_of(map, table=table, time=time, decimal=decimal, skip_rows=skip_rows),
-            profile=profile,
-            rig=rig,
+            profile=own or profile,
+            rig=None if own else rig,
             run_id=run_id,
             started_at=started_at,
             origin=origin,
@@ -126,19 +124,3 @@ async def read_run_file(request: Request, context: Reader, clutch_id: ClutchId, 
         await asyncio.wrap_future(context.workers.submit(Lane.RECORDS, copy_file, clutch_id, run_id, path))
         body = path.open("rb")  # its name goes with the folder, its content when it is closed
     return streamed(body, _FILE_TYPE, headers)
-
-
-async def _save(request: Request, path: Path, filename: str) -> str:
-    """Write the file to disk as it arrives; returns what its sender calls it."""
-    if not request.headers.get("content-type", "").startswith("multipart/form-data"):
-        with path.open("wb") as file:
-            await written(request.stream(), file)
-        return filename
-    async with request.form(max_files=1, max_fields=8) as form:
-        sent = next((part for part in form.values() if isinstance(part, UploadFile)), None)
-        if sent is None:
-            raise InvalidError("the form must hold one file")
-        with path.open("wb") as file:
-            while chunk := await sent.read(_CHUNK):
-                file.write(chunk)
-        return sent.filename or filename

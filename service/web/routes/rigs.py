@@ -1,28 +1,41 @@
 """Rig profiles, and the preview of a file before it is sent."""
 
+import asyncio
+import tempfile
 from functools import partial
+from pathlib import Path
 
 from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
 from service.errors import FieldError, InvalidError
+from service.jobs.workers import Lane
 from service.lists import from_cursor
 from service.queries import rigs
 from service.queries.cache import to_json
+from service.queries.import_preview import preview
 from service.run_files.json_run import checked
 from service.run_files.rig_profile import require_usable
-from service.schemas.parameters import RigName
-from service.schemas.rig import RigIn, RigOut, RigPage
+from service.schemas.parameters import FileCycles, FileKind, FileName, FileRig, OfClutch, RigName
+from service.schemas.rig import Preview, RigIn, RigOut, RigPage
 from service.web.answers import JSON_TYPE, answer, described_body, json_body, now
-from service.web.auth import Admin, Ingester, OwnReader, name_of_caller
+from service.web.auth import Admin, Ingester, OwnIngester, OwnReader, name_of_caller, require_clutch
 from service.web.context import Context, Cursor, Limit
+from service.web.files import received
 from service.web.limits import USUAL_ITEMS
 from service.web.problems import CHANGING, READING, SENDING
 from service.workflows.save_rig import save
 
 router = APIRouter(prefix="/v1/rigs", tags=["rigs"])
+import_router = APIRouter(prefix="/v1/import", tags=["rigs"])
 
+_BODY = {
+    "requestBody": {
+        "required": True,
+        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
 EXAMPLE = {
     "name": "bench-3",
     "columns": [
@@ -89,3 +102,28 @@ async def _saved(request: Request, context: Context, name: str | None) -> Respon
     headers = {"Location": f"/v1/rigs/{saved.name}"}
     content = to_json(saved.model_dump(mode="json"))
     return Response(content=content, status_code=201 if new else 200, media_type=JSON_TYPE, headers=headers)
+
+
+@import_router.post("/preview", response_model=Preview, responses=CHANGING, openapi_extra=_BODY)
+async def preview_file(
+    request: Request,
+    context: OwnIngester,
+    filename: FileName = "upload",
+    rig: FileRig = None,
+    kind: FileKind = None,
+    cycles: FileCycles = None,
+    clutch_id: OfClutch = None,
+) -> Response:
+    """What would be made of a file: its first rows, each column's channel and unit, what would be cut and fitted. Nothing is
+    stored. Without `rig`, and without a `profile` beside the file in a form, the profile that has the file's columns is
+    taken, else the columns' titles."""
+    if clutch_id is not None:
+        require_clutch(request, clutch_id)
+    with tempfile.TemporaryDirectory(dir=context.folder) as folder:
+        path = Path(folder) / "run"
+        filename, profile = await received(request, path, filename)
+        made = partial(
+            preview, filename=filename, rig=rig, profile=profile, kind=kind, cycles=cycles, clutch_id=clutch_id
+        )
+        shown = await asyncio.wrap_future(context.workers.submit(Lane.FILES, made, path))
+    return Response(content=to_json(shown), media_type=JSON_TYPE)

@@ -105,6 +105,7 @@ export class AuditTrail {
 /** @param {Change} change */
 function actionText({ action, before, after }) {
   const name = ACTIONS[action] ?? words(action);
+  if (action === "reread") return `${name} by rig ${shown(after.rig)}`;
   if (action === "correct") return `${name}: ${shown(before.cycles)} to ${shown(after.cycles)}`;
   if (action === "adopt" && after.diagnosis_id === null) return "Back to the baseline model";
   if (action !== "edit") return name;

@@ -6,6 +6,7 @@ import { field, h } from "../shared/dom.js";
 import { fixed, kindName } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 import { guess } from "./file_name.js";
+import { Importer } from "./importer.js";
 import { outcomeOf, receiptView } from "./receipt.js";
 
 /** @import { Receipt } from "../shared/types.js" */
@@ -50,8 +51,13 @@ export class RunFile {
     );
     const numeric = { type: "number", min: 0, step: "any", required: true, inputmode: "decimal" };
     this.cycles = h("input", { id: `cycles-${number}`, value: cycles, ...numeric });
-    const example = { placeholder: "torque_nm:Mz,speed_rpm:n", autocomplete: "off" };
-    this.map = h("input", { id: `map-${number}`, value: listed?.map, ...example });
+    /** @type {Importer | null} how a file that says nothing of its run itself is read */
+    this.importer = null;
+    if (!json && !listed) {
+      const run = { kind: this.kind, cycles: this.cycles, clutch: () => this.clutch };
+      this.importer = new Importer(file, number, run);
+    }
+    this.clutch = "";
     this.remark = h("p", { class: "remark", role: "status" });
     this.fields = h("fieldset", { class: "fields" }, json ? null : this.fileFields());
     this.element = h(
@@ -66,6 +72,7 @@ export class RunFile {
       ),
       this.remark,
       this.fields,
+      this.importer && [this.importer.lead, this.importer.element],
       this.outcome,
     );
   }
@@ -73,16 +80,9 @@ export class RunFile {
   /** What a JSON run says itself and any other file does not. */
   fileFields() {
     const byName = h("small", {}, "as the file's name says");
-    const columns = h(
-      "details",
-      { open: Boolean(this.listed?.map) },
-      h("summary", {}, "Columns are not recognised?"),
-      field(this.map, "Columns by name"),
-    );
     return [
       field(this.kind, "Kind of test", this.guessed.kind && byName.cloneNode(true)),
       field(this.cycles, "Duty cycles since new", this.guessed.cycles && byName.cloneNode(true)),
-      columns,
     ];
   }
 
@@ -102,6 +102,7 @@ export class RunFile {
    */
   compare(id) {
     const own = this.json?.clutch_id;
+    this.clutch = id;
     const other = typeof own === "string" && id !== "" && own !== id;
     this.remark.textContent = other ? `This file says that it is of ${own}, not of ${id}.` : "";
   }
@@ -167,8 +168,11 @@ export class RunFile {
       const { body } = await sendJson("POST", `${clutchPath(id)}/runs`, run);
       return body;
     }
+    const sent = this.importer?.body() ?? this.file;
+    /** @type {Record<string, string>} */
+    const headers = sent === this.file ? { "Content-Type": "application/octet-stream" } : {};
     /** @type {{ body: Receipt }} */
-    const { body } = await send("POST", this.address(id), this.file, { "Content-Type": "application/octet-stream" });
+    const { body } = await send("POST", this.address(id), sent, headers);
     return body;
   }
 
@@ -177,7 +181,7 @@ export class RunFile {
     const { run_id: name, origin, started_at: started } = this.listed ?? {};
     const query = new URLSearchParams({ kind: this.kind.value, cycles: this.cycles.value });
     query.set("filename", this.file.name.slice(-200));
-    const more = { map: this.map.value.trim(), run_id: name, origin, started_at: started };
+    const more = { map: this.listed?.map, rig: this.importer?.rig, run_id: name, origin, started_at: started };
     for (const [key, value] of Object.entries(more)) if (value) query.set(key, value);
     return `${clutchPath(id)}/runs/file?${query}`;
   }

@@ -1,7 +1,7 @@
 // @ts-check
 // Sending runs: files that are dropped or chosen go in; for each its receipt, or every place where it is wrong, comes out.
 // Open this file first: the dialog. Then batch.js (which files are runs), run_file.js (one of them), file_name.js (what its
-// name says), registration.js (a clutch that is not known yet) and receipt.js (what the service made of a run).
+// name says), importer.js (how it is read), registration.js (a clutch that is not known yet) and receipt.js (what the service made of a run).
 
 import { clutchPath, Problem, read } from "../shared/api.js";
 import { field, h } from "../shared/dom.js";
@@ -94,6 +94,20 @@ class Sending {
     document.body.append(this.dialog);
     this.dialog.showModal();
     this.firstEmpty().focus();
+    this.look();
+  }
+
+  /**
+   * See how the files are read, one after the other. Where saved profiles say all of them and the page says the clutch, they
+   * are sent without a question.
+   */
+  async look() {
+    const { runs, wrong } = this.batch;
+    for (const { importer } of runs) await importer?.look();
+    const decided = runs.length > 0 && wrong.length === 0 && runs.every(({ importer }) => importer?.decided);
+    const untouched = !this.closed && runs.every(({ progress }) => progress === "waiting");
+    if (decided && untouched && this.clutch.value === this.page.clutch)
+      this.dialog.querySelector("form")?.requestSubmit();
   }
 
   /**

@@ -577,3 +577,49 @@ export interface DiagnosisOut extends DiagnosisListed {
   maps: MapsOut | null;
   loops: LoopTraceOut[];
 }
+
+/** A column of a rig's files. */
+export interface RigColumn {
+  title: string;
+  channel: string | null;
+  unit?: string | null;
+  stated?: string | null;
+  scale?: number;
+  offset?: number;
+}
+
+/** How the files of a rig are read. */
+export interface RigProfile {
+  columns: RigColumn[];
+  decimal: string | null;
+  table: string | null;
+  kind: string | null;
+  file_name: string | null;
+}
+
+export interface PreviewColumn {
+  title: string;
+  stated_unit: string | null;
+  unit: string | null;
+  channel: string | null;
+  scale: number;
+  offset: number;
+}
+
+/** A file as it would be read. */
+export interface Preview {
+  columns: PreviewColumn[];
+  tables: string[];
+  first_rows: string[][];
+  units: Record<string, string[]>;
+  rig: string | null;
+  profile: RigProfile;
+  kind: string | null;
+  cycles: number | null;
+  missing: string[];
+  channels: Record<string, number[]>;
+  pieces: { start_s: number; stop_s: number; pressure_bar: number; speed_rpm: number | null }[];
+  fits: Fit[];
+  warnings: Warned[];
+  problem: string | null;
+}

@@ -27,6 +27,7 @@ NARROWED: dict[tuple[str, str], Scope] = {
     ("GET", "/v1/clutches"): "read",
     ("POST", "/v1/clutches"): "ingest",
     ("GET", "/v1/fleet/totals"): "read",
+    ("POST", "/v1/import/preview"): "ingest",
     ("GET", "/v1/rigs"): "read",
     ("GET", "/v1/rigs/{name}"): "read",
     ("GET", "/v1/jobs"): "read",

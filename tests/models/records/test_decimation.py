@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from models.arrays import FloatArray
-from service.queries.raw_run.decimation import extreme_rows
+from models.records.decimation import extreme_rows
 
 
 def plainly(columns: list[list[float]], points: int) -> list[int]:

@@ -1,0 +1,157 @@
+"""`clutchlife import`: a rig's file as it would be read, asked about where that is open, sent, and kept as a rig profile."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from service.cli.changes.runs import run_line
+from service.cli.connection import service_at
+from service.cli.options import EX_DATAERR, URL, Key, Patience, Url, errors_in_a_line, fail, out
+from service.cli.sending.client import Service
+
+_KINDS = ("stationary_stribeck", "dynamic_stribeck")
+#: Rows that are shown.
+_ROWS = 3
+
+
+def import_file(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", exists=True, dir_okay=False, help="A file of the rig's recorder")
+    ],
+    clutch: Annotated[str, typer.Option(help="The clutch that was tested")],
+    rig: Annotated[
+        str | None, typer.Option(help="The rig by whose profile it is read; left out, the one that fits")
+    ] = None,
+    kind: Annotated[str | None, typer.Option(help=f"The kind of run: {' or '.join(_KINDS)}")] = None,
+    cycles: Annotated[float | None, typer.Option(min=0, help="Duty cycles since new")] = None,
+    save: Annotated[
+        str | None, typer.Option("--save", help="Keep how it is read as a rig profile of this name")
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Ask nothing; end where something is missing")] = False,
+    url: Url = URL,
+    key: Key = None,
+    patience: Patience = 10.0,
+) -> None:
+    """Show how a file is read, ask for what is missing, send it, and keep the answers as a rig profile.
+
+    The next file of the rig needs no answer: `clutchlife push --rig NAME`, or import again.
+    """
+    with errors_in_a_line(), service_at(url, key, patience) as service:
+        given: dict[str, Any] = {"kind": kind, "cycles": cycles, "rig": rig}
+        profile: dict[str, Any] | None = None
+        shown = _preview(service, file, clutch, given, profile)
+        _show(shown)
+        while shown["missing"] and shown["problem"] is None and not yes:
+            profile = _asked(shown, given, profile)
+            shown = _preview(service, file, clutch, given, profile)
+            _show(shown)
+        if shown["problem"] is not None:
+            fail(shown["problem"], EX_DATAERR)
+        if shown["missing"]:
+            fail(f"still to be given: {', '.join(shown['missing'])}", EX_DATAERR)
+        if shown["rig"] is None and save is None and not yes:
+            save = (
+                typer.prompt("Keep this as the rig profile (a name, or nothing)", default="", show_default=False)
+                or None
+            )
+        if save is not None:
+            _save(service, save, shown)
+            given["rig"], profile = save, None
+        elif profile is None:
+            given["rig"] = shown["rig"]
+        if not yes and not typer.confirm(f"Send it to {clutch}?", default=True):
+            raise typer.Exit(0)
+        given |= {"kind": given["kind"] or shown["kind"], "cycles": shown["cycles"]}
+        receipt = _sent(service, f"/v1/clutches/{clutch}/runs/file", file, given, profile)
+        out.print(run_line(receipt), markup=False, soft_wrap=True)
+
+
+def _preview(
+    service: Service, file: Path, clutch: str, given: dict[str, Any], profile: dict[str, Any] | None
+) -> dict[str, Any]:
+    return _sent(service, "/v1/import/preview", file, given | {"clutch_id": clutch}, profile)
+
+
+def _sent(
+    service: Service, path: str, file: Path, given: dict[str, Any], profile: dict[str, Any] | None
+) -> dict[str, Any]:
+    """The answer to the file, read by a profile that is not saved, or by a saved one or none."""
+    parameters = {name: str(value) for name, value in given.items() if value is not None} | {"filename": file.name}
+    if profile is None:
+        return service.post_file(path, file, parameters)
+    parameters.pop("rig", None)
+    return service.post_form(path, file, profile, parameters)
+
+
+def _show(shown: dict[str, Any]) -> None:
+    """The preview: a row a column of the file, then what is cut and fitted."""
+    grid = Table(
+        title=None if shown["rig"] is None else f"read by the rig profile {shown['rig']}", title_justify="left"
+    )
+    for name in ("#", "column", "channel", "unit", "scale", "offset", *(f"row {row + 1}" for row in range(_ROWS))):
+        grid.add_column(name)
+    for index, column in enumerate(shown["columns"]):
+        read = column["channel"] is not None
+        unit = column["unit"] if read else column["stated_unit"]
+        cells = [
+            column["channel"] or "left out",
+            unit or "",
+            *(f"{column[name]:g}" if read else "" for name in ("scale", "offset")),
+        ]
+        rows = [row[index] if index < len(row) else "" for row in shown["first_rows"][:_ROWS]]
+        grid.add_row(str(index + 1), column["title"], *cells, *rows)
+    out.print(grid)
+    for warning in shown["warnings"]:
+        out.print(f"{warning['code']}: {warning['message']}", markup=False, soft_wrap=True)
+    pieces = f", {len(shown['pieces'])} pieces are cut" if shown["pieces"] else ""
+    cycles = "no cycles" if shown["cycles"] is None else f"{shown['cycles']:g} cycles"
+    out.print(
+        f"{shown['kind'] or 'kind not known'} at {cycles}: {shown['rows']} rows{pieces}, {len(shown['fits'])} curves"
+    )
+    for fit in shown["fits"]:
+        mse = "" if fit["mse_percent"] is None else f", MSE {fit['mse_percent']:.2g} %"
+        out.print(
+            f"  {fit['pressure_bar']:g} bar: {fit['points']} points, RMSE {fit['rmse_nm']:.2g} Nm{mse}", markup=False
+        )
+
+
+def _asked(shown: dict[str, Any], given: dict[str, Any], profile: dict[str, Any] | None) -> dict[str, Any] | None:
+    """Ask for each thing that is missing; the profile with the answers, `given` changed in place."""
+    columns = [dict(column) for column in shown["profile"]["columns"]]
+    edited = False
+    for name in shown["missing"]:
+        if name == "kind":
+            given["kind"] = _choice("Kind of run", list(shown["kinds"] or _KINDS))
+        elif name == "cycles":
+            given["cycles"] = typer.prompt("Duty cycles since new", type=float)
+        elif name.startswith("unit of "):
+            own = next(column for column in columns if column["title"] == name.removeprefix("unit of "))
+            own |= {"unit": _choice(name[0].upper() + name[1:], shown["units"][own["channel"]])}
+            edited = True
+        else:
+            title = _choice(f"Column of {name}", [column["title"] for column in columns if column["channel"] is None])
+            next(column for column in columns if column["title"] == title)["channel"] = name
+            edited = True
+    return shown["profile"] | {"columns": columns} if edited else profile
+
+
+def _choice(question: str, values: list[str]) -> str:
+    """One of the values, by its number."""
+    for place, value in enumerate(values, 1):
+        out.print(f"  {place}  {value}", markup=False)
+    while True:
+        number: int = typer.prompt(f"{question} (1 to {len(values)})", type=int)
+        if 1 <= number <= len(values):
+            return values[number - 1]
+
+
+def _save(service: Service, name: str, shown: dict[str, Any]) -> None:
+    """Keep how the file was read under a name."""
+    body = shown["profile"] | {"name": name, "kind": shown["profile"]["kind"] or shown["kind"]}
+    service.post("/v1/rigs", json.dumps(body).encode())
+    pattern = body["file_name"]
+    found = f"file names such as {pattern} give the cycles" if pattern else "the cycles are to be given with each file"
+    out.print(f"saved as rig {name}; {found}", markup=False, soft_wrap=True)

@@ -1,0 +1,343 @@
+// @ts-check
+// How one file is read: its first rows, each column with its channel, unit and scale to choose from, what will be cut and
+// fitted, drawn before anything is sent; and the rig profile that the choices are kept in.
+
+import { send, sendJson } from "../shared/api.js";
+import { field, h, scrolling, svg } from "../shared/dom.js";
+import { words } from "../shared/format.js";
+import { problemView } from "../shared/problem_view.js";
+import { warnings } from "./receipt.js";
+
+/** @import { Preview, PreviewColumn, RigColumn, RigProfile } from "../shared/types.js" */
+
+/** Rows that are shown. */
+const ROWS = 5;
+
+export class Importer {
+  /**
+   * @param {File} file
+   * @param {number} number tells its fields from those of other files
+   * @param {{ kind: HTMLSelectElement, cycles: HTMLInputElement, clutch: () => string }} run
+   */
+  constructor(file, number, run) {
+    this.file = file;
+    this.number = number;
+    this.run = run;
+    /** @type {Preview | null} */
+    this.shown = null;
+    /** @type {RigProfile | null} the choices, where they are not those of a saved profile */
+    this.chosen = null;
+    this.asked = 0;
+    this.lead = h("p", { class: "quiet", role: "status" }, "Reading …");
+    this.content = h("div", {});
+    this.element = h(
+      "details",
+      { class: "import" },
+      h("summary", {}, "Columns, units, and what is fitted"),
+      this.content,
+    );
+    for (const input of [run.kind, run.cycles]) input.addEventListener("change", () => this.look());
+  }
+
+  /** Whether a saved profile says all of it: then nothing is asked. */
+  get decided() {
+    const { shown } = this;
+    return shown !== null && shown.rig !== null && shown.missing.length === 0 && shown.problem === null;
+  }
+
+  /** The saved profile that the file is sent with. */
+  get rig() {
+    return this.chosen === null ? (this.shown?.rig ?? null) : null;
+  }
+
+  /** Ask how the file is read; an answer that came after a newer question is dropped. */
+  async look() {
+    const asked = (this.asked += 1);
+    const first = this.shown === null; // what only the file's name suggests is no profile's word
+    const { kind, cycles, clutch } = this.run;
+    const query = new URLSearchParams({ filename: this.file.name.slice(-200) });
+    const own = first ? {} : { kind: kind.value, cycles: cycles.value };
+    const more = { ...own, clutch_id: clutch(), rig: this.rig };
+    for (const [name, value] of Object.entries(more)) if (value) query.set(name, value);
+    try {
+      const { body } = await send("POST", `/v1/import/preview?${query}`, this.body());
+      if (asked !== this.asked) return;
+      this.show(body);
+      if (first && body.rig === null && (kind.value || cycles.value)) await this.look();
+    } catch (problem) {
+      if (asked !== this.asked) return;
+      this.lead.replaceChildren();
+      this.content.replaceChildren(problemView(problem));
+    }
+  }
+
+  /** The file, in a form with the choices where there are any. */
+  body() {
+    if (this.chosen === null) return this.file;
+    const form = new FormData();
+    form.append("profile", JSON.stringify(this.chosen));
+    form.append("file", this.file);
+    return form;
+  }
+
+  /** @param {Preview} shown */
+  show(shown) {
+    this.shown = shown;
+    if (this.rig !== null) {
+      if (shown.kind !== null) this.run.kind.value = shown.kind;
+      if (shown.cycles !== null) this.run.cycles.value = String(shown.cycles);
+    }
+    const focused = document.activeElement?.id;
+    const left = shown.missing.map((name) => words(name)).join(", ");
+    const state = shown.problem ?? (left ? `Still to be given: ${left}.` : "Can be sent.");
+    this.lead.replaceChildren(this.rig === null ? "" : h("b", {}, `Read by the rig profile ${this.rig}. `), state);
+    this.element.open ||= shown.problem !== null || this.channelsLack();
+    this.content.replaceChildren(this.columns(shown), this.options(shown), drawing(shown) ?? "");
+    const noted = warnings(shown.warnings);
+    if (noted) this.content.append(noted);
+    this.content.append(this.saving(shown));
+    if (focused) document.getElementById(focused)?.focus(); // what was chosen in was drawn again
+  }
+
+  channelsLack() {
+    return this.shown?.missing.some((name) => !["kind", "cycles"].includes(name)) ?? false;
+  }
+
+  /** @param {Preview} shown */
+  columns({ columns, first_rows: rows, units }) {
+    const head = (/** @type {string} */ name) => h("th", { scope: "row" }, name);
+    const cells = (/** @type {(column: PreviewColumn, index: number) => Node} */ cell) =>
+      columns.map((column, index) => h("td", {}, cell(column, index)));
+    const grid = h(
+      "table",
+      { class: "columns" },
+      h("caption", { class: "hidden" }, `First rows of ${this.file.name}`),
+      h(
+        "thead",
+        {},
+        h(
+          "tr",
+          {},
+          head("Column"),
+          columns.map(({ title }) => h("th", { scope: "col" }, title)),
+        ),
+      ),
+      h(
+        "tbody",
+        {},
+        h(
+          "tr",
+          {},
+          head("Channel"),
+          cells((column, index) => this.channel(column, index, Object.keys(units))),
+        ),
+        h(
+          "tr",
+          {},
+          head("Unit"),
+          cells((column, index) => this.unit(column, index, units[column.channel ?? ""] ?? [])),
+        ),
+        h(
+          "tr",
+          {},
+          head("Scale"),
+          cells((column, index) => this.number_(column, index, "scale")),
+        ),
+        h(
+          "tr",
+          {},
+          head("Offset"),
+          cells((column, index) => this.number_(column, index, "offset")),
+        ),
+        rows.slice(0, ROWS).map((row, line) => {
+          const values = columns.map((_, index) => h("td", {}, row[index] ?? ""));
+          return h("tr", {}, head(`Row ${line + 1}`), values);
+        }),
+      ),
+    );
+    return scrolling("First rows", grid);
+  }
+
+  /**
+   * @param {PreviewColumn} column
+   * @param {number} index
+   * @param {string[]} channels
+   */
+  channel({ title, channel }, index, channels) {
+    const options = channels.map((name) => h("option", { value: name, selected: name === channel }, words(name)));
+    const label = { id: this.id(index, "channel"), "aria-label": `Channel of ${title}` };
+    const choose = (/** @type {any} */ event) => {
+      const value = event.target.value || null;
+      this.choose((columns) => {
+        for (const other of columns) if (other.channel === value) Object.assign(other, { channel: null, unit: null });
+        Object.assign(columns[index], { channel: value, unit: null, stated: null });
+      });
+    };
+    return h("select", { ...label, onchange: choose }, h("option", { value: "" }, "left out"), options);
+  }
+
+  /**
+   * @param {PreviewColumn} column
+   * @param {number} index
+   * @param {string[]} units
+   */
+  unit({ title, channel, unit, stated_unit: stated }, index, units) {
+    if (channel === null) return document.createTextNode(stated ?? "");
+    const names = unit !== null && !units.includes(unit) ? [unit, ...units] : units;
+    const options = names.map((name) => h("option", { value: name, selected: name === unit }, name));
+    const label = { id: this.id(index, "unit"), "aria-label": `Unit of ${title}` };
+    const choose = (/** @type {any} */ event) =>
+      this.choose((columns) => Object.assign(columns[index], { unit: event.target.value || null, stated }));
+    return h(
+      "select",
+      { ...label, onchange: choose },
+      unit === null && h("option", { value: "" }, "choose …"),
+      options,
+    );
+  }
+
+  /**
+   * @param {PreviewColumn} column
+   * @param {number} index
+   * @param {"scale" | "offset"} name
+   */
+  number_(column, index, name) {
+    if (column.channel === null) return document.createTextNode("");
+    const label = { id: this.id(index, name), "aria-label": `${words(name)} of ${column.title}` };
+    const choose = (/** @type {any} */ event) =>
+      this.choose((columns) => Object.assign(columns[index], { [name]: Number(event.target.value) }));
+    return h("input", { ...label, type: "number", step: "any", required: true, value: column[name], onchange: choose });
+  }
+
+  /**
+   * @param {number} index
+   * @param {string} name
+   */
+  id(index, name) {
+    return `import-${this.number}-${name}-${index}`;
+  }
+
+  /** @param {Preview} shown */
+  options({ profile, tables }) {
+    const { number } = this;
+    const choose = (/** @type {"decimal" | "table"} */ name) => (/** @type {any} */ event) =>
+      this.edit((edited) => Object.assign(edited, { [name]: event.target.value || null }));
+    const marks = { "": "found", ",": "comma: 1.234,5", ".": "point: 1,234.5" };
+    const decimal = h(
+      "select",
+      { id: `decimal-${number}`, onchange: choose("decimal") },
+      Object.entries(marks).map(([value, name]) =>
+        h("option", { value, selected: value === (profile.decimal ?? "") }, name),
+      ),
+    );
+    const table = h(
+      "select",
+      { id: `table-${number}`, onchange: choose("table") },
+      ["", ...tables].map((name) =>
+        h("option", { value: name, selected: name === profile.table }, name || "the only one"),
+      ),
+    );
+    return h(
+      "div",
+      { class: "fields" },
+      field(decimal, "Decimal mark"),
+      tables.length > 1 && field(table, "Sheet or test"),
+    );
+  }
+
+  /** @param {(columns: RigColumn[]) => unknown} change */
+  choose(change) {
+    this.edit(({ columns }) => change(columns));
+  }
+
+  /** @param {(profile: RigProfile) => unknown} change */
+  edit(change) {
+    if (this.shown === null) return;
+    const profile = structuredClone(this.chosen ?? this.shown.profile);
+    change(profile);
+    this.chosen = profile;
+    this.look();
+  }
+
+  /** @param {Preview} shown */
+  saving({ profile, missing, problem }) {
+    if (this.rig !== null) return h("p", { class: "quiet" }, "The next file with these columns is read the same way.");
+    const { number } = this;
+    const name = h("input", { id: `rig-${number}`, autocomplete: "off", spellcheck: "false" });
+    const pattern = h("input", { id: `pattern-${number}`, value: profile.file_name, autocomplete: "off" });
+    const answer = h("div", { role: "status" });
+    const save = async () => {
+      const kept = { ...profile, name: name.value.trim(), file_name: pattern.value.trim() || null };
+      try {
+        await sendJson("POST", "/v1/rigs", { ...kept, kind: this.run.kind.value || profile.kind });
+        this.chosen = null;
+        if (this.shown) this.shown.rig = kept.name;
+        await this.look();
+      } catch (refused) {
+        answer.replaceChildren(problemView(refused));
+      }
+    };
+    const ready = problem === null && !this.channelsLack() && !missing.includes("kind");
+    return h(
+      "fieldset",
+      { class: "saving" },
+      h("legend", {}, "Read the next file the same way"),
+      h(
+        "div",
+        { class: "fields" },
+        field(name, "Name of the rig"),
+        field(pattern, "File names", h("small", {}, "{cycles} stands for the duty cycles, * for what differs")),
+      ),
+      h("button", { type: "button", onclick: save, disabled: !ready }, "Save as rig profile"),
+      answer,
+    );
+  }
+}
+
+const WIDTH = 640;
+const HEIGHT = 160;
+
+/**
+ * The record with what is cut of it, or the plateaus; null where nothing is read.
+ * @param {Preview} shown
+ */
+function drawing({ channels, pieces, fits, kind }) {
+  const { time_s: time, torque_nm: torque, speed_rpm: speed } = channels;
+  if (!torque?.length) return null;
+  const along = time ?? speed;
+  if (!along) return null;
+  const x = scale(along, WIDTH);
+  const y = scale([0, ...torque], HEIGHT);
+  const points = along.map((at, index) => `${x(at)},${(HEIGHT - Number(y(torque[index]))).toFixed(1)}`);
+  const cut = pieces.map(({ start_s: start, stop_s: stop }) => {
+    const width = Math.max(1, Number(x(stop)) - Number(x(start)));
+    return svg("rect", { class: "cut", x: x(start), y: 0, width, height: HEIGHT });
+  });
+  const line = time ? svg("polyline", { class: "record", points: points.join(" ") }) : null;
+  const dots = time
+    ? []
+    : points.map((point) => svg("circle", { cx: point.split(",")[0], cy: point.split(",")[1], r: 2 }));
+  const piece = kind === "dynamic_stribeck" ? "stretches of constant pressure" : "plateaus";
+  const parts = [
+    time ? `${pieces.length} ${piece} are cut` : `${torque.length} plateaus`,
+    `${fits.length} curves are fitted`,
+  ];
+  const text = `Torque over ${time ? "time" : "speed"}: ${parts.join(", ")}.`;
+  return h(
+    "figure",
+    { class: "cutting" },
+    svg("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": text }, cut, line, dots),
+    h("figcaption", {}, text),
+  );
+}
+
+/**
+ * From values to px.
+ * @param {number[]} values
+ * @param {number} size
+ */
+function scale(values, size) {
+  const low = values.reduce((a, b) => Math.min(a, b));
+  const high = values.reduce((a, b) => Math.max(a, b));
+  return (/** @type {number} */ value) => ((size * (value - low)) / (high - low || 1)).toFixed(1);
+}

@@ -1,0 +1,236 @@
+"""`/v1/import/preview`: a file as it would be read and evaluated. Nothing is stored."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.clutch import Geometry
+from models.records.decimation import extreme_rows
+from models.records.plateaus import cut_plateaus
+from models.records.pressure_stretches import pressure_stretches
+from service import records
+from service.columns import CHANNELS, RADIANS_PER_SECOND_PER_RPM, bar
+from service.errors import InvalidError
+from service.lives.incoming_run import IncomingRun, SampledChannels
+from service.lives.payloads import fit_items, notice_items
+from service.lives.run_analysis import analyse
+from service.readers.column_names import ending_unit
+from service.readers.read_file import preview_file, read_file
+from service.readers.table import Reading
+from service.readers.unit_table import conversion, spellings
+from service.run_files.rig_profile import Named, fits, named, pattern_for
+from service.run_files.upload import NEEDED, reading_with, run_of
+from service.schemas.clutch import ClutchIn
+from service.schemas.rig import RigProfile
+from storage import clutches, rigs
+from storage.engine.database import Database
+
+#: Samples of each channel that are answered. Chosen: twice the pixels of a plot's width.
+_POINTS = 2000
+
+
+def preview(
+    database: Database,
+    path: Path,
+    *,
+    filename: str,
+    rig: str | None = None,
+    profile: RigProfile | None = None,
+    kind: str | None = None,
+    cycles: float | None = None,
+    clutch_id: str | None = None,
+) -> dict[str, Any]:
+    """What would be made of a file by `profile`, by that of `rig`, or by the one whose columns it has; else by its titles.
+
+    `clutch_id`: the clutch whose geometry and torque filter evaluate it, where it is registered already. Raises InvalidError
+    or TooLargeError where no table is found, NotFoundError where the rig is unknown.
+    """
+    geometry, torque_filter = _clutch(database, clutch_id)
+    if profile is None and rig is not None:
+        with database.reading() as connection:
+            profile = records.rig(connection, rig)
+    shown = preview_file(path, filename=filename, reading=reading_with(profile, Reading()))
+    if profile is None:
+        rig, profile = _fitting(database, shown, filename)
+        shown = preview_file(path, filename=filename, reading=reading_with(profile, Reading())) if profile else shown
+    own = Named() if profile is None else named(profile, filename, shown["labels"])
+    used = _by_titles(shown) if profile is None else profile
+    kind, cycles = kind or own.kind, own.cycles if cycles is None else cycles
+    evaluated = _evaluated(path, filename, used, kind, geometry, torque_filter)
+    kind = kind or (evaluated["kinds"][0] if len(evaluated["kinds"]) == 1 else None)
+    kept = _first_of_each(shown["columns"])
+    columns = [_column(shown["columns"][index], used) for index in kept]
+    return {
+        "filename": filename,
+        "above": shown["above"],
+        "tables": shown["tables"],
+        "columns": columns,
+        "first_rows": [[row[index] if index < len(row) else "" for index in kept] for row in shown["head"]],
+        "units": {name: spellings(name).split(", ") for name in CHANNELS},
+        "rig": rig,
+        "profile": _saveable(shown, used, kind, filename, cycles),
+        "kind": kind,
+        "cycles": cycles,
+        "run_id": own.run_id,
+        **evaluated,
+        "missing": [
+            *evaluated["missing"],
+            *_without_unit(columns),
+            *(["kind"] if kind is None else []),
+            *(["cycles"] if cycles is None else []),
+        ],
+    }
+
+
+def _clutch(database: Database, clutch_id: str | None) -> tuple[Geometry, float]:
+    with database.reading() as connection:
+        row = None if clutch_id is None else clutches.get(connection, clutch_id)
+    record = ClutchIn(clutch_id="any") if row is None else records.record(row)
+    return record.geometry.to_model(), record.torque_filter
+
+
+def _title(column: Mapping[str, Any]) -> str:
+    """A column as a profile names it."""
+    return f"{column['group']}/{column['name']}" if column["group"] else str(column["name"])
+
+
+def _first_of_each(columns: Sequence[Mapping[str, Any]]) -> list[int]:
+    """The indices of columns that have a title, the first of those of equal titles."""
+    titles = [_title(column) if column["name"] else "" for column in columns]
+    return [index for index, title in enumerate(titles) if title and titles.index(title) == index]
+
+
+def _fitting(database: Database, shown: Mapping[str, Any], filename: str) -> tuple[str | None, RigProfile | None]:
+    """The one profile that has the file's columns; of several, the one whose pattern has the file's name."""
+    titles = [_title(column) for column in shown["columns"] if column["name"]]
+    with database.reading() as connection:
+        found = [profile for row in rigs.page(connection) if fits(profile := records.rig_out(row), titles)]
+    if len(found) > 1:
+        found = [
+            profile for profile in found if profile.file_name and named(profile, filename, {}) != _nothing(profile)
+        ]
+    return (found[0].name, found[0]) if len(found) == 1 else (None, None)
+
+
+def _nothing(profile: RigProfile) -> Named:
+    """What a profile says of a file whose name says nothing."""
+    return Named(kind=profile.kind)
+
+
+def _by_titles(shown: Mapping[str, Any]) -> RigProfile | None:
+    """The columns as their titles name them; None where no title is a channel's. A channel of two columns is left open."""
+    channels = [column["channel"] for column in shown["columns"]]
+    columns: dict[str, dict[str, Any]] = {}
+    for column, channel in zip(shown["columns"], channels, strict=True):
+        if column["name"]:
+            only = channel is not None and channels.count(channel) == 1
+            columns.setdefault(_title(column), {"title": _title(column), "channel": channel if only else None})
+    if not any(column["channel"] for column in columns.values()):
+        return None
+    return RigProfile.model_validate({"columns": list(columns.values())})
+
+
+def _column(column: Mapping[str, Any], profile: RigProfile | None) -> dict[str, Any]:
+    title = _title(column)
+    own = next((item for item in profile.columns if item.title == title), None) if profile else None
+    channel = None if own is None else own.channel
+    unit = (
+        None if channel is None or own is None else own.unit or column["unit"] or ending_unit(channel, column["name"])
+    )
+    known = channel is not None and unit is not None and conversion(channel, unit) is not None
+    return {
+        "title": title,
+        "stated_unit": column["unit"],
+        "unit": unit
+        if known
+        else CHANNELS[channel].unit
+        if channel is not None and channel == column["name"]
+        else None,
+        "channel": channel,
+        "scale": 1.0 if own is None else own.scale,
+        "offset": 0.0 if own is None else own.offset,
+    }
+
+
+def _without_unit(columns: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What is missing of columns that are channels: nothing is taken for the channel's own unit without a word."""
+    return [f"unit of {column['title']}" for column in columns if column["channel"] and not column["unit"]]
+
+
+def _saveable(
+    shown: Mapping[str, Any], used: RigProfile | None, kind: str | None, filename: str, cycles: float | None
+) -> dict[str, Any]:
+    """The profile as it could be saved: with all columns, and a pattern of the file's name where the cycles are in that."""
+    titles = dict.fromkeys(_title(column) for column in shown["columns"] if column["name"])
+    own = {column.title: column.model_dump(mode="json") for column in used.columns} if used else {}
+    others = {} if used is None else used.model_dump(mode="json")
+    suggested = {
+        "file_name": others.get("file_name") or pattern_for(filename, cycles),
+        "kind": others.get("kind") or kind,
+    }
+    columns = [own.get(title, {"title": title, "channel": None}) for title in titles]
+    kept = set(RigProfile.model_fields)
+    return {name: value for name, value in (others | suggested | {"columns": columns}).items() if name in kept}
+
+
+def _evaluated(
+    path: Path, filename: str, profile: RigProfile | None, kind: str | None, geometry: Geometry, torque_filter: float
+) -> dict[str, Any]:
+    """The channels, what is cut of them and what is fitted; `problem` says why the file would be refused."""
+    answer: dict[str, Any] = {
+        "rows": 0, "kinds": [], "missing": [], "channels": {}, "pieces": [], "fits": [], "warnings": [], "problem": None,
+    }  # fmt: skip
+    if profile is None:
+        return answer | {"missing": list(NEEDED["stationary_stribeck"])}
+    try:
+        read = read_file(path, filename=filename, reading=reading_with(profile, Reading()))
+        columns, samples = read.columns, max(column.size for column in read.columns.values())
+        answer |= {
+            "rows": samples,
+            "channels": _drawn(columns, samples),
+            "kinds": [name for name, needed in NEEDED.items() if columns.keys() >= set(needed)],
+            "missing": [name for name in NEEDED[kind or "stationary_stribeck"] if name not in columns],
+            "warnings": notice_items(read.notices),
+        }
+        kind = kind or (answer["kinds"][0] if len(answer["kinds"]) == 1 else None)
+        if kind is None or answer["missing"]:
+            return answer
+        run = run_of(read, kind=kind, cycles=0.0)
+        analysis = analyse(run, geometry, torque_filter)
+        return answer | {
+            "pieces": _pieces(run, torque_filter),
+            "fits": fit_items(analysis.fits, {}),
+            "warnings": [*(run.file or {})["warnings"], *notice_items(analysis.warnings)],
+        }
+    except InvalidError as error:
+        return answer | {"problem": error.detail}
+
+
+def _drawn(columns: Mapping[str, FloatArray], samples: int) -> dict[str, list[float]]:
+    if samples > _POINTS:
+        rows = extreme_rows(columns.values(), len(columns), samples=samples, points=_POINTS)
+        columns = {name: column[rows] for name, column in columns.items()}
+    return {name: column.tolist() for name, column in columns.items()}
+
+
+def _pieces(run: IncomingRun, torque_filter: float) -> list[dict[str, Any]]:
+    """The plateaus of a sampled stationary test, or the stretches of constant pressure of a dynamic one."""
+    if "time_s" not in run.channels:
+        return []
+    if run.kind == "stationary_stribeck":
+        cut = cut_plateaus(SampledChannels(run.channels), torque_filter)
+        speeds: Sequence[float | None] = (cut.plateaus.speed / RADIANS_PER_SECOND_PER_RPM).tolist()
+        found = zip(cut.start.tolist(), cut.stop.tolist(), cut.plateaus.pressure.tolist(), speeds, strict=True)
+        return [_piece(*piece) for piece in found]
+    record = SampledChannels(run.channels)
+    order = np.argsort(record.time, kind="stable")
+    time = record.time[order]
+    stretches = pressure_stretches(time, record.pressure[order])
+    return [_piece(float(time[s.start]), float(time[s.stop - 1]), s.pressure, None) for s in stretches]
+
+
+def _piece(start: float, stop: float, pressure: float, speed: float | None) -> dict[str, Any]:
+    return {"start_s": start, "stop_s": stop, "pressure_bar": bar(pressure), "speed_rpm": speed}

@@ -1,0 +1,125 @@
+"""A rig's first file is described once on the page; its second is taken without a question."""
+
+import io
+from collections.abc import Iterator
+from typing import Any
+
+import httpx2
+import openpyxl
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.driving import Watched
+from tests.browser.dropping import drop
+from tests.journeys.dashboard.test_axe import violations
+from tests.support import ONCE, SPEEDS_RPM, Server, serving, stationary
+
+pytestmark = pytest.mark.browser
+
+TITLES = ("Druck", "Drehzahl", "Mz", "Öltemperatur", "Bemerkung")
+OF_WORKBOOK = ("Druck", "Drehzahl", "Mx", "Öltemperatur", "Bemerkung")
+UNITS = ("bar", "1/min", "kNm", "°C", "")
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with serving(tmp_path_factory.mktemp("importer") / "clutchlife.db", loaded=True) as running:
+        with httpx2.Client(base_url=running.url, timeout=60) as http:
+            http.post("/v1/clutches", json={"clutch_id": "bench3-017"}).raise_for_status()
+        yield running
+
+
+@pytest.fixture
+def watched(browser: Browser, server: Server) -> Iterator[Watched]:
+    found = Watched(browser, server.url)
+    yield found
+    found.close()
+
+
+def rows_of(cycles: int) -> list[tuple[float, float, float, float, str]]:
+    """A stationary test with its torque in kNm."""
+    channels = stationary(cycles, pressures=(4.0, 5.0, 6.0), speeds=SPEEDS_RPM[::4])["channels"]
+    columns = (channels["pressure_bar"], channels["speed_rpm"], channels["torque_nm"])
+    return [(p, n, round(m / 1000, 7), 85.0, "i.O.") for p, n, m in zip(*columns, strict=True)]
+
+
+def workbook(cycles: int) -> bytes:
+    """A German workbook with a title block and a row of units."""
+    book = openpyxl.Workbook()
+    sheet = book.active
+    assert sheet is not None
+    sheet.title = "Messung"
+    for line in [
+        ("Prüfstand", "3"),
+        ("Prüfer", "Müller"),
+        ("Lastspiele", cycles),
+        (),
+        OF_WORKBOOK,
+        UNITS,
+        *rows_of(cycles),
+    ]:
+        sheet.append(line)
+    content = io.BytesIO()
+    book.save(content)
+    return content.getvalue()
+
+
+def text(cycles: int) -> bytes:
+    """The same as a German program exports it: semicolons, decimal commas, Latin-1."""
+
+    def cell(value: Any) -> str:
+        return str(value).replace(".", ",") if isinstance(value, float) else str(value)
+
+    head = ["Prüfstand;3", "Prüfer;Müller", f"Lastspiele;{cycles}", "", ";".join(TITLES), ";".join(UNITS)]
+    return "\r\n".join([*head, *(";".join(map(cell, row)) for row in rows_of(cycles))]).encode("latin-1")
+
+
+@pytest.mark.parametrize(("ending", "content", "torque"), [("csv", text, "Mz"), ("xlsx", workbook, "Mx")])
+def test_the_second_file_of_a_rig_is_taken_without_a_question(
+    watched: Watched, server: Server, ending: str, content: Any, torque: str
+) -> None:
+    rig = f"bench-3-{torque}"
+    first, second = (1000, 2000) if ending == "csv" else (3000, 4000)
+    page = opened(watched)
+    drop(page, {f"Stat_{first}_a.{ending}": content(first)})
+    dialog = page.get_by_role("dialog", name="Send a run")
+    expect(dialog.get_by_text("Still to be given")).to_be_visible()  # no title says which column is the torque
+    dialog.get_by_label(f"Channel of {torque}").select_option("torque_nm")
+    expect(dialog.get_by_label(f"Unit of {torque}")).to_have_value("kNm")
+    dialog.get_by_label("Kind of test").select_option("stationary_stribeck")
+    expect(dialog.get_by_text("3 curves are fitted")).to_be_visible()
+    expect(dialog.get_by_label("File names")).to_have_value(f"Stat_{{cycles}}_a.{ending}")
+    assert ONCE.get(f"{server.url}/v1/clutches/bench3-017/runs").json()["items"] == [] or ending == "xlsx"
+    dialog.get_by_label("Name of the rig").fill(rig)
+    dialog.get_by_label("File names").fill(f"Stat_{{cycles}}_*.{ending}")
+    dialog.get_by_role("button", name="Save as rig profile").click()
+    expect(dialog.get_by_text(f"Read by the rig profile {rig}.")).to_be_visible()
+    dialog.get_by_role("button", name="Send", exact=True).click()
+    expect(dialog.get_by_text("Stored", exact=True)).to_be_visible()
+
+    page = opened(watched)
+    drop(page, {f"Stat_{second}_b.{ending}": content(second)})
+    expect(page.get_by_role("dialog").get_by_text("Stored", exact=True)).to_be_visible()
+    receipt = ONCE.get(f"{server.url}/v1/clutches/bench3-017/runs").json()["items"][-1]
+    assert (receipt["cycles"], receipt["kind"], receipt["file"]["rig"]) == (second, "stationary_stribeck", rig)
+    channels = ONCE.get(f"{server.url}/v1/clutches/bench3-017/runs/{receipt['run_id']}").json()["channels"]
+    assert channels["torque_nm"] == pytest.approx([1000 * row[2] for row in rows_of(second)])
+
+
+def opened(watched: Watched) -> Page:
+    page = watched.open("/clutches/bench3-017")
+    page.get_by_text("Live, as of").wait_for()
+    return page
+
+
+def test_the_importer_is_used_by_keyboard_and_passes_axe(watched: Watched) -> None:
+    page = opened(watched)
+    drop(page, {"other.csv": text(5000).replace(b"Mz", b"M_z1")})
+    dialog = page.get_by_role("dialog", name="Send a run")
+    expect(dialog.get_by_label("Channel of M_z1")).to_be_visible()
+    dialog.get_by_label("Channel of M_z1").focus()
+    page.keyboard.type("torque nm")
+    expect(dialog.get_by_label("Unit of M_z1")).to_have_value("kNm")
+    expect(dialog.get_by_label("Channel of M_z1")).to_be_focused()
+    expect(dialog.get_by_label("Channel of M_z1")).to_have_value("torque_nm")
+    assert violations(page) == []

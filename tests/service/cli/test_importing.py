@@ -1,0 +1,59 @@
+"""`clutchlife import`: a rig's first file is asked about once, its second is sent without a question."""
+
+from collections.abc import Callable
+from contextlib import nullcontext
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+from typer.testing import CliRunner
+
+from service.cli import connection
+from service.cli.main import app
+from service.cli.options import EX_DATAERR
+from tests.service.web.test_import_preview import german
+
+Terminal = Callable[..., str]
+
+
+@pytest.fixture
+def terminal(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> Terminal:
+    """A terminal whose service knows a clutch, and what is typed at its questions."""
+    monkeypatch.setattr(connection, "connect", lambda *_, **__: nullcontext(client))
+
+    def typed(*arguments: str | Path, answers: str = "", code: int = 0) -> str:
+        done = CliRunner().invoke(app, list(map(str, arguments)), input=answers, env={"COLUMNS": "200"})
+        assert done.exit_code == code, done.output
+        return done.output
+
+    return typed
+
+
+def test_a_first_file_is_asked_about_and_the_second_is_not(
+    terminal: Terminal, client: TestClient, tmp_path: Path
+) -> None:
+    first, second = tmp_path / "Stat_7000.csv", tmp_path / "Stat_8000.csv"
+    first.write_bytes(german(7000))
+    second.write_bytes(german(8000))
+    # the torque is the first column that is left out, the kind the first of those that fit, the cycles, the name, send
+    shown = terminal("import", first, "--clutch", "c1", answers="1\n1\n7000\nbench-3\ny\n")
+    assert "Column of torque_nm" in shown
+    assert "saved as rig bench-3; file names such as Stat_{cycles}.csv give the cycles" in shown
+    assert "3 curves" in shown
+    again = terminal("import", second, "--clutch", "c1", "--yes")
+    assert "read by the rig profile bench-3" in again
+    receipts = client.get("/v1/clutches/c1/runs").json()["items"]
+    assert [(receipt["cycles"], receipt["file"]["rig"]) for receipt in receipts] == [
+        (7000, "bench-3"),
+        (8000, "bench-3"),
+    ]
+
+
+def test_what_is_missing_ends_it_where_nothing_may_be_asked(
+    terminal: Terminal, client: TestClient, tmp_path: Path
+) -> None:
+    file = tmp_path / "Stat_7000.csv"
+    file.write_bytes(german(7000))
+    shown = terminal("import", file, "--clutch", "c1", "--yes", "--cycles", "7000", code=EX_DATAERR)
+    assert "still to be given: torque_nm, kind" in shown
+    assert client.get("/v1/clutches/c1/runs").json()["items"] == []

@@ -1,0 +1,140 @@
+"""A file as it would be read, before anything is stored."""
+
+import json
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from tests.service.run_files.test_upload import dynamic_record, raw_record
+from tests.support import SPEEDS_RPM, stationary
+
+ADDRESS = "/v1/import/preview"
+
+
+def german(cycles: int, *, torque: str = "Mz", unit: str = "kNm") -> bytes:
+    """A stationary test as a German program exports it: a title block, semicolons, decimal commas, Latin-1."""
+    channels = stationary(cycles, pressures=(4.0, 5.0, 6.0), speeds=SPEEDS_RPM[::4])["channels"]
+    rows = zip(channels["pressure_bar"], channels["speed_rpm"], channels["torque_nm"], strict=True)
+    lines = [";".join(f"{value:.7g}".replace(".", ",") for value in (p, n, m / 1000)) + ";i.O." for p, n, m in rows]
+    head = ["Prüfstand;3", "Prüfer;Müller", f"Lastspiele;{cycles}", "", f"Druck;Drehzahl;{torque};Bemerkung"]
+    return "\r\n".join([*head, f"bar;1/min;{unit};", *lines]).encode("latin-1")
+
+
+def preview(client: TestClient, content: bytes, profile: dict[str, Any] | None = None, **query: Any) -> dict[str, Any]:
+    given = {"filename": "Stat_7000_a.csv"} | query
+    if profile is None:
+        answer = client.post(ADDRESS, params=given, content=content)
+    else:
+        files = {"file": (given["filename"], content)}
+        answer = client.post(ADDRESS, params=given, data={"profile": json.dumps(profile)}, files=files)
+    assert answer.status_code == 200, answer.text
+    shown: dict[str, Any] = answer.json()
+    return shown
+
+
+def chosen(shown: dict[str, Any], title: str, **values: Any) -> dict[str, Any]:
+    """The profile of a preview with other values of one column."""
+    columns = [
+        column | values if column["title"].startswith(title) else column for column in shown["profile"]["columns"]
+    ]
+    profile: dict[str, Any] = shown["profile"] | {"columns": columns}
+    return profile
+
+
+def test_a_first_file_becomes_a_profile_and_the_second_needs_no_answer(client: TestClient) -> None:
+    first = preview(client, german(7000))
+    assert first["above"][:3] == [["Prüfstand", "3"], ["Prüfer", "Müller"], ["Lastspiele", "7000"]]
+    assert first["first_rows"][0][0].startswith("4")
+    assert (first["rig"], first["missing"], first["problem"]) == (None, ["torque_nm", "kind", "cycles"], None)
+    profile = chosen(first, "Mz", channel="torque_nm")
+    second = preview(client, german(7000), profile, kind="stationary_stribeck", cycles=7000)
+    assert (second["missing"], second["problem"]) == ([], None)
+    assert [round(fit["pressure_bar"], 3) for fit in second["fits"]] == [4, 5, 6]
+    torque = second["channels"]["torque_nm"]
+    assert torque == pytest.approx(
+        stationary(7000, pressures=(4.0, 5.0, 6.0), speeds=SPEEDS_RPM[::4])["channels"]["torque_nm"]
+    )
+    assert second["profile"]["file_name"] == "Stat_{cycles}_a.csv"
+    assert client.get("/v1/rigs").json()["items"] == []
+    assert client.get("/v1/clutches/c1/runs").json()["items"] == []  # nothing was stored
+
+    assert (
+        client.post(
+            "/v1/rigs", json=second["profile"] | {"name": "bench-3", "file_name": "Stat_{cycles}_*.csv"}
+        ).status_code
+        == 201
+    )
+    third = preview(client, german(8000), filename="Stat_8000_b.csv")
+    assert (third["rig"], third["kind"], third["cycles"], third["missing"]) == (
+        "bench-3",
+        "stationary_stribeck",
+        8000,
+        [],
+    )
+    assert preview(client, german(8000, torque="Mx"), filename="Stat_8000_b.csv")["rig"] is None  # other columns
+    receipt = client.post("/v1/clutches/c1/runs/file?rig=bench-3&filename=Stat_8000_b.csv", content=german(8000)).json()
+    assert [fit["pressure_bar"] for fit in receipt["fits"]] == [fit["pressure_bar"] for fit in third["fits"]]
+    assert receipt["fits"][0]["parameters"] == third["fits"][0]["parameters"]
+
+
+def test_cycles_stand_in_a_cell_above_the_table(client: TestClient) -> None:
+    first = preview(client, german(7000))
+    profile = chosen(first, "Mz", channel="torque_nm") | {"cycles_cell": "Lastspiele", "kind": "stationary_stribeck"}
+    shown = preview(client, german(7000), profile, filename="run.csv")
+    assert (shown["cycles"], shown["missing"]) == (7000, [])
+    client.post("/v1/rigs", json=profile | {"name": "cell", "file_name": None})
+    receipt = client.post("/v1/clutches/c1/runs/file?rig=cell&filename=run.csv", content=german(7500))
+    assert receipt.json()["cycles"] == 7500
+
+
+def test_a_unit_is_chosen_never_taken_for_granted_and_not_overruled_in_silence(client: TestClient) -> None:
+    bare = german(0, torque="M", unit="")
+    profile = chosen(preview(client, bare), "M", channel="torque_nm")
+    open_ = preview(client, bare, profile, kind="stationary_stribeck", cycles=0)
+    assert open_["missing"] == ["unit of M"]
+    given = chosen(open_, "M", unit="kNm")
+    assert preview(client, bare, given, kind="stationary_stribeck", cycles=0)["missing"] == []
+    client.post("/v1/rigs", json=given | {"name": "bare", "kind": "stationary_stribeck"})
+    address = "/v1/clutches/c1/runs/file?rig=bare&cycles=0"
+    other = client.post(address, content=german(0, torque="M", unit="Nm"))
+    assert (other.status_code, other.json()["errors"][0]["code"]) == (422, "mixed_units")
+    assert client.post(address, content=german(0, torque="M", unit="kNm")).status_code == 201
+
+
+def test_a_scale_and_an_offset_are_of_the_channel(client: TestClient) -> None:
+    first = preview(client, german(0))
+    plain = preview(client, german(0), chosen(first, "Mz", channel="torque_nm"))["channels"]["torque_nm"]
+    scaled = preview(client, german(0), chosen(first, "Mz", channel="torque_nm", scale=2.0, offset=-1.5))
+    assert scaled["channels"]["torque_nm"] == pytest.approx([2 * value - 1.5 for value in plain])
+
+
+def test_columns_that_are_left_out_stay_so_whatever_their_names(client: TestClient) -> None:
+    shown = preview(client, german(0))
+    without = preview(client, german(0), chosen(shown, "Drehzahl", channel=None))
+    assert "speed_rpm" in without["missing"]
+    assert "speed_rpm" not in without["channels"]
+
+
+@pytest.mark.parametrize("kind", ["stationary_stribeck", "dynamic_stribeck"])
+def test_what_is_cut_of_a_record_is_shown_before_it_is_sent(client: TestClient, kind: str) -> None:
+    record = raw_record() if kind == "stationary_stribeck" else dynamic_record()
+    rows = zip(*record.values(), strict=True)
+    content = "\n".join([",".join(record), *(",".join(map(repr, row)) for row in rows)]).encode()
+    assert preview(client, content)["kinds"] == ["stationary_stribeck", "dynamic_stribeck"]
+    shown = preview(client, content, kind=kind, cycles=0)
+    assert shown["missing"] == []
+    assert len(shown["pieces"]) == (24 if kind == "stationary_stribeck" else 1)
+    assert len(shown["fits"]) == (3 if kind == "stationary_stribeck" else 0)
+    assert len(shown["channels"]["time_s"]) <= 2000 < len(record["time_s"]) or kind == "dynamic_stribeck"
+
+
+def test_a_file_that_would_be_refused_says_why_and_one_that_is_no_table_is_422(client: TestClient) -> None:
+    wrong = german(0).replace(b"i.O.", b"i.O.", 1).replace(b";20;", b";abc;", 1)
+    shown = preview(
+        client, wrong, chosen(preview(client, german(0)), "Mz", channel="torque_nm"), kind="stationary_stribeck"
+    )
+    assert "abc" in shown["problem"]
+    assert client.post(ADDRESS, content=b"\x89PNG\r\n").status_code == 422
+    assert client.post(ADDRESS, content=b"").status_code == 422
+    assert client.post(f"{ADDRESS}?rig=none", content=german(0)).status_code == 404
