@@ -45,7 +45,7 @@ def import_file(
         shown = _preview(service, file, clutch, given, profile)
         _show(shown)
         while shown["missing"] and shown["problem"] is None and not yes:
-            profile = _asked(shown, given, profile)
+            profile = _answered(shown, given, profile)
             shown = _preview(service, file, clutch, given, profile)
             _show(shown)
         if shown["problem"] is not None:
@@ -118,7 +118,7 @@ def _show(shown: dict[str, Any]) -> None:
         )
 
 
-def _asked(shown: dict[str, Any], given: dict[str, Any], profile: dict[str, Any] | None) -> dict[str, Any] | None:
+def _answered(shown: dict[str, Any], given: dict[str, Any], profile: dict[str, Any] | None) -> dict[str, Any] | None:
     """Ask for each thing that is missing; the profile with the answers, `given` changed in place."""
     columns = [dict(column) for column in shown["profile"]["columns"]]
     edited = False
@@ -153,5 +153,5 @@ def _save(service: Service, name: str, shown: dict[str, Any]) -> None:
     body = shown["profile"] | {"name": name, "kind": shown["profile"]["kind"] or shown["kind"]}
     service.post("/v1/rigs", json.dumps(body).encode())
     pattern = body["file_name"]
-    found = f"file names such as {pattern} give the cycles" if pattern else "the cycles are to be given with each file"
-    out.print(f"saved as rig {name}; {found}", markup=False, soft_wrap=True)
+    cycles = f"file names such as {pattern} give the cycles" if pattern else "the cycles are to be given with each file"
+    out.print(f"saved as rig {name}; {cycles}", markup=False, soft_wrap=True)

@@ -107,12 +107,12 @@ def _fitting(database: Database, shown: Mapping[str, Any], filename: str) -> tup
     """The one profile that has the file's columns; of several, the one whose pattern has the file's name."""
     titles = [_title(column) for column in shown["columns"] if column["name"]]
     with database.reading() as connection:
-        found = [profile for row in rigs.page(connection) if fits(profile := records.rig_out(row), titles)]
-    if len(found) > 1:
-        found = [
-            profile for profile in found if profile.file_name and named(profile, filename, {}) != _nothing(profile)
+        fitting = [profile for row in rigs.page(connection) if fits(profile := records.rig_out(row), titles)]
+    if len(fitting) > 1:
+        fitting = [
+            profile for profile in fitting if profile.file_name and named(profile, filename, {}) != _nothing(profile)
         ]
-    return (found[0].name, found[0]) if len(found) == 1 else (None, None)
+    return (fitting[0].name, fitting[0]) if len(fitting) == 1 else (None, None)
 
 
 def _nothing(profile: RigProfile) -> Named:
@@ -140,12 +140,12 @@ def _column(column: Mapping[str, Any], profile: RigProfile | None) -> dict[str, 
     unit = (
         None if channel is None or own is None else own.unit or column["unit"] or ending_unit(channel, column["name"])
     )
-    known = channel is not None and unit is not None and conversion(channel, unit) is not None
+    understood = channel is not None and unit is not None and conversion(channel, unit) is not None
     return {
         "title": title,
         "stated_unit": column["unit"],
         "unit": unit
-        if known
+        if understood
         else CHANNELS[channel].unit
         if channel is not None and channel == column["name"]
         else None,
@@ -223,8 +223,8 @@ def _pieces(run: IncomingRun, torque_filter: float) -> list[dict[str, Any]]:
     if run.kind == "stationary_stribeck":
         cut = cut_plateaus(SampledChannels(run.channels), torque_filter)
         speeds: Sequence[float | None] = (cut.plateaus.speed / RADIANS_PER_SECOND_PER_RPM).tolist()
-        found = zip(cut.start.tolist(), cut.stop.tolist(), cut.plateaus.pressure.tolist(), speeds, strict=True)
-        return [_piece(*piece) for piece in found]
+        plateaus = zip(cut.start.tolist(), cut.stop.tolist(), cut.plateaus.pressure.tolist(), speeds, strict=True)
+        return [_piece(*piece) for piece in plateaus]
     record = SampledChannels(run.channels)
     order = np.argsort(record.time, kind="stable")
     time = record.time[order]

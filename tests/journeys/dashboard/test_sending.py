@@ -195,7 +195,7 @@ def test_what_is_wrong_with_a_file_is_said_by_row(watched: Watched, server: Serv
     dialog.get_by_label("Duty cycles since new").fill("30000")
     page.keyboard.press("Enter")
     dialog.get_by_text("Not stored.").wait_for()
-    table = [row.split("\t") for row in dialog.locator("table tbody tr").all_inner_texts()]
+    table = [row.split("\t") for row in dialog.locator(".outcome table tbody tr").all_inner_texts()]
     assert [row[0] for row in table] == ["2", "4"]
     assert table[0][1:3] == ["/channels/torque_nm/1", "abc"]
     assert "must be a number" in table[0][3]

@@ -27,7 +27,7 @@ export class Importer {
     this.shown = null;
     /** @type {RigProfile | null} the choices, where they are not those of a saved profile */
     this.chosen = null;
-    this.asked = 0;
+    this.questions = 0;
     this.lead = h("p", { class: "quiet", role: "status" }, "Reading …");
     this.content = h("div", {});
     this.element = h(
@@ -52,7 +52,7 @@ export class Importer {
 
   /** Ask how the file is read; an answer that came after a newer question is dropped. */
   async look() {
-    const asked = (this.asked += 1);
+    const question = (this.questions += 1);
     const first = this.shown === null; // what only the file's name suggests is no profile's word
     const { kind, cycles, clutch } = this.run;
     const query = new URLSearchParams({ filename: this.file.name.slice(-200) });
@@ -61,11 +61,11 @@ export class Importer {
     for (const [name, value] of Object.entries(more)) if (value) query.set(name, value);
     try {
       const { body } = await send("POST", `/v1/import/preview?${query}`, this.body());
-      if (asked !== this.asked) return;
+      if (question !== this.questions) return;
       this.show(body);
       if (first && body.rig === null && (kind.value || cycles.value)) await this.look();
     } catch (problem) {
-      if (asked !== this.asked) return;
+      if (question !== this.questions) return;
       this.lead.replaceChildren();
       this.content.replaceChildren(problemView(problem));
     }
