@@ -34,6 +34,7 @@ NUMERIC = re.compile(
 #: A point in time or a duration, with a clock's colon or a date's marks.
 TIMELIKE = re.compile(
     r"[+-]?\d[\d./T ,+-]*:[\d:.,+Z -]*([AaPp][Mm])?|\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ].*)?|\d+ days? .*"
+    r"|\d{1,2}[- ][A-Za-z]{3}[- ]\d{4}( .*)?"
 )
 
 
@@ -46,6 +47,10 @@ class Layout:
     titles: int
     start: int
     score: tuple[int, int, int, int]
+
+    def texts(self) -> tuple[tuple[str, str, str], ...]:
+        """The titles, units and groups."""
+        return tuple((title, unit, group) for title, unit, group, _ in self.headings)
 
     def columns(self) -> tuple[Column, ...]:
         """The columns. Raises InvalidError on a title that is too long, or beside whose unit another is stated."""
@@ -62,7 +67,10 @@ def find_table(rows: Sequence[Row], comments: frozenset[int], named: Sequence[st
     """
     runs = list(_runs(rows, comments)) or [(len(rows), 0)]  # titles without data are a table too
     layouts = [_layout([*rows, ()], comments, start, length, named) for start, length in runs]
-    return max((layout for layout in layouts if layout), key=lambda layout: layout.score, default=None)
+    found = [layout for layout in layouts if layout]
+    best = max(found, key=lambda layout: layout.score, default=None)
+    # titles that are repeated within the data do not begin another table
+    return next((layout for layout in found if best and layout.texts() == best.texts()), None)
 
 
 def _runs(rows: Sequence[Row], comments: frozenset[int]) -> Iterator[tuple[int, int]]:
@@ -148,7 +156,7 @@ def _titles(rows: Sequence[Row], upwards: Sequence[int], width: int) -> Iterator
     while own and not own[-1]:
         own.pop()
     yield own
-    if len(upwards) < 2 or len(own) < 2:
+    if len(upwards) < 2 or len(own) < 2 or _are_units(own):
         return
     above = [_text(cell) for cell in rows[upwards[1]]]
     if sum(map(bool, above)) < 2:

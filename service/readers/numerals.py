@@ -212,9 +212,13 @@ class Stamps:
         return self._dates[date]
 
 
+#: The day from which days are counted, so that nanoseconds fit 64 bits.
+_EPOCH = datetime(2000, 1, 1)
+
+
 def _day_by(date: str, order: str) -> int | None:
     try:
-        return datetime.strptime(date, order).toordinal()
+        return (datetime.strptime(date, order) - _EPOCH).days
     except ValueError:
         return None
 

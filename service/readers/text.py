@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pydantic_core
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
@@ -31,6 +32,9 @@ from service.readers.table import Reading, Table
 _FIRST_BLOCK, _BLOCK = 1 << 17, 1 << 18
 #: Bytes of text that wait for a number which shows the decimal sign. Chosen: a test of plateaus is a thousandth.
 _MOST_WAITING = 8 << 20
+#: What a block of nothing but numbers is made of.
+_BARE = b"0123456789.eE+-,\n"
+_NEWLINE, _COMMA = b"\n,"
 _COMMENTS = ("#", "%", "//")
 #: Encodings that are tried where text is not UTF-8; of those that read as many titles the first.
 _ENCODINGS = ("cp1252", "gb18030", "shift_jis", "big5", "euc_kr", "cp1251")
@@ -313,6 +317,9 @@ class _Body:
                 if time.monotonic() > end:
                     message = f"the CSV file cannot be read: it took longer than {self._limits.seconds} s"
                     raise InvalidError(message, errors=[FieldError(pointer="", code="too_slow", message=message)])
+                if not waiting and (rows := self._bare(text)) is not None:
+                    self._add(columns, [rows[:, index] for index in indices])
+                    continue
                 plain = self._plain(text)
                 block = _Block(text, plain or self._careful(text), careful=plain is None)
                 waiting.append(block)
@@ -356,6 +363,28 @@ class _Body:
                 above -= 1
             if start < len(block):
                 yield block[start:]
+
+    def _bare(self, block: bytes) -> FloatArray | None:
+        """A block of nothing but numbers, once the decimal sign is known, [rows, columns]; None for any other block."""
+        separator, decimal = self._form.separator.encode(), self._numerals.decimal
+        if not decimal or self._stamps or not separator.strip(b" "):
+            return None
+        if decimal == b",":
+            block = b"" if b"." in block else block.replace(b",", b".")
+        elif separator != b"," and b"," in block:
+            return None
+        block = block.replace(separator, b",")
+        if not block or block.translate(None, _BARE):
+            return None
+        letters = np.frombuffer(block, np.uint8)
+        ends_line = (letters == _NEWLINE)[(letters == _NEWLINE) | (letters == _COMMA)]
+        if ends_line.size != self._width * block.count(b"\n") or not ends_line[self._width - 1 :: self._width].all():
+            return None  # not as many cells in each line
+        try:
+            numbers = np.array(pydantic_core.from_json(b"[%b]" % block[:-1].replace(b"\n", b",")), dtype=np.float64)
+        except (ValueError, OverflowError):
+            return None
+        return numbers.reshape(-1, self._width)
 
     def _plain(self, block: bytes) -> list[bytes] | None:
         """The columns of a block of nothing but rows of as many cells, apart by line feeds; None for any other block."""

@@ -1,0 +1,354 @@
+"""Files as libraries and programs write them, each with the numbers that it must give or the words that refuse it.
+
+All hold the same record or the same plateaus; what differs is how it is written.
+"""
+
+import io
+import zipfile
+from collections.abc import Callable
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import h5py
+import numpy as np
+import openpyxl  # type: ignore[import-untyped]
+import pandas as pd  # type: ignore[import-untyped]
+import pytest
+import scipy.io
+import xlsxwriter  # type: ignore[import-untyped]
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from service.errors import InvalidError, TooLargeError
+from service.readers.read_file import preview_file, read_file, reading_of
+from service.readers.table import Choice, Reading
+from service.readers.unit_table import UNITS
+
+ROWS = 12
+TIME = np.round(np.arange(ROWS) * 0.01, 2)
+RECORD = {
+    "time_s": TIME,
+    "pressure_bar": np.round(5 + 0.01 * TIME, 4),
+    "speed_rpm": np.round(np.linspace(20, 1970, ROWS), 2),
+    "torque_nm": np.round(np.linspace(21, 19, ROWS), 4),
+}
+NAMES = {"time_s": "Zeit [s]", "pressure_bar": "Druck [bar]", "speed_rpm": "Drehzahl [1/min]", "torque_nm": "M [Nm]"}
+PLATEAUS = ["pressure_bar", "speed_rpm", "torque_nm"]
+
+
+def rows(separator: str = ",", decimal: str = ".", names: list[str] | None = None, number: str = "%.4f") -> str:
+    """The record's rows, a line each."""
+    columns = [RECORD[name].tolist() for name in names or RECORD]
+    lines = [
+        separator.join((number % value).replace(".", decimal) for value in row) for row in zip(*columns, strict=True)
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def frame() -> pd.DataFrame:
+    return pd.DataFrame(RECORD)
+
+
+def savetxt(**how: str) -> bytes:
+    """What numpy.savetxt writes."""
+    held = io.BytesIO()
+    np.savetxt(held, np.c_[*RECORD.values()], **how)  # type: ignore[arg-type]
+    return held.getvalue()
+
+
+def grouped(sign: str, decimal: str, quote: str = "") -> str:
+    """The record's rows with thousands grouped."""
+    marks = str.maketrans(",.", sign + decimal)
+    separator = "," if quote else ";"
+    lines = [
+        [f"{quote}{f'{v:,.4f}'.translate(marks)}{quote}" for v in row] for row in zip(*RECORD.values(), strict=True)
+    ]
+    return "".join(separator.join(line) + "\n" for line in lines)
+
+
+def stamps(form: str) -> str:
+    first = datetime(2026, 11, 2, 7, 0, 0)
+    lines = rows(names=PLATEAUS).splitlines()
+    moments = [(first + timedelta(seconds=float(time))).strftime(form) for time in TIME]
+    return (
+        "timestamp,"
+        + ",".join(PLATEAUS)
+        + "\n"
+        + "".join(f"{at},{line}\n" for at, line in zip(moments, lines, strict=True))
+    )
+
+
+HEAD = ",".join(RECORD)
+GERMAN = ";".join(NAMES.values())
+MAPPED = "time_s:Zeit,pressure_bar:p1,speed_rpm:n1,torque_nm:Mz"
+#: Name of the file -> its text, and a map where it needs one.
+TEXTS: dict[str, tuple[str | bytes, str | None]] = {
+    "pandas.csv": (frame().to_csv(), None),
+    "pandas-semicolon.csv": (frame().to_csv(sep=";", decimal=",", index=False), None),
+    "pandas-tabs.txt": (frame().to_csv(sep="\t", index=False), None),
+    "pandas-string.txt": (frame().to_string(index=False), None),
+    "pandas-dates.csv": (stamps("%Y-%m-%d %H:%M:%S.%f"), None),
+    "iso.csv": (stamps("%Y-%m-%dT%H:%M:%S.%f"), None),
+    "zone.csv": (stamps("%Y-%m-%dT%H:%M:%S.%f+01:00"), None),
+    "german-dates.csv": (stamps("%d.%m.%Y %H:%M:%S.%f"), None),
+    "american-dates.csv": (stamps("%m/%d/%Y %I:%M:%S.%f %p"), None),
+    "matlab-dates.csv": (stamps("%d-%b-%Y %H:%M:%S.%f"), None),
+    "times-of-day.csv": (stamps("%H:%M:%S.%f"), None),
+    "timedelta.csv": (frame().assign(time_s=lambda f: pd.to_timedelta(f.time_s, unit="s").astype(str)).to_csv(), None),
+    "savetxt.txt": (savetxt(header=" ".join(RECORD)), None),
+    "savetxt-commas.csv": (savetxt(delimiter=",", header=HEAD, comments=""), None),
+    "savetxt-g.csv": (savetxt(fmt="%g", delimiter=";", header=HEAD.replace(",", ";")), None),
+    "fixed-width.txt": ("  ".join(f"{name:>14}" for name in RECORD) + "\n" + rows("        "), None),
+    "units-in-brackets-and-blanks.txt": ("t [s]  p [bar]  n [rpm]  M [Nm]\n" + rows("   "), None),
+    "bars.txt": (HEAD.replace(",", "|") + "\n" + rows("|"), None),
+    "latin.csv": ((GERMAN.replace("M [Nm]", "Drehmoment [N·m]") + "\n" + rows(";", ",")).encode("cp1252"), None),
+    "utf16.txt": ((GERMAN.replace(";", "\t") + "\n" + rows("\t", ",")).encode("utf-16"), None),
+    "utf8-bom.csv": ((GERMAN + "\n" + rows(";", ",")).encode("utf-8-sig"), None),
+    "gbk.csv": (("时间(s),压力(bar),转速(rpm),扭矩(Nm)\n" + rows()).encode("gbk"), None),
+    "sjis.csv": (("時間 (s),圧力 (bar),回転数 (rpm),トルク (Nm)\n" + rows()).encode("shift_jis"),
+                 "time_s:時間 (s),pressure_bar:圧力 (bar),speed_rpm:回転数 (rpm),torque_nm:トルク (Nm)"),
+    "cyrillic.csv": (("время [s];давление [bar];обороты [rpm];момент [Nm]\n" + rows(";", ",")).encode("cp1251"),
+                     "time_s:время,pressure_bar:давление,speed_rpm:обороты,torque_nm:момент"),
+    "unit-row.csv": ("Zeit;Druck;Drehzahl;Drehmoment\ns;bar;1/min;Nm\n" + rows(";", ","), None),
+    "unit-row-brackets.csv": ("Zeit;Druck;Drehzahl;Drehmoment\n[s];[bar];[1/min];[Nm]\n" + rows(";", ","), None),
+    "unit-row-above.csv": ("s;bar;1/min;Nm\nZeit;Druck;Drehzahl;Drehmoment\n" + rows(";", ","), None),
+    "header-block.csv": ("Prüfstand 3\nPrüfer;Meier\nDatum;2.11.26\nLasten;7000\n\n" + GERMAN + "\n" + rows(";", ","), None),
+    "colons-above.txt": ("Operator: Meier\nGain: 2.0\nSamples: 12\n\n" + HEAD.replace(",", "\t") + "\n" + rows("\t"), None),
+    "numbers-above.csv": ("Offset,1,2,3\nGain,1,1,1\nend of header\n" + HEAD + "\n" + rows(), None),
+    "two-rows-of-titles.csv": (",Kupplung,,\nZeit,Druck,Drehzahl,Moment\ns,bar,rpm,Nm\n" + rows(), None),
+    "repeated-titles.csv": (HEAD + "\n" + rows().replace("0.0500,", HEAD + "\n0.0500,"), None),
+    "remarks.csv": (HEAD + ",Bemerkung\n" + rows().replace("\n", ",läuft gut; ja\n"), None),
+    "remarks-quoted.csv": (HEAD + ",Bemerkung\n" + rows().replace("\n", ',"ein, zwei\nund drei"\n'), None),
+    "comma-units.csv": ("Time, s;Pressure, bar;Speed, rpm;Torque, Nm\n" + rows(";"), None),
+    "slash-units.csv": ("t / s;p / bar;n / 1/min;M / Nm\n" + rows(";", ","), None),
+    "in-units.csv": ("Zeit in s;Druck in bar;Drehzahl in 1/min;Moment in Nm\n" + rows(";", ","), None),
+    "wide-brackets.csv": ("t（s）,p［bar］,n（rpm）,M（Nm）\n" + rows(), None),
+    "line-break-in-title.csv": ('"Zeit\n[s]";"Druck\n[bar]";"Drehzahl\n[1/min]";"Md\n[Nm]"\n' + rows(";", ","), None),
+    "all-quoted.csv": ('"' + HEAD.replace(",", '","') + '"\n' + '"' + rows('","').replace("\n", '"\n"')[:-1], None),
+    "trailing.csv": (HEAD + ",,\n" + rows().replace("\n", ",,\n"), None),
+    "mapped.csv": ("Zeit;p1;n1;Mz;x\n" + rows(";", ",").replace("\n", ";7\n"), MAPPED),
+    "thousands-german.csv": (GERMAN + "\n" + grouped(".", ","), None),
+    "thousands-american.csv": (HEAD + "\n" + grouped(",", ".", '"'), None),
+    "thousands-swiss.csv": (GERMAN + "\n" + grouped("'", "."), None),
+    "signs.csv": (HEAD + "\n" + rows().replace("\n", "\n+")[:-1].replace("0.0", ".0", 1), None),
+    "exponents.csv": (HEAD + "\n" + rows(number="%.12E"), None),
+    "old-mac.csv": ((HEAD + "\n" + rows()).replace("\n", "\r"), None),
+    "sep.csv": ("sep=;\n" + GERMAN + "\n" + rows(";", ","), None),
+    "labview.lvm": ("LabVIEW Measurement\t\nDecimal_Separator\t,\nX_Columns\tOne\nTime\t08:00\n***End_of_Header***\t\n\t\n"
+                    "Channels\t3\t\t\t\nY_Unit_Label\tbar\trpm\tNm\t\nX0\t0,0\t0,0\t0,0\t\nDelta_X\t0,01\t0,01\t0,01\t\n"
+                    "***End_of_Header***\t\t\t\t\nX_Value\tDruck\tDrehzahl\tMoment\tComment\n" + rows("\t", ","), None),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_a_text_gives_its_numbers(tmp_path: Path, name: str) -> None:
+    content, mapping = TEXTS[name]
+    path = tmp_path / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    require_record(path, reading_of(mapping))
+
+
+def require_record(path: Path, reading: Reading | None = None) -> None:
+    columns = read_file(path, filename=path.name, reading=reading).columns
+    assert columns.keys() == RECORD.keys()
+    for channel, values in RECORD.items():
+        np.testing.assert_allclose(columns[channel], values, rtol=1e-9, atol=1e-9, err_msg=channel)
+
+
+REFUSED = {
+    "german-thousands": ("pressure_bar;speed_rpm;torque_nm\n5;800;21\n5;1.100;21\n", None, "may be 1.1 or 1100"),
+    "american-thousands": ('pressure_bar,speed_rpm,torque_nm\n5,800,21\n5,"1,100",21\n', None, "may be 1.1 or 1100"),
+    "foreign-unit": ("t [s],M [V]\n0,1\n", None, "'V'"),
+    "mapped-foreign-unit": ("t [s],Mz V\n0,1\n", "torque_nm:Mz, V", "not there"),
+    "mapped-unit-of-another": ("t [s];Kraft, kN\n0;1\n", "torque_nm:Kraft, kN", "'kN'"),
+    "turns-or-radians": ("t [s];n [1/s]\n0;1\n", None, "'1/s'"),
+    "decimal-commas-between-commas": (HEAD + "\n0,0,5,0,100,0,20,0\n0,1,5,0,100,0,20,0\n", None, "must have 4 cells"),
+    "ambiguous-dates": ("timestamp,M [Nm]\n01/02/2026 07:00:00,1\n02/02/2026 07:00:00,2\n", None, "day/month"),
+    "hours-or-minutes": ("Zeit,M [Nm]\n07:30,1\n07:31,2\n", None, "must be a number"),
+    "no-titles": ("1,2,3\n4,5,6\n", None, "line 1 must be a header"),
+    "a-footer": (HEAD + "\n" + rows() + "Mittelwert\n", None, "line 14 must have 4 cells"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_text_is_refused_with_words_that_help(tmp_path: Path, name: str) -> None:
+    content, mapping, words = REFUSED[name]
+    (tmp_path / "a.csv").write_text(content, encoding="utf-8")
+    with pytest.raises(InvalidError) as caught:
+        read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of(mapping))
+    assert words in caught.value.detail
+
+
+@pytest.mark.parametrize(("decimal", "speed"), [(",", 1100.0), (".", 1.1)])
+def test_an_option_settles_the_thousands(tmp_path: Path, decimal: str, speed: float) -> None:
+    (tmp_path / "a.csv").write_text(REFUSED["german-thousands"][0], encoding="utf-8")
+    columns = read_file(tmp_path / "a.csv", filename="a.csv", reading=Reading(decimal=decimal)).columns
+    assert columns["speed_rpm"].tolist() == [800.0, speed]
+
+
+# --- workbooks, MATLAB, HDF5, Parquet, ZIP ---
+
+
+def german_workbook(path: Path) -> None:
+    book = openpyxl.Workbook()
+    sheet = book.active
+    sheet.title = "Messung"
+    for row in (
+        ["Prüfstand 3"],
+        ["Lastspiele", 7000],
+        [],
+        ["Zeit", "Druck", "Drehzahl", "Drehmoment", "Bemerkung"],
+        ["s", "bar", "1/min", "Nm"],
+    ):
+        sheet.append(row)
+    for values in zip(*RECORD.values(), strict=True):
+        sheet.append([*map(float, values), "ok"])
+    sheet.merge_cells("A1:D1")
+    book.create_sheet("Notizen").append(["nichts"])
+    book.save(path)
+
+
+def dated_workbook(path: Path) -> None:
+    book = xlsxwriter.Workbook(path, {"default_date_format": "yyyy-mm-dd hh:mm:ss.000"})
+    sheet = book.add_worksheet()
+    for place, title in enumerate(["timestamp", "p [bar]", "n [rpm]", "M [Nm]"]):
+        sheet.write(0, place, title)
+    for row, values in enumerate(zip(*RECORD.values(), strict=True), 1):
+        sheet.write_datetime(row, 0, datetime(2026, 11, 2, 7) + timedelta(seconds=float(values[0])))
+        for place, value in enumerate(values[1:], 1):
+            sheet.write(row, place, value)
+    book.close()
+
+
+def hdf5(path: Path, *, rate: bool) -> None:
+    with h5py.File(path, "w") as file:
+        group = file.create_group("rig")
+        if rate:
+            group.attrs["sample_rate"] = 100.0
+        else:
+            group.create_dataset("time", data=TIME * 1e3).attrs["unit"] = "ms"
+        for name, unit in (("pressure", "bar"), ("speed", "rpm"), ("torque", "Nm")):
+            group.create_dataset(name, data=RECORD[f"{name}_{unit.lower()}"]).attrs["unit"] = unit
+
+
+def version_73(path: Path) -> None:
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, values in RECORD.items():
+            file.create_dataset(name, data=values.reshape(1, -1)).attrs["MATLAB_class"] = np.bytes_("double")
+    with path.open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file ")
+
+
+def struct(path: Path) -> None:
+    named = {"time": "time_s", "pressure": "pressure_bar", "speed": "speed_rpm", "torque": "torque_nm"}
+    units = {"time": "s", "pressure": "bar", "speed": "1/min", "torque": "Nm"}
+    scipy.io.savemat(
+        path, {"test": {name: {"data": RECORD[channel], "unit": units[name]} for name, channel in named.items()}}
+    )
+
+
+def zipped(path: Path) -> None:
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("run/a.csv", frame().to_csv())
+        archive.writestr("run/readme.txt", "a rig\nand no table\n")
+        archive.writestr("run/plot.png", b"\x89PNG")
+
+
+MADE: dict[str, Callable[[Path], object]] = {
+    "german.xlsx": german_workbook,
+    "dated.xlsx": dated_workbook,
+    "pandas.xlsx": lambda path: frame().to_excel(path),
+    "ms.h5": lambda path: hdf5(path, rate=False),
+    "rate.h5": lambda path: hdf5(path, rate=True),
+    "v73.mat": version_73,
+    "vectors.mat": lambda path: scipy.io.savemat(path, RECORD),
+    "packed.mat": lambda path: scipy.io.savemat(path, RECORD, do_compression=True),
+    "v4.mat": lambda path: scipy.io.savemat(path, RECORD, format="4"),
+    "struct.mat": struct,
+    "matrix.mat": lambda path: scipy.io.savemat(
+        path, {"data": np.c_[*RECORD.values()], "names": np.array(list(NAMES.values()), dtype=object)}
+    ),
+    "pandas.parquet": lambda path: frame().assign(note="x").to_parquet(path),
+    "dates.parquet": lambda path: (
+        frame().drop(columns="time_s").assign(time=pd.Timestamp("2026-11-02") + pd.to_timedelta(TIME, unit="s"))
+    ).to_parquet(path),
+    "narrow.parquet": lambda path: frame().assign(pressure_bar=lambda f: f.pressure_bar.astype("float64")).to_parquet(path),
+    "folder.zip": zipped,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_a_file_of_a_library_gives_its_numbers(tmp_path: Path, name: str) -> None:
+    MADE[name](tmp_path / name)
+    require_record(tmp_path / name)
+
+
+def test_a_preview_shows_the_table_and_what_is_understood(tmp_path: Path) -> None:
+    german_workbook(tmp_path / "a.xlsx")
+    shown = preview_file(tmp_path / "a.xlsx", filename="a.xlsx")
+    assert (shown["table"], shown["tables"], shown["first_line"]) == ("Messung", ["Messung", "Notizen"], 6)
+    assert [column["channel"] for column in shown["columns"]] == [*RECORD, None]
+    assert read_file(tmp_path / "a.xlsx", filename="a.xlsx").labels["Lastspiele"] == "7000"
+
+
+@pytest.mark.parametrize("inner", ["xl/worksheets/sheet1.xml", "run.csv"])
+def test_bombs_are_refused_by_what_they_state(tmp_path: Path, inner: str) -> None:
+    with zipfile.ZipFile(tmp_path / "a.xlsx", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("[Content_Types].xml" if "xml" in inner else "b.csv", "<x/>")
+        archive.writestr(inner, b" " * (64 << 20))
+    with pytest.raises(TooLargeError, match="must not unpack to more than"):
+        read_file(tmp_path / "a.xlsx", filename="a.xlsx")
+
+
+# --- no factor ---
+
+UNIT = {
+    channel: sorted(UNITS[unit])
+    for channel, unit in (("pressure_bar", "bar"), ("speed_rpm", "rpm"), ("torque_nm", "Nm"))
+}
+TITLES = {"pressure_bar": "Druck", "speed_rpm": "Drehzahl", "torque_nm": "Drehmoment"}
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.fixed_dictionaries({channel: st.sampled_from(units) for channel, units in UNIT.items()}),
+    st.sampled_from(["{} [{}]", "{} ({})", "{}（{}）", "{} / {}", "{} in {}", "{}, {}", "{}_{}"]),
+    st.sampled_from(
+        [(";", ".", ""), (";", ",", ""), (";", ",", "."), ("\t", ".", ","), ("\t", ",", "."), ("|", ".", ",")]
+    ),
+    st.sampled_from(["%.0f", "%.1f", "%.3f", "%.6f", "%r"]),
+    st.booleans(),
+    st.lists(st.tuples(*[st.floats(0.001, 9000)] * 3), min_size=2, max_size=5),
+)
+def test_no_file_is_accepted_with_a_channel_off_by_a_factor(
+    tmp_path_factory: pytest.TempPathFactory,
+    units: dict[str, str],
+    title: str,
+    signs: tuple[str, str, str],
+    number: str,
+    mapped: bool,
+    values: list[tuple[float, ...]],
+) -> None:
+    """Whatever units, separators, decimals and thousands a file has: it gives the numbers that it states, or is refused."""
+    separator, decimal, thousands = signs
+    titles = [title.format("Kanal " + name if mapped else name, units[channel]) for channel, name in TITLES.items()]
+    printed = [[number % value for value in row] for row in values]
+    lines = [separator.join([_grouped(cell, decimal, thousands) for cell in row]) for row in printed]
+    file = tmp_path_factory.getbasetemp() / "factor.csv"
+    file.write_text("\n".join([separator.join(titles), *lines]) + "\n", encoding="utf-8")
+    choices = {channel: Choice(column=title) for channel, title in zip(TITLES, titles, strict=True)} if mapped else {}
+    try:
+        columns = read_file(file, filename="a.csv", reading=Reading(mapping=choices)).columns
+    except InvalidError:
+        return
+    for place, channel in enumerate(TITLES):
+        factor = UNITS[{"pressure_bar": "bar", "speed_rpm": "rpm", "torque_nm": "Nm"}[channel]][units[channel]].factor
+        expected = [factor * float(row[place]) for row in printed]
+        np.testing.assert_allclose(columns[channel], expected, rtol=1e-9, err_msg=channel)
+
+
+def _grouped(cell: str, decimal: str, thousands: str) -> str:
+    whole, point, fraction = cell.partition(".")
+    if thousands and "e" not in cell:
+        whole = f"{int(whole):,}".replace(",", thousands)
+    return whole + (decimal + fraction if point else "")
