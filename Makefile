@@ -10,6 +10,8 @@
 # make rivals  the same beside other packages, in an environment of their own                (SEED= SIZE=)
 # make blind   hides effects and wants them found: the table of docs/diagnosis.md      (SEED= SIZE=small|full ONLY= ARGS=)
 # make visible hides effects at twice the amplitude that a report calls visible, and counts alarms (SEED= COUNT= STORE=)
+# make adoption  hides artefacts, adopts what the diagnosis offers, holds remaining life against the truth: a table of
+#              docs/diagnosis.md; goes on where it ended                         (SEED= SIZE=small|full ONLY= ARGS=--list)
 # make load     rigs and clients against a running service, what they wait and what is lost: a table of docs/benchmarks.md
 #              (ARGS="--seconds 60 --no-raw"; "--services 4 --database postgresql --rigs 16 --clients 40 --no-raw"); a few
 #              minutes, on a machine that does nothing else
@@ -34,7 +36,7 @@ UNUSED := matplotlib contourpy cycler fonttools kiwisolver pillow
 LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --exclude-newer "7 days" \
 	--custom-compile-command "make lock" $(foreach name,$(UNUSED),--no-emit-package $(name))
 
-.PHONY: demo test slow faults check lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
+.PHONY: adoption demo test slow faults check lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
@@ -94,6 +96,9 @@ blind: $(VENV)/.tests
 
 visible: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.visible
+
+adoption: $(VENV)/.tests
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.adoption $(ARGS)
 
 plausibility: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.plausibility $(if $(SEED),--seed $(SEED)) $(if $(CAMPAIGNS),--campaigns $(CAMPAIGNS)) $(if $(HONEST),--honest $(HONEST)) $(ARGS)

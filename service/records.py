@@ -144,8 +144,13 @@ def present_life(connection: Connection, clutch_id: str) -> str:
 
 def events(connection: Connection, clutch_id: str) -> tuple[Event, ...]:
     """All accepted runs of a clutch as its history sees them, ordered; mean COF as the model in force corrects it."""
-    cofs = results.cofs_of(connection, clutch_id) | assumptions.corrected_cofs_of(connection, clutch_id)
-    return order([_event(row, cofs.get(row.run_key, {})) for row in runs.in_order(connection, clutch_id)])
+    cofs, corrected = results.cofs_of(connection, clutch_id), assumptions.corrected_cofs_of(connection, clutch_id)
+    return order(
+        [
+            _event(row, cofs.get(row.run_key, {})).corrected(corrected.get(row.run_key))
+            for row in runs.in_order(connection, clutch_id)
+        ]
+    )
 
 
 def held(connection: Connection, clutch_id: str) -> tuple[Event, ...]:

@@ -5,6 +5,7 @@ Priors are kept by kind of clutch, version, and the clutches that were left out.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from typing import TypeAlias
 
 import sqlalchemy as sa
 from sqlalchemy import Connection, Row, bindparam, delete, func, select
@@ -14,6 +15,9 @@ from storage.encoding.json_text import Json, to_list, to_object, to_text
 from storage.tables import adopted_model, corrected_cof, fleet_prior, run
 
 # --- adopted models ---
+
+#: Mean COF, its deviation, and mean COF under each draw of the model in force.
+CorrectedCof: TypeAlias = tuple[float, float, tuple[float, ...]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +37,13 @@ _adoption_versions = (
 _adoption_newest = _adoption_versions.limit(1)
 _adoption_adopt = sa.insert(adopted_model)
 _adoption_cofs = (
-    select(corrected_cof.c.run_key, corrected_cof.c.pressure, corrected_cof.c.mean_cof, corrected_cof.c.mean_cof_sd)
+    select(
+        corrected_cof.c.run_key,
+        corrected_cof.c.pressure,
+        corrected_cof.c.mean_cof,
+        corrected_cof.c.mean_cof_sd,
+        corrected_cof.c.mean_cof_draws,
+    )
     .join(run, run.c.run_key == corrected_cof.c.run_key)
     .where(run.c.clutch_id == bindparam("of_clutch"))
     .order_by(corrected_cof.c.run_key, corrected_cof.c.pressure)
@@ -61,20 +71,27 @@ def insert_adoption(connection: Connection, clutch_id: str, row: AdoptedRow) -> 
     connection.execute(_adoption_adopt, {"clutch_id": clutch_id} | asdict(row))
 
 
-def corrected_cofs_of(connection: Connection, clutch_id: str) -> dict[int, dict[float, tuple[float, float]]]:
-    """run_key -> pressure -> mean COF and its deviation under the model in force, where it corrects them."""
-    cofs: dict[int, dict[float, tuple[float, float]]] = {}
-    for run_key, pressure, mean, deviation in connection.execute(_adoption_cofs, {"of_clutch": clutch_id}):
-        cofs.setdefault(run_key, {})[pressure] = (mean, deviation)
+def corrected_cofs_of(connection: Connection, clutch_id: str) -> dict[int, dict[float, CorrectedCof]]:
+    """run_key -> pressure -> mean COF, its deviation, and mean COF under each draw of the model in force, where it corrects
+    them."""
+    cofs: dict[int, dict[float, CorrectedCof]] = {}
+    for run_key, pressure, mean, deviation, draws in connection.execute(_adoption_cofs, {"of_clutch": clutch_id}):
+        cofs.setdefault(run_key, {})[pressure] = (mean, deviation, tuple(to_list(draws or "[]")))
     return cofs
 
 
-def write_corrected_cofs(connection: Connection, run_key: int, cofs: Mapping[float, tuple[float, float]]) -> None:
+def write_corrected_cofs(connection: Connection, run_key: int, cofs: Mapping[float, CorrectedCof]) -> None:
     """Store a run's corrected mean COFs by pressure in place of those it had."""
     connection.execute(_adoption_clear_run, {"of_run": run_key})
     rows = [
-        {"run_key": run_key, "pressure": pressure, "mean_cof": mean, "mean_cof_sd": deviation}
-        for pressure, (mean, deviation) in cofs.items()
+        {
+            "run_key": run_key,
+            "pressure": pressure,
+            "mean_cof": mean,
+            "mean_cof_sd": deviation,
+            "mean_cof_draws": to_text(list(draws)),
+        }
+        for pressure, (mean, deviation, draws) in cofs.items()
     ]
     if rows:
         connection.execute(_adoption_write, rows)

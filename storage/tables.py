@@ -214,6 +214,7 @@ corrected_cof = Table(
     Column("pressure", NUMBER, primary_key=True),
     Column("mean_cof", NUMBER, nullable=False),
     Column("mean_cof_sd", NUMBER, nullable=False),
+    Column("mean_cof_draws", TEXT),
 )
 
 #: Priors learned from fleets of earlier lives, by version from 1 on. `fleet` names the kind of clutch (JSON), `left_out`

@@ -8,6 +8,7 @@ import numpy as np
 from models.diagnosis.attribution.check import Checks
 from models.diagnosis.attribution.decide import decide, revise
 from models.diagnosis.attribution.investigate import investigate
+from models.diagnosis.attribution.sizes import sizes_of
 from models.diagnosis.campaign import Campaign
 from models.diagnosis.design.design import build_design
 from models.diagnosis.detection.raw_records.evidence import raw_evidence
@@ -42,6 +43,7 @@ def diagnose(campaign: Campaign, *, rng: np.random.Generator, without: frozenset
     first = decide(investigation.evidence(without), Checks(problem, rng))
     validation = validate(problem, investigation.projected.fit, first, investigation.where, rng)
     judgement = revise(first, validation.held_out)
+    sizes = sizes_of(problem, judgement, rng)
     hypotheses = () if investigation.search is None else investigation.search.hypotheses
     advice = advise(campaign, problem, *rivals_of(judgement, hypotheses))
-    return report_of(investigation, judgement, validation, advice)
+    return report_of(investigation, judgement, validation, sizes, advice)

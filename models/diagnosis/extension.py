@@ -3,7 +3,10 @@
 An *artefact* (oil temperature, a shifted zero, an unsettled dwell ...) is in the measurement and not in the clutch: its
 torque is taken off every plateau before a curve is fitted. A *course* (running-in, oil change, accelerated wear ...) is in
 the clutch and not in eq. 6: its mean torque is taken off the measured course before eq. 6 is tracked, and put back when
-the threshold's first passage is looked for. Where the cause is ambiguous, every alternative counts with its probability.
+the threshold's first passage is looked for.
+
+What the diagnosis does not know is a weighted set of draws (`effects.draw`), each one coherent correction of all runs of a
+life: a life is tracked under each, and the prognosis is their mixture.
 """
 
 import math
@@ -15,15 +18,15 @@ import numpy as np
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
-from models.diagnosis.baseline.criteria import EXPONENTIAL
-from models.diagnosis.baseline.laws import ATTRACTOR, LOG_CURVATURE, POWERS, Frame, Laws, scene_of
+from models.diagnosis.baseline.laws import Frame, Laws, scene_of
 from models.diagnosis.campaign import Campaign, Oil, StationaryRun
 from models.diagnosis.design.design import build_design
 from models.diagnosis.design.facts import Facts, facts_of
 from models.diagnosis.design.points import Points
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.effect import Kind
-from models.diagnosis.pooled_fit.gauss_newton import Fit
+from models.diagnosis.effects.draw import Draw, DrawnEffect
+from models.diagnosis.effects.effect import Discrepancy, Kind
+from models.diagnosis.effects.template_discrepancy import Ranges
 
 #: Plateaus are handed on in parts of this many: a design takes no more of one run.
 _PART = 2000
@@ -43,18 +46,25 @@ class Extension:
     effects: tuple[str, ...]
     content: Mapping[str, Any]
 
+    @property
+    def weights(self) -> FloatArray:
+        """The weights [d] of the draws; they sum to one."""
+        weights = np.array([draw["weight"] for draw in self.content["draws"]], dtype=np.float64)
+        return np.asarray(weights / weights.sum())
+
     def artefact(self, run: StationaryRun, campaign: Campaign) -> FloatArray:
-        """Torque [n] Nm that the artefacts add to each plateau of a run; zero where there are none. Raises NotFiniteError.
+        """Torque [d, n] Nm that the artefacts add to each plateau of a run under each draw; zero where there are none.
+        Raises NotFiniteError.
 
         `campaign` gives what a run alone does not hold (maintenance, moments of the other runs); it need not hold `run`.
         Without oil temperature, its effect cannot be computed and is not taken off.
         """
         count = run.plateaus.torque.size
-        torque = np.zeros(count)
+        torque = np.zeros((self.weights.size, count))
         usable = np.flatnonzero(run.plateaus.speed != 0)  # as a design takes them: clocks and neighbours are the same
         for rows in np.array_split(usable, max(1, math.ceil(usable.size / _PART))):
             if rows.size:
-                torque[rows] = self._on(run, rows, campaign)
+                torque[:, rows] = self._on(run, rows, campaign)
         return torque
 
     def _on(self, run: StationaryRun, rows: np.ndarray[Any, np.dtype[np.intp]], campaign: Campaign) -> FloatArray:
@@ -62,25 +72,25 @@ class Extension:
         clock = None if run.time is None else tuple(np.asarray(run.time)[rows].tolist())
         alone = replace(campaign, stationary=(replace(run, plateaus=part, time=clock, record=None),), dynamic=())
         points = build_design(alone).points
-        return points.sign * self._mean(points, self._facts(campaign), {Kind.ARTEFACT})[0]
+        return np.asarray(points.sign * self._changes(points, self._facts(campaign), Kind.ARTEFACT))
+
+    @property
+    def has_course(self) -> bool:
+        """Whether any draw follows an effect of use along the life."""
+        return bool(self.content["courses"]) and any(
+            BY_SLUG[effect["slug"]].kind is Kind.COURSE for draw in self.content["draws"] for effect in draw["effects"]
+        )
 
     def course(self, cycles: FloatArray, pressure: FloatArray, velocity: FloatArray) -> FloatArray:
-        """Mean torque [m, k] Nm over velocity [v] m/s > 0 that effects of use add at cycles [m] and pressure [k] Pa. Raises
-        NotFiniteError."""
-        return self._course(cycles, pressure, velocity)[0]
-
-    def course_sd(self, cycles: FloatArray, pressure: FloatArray, velocity: FloatArray) -> FloatArray:
-        """Deviation [m, k] Nm of `course`, from the effects' amplitudes and between alternatives."""
-        return self._course(cycles, pressure, velocity)[1]
-
-    def _course(self, cycles: FloatArray, pressure: FloatArray, velocity: FloatArray) -> tuple[FloatArray, FloatArray]:
-        shape = (cycles.size, pressure.size, velocity.size)
+        """Mean torque [d, m, k] Nm over velocity [v] m/s > 0 that effects of use add at cycles [m] and pressure [k] Pa under
+        each draw. Raises NotFiniteError."""
+        shape = (self.weights.size, cycles.size, pressure.size, velocity.size)
+        if not self.has_course:
+            return np.zeros(shape[:3])
         grid = np.broadcast_arrays(cycles[:, None, None], pressure[:, None], velocity)
-        if not self.content["courses"]:
-            return np.zeros(shape[:2]), np.zeros(shape[:2])
         points = _steady_points(*(np.ravel(axis) for axis in grid))
-        mean, deviation = self._mean(points, facts_from(self.content["facts"]), {Kind.COURSE})
-        return mean.reshape(shape).mean(axis=2), deviation.reshape(shape).mean(axis=2)
+        changes = self._changes(points, facts_from(self.content["facts"]), Kind.COURSE)
+        return np.asarray(changes.reshape(shape).mean(axis=3), dtype=np.float64)
 
     def _facts(self, campaign: Campaign) -> Facts:
         """The campaign's facts, with the temperature, the states and the days that the diagnosis referred to."""
@@ -96,31 +106,28 @@ class Extension:
             plate_warming=kept.plate_warming,
         )
 
-    def _mean(self, points: Points, facts: Facts, kinds: set[Kind]) -> tuple[FloatArray, FloatArray]:
-        """Weighted over the alternatives: change [P] Nm and its deviation [P] Nm."""
-        weights, means, variances = [], [], []
-        for alternative in self.content["alternatives"]:
-            scene = scene_of(_laws(alternative), points, facts)
-            mean, variance = np.zeros(points.run.size), np.zeros(points.run.size)
-            for stored in alternative["effects"]:
+    def _changes(self, points: Points, facts: Facts, kind: Kind) -> FloatArray:
+        """Changes [d, P] Nm of one kind under each draw."""
+        ranges: Ranges = {Discrepancy(name): (low, width) for name, (low, width) in self.content["ranges"].items()}
+        scenes = [scene_of(_laws(laws), points, facts) for laws in self.content["laws"]]
+        changes = np.zeros((self.weights.size, points.run.size))
+        for change, draw in zip(changes, self.content["draws"], strict=True):
+            for stored in draw["effects"]:
                 effect = BY_SLUG[stored["slug"]]
-                if effect.kind in kinds and not effect.counts_in_severity:
-                    change = effect.change(scene, stored["amplitude"], tuple(stored["shape"]))
+                if effect.kind is kind and not effect.counts_in_severity:
+                    drawn = DrawnEffect(
+                        effect=effect,
+                        amplitude=stored["amplitude"],
+                        shape=tuple(stored["shape"]),
+                        factors=tuple(stored["factors"]),
+                    )
+                    change += drawn.change(scenes[draw["laws"]], ranges)
                     if not np.isfinite(change).all():
                         lost = np.count_nonzero(~np.isfinite(change))
                         raise NotFiniteError(
                             f"the change of {effect.slug} is not finite at {lost} of {change.size} points"
                         )
-                    if effect.kind is Kind.COURSE:  # followed far enough, friction ends; it does not reverse
-                        change = np.maximum(change, -scene.curve)
-                    relative = stored["amplitude_sd"] / max(abs(stored["amplitude"]), 1e-300)
-                    mean, variance = mean + change, variance + (change * relative) ** 2
-            weights.append(float(alternative["weight"]))
-            means.append(mean)
-            variances.append(variance)
-        weight = np.array(weights)[:, None] / sum(weights)
-        mean = (weight * means).sum(axis=0)
-        return mean, np.sqrt((weight * (np.array(variances) + (np.array(means) - mean) ** 2)).sum(axis=0))
+        return changes
 
     @property
     def severity_exponent(self) -> float | None:
@@ -138,24 +145,43 @@ class Extension:
         return cls(effects=tuple(stored["effects"]), content=stored["content"])
 
 
-def build_extension(
-    alternatives: Sequence[tuple[float, Fit, Sequence[float]]], facts: Facts, *, courses: bool
-) -> Extension:
-    """From what was fitted: the weight of each alternative, its fit, the deviations of its effects' amplitudes.
+def build_extension(draws: Sequence[Draw], facts: Facts, ranges: Ranges, *, courses: bool) -> Extension:
+    """From weighted draws, and the campaign's facts and ranges that they refer to.
 
-    The most probable one names the effects. `courses`: whether effects of use are to be followed beyond the data; where
-    they did not help to predict the last states from the first, a life is tracked without them.
+    `courses`: whether effects of use are to be followed beyond the data; where they did not help to predict the last states
+    from the first, a life is tracked without them. ζ counts by the mean exponent of severity.
     """
-    stored = [_stored(weight, fit, deviations) for weight, fit, deviations in alternatives]
-    best = max(stored, key=lambda alternative: float(alternative["weight"]))
-    exponents = [effect["amplitude"] for effect in best["effects"] if BY_SLUG[effect["slug"]].counts_in_severity]
+    effects = dict.fromkeys(one.effect.slug for draw in draws for one in draw.effects)
+    laws = list({id(draw.laws): draw.laws for draw in draws}.values())
+    exponents = [
+        (draw.weight, one.amplitude) for draw in draws for one in draw.effects if one.effect.counts_in_severity
+    ]
+    total = sum(weight for weight, _ in exponents)
+    exponent = sum(weight * amplitude for weight, amplitude in exponents) / total if total > 0 else None
     return Extension(
-        effects=tuple(effect["slug"] for effect in best["effects"]),
+        effects=tuple(effects),
         content={
             "facts": facts_to(facts),
-            "alternatives": stored,
+            "ranges": {along.value: list(range_) for along, range_ in ranges.items()},
+            "laws": [_stored_laws(one) for one in laws],
+            "draws": [
+                {
+                    "weight": draw.weight,
+                    "laws": next(place for place, one in enumerate(laws) if one is draw.laws),
+                    "effects": [
+                        {
+                            "slug": one.effect.slug,
+                            "amplitude": one.amplitude,
+                            "shape": list(one.shape),
+                            "factors": list(one.factors),
+                        }
+                        for one in draw.effects
+                    ],
+                }
+                for draw in draws
+            ],
             "courses": courses,
-            "severity_exponent": exponents[0] if exponents and courses else None,
+            "severity_exponent": exponent if courses else None,
         },
     )
 
@@ -186,30 +212,16 @@ def facts_from(stored: Mapping[str, Any]) -> Facts:
     return Facts(**values)
 
 
-def _stored(weight: float, fit: Fit, deviations: Sequence[float]) -> dict[str, Any]:
-    frame = {field.name: getattr(fit.laws.frame, field.name) for field in fields(Frame)}
-    effects = [
-        {
-            "slug": fitted.effect.slug,
-            "amplitude": fitted.amplitude,
-            "amplitude_sd": sd,
-            "shape": list(fitted.shape),
-        }
-        for fitted, sd in zip(fit.effects, deviations, strict=True)
-    ]
-    frame["loop_pressures"] = fit.laws.frame.loop_pressures.tolist()
-    return {"weight": weight, "theta": fit.laws.theta.tolist(), "frame": frame, "effects": effects}
+def _stored_laws(laws: Laws) -> dict[str, Any]:
+    frame = {field.name: getattr(laws.frame, field.name) for field in fields(Frame)}
+    frame["loop_pressures"] = laws.frame.loop_pressures.tolist()
+    return {"theta": laws.theta.tolist(), "frame": frame}
 
 
-def _laws(alternative: Mapping[str, Any]) -> Laws:
-    frame = alternative["frame"]
+def _laws(stored: Mapping[str, Any]) -> Laws:
+    frame = stored["frame"]
     at = Frame(**(frame | {"loop_pressures": np.array(frame["loop_pressures"], dtype=np.float64)}))
-    theta = np.array(alternative["theta"], dtype=np.float64)
-    size = ATTRACTOR + at.loop_pressures.size + POWERS
-    # before it had a bend M̄_c's law was an exponential, and before that the open clutch had no drag
-    if theta.size in (size - 1, size - 1 - POWERS):
-        theta = np.insert(theta, LOG_CURVATURE, np.log(EXPONENTIAL))
-    return Laws(theta=np.append(theta, np.zeros(size - theta.size)), frame=at)
+    return Laws(theta=np.array(stored["theta"], dtype=np.float64), frame=at)
 
 
 def _steady_points(cycles: FloatArray, pressure: FloatArray, velocity: FloatArray) -> Points:

@@ -27,7 +27,8 @@ _BEHIND, _AHEAD = 40, 240
 #: course beside eq. 6 bends some twenty times, and steps are looked at by themselves.
 _STRIDE = 6
 
-#: A given course over ζ [k] that is added to eq. 6, in the quantity's unit [k].
+#: A given course over ζ [k] that is added to eq. 6, in the quantity's unit; [b, k] for each branch of the sample
+#: (`Posterior.branch`), or [1, k] for all.
 Offset: TypeAlias = Callable[[FloatArray], FloatArray]
 
 
@@ -136,7 +137,7 @@ def widened(passages: FloatArray, weight: FloatArray, *, as_of: float, horizon: 
 def paths(posterior: Posterior, progress: FloatArray, offset: Offset | None = None) -> FloatArray:
     """ξ(ζ) + offset(ζ) at progress [k] of every draw; [k, n]."""
     values = posterior.values(progress)
-    return values if offset is None else np.asarray(values + offset(progress)[:, None])
+    return values if offset is None else np.asarray(values + posterior.beside(offset(progress)))
 
 
 def bands(
@@ -154,17 +155,18 @@ def _along_paths(posterior: Posterior, fraction: float, offset: Offset | None, h
     these that a draw's passage lies between. An offset may dip anywhere: beside one all places are taken.
     """
     places, steps = _places(posterior.discrepancy, horizon)
-    course = np.zeros(places.size) if offset is None else offset(places)
+    course = np.zeros((places.size, 1)) if offset is None else posterior.beside(offset(places))
     stride = _STRIDE if offset is None else 1
     sparse = np.unique(np.concatenate([np.arange(0, places.size, stride), steps, steps - 1, [places.size - 1]]))
-    above = posterior.values(places[sparse]) + course[sparse, None]
+    above = posterior.values(places[sparse]) + course[sparse]
     level = fraction * above[0]
     below = above <= level
     first = below.argmax(axis=0)
     passed = np.flatnonzero(below.any(axis=0))
     left = sparse[np.maximum(first[passed] - 1, 0)]
     index = np.minimum(left + np.arange(_STRIDE + 1)[:, None], sparse[first[passed]])
-    near = posterior.taken(passed, posterior.weight[passed]).values(places[index]) + course[index]
+    own = np.zeros(1, dtype=np.intp) if course.shape[1] == 1 else passed
+    near = posterior.taken(passed, posterior.weight[passed]).values(places[index]) + course[index, own]
     passages = np.full(first.size, np.inf)
     passages[passed] = first_below(near, places[index], level[passed])
     return passages

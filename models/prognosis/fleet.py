@@ -18,7 +18,7 @@ J. Comput. Phys. 22 (1976) 245-268, and M. R. Shirts, J. D. Chodera, J. Chem. Ph
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -39,10 +39,9 @@ from models.prognosis.criteria import (
 )
 from models.tracking.courses import WITHOUT_EXPONENT, Course, unit_of_change
 from models.tracking.criteria import REACH
-from models.tracking.discrepancy import Discrepancy
 from models.tracking.filters.grid import Grid
 from models.tracking.measurement import Measurement
-from models.tracking.posterior import Posterior
+from models.tracking.posterior import Posterior, joined
 from models.tracking.prior import Prior, weak
 
 #: The logarithm of a vanishing density: the filter has no draws beyond REACH deviations of its prior.
@@ -204,20 +203,8 @@ def fit_population(fleet: Sequence[Taught], rounds: int = _ROUNDS) -> Population
 
 def pooled(first: Posterior, second: Posterior) -> Posterior:
     """The draws of both, each with half of the weight; discrepancies must be of the same history."""
-    names = [field.name for field in fields(first) if field.init]
-    joined = {name: _joined(getattr(first, name), getattr(second, name)) for name in names}
-    return replace(first, **joined | {"weight": 0.5 * joined["weight"]})
-
-
-def _joined(first: Any, second: Any) -> Any:
-    """Columns one after the other, of discrepancies those that have a row a draw; what they share stays."""
-    if isinstance(first, bool):
-        return first or second
-    if isinstance(first, Discrepancy):
-        names = ("size", "curvature", "height")
-        rows = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in names}
-        return Discrepancy(span=first.span, at=first.at, **rows)
-    return None if first is None else np.concatenate([first, second])
+    both = joined((first, second))
+    return replace(both, weight=0.5 * both.weight)
 
 
 def _learnt(population: FleetPrior, fleet: Sequence[Taught], believed: FloatArray) -> FleetPrior:

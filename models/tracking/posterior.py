@@ -6,9 +6,10 @@ scatter between runs is added, which the filter estimates.
 """
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,8 @@ class Posterior:
 
     `scatter` is the deviation from run to run, in the unit of the quantity; where it is `proportional` (None: nowhere), that
     of a value of the prior's size. `discrepancy` is the deviation of each draw from its course, if there is one; `forced`
-    whether the filter took in a test at once that it could not take in by degrees. From these follow, of every draw, the
+    whether the filter took in a test at once that it could not take in by degrees; `branch` which series of measurements a
+    draw was tracked under, where there are several (`mixture`). From these follow, of every draw, the
     `course` (`courses.Course`), and log φ and log ε as the priors know them (`courses.coordinates_of`), each [n].
     """
 
@@ -49,6 +51,7 @@ class Posterior:
     proportional: NDArray[np.bool_] | None = None
     discrepancy: Discrepancy | None = None
     forced: bool = False
+    branch: NDArray[np.intp] | None = None
     course: NDArray[np.intp] = field(init=False, repr=False, compare=False)
     log_scale: FloatArray = field(init=False, repr=False, compare=False)
     log_exponent: FloatArray = field(init=False, repr=False, compare=False)
@@ -120,12 +123,53 @@ class Posterior:
             proportional=None if self.proportional is None else self.proportional[index],
             discrepancy=None if self.discrepancy is None else self.discrepancy.taken(index),
             forced=self.forced,
+            branch=None if self.branch is None else self.branch[index],
         )
+
+    def beside(self, offsets: FloatArray) -> FloatArray:
+        """Of what is added to each branch [b, k], or to all of them [1, k], what is added to each draw; [k, n] or [k, 1]."""
+        if self.branch is None or len(offsets) == 1:
+            return offsets[:1].T
+        return np.asarray(offsets[self.branch].T)
+
+    def of_branch(self, branch: int) -> "Posterior":
+        """The draws of one branch."""
+        if self.branch is None:
+            return self
+        index = np.flatnonzero(self.branch == branch)
+        return self.taken(index, self.weight[index] / self.weight[index].sum())
 
     def moments(self, sample: FloatArray) -> tuple[float, float]:
         """Weighted mean and deviation of a function of the coefficients, evaluated at the sample [n]."""
         mean = float(self.weight @ sample)
         return mean, math.sqrt(max(0.0, float(self.weight @ np.square(sample - mean))))
+
+
+def joined(parts: Sequence[Posterior]) -> Posterior:
+    """The draws of all parts, which have one history of progress, one after the other, with their weights."""
+    names = [field.name for field in fields(Posterior) if field.init]
+    return Posterior(**{name: _joined([getattr(part, name) for part in parts]) for name in names})
+
+
+def mixture(parts: Sequence[tuple[float, Posterior]]) -> Posterior:
+    """Posteriors under several series of measurements as one: part i has its weight and is branch i."""
+    weighted = [
+        replace(part, weight=weight * part.weight, branch=np.full(part.weight.size, branch))
+        for branch, (weight, part) in enumerate(parts)
+    ]
+    return joined(weighted)
+
+
+def _joined(columns: Sequence[Any]) -> Any:
+    """Columns one after the other, of discrepancies those that have a row a draw; what they share stays."""
+    first = columns[0]
+    if isinstance(first, bool):
+        return any(columns)
+    if isinstance(first, Discrepancy):
+        names = ("size", "curvature", "height")
+        rows = {name: np.concatenate([getattr(column, name) for column in columns]) for name in names}
+        return Discrepancy(span=first.span, at=first.at, **rows)
+    return None if first is None else np.concatenate(columns)
 
 
 State = TypeVar("State")

@@ -131,7 +131,7 @@ def before_and_after(
         runs_before = stored_runs.run_reader(database, clutch_id).campaign_runs(plain.events, origin=plain.origin)
         tests = [run for run in diagnosed_life.runs if isinstance(run, StationaryRun)]
         freed = corrected_cofs(extension, diagnosed_life.record, plain, runs_before, tests)
-        predicted.append(plain.with_cofs({event.run_id: freed.get(event.run_id, event.cofs) for event in plain.events}))
+        predicted.append(plain.corrected(freed))
 
     def prediction(life: Life, model: Extension | None) -> dict[str, Any]:
         assumptions = state.assumptions_under(model, life)

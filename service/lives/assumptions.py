@@ -28,15 +28,18 @@ WEAK, FLEET = "weak", "fleet"
 _OIL_TEMPERATURE = "oil_temperature"
 BASELINE: Mapping[str, Any] = {"name": "baseline", "effects": []}
 
-#: Mean COF [m] that an adopted model's effects add at cycles since new [m], at a pressure [Pa] or ALL_PRESSURES.
+#: Mean COF [d, m] that an adopted model's effects add under each of its draws at cycles since new [m], at a pressure [Pa] or
+#: ALL_PRESSURES.
 Course: TypeAlias = Callable[[FloatArray, float], FloatArray]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModelInForce:
-    """The model as answers name it, its course (None: eq. 6 alone), and the exponent of an adopted load severity."""
+    """The model as answers name it, the weights of its draws, its course (None: eq. 6 alone), and the exponent of an adopted
+    load severity."""
 
     name: Mapping[str, Any] = field(default_factory=lambda: BASELINE)
+    weights: tuple[float, ...] = (1.0,)
     course: Course | None = None
     severity_exponent: float | None = None
 
@@ -111,11 +114,17 @@ class Assumptions:
         """Whether the model in force frees a quantity of the temperature of the oil that it was measured in."""
         return quantity == MEAN_COF and _OIL_TEMPERATURE in self.model.name["effects"]
 
-    def offset(self, quantity: str, pressure: float, cycles: FloatArray) -> FloatArray:
-        """What the model in force adds to a quantity at cycles since new [m]; [m]."""
+    def offsets(self, quantity: str, pressure: float, cycles: FloatArray) -> FloatArray:
+        """What the model in force adds to a quantity under each of its draws at cycles since new [m]; [d, m], [1, m] where
+        it adds nothing."""
         if self.model.course is None or quantity != MEAN_COF:
-            return np.zeros(cycles.shape)
+            return np.zeros((1, *cycles.shape))
         return self.model.course(cycles, pressure)
+
+    def offset(self, quantity: str, pressure: float, cycles: FloatArray) -> FloatArray:
+        """The mean of `offsets` [m]."""
+        offsets = self.offsets(quantity, pressure, cycles)
+        return np.asarray(offsets[0] if len(offsets) == 1 else np.array(self.model.weights) @ offsets)
 
     def named(self) -> dict[str, Any]:
         """The model, the prior and the severity behind an answer, as it names them."""

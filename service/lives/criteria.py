@@ -22,6 +22,9 @@ LEAST_TORQUE_SD = 1e-4
 MOST_LEVELS = 100
 #: Weighted draws of eq. 6's coefficients behind a stored prediction [-]. Chosen: `make score PARTS=exact`.
 PREDICTION_DRAWS = 1000
+#: Particles of a filter at least, however many draws of an adopted model they are shared among [-]. Chosen; no table: the
+#: tails come from the mixture.
+FEWEST_PARTICLES = 60
 #: A prediction warns where the probability of eq. 6 is below this [-]. Chosen: odds of ten to one.
 EQ_6_DOUBTED = 0.1
 #: Exponents of a cycle's work that are weighed by the tests of one life [-]. Chosen: none, and from less than in proportion

@@ -9,7 +9,7 @@ epoch: it may have shifted the level of what is measured.
 import bisect
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, fields, replace
 from datetime import UTC, datetime
 from typing import Any
@@ -29,6 +29,8 @@ from service.lives.criteria import OTHER_OIL
 from service.lives.run_analysis import Value
 
 ByPressure = Mapping[float, Value]
+#: Pressure [Pa] -> mean COF as the model in force corrects it, its deviation, and mean COF under each of the model's draws.
+Corrected = Mapping[float, tuple[float, float, tuple[float, ...]]]
 
 #: Kinds of runs.
 STATIONARY, DYNAMIC, MAINTENANCE = "stationary_stribeck", "dynamic_stribeck", "maintenance"
@@ -66,9 +68,10 @@ class Event:
 
     `moment` is when it was made [s], `dated` whether the rig said so, `arrived` its place in the order of arrival, infinite
     while it comes in. A stationary test has the range of its speeds [rad/s], its mean oil temperature [K], and mean COF with
-    its deviation by pressure [Pa] where its curves determine it; `duty` is the block that ends with the run, `shift` an
-    event that may have shifted the level, `end` why the life was declared ended with it; `shown` what its rows show (None: a
-    channel is dead, so that no other run bears on whether it is held), `confirmed` whether somebody confirmed it.
+    its deviation by pressure [Pa] where its curves determine it, and `under` each draw of the model in force where that
+    corrects it; `duty` is the block that ends with the run, `shift` an event that may have shifted the level, `end` why the
+    life was declared ended with it; `shown` what its rows show (None: a channel is dead, so that no other run bears on
+    whether it is held), `confirmed` whether somebody confirmed it.
     """
 
     run_id: str
@@ -86,6 +89,20 @@ class Event:
     dated: bool = False
     shown: Shown | None = None
     confirmed: bool = False
+    under: Mapping[float, tuple[float, ...]] = field(default_factory=dict)
+
+    def corrected(self, cofs: Corrected | None) -> "Event":
+        """The same run with its mean COF as the model in force corrects it; unchanged where that does not."""
+        if cofs is None:
+            return self
+        means = {level: (mean, sd) for level, (mean, sd, _) in cofs.items()}
+        return replace(self, cofs=means, under={level: draws for level, (_, _, draws) in cofs.items() if draws})
+
+    def cofs_under(self, draw: int) -> ByPressure:
+        """Mean COF and its deviation by pressure [Pa] under one draw."""
+        if not self.under:
+            return self.cofs
+        return {level: (self.under[level][draw], sd) for level, (_, sd) in self.cofs.items()}
 
     def at(self, cycles: float) -> "Event":
         """The same run at other cycles since new."""
@@ -97,7 +114,8 @@ class Series:
     """One quantity at one pressure: measurements by progress ζ, and which event each came from.
 
     `scale` leads from cycles since new to ζ and back; an adopted model's course is off the measurements. A slope is one at
-    `speed_rpm`, the lag of a loop one at `frequency_hz`.
+    `speed_rpm`, the lag of a loop one at `frequency_hz`. `draws` are the measurements under each draw of the model in force,
+    by weight, where it has any: the clutch is tracked under each, and `measurements` are their mean.
     """
 
     quantity: str
@@ -107,6 +125,12 @@ class Series:
     scale: Scale
     speed_rpm: float | None = None
     frequency_hz: float | None = None
+    draws: tuple[tuple[float, tuple[Measurement, ...]], ...] = ()
+
+    @property
+    def weighted(self) -> tuple[tuple[float, tuple[Measurement, ...]], ...]:
+        """The draws, or all of the weight on what was measured."""
+        return self.draws or ((1.0, self.measurements),)
 
     def until(self, event: int) -> int:
         """How many measurements there were when `event` had happened."""
@@ -165,7 +189,13 @@ class Life:
 
     def with_cofs(self, cofs: Mapping[str, ByPressure]) -> "Life":
         """The life by other mean COFs of its tests, by run_id; none for a test that is not among them."""
-        return replace(self, events=tuple(replace(event, cofs=cofs.get(event.run_id, {})) for event in self.events))
+        return replace(
+            self, events=tuple(replace(event, cofs=cofs.get(event.run_id, {}), under={}) for event in self.events)
+        )
+
+    def corrected(self, cofs: Mapping[str, Corrected]) -> "Life":
+        """The life with mean COFs as a model corrects them, by run_id; the others stay."""
+        return replace(self, events=tuple(event.corrected(cofs.get(event.run_id)) for event in self.events))
 
     def scale(self, assumptions: Assumptions) -> Scale:
         """ζ over cycles since new, by the duty of this life."""
@@ -173,13 +203,41 @@ class Life:
 
     def pooled(self, assumptions: Assumptions) -> Series:
         """Mean COF over the pressures of the reference test."""
-        reference = self.reference
-        pooled = [pooled_value(reference, event.cofs) for event in self.events]
-        return self.series(assumptions, MEAN_COF, ALL_PRESSURES, pooled)
+        return self._mean_cofs(assumptions, ALL_PRESSURES, pooled_value)
 
     def at(self, assumptions: Assumptions, level: float) -> Series:
         """Mean COF at one pressure level of the reference test."""
-        return self.series(assumptions, MEAN_COF, level, [nearest(level, event.cofs) for event in self.events])
+        return self._mean_cofs(assumptions, level, lambda _, cofs: nearest(level, cofs))
+
+    def _mean_cofs(
+        self, assumptions: Assumptions, level: float, value: Callable[[ByPressure, ByPressure], Value | None]
+    ) -> Series:
+        """Mean COF by its value of the reference test's and a test's mean COFs, under each draw of the model in force."""
+        first = next((event for event in self.events if event.cofs), None)
+        reference = {} if first is None else first.cofs
+        values = [value(reference, event.cofs) for event in self.events]
+        series = self.series(assumptions, MEAN_COF, level, values)
+        weights, course = assumptions.model.weights, assumptions.model.course
+        if first is None or len(weights) == 1 or (course is None and not any(event.under for event in self.events)):
+            return series
+        cycles = np.array([self.events[index].cycles for index in series.events])
+        off = assumptions.offsets(MEAN_COF, level, cycles)
+        draws = []
+        for draw, weight in enumerate(weights):
+            own_reference = first.cofs_under(draw)
+            own = [value(own_reference, self.events[index].cofs_under(draw)) for index in series.events]
+            taken = off[min(draw, len(off) - 1)].tolist()
+            draws.append(
+                (
+                    weight,
+                    tuple(
+                        replace(measured, value=at[0] - added)
+                        for measured, at, added in zip(series.measurements, own, taken, strict=True)
+                        if at is not None
+                    ),
+                )
+            )
+        return replace(series, draws=tuple(draws))
 
     def series(
         self, assumptions: Assumptions, quantity: str, pressure: float, values: Sequence[Value | None]

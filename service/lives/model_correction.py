@@ -1,7 +1,9 @@
 """An adopted extension (`models.diagnosis.extension`) applied to a clutch's runs: corrected mean COFs, and the course.
 
-Artefacts are taken off the plateaus of a test and its curves fitted anew, with what was known when it was made: the runs
-before it in the order of the history. So the same history gives the same corrections, in whatever order its runs arrived.
+Artefacts are taken off the plateaus of a test and its curves fitted again, with what was known when it was made: the runs
+before it in the order of the history. The fit is to the mean over the model's draws; each draw's own mean COF differs
+from it by the mean of what it takes off less. So the same history gives the same corrections, in whatever order its runs
+arrived.
 Of a sampled record before it only the moment and one point stand in, for to cut all of them at every new run would cost
 more than the run. The fits and receipts of the baseline stay as they are.
 """
@@ -18,11 +20,11 @@ from models.clutch import Geometry
 from models.diagnosis.campaign import Campaign, StationaryRun
 from models.diagnosis.extension import Extension, NotFiniteError
 from models.prognosis.criteria import HORIZON
-from models.records.runs import loaded
+from models.records.runs import Plateaus, loaded
 from service.lives.assumptions import ALL_PRESSURES, Course, ModelInForce
 from service.lives.criteria import COURSE_PROBES
 from service.lives.diagnosis.campaign import CampaignRun, campaign_of, run_of, without_record
-from service.lives.history import STATIONARY, ByPressure, Event, Life, reference_velocities
+from service.lives.history import STATIONARY, Corrected, Event, Life, reference_velocities
 from service.lives.incoming_run import IncomingRun
 from service.lives.run_analysis import levels_of, mean_cofs
 from service.schemas.clutch import ClutchIn
@@ -79,8 +81,9 @@ def corrected_cofs(
     life: Life,
     runs: Sequence[CampaignRun],
     tests: Iterable[StationaryRun],
-) -> dict[str, ByPressure]:
-    """run_id -> pressure [Pa] -> mean COF and its deviation, of the `tests` from which the extension takes something.
+) -> dict[str, Corrected]:
+    """run_id -> pressure [Pa] -> mean COF, its deviation, and mean COF under each draw, of the `tests` from which the
+    extension takes something.
 
     `runs` are those of the life in order, up to the last of the tests at least.
     """
@@ -89,20 +92,40 @@ def corrected_cofs(
     geometry = record.geometry.to_model()
     velocities = reference_velocities(life.speed_range, geometry)
     place = {event.run_id: index for index, event in enumerate(life.events)}
-    corrected: dict[str, ByPressure] = {}
+    corrected: dict[str, Corrected] = {}
     for test in tests:
         artefact = _artefact(extension, test, campaign_of(record, runs[: place[test.run_id]]))
         if artefact is None:
             continue
-        freed = loaded(replace(test.plateaus, torque=test.plateaus.torque - artefact))
+        mean = extension.weights @ artefact
+        freed = loaded(replace(test.plateaus, torque=test.plateaus.torque - mean))
         cofs = {} if freed is None else mean_cofs(levels_of(freed, geometry), velocities, geometry)
         if cofs:
-            corrected[test.run_id] = cofs
+            off = _means_over(mean - artefact, test.plateaus, list(cofs), velocities, geometry)
+            corrected[test.run_id] = {
+                level: (value, sd, tuple((value + off[level]).tolist())) for level, (value, sd) in cofs.items()
+            }
     return corrected
 
 
+def _means_over(
+    torque: FloatArray, plateaus: Plateaus, levels: Sequence[float], velocities: FloatArray, geometry: Geometry
+) -> dict[float, FloatArray]:
+    """pressure [Pa] -> mean over the protocol's velocities of a change of COF [d], known at plateaus [d, n] Nm."""
+    means = {}
+    level_of = np.abs(plateaus.pressure[:, None] - np.array(levels)).argmin(axis=1)
+    speed = geometry.sliding_velocity(np.abs(plateaus.speed))
+    for place, level in enumerate(levels):
+        rows = np.flatnonzero((level_of == place) & (plateaus.speed != 0))
+        rows = rows[np.argsort(speed[rows], kind="stable")]
+        sign = np.sign(plateaus.speed[rows])
+        over = [np.interp(velocities, speed[rows], sign * own[rows]).mean() for own in torque]
+        means[level] = np.array(over) / geometry.torque_per_cof(level)
+    return means
+
+
 def _artefact(extension: Extension, run: StationaryRun, before: Campaign) -> FloatArray | None:
-    """Torque [n] Nm to be taken off, None where there is none.
+    """Torque [d, n] Nm to be taken off under each draw, None where there is none.
 
     A test must be taken in whatever an adopted model makes of it: where it makes no number of it, nothing is taken off.
     """
@@ -120,18 +143,19 @@ def model_in_force(extension: Extension | None, life: Life | None, geometry: Geo
         return ModelInForce()
     return ModelInForce(
         name={"name": "extended", "effects": list(extension.effects)},
+        weights=tuple(extension.weights.tolist()),
         course=course_of(extension, life, geometry),
         severity_exponent=extension.severity_exponent,
     )
 
 
 def course_of(extension: Extension, life: Life, geometry: Geometry) -> Course | None:
-    """Mean COF [m] that the effects of use add at cycles since new [m] at a pressure [Pa], 0 = the reference pressures.
+    """Mean COF [d, m] that the effects of use add at cycles since new [m] at a pressure [Pa], 0 = the reference pressures.
 
     None where they add nothing at any of many cycles, where they make no number of one of them, or no test has set a
     reference yet.
     """
-    if life.speed_range is None or not life.reference:
+    if life.speed_range is None or not life.reference or not extension.has_course:
         return None
     # every fifth of the protocol's speeds: their mean is that of all of them to half a per cent of the course
     velocities = reference_velocities(life.speed_range, geometry)[2::5]
@@ -143,7 +167,7 @@ def course_of(extension: Extension, life: Life, geometry: Geometry) -> Course | 
         per_cof = np.array([geometry.torque_per_cof(float(level)) for level in levels])
         since = np.maximum(np.array(cycles) - life.origin, 0.0)
         course = extension.course(since, levels, velocities)
-        return np.asarray((course / per_cof).mean(axis=1), dtype=np.float64)
+        return np.asarray((course / per_cof).mean(axis=2), dtype=np.float64)
 
     probes = tuple(np.concatenate([[0.0], np.geomspace(1.0, HORIZON, COURSE_PROBES)]).tolist())
     try:

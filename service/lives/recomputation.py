@@ -16,6 +16,7 @@ from service.lives.assumptions import Assumptions, LearnedPrior, ModelInForce, s
 from service.lives.condition import SHOWN
 from service.lives.history import (
     ByPressure,
+    Corrected,
     Event,
     Life,
     Series,
@@ -135,7 +136,7 @@ class Results:
     levels: Levels = field(default_factory=dict)
     cofs: Mapping[str, ByPressure] = field(default_factory=dict)
     receipts: Mapping[str, Receipt] = field(default_factory=dict)
-    corrected: Mapping[str, ByPressure] = field(default_factory=dict)
+    corrected: Mapping[str, Corrected] = field(default_factory=dict)
     corrected_anew: bool = False
     tracking: Tracking | None = None
     summary: dict[str, Any] | None = None
@@ -173,13 +174,14 @@ def computed_anew(
 
 def with_cofs(
     state: ClutchState, levels: Levels, tests: Iterable[StationaryRun], reader: RunReader
-) -> tuple[ClutchState, dict[str, ByPressure], dict[str, ByPressure]]:
+) -> tuple[ClutchState, dict[str, ByPressure], dict[str, Corrected]]:
     """The state with the mean COFs of its events, those that the fits give by run_id, and those that the model in force
     corrects; arguments as of `computed_anew`."""
     cofs = _all_cofs(state.lives, levels, state.geometry)
-    plain = replace(state, events=tuple(replace(event, cofs=cofs.get(event.run_id, {})) for event in state.events))
+    events = tuple(replace(event, cofs=cofs.get(event.run_id, {}), under={}) for event in state.events)
+    plain = replace(state, events=events)
     corrected = _corrected(plain, tests, reader)
-    events = tuple(replace(event, cofs=corrected.get(event.run_id, event.cofs)) for event in plain.events)
+    events = tuple(event.corrected(corrected.get(event.run_id)) for event in plain.events)
     return replace(plain, events=events), cofs, corrected
 
 
@@ -226,7 +228,7 @@ def _all_cofs(lives: Sequence[Life], levels: Levels, geometry: Geometry) -> dict
     return cofs
 
 
-def _corrected(state: ClutchState, tests: Iterable[StationaryRun], reader: RunReader) -> dict[str, ByPressure]:
+def _corrected(state: ClutchState, tests: Iterable[StationaryRun], reader: RunReader) -> dict[str, Corrected]:
     if state.extension is None or not state.events:
         return {}
     life = state.lives[-1]
@@ -236,7 +238,7 @@ def _corrected(state: ClutchState, tests: Iterable[StationaryRun], reader: RunRe
 
 def corrected_newest(
     state: ClutchState, newest: Event, test: StationaryRun | None, reader: RunReader
-) -> ByPressure | None:
+) -> Corrected | None:
     """The mean COFs of the test that comes last, freed of artefacts of the model in force; None where nothing changes."""
     if state.extension is None or newest.speed_range is None or test is None:
         return None

@@ -22,10 +22,12 @@ from models.prognosis.stated_end import StatedEnd, stated_end
 from models.tracking.filters.grid import Grid, GridState
 from models.tracking.filters.particle import Particle, ParticleState
 from models.tracking.filters.ukf import Ukf, UkfState
-from models.tracking.posterior import Posterior, Tracker
+from models.tracking.measurement import Measurement
+from models.tracking.posterior import Posterior, Tracker, mixture
 from models.tracking.prior import Prior
+from service.errors import Notice
 from service.lives.assumptions import WEAK, Assumptions
-from service.lives.criteria import PREDICTION_DRAWS
+from service.lives.criteria import FEWEST_PARTICLES, PREDICTION_DRAWS
 from service.lives.history import Life, Series
 from service.lives.payloads import ended, insufficient, predicted
 from service.lives.prediction_notices import off_track
@@ -142,45 +144,64 @@ def advance(
     A `back_cast` that is known from another filter takes the place of its own. States that were made of other measurements
     or under other priors are not carried on: then the filter starts anew.
     """
-    priors = assumptions.priors(series.quantity, series.measurements[0], series.scale)
-    if tracked is not None and not _continues(tracked, series, priors):
+    branches = _branches(series, assumptions)
+    if tracked is not None and not _continues(tracked, branches):
         tracked = None
     if tracked is not None and tracked.runs == runs:
         return tracked
-    tracker = _tracker(method, len(priors))
+    tracker = _tracker(method, len(branches))
+    weak_prior = assumptions.priors(series.quantity, series.measurements[0], series.scale)[WEAK]
     if tracked is None:
-        start = {name: tracker.start(prior) for name, prior in priors.items()}
+        start = {name: tracker.start(prior) for name, (prior, _) in branches.items()}
         tracked = Tracked(runs=0, states=start, back_cast=BackCast.nothing())
     for step in range(tracked.runs, runs):
         measurement = series.measurements[step]
         states = {
-            name: tracker.update(state, measurement, step_rng(clutch_id, _purpose(method, name), series, step))
+            name: tracker.update(
+                state, branches[name][1][step], step_rng(clutch_id, _purpose(method, name), series, step)
+            )
             for name, state in tracked.states.items()
         }
         judged = tracked.back_cast.judged(measurement) if back_cast is None else back_cast
         tracked = Tracked(runs=step + 1, states=states, back_cast=judged)
         if back_cast is None and kept_after(step + 1):
             sample = drawn(clutch_id, method, series, assumptions, tracked)
-            forecast = tracked.back_cast.forecast(sample, measurement, priors[WEAK])
+            forecast = tracked.back_cast.forecast(sample, measurement, weak_prior)
             tracked = replace(tracked, back_cast=forecast, sample=sample)
     return tracked
 
 
-def _tracker(method: str, priors: int) -> Tracker[Any]:
-    """A filter under one of so many priors, among which the particles are shared."""
+def _branches(series: Series, assumptions: Assumptions) -> dict[str, tuple[Prior, tuple[Measurement, ...]]]:
+    """What a filter is run under, by name: every prior, with every draw of the series' measurements."""
+    return {
+        _branch(prior_name, draw, series): (prior, measurements)
+        for draw, (_, measurements) in enumerate(series.weighted)
+        for prior_name, prior in assumptions.priors(series.quantity, measurements[0], series.scale).items()
+    }
+
+
+def _branch(prior: str, draw: int, series: Series) -> str:
+    """The name of a state: that of its prior, and of the draw where there are several."""
+    return f"{prior}@{draw}" if series.draws else prior
+
+
+def _tracker(method: str, branches: int) -> Tracker[Any]:
+    """A filter in one of so many branches, among which the particles are shared."""
     tracker = _TRACKERS[method]
-    return replace(tracker, particles=tracker.particles // priors) if isinstance(tracker, Particle) else tracker
+    if not isinstance(tracker, Particle):
+        return tracker
+    return replace(tracker, particles=max(tracker.particles // branches, min(tracker.particles, FEWEST_PARTICLES)))
 
 
-def _continues(tracked: Tracked, series: Series, priors: Mapping[str, Prior]) -> bool:
-    """Whether the states are those of the series' first measurements under these priors."""
-    if tracked.states.keys() != priors.keys() or any(tracked.states[name].prior != p for name, p in priors.items()):
+def _continues(tracked: Tracked, branches: Mapping[str, tuple[Prior, tuple[Measurement, ...]]]) -> bool:
+    """Whether the states are those of the branches' first measurements under their priors."""
+    if tracked.states.keys() != branches.keys():
         return False
-    if tracked.runs > len(series.measurements):
-        return False
-    measurements = series.measurements[: tracked.runs]
-    for state in tracked.states.values():
-        history = state.history
+    for name, state in tracked.states.items():
+        prior, own = branches[name]
+        if state.prior != prior or tracked.runs > len(own):
+            return False
+        measurements, history = own[: tracked.runs], state.history
         rows = zip(
             measurements, history.progress.tolist(), history.value.tolist(), history.epoch.tolist(), strict=False
         )
@@ -192,16 +213,20 @@ def _continues(tracked: Tracked, series: Series, priors: Mapping[str, Prior]) ->
 def drawn(clutch_id: str, method: str, series: Series, assumptions: Assumptions, tracked: Tracked) -> Posterior:
     """A weighted sample of the coefficients after `tracked.runs` measurements; the same each time, and drawn once.
 
-    The draws are shared among the priors: so a prediction costs the same whether a fleet has taught or not.
+    Its size is shared among the priors and the draws of the model in force: so a prediction costs about the same.
     """
     if tracked.sample is not None:
         return tracked.sample
     tracker, size = _tracker(method, len(tracked.states)), PREDICTION_DRAWS // len(tracked.states)
-    posteriors = {}
-    for name, state in tracked.states.items():
-        rng = step_rng(clutch_id, f"{_purpose(method, name)}-posterior", series, tracked.runs)
-        posteriors[name] = tracker.posterior(state, size, rng)
-    return assumptions.pooled(posteriors, series.measurements[0], series.scale)
+    parts = []
+    for draw, (weight, measurements) in enumerate(series.weighted):
+        posteriors = {}
+        for prior in assumptions.priors(series.quantity, measurements[0], series.scale):
+            name = _branch(prior, draw, series)
+            rng = step_rng(clutch_id, f"{_purpose(method, name)}-posterior", series, tracked.runs)
+            posteriors[prior] = tracker.posterior(tracked.states[name], size, rng)
+        parts.append((weight, assumptions.pooled(posteriors, measurements[0], series.scale)))
+    return mixture(parts) if series.draws else parts[0][1]
 
 
 def _purpose(method: str, prior: str) -> str:
@@ -239,7 +264,6 @@ def predict(
         stated=(end.ends, end.weight),
     )
     measurements = series.measurements[: tracked.runs]
-    priors = assumptions.priors(series.quantity, measurements[0], series.scale)
     return predicted(
         passage,
         assumptions,
@@ -255,8 +279,21 @@ def predict(
             "effective_draws": sample.effective_draws,
             "status": sample.status.value,
         },
-        warnings=off_track(sample, measurements, priors[WEAK]),
+        warnings=_off_track(sample, series, assumptions, tracked.runs),
     )
+
+
+def _off_track(sample: Posterior, series: Series, assumptions: Assumptions, runs: int) -> list[Notice]:
+    """The warning of a last test that lies far off under every draw of the model in force; that of the draw under which it
+    is nearest."""
+    found: list[list[Notice]] = []
+    for draw, (_, measurements) in enumerate(series.weighted):
+        prior = assumptions.priors(series.quantity, measurements[0], series.scale)[WEAK]
+        notices = off_track(sample.of_branch(draw), measurements[:runs], prior)
+        if not notices:
+            return []
+        found.append(notices)
+    return found[0]
 
 
 def end_of_life(
@@ -285,4 +322,11 @@ def offset_of(series: Series, assumptions: Assumptions) -> Offset | None:
     """The course of the model in force over ζ, None where there is none."""
     if assumptions.model.course is None:
         return None
-    return lambda progress: assumptions.offset(series.quantity, series.pressure, series.scale.cycles(progress))
+    return lambda progress: assumptions.offsets(series.quantity, series.pressure, series.scale.cycles(progress))
+
+
+def mean_offset_of(series: Series, assumptions: Assumptions) -> Offset | None:
+    """The mean of that over the model's draws [1, k]."""
+    if assumptions.model.course is None:
+        return None
+    return lambda progress: assumptions.offset(series.quantity, series.pressure, series.scale.cycles(progress))[None]

@@ -38,6 +38,7 @@ class Amplitude(Answer):
     value: Number = Field(description="Estimate")
     sd: Number = Field(description="Its standard deviation")
     unit: str = Field(description="Its unit")
+    interval: list[Number] = Field(default_factory=list, description="Its 90 % interval, lower and upper end")
 
 
 class ExplanationOut(Answer):
@@ -188,6 +189,10 @@ class DiagnosisListed(Answer):
     stale: bool = Field(description="Whether runs were posted since")
     earlier_life: bool = Field(description="Whether a rebuild has ended the life that it diagnosed")
     adoptable: bool = Field(description="Whether it has an extended model to adopt")
+    not_adoptable: str | None = Field(
+        default=None,
+        description="Why a cause that was fitted gives nothing to adopt; null where it does, or none was fitted",
+    )
     adopted: bool = Field(description="Whether its model is in force")
     problem: str | None = Field(description="Why it failed")
     code_version: str = Field(description="The release that made it")

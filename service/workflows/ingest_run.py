@@ -20,6 +20,7 @@ from service.lives.history import (
     DYNAMIC,
     STATIONARY,
     ByPressure,
+    Corrected,
     Event,
     duty_block,
     life_with,
@@ -272,12 +273,12 @@ def _among(
         evaluated = _evaluated(before, state, event)
         state, computed = computed_anew(state, levels, receipts, tests, reader, evaluated=evaluated)
         return _summarised(database, state, computed, arrival, answer)
-    corrected: dict[str, ByPressure] = {}
+    corrected: dict[str, Corrected] = {}
     if state.extension is not None and event is state.events[-1]:
         runs_before = stored_runs.run_reader(database, state.clutch_id)
         cofs = corrected_newest(state, event, test_of(arrival, life_with(state.events, event)), runs_before)
         if cofs is not None:
-            event = replace(event, cofs=cofs)
+            event = event.corrected(cofs)
             corrected, state = {event.run_id: cofs}, replace(state, events=(*state.events[:-1], event))
     tracking = track(state, newest=event)
     noticed = history_warnings(state.lives, tracking.warnings, run_id=event.run_id)[event.run_id]

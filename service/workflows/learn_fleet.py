@@ -24,7 +24,7 @@ from service.lives.history import WORN, Life
 from service.lives.outlook import Evidence, needs_evidence, summarised
 from service.lives.payloads import warned_anew
 from service.lives.recomputation import ClutchState, Receipt, Results, track
-from service.lives.tracks import CARRIED, offset_of
+from service.lives.tracks import CARRIED, mean_offset_of
 from service.settings import CODE_VERSION
 from storage import assumptions, clutches, results
 from storage.assumptions import NOBODY, FleetPriorRow
@@ -169,13 +169,13 @@ def _lesson(life: Life, assumptions: Assumptions, fraction: float) -> Lesson | N
     if len(measurements) < FEWEST_TESTS_TO_LEARN:
         return None
     lesson = taught([replace(measurement, progress=measurement.progress * unit) for measurement in measurements])
-    offset = offset_of(series, assumptions)
+    offset = mean_offset_of(series, assumptions)
     progress = np.array([measurement.progress for measurement in measurements])
     values = np.array([measurement.value for measurement in measurements])
     initial = lesson.initial
     if offset is not None:
-        values = values + offset(progress)
-        initial += float(offset(np.zeros(1))[0])
+        values = values + offset(progress)[0]
+        initial += float(offset(np.zeros(1))[0, 0])
     end, deviation, censored = measured_end(progress, values, fraction * initial), 0.0, False
     horizon = float(series.scale.progress(series.scale.origin + HORIZON))
     if end is None and life.end is not None:  # stopped before any test passed the threshold

@@ -6,6 +6,7 @@ mean COF that it passes for the first time after a drawn number of cycles, so th
 """
 
 import tempfile
+import time
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -70,9 +71,9 @@ def lived(job: tuple[str, tuple[int, ...]]) -> Lived:
         end = np.random.default_rng([*seed, k]).uniform(SOONEST, LATEST) * hidden.plan.life.span
         fraction = passed_at(hidden, end)
         if fraction is not None:
-            verdict, adopted, forecasts = _forecasts(hidden, fraction)
+            report, *forecasts = forecasts_of(runs(hidden), fraction)
             before, after = (_crps(forecast, end) for forecast in forecasts)
-            return Lived(slug, hidden.seed, verdict, adopted, before, after)
+            return Lived(slug, hidden.seed, report["verdict"], report["adoptable"], before, after)
     return Lived(slug, seed, "unreachable", False, None, None)
 
 
@@ -106,24 +107,32 @@ def mean_cof(hidden: Hidden, cycles: FloatArray) -> FloatArray:
     return np.asarray((torque / bar).mean(axis=1)[np.searchsorted(all_cycles, cycles)])
 
 
-def _forecasts(hidden: Hidden, fraction: float) -> tuple[str, bool, list[dict[str, Any]]]:
-    """The verdict, whether something was adopted, and the forecast of the end of life before and after."""
+def forecasts_of(
+    sent: Sequence[dict[str, Any]], fraction: float
+) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+    """The report on runs that are posted, and the forecast of the end of life before and after adoption; the same twice
+    where nothing is there to adopt."""
     with tempfile.TemporaryDirectory() as folder:
         app = create_app(Settings(workers=0, database=f"sqlite:///{Path(folder) / 'a.db'}"))
         with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as http:
             base = "/v1/clutches/blind"
             clutch = {"clutch_id": "blind", "origin": "simulated", "end_of_life": {"cof_fraction": fraction}}
             http.post("/v1/clutches", json=clutch).raise_for_status()
-            for run in runs(hidden):
+            for run in sent:
                 http.post(f"{base}/runs", json=run | {"origin": "simulated"}).raise_for_status()
             answer = http.post(f"{base}/diagnoses", json={"adopt": False}, headers={"Prefer": "wait=120"})
             report = answer.raise_for_status().json()
-            forecasts = [http.get(f"{base}/remaining-useful-life").raise_for_status().json()]
+            while report["status"] == "running":
+                time.sleep(1.0)
+                report = http.get(f"{base}/diagnoses/{report['diagnosis_id']}").raise_for_status().json()
+            if report["status"] != "finished":
+                raise RuntimeError(f"a diagnosis ended without a report: {report['problem']}")
+            before = after = http.get(f"{base}/remaining-useful-life").raise_for_status().json()
             if report["adoptable"]:
                 wanted = {"diagnosis_id": report["diagnosis_id"]}
                 http.put(f"{base}/model", json=wanted).raise_for_status()
-            forecasts.append(http.get(f"{base}/remaining-useful-life").raise_for_status().json())
-    return str(report["verdict"]), bool(report["adoptable"]), forecasts
+                after = http.get(f"{base}/remaining-useful-life").raise_for_status().json()
+    return report, before, after
 
 
 def _crps(forecast: dict[str, Any], end: float) -> float:

@@ -37,12 +37,12 @@ def test_a_model_of_no_diagnosis_is_refused(stocked: Database) -> None:
 
 
 def test_corrections_stand_beside_the_fits(stocked: Database) -> None:
-    cofs = {4e5: (0.12, 0.001), 5e5: (0.11, 0.002)}
+    cofs = {4e5: (0.12, 0.001, (0.11, 0.13)), 5e5: (0.11, 0.002, ())}
     with stocked.writing() as connection:
         assumptions.write_corrected_cofs(connection, 1, cofs)
         assert assumptions.corrected_cofs_of(connection, CLUTCH) == {1: cofs}
-        assumptions.write_corrected_cofs(connection, 1, {4e5: (0.13, 0.001)})
-        assert assumptions.corrected_cofs_of(connection, CLUTCH) == {1: {4e5: (0.13, 0.001)}}
+        assumptions.write_corrected_cofs(connection, 1, {4e5: (0.13, 0.001, ())})
+        assert assumptions.corrected_cofs_of(connection, CLUTCH) == {1: {4e5: (0.13, 0.001, ())}}
         assert assumptions.corrected_cofs_of(connection, "another") == {}
         assumptions.clear_corrected_cofs(connection, "another")
         assert assumptions.corrected_cofs_of(connection, CLUTCH)

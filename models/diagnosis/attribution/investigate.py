@@ -5,7 +5,7 @@ baseline, everything is computed once more against that, its noise first.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from models.diagnosis.pooled_fit.problem import FitProblem
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Investigation:
     """A baseline's fit with everything projected off it, its alarms, the search (None where nothing called for one), raw
-    records' evidence, and the axes on which structure lives."""
+    records' evidence, the axes on which structure lives, and the first baseline where the search found a better one."""
 
     baseline: Baseline
     projected: ProjectedFit
@@ -34,6 +34,7 @@ class Investigation:
     search: SearchResult | None
     raw: tuple[RawEvidence, ...]
     where: tuple[Where, ...]
+    first: Baseline | None = None
 
     @property
     def problem(self) -> FitProblem:
@@ -64,7 +65,8 @@ def investigate(
     first = _investigated(baseline, columns, raw, rng)
     if first.search is None or first.search.better_baseline is None:
         return first
-    return _investigated(from_better(baseline, first.search.better_baseline), columns, raw, rng)
+    again = _investigated(from_better(baseline, first.search.better_baseline), columns, raw, rng)
+    return replace(again, first=baseline)
 
 
 def _investigated(

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.baseline.criteria import CURVATURE_BOUNDS, EARLY
+from models.diagnosis.baseline.criteria import BELOW, CURVATURE_BOUNDS, EARLY
 from models.diagnosis.design.facts import Facts
 from models.diagnosis.design.points import IntArray, Points
 from models.friction.stribeck import GAMMA
@@ -71,10 +71,11 @@ class Laws:
     theta: FloatArray
     frame: Frame
 
-    def parameters(self, pressure: FloatArray, cycles: FloatArray) -> FloatArray:
-        """M_s, M̄_c, V_S, C_v [n, 4] at pressure [n] Pa and cycles [n]. V_S is kept above 0, the others are as fitted."""
+    def parameters(self, pressure: FloatArray, cycles: FloatArray, *, below: float = 0.0) -> FloatArray:
+        """M_s, M̄_c, V_S, C_v [n, 4] at pressure [n] Pa and cycles [n]. V_S is kept above 0, the others are as fitted.
+        `below` as `falling_weight` takes it."""
         begins, repeats = _stretches(pressure, cycles)
-        return np.repeat(self._values(pressure[begins], cycles[begins], None)[0], repeats, axis=0)
+        return np.repeat(self._values(pressure[begins], cycles[begins], None, below)[0], repeats, axis=0)
 
     def with_gradient(self, pressure: FloatArray, cycles: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Parameters [n, 4], their derivatives by θ's blocks [n, 4, BLOCK], and those of M̄_c by FALL [n, 2]."""
@@ -85,7 +86,7 @@ class Laws:
         return values, slopes, by_fall
 
     def _values(
-        self, pressure: FloatArray, cycles: FloatArray, slopes: FloatArray | None
+        self, pressure: FloatArray, cycles: FloatArray, slopes: FloatArray | None, below: float = 0.0
     ) -> tuple[FloatArray, FloatArray]:
         """Parameters [n, 4] and M̄_c's derivatives by FALL [n, 2]; fills `slopes` [n, 4, BLOCK] where it is given."""
         values = np.empty((pressure.size, 4))
@@ -94,7 +95,7 @@ class Laws:
         # rows of one test follow each other: eq. 6 is computed once for each
         begins, repeats = _stretches(cycles)
         states = cycles[begins]
-        fall, fall_slopes = falling_weight(high, self.frame.span, self.theta[FALL])
+        fall, fall_slopes = falling_weight(high, self.frame.span, self.theta[FALL], below)
         for k in range(4):
             first, second, share_1, share_2, log_half, log_exponent = self.theta[k * BLOCK : (k + 1) * BLOCK].tolist()
             weight_1, weight_2 = (fall, 1.0 - fall) if k == RATIO else (1.0 - high, high)
@@ -142,18 +143,23 @@ def _stretches(*keys: FloatArray) -> tuple[IntArray, IntArray]:
     return begins, np.diff(begins, append=changes.size)
 
 
-def falling_weight(high: FloatArray, span: float, fall: FloatArray) -> tuple[FloatArray, FloatArray]:
+def falling_weight(
+    high: FloatArray, span: float, fall: FloatArray, below: float = 0.0
+) -> tuple[FloatArray, FloatArray]:
     """w [n] of M̄_c's law at (p - P⁻)/(P⁺ - P⁻) = `high` [n], and its derivatives [n, 2] by `fall`: log p_0, p_0 in Pa, and
-    log b, b within CURVATURE_BOUNDS. Below P⁻ the law goes on by its tangent: a hyperbola has its pole there."""
+    log b, b within CURVATURE_BOUNDS. Below P⁻ the law goes on by its tangent, for a hyperbola has its pole there; by itself
+    for `below` of the span (and of the way to the pole) first."""
     ratio = float(np.clip(span / np.exp(fall[0]), 1e-3, 60.0))
     curvature = float(np.exp(np.clip(fall[1], *np.log(CURVATURE_BOUNDS))))
     at = np.append(high, 1.0)
-    stretched = 1.0 + curvature * ratio * np.maximum(at, 0.0)
+    near = np.maximum(at, -below * min(1.0, 1.0 / (curvature * ratio)))
+    stretched = 1.0 + curvature * ratio * near
     logs = np.log(stretched)
-    weight = np.exp(-logs / curvature) - ratio * np.minimum(at, 0.0)
-    along = ratio * at / stretched
-    by_curvature = (logs / curvature - along) * np.exp(-logs / curvature) * (at > 0.0)
-    by_decay = along * np.where(at > 0.0, np.exp(-logs / curvature), 1.0)
+    left, along = np.exp(-logs / curvature), ratio * near / stretched
+    tangent = ratio * np.minimum(at - near, 0.0) / stretched
+    weight = left * (1.0 - tangent)
+    by_decay = left * (along * (1.0 - tangent) + tangent * (1.0 - curvature * along))
+    by_curvature = left * ((logs / curvature - along) * (1.0 - tangent) + tangent * curvature * along)
     slopes = np.stack([by_decay, by_curvature], axis=-1)
     whole = 1.0 - weight[-1]
     by_fall = (slopes[:-1] - slopes[-1]) / whole + ((weight[:-1] - weight[-1]) / whole**2)[:, None] * slopes[-1]
@@ -223,11 +229,14 @@ class Scene:
         velocity: FloatArray | None = None,
         pressure: FloatArray | None = None,
     ) -> FloatArray:
-        """S [P] Nm with other cycles, velocity [m/s] > 0 or pressure [Pa] at the points."""
+        """S [P] Nm with other cycles, velocity [m/s] > 0 or pressure [Pa] at the points. Under another pressure M̄_c's law
+        goes on BELOW the lowest that was measured: it is the same clutch there."""
         p = self.points.pressure if pressure is None else pressure
         parameters = self.parameters
         if cycles is not None or pressure is not None:
-            parameters = self.laws.parameters(p, self.points.cycles if cycles is None else cycles)
+            parameters = self.laws.parameters(
+                p, self.points.cycles if cycles is None else cycles, below=0.0 if pressure is None else BELOW
+            )
         return self.points.engaged * curve(self.points.velocity if velocity is None else velocity, parameters)
 
 

@@ -74,13 +74,15 @@ class Resemblance(StrEnum):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShapeParameter:
     """A shape parameter: its name and unit, its bounds; `smooth` where the change may be differentiated in it (then it
-    is refined between grid values), else it is taken from the grid."""
+    is refined between grid values), else it is taken from the grid; `held` where a smooth one stays at the values of
+    `Effect.courses` while a size is averaged over them: the size bends with it."""
 
     name: str
     unit: str
     lowest: float
     highest: float
     smooth: bool = False
+    held: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,6 +107,7 @@ class Effect:
     which friction in loops then lags behind, or the measured torque itself; None where that is unknown and the last shape
     says (1 or 0).
     discrepancies: along what its form is uncertain (`effects.template_discrepancy`); an exact law has none.
+    courses(facts) gives the shapes between which a size is averaged; None: as it was fitted.
     several(scene, settings) -> [P, m] Nm is the same for many (amplitude, shape) at once, where that is cheaper.
     tails: degrees of freedom of the amplitude's prior (`effects.amplitude_prior`), infinite for a normal one.
     resembles_temperature: whether an oil temperature that was not measured could look like it.
@@ -131,6 +134,7 @@ class Effect:
     before_lag: bool | None
     discrepancies: tuple[Discrepancy, ...]
     tails: float = 2.0
+    courses: Callable[[Facts], tuple[Tried, ...]] | None = None
     several: Callable[[Scene, Sequence[tuple[float, Shape]]], FloatArray] | None = None
     grows_with: Measure | None = None
     resembles_temperature: Resemblance = Resemblance.NEVER

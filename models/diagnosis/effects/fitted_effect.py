@@ -65,6 +65,11 @@ def effect_precisions(fitted: FittedEffect) -> FloatArray:
     return np.array([amplitude_prior.precision(fitted.effect, fitted.amplitude), *(width**-2.0 for width in smooth)])
 
 
+def smooth_places(effect: Effect) -> list[int]:
+    """Which of an effect's shapes are smooth."""
+    return [place for place, shape in enumerate(effect.shapes) if shape.smooth]
+
+
 def free_shapes(fitted: FittedEffect) -> NDArray[np.bool_]:
     """Which of (amplitude, smooth shapes) [1 + s] a refit may move: shapes at a bound stay there."""
     smooth = [(value, shape) for value, shape in zip(fitted.shape, fitted.effect.shapes, strict=True) if shape.smooth]

@@ -10,7 +10,7 @@ bound, and of its model discrepancy, each held by its prior. Rows to come have t
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import nnls
@@ -20,21 +20,17 @@ from models.diagnosis.baseline.laws import OPEN_DRAG
 from models.diagnosis.baseline.prediction import Prediction, predict
 from models.diagnosis.criteria import DISCREPANCY_SD, LEAST_NOISE
 from models.diagnosis.design.design import Design
-from models.diagnosis.design.points import Points
 from models.diagnosis.effects.fitted_effect import (
-    FittedEffect,
     effect_columns,
     effect_precisions,
     effect_rows,
     free_shapes,
 )
-from models.diagnosis.effects.template_discrepancy import discrepancy_factors
+from models.diagnosis.effects.template_discrepancy import factors_at, ranges_of
 from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.diagnosis.pooled_fit.gram import Gram, gram_of
 from models.diagnosis.pooled_fit.problem import FitProblem
 from models.diagnosis.pooled_fit.projection import project
-
-_RANGES = ("velocity", "cycles", "clock")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,6 +50,7 @@ class CandidateDistances:
         free[OPEN_DRAG] = True  # a trial with the clutch open brings a drag that no measurement has determined yet
         problem = replace(problem, priors=replace(problem.priors, free=free))
         self._problem, self._fits = problem, fits
+        self._ranges = ranges_of(problem.design.rows)
         rows = _Rows(
             problem=problem,
             predictions=tuple(fit.prediction for fit in fits),
@@ -96,7 +93,7 @@ class CandidateDistances:
         own, precisions = [], []
         for effect in fit.effects:
             changes = effect_rows(design, prediction, effect)
-            discrepancy = changes[:, None] * _discrepancy_factors(self._problem.design, design, effect)
+            discrepancy = changes[:, None] * factors_at(design.rows, effect.effect, self._ranges)
             free = free_shapes(effect)
             own += [effect_columns(design, prediction, effect)[:, free], discrepancy]
             precisions += [*effect_precisions(effect)[free], *[DISCREPANCY_SD**-2.0] * discrepancy.shape[1]]
@@ -116,23 +113,6 @@ def _torque(design: Design, prediction: Prediction, fit: Fit) -> FloatArray:
     """[N] Nm of a candidate at the rows."""
     changes = [effect_rows(design, prediction, effect) for effect in fit.effects]
     return np.asarray(prediction.torque + sum(changes, np.zeros_like(prediction.torque)), dtype=np.float64)
-
-
-def _discrepancy_factors(measured: Design, rows: Design, fitted: FittedEffect) -> FloatArray:
-    """The factors of an effect's model discrepancy [N, k] at rows, over the ranges of those measured: beyond them as at
-    their ends."""
-    if rows is measured:
-        return discrepancy_factors(measured, fitted.effect)
-    count = rows.torque.size
-    ends = {name: (getattr(measured.rows, name).min(), getattr(measured.rows, name).max()) for name in _RANGES}
-    cut = replace(
-        rows.rows, **{name: np.clip(getattr(rows.rows, name), low, high) for name, (low, high) in ends.items()}
-    )
-    joined = {
-        field.name: np.concatenate([getattr(measured.rows, field.name), getattr(cut, field.name)])
-        for field in fields(Points)
-    }
-    return discrepancy_factors(replace(measured, rows=Points(**joined)), fitted.effect)[-count:]
 
 
 def _joined(first: Gram, second: Gram) -> Gram:

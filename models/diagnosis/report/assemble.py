@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from models.diagnosis.attribution.evidence import STEPS, Hypothesis, HypothesisStatus
 from models.diagnosis.attribution.investigate import Investigation
+from models.diagnosis.attribution.sizes import Sizes
 from models.diagnosis.attribution.verdict import Judgement, Verdict
 from models.diagnosis.design.design import Design
 from models.diagnosis.detection.lack_of_fit import Misfit, misfit_of
@@ -14,7 +15,7 @@ from models.diagnosis.pooled_fit.run_scatter import run_scatter
 from models.diagnosis.report.candidates import candidates_of, with_signs
 from models.diagnosis.report.maps import loop_traces, residual_maps
 from models.diagnosis.report.outlying_run import outlying_run
-from models.diagnosis.report.proposed_extension import proposed_extension, withheld_note
+from models.diagnosis.report.proposed_extension import proposed_extension, reason_against
 from models.diagnosis.report.report import Report
 from models.diagnosis.report.statistics import statistics_of
 from models.diagnosis.report.summary import Findings, summarise
@@ -23,14 +24,19 @@ from models.diagnosis.validation.extended_model import Validation
 
 
 def report_of(
-    investigation: Investigation, judgement: Judgement, validation: Validation, advice: tuple[Advice, ...]
+    investigation: Investigation,
+    judgement: Judgement,
+    validation: Validation,
+    sizes: Sizes,
+    advice: tuple[Advice, ...],
 ) -> Report:
     """Candidates, misfits, gain, advice, maps, loops, extension, summary."""
     problem, projected = investigation.problem, investigation.projected
     hypotheses: Sequence[Hypothesis] = () if investigation.search is None else investigation.search.hypotheses
-    notes = _notes(investigation, judgement, validation)
+    reason = reason_against(judgement.proposal, validation.gain, sizes)
+    notes = tuple(note for note in (*_notes(investigation, judgement), reason) if note)
     scatter = run_scatter(projected.projections)
-    candidates = candidates_of(problem, judgement, hypotheses, investigation.raw)
+    candidates = candidates_of(problem, judgement, hypotheses, investigation.raw, sizes.by_slug)
     findings = Findings(
         verdict=judgement.verdict,
         causes=judgement.causes,
@@ -60,7 +66,8 @@ def report_of(
         visible=findings.visible,
         maps=residual_maps(problem, projected.fit, validation.extended),
         loops=loop_traces(problem, projected.fit, validation.extended),
-        extension=proposed_extension(problem, judgement),
+        extension=proposed_extension(problem, judgement, sizes, reason),
+        not_adoptable=reason,
         notes=notes,
         statistics=statistics_of(investigation.alarms, judgement.comparison, scatter),
     )
@@ -82,6 +89,7 @@ def insufficient(missing: str, design: Design) -> Report:
         maps=None,
         loops=(),
         extension=None,
+        not_adoptable="",
         notes=design.notes,
         statistics={},
     )
@@ -96,9 +104,8 @@ def _extended_misfit(investigation: Investigation, judgement: Judgement, validat
     return misfit_of(investigation.problem, validation.extended, left)
 
 
-def _notes(investigation: Investigation, judgement: Judgement, validation: Validation) -> tuple[str, ...]:
-    """Of the baseline, of raw records, of fits that did not end, on an outlying run where the case is open, and on an
-    extension that is withheld."""
+def _notes(investigation: Investigation, judgement: Judgement) -> tuple[str, ...]:
+    """Of the baseline, of raw records, of fits that did not end, and on an outlying run where the case is open."""
     notes = [*investigation.baseline.notes, *(f"{record.effect}: {record.note}." for record in investigation.raw)]
     notes += [
         f"The fit of {' and '.join(hypothesis.slugs)} had not converged after {STEPS} steps: no cause is named by it."
@@ -106,6 +113,8 @@ def _notes(investigation: Investigation, judgement: Judgement, validation: Valid
         if hypothesis.status is HypothesisStatus.OUT_OF_STEPS
     ]
     if judgement.open:
-        notes.append(outlying_run(investigation.problem, investigation.projected.fit))
-    notes.append(withheld_note(judgement.proposal, validation.gain))
+        # an effect in one run alone may bend a better baseline's laws until that run fits
+        first = investigation.first
+        alone = "" if first is None else outlying_run(first.problem, first.fit)
+        notes.append(alone or outlying_run(investigation.problem, investigation.projected.fit))
     return tuple(note for note in notes if note)

@@ -1,11 +1,12 @@
 """The candidates of a report: each effect that competed, with its probability, evidence and estimated amplitude."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from models.diagnosis.attribution.evidence import Hypothesis
+from models.diagnosis.attribution.sizes import Size
 from models.diagnosis.attribution.verdict import Explanation, Judgement
 from models.diagnosis.criteria import LEAST_LISTED
 from models.diagnosis.detection.raw_records.evidence import RawEvidence
@@ -18,7 +19,11 @@ from models.diagnosis.report.report import Candidate
 
 
 def candidates_of(
-    problem: FitProblem, judgement: Judgement, hypotheses: Sequence[Hypothesis], raw: Sequence[RawEvidence]
+    problem: FitProblem,
+    judgement: Judgement,
+    hypotheses: Sequence[Hypothesis],
+    raw: Sequence[RawEvidence],
+    sizes: Mapping[str, Size],
 ) -> tuple[Candidate, ...]:
     """Each effect as the verdict has it, else alone, else beside the one that it goes with best."""
     records = {record.effect: record for record in raw}
@@ -34,6 +39,8 @@ def candidates_of(
             place = hypothesis.slugs.index(slug)
             deviation = amplitude_deviations(problem, hypothesis.fit)[place]
             estimate = _estimate(slug, hypothesis.fit.effects[place].amplitude, deviation)
+            if slug in sizes:
+                estimate = _sized(slug, sizes[slug])
             evidence = hypothesis.evidence
             beside = tuple(other for other in hypothesis.slugs if other != slug)
         elif slug in records:
@@ -64,6 +71,12 @@ def _estimate(slug: str, amplitude: float, deviation: float) -> Estimate:
         unit=effect.unit,
         one_sided=effect.positive,
     )
+
+
+def _sized(slug: str, size: Size) -> Estimate:
+    scale = BY_SLUG[slug].scale
+    low, high = (_finite(scale * end) for end in size.interval)
+    return replace(_estimate(slug, size.value, size.sd), stated_interval=(low, high), stated_sign=1.0 - size.other_sign)
 
 
 def _finite_estimate(estimate: Estimate) -> Estimate:

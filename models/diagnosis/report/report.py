@@ -87,6 +87,8 @@ class Report:
     maps: Maps | None
     loops: tuple[LoopTrace, ...]
     extension: Extension | None
+    #: Why a cause that was fitted gives nothing to adopt, in a sentence; empty where it does, or none was fitted.
+    not_adoptable: str
     #: Anything an engineer should know about the data: assumed noise floor, missing channels, states left out.
     notes: tuple[str, ...]
     #: Numbers of the engine that a test may want: alarm statistic, its threshold, closure p-values.

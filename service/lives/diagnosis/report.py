@@ -29,6 +29,7 @@ def empty() -> dict[str, Any]:
         "gain": _gain(None, {}, {}),
         "advice": [],
         "visible": [],
+        "not_adoptable": None,
         "notes": [],
         "statistics": {},
         "maps": None,
@@ -66,6 +67,7 @@ def public(
                     "value": finite(candidate.estimate.value),
                     "sd": finite(candidate.estimate.sd),
                     "unit": candidate.estimate.unit,
+                    "interval": [finite(end) for end in candidate.estimate.interval],
                 },
                 "beside": list(candidate.beside),
                 "fit": None if candidate.fit is None else candidate.fit.value,
@@ -88,6 +90,7 @@ def public(
             }
             for smallest in report.visible
         ],
+        "not_adoptable": report.not_adoptable or None,
         "notes": [*notes, *report.notes],
         "statistics": {name: finite(value) for name, value in report.statistics.items()},
         "maps": None if report.maps is None else _maps(report.maps, origin),

@@ -36,8 +36,8 @@ def track_item(
     if len({measurement.progress for measurement in series.measurements}) < FEWEST_TESTS:
         return paths_item(quantity, series, None, assumptions)
     cycles = trajectory_cycles(series)
-    course = assumptions.offset(series.quantity, series.pressure, cycles)
-    values = posterior.values(series.scale.progress(cycles)) + course[:, None]
+    course = assumptions.offsets(series.quantity, series.pressure, cycles)
+    values = posterior.values(series.scale.progress(cycles)) + posterior.beside(course)
     band = np.array([weighted_quantiles(row, posterior.weight, BAND) for row in values])
     home = _following_eq_6(posterior)
     item = {

@@ -1,11 +1,12 @@
 """A sample of eq. 6 of any series by any filter, and of every Stribeck parameter at every reference pressure."""
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 
 from models.friction.stribeck import PARAMETER_NAMES
 from models.prognosis.back_cast import BackCast
 from models.tracking.filters.grid import Grid
-from models.tracking.posterior import Posterior
+from models.tracking.posterior import Posterior, mixture
 from service.lives.assumptions import Assumptions
 from service.lives.criteria import TRAJECTORY_DRAWS, TRAJECTORY_LATTICE
 from service.lives.history import Life, Series, nearest
@@ -26,13 +27,15 @@ def posterior_of(clutch_id: str, series: Series, assumptions: Assumptions, metho
         runs = len(series.measurements)
         tracked = advance(clutch_id, method, series, assumptions, None, runs, back_cast=BackCast.nothing())
         return drawn(clutch_id, method, series, assumptions, tracked)
-    first = series.measurements[0]
-    posteriors = {}
-    for name, prior in assumptions.priors(series.quantity, first, series.scale).items():
-        state = _GRID.from_history(prior, series.measurements)
-        rng = step_rng(clutch_id, f"trajectory-{name}", series, len(series.measurements))
-        posteriors[name] = _GRID.posterior(state, TRAJECTORY_DRAWS, rng)
-    return assumptions.pooled(posteriors, first, series.scale)
+    parts = []
+    for weight, measurements in series.weighted:
+        posteriors = {}
+        for name, prior in assumptions.priors(series.quantity, measurements[0], series.scale).items():
+            state = _GRID.from_history(prior, measurements)
+            rng = step_rng(clutch_id, f"trajectory-{name}", series, len(measurements))
+            posteriors[name] = _GRID.posterior(state, math.ceil(TRAJECTORY_DRAWS / len(series.weighted)), rng)
+        parts.append((weight, assumptions.pooled(posteriors, measurements[0], series.scale)))
+    return parts[0][1] if len(parts) == 1 else mixture(parts)
 
 
 def tests_of(life: Life, fits: Mapping[str, Sequence[LevelFit]]) -> list[Sequence[LevelFit]]:

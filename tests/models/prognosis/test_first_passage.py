@@ -203,7 +203,7 @@ def test_looking_at_every_sixth_place_first_is_looking_at_all(monkeypatch: pytes
 def test_a_short_dip_of_an_offset_is_a_crossing(begin: float) -> None:
     """-0.35 over 8 % of the cycles takes 0.8 below half of it, long before the course itself gets there."""
     dip = predict_first_passage(
-        sample([-0.6]), fraction=0.5, as_of=0.0, offset=lambda z: -0.35 * ((z > begin) & (z < 1.08 * begin))
+        sample([-0.6]), fraction=0.5, as_of=0.0, offset=lambda z: -0.35 * ((z > begin) & (z < 1.08 * begin))[None]
     )
     assert dip.end_of_life[0.5] == pytest.approx(begin, rel=0.06)
 
@@ -211,10 +211,10 @@ def test_a_short_dip_of_an_offset_is_a_crossing(begin: float) -> None:
 def test_an_offset_is_part_of_the_criterion() -> None:
     """ξ + offset <= half of (ξ0 + offset(0)): 1/(1 + u) + 0.2 = 0.6 at u = 1.5; a step from 0 to 0.2 at 100: 7/3."""
     draws = sample([-1.0])
-    always = predict_first_passage(draws, fraction=0.5, as_of=0.0, offset=lambda z: np.full(z.size, 0.2))
+    always = predict_first_passage(draws, fraction=0.5, as_of=0.0, offset=lambda z: np.full((1, z.size), 0.2))
     assert always.end_of_life[0.5] == pytest.approx(1_500.0, rel=1e-3)
     assert (always.initial, always.current[0]) == (pytest.approx(1.2), pytest.approx(1.2))
-    later = predict_first_passage(draws, fraction=0.5, as_of=250.0, offset=lambda z: 0.2 * (z > 100.0))
+    later = predict_first_passage(draws, fraction=0.5, as_of=250.0, offset=lambda z: 0.2 * (z > 100.0)[None])
     assert later.end_of_life[0.5] == pytest.approx(1_000.0 * (1.0 / 0.3 - 1.0), rel=1e-3)
     assert later.current[0] == pytest.approx(1.0)
 

@@ -207,6 +207,6 @@ def test_an_adopted_model_corrects_no_open_test(client: TestClient, database_url
     post(client, stationary(0, run_id="s0"), sweep(0, "open"))
     known = campaign(database_url)
     assert known.life is not None
-    shifted = SimpleNamespace(artefact=lambda run, _: np.ones_like(run.plateaus.torque))
+    shifted = SimpleNamespace(weights=np.ones(1), artefact=lambda run, _: np.ones((1, run.plateaus.torque.size)))
     found = corrected_cofs(shifted, known.record, known.life, known.runs, known.campaign.stationary)  # type: ignore[arg-type]
     assert found.keys() == {"s0"}

@@ -28,12 +28,12 @@ SHIFT_NM, FROM_CYCLES, COURSE_NM = 1.5, 2000.0, -0.2
 
 def _artefact(self: Extension, run: StationaryRun, campaign: Campaign) -> Any:
     assert all(each.run_id != run.run_id and each.cycles <= run.cycles for each in campaign.stationary)
-    return np.full(run.plateaus.torque.size, self.content["shift_nm"] if run.cycles >= FROM_CYCLES else 0.0)
+    return np.full((1, run.plateaus.torque.size), self.content["shift_nm"] if run.cycles >= FROM_CYCLES else 0.0)
 
 
 def _course(self: Extension, cycles: Any, pressure: Any, velocity: Any) -> Any:
     assert velocity.ndim == 1
-    return np.outer(self.content["course_nm"] * (1 - np.exp(-cycles / 1000.0)), np.ones(pressure.size))
+    return np.outer(self.content["course_nm"] * (1 - np.exp(-cycles / 1000.0)), np.ones(pressure.size))[None]
 
 
 def _exponent(self: Extension) -> float | None:
@@ -41,7 +41,13 @@ def _exponent(self: Extension) -> float | None:
     return found
 
 
-METHODS = {"artefact": _artefact, "course": _course, "severity_exponent": property(_exponent)}
+METHODS = {
+    "artefact": _artefact,
+    "course": _course,
+    "severity_exponent": property(_exponent),
+    "weights": property(lambda _: np.ones(1)),
+    "has_course": property(lambda _: True),
+}
 
 
 def _report(campaign: Campaign, extension: Extension | None) -> Report:
@@ -115,6 +121,7 @@ def _report(campaign: Campaign, extension: Extension | None) -> Report:
             ),
         ),
         extension=extension,
+        not_adoptable="",
         notes=("made by a stand-in",),
         statistics={"alarm": float("nan"), "threshold": 11.0},
     )

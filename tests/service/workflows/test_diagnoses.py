@@ -52,7 +52,13 @@ def test_a_report_is_answered_stored_and_listed(client: TestClient) -> None:
     assert answer.headers["Location"] == f"{BASE}/diagnoses/{report['diagnosis_id']}"
     assert (report["verdict"], report["causes"], report["as_of_cycles"]) == ("cause_named", EFFECTS, 3000)
     assert (report["adoptable"], report["adopted"], report["stale"]) == (True, False, False)
-    assert report["candidates"][0]["estimate"] == {"name": "zero shift", "value": 1.5, "sd": None, "unit": "Nm"}
+    assert report["candidates"][0]["estimate"] == {
+        "name": "zero shift",
+        "value": 1.5,
+        "sd": None,
+        "unit": "Nm",
+        "interval": [None, None],
+    }
     assert report["statistics"] == {"alarm": None, "threshold": 11.0}
     assert report["maps"]["axes"]["pressure_bar"] == [4.0, 5.0]
     assert report["maps"]["axes"]["speed_rpm"][0] == pytest.approx(95.493)

@@ -42,7 +42,7 @@ EFFECT = Effect(
     amplitude="viscosity exponent β",
     unit="-",
     prior_sd=0.7,
-    positive=False,
+    positive=True,
     scale=1.0,
     shapes=(ShapeParameter(name="share of V_S κ", unit="-", lowest=-5.0, highest=2.0, smooth=True),),
     grid=_grid,

@@ -20,6 +20,10 @@ from models.diagnosis.effects.effect import (
 #: Courses of the zero: one offset from a cycle on, along the test's clock (straight, or settling), along the life by cycles
 #: or by the days that it took.
 STEP, CLOCK, SETTLING, LIFE, DAYS = 0.0, 1.0, 2.0, 3.0, 4.0
+#: Between these too a size is averaged: x^q and x (1 + s)/(x + s) along the life, without knots that may be off, by cycles
+#: or by days; their powers q, and s (chosen, with those of a pressure's offset).
+EVEN, EVEN_DAYS, FLATTENING, FLATTENING_DAYS = 5.0, 6.0, 7.0, 8.0
+POWERS, FLATTENED = (0.5, 0.7, 1.0, 1.4, 2.0), (0.1, 0.3, 1.0)
 _HOUR = 3600.0
 #: Times [s] after which a zero has settled to 1/e, each refined by the factor e^x, x the first of the knots below.
 TIMES = (120.0, 400.0)
@@ -47,6 +51,22 @@ def _grid(facts: Facts) -> tuple[Tried, ...]:
     return tuple(tried)
 
 
+def _courses(facts: Facts) -> tuple[Tried, ...]:
+    tried = list(_grid(facts))
+    if facts.states.size > 2:
+        timed = facts.first_moment is not None
+        weight = -0.7 - float(np.log((len(POWERS) + len(FLATTENED)) * (1 + timed)))
+        for course, values in (
+            (EVEN, POWERS),
+            (FLATTENING, FLATTENED),
+            (EVEN_DAYS, POWERS),
+            (FLATTENING_DAYS, FLATTENED),
+        ):
+            if timed or course in {EVEN, FLATTENING}:
+                tried += [Tried(shape=(course, value, *STRAIGHT), log_weight=weight) for value in values]
+    return tuple(tried)
+
+
 def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     course, value, *off = shape
     clock, cycles = scene.points.clock, scene.points.cycles
@@ -57,8 +77,14 @@ def _change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
     elif course == SETTLING:
         share = -np.expm1(-np.maximum(clock, 0.0) / (value * np.exp(off[0])))
     else:
-        life = np.maximum(_gone(scene) if course == DAYS else (cycles - scene.facts.states[0]) / scene.facts.life, 0.0)
-        share = life**value + np.interp(life, KNOTS, [0.0, *off, 0.0])
+        days = course in {DAYS, EVEN_DAYS, FLATTENING_DAYS}
+        life = np.maximum(_gone(scene) if days else (cycles - scene.facts.states[0]) / scene.facts.life, 0.0)
+        if course in {LIFE, DAYS}:
+            share = life**value + np.interp(life, KNOTS, [0.0, *off, 0.0])
+        elif course in {EVEN, EVEN_DAYS}:
+            share = life**value
+        else:
+            share = life * (1.0 + value) / (life + value)
     return np.asarray(amplitude * scene.points.sign * share, dtype=np.float64)
 
 
@@ -89,7 +115,7 @@ EFFECT = Effect(
     positive=False,
     scale=1.0,
     shapes=(
-        ShapeParameter(name="course", unit="-", lowest=0.0, highest=4.0),
+        ShapeParameter(name="course", unit="-", lowest=0.0, highest=8.0),
         ShapeParameter(name="onset or settling time", unit="cycles or s", lowest=-1.0, highest=float("inf")),
         *(
             ShapeParameter(
@@ -103,6 +129,7 @@ EFFECT = Effect(
         ),
     ),
     grid=_grid,
+    courses=_courses,
     change=_change,
     grows_with=Measure.TORQUE,
     before_lag=False,

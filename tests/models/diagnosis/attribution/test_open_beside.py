@@ -12,7 +12,9 @@ from models.diagnosis.design.facts import facts_of
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.effects.catalogued.squeeze_film import usual_slope
 from models.diagnosis.effects.catalogued.torque_zero_shift import CLOCK, STRAIGHT
+from models.diagnosis.effects.draw import Draw, DrawnEffect
 from models.diagnosis.effects.fitted_effect import FittedEffect
+from models.diagnosis.effects.template_discrepancy import ranges_of
 from models.diagnosis.experiments.candidates import with_trial
 from models.diagnosis.extension import build_extension
 from models.diagnosis.pooled_fit.gauss_newton import fit
@@ -84,8 +86,10 @@ def test_a_correction_is_what_the_diagnosis_saw_where_some_plateaus_are_open(
     noise = replace(known.problem.noise, deviation=0.01 * np.abs(design.torque) + 0.05)
     effect = FittedEffect(effect=BY_SLUG[slug], amplitude=amplitude, shape=shape)
     fitted = fit(FitProblem(design=design, noise=noise, priors=priors), laws, (effect,), steps=0)
-    extension = build_extension([(1.0, fitted, [0.01])], design.facts, courses=True)
-    found = extension.artefact(mixed, replace(given, stationary=runs[1:]))
+    one = DrawnEffect(effect=effect.effect, amplitude=amplitude, shape=shape)
+    draws = [Draw(weight=1.0, laws=fitted.laws, effects=(one,))]
+    extension = build_extension(draws, design.facts, ranges_of(design.rows), courses=True)
+    (found,) = extension.artefact(mixed, replace(given, stationary=runs[1:]))
     rows = np.flatnonzero(design.rows.run == 0)
     seen = BY_SLUG[slug].change(predict(design, fitted.laws).scene, amplitude, shape)[rows]
     np.testing.assert_allclose(found, design.rows.sign[rows] * seen, atol=1e-9)

@@ -19,7 +19,6 @@ from models.diagnosis.effects.effect import unit_changes
 from models.diagnosis.experiments.candidates import PASSES, TRIALS, runs_of, with_trial
 from models.diagnosis.experiments.rivals import Rival
 from models.diagnosis.experiments.test_plan import advise
-from models.diagnosis.extension import Extension, build_extension
 from models.diagnosis.pooled_fit.baseline_fit import fit_baseline, missing_for_baseline
 from models.diagnosis.pooled_fit.starts import starting_laws
 from models.diagnosis.report.maps import loop_traces, residual_maps
@@ -248,12 +247,3 @@ def test_the_open_sweep_is_five_passes_over_one_pressures_speeds() -> None:
     assert again is not None
     assert again.stationary[-1].plateaus.pressure.min() == pytest.approx(1e5)
     assert TRIALS["open_clutch"].text
-
-
-def test_a_model_stored_before_open_clutches_had_a_drag_is_read(swung: Study) -> None:
-    fit = swung.extended(("inertia_torque", 0.001, ()))
-    stored = build_extension([(1.0, fit, [1e-4])], swung.design.facts, courses=True).to_dict()
-    older = Extension.from_dict(stored)
-    older.content["alternatives"][0]["theta"] = stored["content"]["alternatives"][0]["theta"][: OPEN_DRAG.start]
-    run = swung.campaign.stationary[0]
-    assert not older.artefact(run, swung.campaign).any()

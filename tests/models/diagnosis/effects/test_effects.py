@@ -81,7 +81,7 @@ def test_units_of_a_few(scene: Scene) -> None:
     np.testing.assert_allclose(inertia, scene.points.acceleration / 0.058)  # 1 kg m² feels dω/dt
     drag = BY_SLUG["hydrodynamic_drag"].change(scene, 1.0, (1.0, 0.0, 0.0, 0.0))
     assert np.ptp(drag[steady] / scene.points.velocity[steady]) < 1e-12  # pressure is not in it
-    offset = BY_SLUG["pressure_offset"].change(scene, 1000.0, (0.0, 0.0))
+    offset = BY_SLUG["pressure_offset"].change(scene, 1000.0, (0.0, 0.0, 0.0))
     higher = scene.curve_at(pressure=scene.points.pressure + 1000.0) - scene.curve
     np.testing.assert_allclose(offset, higher, rtol=0.02, atol=1e-4)
     zero = BY_SLUG["torque_zero_shift"].change(scene, 0.5, (0.0, 2000.0, *STRAIGHT))

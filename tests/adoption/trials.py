@@ -1,0 +1,185 @@
+"""One trial: an artefact is hidden, what the diagnosis offers is adopted, and remaining life is held against the truth.
+
+Campaigns are those of the blind rig in its own forms (`tests.blind.rig`), lives end as in `tests.blind.lives`. Both the
+campaign and what came of it are stored, a file each, so that a run goes on where it ended.
+"""
+
+import gzip
+import json
+import subprocess
+import time
+import zlib
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tests.blind.lives import ARTEFACTS, DRAWS, LATEST, SOONEST, STATES, forecasts_of, passed_at
+from tests.blind.rig.hide import Hidden, hide
+from tests.blind.rig.loudness import UnreachableError
+from tests.blind.rig.sent import runs
+
+#: How loud the artefacts are, and campaigns of each at each loudness with loops and as many without in the whole table.
+LOUD, EACH = (80.0, 300.0), 20
+ROOT = Path(__file__).parents[2]
+STORE = ROOT / ".adoption"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """An artefact at a loudness, with dynamic tests or without, and its number."""
+
+    slug: str
+    lam: float
+    loops: bool
+    seed: int
+    number: int
+
+    @property
+    def name(self) -> str:
+        return f"{self.slug}-{self.lam:.0f}-{'loops' if self.loops else 'plateaus'}-{self.seed}-{self.number}"
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What is posted, and the truth: the share of its first mean COF at which the clutch ends, its end [cycles], the cycles
+    measured, the artefact's size in the catalogue's unit and sense after the last state. None: it could not be made."""
+
+    sent: list[dict[str, Any]]
+    fraction: float
+    end: float
+    span: float
+    size: float
+
+
+@dataclass(frozen=True)
+class Adopted:
+    """What came of a trial; `estimates` are by effect the value, its deviation and its 90 % interval, `before` and `after`
+    the end's quantiles; all empty where no campaign could be made."""
+
+    trial: Trial
+    commit: str
+    verdict: str = "unreachable"
+    causes: list[str] = field(default_factory=list)
+    adoptable: bool = False
+    reason: str = ""
+    summary: str = ""
+    estimates: dict[str, list[float]] = field(default_factory=dict)
+    before: dict[str, float | None] = field(default_factory=dict)
+    after: dict[str, float | None] = field(default_factory=dict)
+    end: float = 0.0
+    span: float = 0.0
+    size: float = 0.0
+    seconds: float = 0.0
+
+    @property
+    def made(self) -> bool:
+        return self.verdict != "unreachable"
+
+    @property
+    def named_right(self) -> bool:
+        return self.verdict == "cause_named" and self.causes == [self.trial.slug]
+
+
+def trials(seed: int, size: float) -> list[Trial]:
+    """All trials; `size` 1 is the whole table, smaller takes that share, at least one of each."""
+    count = max(1, round(size * EACH))
+    return [
+        Trial(slug, lam, loops, seed, number)
+        for number in range(count)
+        for slug in ARTEFACTS
+        for lam in LOUD
+        for loops in (False, True)
+    ]
+
+
+def made(trial: Trial) -> Campaign | None:
+    """The campaign of a trial, made or read."""
+    path = STORE / "campaigns" / f"{trial.name}.json.gz"
+    if not path.exists():
+        campaign = _made(trial)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        stored = json.dumps(None if campaign is None else asdict(campaign)).encode()
+        path.with_suffix(".part").write_bytes(gzip.compress(stored, 3))
+        path.with_suffix(".part").rename(path)
+    read = json.loads(gzip.decompress(path.read_bytes()))
+    return None if read is None else Campaign(**read)
+
+
+def _made(trial: Trial) -> Campaign | None:
+    seed = (trial.seed, zlib.crc32(b"adoption"), zlib.crc32(trial.name.encode()))
+    for k in range(DRAWS):
+        try:
+            hidden = hide((*seed, k), (trial.slug,), trial.lam, loops=trial.loops, states=STATES)
+        except UnreachableError:
+            continue
+        end = float(np.random.default_rng([*seed, k]).uniform(SOONEST, LATEST) * hidden.plan.life.span)
+        fraction = passed_at(hidden, end)
+        if fraction is not None:
+            return Campaign(runs(hidden), fraction, end, hidden.plan.life.span, size_of(hidden))
+    return None
+
+
+def size_of(hidden: Hidden) -> float:
+    """The artefact's size after the last state: a zero [Nm] or an offset [bar] with its sign, the oil's exponent [-]."""
+    effect, amplitude = hidden.effects[0]
+    site = hidden.plan.sites[0]
+    last = np.flatnonzero(site.state == site.state.max())
+    if effect.reading is not None:
+        return float(effect.reading(amplitude, site, site.bar)[last].mean())
+    if effect.slug == "pressure_offset":
+        assert effect.friction is not None
+        change = effect.friction(amplitude, site, hidden.clutch.law(site.bar, site.cycles))
+        return float(np.sign(change[last].mean()) * amplitude)
+    return amplitude
+
+
+def adopted(trial: Trial) -> Adopted:
+    """What comes of a trial, computed or read."""
+    path = STORE / "results" / f"{trial.name}.json"
+    if path.exists():
+        stored = json.loads(path.read_text(encoding="utf-8"))
+        return Adopted(**(stored | {"trial": Trial(**stored["trial"])}))
+    result = _adopted(trial)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.with_suffix(".part").write_text(json.dumps(asdict(result)), encoding="utf-8")
+    path.with_suffix(".part").rename(path)
+    return result
+
+
+def _adopted(trial: Trial) -> Adopted:
+    campaign = made(trial)
+    if campaign is None:
+        return Adopted(trial, commit())
+    began = time.monotonic()
+    report, before, after = forecasts_of(campaign.sent, campaign.fraction)
+    return Adopted(
+        trial=trial,
+        commit=commit(),
+        verdict=report["verdict"],
+        causes=report["causes"],
+        adoptable=report["adoptable"],
+        reason=report.get("not_adoptable") or "",
+        summary=report["summary"],
+        estimates={candidate["effect"]: _estimate(candidate["estimate"]) for candidate in report["candidates"]},
+        before=before["end_of_life_cycles"],
+        after=after["end_of_life_cycles"],
+        end=campaign.end,
+        span=campaign.span,
+        size=campaign.size,
+        seconds=time.monotonic() - began,
+    )
+
+
+def _estimate(estimate: dict[str, Any]) -> list[float]:
+    """Value, deviation, and the 90 % interval."""
+    value, sd = estimate["value"], estimate["sd"]
+    return [value, sd, *estimate.get("interval", (value - 1.645 * sd, value + 1.645 * sd))]
+
+
+def commit() -> str:
+    """The commit that is tested."""
+    asked = ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"]
+    said = subprocess.run(asked, capture_output=True, text=True, check=False)
+    return said.stdout.strip() or "unknown"

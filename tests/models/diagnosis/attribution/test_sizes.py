@@ -1,0 +1,56 @@
+"""The size of a cause: what the data say of it, whatever course over life is assumed, and what is not offered."""
+
+import numpy as np
+import pytest
+
+from models.diagnosis.criteria import DRAWS, SIGN_UNDETERMINED
+from models.diagnosis.diagnose import diagnose
+from models.diagnosis.effects.catalogue import BY_SLUG
+from models.diagnosis.report.report import Report
+from tests.models.diagnosis.rehearsals import rehearsal
+
+
+@pytest.fixture(scope="module")
+def creeping() -> Report:
+    return diagnose(rehearsal(7, {"pressure_offset": 0.5}, dynamic=False, tests=12), rng=np.random.default_rng(0))
+
+
+@pytest.fixture(scope="module")
+def shifted() -> Report:
+    return diagnose(rehearsal(5, {"torque_zero_shift": 3.0}, dynamic=False, tests=12), rng=np.random.default_rng(0))
+
+
+def test_an_offset_whose_sign_depends_on_the_course_assumed_is_no_adoption(creeping: Report) -> None:
+    """+0.5 bar in the end was named -0.111 ± 0.040 bar, and adopting it moved 4,090 remaining cycles to 6,090 of 1,730."""
+    assert "pressure_offset" in creeping.causes
+    assert creeping.extension is None
+    assert "do not determine the size of pressure offset" in creeping.not_adoptable
+    assert creeping.not_adoptable in creeping.summary
+    estimate = next(each for each in creeping.candidates if each.effect == "pressure_offset").estimate
+    low, high = estimate.interval
+    assert low < 0.0 < 0.35 < high
+
+
+def test_a_zero_whose_sign_is_known_is_offered(shifted: Report) -> None:
+    assert shifted.causes == ("torque_zero_shift",)
+    assert shifted.extension is not None
+    assert shifted.not_adoptable == ""
+    estimate = next(each for each in shifted.candidates if each.effect == "torque_zero_shift").estimate
+    low, high = estimate.interval
+    assert 0.0 < low < estimate.value < high
+
+
+def test_draws_weigh_one_and_carry_only_what_the_report_names(shifted: Report) -> None:
+    assert shifted.extension is not None
+    assert shifted.extension.weights.size <= DRAWS
+    assert shifted.extension.weights.sum() == pytest.approx(1.0)
+    assert set(shifted.extension.effects) == set(shifted.causes)
+    sizes = [effect["amplitude"] for draw in shifted.extension.content["draws"] for effect in draw["effects"]]
+    assert len(set(sizes)) > DRAWS // 2
+    assert np.mean(np.array(sizes) < 0) <= SIGN_UNDETERMINED
+
+
+@pytest.mark.parametrize("slug", ["inertia_torque", "oil_temperature"])
+def test_a_size_outside_physics_is_no_candidate(slug: str) -> None:
+    """A moment of inertia of -1e-4 kg m² was offered with probability 1."""
+    assert BY_SLUG[slug].positive
