@@ -71,8 +71,9 @@ function tiles(clutch, life) {
   const spread = deviation ? `± ${deviation}; ` : "";
   const lasts = status === "reached" ? "the end of life is reached" : atLeast(life.at_least);
   const certain = life.ended ? `ended at ${fixed(life.ended.cycles)} cycles` : lasts;
-  const quantiles =
-    ["insufficient_data", "reached", "ended"].includes(status) ? "" : `90 %: ${interval(life.remaining_cycles)}; `;
+  const quantiles = ["insufficient_data", "reached", "ended"].includes(status)
+    ? ""
+    : `90 %: ${interval(life.remaining_cycles)}; `;
   const share = current.fraction_of_initial;
   const at = current.mean_cof === null ? "" : `as measured at ${fixed(current.measured_at_cycles)} cycles`;
   const used = `${life.runs_used} ${life.runs_used === 1 ? "test" : "tests"} used, ${clutch.runs} runs`;
