@@ -24,6 +24,8 @@ ANSWERS = [
 ]
 #: When something was stored, and how many changes there were.
 TIMES = {"revision", "created_at", "received_at"}
+#: What says that runs are held, and what follows from it while they are.
+OF_HELD_RUNS = {"held_runs", "at_least", "at_least_at", "state", "statement", "warnings", "items"}
 LAST = 7000
 #: Of the first test; the others follow as their cycles do, 1,000 an hour.
 FIRST = datetime(2026, 11, 2, 8, tzinfo=UTC)
@@ -61,6 +63,15 @@ def plain(value: Any) -> Any:
 def answers(url: str) -> dict[str, Any]:
     newest = {"Prefer": "wait=60"}  # a page that reads as well keeps the workers busy
     return {path: plain(ONCE.get(f"{url}{path}", headers=newest).raise_for_status().json()) for path in ANSWERS}
+
+
+def accepted_part(found: dict[str, Any]) -> dict[str, Any]:
+    """Of a clutch's answers, what depends on accepted runs alone."""
+    return {
+        path: {key: value for key, value in answer.items() if key not in OF_HELD_RUNS}
+        for path, answer in found.items()
+        if path.startswith(f"{CLUTCH}/")
+    }
 
 
 def opened(watched: Watched) -> Page:
