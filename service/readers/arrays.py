@@ -84,12 +84,12 @@ def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ..
     elif len(knowing := _complete(sources)) > 1:
         only(knowing, "", "group")
     if not sources:
-        what = (
+        hint = (
             f": {', '.join(unread[:10])} can be read by MATLAB alone; save columns as arrays or in a struct"
             if unread
             else ""
         )
-        message = f"the file holds no array of numbers that could be a channel{what}"
+        message = f"the file holds no array of numbers that could be a channel{hint}"
         raise InvalidError(message, errors=[FieldError(pointer="", code="no_arrays", message=message)])
     if len(sources) > limits.most_columns:
         raise InvalidError(f"a file must not have more than {limits.most_columns} arrays, got {len(sources)}")
@@ -111,10 +111,10 @@ def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ..
 
 def _complete(sources: list[_Source]) -> list[str]:
     """The groups that each hold a torque, a speed and a pressure: tests of their own."""
-    known: dict[str, set[str | None]] = {}
+    channels_by_group: dict[str, set[str | None]] = {}
     for source in sources:
-        known.setdefault(source.column.group, set()).add(known_channel(source.column.name))
-    return [group for group, names in known.items() if {"torque_nm", "speed_rpm", "pressure_bar"} <= names]
+        channels_by_group.setdefault(source.column.group, set()).add(known_channel(source.column.name))
+    return [group for group, names in channels_by_group.items() if {"torque_nm", "speed_rpm", "pressure_bar"} <= names]
 
 
 def _sources(tree: Tree, group: str, depth: int) -> Iterator[_Source]:

@@ -67,14 +67,14 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
 
 def labels(table: Table) -> dict[str, str]:
     """What the lines above the table say: `label: value`, `label = value` or a label and its value in two cells."""
-    found: dict[str, str] = {}
+    values_by_label: dict[str, str] = {}
     for row in table.above:
         cells = [cell for cell in row if cell]
         if len(cells) == 1:
             cells = [part.strip() for part in re.split(r"[:=]", cells[0], maxsplit=1)]
         if len(cells) > 1:
-            found.setdefault(cells[0][:MOST_QUOTED], cells[1][:MOST_QUOTED])
-    return found
+            values_by_label.setdefault(cells[0][:MOST_QUOTED], cells[1][:MOST_QUOTED])
+    return values_by_label
 
 
 def _clocks(columns: Sequence[Column], taken: Sequence[Taken]) -> dict[int, int | Clock | None]:
@@ -113,9 +113,9 @@ def _read(
         values[column.index], valid[column.index] = _numbers(column, read.pop(column.index))
     used = [clock for clock in clocks.values() if isinstance(clock, Clock)]
     times: dict[object, FloatArray] = {}
-    for one in used:
-        if one.key not in times:
-            times[one.key] = one.read()
+    for recorder_clock in used:
+        if recorder_clock.key not in times:
+            times[recorder_clock.key] = recorder_clock.read()
     series = {}
     for column in taken:
         if column.channel != "time_s":
@@ -220,10 +220,10 @@ def _on_one_clock(series: Mapping[str, _Series], notices: list[Notice]) -> dict[
     return {name: column[kept] for name, column in columns.items()}
 
 
-def _same_clock(one: _Series, other: _Series) -> bool:
-    if one.times is None or other.times is None:
-        return one.times is other.times
-    return one.clock == other.clock or np.array_equal(one.times, other.times)
+def _same_clock(series: _Series, other: _Series) -> bool:
+    if series.times is None or other.times is None:
+        return series.times is other.times
+    return series.clock == other.clock or np.array_equal(series.times, other.times)
 
 
 def _refuse_lengths(series: Mapping[str, _Series], lengths: Mapping[str, int]) -> None:

@@ -216,15 +216,15 @@ def choose(columns: Sequence[Column], reading: Reading) -> list[Taken]:
         if channel == "time_s" and reading.time == NO_TIME:
             continue
         indices.setdefault(channel, []).append(index)
-    for channel, found in indices.items():
-        if len(found) > 1 and channel != "time_s":
-            raise _twice(channel, *(columns[index] for index in found))
+    for channel, positions in indices.items():
+        if len(positions) > 1 and channel != "time_s":
+            raise _twice(channel, *(columns[index] for index in positions))
     if not indices:
         raise InvalidError(f"the file holds no known channel: it has {_list(columns)}; {remedy(columns)}")
     taken = [
         Taken(name, index, _conversion(name, columns[index], named.get(name) if index in by_map else None))
-        for name, found in indices.items()
-        for index in found
+        for name, positions in indices.items()
+        for index in positions
     ]
     return sorted(taken, key=lambda column: column.index)
 

@@ -67,10 +67,10 @@ def find_table(rows: Sequence[Row], comments: frozenset[int], named: Sequence[st
     """
     runs = list(_runs(rows, comments)) or [(len(rows), 0)]  # titles without data are a table too
     layouts = [_layout([*rows, ()], comments, start, length, named) for start, length in runs]
-    found = [layout for layout in layouts if layout]
-    best = max(found, key=lambda layout: layout.score, default=None)
+    candidates = [layout for layout in layouts if layout]
+    best = max(candidates, key=lambda layout: layout.score, default=None)
     # titles that are repeated within the data do not begin another table
-    return next((layout for layout in found if best and layout.texts() == best.texts()), None)
+    return next((layout for layout in candidates if best and layout.texts() == best.texts()), None)
 
 
 def _runs(rows: Sequence[Row], comments: frozenset[int]) -> Iterator[tuple[int, int]]:
@@ -115,10 +115,10 @@ def _layout(
     for place, at in enumerate(above):
         for titles in _titles(rows, above[place:], width):
             filled = sum(map(bool, titles))
-            known = recognised(titles, named)
-            enough = filled >= width if at in comments else filled >= min(2, width) or known
+            channel_count = recognised(titles, named)
+            enough = filled >= width if at in comments else filled >= min(2, width) or channel_count
             rank = (
-                known,
+                channel_count,
                 int(len(titles) == width and max(map(len, titles), default=0) <= LONGEST_TITLE),
                 int(not _are_units(titles)),
             )
@@ -139,15 +139,15 @@ def _layout(
 
 def _text_rows_above(rows: Sequence[Row], comments: frozenset[int], start: int) -> list[int]:
     """The nearest rows of text above the data, the lowest first."""
-    found: list[int] = []
+    text_rows: list[int] = []
     for index in range(start - 1, -1, -1):
         if index not in comments and any(map(is_value, rows[index])):
             break
         if not is_blank(rows[index]):
-            found.append(index)
-        if len(found) == _MOST_TITLE_ROWS:
+            text_rows.append(index)
+        if len(text_rows) == _MOST_TITLE_ROWS:
             break
-    return found
+    return text_rows
 
 
 def _titles(rows: Sequence[Row], upwards: Sequence[int], width: int) -> Iterator[list[str]]:

@@ -59,15 +59,15 @@ class Numerals:
         """Learn the decimal sign from columns, the cells of each apart by line feeds. Raises Undecided."""
         if self.decimal:
             return
-        doubtful, found = False, []
+        doubtful, occurrences = False, []
         for text in texts:
             for sign, other in (_SIGNS, _SIGNS[::-1]):
                 if sign in text:
-                    found += [(match.start(), sign) for match in (_DECIMAL[sign].search(text),) if match]
-                    found += [(match.start(), other) for match in (_GROUPING[sign].search(text),) if match]
+                    occurrences += [(match.start(), sign) for match in (_DECIMAL[sign].search(text),) if match]
+                    occurrences += [(match.start(), other) for match in (_GROUPING[sign].search(text),) if match]
                     doubtful = doubtful or any(_GROUPED[sign].fullmatch(cell) for cell in text.split(b"\n"))
-        if found:
-            self.decimal = min(found)[1]
+        if occurrences:
+            self.decimal = min(occurrences)[1]
         elif doubtful:
             raise Undecided
 
@@ -94,22 +94,22 @@ class Numerals:
         if not text.translate(None, _PLAIN):
             # +5, .5, 007 are numbers, and none of JSON's
             with contextlib.suppress(ValueError, OverflowError):
-                found = np.array(pydantic_core.from_json(b"[%b]" % text.replace(b"\n", b",")), dtype=np.float64)
-                return found if text else None
+                numbers = np.array(pydantic_core.from_json(b"[%b]" % text.replace(b"\n", b",")), dtype=np.float64)
+                return numbers if text else None
         cells = text.split(b"\n")
         return np.array([float(cell) for cell in cells]) if all(map(NUMBER.fullmatch, cells)) else None
 
     def wrong(self, text: bytes) -> list[tuple[int, str]]:
         """The rows of a column that are no numbers, each with the rule that it breaks."""
-        found = []
+        broken_rules = []
         for row, cell in enumerate(text.split(b"\n")):
             if self.floats(cell) is None:
                 swapped = Numerals("," if self.decimal == b"." else ".")
                 rule = "must be a number"
                 if self.decimal and swapped.floats(cell) is not None:
                     rule = f"must have the decimal sign {self.decimal.decode()!r} as before"
-                found.append((row, rule))
-        return found
+                broken_rules.append((row, rule))
+        return broken_rules
 
 
 _DATE = r"(?P<date>\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}|\d{1,2}[- ][A-Za-z]{3}[- ]\d{4})"
@@ -137,8 +137,8 @@ class Stamps:
         nanoseconds = self._iso(cells)
         if nanoseconds is None:
             self._narrow(cells)
-            parsed = [self._one(cell) for cell in cells]
-            if any(one is None or abs(one) >= 2**63 for one in parsed):
+            parsed = [self._nanoseconds(cell) for cell in cells]
+            if any(moment is None or abs(moment) >= 2**63 for moment in parsed):
                 return None
             nanoseconds = np.array(parsed, dtype=np.int64)
         if self._first is None and nanoseconds.size:
@@ -157,7 +157,7 @@ class Stamps:
         except ValueError:
             return None
 
-    def _one(self, cell: str) -> int | None:
+    def _nanoseconds(self, cell: str) -> int | None:
         match = _STAMP.fullmatch(cell.strip())
         if match is None or not (match["date"] or match["first"]):
             return None
@@ -204,8 +204,8 @@ class Stamps:
     def _day(self, date: str) -> int | None:
         """The day's number; None where it is no date."""
         if date not in self._dates:
-            found = (_day_by(date, order) for order in (*_ORDERS, *sorted(self._orders)))
-            day = next((one for one in found if one is not None), None)
+            days = (_day_by(date, order) for order in (*_ORDERS, *sorted(self._orders)))
+            day = next((number for number in days if number is not None), None)
             if day is None:
                 return None
             self._dates[date] = day

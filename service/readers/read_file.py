@@ -68,16 +68,16 @@ def _in_archive(path: Path, reading: Reading, limits: Limits, read: Callable[...
         return _member(path, matching[0], replace(reading, table=""), limits, read)
     if within:
         return _member(path, within[0], replace(reading, table=reading.table[len(within[0]) + 1 :]), limits, read)
-    found: dict[str, Read] = {}
+    records: dict[str, Read] = {}
     refused: dict[str, InvalidError] = {}
     for name in names[:_MOST_TRIED]:
         try:
-            found[name] = _member(path, name, reading, limits, read)
+            records[name] = _member(path, name, reading, limits, read)
         except InvalidError as error:
             refused[name] = error
-    if not found and len(refused) == 1:
+    if not records and len(refused) == 1:
         raise next(iter(refused.values()))
-    return list(found.values())[only(list(found) or names, "", "file")]
+    return list(records.values())[only(list(records) or names, "", "file")]
 
 
 def _member(path: Path, name: str, reading: Reading, limits: Limits, read: Callable[..., Read]) -> Read:

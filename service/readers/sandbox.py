@@ -84,13 +84,13 @@ def preview_isolated(kind: Format, path: Path, *, reading: Reading, limits: Limi
     return shown
 
 
-def not_installed(kind: Format, what: str) -> str | None:
-    """None where a format's package is installed, else how to install it, after `what` (a format is not read here)."""
+def not_installed(kind: Format, consequence: str) -> str | None:
+    """None where a format's package is installed, else `consequence` (a format is not read here) and how to install it."""
     _, package, extra = READERS[kind]
     if find_spec(package) is not None:
         return None
     command = f"pip install -e '.[{extra}]'" if extra else "pip install -e ."
-    return f"{what}: its library is missing, install it in the checkout where the service runs: {command}"
+    return f"{consequence}: its library is missing, install it in the checkout where the service runs: {command}"
 
 
 def _unpacked(kind: Format, path: Path, answer: str, reading: Reading, limits: Limits) -> Any:

@@ -103,7 +103,7 @@ class Table:
     notices: tuple[Notice, ...] = ()
 
 
-def only(names: Sequence[str], wanted: str, what: str) -> int:
+def only(names: Sequence[str], wanted: str, kind: str) -> int:
     """The index of the table that is read among those of a file, by name or by number from 1.
 
     Raises InvalidError where none is named and there are several, or the named one is not there.
@@ -116,12 +116,12 @@ def only(names: Sequence[str], wanted: str, what: str) -> int:
     elif len(names) == 1:
         return 0
     shown = ", ".join(repr(name[:MOST_QUOTED]) for name in names[:10]) + (" ..." if len(names) > 10 else "")
-    missing = f"has no {what} {wanted[:MOST_QUOTED]!r}" if wanted else f"holds {len(names)} {what}s with channels"
+    missing = f"has no {kind} {wanted[:MOST_QUOTED]!r}" if wanted else f"holds {len(names)} {kind}s with channels"
     message = f"the file {missing}: table=NAME chooses one of {shown}"
     raise InvalidError(message, errors=[FieldError(pointer="/table", code="which_table", message=message)])
 
 
-def cut_short(what: str) -> InvalidError:
+def cut_short(defect: str) -> InvalidError:
     """The error of a file whose end is missing."""
-    message = f"the file is cut off: {what}"
+    message = f"the file is cut off: {defect}"
     return InvalidError(message, errors=[FieldError(pointer="", code="truncated", message=message)])

@@ -147,8 +147,8 @@ def _encodings(head: bytes) -> list[str]:
             return [name]
     if _decodes(head, "utf-8"):
         return ["utf-8"]
-    found = [name for name in _ENCODINGS if _decodes(head, name)] or ["latin-1"]
-    return sorted(found, key=lambda name: name != "gb18030") if _CHINESE.fullmatch(head) else found
+    encodings = [name for name in _ENCODINGS if _decodes(head, name)] or ["latin-1"]
+    return sorted(encodings, key=lambda name: name != "gb18030") if _CHINESE.fullmatch(head) else encodings
 
 
 def _decodes(head: bytes, encoding: str) -> bool:
@@ -330,11 +330,11 @@ class _Body:
                     if size > _MOST_WAITING:
                         break
                     continue
-                for one in waiting:
-                    self._add(columns, self._numbers(one))
+                for block in waiting:
+                    self._add(columns, self._numbers(block))
                 waiting, size = [], 0
-        for one in waiting:
-            self._refuse_doubt(one)
+        for block in waiting:
+            self._refuse_doubt(block)
         for index, column in enumerate(columns):
             column.resize(self._rows, refcheck=False)
             if indices[index] in self._stamps:
@@ -476,14 +476,14 @@ class _Body:
 
     def _numbers(self, block: _Block) -> list[FloatArray]:
         """A block's columns as numbers. Raises InvalidError with every cell of it that is none."""
-        found = [self._column(index, text) for index, text in zip(self._indices, block.columns, strict=True)]
-        numbers = [column for column in found if column is not None]
-        if len(numbers) == len(found):
+        columns = [self._column(index, text) for index, text in zip(self._indices, block.columns, strict=True)]
+        numbers = [column for column in columns if column is not None]
+        if len(numbers) == len(columns):
             return numbers
         if not block.careful:
             return self._numbers(_Block(block.text, self._careful(block.text), careful=True))
         errors, total = [], 0
-        for index, text, column in zip(self._indices, block.columns, found, strict=True):
+        for index, text, column in zip(self._indices, block.columns, columns, strict=True):
             for row, rule in self._numerals.wrong(text) if column is None else ():
                 total += 1
                 if total <= MOST_ERRORS:

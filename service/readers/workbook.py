@@ -34,7 +34,7 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     named = [choice.column for choice in choices_of(reading).values()]
     if reading.table or len(sheets) == 1:
         sheets = [sheets[only(sheets, reading.table, "sheet")]]
-    found: dict[str, tuple[list[Sequence[Any]], Layout]] = {}
+    tables: dict[str, tuple[list[Sequence[Any]], Layout]] = {}
     refused: list[InvalidError] = []
     for name in sheets:
         rows: list[Sequence[Any]] = [
@@ -45,11 +45,11 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
             line = next((index for index, row in enumerate(rows) if not is_blank(row)), 0)
             refused.append(no_table(line + 1, " ".join(map(str, rows[line] if rows else ()))))
         elif len(sheets) == 1 or recognised([heading[0] for heading in layout.headings], named):
-            found[name] = rows, layout
-    if not found and refused:
+            tables[name] = rows, layout
+    if not tables and refused:
         raise refused[0]
-    name = list(found)[only(list(found) or sheets, "", "sheet")]
-    return _table(name, *found[name], reading, tuple(sheets), limits)
+    name = list(tables)[only(list(tables) or sheets, "", "sheet")]
+    return _table(name, *tables[name], reading, tuple(sheets), limits)
 
 
 def _trimmed(row: Sequence[Any]) -> Sequence[Any]:
