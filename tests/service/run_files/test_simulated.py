@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from models.friction.identification import fit_curves
 from models.loops.loops import evaluate_loops
 from models.records.runs import curves_by_pressure
 from models.rig.campaign import simulate, simulated_clutch
-from models.rig.hysteresis import ATTRACTOR
+from models.rig.hidden import clutch_for
 from models.rig.programme import Programme
 from models.rig.sampled import DynamicTest, RawTest
 from models.rig.simulated_runs import SimulatedRun
@@ -33,8 +32,7 @@ FORMATS = ("csv", "tdms", "mdf4")
 
 def measured(programme: Programme) -> list[SimulatedRun]:
     """The tests of the same campaign as the command makes them."""
-    clutch = simulated_clutch(7)
-    clutch = replace(clutch, lag=replace(clutch.lag, attractor=ATTRACTOR))
+    clutch = clutch_for(simulated_clutch(7), {})
     runs = simulate(7, clutch=clutch, sensor=SHARP, programme=programme, most_tests=1)
     return [run for run in runs if run.duty is None]
 
