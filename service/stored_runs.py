@@ -190,7 +190,7 @@ def recomputed(recorded: Recorded) -> Recomputed:
     evidence = Evidence(
         levels=levels,
         receipts=receipts,
-        engagements={run_id: known for run_id, known in engagements.items() if known is not None},
+        engagements={run_id: engagement for run_id, engagement in engagements.items() if engagement is not None},
         reader=reader,
     )
     summary = summarised(final, computed.tracking or Tracking(), evidence)

@@ -151,10 +151,10 @@ def build_extension(draws: Sequence[Draw], facts: Facts, ranges: Ranges, *, cour
     `courses`: whether effects of use are to be followed beyond the data; where they did not help to predict the last states
     from the first, a life is tracked without them. ζ counts by the mean exponent of severity.
     """
-    effects = dict.fromkeys(one.effect.slug for draw in draws for one in draw.effects)
+    effects = dict.fromkeys(effect.effect.slug for draw in draws for effect in draw.effects)
     laws = list({id(draw.laws): draw.laws for draw in draws}.values())
     exponents = [
-        (draw.weight, one.amplitude) for draw in draws for one in draw.effects if one.effect.counts_in_severity
+        (draw.weight, effect.amplitude) for draw in draws for effect in draw.effects if effect.effect.counts_in_severity
     ]
     total = sum(weight for weight, _ in exponents)
     exponent = sum(weight * amplitude for weight, amplitude in exponents) / total if total > 0 else None
@@ -163,19 +163,19 @@ def build_extension(draws: Sequence[Draw], facts: Facts, ranges: Ranges, *, cour
         content={
             "facts": facts_to(facts),
             "ranges": {along.value: list(range_) for along, range_ in ranges.items()},
-            "laws": [_stored_laws(one) for one in laws],
+            "laws": [_stored_laws(shared) for shared in laws],
             "draws": [
                 {
                     "weight": draw.weight,
-                    "laws": next(place for place, one in enumerate(laws) if one is draw.laws),
+                    "laws": next(place for place, shared in enumerate(laws) if shared is draw.laws),
                     "effects": [
                         {
-                            "slug": one.effect.slug,
-                            "amplitude": one.amplitude,
-                            "shape": list(one.shape),
-                            "factors": list(one.factors),
+                            "slug": effect.effect.slug,
+                            "amplitude": effect.amplitude,
+                            "shape": list(effect.shape),
+                            "factors": list(effect.factors),
                         }
-                        for one in draw.effects
+                        for effect in draw.effects
                     ],
                 }
                 for draw in draws

@@ -161,14 +161,14 @@ class Fit:
 
     def predict(self, cycles: FloatArray, epoch: FloatArray) -> "Predicted":
         """y at cycles [m] since the life began in epochs [m]."""
-        them = self._both(cycles, epoch)
+        features = self._both(cycles, epoch)
         n = self.tests.cycles.size
-        prior = _diagonal(them)
+        prior = _diagonal(features)
         if n == 0:
             mean, variance = np.full((len(_GRID), cycles.size), self.tests.level), prior
             log_weight = np.full(len(_GRID), -math.log(len(_GRID)))
         else:
-            cross = self._covariance(self._own, them)
+            cross = self._covariance(self._own, features)
             mean = self.tests.level + np.einsum("gn,gnm->gm", self.pull, cross)
             variance = np.maximum(prior - (cross * (self.precision @ cross)).sum(axis=1), 0.0)
             log_weight = self.log_weight

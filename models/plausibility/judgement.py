@@ -64,22 +64,22 @@ class Verdict:
     latest: float | None
 
 
-def judge(runs: Sequence[Run], asked: Collection[int], doubted: Collection[int]) -> dict[int, Verdict]:
+def judge(runs: Sequence[Run], in_question: Collection[int], doubted: Collection[int]) -> dict[int, Verdict]:
     """The runs that are to be held, by index.
 
-    `runs` in the order of the history; `asked`: those in question, the others are looked at where they surprise; `doubted`:
-    those that are held now, from which one search begins.
+    `runs` in the order of the history; `in_question`: the others are looked at where they surprise; `doubted`: those that
+    are held now, from which one search begins.
     """
-    clutch = _Clutch(runs=tuple(runs), asked=frozenset(asked))
+    clutch = _Clutch(runs=tuple(runs), in_question=frozenset(in_question))
     weighed: dict[Belief, float] = {}
     best: _Weighed | None = None
-    for slipped in (frozenset[int](), frozenset(doubted), frozenset(asked)):
+    for slipped in (frozenset[int](), frozenset(doubted), frozenset(in_question)):
         if best is not None and not (best.belief.slipped or doubted or best.doubts):
             break  # nothing surprises
-        found = _searched(clutch, Belief(slipped=slipped))
-        weighed[found.belief] = found.log_probability
-        if best is None or found.log_probability > best.log_probability:
-            best = found
+        optimum = _searched(clutch, Belief(slipped=slipped))
+        weighed[optimum.belief] = optimum.log_probability
+        if best is None or optimum.log_probability > best.log_probability:
+            best = optimum
     if best is None:
         return {}
     for index, log_odds in best.log_odds.items():
@@ -121,7 +121,7 @@ class _Clutch:
     """All runs, and what depends on no belief."""
 
     runs: tuple[Run, ...]
-    asked: frozenset[int]
+    in_question: frozenset[int]
     fits: dict[tuple[Any, ...], Fit] = field(default_factory=dict)
 
     @cached_property
@@ -132,7 +132,7 @@ class _Clutch:
     @cached_property
     def centres(self) -> FloatArray:
         """The cycles about which runs are looked at."""
-        return np.append(self.cycles[sorted(self.asked)], self.cycles.max(initial=0.0))
+        return np.append(self.cycles[sorted(self.in_question)], self.cycles.max(initial=0.0))
 
     @cached_property
     def near(self) -> list[int]:
@@ -235,12 +235,12 @@ class _Weighed:
         key = (tuple(own), outlying, levels, shifts.tobytes(), origin, level, level_sd)
         if key not in self.clutch.fits:
             sent = [self.clutch.runs[i].sent for i in own]
-            cycles = np.array([max(one.cycles - origin, 0.0) for one in sent])
+            cycles = np.array([max(reading.cycles - origin, 0.0) for reading in sent])
             further = np.array([criteria.OUTLYING_SD**2 if i in outlying else 0.0 for i in own])
             tests = Tests(
                 cycles=cycles,
-                log_cof=np.array([one.log_cof for one in sent], dtype=np.float64),
-                variance=np.array([one.spread**2 for one in sent]) + further,
+                log_cof=np.array([reading.log_cof for reading in sent], dtype=np.float64),
+                variance=np.array([reading.spread**2 for reading in sent]) + further,
                 epoch=_epoch(shifts, cycles + origin),
                 levels=np.array([c for i, c in zip(own, cycles.tolist(), strict=True) if i in levels]),
                 level=level,
@@ -321,15 +321,15 @@ class _Weighed:
             at = life if reading.cycles == run.sent.cycles else self._life_at(reading.cycles)
             by_life.setdefault(at, []).append(reading)
         values: dict[int, float] = {}
-        for at, those in by_life.items():
-            cycles = np.array([reading.cycles for reading in those])
+        for at, of_life in by_life.items():
+            cycles = np.array([reading.cycles for reading in of_life])
             predicted = self._predicted(index, at, cycles)
-            log_cof = np.array([reading.log_cof for reading in those], dtype=np.float64)
-            spread = np.array([reading.spread for reading in those])
+            log_cof = np.array([reading.log_cof for reading in of_life], dtype=np.float64)
+            spread = np.array([reading.spread for reading in of_life])
             new_level = np.array([self._new_level(index, at, value) for value in cycles.tolist()])
             density = predicted.log_density(log_cof, spread, new_level) + log_physics(log_cof)
             values |= {
-                id(reading): value for reading, value in zip(those, np.maximum(density, _LEAST).tolist(), strict=True)
+                id(reading): value for reading, value in zip(of_life, np.maximum(density, _LEAST).tolist(), strict=True)
             }
         return [values.get(id(reading), 0.0) for reading in readings]
 
@@ -402,7 +402,7 @@ class _Weighed:
         for i, value in zip(self.clutch.near, self.clutch.surprise(self._sets([])[0]).tolist(), strict=True):
             surprise[i] = surprise.get(i, 0.0) + min(value - _SUSPICIOUS_CYCLES, 0.0)
         odd = [i for i, value in sorted(surprise.items(), key=lambda item: item[1]) if value < 0.0]
-        return self.clutch.asked.union(odd[:_SUSPECTS])
+        return self.clutch.in_question.union(odd[:_SUSPECTS])
 
     @property
     def doubts(self) -> bool:

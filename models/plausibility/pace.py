@@ -130,22 +130,22 @@ def _of_gaps(gaps: FloatArray) -> FloatArray:
     padded = np.concatenate([np.zeros((sets, criteria.MEMORY)), gaps], axis=1)
     places = np.arange(count)[:, None] + criteria.MEMORY - 1 - np.arange(criteria.MEMORY)
     before = padded[:, places]  # [h, k, memory], the last one first
-    known = before >= 0.5
-    weight = known * _RECENCY
+    present = before >= 0.5
+    weight = present * _RECENCY
     total = weight.sum(axis=2, keepdims=True)
     weight = weight / np.maximum(total, 1e-12)
     log_gap = np.log(np.maximum(gaps, 0.5))
     log_before = np.log(np.maximum(before, 0.5))
     same = (weight * (np.abs(before - gaps[:, :, None]) < 0.5)).sum(axis=2)
     like = (weight * _log_normal(log_gap[:, :, None], log_before, criteria.LIKE_GAP_SD)).sum(axis=2)
-    growing = known[:, :, 0] & known[:, :, 1] if criteria.MEMORY > 1 else np.zeros(gaps.shape, dtype=bool)
+    growing = present[:, :, 0] & present[:, :, 1] if criteria.MEMORY > 1 else np.zeros(gaps.shape, dtype=bool)
     grown = 2.0 * log_before[:, :, 0] - log_before[:, :, 1]
     like = np.where(growing, 0.8 * like + 0.2 * _log_normal(log_gap, grown, criteria.LIKE_GAP_SD), like)
     similar = _log_normal(log_gap, (weight * log_before).sum(axis=2), criteria.SIMILAR_GAP_SD)
     anything = np.exp(log_anywhere(gaps))
-    told = criteria.SAME_GAP * same + criteria.LIKE_GAP * like + criteria.SIMILAR_GAP * similar
+    by_earlier = criteria.SAME_GAP * same + criteria.LIKE_GAP * like + criteria.SIMILAR_GAP * similar
     rest = 1.0 - criteria.SAME_GAP - criteria.LIKE_GAP - criteria.SIMILAR_GAP
-    law = np.where(total[:, :, 0] > 0, told + rest * anything, anything)
+    law = np.where(total[:, :, 0] > 0, by_earlier + rest * anything, anything)
     return np.where(gaps < 0.5, criteria.REPEATS, law)
 
 
@@ -177,5 +177,5 @@ def _last_seen(values: FloatArray) -> FloatArray:
     """Each value [h, n], or the last finite one before it; -inf before the first."""
     there = np.isfinite(values)
     index = np.maximum.accumulate(np.where(there, np.arange(values.shape[1]), -1), axis=1)
-    seen = np.take_along_axis(values, np.maximum(index, 0), axis=1)
-    return np.where(index >= 0, seen, -np.inf)
+    latest = np.take_along_axis(values, np.maximum(index, 0), axis=1)
+    return np.where(index >= 0, latest, -np.inf)

@@ -81,10 +81,10 @@ def main(
                 send((None, RuntimeError(f"the result cannot be sent: {error}")))
 
 
-def _answered(asked: bytes) -> tuple[Any, BaseException | None]:
+def _answered(message: bytes) -> tuple[Any, BaseException | None]:
     """What a call returns, or raises with where it was raised."""
     try:
-        function, arguments, request = pickle.loads(asked)  # noqa: S301  (of our own service)
+        function, arguments, request = pickle.loads(message)  # noqa: S301  (of our own service)
         logging.request_id.set(request)
         return function(_opened[0], *arguments), None
     except BaseException as error:  # noqa: BLE001  (raised again for who asked)

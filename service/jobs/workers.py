@@ -100,7 +100,7 @@ class _Call:
     request: str
     seconds: float
     patience: float
-    asked: float = field(default_factory=time.monotonic)
+    queued_at: float = field(default_factory=time.monotonic)
     begun: float | None = None
     retried: bool = False
     answer: "Future[Any]" = field(default_factory=Future)
@@ -237,8 +237,8 @@ class Workers:
         _join(threads, _LAST_SECONDS)
         with self._lock:
             left = list(self._workers)
-        for each in left:
-            each.stop()
+        for open_worker in left:
+            open_worker.stop()
         _join(threads, _SILENCE)
         self._closed.set()
         self._watching.join()
@@ -287,7 +287,7 @@ class Workers:
         try:
             result = made.call(call)
         except _LostError:
-            waited = time.monotonic() - call.asked
+            waited = time.monotonic() - call.queued_at
             again = not (call.retried or call.answer.done() or waited > call.patience)
             error = BusyError("the process that worked on this has ended: ask again in a little while")
         except BaseException as raised:  # noqa: BLE001  (raised again for who asked)
@@ -330,18 +330,20 @@ class Workers:
     def _check(self, now: float) -> None:
         with self._lock:
             running = [(made, call) for made, (_, call) in self._workers.items()]
-            refused = [call for queue in self._queues.values() for call in queue if now - call.asked > call.patience]
+            refused = [
+                call for queue in self._queues.values() for call in queue if now - call.queued_at > call.patience
+            ]
             for call in refused:
                 self._queues[call.lane].remove(call)
                 self._ended(call)
             for waiting in self._turns.values():
-                late = [call for call in waiting if now - call.asked > call.patience]
+                late = [call for call in waiting if now - call.queued_at > call.patience]
                 for call in late:
                     waiting.remove(call)
                     self._count(call.lane, -1)
                 refused += late
         for call in refused:
-            _answer(call, BusyError(f"it has waited for {now - call.asked:.0f} s: ask again in a little while"))
+            _answer(call, BusyError(f"it has waited for {now - call.queued_at:.0f} s: ask again in a little while"))
         for made, running_call in running:
             made.check(now)
             if running_call is not None and running_call.is_overdue(now):

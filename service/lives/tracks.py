@@ -286,14 +286,14 @@ def predict(
 def _off_track(sample: Posterior, series: Series, assumptions: Assumptions, runs: int) -> list[Notice]:
     """The warning of a last test that lies far off under every draw of the model in force; that of the draw under which it
     is nearest."""
-    found: list[list[Notice]] = []
+    notices_by_draw: list[list[Notice]] = []
     for draw, (_, measurements) in enumerate(series.weighted):
         prior = assumptions.priors(series.quantity, measurements[0], series.scale)[WEAK]
         notices = off_track(sample.of_branch(draw), measurements[:runs], prior)
         if not notices:
             return []
-        found.append(notices)
-    return found[0]
+        notices_by_draw.append(notices)
+    return notices_by_draw[0]
 
 
 def end_of_life(

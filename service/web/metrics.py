@@ -72,7 +72,7 @@ class Processes(Collector):
 
     def collect(self) -> Iterator[Metric]:
         """The sums, and when the first of them was started."""
-        found: dict[str, Metric] = {}
+        metrics: dict[str, Metric] = {}
         for number in {path.stem.rpartition("_")[2] for path in self._folder.glob("*.db")}:
             if not Path("/proc", number).exists():
                 mark_process_dead(int(number), str(self._folder))  # type: ignore[no-untyped-call]
@@ -81,11 +81,11 @@ class Processes(Collector):
             ProcessCollector(registry=own, pid=partial(int, number))
             for metric in own.collect():
                 sum_up = min if metric.name == "process_start_time_seconds" else add
-                kept = found.setdefault(metric.name, metric)
+                kept = metrics.setdefault(metric.name, metric)
                 if kept is not metric:
                     pairs = zip(kept.samples, metric.samples, strict=True)
-                    kept.samples = [one._replace(value=sum_up(one.value, other.value)) for one, other in pairs]
-        yield from found.values()
+                    kept.samples = [sample._replace(value=sum_up(sample.value, other.value)) for sample, other in pairs]
+        yield from metrics.values()
 
 
 class Present(Collector):

@@ -289,9 +289,9 @@ def _others(loaded: _Loaded) -> ClutchState:
     return replace(loaded.state, events=events, held=held)
 
 
-def _together(others: ClutchState, asked: Event | None) -> Judged:
+def _together(others: ClutchState, changed: Event | None) -> Judged:
     corrected = others.extension is not None
-    return doubts_together(others.events, others.held, asked, others.geometry, corrected=corrected)
+    return doubts_together(others.events, others.held, changed, others.geometry, corrected=corrected)
 
 
 def _judged_with(loaded: _Loaded, row: RunRow) -> Judged:

@@ -96,7 +96,9 @@ def decide(case: CaseEvidence, checks: Checks) -> Judgement:
 def _adequate(alarms: Alarms) -> Judgement:
     """Nothing is wrong, up to what the rarest alarm says against it: a p-value is a Bayes factor of 1/(-e p ln p) at most
     (Sellke, Bayarri and Berger, Am. Stat. 55 (2001) 62)."""
-    p_value = min(max(min(each.p_value for each in (alarms.effects, alarms.contrasts, alarms.lines)), 1e-300), 1 / np.e)
+    p_value = min(
+        max(min(alarm.p_value for alarm in (alarms.effects, alarms.contrasts, alarms.lines)), 1e-300), 1 / np.e
+    )
     against = WRONG / (1.0 - WRONG) / (-np.e * p_value * np.log(p_value))
     weights = {(): 1.0, _UNKNOWN: float(against)}
     return judged(Verdict.MODEL_ADEQUATE, weights, {(): 1.0})
@@ -294,7 +296,7 @@ def _joined(judgement: Judgement, vibrations: tuple[str, ...]) -> Judgement:
     """With vibrations that raw records show: they are causes beside the others, or the only ones."""
     if not vibrations:
         return judgement
-    before = {one.effects: one.probability for one in judgement.explanations}
+    before = {explanation.effects: explanation.probability for explanation in judgement.explanations}
     after = {(*effects, *vibrations): weight for effects, weight in before.items()}
     weights = {effects: (1.0 - VIBRATION_PROBABILITY) * weight for effects, weight in before.items()}
     for effects, weight in after.items():
@@ -321,6 +323,6 @@ def _unsure(judgement: Judgement) -> Judgement:
     uneven = judgement.comparison is not None and judgement.comparison.check.parts.p_value < LEAST_REMAINDER_P_VALUE
     if not (pair and uneven):
         return judgement
-    weights = {one.effects: one.probability for one in judgement.explanations}
+    weights = {explanation.effects: explanation.probability for explanation in judgement.explanations}
     doubted = judged(Verdict.CAUSE_AMBIGUOUS, weights, _with_a_doubt(judgement.credible[0]))
     return replace(judgement, verdict=doubted.verdict, causes=doubted.causes, explanations=doubted.explanations)

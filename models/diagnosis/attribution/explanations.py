@@ -38,16 +38,16 @@ def explanations_of(weights: Mapping[tuple[str, ...], float]) -> tuple[Explanati
         merged[frozenset(own)] = order, before + weight / total
     kept = [(effects, weight) for effects, weight in merged.values() if weight >= LEAST_EXPLANATION]
     whole = sum(weight for _, weight in kept)
-    found = [Explanation(effects=effects, probability=weight / whole) for effects, weight in kept]
-    return tuple(sorted(found, key=lambda one: -one.probability))
+    explanations = [Explanation(effects=effects, probability=weight / whole) for effects, weight in kept]
+    return tuple(sorted(explanations, key=lambda explanation: -explanation.probability))
 
 
 def credible_explanations(explanations: Iterable[Explanation]) -> tuple[Explanation, ...]:
     """The fewest explanations, most probable first, that hold CREDIBLE_MASS."""
     chosen, mass = list[Explanation](), 0.0
-    for one in explanations:
-        chosen.append(one)
-        mass += one.probability
+    for explanation in explanations:
+        chosen.append(explanation)
+        mass += explanation.probability
         if mass >= CREDIBLE_MASS:
             break
     return tuple(chosen)
@@ -55,7 +55,7 @@ def credible_explanations(explanations: Iterable[Explanation]) -> tuple[Explanat
 
 def read(explanations: tuple[Explanation, ...]) -> tuple[Verdict, tuple[str, ...]]:
     """The verdict and the causes that explanations, most probable first, amount to."""
-    nothing = sum(one.probability for one in explanations if not one.effects)
+    nothing = sum(explanation.probability for explanation in explanations if not explanation.effects)
     unknown = probability_of(explanations, UNCATALOGUED)
     if nothing >= _HALF:
         return Verdict.MODEL_ADEQUATE, ()
@@ -63,11 +63,11 @@ def read(explanations: tuple[Explanation, ...]) -> tuple[Verdict, tuple[str, ...
         return Verdict.UNEXPLAINED_STRUCTURE, ()
     by_slug = probabilities_by_slug(explanations)
     likely = tuple(slug for slug, share in by_slug.items() if share >= LEAST_SECOND_NAMED)
-    exactly = sum(one.probability for one in explanations if set(one.effects) == set(likely))
+    exactly = sum(explanation.probability for explanation in explanations if set(explanation.effects) == set(likely))
     if likely and by_slug[likely[0]] >= LEAST_NAMED and unknown <= 1.0 - LEAST_NAMED + 1e-9 and exactly >= _HALF:
         return Verdict.CAUSE_NAMED, likely
     near = credible_explanations(explanations)
-    return Verdict.CAUSE_AMBIGUOUS, tuple(dict.fromkeys(slug for one in near for slug in one.effects))
+    return Verdict.CAUSE_AMBIGUOUS, tuple(dict.fromkeys(slug for explanation in near for slug in explanation.effects))
 
 
 def reconciled(
@@ -83,8 +83,8 @@ def reconciled(
             + share * target.get(effects, 0.0) / whole
             for effects in {**weights, **target}
         }
-        found = explanations_of(mixed)
-        reads, causes = read(found)
+        explanations = explanations_of(mixed)
+        reads, causes = read(explanations)
         if reads is verdict and (named is None or set(causes) == set(named)):
-            return found
-    return found
+            return explanations
+    return explanations

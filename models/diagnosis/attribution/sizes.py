@@ -91,14 +91,16 @@ class _Component:
     def sizes(self, drawn: Sequence[DrawnEffect]) -> list[float]:
         """The size of each effect after the last state."""
         return [
-            one.amplitude * max(1.0 + float(last @ np.array(one.factors)), 0.0)
-            for one, last in zip(drawn, self.last, strict=True)
+            effect.amplitude * max(1.0 + float(last @ np.array(effect.factors)), 0.0)
+            for effect, last in zip(drawn, self.last, strict=True)
         ]
 
 
 def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator) -> Sizes:
     """The sizes of a judgement's causes, and DRAWS draws or fewer of equal weight; none where nothing was fitted."""
-    components = [component for found, share in _shares(judgement) for component in _components(problem, found, share)]
+    components = [
+        component for fitted, share in _shares(judgement) for component in _components(problem, fitted, share)
+    ]
     if not components:
         return Sizes(by_slug={})
     weight = np.array([component.weight for component in components])
@@ -111,9 +113,11 @@ def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator
         trends = component.trend[0] + offs @ component.trend[1]
         for off, trend in zip(offs, trends.tolist(), strict=True):
             effects = component.effects(off)
-            for one, size in zip(effects, component.sizes(effects), strict=True):
-                sized.setdefault(one.effect.slug, []).append((size, index))
-            samples.append((trend, index, tuple(one for one in effects if one.effect.slug in judgement.causes)))
+            for effect, size in zip(effects, component.sizes(effects), strict=True):
+                sized.setdefault(effect.effect.slug, []).append((size, index))
+            samples.append(
+                (trend, index, tuple(effect for effect in effects if effect.effect.slug in judgement.causes))
+            )
     nothing = max(SIZES_SAMPLED - len(samples), 0)
     samples += [(0.0, 0, ())] * nothing
     samples.sort(key=lambda sample: sample[0])
@@ -124,7 +128,7 @@ def sizes_of(problem: FitProblem, judgement: Judgement, rng: np.random.Generator
             Draw(weight=1.0 / len(chosen), laws=components[index].fit.laws, effects=effects)
             for _, index, effects in chosen
         ),
-        by_slug={slug: _size(found) for slug, found in sized.items() if slug in judgement.causes},
+        by_slug={slug: _size(pairs) for slug, pairs in sized.items() if slug in judgement.causes},
     )
 
 
@@ -140,8 +144,8 @@ def _shares(judgement: Judgement) -> list[tuple[Fit, float]]:
     return [(fitted, share / total) for fitted, share in shares if share > 0.0]
 
 
-def _size(found: Sequence[tuple[float, int]]) -> Size:
-    sizes, of = np.array([size for size, _ in found]), np.array([index for _, index in found])
+def _size(pairs: Sequence[tuple[float, int]]) -> Size:
+    sizes, of = np.array([size for size, _ in pairs]), np.array([index for _, index in pairs])
     positive = float((sizes > 0).mean())
     signs = {bool((sizes[of == index] > 0).mean() > 0.5) for index in np.unique(of) if (of == index).mean() > 0.02}
     low, high = np.quantile(sizes, (0.05, 0.95)).tolist()
@@ -154,9 +158,9 @@ def _size(found: Sequence[tuple[float, int]]) -> Size:
     )
 
 
-def _components(problem: FitProblem, found: Fit, share: float) -> Iterator[_Component]:
+def _components(problem: FitProblem, original: Fit, share: float) -> Iterator[_Component]:
     """A fit's effects refitted under each of their courses, weighed by evidence; as they were found where they have none."""
-    fitted = replace(found, effects=tuple(_unshrunk(one) for one in found.effects))
+    fitted = replace(original, effects=tuple(_unshrunk(effect) for effect in original.effects))
     courses = list(_courses(problem, fitted))
     if not courses:
         courses = [(0.0, fit(problem, fitted.laws, fitted.effects, steps=COURSE_STEPS))]
@@ -167,28 +171,28 @@ def _components(problem: FitProblem, found: Fit, share: float) -> Iterator[_Comp
             yield _component(problem, fitted, weight)
 
 
-def _unshrunk(one: FittedEffect) -> FittedEffect:
+def _unshrunk(fitted: FittedEffect) -> FittedEffect:
     """An effect whose size has a prior that is nearly flat in its logarithm: that it is at work is decided already."""
-    return replace(one, effect=replace(one.effect, tails=min(one.effect.tails, SIZE_TAILS)))
+    return replace(fitted, effect=replace(fitted.effect, tails=min(fitted.effect.tails, SIZE_TAILS)))
 
 
 def _courses(problem: FitProblem, fitted: Fit) -> Iterator[tuple[float, Fit]]:
     """Log weight [nats] and refit of every course that counts. Of each kind the course most like the fitted one is refitted
     first, and then its neighbours as long as they count."""
     best = -np.inf
-    for place, one in enumerate(fitted.effects):
-        if one.effect.courses is None:
+    for place, effect in enumerate(fitted.effects):
+        if effect.effect.courses is None:
             continue
         held = replace(
-            one.effect,
-            shapes=tuple(replace(shape, smooth=shape.smooth and not shape.held) for shape in one.effect.shapes),
+            effect.effect,
+            shapes=tuple(replace(shape, smooth=shape.smooth and not shape.held) for shape in effect.effect.shapes),
         )
-        for kind in _kinds(one.effect, problem):
-            first = _most_alike(fitted, one, kind)
+        for kind in _kinds(effect.effect, problem):
+            first = _most_alike(fitted, effect, kind)
             for way in (range(first, len(kind)), range(first - 1, -1, -1)):
                 near, laws = fitted.effects, fitted.laws
                 for index in way:
-                    shape = _with_free(kind[index].shape, one)
+                    shape = _with_free(kind[index].shape, effect)
                     tried = replace(near[place], effect=held, shape=shape)
                     refit = fit(problem, laws, (*near[:place], tried, *near[place + 1 :]), steps=COURSE_STEPS)
                     if not np.isfinite(refit.cost) or refit.wrong_sign:
@@ -217,11 +221,11 @@ def _with_free(shape: tuple[float, ...], fitted: FittedEffect) -> tuple[float, .
     return tuple(was if parameter.smooth and not parameter.held else value for value, was, parameter in own)
 
 
-def _most_alike(fitted: Fit, one: FittedEffect, kind: Sequence[Tried]) -> int:
+def _most_alike(fitted: Fit, effect: FittedEffect, kind: Sequence[Tried]) -> int:
     """Which of the courses changes torque most like an effect as it is fitted."""
     scene = fitted.prediction.scene
-    change = one.effect.change(scene, one.amplitude, one.shape)
-    others = one.effect.changes(scene, [(one.amplitude, tried.shape) for tried in kind])
+    change = effect.effect.change(scene, effect.amplitude, effect.shape)
+    others = effect.effect.changes(scene, [(effect.amplitude, tried.shape) for tried in kind])
     along = np.abs(change @ others) / np.maximum(np.linalg.norm(others, axis=0), 1e-300)
     return int(np.argmax(along))
 

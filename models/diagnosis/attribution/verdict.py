@@ -34,15 +34,15 @@ class Explanation:
 
 def probability_of(explanations: Iterable[Explanation], slug: str) -> float:
     """The probability that an effect is at work, alone or beside others."""
-    return min(sum(one.probability for one in explanations if slug in one.effects), 1.0)
+    return min(sum(explanation.probability for explanation in explanations if slug in explanation.effects), 1.0)
 
 
 def probabilities_by_slug(explanations: Iterable[Explanation]) -> dict[str, float]:
     """The probability of each effect of the catalogue, largest first."""
     listed = tuple(explanations)
-    slugs = dict.fromkeys(slug for one in listed for slug in one.effects if slug != UNCATALOGUED)
-    found = {slug: probability_of(listed, slug) for slug in slugs}
-    return dict(sorted(found.items(), key=lambda item: -item[1]))
+    slugs = dict.fromkeys(slug for explanation in listed for slug in explanation.effects if slug != UNCATALOGUED)
+    probabilities = {slug: probability_of(listed, slug) for slug in slugs}
+    return dict(sorted(probabilities.items(), key=lambda item: -item[1]))
 
 
 class Proposal(StrEnum):

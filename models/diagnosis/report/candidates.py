@@ -88,10 +88,12 @@ def with_signs(explanations: Iterable[Explanation], candidates: Iterable[Candida
     signs = {candidate.effect: candidate.estimate.sign_probability for candidate in candidates}
     return tuple(
         replace(
-            one,
-            sign_probability=min((sign for slug in one.effects if (sign := signs.get(slug)) is not None), default=None),
+            explanation,
+            sign_probability=min(
+                (sign for slug in explanation.effects if (sign := signs.get(slug)) is not None), default=None
+            ),
         )
-        for one in explanations
+        for explanation in explanations
     )
 
 

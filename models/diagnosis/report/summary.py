@@ -89,10 +89,12 @@ def _adequate(findings: Findings) -> list[str]:
         sizes = "; ".join(_detectable(visible, visible.amplitude) for visible in shown[:VISIBLE_MENTIONED])
         parts.append(f"These data would have shown, with 90 % power: {sizes}.")
     partly = [
-        each for each in catalogued if _within_reach(each, each.least) and not _within_reach(each, each.amplitude)
+        visible
+        for visible in catalogued
+        if _within_reach(visible, visible.least) and not _within_reach(visible, visible.amplitude)
     ]
     if partly:
-        sizes = "; ".join(_detectable(each, each.least) for each in partly[:VISIBLE_MENTIONED])
+        sizes = "; ".join(_detectable(visible, visible.least) for visible in partly[:VISIBLE_MENTIONED])
         parts.append(f"Only in some of its forms, others being absorbed by the baseline: {sizes}.")
     hidden = [visible.effect for visible in catalogued if not _within_reach(visible, visible.least)]
     if hidden:
@@ -128,7 +130,9 @@ def _named(findings: Findings) -> list[str]:
     chosen = [candidate for candidate in findings.candidates if candidate.effect in causes]
     others = [candidate for candidate in findings.candidates if candidate.effect not in causes]
     names = " together with ".join(effect_name(slug) for slug in findings.causes)
-    exactly = sum(one.probability for one in findings.explanations if causes <= set(one.effects))
+    exactly = sum(
+        explanation.probability for explanation in findings.explanations if causes <= set(explanation.effects)
+    )
     parts = [
         _error(findings),
         f"The cause{'s are' if len(findings.causes) > 1 else ' is'} {names} (probability {probability(exactly)}).",
@@ -160,17 +164,17 @@ def _ambiguous(findings: Findings) -> list[str]:
     """The explanations among which the choice is, each with its probability, and each effect's size where it first comes."""
     sized = {candidate.effect: candidate.estimate for candidate in findings.candidates}
     alternatives = []
-    for one in credible_explanations(findings.explanations):
-        names = [_alternative(slug, findings.resembles) for slug in one.effects] or ["nothing at all"]
+    for explanation in credible_explanations(findings.explanations):
+        names = [_alternative(slug, findings.resembles) for slug in explanation.effects] or ["nothing at all"]
         sizes = [
             signed(estimate) if estimate.value != 0.0 else "not measured, so it cannot be excluded"
-            for slug in one.effects
+            for slug in explanation.effects
             if (estimate := sized.pop(slug, None)) is not None
         ]
-        inside = "; ".join([f"probability {probability(one.probability)}", *sizes])
+        inside = "; ".join([f"probability {probability(explanation.probability)}", *sizes])
         alternatives.append(f"{' together with '.join(names)} ({inside})")
-    said = f"{', '.join(alternatives[:-1])}, or {alternatives[-1]}"
-    return [_error(findings), f"These data cannot distinguish what explains it, the most probable first: {said}."]
+    listing = f"{', '.join(alternatives[:-1])}, or {alternatives[-1]}"
+    return [_error(findings), f"These data cannot distinguish what explains it, the most probable first: {listing}."]
 
 
 def _alternative(slug: str, resembles: str) -> str:

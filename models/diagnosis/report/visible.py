@@ -45,10 +45,10 @@ def _amplitudes(projected: ProjectedFit, threshold: float) -> FloatArray:
     needed = 0.5 * (np.sqrt(2 * threshold) + float(ndtri(VISIBLE_POWER))) ** 2
     best = projected.likely.evidence
     largest = np.zeros(len(projected.columns))
-    for each in projected.projections:
-        info = np.diag(each.info)[projected.effects]
-        shown = info > LEAST_VISIBLE_SHARE * each.whole[projected.effects]
-        left = max(needed - best + each.evidence, 0.0)
+    for projection in projected.projections:
+        info = np.diag(projection.info)[projected.effects]
+        shown = info > LEAST_VISIBLE_SHARE * projection.whole[projected.effects]
+        left = max(needed - best + projection.evidence, 0.0)
         amplitude = np.sqrt(2 * left / np.where(shown, info, 1.0))
         largest = np.maximum(largest, np.where(shown, amplitude, np.inf if left > 0 else 0.0))
     return largest

@@ -114,7 +114,7 @@ def measure_gain(problem: FitProblem, baseline: Fit, extended: Fit, rng: np.rand
         mse_percent_after=100 * float(np.mean(after**2)) / max(total, 1e-300),
         log_score_gain=sum(fold.score for fold in held) * design.torque.size / rows.size,
         forecast_log_score_gain=forecast,
-        hardest=max((one for fold in held for one in _groups(design, fold)), key=lambda one: one.rmse),
+        hardest=max((group for fold in held for group in _groups(design, fold)), key=lambda group: group.rmse),
     )
 
 

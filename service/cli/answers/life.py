@@ -80,9 +80,9 @@ def show(answer: Mapping[str, Any]) -> None:
     out.print(f"{answer['clutch_id']}{at}: {answer['statement']}", markup=False, style="bold")
     for line in _lines(answer):
         out.print(line, markup=False, soft_wrap=True)
-    known = [row for row in _rows(answer) if any(row[1].get(q) is not None for q in _SHOWN)]
-    if known:
-        rows = [(name, *(shown(quantity.get(q)) for q in _SHOWN)) for name, quantity, shown in known]
+    with_quantiles = [row for row in _rows(answer) if any(row[1].get(q) is not None for q in _SHOWN)]
+    if with_quantiles:
+        rows = [(name, *(shown(quantity.get(q)) for q in _SHOWN)) for name, quantity, shown in with_quantiles]
         show_table(["probability", *(f"{100 * float(q):g} %" for q in _SHOWN)], rows)
     criteria = answer.get("criteria", [])
     if len(criteria) > 1 or any(end["quantity"] != "mean_cof" for end in criteria):

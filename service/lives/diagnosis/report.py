@@ -50,11 +50,13 @@ def public(
         "summary": report.summary,
         "explanations": [
             {
-                "effects": list(one.effects),
-                "probability": finite(one.probability),
-                "sign_probability": None if one.sign_probability is None else finite(one.sign_probability),
+                "effects": list(explanation.effects),
+                "probability": finite(explanation.probability),
+                "sign_probability": None
+                if explanation.sign_probability is None
+                else finite(explanation.sign_probability),
             }
-            for one in report.explanations
+            for explanation in report.explanations
         ],
         "candidates": [
             {

@@ -61,19 +61,19 @@ def doubts_alone(run: IncomingRun, analysis: Analysis, geometry: Geometry) -> tu
 
 
 def doubts_together(
-    accepted: Sequence[Event], held: Sequence[Event], asked: Event | None, geometry: Geometry, *, corrected: bool
+    accepted: Sequence[Event], held: Sequence[Event], incoming: Event | None, geometry: Geometry, *, corrected: bool
 ) -> Judged:
     """Which runs are to be held, all of them weighed together.
 
-    `accepted` and `held` are the runs as they stand, `asked` one that comes in or was changed (None: none is new). Held runs
-    with a dead channel are no part of the question, nor are those after the declared end of their life. `corrected`: a
-    model in force corrects the mean COFs of tests.
+    `accepted` and `held` are the runs as they stand, `incoming` one that comes in or was changed (None: none is new). Held
+    runs with a dead channel are no part of the question, nor are those after the declared end of their life. `corrected`:
+    a model in force corrects the mean COFs of tests.
     """
-    new = [] if asked is None else [asked]
+    new = [] if incoming is None else [incoming]
     doubted = [
         event for event in held if event.shown is not None and beyond_end(order([*accepted, *new, event])) is None
     ]
-    if asked is None and not doubted:
+    if incoming is None and not doubted:
         return Judged()
     events = order([*accepted, *doubted, *new])
     aside = {event.run_id for event in doubted}

@@ -96,7 +96,7 @@ def shown_by(columns: Columns | None, geometry: Geometry) -> Shown:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Known:
+class _Comparison:
     """What the runs of a life are compared with: its first test that has mean COFs, and the range of its speeds."""
 
     reference: Event | None
@@ -201,16 +201,16 @@ def runs_of(events: Sequence[Event], held: Collection[str], geometry: Geometry, 
     for life in lives_of([replace(event, rebuild=event.rebuild and event.run_id not in held) for event in events]):
         tests = [event for event in life.events if event.cofs]
         reference = next((event for event in tests if event.run_id not in held), tests[0] if tests else None)
-        known = _Known(reference=reference, life=life, geometry=geometry, corrected=corrected)
+        comparison = _Comparison(reference=reference, life=life, geometry=geometry, corrected=corrected)
         for event in life.events:
             shown = event.shown or Shown()
-            sent = known.reading(event, shown, event.cofs)
+            sent = comparison.reading(event, shown, event.cofs)
             runs.append(
                 Run(
                     name=event.run_id,
                     kind=event.kind,
                     sent=sent,
-                    slips=none if event.shown is None else partial(known.slips, event, shown),
+                    slips=none if event.shown is None else partial(comparison.slips, event, shown),
                     tests=bool(event.cofs) and sent.log_cof is not None and not life.in_other_oil(event),
                     block=None if event.duty is None or event.kind == RUN_IN else event.duty.cycles,
                     moment=event.moment if event.dated else None,

@@ -45,21 +45,21 @@ def life_by_criteria(
         row = records.clutch(connection, clutch_id)
         state = records.state(connection, clutch_id)
         evidence = measured_lives.evidence(connection, clutch_id)
-    asked = _Asked(method=method, quantity=quantity, criterion=criterion, pressure_bar=pressure_bar)
+    request = _Request(method=method, quantity=quantity, criterion=criterion, pressure_bar=pressure_bar)
     chosen = chosen_life(state, life, at_cycles)
-    answer = _by_criteria(state, chosen, evidence, asked)
+    answer = _by_criteria(state, chosen, evidence, request)
     now = chosen.number == chosen.of and (at_cycles is None or at_cycles >= row.summary.get("as_of_cycles", math.inf))
     among = None
     if state.held and now:
         evidence = replace(evidence, reader=stored_runs.run_reader(database, clutch_id))
         held = with_held(state, evidence)
-        among = _by_criteria(held, chosen_life(held), evidence, asked)
+        among = _by_criteria(held, chosen_life(held), evidence, request)
     head = {"clutch_id": clutch_id, "method": method, "revision": row.revision, "origin": state.record.origin}
     return head | answer | beside_held(answer, row.summary if now else {}, among)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Asked:
+class _Request:
     """By which filter and criteria an answer is asked for."""
 
     method: str
@@ -68,17 +68,17 @@ class _Asked:
     pressure_bar: float | None
 
 
-def _by_criteria(state: ClutchState, chosen: ChosenLife, evidence: Evidence, asked: _Asked) -> dict[str, Any]:
+def _by_criteria(state: ClutchState, chosen: ChosenLife, evidence: Evidence, request: _Request) -> dict[str, Any]:
     events = () if chosen.life is None else chosen.life.events
-    by_mean_cof = predict_at(state.clutch_id, events, chosen.assumptions, state.fraction, method=asked.method)
+    by_mean_cof = predict_at(state.clutch_id, events, chosen.assumptions, state.fraction, method=request.method)
     answer = by_mean_cof | {"life": chosen.item(), "criteria": []}
     measured = measured_life(state, chosen, evidence)
     if measured is None:
         return answer
-    wanted = _wanted(state.record.end_of_life, measured, asked.quantity, asked.criterion, asked.pressure_bar)
+    wanted = _wanted(state.record.end_of_life, measured, request.quantity, request.criterion, request.pressure_bar)
     if all(criterion_in.quantity != MEAN_COF for criterion_in in wanted):
         answer |= _NOT_OF_MEAN_COF
-    ends = [criterion_end(measured, criterion_in, asked.method) for criterion_in in wanted]
+    ends = [criterion_end(measured, criterion_in, request.method) for criterion_in in wanted]
     return ended(answer | criteria_answer(measured, ends, answer["current"]), measured.life.end)
 
 

@@ -37,9 +37,9 @@ def _grid(facts: Facts) -> tuple[Tried, ...]:
 def _courses(facts: Facts) -> tuple[Tried, ...]:
     tried = [Tried(shape=(CONSTANT, 0.0, 0.0))]
     if facts.states.size > 2:
-        each = math.log(len(STARTS) / (len(POWERS) + len(SETTLED)))
-        tried += [Tried(shape=(GROWING, 0.0, math.log(power)), log_weight=each) for power in POWERS]
-        tried += [Tried(shape=(SETTLING, share, 0.0), log_weight=each) for share in SETTLED]
+        log_weight = math.log(len(STARTS) / (len(POWERS) + len(SETTLED)))
+        tried += [Tried(shape=(GROWING, 0.0, math.log(power)), log_weight=log_weight) for power in POWERS]
+        tried += [Tried(shape=(SETTLING, share, 0.0), log_weight=log_weight) for share in SETTLED]
         tried += _steps(facts)
     return tuple(tried)
 

@@ -51,8 +51,8 @@ export class Stored {
    * @param {number} cycles of its last run
    */
   async end(ended, cycles) {
-    const asked = ended === null ? askEnd(this.clutchId, cycles) : askTakeBack(this.clutchId, ended);
-    await showDone(await asked, this.refresh);
+    const answer = ended === null ? askEnd(this.clutchId, cycles) : askTakeBack(this.clutchId, ended);
+    await showDone(await answer, this.refresh);
   }
 
   /** @param {ClutchOut} clutch */
