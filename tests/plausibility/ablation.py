@@ -29,7 +29,7 @@ WITHOUT: dict[str, tuple[tuple[object, str, Any], ...]] = {
     "the pace of cycles": ((pace, "log_probability", _anywhere),),
     "order in time": ((pace, "log_order", lambda start, _: np.zeros(start.shape[0])),),
     "physics of COF": ((judgement, "log_physics", lambda _: 0.0),),
-    "pressure, speed, oil": ((reading._Known, "_log_protocol", lambda *_: 0.0),),
+    "pressure, speed, oil": ((reading._Comparison, "_log_protocol", lambda *_: 0.0),),
     "slip: digits": ((judgement, "slips_of", _slips_but(*slips.OF_CYCLES[:3])),),
     "slip: other cycles": ((judgement, "slips_of", _slips_but(slips.OTHER_CYCLES)),),
     "slip: units": ((judgement, "slips_of", _slips_but("pressure", "torque", "speed", "oil")),),
