@@ -12,6 +12,7 @@ ambiguous; an extension that predicts worse is withheld.
 Templates have a model discrepancy (`effects.template_discrepancy`), so evidence includes what they err by.
 """
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -97,9 +98,9 @@ def _adequate(alarms: Alarms) -> Judgement:
     """Nothing is wrong, up to what the rarest alarm says against it: a p-value is a Bayes factor of 1/(-e p ln p) at most
     (Sellke, Bayarri and Berger, Am. Stat. 55 (2001) 62)."""
     p_value = min(
-        max(min(alarm.p_value for alarm in (alarms.effects, alarms.contrasts, alarms.lines)), 1e-300), 1 / np.e
+        max(min(alarm.p_value for alarm in (alarms.effects, alarms.contrasts, alarms.lines)), 1e-300), 1 / math.e
     )
-    against = WRONG / (1.0 - WRONG) / (-np.e * p_value * np.log(p_value))
+    against = WRONG / (1.0 - WRONG) / (-math.e * p_value * np.log(p_value))
     weights = {(): 1.0, _UNKNOWN: float(against)}
     return judged(Verdict.MODEL_ADEQUATE, weights, {(): 1.0})
 
