@@ -24,7 +24,7 @@ from service.errors import MOST_ERRORS, MOST_QUOTED, FieldError, InvalidError, T
 from service.readers.column_names import choices_of
 from service.readers.detect import ByteSource
 from service.readers.grid import MOST_ROWS, Layout, find_table, no_table
-from service.readers.limits import LONGEST_LINE_BYTES, Limits
+from service.readers.limits import LIMITS, LONGEST_LINE_BYTES, Limits
 from service.readers.numerals import Numerals, Stamps, Undecided, doubtful_number
 from service.readers.table import Reading, Table
 
@@ -246,7 +246,7 @@ def _cells(line: str, separator: str) -> list[str]:
     """The cells of a line, without quotes, without blanks around them."""
     if not separator.strip(" "):
         apart = r"\s{2,}|\t" if len(separator) > 1 else r"(?<!/)[ \t]+(?![\[({/])"
-        return re.split(apart, line.strip())
+        return re.split(apart, line.strip(), maxsplit=LIMITS.most_columns)  # one more cell is one too many
     if '"' in line:
         even = line.replace("\r", " ").split("\n")  # a carriage return within a line is a blank, not a second line
         try:

@@ -9,7 +9,7 @@ from tests.support import ONCE, Server, clutchlife
 def test_campaigns_of_records_are_pushed_without_a_word_on_kind_and_cycles(server: Server, tmp_path: Path) -> None:
     for form in ("csv", "mdf4"):
         folder = tmp_path / form
-        assert "3 simulated runs" in clutchlife("simulate", "--out", folder, "--format", form, "--tests", "1")
+        assert "3 simulated runs" in clutchlife("simulate", "--film", "--out", folder, "--format", form, "--tests", "1")
         push = ("push", folder, "--clutch", form, "--url", server.url, "--spool", tmp_path / "spool")
         assert "4 stored, 0 known already, 0 refused" in clutchlife(*push)
         assert "0 stored, 4 known already, 0 refused" in clutchlife(*push)

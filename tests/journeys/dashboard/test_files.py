@@ -25,7 +25,10 @@ def http(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx2.Client]:
 
 
 def assets_of(http: httpx2.Client, path: str) -> list[str]:
-    return re.findall(r'(?:src|href)="(/assets/[^"]+)"', http.get(path).text)
+    """Paths of a page's files; the page names them relative to itself, so that it may stand behind any path."""
+    page = http.get(path)
+    names = re.findall(r'(?:src|href)="([^"]*assets/[^"]+)"', page.text)
+    return [page.url.join(name).path for name in names]
 
 
 @pytest.mark.parametrize("path", PAGES)

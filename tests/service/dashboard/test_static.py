@@ -59,10 +59,8 @@ def test_the_first_file_of_a_chapter_says_what_it_is(chapter: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(MODULES))
-def test_a_module_is_short_and_checked(name: str) -> None:
-    lines = MODULES[name].splitlines()
-    assert lines[0] == "// @ts-check"
-    assert len(lines) < 300
+def test_a_module_is_checked(name: str) -> None:
+    assert MODULES[name].splitlines()[0] == "// @ts-check"
 
 
 @pytest.mark.parametrize("name", sorted(MODULES))

@@ -183,7 +183,7 @@ def test_what_is_no_cluster_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     with local_cluster(0) as running, no_worker:
         executor_of(running.address)
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(ExecutorUnavailableError, match=r"pip install clutchlife\[cluster\]"):
+    with pytest.raises(ExecutorUnavailableError, match=r"pip install -e '\.\[cluster\]'"):
         executor_of("tcp://127.0.0.1:1")
 
 

@@ -76,7 +76,7 @@ def test_all_samples_bit_for_bit_behind_the_receipt(database: Database, tmp_path
     assert row is not None
     assert row.receipt.items() <= body.items()
     assert body.keys() - row.receipt.keys() == {
-        "channels", "samples", "changes", "doubts", "received_by", "sent_cycles", "state",
+        "channels", "samples", "changes", "doubts", "reading", "received_by", "sent_cycles", "state",
     }  # fmt: skip
     assert body["samples"] == SAMPLES
     assert list(body["channels"]) == list(dynamic())
@@ -122,7 +122,7 @@ def test_without_the_extra_parquet_is_not_given(
     database: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(formats, "_PACKAGE", "no-such-package")
-    with pytest.raises(NotAcceptableError, match=r"clutchlife\[parquet\]"):
+    with pytest.raises(NotAcceptableError, match=r"pip install -e '\.\[parquet\]'"):
         written(database, tmp_path / "body", kind="parquet")
 
 
