@@ -47,8 +47,11 @@ class Tests:
 
 
 def _own_clock(cycles: FloatArray, latest: float) -> FloatArray:
-    """u of every scale [scales, k]; where no test was made after the start, any further one is at u = 1."""
-    if latest <= 0.0:
+    """u of every scale [scales, k]; where no test was made after the start, any further one is at u = 1.
+
+    Cycles of which floats cannot hold the inverse are none.
+    """
+    if latest < 1e-300:
         return np.tile(np.minimum(cycles, 1.0), (_SCALES.size, 1))
     log_scale = (_SCALES + math.log(latest))[:, None]
     course = np.full(1, Course.LOGARITHM, dtype=np.intp)

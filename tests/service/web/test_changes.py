@@ -4,6 +4,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service import records
+from service.lives.plausibility.doubts import Judged
 from service.web.auth import make_key
 from storage import keys
 from storage.engine.opening import open_database
@@ -22,7 +23,7 @@ def post(client: TestClient, **headers: str) -> None:
 @pytest.fixture(autouse=True)
 def _nothing_is_doubted(monkeypatch: pytest.MonkeyPatch) -> None:
     for workflow in ("ingest_run", "change_run"):
-        monkeypatch.setattr(f"service.workflows.{workflow}.doubts", lambda *_: ())
+        monkeypatch.setattr(f"service.workflows.{workflow}.doubts_together", lambda *_, **__: Judged())
 
 
 def test_a_change_moves_the_tag_on_and_its_repeat_does_not(client: TestClient) -> None:

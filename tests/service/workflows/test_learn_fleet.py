@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from service import records
 from service.app import create_app
 from service.cli.main import app
+from service.lives.plausibility.doubts import Judged
 from service.lives.recomputation import ClutchState, Tracking
 from service.settings import Settings
 from service.workflows import learn_fleet
@@ -93,7 +94,7 @@ def accelerating(cycles: float, end: float) -> float:
 
 def test_lives_that_ended_calibrate_the_next(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """They accelerate, and forecasts of such lives are late at first: the next is stated to end where the others did."""
-    monkeypatch.setattr("service.workflows.ingest_run.doubts", lambda *_: ())
+    monkeypatch.setattr("service.workflows.ingest_run.doubts_together", lambda *_, **__: Judged())
     ends = {"old-0": 8_000.0, "old-1": 8_600.0, "old-2": 9_100.0, "old-3": 9_800.0, "new": 8_900.0}
     with client_of(url) as client:
         for name, end in ends.items():

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from service.lives.plausibility.doubts import Judged
 from service.workflows.replay import replay_clutch
 from tests.service.workflows.benches import CLUTCH, Bench, assert_same, body, stood_in
 
@@ -79,7 +80,7 @@ def test_a_mended_clutch_answers_as_one_without_slips(
                 if after == number:
                     mend(slipped, other)
         with monkeypatch.context() as believed:
-            believed.setattr("service.workflows.ingest_run.doubts", lambda *_: ())
+            believed.setattr("service.workflows.ingest_run.doubts_together", lambda *_, **__: Judged())
             for one in sent:
                 if "extra" not in one.slip:
                     right.send(one.run)

@@ -64,9 +64,13 @@ def test_a_walk_by_name_follows_its_cursor(fleet: TestClient) -> None:
 def test_a_clutch_says_its_state_and_why(fleet: TestClient) -> None:
     states = {item["clutch_id"]: item["state"] for item in fleet.get("/v1/clutches").json()["items"]}
     assert states == {
-        "ended": {"name": "failure", "why": "end of life reached"},
-        "ageing": {"name": "normal", "why": "may never reach end of life"},
-        "c1": {"name": "check", "why": "fewer than three tests: no prognosis yet"},
+        "ended": {"name": "failure", "why": "the end of life is reached: mean COF at 50 % of new"},
+        "ageing": {
+            "name": "normal",
+            "why": "at least 7,100 cycles are left with 95 %; the end of life is reached within 1,000,000 cycles with a "
+            "probability of 94 %",
+        },
+        "c1": {"name": "check", "why": "no run yet that counts"},
     }
     assert fleet.get("/v1/clutches/ended").json()["state"] == states["ended"]
 
