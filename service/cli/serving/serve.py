@@ -1,7 +1,7 @@
 """`clutchlife serve`: the service."""
 
 import signal
-from contextlib import closing
+from contextlib import ExitStack, closing
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, get_args
 
@@ -59,7 +59,7 @@ def serve(
     from storage.engine.postgresql.connect import is_on_server  # start-up time
 
     given = {"insecure_local": insecure_local or None, "log_level": log_level, "raw": raw, "root_path": root_path}
-    with errors_in_a_line():
+    with errors_in_a_line(), ExitStack() as taken:
         settings = Settings.from_environment(database, **{name: value for name, value in given.items() if value})
         configure(settings.log_format, settings.log_level)
         if processes > 1 and not is_on_server(settings.database):
@@ -69,16 +69,16 @@ def serve(
             )
         # a port that is not free ends the start before anything is made; without a database there are no keys
         first = host if is_loopback(host) or database_exists(settings.database) else LOOPBACK
-        sockets = listening.bound(first, port)
+        sockets = [taken.enter_context(at_address) for at_address in listening.bound(first, port)]
         start.info("settings", extra={"fields": settings.shown()})
         for line in Settings.misspelt():
             start.warning(line)
         host = _allowed(host, settings)
         if host != first:
-            for taken in sockets:
-                taken.close()
-            sockets = listening.bound(host, port)
+            taken.close()
+            sockets = [taken.enter_context(at_address) for at_address in listening.bound(host, port)]
         shown = (listening.page(host, listening.port_of(sockets), settings.root_path), _place(settings.database))
+        taken.pop_all()
     from service.cli.serving import services  # start-up time
 
     def announce() -> None:
