@@ -6,7 +6,7 @@ from typing import Any
 from sqlalchemy import Connection
 
 from service import records
-from service.lives.condition import state_of
+from service.lives.condition import state_of, top_line
 from storage import clutches, verdicts
 from storage.clutches import ClutchRow
 from storage.verdicts import VerdictRow
@@ -24,6 +24,8 @@ def latest(connection: Connection, row: ClutchRow, verdict: VerdictRow | None) -
         "diagnosis_id": verdict.diagnosis_id,
         "verdict": verdict.verdict,
         "causes": list(verdict.causes),
+        "advice": {name: verdict.advice[0][name] for name in ("test", "separates")} if verdict.advice else None,
+        "adoptable": verdict.adoptable and not earlier,
         "adopted": verdict.adopted and not earlier,
         "earlier_life": earlier,
     }
@@ -31,7 +33,16 @@ def latest(connection: Connection, row: ClutchRow, verdict: VerdictRow | None) -
 
 def state(connection: Connection, row: ClutchRow) -> dict[str, str]:
     """The clutch's state and why."""
-    return state_of(row.summary, disputed=row.disputed is not None and row.disputed == _present_life(connection, row))
+    return state_of(row.summary, disputed=_disputed(connection, row))
+
+
+def first_line(connection: Connection, row: ClutchRow, diagnosis: dict[str, Any] | None) -> dict[str, str]:
+    """What stands first of the clutch: `headline` and `action`; `diagnosis` is its newest one as it goes out."""
+    return top_line(row.summary, disputed=_disputed(connection, row), diagnosis=diagnosis)
+
+
+def _disputed(connection: Connection, row: ClutchRow) -> bool:
+    return row.disputed is not None and row.disputed == _present_life(connection, row)
 
 
 def note_dispute(connection: Connection, clutch_id: str) -> None:

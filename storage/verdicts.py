@@ -8,13 +8,14 @@ from sqlalchemy import Connection, bindparam, select
 
 from storage.diagnoses import FINISHED
 from storage.dialects import json_fields
-from storage.encoding.json_text import to_object
+from storage.encoding.json_text import Json, to_object
 from storage.tables import adopted_model, diagnosis
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VerdictRow:
-    """A finished diagnosis' verdict and causes; `adopted` where the model adopted last came from it.
+    """A finished diagnosis' verdict, causes and advised tests, the best first; `adoptable` where it has an extended model,
+    `adopted` where the model adopted last came from it.
 
     `life` is the run_id of the rebuild with which the diagnosed life began, "" for the first life.
     """
@@ -23,6 +24,8 @@ class VerdictRow:
     life: str
     verdict: str | None
     causes: tuple[str, ...]
+    advice: tuple[Json, ...]
+    adoptable: bool
     adopted: bool
 
 
@@ -39,12 +42,13 @@ _in_force = (
     .limit(1)
     .scalar_subquery()
 )
-_short = json_fields(diagnosis.c.report, "verdict", "causes")
+_short = json_fields(diagnosis.c.report, "verdict", "causes", "advice")
 _verdicts = select(
     diagnosis.c.clutch_id,
     diagnosis.c.diagnosis_id,
     diagnosis.c.life,
     _short.label("short"),
+    diagnosis.c.extension.is_not(None).label("adoptable"),
     (_in_force == diagnosis.c.diagnosis_id).label("adopted"),
 ).where(diagnosis.c.clutch_id.in_(bindparam("wanted", expanding=True)), diagnosis.c.diagnosis_key == _newest)
 
@@ -52,13 +56,17 @@ _verdicts = select(
 def newest(connection: Connection, clutch_ids: Sequence[str]) -> dict[str, VerdictRow]:
     """clutch_id -> its newest finished diagnosis, where it has one."""
     verdicts: dict[str, VerdictRow] = {}
-    for clutch_id, diagnosis_id, life, short, adopted in connection.execute(_verdicts, {"wanted": list(clutch_ids)}):
+    for clutch_id, diagnosis_id, life, short, adoptable, adopted in connection.execute(
+        _verdicts, {"wanted": list(clutch_ids)}
+    ):
         summary = to_object(short)
         verdicts[clutch_id] = VerdictRow(
             diagnosis_id=diagnosis_id,
             life=life,
             verdict=summary["verdict"],
             causes=tuple(summary["causes"] or ()),
+            advice=tuple(summary["advice"] or ()),
+            adoptable=bool(adoptable),
             adopted=bool(adopted),
         )
     return verdicts

@@ -1,7 +1,8 @@
 """The condition of a clutch, stored beside it and stated by lists, pages and terminals alike: its remaining life in short,
-what held runs would make of it, and its state after NAMUR NE 107 with the reason as a sentence.
+what held runs would make of it, its state after NAMUR NE 107 with the reason as a sentence, and what to do about it.
 
-`summary_of` makes what is stored; `state_of` is the only place where a state is decided.
+`summarised` (in `outlook.py`) makes what is stored; `state_of` is the only place where a state is decided, `top_line` the
+only one where the line above a clutch's page and its action are written.
 """
 
 import math
@@ -24,6 +25,10 @@ STATES = FAILURE, MAINTENANCE, CHECK, OUT_OF_SPECIFICATION, NORMAL = (
     "check",
     "out_of_specification",
     "normal",
+)
+#: What a state is called on a page and in a terminal.
+STATE_WORDS = dict(
+    zip(STATES, ("Failure", "Maintenance required", "Function check", "Out of specification", "Normal"), strict=True)
 )
 #: What of a prediction is stored with a clutch.
 SUMMARY = (
@@ -68,10 +73,14 @@ def beside_held(
         held = {"count": summary["held"]} | {name: among[name] for name in ("status", "remaining_cycles")}
         warnings.append(_held_warning(payload, held))
     at_least = lower_bound(payload["at_least"], among)
-    pace = summary.get("pace")
-    at = None if pace is None or at_least is None else date_of(pace["moment"] + at_least / pace["cycles_per_second"])
-    statement = statement_of(payload, at_least)
+    at, statement = _at_pace(summary, at_least), statement_of(payload, at_least)
     return {"at_least": at_least, "at_least_at": at, "held_runs": held, "statement": statement, "warnings": warnings}
+
+
+def _at_pace(summary: Mapping[str, Any], at_least: float | None) -> str | None:
+    """When the safe bound is used up at the pace of the runs, ISO 8601; None where either is unknown."""
+    pace = summary.get("pace")
+    return None if pace is None or at_least is None else date_of(pace["moment"] + at_least / pace["cycles_per_second"])
 
 
 def stated(summary: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -124,23 +133,105 @@ def _interval_in_words(remaining: Mapping[str, float | None]) -> str:
 def state_of(summary: Mapping[str, Any], *, disputed: bool) -> dict[str, str]:
     """A clutch's state after NAMUR NE 107 by its summary, and why; `disputed`: its newest diagnosis found that data and
     model disagree, and nobody has acted on it. The name is stored with the clutch whenever the summary is."""
+    name, reason = _state_and_reason(summary, disputed=disputed)
     if "status" not in summary:
-        held = summary.get("held", 0)
-        return {"name": CHECK, "why": held_in_words(held) if held else "no run yet that counts"}
-    status, held, disagree = summary["status"], summary.get("held", 0), "data and model disagree, see the diagnosis"
+        return {"name": name, "why": reason}
     among = summary.get("with_held")
     says = statement_of(summary, lower_bound(summary["at_least"], among and among[SHOWN]))
+    return {"name": name, "why": f"{reason}: {says}" if reason else says}
+
+
+def _state_and_reason(summary: Mapping[str, Any], *, disputed: bool) -> tuple[str, str]:
+    """The first state that holds, and why as a clause; no reason where the statement of the remaining life is one."""
+    held = summary.get("held", 0)
+    if "status" not in summary:
+        return CHECK, held_in_words(held) if held else "no run yet that counts"
+    status = summary["status"]
     worn = status == ENDED and summary["ended"]["reason"] == WORN
     near = None if status in (REACHED, INSUFFICIENT, ENDED) else _near_end(summary)
     rules = (
-        (FAILURE, says if status == REACHED or worn else None),
-        (MAINTENANCE, near and f"{near}: {says}"),
-        (CHECK, f"{held_in_words(held)}: {says}" if held else None),
-        (CHECK, f"{_tests(summary['runs_used'])}: {says}" if status == INSUFFICIENT else None),
-        (OUT_OF_SPECIFICATION, f"{disagree}: {says}" if disputed and status != ENDED else None),
-        (NORMAL, says),
+        (FAILURE, "" if status == REACHED or worn else None),
+        (MAINTENANCE, near),
+        (CHECK, held_in_words(held) if held else None),
+        (CHECK, _tests(summary["runs_used"]) if status == INSUFFICIENT else None),
+        (OUT_OF_SPECIFICATION, "data and model disagree, see the diagnosis" if disputed and status != ENDED else None),
+        (NORMAL, ""),
     )
-    return next({"name": name, "why": why} for name, why in rules if why is not None)
+    return next((name, reason) for name, reason in rules if reason is not None)
+
+
+def top_line(
+    summary: Mapping[str, Any], *, disputed: bool, diagnosis: Mapping[str, Any] | None = None
+) -> dict[str, str]:
+    """What stands first on a clutch's page and in `clutchlife status`: `headline`, its state in words, the safe bound with
+    its date at this pace, and the median; `action`, one sentence of what to do. `diagnosis`: the newest one as it goes out.
+    """
+    name, reason = _state_and_reason(summary, disputed=disputed)
+    words = STATE_WORDS[name]
+    if "status" not in summary:
+        return {"headline": f"{words}: {reason}", "action": _action(name, summary, None, diagnosis)}
+    among = (summary.get("with_held") or {}).get(SHOWN)
+    at_least = lower_bound(summary["at_least"], among)
+    at = _at_pace(summary, at_least)
+    date = None if at is None else _day_in_words(at)
+    says = _numbers_in_words(summary, at_least, date)
+    return {
+        "headline": f"{words}: {reason}; {says}" if reason else f"{words}: {says}",
+        "action": _action(name, summary, date, diagnosis),
+    }
+
+
+def _numbers_in_words(summary: Mapping[str, Any], at_least: float | None, date: str | None) -> str:
+    """The safe bound, its date and the median; else the statement, where there is no number to give."""
+    median = summary["remaining_cycles"]["0.5"]
+    if summary["status"] in (REACHED, INSUFFICIENT, ENDED) or at_least is None or at_least < 1.0:
+        return statement_of(summary, at_least)
+    bound = f"at least {rounded_down(at_least)} more cycles (95 %)"
+    until = "" if date is None else f", that is until {date} at this pace"
+    if median is None:
+        chance = chance_in_words(summary["probability_of_reaching"])
+        return f"{bound}{until}; the end of life is reached within {HORIZON:,.0f} cycles with a probability of {chance}"
+    return f"{bound}, most likely {_two_digits(median)}{until}"
+
+
+def _action(name: str, summary: Mapping[str, Any], date: str | None, diagnosis: Mapping[str, Any] | None) -> str:
+    """What to do about a state, in one sentence."""
+    held = summary.get("held", 0)
+    if name == FAILURE:
+        return "Replace the clutch."
+    if name == MAINTENANCE:
+        return "Replace it soon." if date is None else f"Replace before {date}."
+    if name == CHECK and held:
+        return "Confirm, correct or withdraw " + ("one held run." if held == 1 else f"{held} held runs.")
+    if name == CHECK:
+        missing = FEWEST_TESTS - summary.get("runs_used", 0)
+        tests = "one more stationary test" if missing == 1 else f"{missing} stationary tests at different cycles"
+        return f"Run {tests}: a prognosis needs {FEWEST_TESTS}."
+    if name == NORMAL or diagnosis is None:
+        return "Its life has ended: nothing to do." if summary.get("ended") else "Nothing to do: carry on testing."
+    causes = [_cause_in_words(cause) for cause in diagnosis["causes"]]
+    if diagnosis["adoptable"]:
+        return f"Adopt the model with {' and '.join(causes)}: it explains where data and model disagree."
+    if (advice := diagnosis["advice"]) is not None:
+        return f"Run a {advice['test'].removeprefix('the ')}: {_decides(advice['separates'])}."
+    return "Read the diagnosis before you rely on the forecast."
+
+
+def _decides(separates: Sequence[str]) -> str:
+    effects = [_cause_in_words(effect) for effect in separates if effect != "baseline"]
+    if len(effects) == 1:
+        return f"it shows whether {effects[0]} is at work"
+    return f"it decides between {' and '.join(effects)}"
+
+
+def _cause_in_words(slug: str) -> str:
+    return "a cause outside the catalogue" if slug == "uncatalogued" else slug.replace("_", " ")
+
+
+def _day_in_words(moment: str) -> str:
+    """A moment (ISO 8601) as a date, as 3 Dec 2026."""
+    day = datetime.fromisoformat(moment)
+    return f"{day.day} {day:%b %Y}"
 
 
 def _tests(count: int) -> str:
@@ -180,8 +271,23 @@ def bound_in_words(at_least: float | None) -> str:
     """The safe bound of the remaining cycles, rounded down to two digits."""
     if at_least is None or at_least < 1.0:
         return "nothing is certain of the cycles that are left"
-    unit = 10.0 ** max(0, math.floor(math.log10(at_least)) - 1)
-    return f"at least {math.floor(at_least / unit) * unit:,.0f} cycles are left with 95 %"
+    return f"at least {rounded_down(at_least)} cycles are left with 95 %"
+
+
+def rounded_down(cycles: float) -> str:
+    """Cycles, at least 1, rounded down to two digits."""
+    unit = _second_digit(cycles)
+    return f"{math.floor(cycles / unit) * unit:,.0f}"
+
+
+def _two_digits(cycles: float) -> str:
+    unit = _second_digit(max(1.0, cycles))
+    return f"{round(cycles / unit) * unit:,.0f}"
+
+
+def _second_digit(cycles: float) -> float:
+    """The unit of the second digit of a number of cycles, at least 1."""
+    return float(10.0 ** max(0, math.floor(math.log10(cycles)) - 1))
 
 
 def limit_in_words(criterion: Mapping[str, Any]) -> str:

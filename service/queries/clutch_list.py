@@ -93,33 +93,32 @@ def _next(rows: Sequence[ClutchRow], limit: int, *, by_name: bool) -> Place | No
     return 0.0 if by_name else rows[limit - 1].rank, rows[limit - 1].clutch_id
 
 
-def _as_json(row: ClutchRow, held: int, verdict: dict[str, Any] | None, state: dict[str, str]) -> bytes:
+def _as_json(row: ClutchRow, held: int, verdict: dict[str, Any] | None, state: dict[str, Any]) -> bytes:
     return to_json(_item(row, held, verdict, state))
 
 
 def _shown(
     connection: Connection, rows: Sequence[ClutchRow]
-) -> list[tuple[ClutchRow, int, dict[str, Any] | None, dict[str, str]]]:
-    """Clutches, each with the number of its held runs, its newest finished diagnosis as it goes out, and its state."""
+) -> list[tuple[ClutchRow, int, dict[str, Any] | None, dict[str, Any]]]:
+    """Clutches, each with the number of its held runs, its newest finished diagnosis as it goes out, and its state with
+    headline and action."""
     names = [row.clutch_id for row in rows]
     newest, held = verdicts.newest(connection, names), runs.held(connection, names)
-    return [
-        (
-            row,
-            held.get(row.clutch_id, 0),
-            stored_verdicts.latest(connection, row, newest.get(row.clutch_id)),
-            stored_verdicts.state(connection, row),
-        )
-        for row in rows
-    ]
+    shown = []
+    for row in rows:
+        diagnosis = stored_verdicts.latest(connection, row, newest.get(row.clutch_id))
+        first = stored_verdicts.first_line(connection, row, diagnosis)
+        state = {"state": stored_verdicts.state(connection, row)}
+        shown.append((row, held.get(row.clutch_id, 0), diagnosis, state | first))
+    return shown
 
 
-def _item(row: ClutchRow, held: int, diagnosis: dict[str, Any] | None, state: dict[str, str]) -> dict[str, Any]:
+def _item(row: ClutchRow, held: int, diagnosis: dict[str, Any] | None, state: dict[str, Any]) -> dict[str, Any]:
     return records.record(row).model_dump(mode="json") | {
         "archived": row.archived,
         "created_at": row.created_at,
         "revision": row.revision,
-        "state": state,
+        **state,
         "runs": row.summary.get("runs", 0),
         "held": held,
         "summary": stated(row.summary),

@@ -222,12 +222,21 @@ class Recent(Answer):
     mean_cof: list[float] = Field(description="Mean COF of the present life, thinned to at most 32 values")
 
 
+class AdvisedTest(Answer):
+    """The test that would say most."""
+
+    test: str = Field(description="The test in a sentence")
+    separates: list[str] = Field(description="The two effects that it distinguishes; `baseline` stands for none")
+
+
 class LatestDiagnosis(Answer):
     """The newest finished diagnosis."""
 
     diagnosis_id: str = Field(description="The diagnosis' name")
     verdict: str | None = Field(description="Its verdict")
     causes: list[str] = Field(description="The causes it names, by their slugs")
+    advice: AdvisedTest | None = Field(description="The test that would say most; null where none is advised")
+    adoptable: bool = Field(description="Whether it has an extended model to adopt")
     adopted: bool = Field(description="Whether its model is in force")
     earlier_life: bool = Field(description="Whether a rebuild has ended the life that it diagnosed")
 
@@ -260,6 +269,10 @@ class ClutchOut(Answer):
     created_at: str = Field(description="When it was registered; UTC, ISO 8601")
     revision: Revision
     state: ClutchState = Field(description="What it asks for")
+    headline: str = Field(
+        description="One line: the state in words, the safe bound with its date at this pace, and the median"
+    )
+    action: str = Field(description="One sentence: what to do now")
     runs: int = Field(description="Number of runs that count; those that are held or were withdrawn do not")
     held: int = Field(description="Number of runs that are held: they wait to be confirmed, corrected or withdrawn")
     summary: ClutchSummary | None = Field(description="Health and remaining life; null before the first run")

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from models.prognosis.criteria import QUANTILES
-from service.lives.condition import STATES, bound_in_words, state_of
+from service.lives.condition import STATES, bound_in_words, state_of, top_line
 from service.queries import clutch_list, degradation, series
 from service.queries.life.criteria import life_by_criteria
 from service.queries.life.planned_duty import planned_life
@@ -174,6 +174,65 @@ def test_the_first_state_that_holds_is_the_state(known: dict[str, Any], disputed
     assert state["name"] == name
     assert words in state["why"]
     assert "may never" not in state["why"]
+
+
+PACE = {"cycles_per_second": 1000 / 86_400, "moment": 1_796_083_200.0}  # 1,000 cycles a day from 1 December 2026
+HELD = {"held": 1, "with_held": {"particle": {"status": "predicted", "at_least": 3149.0, "remaining_cycles": {}}}}
+
+
+def found(causes: list[str], advice: list[str] | None = None, *, adoptable: bool = False) -> dict[str, Any]:
+    """A diagnosis as it goes out."""
+    advised = advice and {"test": "stationary test with the oil at 60 °C", "separates": advice}
+    return {"causes": causes, "advice": advised, "adoptable": adoptable}
+
+
+@pytest.mark.parametrize(
+    ("known", "diagnosis", "headline", "action"),
+    [
+        (
+            summary(9450.0, pace=PACE), None,
+            "Normal: at least 9,400 more cycles (95 %), most likely 9,400, that is until 10 Dec 2026 at this pace",
+            "Nothing to do: carry on testing.",
+        ),
+        (
+            summary(2000.0, pace=PACE), None,
+            "Maintenance required: less than 20 % of its life may be left; at least 2,000 more cycles (95 %), "
+            "most likely 2,000, that is until 3 Dec 2026 at this pace",
+            "Replace before 3 Dec 2026.",
+        ),
+        (summary(2000.0), None, "Maintenance required: ", "Replace it soon."),
+        (summary(0.0, status="reached"), None, "Failure: the end of life is reached: slope", "Replace the clutch."),
+        (
+            summary(9000.0, **HELD), None,
+            "Function check: 1 run is held and does not count; at least 3,100 more cycles (95 %), most likely 9,000",
+            "Confirm, correct or withdraw one held run.",
+        ),
+        (
+            summary(800.0, status="insufficient_data", runs_used=2), None,
+            "Function check: 2 of the 3 tests that a prognosis needs; the tests cannot tell yet: at least 800 cycles",
+            "Run one more stationary test: a prognosis needs 3.",
+        ),
+        ({}, None, "Function check: no run yet", "Run 3 stationary tests at different cycles: a prognosis needs 3."),
+        (summary(9000.0), found(["oil_temperature"], adoptable=True), "Out of specification: ", "Adopt the model with oil"),
+        (
+            summary(9000.0), found(["inertia_torque", "squeeze_film"], ["inertia_torque", "squeeze_film"]),
+            "Out of specification: ",
+            "Run a stationary test with the oil at 60 °C: it decides between inertia torque and squeeze film.",
+        ),
+        (
+            summary(9000.0), found(["oil_temperature"], ["oil_temperature", "baseline"]), "Out of specification: ",
+            "Run a stationary test with the oil at 60 °C: it shows whether oil temperature is at work.",
+        ),
+        (summary(9000.0), found([]), "Out of specification: ", "Read the diagnosis before you rely on the forecast."),
+    ],
+    ids=str,
+)  # fmt: skip
+def test_the_top_line_answers_and_says_what_to_do(
+    known: dict[str, Any], diagnosis: dict[str, Any] | None, headline: str, action: str
+) -> None:
+    line = top_line(known, disputed=diagnosis is not None, diagnosis=diagnosis)
+    assert line["headline"].startswith(headline)
+    assert line["action"].startswith(action)
 
 
 def test_the_states_stand_in_the_order_of_the_contract() -> None:
