@@ -290,7 +290,7 @@ EXAMPLES: dict[str, Any] = {
     "version": 1,
     "why": "at least 3,400 cycles are left with 95 %",
     "ClutchOut.action": "Replace before 3 Dec 2026.",
-    "ClutchOut.headline": "Normal: at least 3,400 more cycles (95 %), most likely 5,200, that is until 3 Dec 2026 at this pace",
+    "ClutchOut.headline": "Normal: at least 3,400 more cycles (95 %), most likely 5,200",
     # what is of another type in one schema
     "AsymptoticLaw.covariance": [[0.01, 0.0, 0.0], [0.0, 0.04, 0.0], [0.0, 0.0, 0.1]],
     "LinearLaw.covariance": [[0.01, -0.001], [-0.001, 0.0002]],

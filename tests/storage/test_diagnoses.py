@@ -12,6 +12,7 @@ from tests.storage.samples import store_diagnoses
 
 CLUTCH = "bench3-017"
 AT = "2026-11-02T10:00:00+00:00"
+REPORT = {"verdict": "cause_named", "causes": ["oil_change"], "advice": [{"test": "another sweep"}], "maps": {}}
 
 
 @pytest.fixture
@@ -75,7 +76,7 @@ def stored(database: Database) -> Database:
             )
             diagnoses.insert(connection, new)
         diagnoses.finish(connection, "d0", AT, {"verdict": "model_adequate", "causes": []}, None)
-        diagnoses.finish(connection, "d1", AT, {"verdict": "cause_named", "causes": ["oil_change"], "maps": {}}, {})
+        diagnoses.finish(connection, "d1", AT, REPORT, {})
         diagnoses.fail(connection, "d2", AT, "too slow")
         diagnoses.fail(connection, "d4", AT, "too slow")
     return database
@@ -86,7 +87,10 @@ def test_the_newest_that_finished_is_told(stored: Database) -> None:
         said = verdicts.newest(connection, ["a", "b", "nobody"])
         assert verdicts.newest(connection, []) == {}
         assert verdicts.newest(connection, ["b"]) == {}
-    expected = VerdictRow(diagnosis_id="d1", life="", verdict="cause_named", causes=("oil_change",), adopted=False)
+    causes, advice = ("oil_change",), ({"test": "another sweep"},)
+    expected = VerdictRow(
+        diagnosis_id="d1", life="", verdict="cause_named", causes=causes, advice=advice, adoptable=True, adopted=False
+    )
     assert said == {"a": expected}
 
 
