@@ -50,6 +50,8 @@ _BLOCK = 1 << 20
 _STARTED = b"started\n"
 #: Characters of a foreign library's message that ours quotes, and of a whole message.
 _MOST_QUOTED, _LONGEST_DETAIL = 200, 4000
+#: How C code ends on a file that it does not bear.
+_CRASHES = (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT)
 #: Files that the reading process has open at once. Chosen: importing the libraries takes a dozen.
 _MOST_OPEN_FILES = 64
 #: Added to the limit on reading, for the interpreter to start and import the library.
@@ -147,6 +149,10 @@ def _run(kind: Format, path: Path, answer: str, reading: Reading, limits: Limits
             raise BusyError("the service is ending: send the file again in a little while")
         if ended.returncode == -signal.SIGABRT and kind is Format.WORKBOOK:  # how a library in Rust ends without memory
             raise _too_much(kind)
+        if -ended.returncode in _CRASHES:  # in the C code of its library, which is what the process is for
+            crash = _ending(ended.returncode)
+            why = f"it is damaged, or not such a file: the library that reads it ended with {crash}"
+            raise _unreadable(kind, why, "reader_crashed")
         if ended.returncode:
             raise _unreadable(kind, f"its reader ended with {_ending(ended.returncode)}")
         return _answer(result, kind, answer, limits)

@@ -322,6 +322,8 @@ class _Body:
                     continue
                 plain = self._plain(text)
                 block = _Block(text, plain or self._careful(text), careful=plain is None)
+                if not block.columns:
+                    continue
                 waiting.append(block)
                 try:
                     self._numerals.settle(block.columns)
@@ -420,7 +422,7 @@ class _Body:
         return ["\n".join(columns[index]).encode() for index in self._indices]
 
     def _careful(self, block: bytes) -> list[bytes]:
-        """The columns of any other block, without comments, blank lines and repeated titles.
+        """The columns of any other block, without comments, blank lines and repeated titles; none where no row is left.
 
         Raises InvalidError with every line of it that has too few or too many cells.
         """
@@ -433,8 +435,9 @@ class _Body:
                 rows.append(line)
             else:
                 self.lines.skip(self._rows + len(rows))
-        plain = self._plain("".join(f"{row}\n" for row in rows).encode()) if rows else [b"" for _ in self._indices]
-        return plain or self._by_line(rows)
+        if not rows:
+            return []
+        return self._plain("".join(f"{row}\n" for row in rows).encode()) or self._by_line(rows)
 
     def _by_line(self, lines: Sequence[str]) -> list[bytes]:
         """The columns line by line: cells over several lines, and cells that are missing or empty at the ends."""
@@ -476,6 +479,8 @@ class _Body:
 
     def _numbers(self, block: _Block) -> list[FloatArray]:
         """A block's columns as numbers. Raises InvalidError with every cell of it that is none."""
+        if not block.columns:
+            return [np.empty(0) for _ in self._indices]
         columns = [self._column(index, text) for index, text in zip(self._indices, block.columns, strict=True)]
         numbers = [column for column in columns if column is not None]
         if len(numbers) == len(columns):
@@ -492,8 +497,6 @@ class _Body:
         raise _many(sorted(errors, key=lambda error: error.row or 0), total, self.lines.of(self._rows + rows))
 
     def _column(self, index: int, text: bytes) -> FloatArray | None:
-        if not text:
-            return np.empty(0)
         numbers = None if index in self._stamps else self._numerals.floats(text)
         if numbers is None and self._channels[index] == "time_s":
             stamps = self._stamps.setdefault(index, Stamps())

@@ -113,6 +113,7 @@ WRONG = [
     (f"{HEADER}\n{ROWS}end of data\n", r"line 4 must have 4 cells, got 1: 'end of data'"),
     (f"{HEADER}\n{ROWS}0.2,5,100\n", r"line 4 must have 4 cells, got 3"),
     (f"{HEADER}\n{ROWS}0.2,5,100,20,9\n", r"line 4 must have 4 cells, got 5"),
+    (f"{HEADER}\n0.2,5,,20\n", r"speed_rpm\[0\] \(line 2\) must be a number, got ''"),
     (f"{HEADER}\n{ROWS}0.2,5,,20\n", r"speed_rpm\[2\] \(line 4\) must be a number, got ''"),
     (f"{HEADER}\n{ROWS}#\n\n0.2,5,x,20\n", r"speed_rpm\[2\] \(line 6\) must be a number, got 'x'"),
     (f"{HEADER}\n{ROWS}#\n0.2,5,NaN,20\n", r"speed_rpm\[2\] \(line 5\) must be finite, got nan"),
