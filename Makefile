@@ -1,4 +1,5 @@
 # make demo    a simulated clutch's life, posted run by run, with its prognosis      (ARGS=--exit to end by itself)
+# make shell   a shell in which clutchlife is a command
 # make test    all tests but those of `make slow`
 # make slow    what takes long and rarely fails: what intervals promise, counted over many lives; further ways to the same
 #              answer, files cut off anywhere, charts drawn by the large library                               (30 minutes)
@@ -36,11 +37,15 @@ UNUSED := matplotlib contourpy cycler fonttools kiwisolver pillow
 LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --exclude-newer "7 days" \
 	--custom-compile-command "make lock" $(foreach name,$(UNUSED),--no-emit-package $(name))
 
-.PHONY: adoption demo test slow faults check lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
+.PHONY: adoption demo shell test slow faults check lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
 	$(BIN)/clutchlife demo $(ARGS)
+
+shell: $(VENV)/.runs
+	@echo "clutchlife is a command in this shell; exit leaves it"
+	@PATH="$(abspath $(BIN)):$$PATH" VIRTUAL_ENV="$(abspath $(VENV))" $${SHELL:-/bin/sh}
 
 test: $(VENV)/.tests $(VENV)-generator/.ready
 	$(BIN)/python -m tests.browser

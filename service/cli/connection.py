@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from service.cli.options import EX_DATAERR, EX_TEMPFAIL, errors_in_a_line, fail
-from service.cli.sending.answers import RefusedError, ServiceAwayError
-from service.cli.sending.client import Service, connect
+from service.client.clutchlife.answers import RefusedError, ServiceAwayError
+from service.client.clutchlife.transport import Service, connect
 
 
 @contextmanager

@@ -1,9 +1,7 @@
 """`clutchlife diagnose`: what the simulation gets wrong about a clutch, and why."""
 
 import json
-import time
-from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -11,10 +9,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from service.cli.connection import service_at
 from service.cli.diagnosis_view import shown
 from service.cli.options import URL, ClutchId, Key, Patience, Url, err, fail, out
-from service.cli.sending.client import Service
-
-#: Seconds that the service may hold the request until the report is there, and seconds between two looks at it afterwards.
-_WAIT, _LOOK = 10, 0.5
+from service.client.clutchlife.client import diagnosed
 
 
 def diagnose(
@@ -30,7 +25,7 @@ def diagnose(
         columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
         with Progress(*columns, console=err, transient=True) as progress:
             progress.add_task("diagnosing", total=None)
-            report = ask(service, clutch, adopt=adopt)
+            report = diagnosed(service, clutch, adopt=adopt)
     if as_json:
         typer.echo(json.dumps(report, indent=1, ensure_ascii=False))
     elif report["status"] == "finished":
@@ -40,13 +35,3 @@ def diagnose(
             out.print(f"To track under it: clutchlife model {clutch} --adopt {report['diagnosis_id']}", markup=False)
     if report["status"] != "finished":
         fail(f"the diagnosis failed: {report['problem']}")
-
-
-def ask(service: Service, clutch: str, *, adopt: bool, look: Callable[[float], None] = time.sleep) -> dict[str, Any]:
-    """Request a diagnosis and wait until it has ended; its report."""
-    address = f"/v1/clutches/{clutch}/diagnoses"
-    report = service.post(address, json.dumps({"adopt": adopt}).encode(), prefer=f"wait={_WAIT}")
-    while report["status"] == "running":
-        look(_LOOK)
-        report = service.get(f"{address}/{report['diagnosis_id']}")
-    return report

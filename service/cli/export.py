@@ -13,7 +13,7 @@ from rich.progress import Progress
 
 from service.cli.connection import service_at
 from service.cli.options import URL, ClutchId, Key, Patience, Url, err, errors_in_a_line, out
-from service.cli.sending.client import Service
+from service.client.clutchlife.transport import Service
 from service.run_files import manifest
 
 #: The folder of what was sent and does not count so.

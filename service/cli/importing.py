@@ -10,7 +10,7 @@ from rich.table import Table
 from service.cli.changes.runs import run_line
 from service.cli.connection import service_at
 from service.cli.options import EX_DATAERR, URL, Key, Patience, Url, errors_in_a_line, fail, out
-from service.cli.sending.client import Service
+from service.client.clutchlife.transport import Service
 
 _KINDS = ("stationary_stribeck", "dynamic_stribeck")
 #: Rows that are shown.

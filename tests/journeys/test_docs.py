@@ -77,7 +77,7 @@ def missing(text: str) -> list[str]:
 
 def product_files() -> list[Path]:
     """The Python files of the product and its tests, from the top of the repository."""
-    folders = ("models", "service", "storage", "tests")
+    folders = ("docs", "models", "service", "storage", "tests")
     return [path.relative_to(ROOT) for folder in folders for path in (ROOT / folder).rglob("*.py")]
 
 

@@ -16,11 +16,11 @@ from typing import Annotated, Any
 import typer
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from service.cli.diagnose import ask
 from service.cli.diagnosis_view import shown
 from service.cli.options import Seed, fail, out
-from service.cli.sending.answers import ServiceAwayError
-from service.cli.sending.client import Service, connect
+from service.client.clutchlife.answers import ServiceAwayError
+from service.client.clutchlife.client import diagnosed
+from service.client.clutchlife.transport import Service, connect
 
 _PORT = 8000
 _START_SECONDS = 60.0
@@ -117,7 +117,7 @@ def _diagnosed(service: Service, clutch_id: str, end: float | None) -> None:
     before = service.get(f"/v1/clutches/{clutch_id}/remaining-useful-life", **halfway)
     with _progress() as progress:
         progress.add_task("diagnosing", total=None)
-        report = ask(service, clutch_id, adopt=True)
+        report = diagnosed(service, clutch_id, adopt=True)
     if report["status"] != "finished":
         fail(f"the diagnosis failed: {report['problem']}")
     for part in shown(report):

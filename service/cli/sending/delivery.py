@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from service.cli.sending import entry as entries
-from service.cli.sending.answers import RefusedError, ServiceAwayError
-from service.cli.sending.client import NoLongerWantedError, Service
 from service.cli.sending.entry import INSPECTIONS, RUNS, Entry
 from service.cli.sending.spool import Spool
+from service.client.clutchlife.answers import RefusedError, ServiceAwayError
+from service.client.clutchlife.transport import NoLongerWantedError, Service
 
 #: Runs in a row that an otherwise present service does not answer, after which it is taken to be away. Chosen: one run that
 #: it cannot take must not hold up the others; two cost twice the patience.

@@ -7,10 +7,10 @@ from typing import Annotated
 import typer
 
 from service.cli.options import EX_DATAERR, EX_USAGE, URL, Key, Patience, Url, errors_in_a_line, fail
-from service.cli.sending.client import Service
 from service.cli.sending.entry import INSPECTIONS, RUNS, Entry
 from service.cli.sending.spool import Spool, default_folder
 from service.cli.sending.transmission import say, transmit
+from service.client.clutchlife.transport import Service
 from service.run_files import manifest
 
 SPOOL = default_folder()

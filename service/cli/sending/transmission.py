@@ -5,11 +5,11 @@ from collections.abc import Callable, Sequence
 from rich.progress import Progress
 
 from service.cli.options import EX_DATAERR, EX_TEMPFAIL, err, fail, out
-from service.cli.sending.answers import RefusedError, ServiceAwayError
-from service.cli.sending.client import Service, connect
 from service.cli.sending.delivery import Sent, deliver
 from service.cli.sending.folder_lock import HeldError
 from service.cli.sending.spool import Spool
+from service.client.clutchlife.answers import RefusedError, ServiceAwayError
+from service.client.clutchlife.transport import Service, connect
 
 
 def say(line: str) -> None:

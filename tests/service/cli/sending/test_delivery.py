@@ -6,15 +6,15 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from service.cli.sending import client
-from service.cli.sending.answers import RefusedError, ServiceAwayError
-from service.cli.sending.client import Service
 from service.cli.sending.delivery import Sent, deliver
 from service.cli.sending.entry import INSPECTIONS
 from service.cli.sending.spool import Spool
+from service.client.clutchlife import transport
+from service.client.clutchlife.answers import RefusedError, ServiceAwayError
+from service.client.clutchlife.transport import Service
 from tests.service.cli.sending.stand_in_service import URL, Answer, StandInService, body, problem
-from tests.service.cli.sending.test_client import Clock
 from tests.service.cli.sending.test_spool import contents, set_aside, written
+from tests.service.client.clutchlife.test_transport import Clock
 
 
 class Sender:
@@ -48,7 +48,7 @@ class Sender:
 @pytest.fixture
 def sender(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Sender:
     clock = Clock()
-    monkeypatch.setattr(client, "time", clock)
+    monkeypatch.setattr(transport, "time", clock)
     return Sender(tmp_path, clock)
 
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from service.cli.sending import entry as entries
-from service.cli.sending.client import Service
 from service.cli.sending.delivery import Sent, deliver
 from service.cli.sending.folder_lock import HeldError
 from service.cli.sending.spool import Spool
+from service.client.clutchlife.transport import Service
 from tests.service.cli.sending.stand_in_service import URL, StandInService, body
 
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from service.cli.sending.client import Service
 from service.cli.sending.delivery import Sent, deliver
 from service.cli.sending.spool import Spool
+from service.client.clutchlife.transport import Service
 from tests.service.cli.sending.kills import every_kill
 from tests.service.cli.sending.stand_in_service import URL, StandInService, body
 from tests.service.cli.sending.test_spool import PARAMETERS, contents, old_release, set_aside, written

@@ -166,8 +166,8 @@ def test_api10_what_others_answer_or_send_is_not_trusted() -> None:
     """A redirect would carry key and runs elsewhere. Answers: test_answers.py. Files: test_mdf4.py, test_manifest.py."""
     import httpx2
 
-    from service.cli.sending.answers import passing
-    from service.cli.sending.client import connect
+    from service.client.clutchlife.answers import passing
+    from service.client.clutchlife.transport import connect
 
     with connect(URL, key="a-key") as client:
         assert not client.follow_redirects

@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 import httpx2
 import pytest
 
-from service.cli.sending.answers import RefusedError, content, passing, problem, retry_after
+from service.client.clutchlife.answers import RefusedError, content, passing, problem, retry_after
 from tests.service.cli.sending.stand_in_service import problem as own
 
 PORTAL = httpx2.Response(200, html="<html>Please log in</html>")

@@ -6,9 +6,9 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from service.cli.sending import client
-from service.cli.sending.answers import RefusedError, ServiceAwayError
-from service.cli.sending.client import NoLongerWantedError, Service
+from service.client.clutchlife import transport
+from service.client.clutchlife.answers import RefusedError, ServiceAwayError
+from service.client.clutchlife.transport import NoLongerWantedError, Service
 from tests.service.cli.sending.stand_in_service import URL
 
 RECEIPT = httpx2.Response(200, json={"run_id": "r1"})
@@ -32,7 +32,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     fake = Clock()
-    monkeypatch.setattr(client, "time", fake)
+    monkeypatch.setattr(transport, "time", fake)
     return fake
 
 

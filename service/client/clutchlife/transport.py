@@ -1,4 +1,4 @@
-"""A client of the service: it waits while the service is away or busy, and raises what the service refuses."""
+"""Requests to a service: repeated while it is away or busy; what it refuses is raised."""
 
 import json
 import time
@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import httpx2
 
-from service.cli.sending.answers import (
+from .answers import (
     RefusedError,
     ServiceAwayError,
     content,
@@ -96,6 +96,10 @@ class Service:
         """The file that answers a GET; raises as `post` does."""
         return self._repeated("GET", path, image)
 
+    def delete(self, path: str) -> dict[str, Any]:
+        """The answer to a DELETE, empty where it says nothing; raises as `post` does."""
+        return self._repeated("DELETE", path, lambda response: {} if response.status_code == 204 else content(response))
+
     def get(self, path: str, **params: Any) -> dict[str, Any]:
         """The answer to a GET; raises as `post` does."""
         return self._answer("GET", path, params=params)
@@ -118,6 +122,7 @@ class Service:
         **request: Any,
     ) -> Answer:
         deadline, wait, unsure = time.monotonic() + self.patience, FIRST_WAIT, False
+        report: dict[str, Any] | None = None
         while True:
             if not wanted():
                 raise NoLongerWantedError
@@ -135,10 +140,10 @@ class Service:
                     raise RefusedError(response.status_code, problem(response))
                 if not reason and answer is not None:
                     return answer
-                unsure = unsure or perhaps_stored(response)
+                unsure, report = unsure or perhaps_stored(response), content(response)
                 wait = max(wait, retry_after(response.headers))
             if time.monotonic() + wait > deadline:
-                raise ServiceAwayError(f"{self.http.base_url}: {reason}", perhaps_stored=unsure)
+                raise ServiceAwayError(f"{self.http.base_url}: {reason}", perhaps_stored=unsure, problem=report)
             self.on_wait(reason, wait)
             time.sleep(wait)
             wait = min(2 * wait, LAST_WAIT)

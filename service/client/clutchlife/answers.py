@@ -33,24 +33,37 @@ _CONFLICT, _ARCHIVED = _TYPE + "conflict", _TYPE + "archived"
 _MOST_QUOTED = 500
 
 
-class ServiceAwayError(Exception):
+class ClutchlifeError(Exception):
+    """Base of what the client raises. `problem` is the service's report (RFC 9457), empty where there is none."""
+
+    problem: dict[str, Any]
+
+    def __init__(self, message: str, problem: dict[str, Any] | None = None) -> None:
+        super().__init__(message)
+        self.problem = {} if problem is None else problem
+
+
+class ServiceAwayError(ClutchlifeError):
     """The service did not answer, or was busy, for longer than the patience.
 
     `perhaps_stored`: a try reached a server and got no answer of the service, so it may have been carried out.
     """
 
-    def __init__(self, message: str, *, perhaps_stored: bool = True) -> None:
-        super().__init__(message)
+    def __init__(self, message: str, *, perhaps_stored: bool = True, problem: dict[str, Any] | None = None) -> None:
+        super().__init__(message, problem)
         self.perhaps_stored = perhaps_stored
 
 
-class RefusedError(Exception):
-    """The service refused the request; repeating it would be refused again."""
+class DiagnosisFailedError(ClutchlifeError):
+    """A diagnosis ended without a report; `problem` holds why as `detail`."""
+
+
+class RefusedError(ClutchlifeError):
+    """The service refused the request; repeating it would be refused again. `problem["errors"]` says what is wrong where."""
 
     def __init__(self, status: int, problem: dict[str, Any]) -> None:
-        super().__init__(f"{status}: {problem.get('detail') or problem.get('title') or 'refused'}")
+        super().__init__(f"{status}: {problem.get('detail') or problem.get('title') or 'refused'}", problem)
         self.status = status
-        self.problem = problem
 
     @property
     def of_the_run(self) -> bool:

@@ -1,0 +1,193 @@
+"""The client for scripts: one method a question.
+
+>>> from clutchlife import Client                                      # doctest: +SKIP
+>>> Client("http://127.0.0.1:8000").remaining_useful_life("e")["at_least"]  # doctest: +SKIP
+4180
+"""
+
+import json
+import math
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+from urllib.parse import quote
+
+from .answers import DiagnosisFailedError, RefusedError
+from .tables import Frames, columns, table
+from .transport import Service, connect
+
+#: Seconds that the service may hold a request for a diagnosis, and seconds between two looks at it afterwards.
+_WAIT, _LOOK = 10, 0.5
+_JSON_SUFFIX = ".json"
+
+Answer = dict[str, Any]
+
+
+class Client:
+    """A running service. Where a request is refused, RefusedError carries the service's problem report; where the service is
+    away for longer than `patience` [s], ServiceAwayError is raised.
+
+    Lists are tables: frames of pandas, else of polars, else lists of dictionaries; `frames` asks for one of them. Threads
+    may share a client.
+    """
+
+    def __init__(
+        self,
+        url: str = "http://127.0.0.1:8000",
+        key: str | None = None,
+        *,
+        patience: float = 10.0,
+        timeout: float = 60.0,
+        frames: Frames = "auto",
+    ) -> None:
+        self.service = Service(http=connect(url, key=key, timeout=timeout), patience=patience)
+        self.frames: Frames = frames
+
+    def __enter__(self) -> Self:
+        """The client itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close its connections."""
+        self.close()
+
+    def close(self) -> None:
+        """Close its connections."""
+        self.service.http.close()
+
+    # --- clutches ---
+
+    def clutches(self, **arguments: Any) -> Any:
+        """All clutches as a table, worst first, with state and remaining life; `archived=True`: the archived ones."""
+        return self._table("/v1/clutches", **arguments)
+
+    def clutch(self, clutch_id: str) -> Answer:
+        """One clutch: its record, its state and its remaining life in short."""
+        return self.service.get(_clutch(clutch_id))
+
+    def register(self, clutch_id: str, **record: Any) -> Answer:
+        """Register a clutch; what is left out has the reference's values. The same again changes nothing."""
+        return self.service.post("/v1/clutches", _body({"clutch_id": clutch_id, **record}))
+
+    # --- runs ---
+
+    def runs(self, clutch_id: str, **arguments: Any) -> Any:
+        """The receipts of a clutch's runs as a table, by cycles; `state="held"`: those that wait for a person."""
+        return self._table(f"{_clutch(clutch_id)}/runs", **arguments)
+
+    def run(self, clutch_id: str, run_id: str, **arguments: Any) -> Answer:
+        """One run with its channels; `points=2000` thins them."""
+        return self.service.get(f"{_clutch(clutch_id)}/runs/{quote(run_id, safe='')}", **arguments)
+
+    def post_run(self, clutch_id: str, run: Mapping[str, Any] | str | Path | None = None, **fields: Any) -> Answer:
+        """Send a run; its receipt. Safe to repeat.
+
+        `run` is its content, or its file: JSON, or a recorder's file with `kind` and `cycles` or a `rig`. Instead of or
+        beside a content its `fields` may be given, as `kind="maintenance", event="oil_change", cycles=7000`; `channels` may
+        be a frame of pandas or polars, or arrays by name.
+        """
+        address = f"{_clutch(clutch_id)}/runs"
+        if isinstance(run, (str, Path)):
+            path = Path(run)
+            if path.suffix == _JSON_SUFFIX:
+                return self.service.post(address, _body(json.loads(path.read_bytes()) | _content(fields)))
+            given = {"filename": path.name} | {name: value for name, value in fields.items() if value is not None}
+            profile = given.pop("profile", None)
+            parameters = {name: str(value) for name, value in given.items()}
+            if profile is not None:
+                return self.service.post_form(f"{address}/file", path, profile, parameters)
+            return self.service.post_file(f"{address}/file", path, parameters)
+        return self.service.post(address, _body(_content({**({} if run is None else run), **fields})))
+
+    # --- what is known ---
+
+    def remaining_useful_life(self, clutch_id: str, **arguments: Any) -> Answer:
+        """The duty cycles that remain, with quantiles; arguments are those of the API: `method`, `at_cycles`, ..."""
+        return self.service.get(f"{_clutch(clutch_id)}/remaining-useful-life", **arguments)
+
+    def forecast(self, clutch_id: str, programme: Any, **fields: Any) -> Answer:
+        """Remaining life under planned duty: `programme=[{"cycles": 5000, "energy_per_cycle_kj": 25}]`."""
+        address = f"{_clutch(clutch_id)}/remaining-useful-life/forecast"
+        return self.service.post(address, _body({"programme": list(programme), **fields}))
+
+    def degradation(self, clutch_id: str, **arguments: Any) -> Answer:
+        """The coefficients of every tracked quantity's course, with their uncertainty."""
+        return self.service.get(f"{_clutch(clutch_id)}/degradation", **arguments)
+
+    def stribeck(self, clutch_id: str, **arguments: Any) -> Any:
+        """The fitted curves of all stationary tests as a table."""
+        return self._table(f"{_clutch(clutch_id)}/stribeck", **arguments)
+
+    def loops(self, clutch_id: str, **arguments: Any) -> Any:
+        """The friction loops of all dynamic tests as a table."""
+        return self._table(f"{_clutch(clutch_id)}/loops", **arguments)
+
+    def series(self, clutch_id: str, **arguments: Any) -> Any:
+        """Every quantity over cycles as flat rows."""
+        return self._table(f"{_clutch(clutch_id)}/series", **arguments)
+
+    # --- diagnoses ---
+
+    def diagnose(self, clutch_id: str, *, adopt: bool = False, wait: float = 600.0) -> Answer:
+        """Have a clutch diagnosed and wait for the report. Raises DiagnosisFailedError where it failed, TimeoutError where
+        it has not ended after `wait` [s]."""
+        report = diagnosed(self.service, clutch_id, adopt=adopt, wait=wait)
+        if report["status"] != "finished":
+            raise DiagnosisFailedError(f"the diagnosis failed: {report['problem']}", {"detail": report["problem"]})
+        return report
+
+    def diagnoses(self, clutch_id: str, **arguments: Any) -> Any:
+        """The diagnoses of a clutch as a table, newest first."""
+        return self._table(f"{_clutch(clutch_id)}/diagnoses", **arguments)
+
+    def adopt(self, clutch_id: str, diagnosis_id: str | None) -> Answer:
+        """Track a clutch under a diagnosis's extended model; None: under the baseline again."""
+        return self.service.put(f"{_clutch(clutch_id)}/model", _body({"diagnosis_id": diagnosis_id}))
+
+    def _table(self, address: str, **arguments: Any) -> Any:
+        return table(self.service.pages(address, **arguments), self.frames)
+
+
+def diagnosed(
+    service: Service, clutch_id: str, *, adopt: bool, wait: float = math.inf, look: Callable[[float], None] = time.sleep
+) -> Answer:
+    """The report of a diagnosis that is asked for, once it has ended. Raises TimeoutError after `wait` [s]."""
+    address = f"{_clutch(clutch_id)}/diagnoses"
+    deadline = time.monotonic() + wait
+    report = service.post(address, _body({"adopt": adopt}), prefer=f"wait={int(min(_WAIT, max(0.0, wait)))}")
+    while report["status"] == "running":
+        if time.monotonic() > deadline:
+            raise TimeoutError(f"diagnosis {report['diagnosis_id']} of {clutch_id} has not ended after {wait:g} s")
+        look(_LOOK)
+        report = service.get(f"{address}/{report['diagnosis_id']}")
+    return report
+
+
+def _clutch(clutch_id: str) -> str:
+    if not clutch_id:
+        raise RefusedError(0, {"detail": "a clutch's name must not be empty"})
+    return f"/v1/clutches/{quote(clutch_id, safe='')}"
+
+
+def _content(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """A run as JSON has it; what is None is left out."""
+    stated = {name: value for name, value in fields.items() if value is not None}
+    if "channels" in stated:
+        stated["channels"] = columns(stated["channels"])
+    return stated
+
+
+def _body(content: Mapping[str, Any]) -> bytes:
+    return json.dumps(content, default=_plain).encode()
+
+
+def _plain(value: Any) -> Any:
+    """A number or a time of numpy, pandas or the standard library, as JSON takes it."""
+    for convert in ("tolist", "isoformat"):
+        if hasattr(value, convert):
+            return getattr(value, convert)()
+    raise TypeError(f"{type(value).__name__} cannot be sent as JSON")

@@ -1,0 +1,53 @@
+"""Lists of the service as tables: frames of pandas, else of polars, else lists, by what is installed or asked for."""
+
+import importlib
+import importlib.util
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, Literal
+
+#: What a table is: a frame of this library, a list of dictionaries, or (`auto`) the first that is installed, in this order.
+Frames = Literal["auto", "pandas", "polars", "list"]
+
+
+def table(items: Iterable[Mapping[str, Any]], frames: Frames = "auto") -> Any:
+    """The items as rows; in frames an object within an item is columns of its own, `state.name`, and lists are cells.
+
+    Raises ImportError where the library that is asked for is not installed.
+    """
+    library = _chosen(frames)
+    if library == "list":
+        return [dict(item) for item in items]
+    rows = [dict(_cells(item)) for item in items]
+    if library == "pandas":
+        return importlib.import_module("pandas").DataFrame(rows)
+    # of all rows: the first ones may have nulls where later ones have numbers
+    return importlib.import_module("polars").DataFrame(rows, infer_schema_length=None, strict=False)
+
+
+def columns(channels: Any) -> dict[str, list[Any]]:
+    """A run's channels as the service takes them, of a frame of pandas or polars, of arrays or lists, by name."""
+    if not isinstance(channels, Mapping):
+        channels = {str(name): channels[name] for name in channels.columns}
+    return {name: _column(values) for name, values in channels.items()}
+
+
+def _column(values: Any) -> list[Any]:
+    for convert in ("tolist", "to_list"):
+        if hasattr(values, convert):
+            return list(getattr(values, convert)())
+    return list(values)
+
+
+def _chosen(frames: Frames) -> str:
+    if frames != "auto":
+        return frames
+    libraries: Sequence[str] = ("pandas", "polars")
+    return next((name for name in libraries if importlib.util.find_spec(name) is not None), "list")
+
+
+def _cells(item: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in item.items():
+        if isinstance(value, Mapping) and value:
+            yield from _cells(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
