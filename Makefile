@@ -7,22 +7,22 @@
 #              sequences of requests, and files of every format with bytes changed          (an hour; ARGS="-k kills")
 # make check   formatting, lint, types, layers; of the dashboard's JavaScript and styles too, for which it needs npm
 # make lowest  tests that meet every dependency, on the oldest releases that pyproject.toml allows
-# make score   how good the prognosis is, on simulated lives: the tables of docs/prognosis.md  (SEED= SIZE= PARTS= ARGS=--write)
+# make score   how good the prognosis is, on simulated lives: the tables of docs/appendix/prognosis.md  (SEED= SIZE= PARTS= ARGS=--write)
 # make rivals  the same beside other packages, in an environment of their own                (SEED= SIZE=)
-# make blind   hides effects and wants them found: the table of docs/diagnosis.md      (SEED= SIZE=small|full ONLY= ARGS=)
+# make blind   hides effects and wants them found: the table of docs/appendix/diagnosis.md      (SEED= SIZE=small|full ONLY= ARGS=)
 # make visible hides effects at twice the amplitude that a report calls visible, and counts alarms (SEED= COUNT= STORE=)
 # make adoption  hides artefacts, adopts what the diagnosis offers, holds remaining life against the truth: a table of
-#              docs/diagnosis.md; goes on where it ended                         (SEED= SIZE=small|full ONLY= ARGS=--list)
-# make load     rigs and clients against a running service, what they wait and what is lost: a table of docs/benchmarks.md
+#              docs/appendix/diagnosis.md; goes on where it ended                         (SEED= SIZE=small|full ONLY= ARGS=--list)
+# make load     rigs and clients against a running service, what they wait and what is lost: a table of docs/appendix/benchmarks.md
 #              (ARGS="--seconds 60 --no-raw"; "--services 4 --database postgresql --rigs 16 --clients 40 --no-raw"); a few
 #              minutes, on a machine that does nothing else
-# make scale    requests and commands with 1,000 clutches of 200 tests in one file, beside 10: a table of docs/scale.md
+# make scale    requests and commands with 1,000 clutches of 200 tests in one file, beside 10: a table of docs/appendix/scale.md
 #              (ARGS="--clutches 10000 --states 5"); needs 7 GB of disk. python -m tests.scale.replay --clutches 300: a replay
 #              in one process, in a pool and on a Dask cluster of which a worker is killed
-# make plausibility  sends mistyped and honest runs: the tables of docs/plausibility.md  (SEED= CAMPAIGNS= HONEST= ARGS=--write)
+# make plausibility  sends mistyped and honest runs: the tables of docs/appendix/plausibility.md  (SEED= CAMPAIGNS= HONEST= ARGS=--write)
 # make real    what is said of real measurements; make benchmark: how long things take; make picture: README's pictures;
 #              make figures: the figures of docs/
-# make architecture  the picture, the ways and the examples of docs/architecture.md, from the code
+# make architecture  the picture, the ways and the examples of docs/explanation/architecture.md, from the code
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin

@@ -86,7 +86,7 @@ class Settings(BaseSettings):
         ge=1,
         description="how many connections one address may have open; further ones are answered 429 and closed",
     )
-    # docs/benchmarks.md: the longest diagnosis takes 11 s
+    # docs/appendix/benchmarks.md: the longest diagnosis takes 11 s
     diagnosis_seconds: int = Field(
         default=300,
         ge=1,
@@ -102,7 +102,7 @@ class Settings(BaseSettings):
         description="how long after its service was killed a job is begun again by another, or by the next on a file",
     )
     most_diagnoses: int = Field(default=16, ge=1, description="diagnoses that wait or run; further ones get a 503")
-    # docs/scale.md: 10,000 clutches of 16 tests take four hours of a core, of 200 tests more than twelve times as long
+    # docs/appendix/scale.md: 10,000 clutches of 16 tests take four hours of a core, of 200 tests over twelve times that
     replay_hours: int = Field(
         default=72, ge=1, description="how long a replay or a fleet refresh that is a job may take, by the clock [h]"
     )

@@ -27,7 +27,7 @@ from storage.encoding.decimals import DECIMAL_CODEC, LONG, decode_decimals, enco
 from storage.engine.errors import DamagedData, DatabaseBusy
 from storage.tables import channel, raw_store, run
 
-#: Bytes of an encoded column that stay in the database wherever raw records go. Chosen by a table of docs/benchmarks.md
+#: Bytes of an encoded column that stay in the database wherever raw records go. Chosen: docs/appendix/benchmarks.md
 #: (`python -m tests.benchmarks.places`): a store adds 20 to 45 ms to a column of any length. Some 10,000 samples are longer.
 MOST_INLINE = 64 << 10
 #: The name under which a run's file stands among its channels; no channel has it.

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-PICTURE = Path(__file__).parents[1] / "docs" / "demo.svg"
+PICTURE = Path(__file__).parents[1] / "docs" / "figures" / "demo.svg"
 
 
 def main() -> None:

@@ -13,7 +13,7 @@ from tests.browser.driving import chromium, pointed_at
 from tests.browser.lives import demo, post
 from tests.support import serving, stationary
 
-DOCS = Path(__file__).parents[1] / "docs"
+DOCS = Path(__file__).parents[1] / "docs" / "figures"
 MOST_BYTES = 300_000
 
 

@@ -2,7 +2,8 @@
 
 Design, baseline, noise, uncatalogued effects and raw records have their own `criteria.py`, the templates of single effects
 their priors beside them. "chosen; no table" says that no record was kept of what else was tried;
-docs/diagnosis.md has what the whole does on hidden effects (`make blind`). λ is the expected log-likelihood ratio [nats]
+What the whole does on hidden effects (`make blind`): docs/appendix/diagnosis.md.
+ λ is the expected log-likelihood ratio [nats]
 of an effect (`pooled_fit.projection`), for the best hypothesis estimated by the drop of its cost.
 """
 

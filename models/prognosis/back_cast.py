@@ -10,7 +10,7 @@ Where forecasts fared badly a prognosis is wider: remaining life is raised, as a
     w = max(1, the ⌈0.9 (m + 1)⌉-th smallest of m misses),
 
 the largest where m is below 9: the quantile of split conformal prediction. The misses of one life are no independent
-draws, so it promises nothing here; docs/prognosis.md says what it achieves.
+draws, so it promises nothing here; docs/appendix/prognosis.md says what it achieves.
 
 Source: H. Papadopoulos, K. Proedrou, V. Vovk, A. Gammerman, ECML (2002) 345-356, for the quantile.
 """

@@ -54,7 +54,7 @@ WIDER = 1.5
 #: table: it decides no number.
 SETTLED = 1e-3
 
-# What ended lives say of one that has not (`ended_lives`): what it achieves is in docs/prognosis.md, A fleet's prior
+# What ended lives say of one that has not (`ended_lives`): what it achieves: docs/appendix/prognosis.md, A fleet's prior
 
 #: More ended lives than this say no more: their predictive is within 1 % of the normal's width, and each costs every answer
 #: 0.02 ms. Chosen; no table.

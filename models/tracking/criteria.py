@@ -37,7 +37,8 @@ LEAST_RELATIVE = 0.01
 # The discrepancy beside eq. 6 (`discrepancy`)
 
 #: The sizes q: the deviation of δ at the end of what was measured, as a share of the quantity. Chosen, as are the SHARES:
-#: smaller or larger ones with more weight do not improve the forecasts (docs/prognosis.md: lives that do not follow eq. 6).
+#: smaller or larger ones with more weight do not improve the forecasts (docs/appendix/prognosis.md: lives that do not
+#: follow eq. 6).
 SIZES = np.array([0.0, 0.01, 0.03, 0.1])
 #: How the probability that there is a discrepancy is divided among the sizes that are not 0. Chosen: with SIZES.
 SHARES = np.array([0.4, 0.35, 0.25])

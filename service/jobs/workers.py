@@ -65,7 +65,7 @@ class Lane(Enum):
     RENEWALS = None
 
 
-#: [s] How long a call of a lane may take. Chosen: ten times what the longest of `make load` and of docs/scale.md take.
+#: [s] How long a call of a lane may take. Chosen: ten times the longest of `make load` and docs/appendix/scale.md.
 SECONDS = {
     Lane.RUNS: 60.0,
     Lane.ANSWERS: 120.0,

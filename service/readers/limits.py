@@ -15,7 +15,7 @@ LONGEST_MAP = 4096
 class Limits:
     """Bounds on one file and on the process that reads it."""
 
-    #: Bytes, unpacked. Chosen; by docs/benchmarks.md five channels at 10 kHz for 1,400 s are half of it as CSV.
+    #: Bytes, unpacked. Chosen; by docs/appendix/benchmarks.md five channels at 10 kHz for 1,400 s are half of it as CSV.
     most_bytes: int = 1 << 30
     #: Unpacked over packed bytes, and the unpacked bytes that are free of that rule: a short text of few digits packs well.
     #: Chosen; no table.
@@ -25,7 +25,7 @@ class Limits:
     most_values: int = 20_000_000
     #: Columns, whether they are taken or not. Chosen; no table.
     most_columns: int = 1000
-    #: Seconds of reading. Chosen; by docs/benchmarks.md 1.4 million rows take 2.5 s at most, fits and storage included.
+    #: Seconds of reading. Chosen; by docs/appendix/benchmarks.md 1.4 million rows take 2.5 s at most, with fits and storage.
     seconds: int = 30
     #: Address space of the process that reads a TDMS, MDF4 or Parquet file, bytes: 1.5 GiB. Chosen; no table.
     memory_bytes: int = 3 << 29

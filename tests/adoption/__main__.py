@@ -2,7 +2,7 @@
 
 SEED= other campaigns (1)    SIZE= small, full, or a share of the full table    PROCESSES= how many at once (1)
 ONLY= trials whose names begin with these    ARGS="--scheduler WHERE" as in `make blind`
-ARGS=--write puts the table into docs/diagnosis.md, ARGS=--list lists every trial, ARGS=--stored takes only what is stored
+ARGS=--write puts the table into docs/appendix/diagnosis.md, ARGS=--list lists every trial, ARGS=--stored what is stored
 
 Campaigns and results are stored in .adoption, a file each: the next run goes on where this one ended. After a change of
 code remove .adoption/results.
@@ -23,7 +23,7 @@ from tests.blind.__main__ import run, scheduler
 from tests.blind.lives import ARTEFACTS
 
 SIZES = {"small": 0.1, "full": 1.0}
-DOCUMENT = Path(__file__).parents[2] / "docs" / "diagnosis.md"
+DOCUMENT = Path(__file__).parents[2] / "docs" / "appendix" / "diagnosis.md"
 BEGIN, END = "<!-- adoption: begin -->", "<!-- adoption: end -->"
 #: A median further from the truth than before by more than this share of life is worse [-].
 WORSE = 0.02
@@ -134,7 +134,7 @@ def listed(one: Adopted) -> str:
 
 
 def write(lines: Sequence[str]) -> None:
-    """Between the markers of docs/diagnosis.md."""
+    """Between the markers of docs/appendix/diagnosis.md."""
     text = DOCUMENT.read_text(encoding="utf-8")
     before, rest = text.split(BEGIN)
     DOCUMENT.write_text(f"{before}{BEGIN}\n\n" + "\n".join(lines) + f"\n\n{END}{rest.split(END)[1]}", encoding="utf-8")

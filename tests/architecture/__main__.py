@@ -1,4 +1,4 @@
-"""`make architecture`: draws docs/architecture.svg and writes the parts of docs/architecture.md that come from the code."""
+"""`make architecture`: the picture, and the parts of docs/explanation/architecture.md that come from the code."""
 
 import sys
 

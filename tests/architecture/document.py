@@ -1,4 +1,4 @@
-"""The parts of docs/architecture.md that are written by the code: the ways of the common errands, and the examples.
+"""The parts of docs/explanation/architecture.md made from the code: the ways of the common errands, and the examples.
 
 A part stands between `<!-- name -->` and `<!-- end -->`. `python -m tests.architecture` writes all of them anew.
 """
@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from tests.architecture import examples, rooms
 from tests.architecture.source import CHAPTERS, ROOT, by_name, first_sentence
 
-DOCUMENT = ROOT / "docs" / "architecture.md"
+DOCUMENT = ROOT / "docs" / "explanation" / "architecture.md"
 DIAGNOSIS = "models.diagnosis"
 
 

@@ -1,4 +1,4 @@
-"""`python -m tests.architecture.picture`: the picture of the code, drawn from its imports, into docs/architecture.svg.
+"""`python -m tests.architecture.picture`: draws the code from its imports, into docs/figures/architecture.svg.
 
 Four bands from the top: service, storage, models, and inside models the chapters of the diagnosis. A box imports only boxes
 below it; an arrow that a longer way implies is left out, and what a box takes from the bands below stands in it. An arrow on
@@ -14,7 +14,7 @@ from tests.architecture import graph
 from tests.architecture.graph import Box
 from tests.architecture.source import PACKAGES, ROOT, modules
 
-PICTURE = ROOT / "docs" / "architecture.svg"
+PICTURE = ROOT / "docs" / "figures" / "architecture.svg"
 
 WIDTH = 1120
 _LEFT, _RIGHT, _BOX, _ROW, _GAP, _BAND = 116, 16, 34, 62, 18, 26

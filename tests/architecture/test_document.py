@@ -1,4 +1,4 @@
-"""docs/architecture.md and its picture are those of the code as it is."""
+"""docs/explanation/architecture.md and its picture are those of the code as it is."""
 
 import pytest
 

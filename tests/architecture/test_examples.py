@@ -1,4 +1,4 @@
-"""The examples of docs/architecture.md are carried out: added to a copy of the product, they work end to end."""
+"""The examples of docs/explanation/architecture.md are carried out: added to a copy of the product, they work end to end."""
 
 import os
 import subprocess

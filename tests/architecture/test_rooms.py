@@ -1,4 +1,4 @@
-"""The files that the common errands pass through are printed, and are those that docs/architecture.md names."""
+"""The files that the common errands pass through are printed, and are those that docs/explanation/architecture.md names."""
 
 from collections.abc import Callable
 
@@ -20,4 +20,4 @@ def test_the_document_names_the_files_of_an_errand(name: str, errand: Callable[[
     assert paths, "nothing was watched"
     assert all((ROOT / path).is_file() for path in paths)
     documented = document.paths_of(document.parts(document.DOCUMENT.read_text(encoding="utf-8"))[name])
-    assert set(documented) == set(paths), "docs/architecture.md names other files: make architecture"
+    assert set(documented) == set(paths), "docs/explanation/architecture.md names other files: make architecture"

@@ -3,7 +3,7 @@
 SEED=  another seed, other campaigns          SIZE=   small, full, or a share of the full table
 ONLY=  rows whose names begin with these (lives: remaining life)    PROCESSES= how many at once (2)
 ARGS="--scheduler WHERE": local, processes[:N], or tcp://host:port of a Dask scheduler whose workers can import these tests
-ARGS=--write puts the table into docs/diagnosis.md, ARGS=--failures lists what went wrong with the line that repeats it
+ARGS=--write puts the table into docs/appendix/diagnosis.md, ARGS=--failures lists what went wrong with its command
 """
 
 import os
@@ -25,7 +25,7 @@ Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 SIZES = {"small": 0.1, "full": 1.0}
-DOCUMENT = Path(__file__).parents[2] / "docs" / "diagnosis.md"
+DOCUMENT = Path(__file__).parents[2] / "docs" / "appendix" / "diagnosis.md"
 BEGIN, END = "<!-- blind tests: begin -->", "<!-- blind tests: end -->"
 
 
@@ -61,7 +61,7 @@ def document(outcomes: Sequence[Outcome], lived: Sequence[lives.Lived], command:
 
 
 def write(lines: Sequence[str]) -> None:
-    """Between the markers of docs/diagnosis.md."""
+    """Between the markers of docs/appendix/diagnosis.md."""
     text = DOCUMENT.read_text(encoding="utf-8")
     before, rest = text.split(BEGIN)
     after = rest.split(END)[1]

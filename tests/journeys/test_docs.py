@@ -11,7 +11,7 @@ import pytest
 from tests.support import ONCE, Server
 
 ROOT = Path(__file__).parents[2]
-DOCUMENTS = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
+DOCUMENTS = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
 
 
 def blocks(path: Path, language: str) -> list[str]:
@@ -20,7 +20,7 @@ def blocks(path: Path, language: str) -> list[str]:
 
 
 def test_the_examples_of_the_api_run(server: Server) -> None:
-    script = "\n".join(["set -eu", *blocks(ROOT / "docs" / "api.md", "sh")])
+    script = "\n".join(["set -eu", *blocks(ROOT / "docs" / "reference" / "api.md", "sh")])
     done = subprocess.run(
         ["bash", "-c", script], env=os.environ | {"URL": server.url}, capture_output=True, text=True, check=False
     )
@@ -30,7 +30,7 @@ def test_the_examples_of_the_api_run(server: Server) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_commands_that_are_named_are_there(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     commands = set(
@@ -56,7 +56,7 @@ def own_words(path: Path) -> str:
     return re.sub(r"<!-- example-[a-z-]+ -->.*?<!-- end -->", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
 
 
-@pytest.mark.parametrize("path", [*DOCUMENTS, ROOT / "CHANGELOG.md"], ids=lambda path: path.name)
+@pytest.mark.parametrize("path", [*DOCUMENTS, ROOT / "CHANGELOG.md"], ids=lambda path: str(path.relative_to(ROOT)))
 def test_paths_exist(path: Path) -> None:
     """Every file, folder and module that a document names, from the top of the repository."""
     text = own_words(path)
@@ -81,7 +81,7 @@ def product_files() -> list[Path]:
     return [path.relative_to(ROOT) for folder in folders for path in (ROOT / folder).rglob("*.py")]
 
 
-@pytest.mark.parametrize("path", [*DOCUMENTS, ROOT / "CHANGELOG.md"], ids=lambda path: path.name)
+@pytest.mark.parametrize("path", [*DOCUMENTS, ROOT / "CHANGELOG.md"], ids=lambda path: str(path.relative_to(ROOT)))
 def test_files_that_are_named_shortly_exist(path: Path) -> None:
     """`decide.py` or `attribution/decide.py`."""
     assert missing(own_words(path)) == []
@@ -99,15 +99,15 @@ def test_settings_are_documented() -> None:
         name for source in sources for name in re.findall(r'"(CLUTCHLIFE_\w+)"', source.read_text(encoding="utf-8"))
     }
     assert variables
-    operations = (ROOT / "docs" / "operations.md").read_text(encoding="utf-8")
+    operations = (ROOT / "docs" / "reference" / "operations.md").read_text(encoding="utf-8")
     assert [name for name in sorted(variables) if name not in operations] == []
 
 
 def test_every_address_is_documented(server: Server) -> None:
     described = ONCE.get(f"{server.url}/openapi.json").json()
-    text = (ROOT / "docs" / "api.md").read_text(encoding="utf-8") + (ROOT / "docs" / "operations.md").read_text(
-        encoding="utf-8"
-    )
+    text = (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8") + (
+        ROOT / "docs" / "reference" / "operations.md"
+    ).read_text(encoding="utf-8")
     for address in described["paths"]:
         name = address.rstrip("/").rsplit("/", 1)[-1].removesuffix(".csv")
         assert name.startswith("{") or name in text, address

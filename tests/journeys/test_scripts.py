@@ -1,4 +1,4 @@
-"""What docs/scripts.md shows, done: Python runs; the recipes for MATLAB and LabVIEW are the requests that these send."""
+"""What docs/how-to/scripts.md shows, done: Python runs; the recipes for MATLAB and LabVIEW are the requests that these send."""
 
 import ast
 import json
@@ -17,7 +17,7 @@ from service.client.clutchlife import Client
 from tests.support import Server
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "scripts.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "how-to" / "scripts.md").read_text(encoding="utf-8")
 #: Where the package is that scripts import.
 SCRIPTS = os.environ | {"PYTHONPATH": str(ROOT / "service" / "client")}
 
@@ -36,7 +36,7 @@ def test_the_python_example_runs(server: Server) -> None:
 
 
 def test_the_notebook_runs(server: Server) -> None:
-    script = ROOT / "docs" / "first_steps.py"
+    script = ROOT / "docs" / "tutorial" / "first_steps.py"
     environment = SCRIPTS | {"CLUTCHLIFE_URL": server.url}
     done = subprocess.run([sys.executable, script], env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

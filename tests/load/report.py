@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from tests.load.beside import Beside, Processor
 from tests.load.field import LIVEZ, ROUTES, Counts
 
-#: The demands of docs/benchmarks.md: ms of 99 of 100 GETs and plain POSTs, posts a second without raw files, and how much
-#: more memory the last third of the time may take, on average, than the middle third. The first third fills caches.
+#: The demands of docs/appendix/benchmarks.md: ms of 99 of 100 GETs and plain POSTs, posts a second without raw files, how
+#: much more memory the last third of the time may take, on average, than the middle third. The first third fills caches.
 MOST_GET_MS, MOST_POST_MS, LEAST_POSTS_A_SECOND, MOST_GROWTH = 50.0, 500.0, 15.0, 1.10
 
 

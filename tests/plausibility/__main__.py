@@ -24,7 +24,7 @@ LEAST_HELD, MOST_FALSE = 0.95, 0.005
 #: Of the runs of honest lives that are no eq. 6 so many are held in the end at most; of slips so many are out of the track
 #: after ten further runs at least.
 MOST_IN_THE_END, LEAST_AFTER = 0.01, 0.93
-DOCUMENT = Path(__file__).parents[2] / "docs" / "plausibility.md"
+DOCUMENT = Path(__file__).parents[2] / "docs" / "appendix" / "plausibility.md"
 BEGIN, END = "<!-- plausibility -->", "<!-- end of plausibility -->"
 
 

@@ -1,6 +1,6 @@
 """`make rivals`: the same lives predicted by other packages, in one run: CRPS and time beside ours.
 
-SIZE scales the number of lives, SEED changes them; with --write the table takes its place in docs/prognosis.md.
+SIZE scales the number of lives, SEED changes them; with --write the table takes its place in docs/appendix/prognosis.md.
 """
 
 import argparse

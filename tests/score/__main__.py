@@ -1,7 +1,7 @@
-"""`make score`: how good the prognosis is, on simulated lives whose end is known; the tables of docs/prognosis.md.
+"""`make score`: how good the prognosis is, on simulated lives whose end is known; the tables of docs/appendix/prognosis.md.
 
 SIZE scales the number of lives (1: at least 1,000 for coverage), SEED changes them; parts may be named. With --write the
-tables take their place in docs/prognosis.md. --scheduler says where the parts are computed: local, processes[:N], or
+tables take their place in docs/appendix/prognosis.md. --scheduler: where the parts are computed: local, processes[:N], or
 tcp://host:port of a Dask scheduler whose workers can import these tests.
 """
 

@@ -15,7 +15,7 @@ from models.prognosis.scoring import crps_of_sample, pit_histogram, pit_of_sampl
 from models.tracking.posterior import Posterior
 from tests.statistical.lives import ends
 
-DOCS = Path(__file__).parents[2] / "docs" / "prognosis.md"
+DOCS = Path(__file__).parents[2] / "docs" / "appendix" / "prognosis.md"
 
 
 @dataclass(frozen=True)
@@ -89,10 +89,10 @@ def shares(numbers: list[float]) -> str:
 
 
 def written(part: str, command: str, table: str) -> None:
-    """Put a table, under the command that made it, in its place in docs/prognosis.md."""
+    """Put a table, under the command that made it, in its place in docs/appendix/prognosis.md."""
     block = f"<!-- score {part} -->\n`{command}`: {table}\n<!-- end -->"
     text = DOCS.read_text()
     found, count = re.subn(rf"<!-- score {part} -->.*?<!-- end -->", lambda _: block, text, flags=re.DOTALL)
     if count != 1:
-        raise SystemExit(f"docs/prognosis.md has {count} places for {part}")
+        raise SystemExit(f"docs/appendix/prognosis.md has {count} places for {part}")
     DOCS.write_text(found)

@@ -12,7 +12,7 @@ import pytest
 
 from service.settings import PREFIX, Settings, redacted
 
-OPERATIONS = Path(__file__).parents[2] / "docs" / "operations.md"
+OPERATIONS = Path(__file__).parents[2] / "docs" / "reference" / "operations.md"
 #: Names of earlier releases, which services are started with.
 EARLIER = {
     "CLUTCHLIFE_DATABASE": ("sqlite:///other.db", "database", "sqlite:///other.db"),

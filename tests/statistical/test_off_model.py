@@ -32,7 +32,7 @@ def shares(told: Any) -> tuple[list[float], list[float]]:
 @pytest.mark.parametrize("name", [name for name in LAWS if name != "exponential to a floor"])
 def test_from_60_percent_of_life_on_the_truth_is_held(name: str) -> None:
     """30 lives leave a deviation of 5 points at 90 %. Earlier, nothing in the data tells a line from the beginning of
-    an eq. 6; the exponential, whose end lies near its floor, is the law that is held least: docs/prognosis.md."""
+    an eq. 6; the exponential, whose end lies near its floor, is the law that is held least: docs/appendix/prognosis.md."""
     course = LAWS[name]
     assert course(0.0) == pytest.approx(1.0)
     assert course(1.0) == pytest.approx(0.5, abs=2e-3)

@@ -1,4 +1,4 @@
-"""The tables of docs/diagnosis.md, made from the catalogue's values: `python -m tests.models.diagnosis.tables`.
+"""The tables of docs/appendix/diagnosis.md, made from the catalogue's values: `python -m tests.models.diagnosis.tables`.
 
 Writes them into the document, between their marks.
 """
@@ -41,7 +41,7 @@ def _table(rows: list[tuple[str, ...]]) -> str:
 
 def main() -> None:
     """Put both tables into the document."""
-    document = Path(__file__).parents[3] / "docs" / "diagnosis.md"
+    document = Path(__file__).parents[3] / "docs" / "appendix" / "diagnosis.md"
     text = document.read_text(encoding="utf-8")
     for mark, table in (("catalogue", catalogue_table()), ("trials", trials_table())):
         start, end = f"<!-- {mark} -->", f"<!-- /{mark} -->"

@@ -1,4 +1,4 @@
-"""docs/diagnosis.md holds exactly the tables that the catalogue gives."""
+"""docs/appendix/diagnosis.md holds exactly the tables that the catalogue gives."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from models.diagnosis.effects.catalogue import CATALOGUE
 from models.diagnosis.experiments.candidates import TRIALS
 from tests.models.diagnosis.tables import catalogue_table, trials_table
 
-DOCUMENT = (Path(__file__).parents[3] / "docs" / "diagnosis.md").read_text(encoding="utf-8")
+DOCUMENT = (Path(__file__).parents[3] / "docs" / "appendix" / "diagnosis.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(("mark", "table"), [("catalogue", catalogue_table), ("trials", trials_table)])

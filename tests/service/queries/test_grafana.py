@@ -37,7 +37,7 @@ def aged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
 def test_what_starts_grafana_turns_on_the_series_that_it_reads() -> None:
     compose = (FOLDER.parent / "compose.yaml").read_text(encoding="utf-8")
     assert "CLUTCHLIFE_CLUTCH_METRICS: ${CLUTCHLIFE_CLUTCH_METRICS:-false}" in compose
-    for name in ("docker/compose.yaml", "docs/dashboard.md"):
+    for name in ("docker/compose.yaml", "docs/reference/dashboard.md"):
         text = (FOLDER.parents[1] / name).read_text(encoding="utf-8")
         (command,) = re.findall(r"(CLUTCHLIFE_KEY_FILE=.*?--profile grafana)", text, re.DOTALL)
         assert "CLUTCHLIFE_CLUTCH_METRICS=true" in command, name

@@ -25,7 +25,7 @@ EFFECT = Effect(
     title="The shaft passes a critical speed",
     physics="Unbalance loads the bearings most at the critical speed: a torque that peaks there, whatever the pressure.",
     formula="a / (1 + ((v - v_c)/w)²), w = 0.8 m/s",
-    source="made up for docs/architecture.md",
+    source="made up for docs/explanation/architecture.md",
     family=Family.DYNAMIC,
     kind=Kind.ARTEFACT,
     channels=(),
