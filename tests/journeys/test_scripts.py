@@ -1,4 +1,4 @@
-"""What docs/how-to/scripts.md shows, done: Python runs; the recipes for MATLAB and LabVIEW are the requests that these send."""
+"""What docs/how-to/scripts.md shows, done: Python runs; recipes for MATLAB and LabVIEW are the requests that these send."""
 
 import ast
 import json
