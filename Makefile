@@ -22,11 +22,14 @@
 # make plausibility  sends mistyped and honest runs: the tables of docs/appendix/plausibility.md  (SEED= CAMPAIGNS= HONEST= ARGS=--write)
 # make real    what is said of real measurements; make benchmark: how long things take; make picture: README's pictures;
 #              make figures: the figures of docs/
+# make docs    the site of docs/, which the service serves at /help; warnings and dead links are errors
 # make architecture  the picture, the ways and the examples of docs/explanation/architecture.md, from the code
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 ARGS ?=
+# the built site, as the service serves it and the wheel takes it along
+HELP := service/dashboard/help
 # what checks JavaScript: of `make check` alone, everything else needs Python only
 JAVASCRIPT := tests/javascript/node_modules
 
@@ -37,7 +40,7 @@ UNUSED := matplotlib contourpy cycler fonttools kiwisolver pillow
 LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --exclude-newer "7 days" \
 	--custom-compile-command "make lock" $(foreach name,$(UNUSED),--no-emit-package $(name))
 
-.PHONY: adoption demo shell test slow faults check lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
+.PHONY: docs adoption demo shell test slow faults check lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
@@ -93,6 +96,11 @@ real: $(VENV)/.tests
 figures: $(VENV)/.tests
 	$(BIN)/python -m tests.figures
 
+docs: $(VENV)-docs/.ready
+	rm -rf $(HELP)
+	$(VENV)-docs/bin/python -m sphinx --quiet --fail-on-warning --keep-going --builder html --fresh-env \
+		--doctree-dir $(VENV)-docs/doctrees docs $(HELP)
+
 architecture: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.architecture
 
@@ -147,6 +155,11 @@ $(VENV)-generator/.ready: tests/requirements-generator.txt | $(VENV)/.python
 	$(VENV)-generator/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r tests/requirements-generator.txt
 	@touch $@
 
+$(VENV)-docs/.ready: docs/requirements.txt | $(VENV)/.python
+	$(PYTHON) -m venv $(VENV)-docs
+	$(VENV)-docs/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r docs/requirements.txt
+	@touch $@
+
 $(JAVASCRIPT)/.package-lock.json: tests/javascript/package.json tests/javascript/package-lock.json
 	@command -v npm >/dev/null || { echo "make check needs npm (with Node.js 20 or later) for the dashboard's JavaScript; 'npm' is not there. make test and make demo do without it." >&2; exit 1; }
 	cd tests/javascript && npm ci --ignore-scripts --loglevel=error
@@ -156,8 +169,9 @@ lock:
 	uv pip compile $(LOCK) pyproject.toml -o docker/requirements.txt
 	uv pip compile $(LOCK) pyproject.toml --extra cluster --extra objects --extra postgresql -o docker/requirements-scale.txt
 	uv pip compile $(LOCK) pyproject.toml --group test -o tests/requirements.txt
+	uv pip compile $(LOCK) --group docs -o docs/requirements.txt
 	uv pip compile $(LOCK) --group generator -o tests/requirements-generator.txt
 	uv pip compile $(LOCK) --resolution lowest-direct pyproject.toml --group test -o tests/requirements-lowest.txt
 
 clean:
-	rm -rf $(JAVASCRIPT) $(VENV) $(VENV)-lowest $(VENV)-generator $(VENV)-rivals .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(JAVASCRIPT) $(VENV) $(VENV)-lowest $(VENV)-generator $(VENV)-rivals $(VENV)-docs $(HELP) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -10,7 +10,7 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi_offline import FastAPIOffline
 
-from service.dashboard import assets
+from service.dashboard import assets, site
 from service.dashboard import pages as dashboard
 from service.jobs import kinds
 from service.jobs.kinds import Kind
@@ -145,6 +145,7 @@ def create_app(settings: Settings) -> FastAPI:
     for beside in (clutches.fleet_router, exports.router, exports.fleet_router, description.router, rigs.import_router):
         app.include_router(beside)
     app.include_router(dashboard.router(assets.load()))
+    app.include_router(site.router())
     openapi.install(app, settings.root_path)
     app.add_middleware(Polls)
     app.add_middleware(

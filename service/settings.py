@@ -27,7 +27,7 @@ _SECRETS = ((re.compile(r"://([^:/@]*):.*@"), r"://\1:***@"), (re.compile(r"\?.*
 
 
 #: What the service's own addresses begin with: a path that a proxy adds and takes off again must be told from them.
-_OWN = ("v1", "clutches", "assets", "docs", "openapi.json", "static-offline-docs", "livez", "readyz", "metrics")
+_OWN = ("v1", "clutches", "assets", "docs", "help", "openapi.json", "static-offline-docs", "livez", "readyz", "metrics")
 _SEGMENTS = re.compile(r"(?:/[A-Za-z0-9._~-]+)*")
 
 

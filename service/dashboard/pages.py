@@ -7,7 +7,7 @@ from starlette.exceptions import HTTPException
 from service.dashboard.assets import Asset, Assets
 
 _IMMUTABLE = "public, max-age=31536000, immutable"
-_REVALIDATE = "no-cache"
+REVALIDATE = "no-cache"
 
 
 def router(assets: Assets) -> APIRouter:
@@ -18,12 +18,12 @@ def router(assets: Assets) -> APIRouter:
     @routes.get("/")
     def fleet(request: Request) -> Response:
         """Every clutch, worst first."""
-        return _answer(request, pages["fleet.html"], _REVALIDATE)
+        return answer(request, pages["fleet.html"], REVALIDATE)
 
     @routes.get("/clutches/{clutch_id}")
     def clutch(request: Request, clutch_id: str) -> Response:  # noqa: ARG001  (the page reads its own address)
         """One clutch."""
-        return _answer(request, pages["clutch.html"], _REVALIDATE)
+        return answer(request, pages["clutch.html"], REVALIDATE)
 
     @routes.get("/assets/{digest}/{name:path}")
     def asset(request: Request, digest: str, name: str) -> Response:
@@ -31,12 +31,13 @@ def router(assets: Assets) -> APIRouter:
         served = assets.by_name.get(name)
         if served is None or name in pages:
             raise HTTPException(404, f"no such file: {name[:80]}")
-        return _answer(request, served, _IMMUTABLE if digest == assets.digest else "no-store")
+        return answer(request, served, _IMMUTABLE if digest == assets.digest else "no-store")
 
     return routes
 
 
-def _answer(request: Request, asset: Asset, caching: str) -> Response:
+def answer(request: Request, asset: Asset, caching: str) -> Response:
+    """A file, gzipped where the browser takes that; 304 where it has it already."""
     zipped = "gzip" in request.headers.get("accept-encoding", "")
     tag = f'"{asset.digest}{"-gz" if zipped else ""}"'
     headers = {"ETag": tag, "Cache-Control": caching, "Vary": "Accept-Encoding"}

@@ -72,7 +72,7 @@ def service() -> None:
             "GET degradation, cached": milliseconds(lambda: http.get(f"{address}/degradation"), 20),
             "GET stribeck": milliseconds(lambda: http.get(f"{address}/stribeck"), 10),
         }
-    print("### The service, over a socket\n\n| what | ms |\n|---|---|")
+    print("## The service, over a socket\n\n| what | ms |\n|---|---|")
     for name, taken in rows.items():
         print(f"| {name} | {taken:.1f} |")
 
@@ -114,7 +114,7 @@ def identification() -> None:
         "scipy `least_squares`, bounded, one start": milliseconds(lambda: [bounded(each) for each in found], 5),
         "scipy `trust-constr` with gradients, one start": milliseconds(lambda: [trust(each) for each in found], 1),
     }
-    print("\n### Seven curves of 40 points fitted\n\n| what | ms | times ours |\n|---|---|---|")
+    print("\n## Seven curves of 40 points fitted\n\n| what | ms | times ours |\n|---|---|---|")
     for name, taken in rows.items():
         print(f"| {name} | {taken:.1f} | {taken / ours:.1f} |")
 
@@ -123,7 +123,7 @@ def tracking() -> None:
     """One more measurement on the way to 20 and to 60, and the last ten of them; in time of the processor alone."""
     law = campaign.simulated_clutch(1)
     rng = np.random.default_rng(1)
-    print("\n### One measurement more, and the prediction's draws\n")
+    print("\n## One measurement more, and the prediction's draws\n")
     print("| filter | tests | update, mean, ms | the last ten, ms | 1,000 draws, ms |\n|---|---|---|---|---|")
     for count in (20, 60):
         zeta = np.linspace(0.0, 12_000.0, count)

@@ -42,7 +42,7 @@ def pages() -> None:
         "the chart that can be zoomed in its place, after it was pointed at, nothing cached": _middle(clutch, 3),
         "the same, the library cached": _middle(clutch, 4),
     }
-    print("\n### The pages, in Chromium\n\n| what | ms |\n|---|---|")
+    print("\n## The pages, in Chromium\n\n| what | ms |\n|---|---|")
     for name, taken in rows.items():
         print(f"| {name} | {taken:.0f} |")
 

@@ -51,7 +51,7 @@ def records() -> None:
     """Time from the file to the receipt, the best and the median of three; the service's own time of the processor, its
     children's included, which others at work do not lengthen as much; and what a fresh service grew by before them.
     """
-    print("\n### A record of 1,400 s at 1 kHz, five channels: from the file to the fitted receipt, over a socket\n")
+    print("\n## A record of 1,400 s at 1 kHz, five channels: from the file to the fitted receipt, over a socket\n")
     print("| file | MB | best, s | median, s | of the processor, least, s | added memory at most, MB |")
     print("|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:

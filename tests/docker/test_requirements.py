@@ -8,7 +8,13 @@ import pytest
 
 from tests.architecture.source import ROOT
 
-LOCKS = sorted([*(ROOT / "docker").glob("requirements*.txt"), *(ROOT / "tests").glob("requirements*.txt")])
+LOCKS = sorted(
+    [
+        *(ROOT / "docker").glob("requirements*.txt"),
+        *(ROOT / "docs").glob("*.txt"),
+        *(ROOT / "tests").glob("requirements*.txt"),
+    ]
+)
 UNUSED = ("matplotlib", "contourpy", "cycler", "fonttools", "kiwisolver", "pillow")
 
 

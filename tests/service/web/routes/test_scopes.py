@@ -19,7 +19,7 @@ OPEN = [
     ("GET", path)
     for path in (
         "/", "/clutches/{clutch_id}", "/assets/{digest}/{name:path}", "/livez", "/readyz", "/openapi.json", "/docs",
-        "/docs/start.js", "/static-offline-docs",
+        "/docs/start.js", "/help", "/help/{name:path}", "/static-offline-docs",
     )
 ]  # fmt: skip
 #: Routes that name no clutch and keep to those of the key.

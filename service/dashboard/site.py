@@ -1,0 +1,52 @@
+"""`/help`: the site of `docs/`, as `make docs` built it; where it was not built, a line that says how.
+
+The wheel and the container's image have it built in. Its pages hold no data and no script, and load nothing from elsewhere.
+"""
+
+import posixpath
+from pathlib import Path
+
+from fastapi import APIRouter, Request
+from fastapi.responses import RedirectResponse, Response
+from starlette.exceptions import HTTPException
+
+from service.dashboard.assets import Asset
+from service.dashboard.pages import REVALIDATE, answer
+
+SITE = Path(__file__).parent / "help"
+NOT_BUILT = "The help is not built here: run `make docs` in the checkout and start the service again.\n"
+_TYPES = {
+    ".css": "text/css; charset=utf-8",
+    ".html": "text/html; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".png": "image/png",
+    ".svg": "image/svg+xml",
+}
+
+
+def router(folder: Path = SITE) -> APIRouter:
+    """`/help/...` from a built site; names are looked up among the files that were there at the start."""
+    paths = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*") if path.suffix in _TYPES}
+    read: dict[str, Asset] = {}
+    routes = APIRouter(include_in_schema=False)
+
+    @routes.get("/help")
+    def top() -> Response:
+        """Relative addresses of a page need the slash."""
+        return RedirectResponse("/help/", 308)
+
+    @routes.get("/help/{name:path}")
+    def page(request: Request, name: str) -> Response:
+        """A page, a picture or what a page loads."""
+        if not paths:
+            return Response(NOT_BUILT, status_code=404, media_type="text/plain; charset=utf-8")
+        if name.endswith("/") or not name:
+            name = posixpath.join(name, "index.html")
+        if name not in paths:
+            raise HTTPException(404, f"no such page: {name[:80]}")
+        if name not in read:
+            path = paths[name]
+            read[name] = Asset(name=name, media_type=_TYPES[path.suffix], body=path.read_bytes())
+        return answer(request, read[name], REVALIDATE)
+
+    return routes
