@@ -1,23 +1,28 @@
-"""What lives of the same kind that have ended say of one that has not.
+"""What lives of the same kind that have ended say of one that has not: where they ended, and along which course.
 
-They say two things of its end T: where the others ended, and how right the filter was of them when it knew as little.
-Both are densities of log T, and their product, given that the clutch is alive at ζ, is what is stated:
+The measured course of an ended life, stretched in ζ and a little in size, is one more course that a clutch may take: "as
+clutch 12, 1.1 times as long". With D = (1 - y/y_0)/(1 - fraction) the share of the way to the threshold that is behind,
 
-    p(T) ∝ t((log T - c - μ)/σ) · t((log T - m - a r)/(k r)),    T > ζ
+    D(ζ) = x + (1 + a) b_j(ζ T_j/T) + δ(ζ) + steps + e,     b_j the D of ended life j, which ended at T_j
 
-The first is Student's t, the predictive of the others' log ends about their median c. In the second the filter's forecast is
-taken as a measurement of log T, m its median, whose error is learned: a and k from the errors (log T_j - m_j)/r_j that the
-forecasts of the ended lives had at the same ζ, again as a Student's t predictive. A forecast that is wider errs more, if
-not in proportion: r is the root of its deviation times the mean (geometric) of all. So a filter that
-is far off late in earlier lives is corrected, one that told nothing hardly counts, and one that was right decides.
+is linear in x and a given life j, the end T and the deviations of e (s) and of δ (q at T): δ is an integrated random
+walk, as beside any other course (`models.tracking.discrepancy`). All that is linear is integrated out, and the evidence of
+a clutch's tests weighs every j, T, q and s. Where the clutch then crosses the threshold follows from x, a and δ. As no
+life is another one stretched evenly, log T has a further deviation ω r^1.5 √(1 + 2/n), r the share of it that remains, by n
+lives. The prior of T is the predictive of the others' log ends about their median c, Student's t, given that the clutch is
+alive:
 
-An end may be uncertain: a life that was declared worn just short of its threshold. Its log T has a deviation s, and both
-predictives have s² more in their sum of squares (the expected one). Or it is censored: a life that was taken out at C for
-another reason says T > C, a factor 1 - F(log C) in the likelihood of each predictive's mean and deviation, which are then
-averaged over numerically.
+    p(T) ∝ t((log T - c - μ)/σ) · Σ w_jqs(T') N(log T; log T', ...),    T > ζ
 
-Source: D. V. Lindley, A. Tversky, R. V. Brown, J. R. Stat. Soc. A 142 (1979) 146-162, for a forecast as a measurement;
-A. Gelman et al., Bayesian Data Analysis (2013) ch. 3, for the predictive.
+A clutch of another kind takes one of a few smooth courses with an end anywhere: the evidence says how probable that is, and
+with that probability the ended lives say nothing.
+
+An end may be uncertain: a life that was declared worn just short of its threshold. Its log T has a deviation, whose square
+the predictive has more in its sum of squares (the expected one). Or it is censored: a life that was taken out at C for
+another reason says T > C, a factor 1 - F(log C) in the likelihood of the predictive's mean and deviation, which are then
+averaged over numerically; it has no end, so it is no course.
+
+Source: A. Gelman et al., Bayesian Data Analysis (2013) ch. 3, for the predictive.
 """
 
 import math
@@ -27,39 +32,56 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaincinv, log_ndtr, logsumexp, ndtri
+from scipy.special import expit, gammaincinv, log_ndtr, logsumexp, ndtri
 
 from models.arrays import FloatArray
-from models.prognosis.back_cast import HALF_WIDTH, kept_after
 from models.prognosis.criteria import (
-    BAND,
+    COURSE_DISCREPANCIES,
+    COURSE_SCATTERS,
+    COURSE_SIZE_SD,
+    COURSE_STRETCH_SD,
     DECLARED_EARLY,
     DECLARED_UNSEEN,
     END_WORTH,
-    ERROR_VAGUE,
-    ERROR_WORTH,
-    FAR_BEYOND,
-    FEWEST_ALIVE,
+    FEWEST_ENDED,
+    FEWEST_SEVERITIES,
     FEWEST_TESTS,
-    LEAST_DEVIATION,
     MOST_ENDED,
+    OTHER_KIND,
     VAGUE,
 )
-from models.prognosis.first_passage import Offset, ends_of_life, weighted_quantiles
+from models.prognosis.first_passage import Offset, ends_of_life
+from models.tracking.criteria import STEP_SIZE
 from models.tracking.filters.grid import Grid
+from models.tracking.history import later_epochs
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior
 from models.tracking.prior import weak
 
-_GRID, _DRAWS, _PLACES = Grid(), 500, 500
+_GRID, _DRAWS = Grid(), 500
+#: Ends T that are tried, and places of the density that is stated.
+_ENDS, _PLACES = 50, 400
+#: Of the nodes (life, T, q, s) those that hold this share of the evidence are led on.
+_HELD = 0.999
+#: How far beyond the latest end, and before the present age, the end of a course is looked for, in logarithms.
+_BEYOND, _BEFORE = 0.7, 0.2
+#: How far beyond the present age a clutch of another kind may end, in logarithms: a thousandfold.
+_ANYWHERE = 7.0
+#: A course crosses the threshold at most so much later than its end [T].
+_FARTHEST = 3.0
+#: What remains of an ended life's course is straight, and never flatter than this share of its mean pace.
+_FLATTEST = 0.3
+#: Deviation of x: tests may begin when half of the way is behind.
+_LEVEL_SD = 0.5
 #: Means, and deviations, that a predictive with censored values is averaged over.
 _NODES = 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EndedLife:
-    """A life's end [ζ] by the criterion's `fraction`, and what was forecast of it: the logarithm of BAND's quantiles of the
-    end [f, 3] at progress [f]; the mean energy [J] of its cycles, None where its duty does not state it.
+    """A life's end [ζ] by the criterion's `fraction`, and its course until then: `progress` [t] and
+    `damage` [t] of its tests, the share of the way to the threshold; the mean energy [J] of its cycles, None where its duty
+    does not state it.
 
     `deviation` is that of the logarithm of an uncertain end; of a `censored` life `end` is when it was taken out before it.
     """
@@ -67,23 +89,26 @@ class EndedLife:
     end: float
     fraction: float
     progress: FloatArray
-    forecasts: FloatArray
+    damage: FloatArray
     energy: float | None = None
     deviation: float = 0.0
     censored: bool = False
 
-    def forecast_at(self, progress: float) -> FloatArray:
-        """The forecast [3] at that progress, between those before and after it."""
-        return np.array([np.interp(progress, self.progress, column) for column in self.forecasts.T])
+    @property
+    def final_pace(self) -> float:
+        """The slope of its course over the last tenth of its life, in shares of the way over shares of the life."""
+        return max(10.0 * (1.0 - self._inside(np.array(0.9)).item()), _FLATTEST)
+
+    def course(self, share: FloatArray) -> FloatArray:
+        """b at shares of its life >= 0, any shape: straight between its tests, and beyond its end."""
+        return np.where(share > 1.0, 1.0 + self.final_pace * (share - 1.0), self._inside(share))
+
+    def _inside(self, share: FloatArray) -> FloatArray:
+        return np.asarray(np.interp(share, np.append(self.progress / self.end, 1.0), np.append(self.damage, 1.0)))
 
     def in_unit(self, cycles: float) -> "EndedLife":
         """The same life with ζ counted in units of so many cycles."""
-        return replace(
-            self,
-            end=self.end / cycles,
-            progress=self.progress / cycles,
-            forecasts=self.forecasts - math.log(cycles),
-        )
+        return replace(self, end=self.end / cycles, progress=self.progress / cycles)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON can carry it."""
@@ -91,7 +116,7 @@ class EndedLife:
             "end": self.end,
             "fraction": self.fraction,
             "progress": self.progress.tolist(),
-            "forecasts": self.forecasts.tolist(),
+            "damage": self.damage.tolist(),
             "energy": self.energy,
             "deviation": self.deviation,
             "censored": self.censored,
@@ -104,7 +129,7 @@ class EndedLife:
             end=stored["end"],
             fraction=stored["fraction"],
             progress=np.array(stored["progress"]),
-            forecasts=np.array(stored["forecasts"]),
+            damage=np.array(stored["damage"]),
             energy=stored["energy"],
             deviation=stored["deviation"],
             censored=stored["censored"],
@@ -112,26 +137,29 @@ class EndedLife:
 
 
 def ended_life(
-    history: Sequence[Measurement], end: float, *, fraction: float, horizon: float, offset: Offset | None = None
+    progress: FloatArray, values: FloatArray, end: float, *, initial: float, fraction: float
 ) -> EndedLife | None:
-    """What a life that ended at ζ = `end` > 0 teaches, by its measurements in order and the exact filter.
+    """What a life that ended at ζ = `end` > 0 teaches, by its tests at progress [n] >= 0 with values [n].
 
-    The filter runs under the weak prior. None where it was measured at fewer than FEWEST_TESTS different ζ before its end.
+    `initial` > 0 is the value when new. None where it was measured at fewer than FEWEST_TESTS different ζ before its end.
     """
-    before = [measurement for measurement in history if measurement.progress < end]
-    prior, rng = weak(history[0], falling=True), np.random.default_rng(0)
-    progress, forecasts = [], []
-    for count in range(FEWEST_TESTS, len(before) + 1):
-        tests = before[:count]
-        if len({measurement.progress for measurement in tests}) >= FEWEST_TESTS and kept_after(count):
-            posterior = _GRID.posterior(_GRID.from_history(prior, tests), _DRAWS, rng)
-            progress.append(tests[-1].progress)
-            forecasts.append(
-                forecast(posterior, ends_of_life(posterior, fraction, offset=offset, horizon=horizon), horizon)
-            )
-    if not progress:
+    before = np.flatnonzero(progress < end)
+    at, where = np.unique(progress[before], return_inverse=True)
+    if at.size < FEWEST_TESTS:
         return None
-    return EndedLife(end=end, fraction=fraction, progress=np.array(progress), forecasts=np.array(forecasts))
+    mean = np.bincount(where, weights=values[before]) / np.bincount(where)
+    return EndedLife(end=end, fraction=fraction, progress=at, damage=(1.0 - mean / initial) / (1.0 - fraction))
+
+
+def value_when_new(history: Sequence[Measurement]) -> float:
+    """ξ0 of a life by its measurements in order, as the exact filter has it in the mean under the weak prior."""
+    drawn = _drawn(history)
+    return float(drawn.weight @ drawn.initial)
+
+
+def _drawn(history: Sequence[Measurement]) -> Posterior:
+    prior = weak(history[0], falling=True)
+    return _GRID.posterior(_GRID.from_history(prior, history), _DRAWS, np.random.default_rng(0))
 
 
 def declared_end(
@@ -143,8 +171,7 @@ def declared_end(
     to come. The exact filter's draws of x >= 0, those before `at` being at it, are weighted by exp(-x/DECLARED_EARLY); and
     with DECLARED_UNSEEN to one against them all the tests show nothing of what ended the life, and x is that alone.
     """
-    prior = weak(history[0], falling=True)
-    posterior = _GRID.posterior(_GRID.from_history(prior, history), _DRAWS, np.random.default_rng(0))
+    posterior = _drawn(history)
     ends = ends_of_life(posterior, fraction, offset=offset, horizon=horizon)
     early = np.log(np.clip(ends, at, horizon) / at)
     weight = posterior.weight * np.exp(-early / DECLARED_EARLY)
@@ -163,36 +190,180 @@ def representative(lives: Sequence[EndedLife]) -> list[EndedLife]:
     return [ordered[place] for place in places.tolist()]
 
 
-def forecast(posterior: Posterior, ends: FloatArray, horizon: float) -> FloatArray:
-    """The logarithm of BAND's quantiles [3] of the ends of life [n] of a sample; of an end beyond the horizon, that."""
-    stated = weighted_quantiles(np.clip(ends, 1e-9 * horizon, horizon), posterior.weight, BAND)
-    return np.log(stated)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kin:
+    """The end of life as lives of the kind have it: a sample [n] with weights [n] that sum to one; and the probability that
+    the clutch is of their kind."""
+
+    ends: FloatArray
+    weight: FloatArray
+    probability: float
 
 
-def calibrated(own: FloatArray, as_of: float, alive: Sequence[EndedLife]) -> tuple[FloatArray, FloatArray] | None:
-    """The end of life of a clutch that is alive at ζ = `as_of` > 0, given its forecast `own` [3] and ended lives that were
-    alive then: a sample [n] with weights [n] that sum to one. None of fewer than FEWEST_ALIVE lives that are not censored.
+def as_its_kind(
+    tests: Sequence[Measurement], as_of: float, lives: Sequence[EndedLife], offset: FloatArray | None = None
+) -> Kin | None:
+    """The end of life of a clutch that is alive at ζ = `as_of` > 0, given its tests and lives that have ended.
+
+    `offset` [t] is added to the tests' values. None of fewer than FEWEST_ENDED lives that are not censored, of fewer than
+    FEWEST_TESTS tests at different ζ, or where the first value is not positive.
     """
-    exact = np.array([not life.censored for life in alive])
-    if np.count_nonzero(exact) < FEWEST_ALIVE:
+    exact = np.array([not life.censored for life in lives], dtype=bool)
+    if np.count_nonzero(exact) < FEWEST_ENDED or len({test.progress for test in tests}) < FEWEST_TESTS:
         return None
-    log_ends = np.log([life.end for life in alive])
-    variance = np.array([life.deviation**2 for life in alive])
-    beyond = float(log_ends.max()) + math.log(FAR_BEYOND)
-    forecasts = np.minimum([*(life.forecast_at(as_of) for life in alive), own], beyond)
-    median, deviation = forecasts[:, 1], (forecasts[:, 2] - forecasts[:, 0]) / (2.0 * HALF_WIDTH)
-    size = np.sqrt(np.maximum(deviation, LEAST_DEVIATION))
-    size *= math.exp(float(np.log(size).mean()))
+    seen = _Seen.of(tests, offset, lives[0].fraction)
+    if seen is None:
+        return None
+    log_ends = np.log([life.end for life in lives])
+    variance = np.array([life.deviation**2 for life in lives])
     centre = float(np.median(log_ends[exact]))
     of_ends = _predictive(log_ends - centre, variance, exact, VAGUE, END_WORTH)
-    errors = (log_ends - median[:-1]) / size[:-1]
-    of_errors = _predictive(errors, variance / size[:-1] ** 2, exact, ERROR_VAGUE, ERROR_WORTH)
-    now = math.log(as_of)
-    far = max(beyond, now + 1.0)
-    log_end = now + (far - now) * np.linspace(0.0, 1.0, _PLACES + 1)[1:] ** 2
-    log_weight = of_ends.log_density(log_end - centre) + of_errors.log_density((log_end - median[-1]) / size[-1])
-    weight = np.exp(log_weight - log_weight.max()) * np.gradient(log_end)
-    return np.exp(log_end), weight / weight.sum()
+    now, earliest = math.log(as_of), math.log(seen.span) - _BEFORE
+    latest = max(float(log_ends.max()), now) + _BEYOND
+    log_end = np.linspace(earliest, latest, _ENDS)
+    clock = seen.progress / np.exp(log_end)[:, None]
+    courses = [life for life, counts in zip(lives, exact, strict=True) if counts]
+    kin = seen.nodes(log_end, np.stack([life.course(clock) for life in courses]))
+    pace = np.array([life.final_pace for life in courses])
+    middle, deviation, share = kin.crossings(seen, log_end, pace, as_of)
+    places = now + (latest + _BEYOND - now) * np.linspace(0.0, 1.0, _PLACES + 1)[1:] ** 1.5
+    density = np.exp(-0.5 * np.square((places[:, None] - middle) / deviation)) @ (share / deviation)
+    log_prior = of_ends.log_density(places - centre)
+    stated = density * np.exp(log_prior - log_prior.max()) * np.gradient(places)
+    if not stated.any():
+        return None
+    log_anywhere = np.linspace(earliest, earliest + _ANYWHERE, _ENDS)
+    others = seen.nodes(log_anywhere, _other_shapes(seen.progress / np.exp(log_anywhere)[:, None]))
+    log_prior = of_ends.log_density(log_end - centre)
+    log_prior -= logsumexp(log_prior)
+    log_odds = logsumexp(kin.log_evidence + log_prior[:, None, None]) - math.log(len(courses))
+    log_odds -= logsumexp(others.log_evidence) - math.log(_ENDS * others.log_evidence.shape[2])
+    log_odds += math.log((1.0 - OTHER_KIND) / OTHER_KIND)
+    return Kin(ends=np.exp(places), weight=stated / stated.sum(), probability=float(expit(log_odds)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Seen:
+    """A clutch's tests in the coordinates in which both its scatter and δ are independent from number to number: `damage`
+    [n], `features` [n, p] (x and the steps, for deviations of 1), `turn` [n, n] that leads there, and δ's variances `walk`
+    [n] for q = 1 at the `span`; and their `progress` [n]. `sizes` [p] is how far each feature moves the crossing."""
+
+    progress: FloatArray
+    span: float
+    damage: FloatArray
+    features: FloatArray
+    sizes: FloatArray
+    turn: FloatArray
+    walk: FloatArray
+
+    @classmethod
+    def of(cls, tests: Sequence[Measurement], offset: FloatArray | None, fraction: float) -> "_Seen | None":
+        progress, value, variance, epoch = np.array([(t.progress, t.value, t.variance, t.epoch) for t in tests]).T
+        value = value if offset is None else value + offset
+        first = value[progress.argmin()]
+        if first <= 0.0:
+            return None
+        damage, span = (1.0 - value / first) / (1.0 - fraction), float(progress.max())
+        # half of the scatter is taken to be that of the fits: a test that is known badly counts for less
+        noise = np.sqrt(0.5 + 0.5 * variance / variance.mean()) if variance.any() else np.ones(value.size)
+        later = later_epochs(epoch)
+        steps = (epoch[:, None] >= np.array(later)) * STEP_SIZE / (1.0 - fraction)
+        features = np.column_stack([np.full(value.size, _LEVEL_SD), steps])
+        walk, turn = np.linalg.eigh(_walked(progress / span, (progress / span)[:, None]) / np.outer(noise, noise))
+        turn = turn / noise[:, None]
+        return cls(
+            progress=progress,
+            span=span,
+            damage=damage @ turn,
+            features=turn.T @ features,
+            sizes=np.array([_LEVEL_SD * (1.0 - fraction), *np.full(len(later), STEP_SIZE / (1.0 - fraction))]),
+            turn=turn,
+            walk=np.maximum(walk, 0.0),
+        )
+
+    def nodes(self, log_end: FloatArray, courses: FloatArray) -> "_Nodes":
+        """The evidence of the tests for courses [j, e, n] of ends [e]."""
+        size = np.repeat(COURSE_DISCREPANCIES, COURSE_SCATTERS.size)
+        scatter = np.tile(COURSE_SCATTERS, COURSE_DISCREPANCIES.size)
+        size = size * ((self.span * np.exp(-log_end)) ** 1.5)[:, None]
+        weight = 1.0 / (np.square(size)[..., None] * self.walk + np.square(scatter)[:, None])
+        b, x, d = np.moveaxis(courses @ self.turn, 0, 2), self.features, self.damage
+        of_b = np.stack([weight @ (b * column[:, None]) for column in x.T], axis=-1)
+        of_d, gram = (weight * d) @ x, np.einsum("ekn,np,nq->ekpq", weight, x, x, optimize=True)
+        inverse = np.linalg.inv(np.eye(x.shape[1]) + gram)
+        solved = np.einsum("ekpq,ekq->ekp", inverse, of_d)
+        bb = weight @ np.square(b) - np.einsum("ekjp,ekpq,ekjq->ekj", of_b, inverse, of_b, optimize=True)
+        bd = weight @ (b * d[:, None]) - np.einsum("ekjp,ekp->ekj", of_b, solved)
+        dd = ((weight * d) @ d - (of_d * solved).sum(axis=2))[..., None]
+        precision = bb + COURSE_SIZE_SD**-2
+        taller = (bd - bb) / precision
+        fixed = np.log(weight).sum(axis=2) + np.linalg.slogdet(inverse)[1]
+        log_evidence = 0.5 * (fixed[..., None] - dd + 2.0 * bd - bb + taller * (bd - bb) - np.log(precision))
+        return _Nodes(
+            log_evidence=log_evidence - math.log(COURSE_SIZE_SD),
+            size=size,
+            weight=weight,
+            taller=taller,
+            taller_variance=1.0 / precision,
+            features=solved[:, :, None] - (1.0 + taller)[..., None] * np.einsum("ekpq,ekjq->ekjp", inverse, of_b),
+            courses=b,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Nodes:
+    """By end, pair of deviations (of δ, of the scatter) and course: the log evidence, the mean and the variance of a, each
+    [e, k, j], and the mean of the features [e, k, j, p]; of ends and pairs δ's deviation at the span [e, k] and the weights
+    of the numbers [e, k, n]; the courses [e, n, j]."""
+
+    log_evidence: FloatArray
+    size: FloatArray
+    weight: FloatArray
+    taller: FloatArray
+    taller_variance: FloatArray
+    features: FloatArray
+    courses: FloatArray
+
+    def crossings(
+        self, seen: _Seen, log_end: FloatArray, pace: FloatArray, as_of: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Where the threshold is crossed, under the nodes that hold nearly all of the evidence: the logarithm of ζ [m], its
+        deviation [m], and the nodes' shares of the evidence [m]. `pace` [j] is that of every course at its end."""
+        share = np.exp(self.log_evidence - self.log_evidence.max()).ravel()
+        order = np.argsort(share)[::-1]
+        within = np.cumsum(share[order])
+        held = order[: int(np.searchsorted(within, _HELD * within[-1])) + 1]
+        e, k, j = np.unravel_index(held, self.log_evidence.shape)
+        end, weight, variance = np.exp(log_end[e]), self.weight[e, k], np.square(self.size[e, k])
+        ahead = np.maximum(end / seen.span, 1.0)
+        across = _walked(seen.progress / seen.span, ahead[:, None]) @ seen.turn
+        left = (
+            seen.damage
+            - self.features[e, k, j] @ seen.features.T
+            - (1.0 + self.taller[e, k, j])[:, None] * self.courses[e, :, j]
+        )
+        beyond = (
+            self.taller[e, k, j] + self.features[e, k, j] @ seen.sizes + variance * (across * weight * left).sum(axis=1)
+        )
+        spread = variance * ahead**3 - np.square(variance) * (np.square(across) * weight).sum(axis=1)
+        spread = np.maximum(spread, 0.0) + self.taller_variance[e, k, j]
+        early = np.clip(beyond / pace[j], -_FARTHEST, 1.0 - 1.0 / (1.0 + _FARTHEST))
+        to_come = np.maximum(1.0 - as_of / end, 0.0)
+        wander = COURSE_STRETCH_SD * math.sqrt(1.0 + 2.0 / pace.size) * to_come**1.5
+        step = (log_end[1] - log_end[0]) / math.sqrt(12.0)
+        deviation = np.sqrt(spread / np.square(pace[j]) + np.square(wander) + step**2)
+        return log_end[e] + np.log1p(-early), deviation, share[held] / share[held].sum()
+
+
+def _walked(early: FloatArray, late: FloatArray) -> FloatArray:
+    """The covariance of an integrated random walk whose deviation at 1 is 1, at two times, broadcast."""
+    low, high = np.minimum(early, late), np.maximum(early, late)
+    return np.asarray(0.5 * low**2 * (3.0 * high - low))
+
+
+def _other_shapes(share: FloatArray) -> FloatArray:
+    """The courses of a clutch of another kind at shares of its life: slowing down, straight and steepening."""
+    return np.stack([np.log1p(share / 0.03) / math.log1p(1.0 / 0.03), share, np.minimum(share, 2.0) ** 3])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -254,8 +425,8 @@ def severity_exponent(ends: FloatArray, work: FloatArray) -> tuple[float, float]
     """
     x = np.log(work) - np.log(work).mean()
     spread = float(x @ x)
-    if x.size < FEWEST_ALIVE or spread == 0.0:
-        raise ValueError(f"lives under different work are needed, {FEWEST_ALIVE} or more, got {x.size}")
+    if x.size < FEWEST_SEVERITIES or spread == 0.0:
+        raise ValueError(f"lives under different work are needed, {FEWEST_SEVERITIES} or more, got {x.size}")
     y = np.log(ends) - np.log(ends).mean()
     slope = float(x @ y) / spread
     left = y - slope * x

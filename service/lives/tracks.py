@@ -315,6 +315,7 @@ def end_of_life(
         offset=offset_of(series, assumptions),
         power=tracked.back_cast.widening,
         ended=assumptions.ended((series.quantity, series.pressure), fraction, series.scale),
+        tests=series.measurements[: tracked.runs],
     )
 
 

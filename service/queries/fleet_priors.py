@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.degradation.severity import SeverityBasis
-from models.prognosis.criteria import FEWEST_ALIVE
+from models.prognosis.criteria import FEWEST_SEVERITIES
 from models.prognosis.ended_lives import EndedLife, severity_exponent
 from models.prognosis.fleet import FleetPrior
 from storage import assumptions
@@ -57,7 +57,7 @@ def _severity_exponent(row: FleetPriorRow) -> dict[str, float] | None:
     """By which power of a cycle's energy the ended lives were shorter; None where they cannot tell it."""
     lives = [EndedLife.from_dict(stored) for stored in row.content.get("ended", ())]
     by_energy = [(life.end, life.energy) for life in lives if life.energy]
-    if len(by_energy) < FEWEST_ALIVE or len({energy for _, energy in by_energy}) == 1:
+    if len(by_energy) < FEWEST_SEVERITIES or len({energy for _, energy in by_energy}) == 1:
         return None
     value, deviation = severity_exponent(*np.array(by_energy).T)
     severity = row.fleet["severity"]

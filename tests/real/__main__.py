@@ -8,7 +8,7 @@ from typing import Any
 
 import httpx2
 
-from tests.real import diagnosis, fleets, lag, lives, loaders, prognosis
+from tests.real import diagnosis, lag, lives, loaders, prognosis
 from tests.support import serving
 
 
@@ -90,8 +90,6 @@ def main() -> int:
     print("\n## The prognosis\n")
     prognosis.main()
     lives.main()
-    print()
-    fleets.main()
     return 0
 
 

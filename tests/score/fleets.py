@@ -10,6 +10,7 @@ from models.prognosis.ended_lives import EndedLife, ended_life
 from models.prognosis.fleet import learn
 from models.prognosis.stated_end import stated_end
 from models.tracking.filters.grid import Grid
+from models.tracking.measurement import Measurement
 from models.tracking.prior import weak
 from tests.score.table import Scores
 from tests.statistical.lives import STAGES, Life
@@ -29,6 +30,11 @@ def kind(rng: np.random.Generator, change: float, scale: float, exponent: float)
     return Life(truth, 0.003 * initial, float(first_passage(0.5 * initial, truth)))
 
 
+def _taught(history: list[Measurement], end: float) -> EndedLife | None:
+    progress, values = (np.array(column) for column in zip(*((m.progress, m.value) for m in history), strict=True))
+    return ended_life(progress, values, end, initial=history[0].value, fraction=0.5)
+
+
 def fleets(count: int, seed: int) -> str:
     """CRPS with a fleet's prior, and calibrated by its ended lives too, over that with the weak one, on the same lives."""
     lines = [
@@ -45,7 +51,7 @@ def fleets(count: int, seed: int) -> str:
                 fleet = [kind(rng, 0.75, 5_000.0 * other, 0.7) for _ in range(size)]
                 taught_by = [(each.end, each.measured(1.0, 25, rng)) for each in fleet if math.isfinite(each.end)]
                 learned = learn([history for _, history in taught_by])
-                lives = [ended_life(history, end, fraction=0.5, horizon=HORIZON) for end, history in taught_by]
+                lives = [_taught(history, end) for end, history in taught_by]
                 ended = [each for each in lives if each is not None]
             life = kind(rng, 0.75, 5_000.0, 0.7)
             assert learned is not None
@@ -59,7 +65,7 @@ def fleets(count: int, seed: int) -> str:
                 scores.add("weak", stage, plain, life.end)
                 together, now = learned.together(plain, taught, measurements[0]), seen[-1].progress
                 scores.add("fleet", stage, together, life.end)
-                stated = stated_end(together, fraction=0.5, as_of=now, horizon=HORIZON, ended=ended)
+                stated = stated_end(together, fraction=0.5, as_of=now, horizon=HORIZON, ended=ended, tests=seen)
                 scores.add_sample("ended", stage, np.minimum(stated.ends, HORIZON), stated.weight, life.end)
         for stated_by, title in (("fleet", "under its prior"), ("ended", "calibrated by its ended lives")):
             cells = [

@@ -222,7 +222,7 @@ class RemainingLife(Answer):
     )
     ended_lives: int = Field(
         default=0,
-        description="Lives of the same kind that ended, and later than this one is old, by which the end was calibrated",
+        description="Lives of the same kind that have ended, by whose ends and courses the end was calibrated",
     )
     sample: SampleQuality | None = Field(
         default=None, description="The draws behind the prediction; null where nothing is predicted"

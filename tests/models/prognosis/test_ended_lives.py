@@ -1,180 +1,207 @@
-"""What ended lives say: where they ended, and how right forecasts of them were."""
+"""What ended lives say of the next: where they ended, and along which course."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.special import log_ndtr
+from scipy.stats import multivariate_normal
 
-from models.prognosis.ended_lives import EndedLife, calibrated, declared_end, ended_life, representative
+from models.arrays import FloatArray
+from models.prognosis import ended_lives
+from models.prognosis.criteria import COURSE_SIZE_SD, VAGUE
+from models.prognosis.ended_lives import EndedLife, Kin, as_its_kind, declared_end, ended_life, representative
 from models.prognosis.first_passage import weighted_quantiles
+from models.tracking.criteria import STEP_SIZE
 from models.tracking.measurement import Measurement
 
-ENDS = 1_000.0 * np.exp(0.08 * np.array([-1.5, -1.0, -0.6, -0.3, 0.0, 0.1, 0.4, 0.7, 1.1, 1.6]))
+ENDS = 1_000.0 * np.exp(0.2 * np.array([-1.5, -1.0, -0.6, -0.3, 0.0, 0.1, 0.4, 0.7, 1.1, 1.6]))
+
+#: The share of the way to the threshold over the share of life.
+Shape = Callable[[FloatArray], FloatArray]
 
 
-def ended(end: float, off: float = 1.0, spread: float = 0.05) -> EndedLife:
-    """A life whose forecasts were `off` times its end throughout, with that deviation of the logarithm."""
-    stated = math.log(off * end) + 1.645 * spread * np.array([-1.0, 0.0, 1.0])
-    return EndedLife(end=end, fraction=0.5, progress=np.array([100.0, 500.0]), forecasts=np.array([stated, stated]))
+def knee(share: FloatArray) -> FloatArray:
+    """Slow until 0.7 of a life, then six times as fast."""
+    return np.where(share < 0.7, 0.4 * share, 0.28 + 2.4 * (share - 0.7))
 
 
-def quantiles(own: EndedLife, lives: list[EndedLife], as_of: float = 400.0) -> list[float]:
-    stated = calibrated(own.forecasts[0], as_of, [life for life in lives if life.end > as_of])
-    assert stated is not None
-    ends, weight = stated
-    assert weight.sum() == pytest.approx(1.0)
-    assert ends.min() > as_of
-    return [float(x) for x in weighted_quantiles(ends, weight, (0.05, 0.5, 0.95))]
+def slowing(share: FloatArray) -> FloatArray:
+    return np.log1p(20.0 * share) / math.log(21.0)
 
 
-def test_forecasts_that_were_right_decide() -> None:
-    lives = [ended(end, off) for end, off in zip(ENDS, np.exp(0.05 * np.sin(np.arange(10.0))), strict=True)]
-    low, middle, high = quantiles(ended(1_150.0), lives)
-    assert 1_060.0 < middle < 1_160.0
-    assert 0.1 < math.log(high / low) < 0.25
+def measured(
+    end: float, until: float, shape: Shape = knee, seed: int = 1, scatter: float = 0.002, step: float = 0.0
+) -> list[Measurement]:
+    """Tests at every 30th of a life that ends at `end`, up to a share of it; `step` is what an event at its third adds."""
+    rng = np.random.default_rng(seed)
+    shares = np.arange(0.0, until + 1e-9, 1.0 / 30.0)
+    values = 0.1 * (1.0 - 0.5 * shape(shares)) * (1.0 + scatter * rng.standard_normal(shares.size))
+    later = (shares > 1.0 / 3.0) & (step != 0.0)
+    return [
+        Measurement(progress=end * x, value=y + 0.1 * step * after, variance=1e-8, epoch=int(after))
+        for x, y, after in zip(shares.tolist(), values.tolist(), later.tolist(), strict=True)
+    ]
 
 
-def test_forecasts_that_are_late_are_led_back_to_the_ends() -> None:
-    """All 22 times too late, as of a course that accelerates: what is left is where the others ended."""
-    scatter = 22.0 * np.exp(0.9 * np.cos(3.0 * np.arange(10.0)))
-    lives = [ended(end, off, 0.3) for end, off in zip(ENDS, scatter, strict=True)]
-    low, middle, high = quantiles(ended(1_000.0, 15.0, 0.3), lives)
-    assert (low, middle, high) == pytest.approx((860.0, 1_005.0, 1_175.0), rel=0.05)
+def ended(end: float, shape: Shape = knee, seed: int = 0) -> EndedLife:
+    tests = measured(end, 1.0, shape, seed)
+    progress, values = (np.array(column) for column in zip(*((t.progress, t.value) for t in tests), strict=True))
+    life = ended_life(progress, values, end, initial=0.1, fraction=0.5)
+    assert life is not None
+    return life
 
 
-def test_a_hundred_of_a_thousand_say_the_same() -> None:
-    rng = np.random.default_rng(2)
-    lives = [ended(1_000.0 * math.exp(off), 1.0 + 0.1 * off) for off in rng.normal(0.0, 0.2, 1_000).tolist()]
-    some = representative(lives)
-    assert len(some) == 100
-    assert {life.end for life in some} >= {min(life.end for life in lives), max(life.end for life in lives)}
-    own = ended(1_100.0, 1.0, 0.3)
-    assert quantiles(own, some) == pytest.approx(quantiles(own, lives), rel=0.02)
-    assert representative(lives[:100]) == lives[:100]
+def lives(shape: Shape = knee) -> list[EndedLife]:
+    return [ended(end, shape, number) for number, end in enumerate(ENDS)]
+
+
+def said(tests: list[Measurement], of: list[EndedLife]) -> Kin:
+    kin = as_its_kind(tests, tests[-1].progress, of)
+    assert kin is not None
+    assert kin.weight.sum() == pytest.approx(1.0)
+    return kin
+
+
+def quantiles(kin: Kin) -> list[float]:
+    return weighted_quantiles(kin.ends, kin.weight, (0.05, 0.5, 0.95)).tolist()
+
+
+@pytest.mark.parametrize("until", [0.4, 0.6, 0.8])
+def test_a_knee_that_the_others_had_is_expected_before_its_first_sign(until: float) -> None:
+    kin = said(measured(1_200.0, until), lives())
+    low, middle, high = quantiles(kin)
+    assert low < 1_200.0 < high
+    assert abs(math.log(middle / 1_200.0)) < 0.1
+    assert high / low < 1.7
+    assert kin.probability > 0.9
+
+
+def test_the_course_says_more_than_where_the_others_ended() -> None:
+    """A life of 1.6 times their median comes less far than they had, and is expected the later the longer that goes on."""
+    tests = measured(1_600.0, 0.8, seed=3)
+    early, late = (quantiles(said(tests[:count], lives()))[1] for count in (13, 22))
+    assert 1_200.0 < early < late
+    assert late == pytest.approx(1_600.0, rel=0.1)
+
+
+def test_two_ended_lives_count_and_one_or_those_taken_out_do_not() -> None:
+    tests, some = measured(1_200.0, 0.5), lives()
+    assert as_its_kind(tests, 600.0, some[4:6]) is not None
+    assert as_its_kind(tests, 600.0, some[4:5]) is None
+    assert as_its_kind(tests, 600.0, [some[4], replace(some[5], censored=True)]) is None
+    assert as_its_kind(tests[:2], 600.0, some) is None
+
+
+def test_a_clutch_that_wears_otherwise_is_hardly_of_the_kind() -> None:
+    """It falls at once as none of them did: to a half by a sixth of their shortest life."""
+    tests = measured(125.0, 0.9, slowing)
+    assert said(tests, lives()).probability < 0.1
+    assert said(tests, [replace(each.in_unit(7.0)) for each in lives(slowing)]).probability > 0.9
+
+
+def test_a_declared_step_of_the_level_is_no_wear() -> None:
+    """An oil change that lifts COF by a twentieth: the end is stated as without it, somewhat less surely."""
+    plain, stepped = (quantiles(said(measured(1_100.0, 0.85, step=step), lives())) for step in (0.0, 0.02))
+    assert stepped[1] == pytest.approx(plain[1], rel=0.1)
+    assert stepped[0] < 1_150.0 < stepped[2]
 
 
 def test_it_is_alive_now() -> None:
-    lives = [ended(end) for end in ENDS]
-    low, _, _ = quantiles(ended(900.0), lives, as_of=1_000.0)
-    assert low > 1_000.0
-    assert calibrated(ended(1_200.0).forecasts[0], 1_100.0, lives[8:]) is None
+    """At an age that most of the others did not reach."""
+    low, _, _ = quantiles(said(measured(1_500.0, 0.8), lives()))
+    assert low > 1_200.0
 
 
-def test_the_sample_is_of_the_density_that_is_stated() -> None:
-    """Against the product of the two predictives, summed up on a fine even grid of T."""
-    lives = [ended(end, off) for end, off in zip(ENDS, np.exp(0.1 * np.sin(np.arange(10.0))), strict=True)]
-    own = ended(1_050.0, 1.0, 0.2)
-    found = quantiles(own, lives)
-    log_ends = np.log(ENDS)
-    deviations = np.array([0.05] * 10 + [0.2])
-    size = np.sqrt(deviations) * math.exp(np.log(np.sqrt(deviations)).mean())
-    errors = -0.1 * np.sin(np.arange(10.0)) / size[:-1]
-    ends = np.linspace(400.0, 10_000.0, 400_001)[1:]
-    log_density = np.zeros(ends.size)
-    for values, shift, unit, vague, (shape, rate) in (
-        (log_ends - np.median(log_ends), np.median(log_ends), 1.0, 10.0, (1.0, 0.01)),
-        (errors, math.log(1_050.0), size[-1], 1.0, (1.0, 1.0)),
-    ):
-        worth = 10 + vague**-2
-        mean = values.sum() / worth
-        a, b = shape + 5.0, rate + 0.5 * ((values**2).sum() - worth * mean**2)
-        x = ((np.log(ends) - shift) / unit - mean) / math.sqrt(b / a * (1 + 1 / worth))
-        log_density -= (a + 0.5) * np.log1p(x**2 / (2 * a))
-    weight = np.exp(log_density - log_density.max()) / ends  # a density of log T
-    expected = weighted_quantiles(ends, weight, (0.05, 0.5, 0.95))
-    assert found == pytest.approx(expected.tolist(), rel=2e-3)
+def test_the_evidence_is_that_of_the_normal_written_out() -> None:
+    """Of every course, end and pair of deviations, with x, a, the step and δ integrated out: by dense covariances."""
+    tests = measured(1_100.0, 0.5, step=0.02)
+    seen = ended_lives._Seen.of(tests, None, 0.5)
+    assert seen is not None
+    log_end = np.log([900.0, 1_300.0])
+    progress, damage = seen.progress, (1.0 - np.array([t.value for t in tests]) / tests[0].value) / 0.5
+    own = lives()[3:5]
+    courses = np.stack([life.course(progress / np.exp(log_end)[:, None]) for life in own])
+    found = seen.nodes(log_end, courses).log_evidence
+    later = np.array([float(t.epoch) for t in tests])
+    low, high = np.minimum(progress, progress[:, None]), np.maximum(progress, progress[:, None])
+    expected = np.empty(found.shape)
+    for e, end in enumerate(np.exp(log_end)):
+        walk = 0.5 * low**2 * (3.0 * high - low) / end**3
+        pairs = [(q, s) for q in ended_lives.COURSE_DISCREPANCIES for s in ended_lives.COURSE_SCATTERS]
+        for k, (q, s) in enumerate(pairs):
+            for j in range(2):
+                b = courses[j, e]
+                covariance = q**2 * walk + s**2 * np.eye(b.size) + 0.25 * np.ones((b.size, b.size))
+                covariance += COURSE_SIZE_SD**2 * np.outer(b, b) + (STEP_SIZE / 0.5) ** 2 * np.outer(later, later)
+                expected[e, k, j] = multivariate_normal(b, covariance).logpdf(damage)
+    assert found - found[0, 0, 0] == pytest.approx(expected - expected[0, 0, 0], abs=1e-5)
+
+
+def test_forty_of_a_thousand_say_the_same() -> None:
+    rng = np.random.default_rng(2)
+    many = [ended(1_000.0 * math.exp(off)) for off in rng.normal(0.0, 0.2, 1_000).tolist()]
+    some = representative(many)
+    assert len(some) == 40
+    assert {life.end for life in some} >= {min(life.end for life in many), max(life.end for life in many)}
+    tests = measured(1_100.0, 0.6)
+    assert quantiles(said(tests, some)) == pytest.approx(quantiles(said(tests, many[:200])), rel=0.05)
+    assert representative(many[:40]) == many[:40]
 
 
 def test_a_life_counts_in_other_units_alike() -> None:
-    lives = [ended(end) for end in ENDS]
-    own = ended(1_100.0)
-    found = quantiles(own, lives)
-    halves = quantiles(own.in_unit(2.0), [life.in_unit(2.0) for life in lives], as_of=200.0)
-    assert [2.0 * x for x in halves] == pytest.approx(found)
-    assert EndedLife.from_dict(own.to_dict()).forecasts.tolist() == own.forecasts.tolist()
+    tests = measured(1_100.0, 0.6)
+    halves = [replace(test, progress=0.5 * test.progress) for test in tests]
+    found = quantiles(said(halves, [life.in_unit(2.0) for life in lives()]))
+    assert [2.0 * x for x in found] == pytest.approx(quantiles(said(tests, lives())))
+    own = lives()[0]
+    assert EndedLife.from_dict(own.to_dict()).damage.tolist() == own.damage.tolist()
 
 
-def test_an_ended_life_has_forecasts_of_its_own_end() -> None:
-    """Eq. 6 with ε = 1 and Δ = -1: half is left at ζ = φ = 1,000."""
-    rng = np.random.default_rng(3)
-    history = [
-        Measurement(progress=x, value=0.1 * (1.0 / (1.0 + x / 1_000.0) + 0.003 * rng.standard_normal()), variance=0.0)
-        for x in np.linspace(0.0, 1_200.0, 13)
-    ]
-    life = ended_life(history, 1_000.0, fraction=0.5, horizon=1e6)
+def test_an_ended_life_has_the_course_of_its_tests_until_its_end() -> None:
+    progress = np.array([300.0, 0.0, 300.0, 600.0, 1_200.0])
+    values = np.array([0.09, 0.1, 0.08, 0.07, 0.04])
+    life = ended_life(progress, values, 1_000.0, initial=0.1, fraction=0.5)
     assert life is not None
-    assert life.progress.tolist() == [200.0, 300.0, 500.0, 700.0]
-    low, _, high = life.forecasts[-1]
-    assert low < math.log(1_000.0) < high
-    assert ended_life(history[:2], 1_000.0, fraction=0.5, horizon=1e6) is None
-
-
-def by_draws(lives: list[EndedLife], own: EndedLife, as_of: float) -> list[float]:
-    """The same by brute force: means and deviations drawn from their priors, weighted by all that is known of every life."""
-    rng = np.random.default_rng(5)
-    deviations = np.array(
-        [0.05 if life.forecasts[0, 2] - life.forecasts[0, 0] < 0.2 else 0.3 for life in [*lives, own]]
-    )
-    size = np.sqrt(deviations) * math.exp(np.log(np.sqrt(deviations)).mean())
-    log_ends = np.array([math.log(life.end) for life in lives])
-    centre = float(np.median([math.log(life.end) for life in lives if not life.censored]))
-    median = np.array([life.forecasts[0, 1] for life in [*lives, own]])
-    log_end = np.linspace(math.log(as_of), math.log(10_000.0), 4_001)[1:]
-    log_density = np.zeros(log_end.size)
-    for values, unit, of_value, vague, (shape, rate) in (
-        (log_ends - centre, np.ones(len(lives)), log_end - centre, 10.0, (1.0, 0.01)),
-        ((log_ends - median[:-1]) / size[:-1], size[:-1], (log_end - median[-1]) / size[-1], 1.0, (1.0, 1.0)),
-    ):
-        sigma = np.sqrt(rate / rng.gamma(shape, size=400_000))
-        mean = vague * sigma * rng.standard_normal(sigma.size)
-        log_weight = np.zeros(sigma.size)
-        for life, value, one in zip(lives, values, unit, strict=True):
-            if life.censored:
-                log_weight += log_ndtr((mean - value) / sigma)
-            else:
-                squares = (value - mean) ** 2 + (life.deviation / one) ** 2
-                log_weight += -0.5 * squares / sigma**2 - np.log(sigma)
-        best = np.argsort(log_weight)[-20_000:]
-        weight = np.exp(log_weight[best] - log_weight[best].max())
-        chosen = rng.choice(best, 2_000, p=weight / weight.sum())
-        off = (of_value[:, None] - mean[chosen]) / sigma[chosen]
-        log_density += np.log((np.exp(-0.5 * off**2) / sigma[chosen]).mean(axis=1) + 1e-300)
-    share = np.exp(log_density - log_density.max())
-    return [float(np.exp(log_end[np.searchsorted(np.cumsum(share) / share.sum(), q)])) for q in (0.05, 0.5, 0.95)]
-
-
-def some_censored() -> list[EndedLife]:
-    """Ten lives of which three were taken out at four fifths of their end, and two are known to a tenth."""
-    lives = [ended(end, off) for end, off in zip(ENDS, np.exp(0.1 * np.sin(np.arange(10.0))), strict=True)]
-    for number in (6, 8, 9):
-        lives[number] = replace(lives[number], end=0.8 * lives[number].end, censored=True)
-    return [replace(life, deviation=0.1) if number < 2 else life for number, life in enumerate(lives)]
+    assert life.progress.tolist() == [0.0, 300.0, 600.0]
+    assert life.damage.tolist() == pytest.approx([0.0, 0.3, 0.6])
+    assert life.course(np.array([0.3, 0.8, 1.0, 1.5])).tolist() == pytest.approx([0.3, 0.8, 1.0, 1.5])
+    assert ended_life(progress[:3], values[:3], 1_000.0, initial=0.1, fraction=0.5) is None
 
 
 def test_uncertain_and_censored_ends_are_weighed_as_by_brute_force() -> None:
-    """Within 2 %: the other way is drawn."""
-    own = ended(1_050.0, 1.0, 0.3)
-    assert quantiles(own, some_censored()) == pytest.approx(by_draws(some_censored(), own, 400.0), rel=0.02)
+    """The predictive of log ends, by means and deviations drawn from their priors and weighted; within 2 %."""
+    rng = np.random.default_rng(5)
+    values = np.array([-0.3, -0.2, -0.05, 0.0, 0.1, 0.15, -0.1, 0.12])
+    variance = np.array([0.01, 0.01, *np.zeros(6)])
+    exact = np.array([True] * 6 + [False] * 2)
+    shape, rate = 1.0, 0.03
+    sigma = np.sqrt(rate / rng.gamma(shape, size=400_000))
+    mean = VAGUE * sigma * rng.standard_normal(sigma.size)
+    log_weight = np.zeros(sigma.size)
+    for value, own, known in zip(values, variance, exact, strict=True):
+        squares = (value - mean) ** 2 + own
+        log_weight += -0.5 * squares / sigma**2 - np.log(sigma) if known else log_ndtr((mean - value) / sigma)
+    best = np.argsort(log_weight)[-20_000:]
+    weight = np.exp(log_weight[best] - log_weight[best].max())
+    chosen = rng.choice(best, 4_000, p=weight / weight.sum())
+    at = np.linspace(-2.0, 2.0, 2_001)
+    drawn = (np.exp(-0.5 * ((at[:, None] - mean[chosen]) / sigma[chosen]) ** 2) / sigma[chosen]).mean(axis=1)
+    stated = np.exp(ended_lives._predictive(values, variance, exact, VAGUE, (shape, rate)).log_density(at))
+    expected, found = (weighted_quantiles(at, each / each.sum(), (0.05, 0.5, 0.95)) for each in (drawn, stated))
+    assert np.exp(found) == pytest.approx(np.exp(expected), rel=0.02)
 
 
 def test_a_life_that_was_taken_out_says_that_its_end_was_later() -> None:
     """Not that it was then; and one that was taken out early says next to nothing."""
-    own = ended(1_050.0, 22.0, 0.3)
-    known = [ended(end, 22.0 * math.exp(0.9 * math.cos(3.0 * n)), 0.3) for n, end in enumerate(ENDS[:7])]
-    out = [replace(life, end=1_100.0, censored=True) for life in known[:3]]
-    without, with_these = quantiles(own, known), quantiles(own, known + out)
-    as_ends = quantiles(own, known + [replace(life, censored=False) for life in out])
-    assert with_these[1] > as_ends[1] > without[1]
-    early = quantiles(own, known + [replace(life, end=500.0) for life in out])
-    assert early == pytest.approx(without, rel=0.01)
-
-
-def test_lives_that_were_taken_out_are_not_counted_as_ends() -> None:
-    lives = [ended(end) for end in ENDS]
-    assert calibrated(lives[0].forecasts[0], 400.0, lives[:3]) is not None
-    assert calibrated(lives[0].forecasts[0], 400.0, [*lives[:2], replace(lives[2], censored=True)]) is None
+    tests, known = measured(1_300.0, 0.3), lives()[:6]
+    out = [replace(life, end=1_400.0, censored=True) for life in known[:3]]
+    without, with_these = quantiles(said(tests, known)), quantiles(said(tests, known + out))
+    assert with_these[1] > without[1]
+    early = quantiles(said(tests, known + [replace(life, end=200.0) for life in out]))
+    assert early == pytest.approx(without, rel=0.02)
 
 
 def accelerating(until: float) -> list[Measurement]:
@@ -200,5 +227,5 @@ def test_a_life_without_wear_that_is_declared_worn_ended_then() -> None:
 
 
 def test_uncertain_and_censored_ends_are_stored_exactly() -> None:
-    for life in some_censored():
+    for life in (replace(lives()[0], deviation=0.1), replace(lives()[1], censored=True)):
         assert EndedLife.from_dict(life.to_dict()).to_dict() == life.to_dict()
