@@ -6,8 +6,8 @@ The tracker's courses (`models.tracking.courses`, `discrepancy`) on y = log COF,
 
 with b the logarithm's course of scale φ, the limit of eq. 6 that fits steep starts and even wear alike, T the cycles of the
 latest test and δ the tracker's discrepancy, which runs on the course's own clock u. Level, change, δ and steps are normal
-and integrated out; φ/T, q and the scatter are averaged over a few values by their evidence. A course of eq. 6 is one of
-them, and so are knees, courses that level off and courses that do not change at all.
+and integrated out; φ/T, the sizes of change and δ, and the scatter are averaged over a few values by their evidence. A
+course of eq. 6 is one of them, and so are knees, courses that level off and courses that do not change at all.
 """
 
 import math
@@ -22,9 +22,13 @@ from models.tracking.courses import Course, basis
 from models.tracking.discrepancy import smooth
 
 _GRID = np.array(
-    [(scale, size, scatter) for scale in criteria.SCALES for size in criteria.SIZES for scatter in criteria.SCATTERS]
+    [(scale, *size, scatter) for scale in criteria.SCALES for size in criteria.SIZES for scatter in criteria.SCATTERS]
 )
+#: Variances of the change and of δ, by size.
+_OF_CHANGE, _OF_DISCREPANCY = np.square(np.array(criteria.SIZES)).T
 _SCALES = np.log(np.array(criteria.SCALES))
+#: Columns [scales, k, p] of cycles k: of level and steps, of the change, of δ.
+_Features = tuple[FloatArray, FloatArray, FloatArray]
 #: A probability of nothing.
 _NEVER = 1e-300
 
@@ -70,9 +74,9 @@ class Fit:
     tests: Tests
 
     def _features(self, cycles: FloatArray, epoch: FloatArray) -> FloatArray:
-        """Columns [scales, k, p] whose products sum to the covariance, those of δ apart, for a deviation of 1."""
+        """Columns [scales, k, p] whose products sum to the covariance of level and steps."""
         u = _own_clock(cycles, self.latest)
-        head = [np.full(u.shape, self.tests.level_sd), criteria.CHANGE_SD * u]
+        head = [np.full(u.shape, self.tests.level_sd)]
         further = [np.broadcast_to(criteria.LEVEL_SD * (cycles >= at), u.shape) for at in self.tests.levels]
         steps = [np.broadcast_to(criteria.STEP_SD * (epoch > e), u.shape) for e in np.unique(self.tests.epoch)]
         return np.stack([*head, *further, *steps], axis=2)
@@ -82,25 +86,23 @@ class Fit:
         """T."""
         return float(self.tests.cycles.max(initial=0.0))
 
-    def _covariance(self, a: tuple[FloatArray, FloatArray], b: tuple[FloatArray, FloatArray]) -> FloatArray:
-        """Covariance [g, k, m] of y without scatter between two sets of features."""
-        plain = a[0] @ np.swapaxes(b[0], 1, 2)
-        bent = a[1] @ np.swapaxes(b[1], 1, 2)
-        sizes = np.square(np.array(criteria.SIZES))[None, :, None, None]
-        both = plain[:, None] + sizes * bent[:, None]
-        return np.asarray(np.repeat(both.reshape(-1, *plain.shape[1:]), len(criteria.SCATTERS), axis=0))
+    def _covariance(self, a: "_Features", b: "_Features") -> FloatArray:
+        """Covariance [g, k, m] of y without scatter between two sets of cycles."""
+        plain, change, bent = (left @ np.swapaxes(right, 1, 2) for left, right in zip(a, b, strict=True))
+        return _by_node(plain, change, bent)
 
-    def _both(self, cycles: FloatArray, epoch: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return self._features(cycles, epoch), smooth(_own_clock(cycles, self.latest), 1.0)
+    def _all(self, cycles: FloatArray, epoch: FloatArray) -> "_Features":
+        u = _own_clock(cycles, self.latest)
+        return self._features(cycles, epoch), u[:, :, None], smooth(u, 1.0)
 
     @cached_property
-    def _own(self) -> tuple[FloatArray, FloatArray]:
-        return self._both(self.tests.cycles, self.tests.epoch)
+    def _own(self) -> "_Features":
+        return self._all(self.tests.cycles, self.tests.epoch)
 
     @cached_property
     def noise(self) -> FloatArray:
         """Variance of every test about its course [g, n]."""
-        return np.asarray(self.tests.variance + np.square(_GRID[:, 2, None]))
+        return np.asarray(self.tests.variance + np.square(_GRID[:, -1, None]))
 
     @cached_property
     def precision(self) -> FloatArray:
@@ -164,7 +166,7 @@ class Fit:
 
     def predict(self, cycles: FloatArray, epoch: FloatArray) -> "Predicted":
         """y at cycles [m] since the life began in epochs [m]."""
-        features = self._both(cycles, epoch)
+        features = self._all(cycles, epoch)
         n = self.tests.cycles.size
         prior = _diagonal(features)
         if n == 0:
@@ -175,7 +177,7 @@ class Fit:
             mean = self.tests.level + np.einsum("gn,gnm->gm", self.pull, cross)
             variance = np.maximum(prior - (cross * (self.precision @ cross)).sum(axis=1), 0.0)
             log_weight = self.log_weight
-        return Predicted(log_weight=log_weight, mean=mean, variance=variance + np.square(_GRID[:, 2, None]))
+        return Predicted(log_weight=log_weight, mean=mean, variance=variance + np.square(_GRID[:, -1, None]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,10 +211,15 @@ def log_outlying(off: FloatArray, variance: FloatArray, log_weight: FloatArray) 
     return np.asarray(np.logaddexp.reduce(log_weight + np.logaddexp(plain, further), axis=0))
 
 
-def _diagonal(features: tuple[FloatArray, FloatArray]) -> FloatArray:
-    plain, bent = (np.square(part).sum(axis=2) for part in features)
-    both = plain[:, None] + np.square(np.array(criteria.SIZES))[None, :, None] * bent[:, None]
-    return np.asarray(np.repeat(both.reshape(-1, plain.shape[1]), len(criteria.SCATTERS), axis=0))
+def _diagonal(features: _Features) -> FloatArray:
+    return _by_node(*(np.square(part).sum(axis=2) for part in features))
+
+
+def _by_node(plain: FloatArray, change: FloatArray, bent: FloatArray) -> FloatArray:
+    """The sum [g, ...] of the parts [scales, ...] of a covariance, each with its size at every node."""
+    sizes = (-1, *(1,) * (plain.ndim - 1))
+    both = plain[:, None] + _OF_CHANGE.reshape(sizes) * change[:, None] + _OF_DISCREPANCY.reshape(sizes) * bent[:, None]
+    return np.asarray(np.repeat(both.reshape(-1, *plain.shape[1:]), len(criteria.SCATTERS), axis=0))
 
 
 def log_physics(log_cof: FloatArray) -> FloatArray:

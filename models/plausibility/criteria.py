@@ -32,11 +32,12 @@ USUAL = 1.5
 
 # The course of mean COF (`course`)
 
-#: What the runs choose among: φ as a share of the cycles of the latest test; the discrepancy of log COF at the latest test;
-#: the scatter from run to run of log COF. Chosen: courses that slow down, go evenly and accelerate; sensors of 0.3 to 5 %.
-SCALES, SIZES, SCATTERS = (0.03, 0.3, 10.0), (0.05, 0.25, 1.5), (0.003, 0.012, 0.05)
-#: Deviation of the change of log COF up to the latest test. Chosen: half of COF is lost within some two deviations.
-CHANGE_SD = 0.3
+#: What the runs choose among: φ as a share of the cycles of the latest test; the scatter from run to run of log COF. Chosen:
+#: courses that slow down, go evenly and accelerate; sensors of 0.3 to 5 %.
+SCALES, SCATTERS = (0.03, 0.3, 10.0), (0.003, 0.012, 0.05)
+#: And the deviations of the change of log COF up to the latest test and of its discrepancy. Chosen: half of COF is lost
+#: within some two deviations; or hardly any yet, as a life's second test often shows.
+SIZES = ((0.02, 0.02), (0.3, 0.05), (0.3, 0.25), (0.3, 1.5))
 #: One honest test in so many is off by more than its scatter, and the deviation of that. Chosen: gains that are misread, oil
 #: that nobody logged.
 OUTLYING_SHARE, OUTLYING_SD = 0.02, 0.06
