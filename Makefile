@@ -23,6 +23,7 @@
 # make real    what is said of real measurements; make benchmark: how long things take; make picture: README's pictures;
 #              make figures: the figures of docs/
 # make docs    the site of docs/, which the service serves at /help; warnings and dead links are errors
+# make reference  the pages of docs/reference that are made from the code
 # make architecture  the picture, the ways and the examples of docs/explanation/architecture.md, from the code
 PYTHON ?= python3
 VENV ?= .venv
@@ -40,7 +41,7 @@ UNUSED := matplotlib contourpy cycler fonttools kiwisolver pillow
 LOCK := --universal --python-version 3.11 --generate-hashes --upgrade --quiet --exclude-newer "7 days" \
 	--custom-compile-command "make lock" $(foreach name,$(UNUSED),--no-emit-package $(name))
 
-.PHONY: docs adoption demo shell test slow faults check lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
+.PHONY: docs reference adoption demo shell test slow faults check lowest benchmark load scale real figures architecture blind visible plausibility score rivals picture lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.runs
@@ -100,6 +101,9 @@ docs: $(VENV)-docs/.ready
 	rm -rf $(HELP)
 	$(VENV)-docs/bin/python -m sphinx --quiet --fail-on-warning --keep-going --builder html --fresh-env \
 		--doctree-dir $(VENV)-docs/doctrees docs $(HELP)
+
+reference: $(VENV)/.tests
+	$(BIN)/python -m tests.documents
 
 architecture: $(VENV)/.tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.architecture

@@ -1,0 +1,345 @@
+"""The pages of docs/reference that are made from the code: settings, commands, routes, fields, codes, metrics.
+
+Each is a function from the code to Markdown; `python -m tests.documents` writes them, `test_reference.py` holds them.
+"""
+
+import ast
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import click
+import typer
+from prometheus_client.parser import text_string_to_metric_families
+
+from service import errors
+from service.app import create_app
+from service.cli import main as command_line
+from service.cli import options
+from service.settings import PREFIX, Settings
+from service.web.metrics import Metrics
+from storage.engine.opening import open_database
+
+ROOT = Path(__file__).parents[2]
+FOLDER = ROOT / "docs" / "reference"
+#: Statuses that every address with a key may answer with.
+ANYWHERE = (401, 403, 422, 429, 503)
+#: Arguments that need no help in the terminal.
+PLAIN = {"clutch": "The clutch's name", "run": "The run's name", "key_id": "The key's id, as `key list` shows it"}
+PLAIN |= {"path": "The file to write", "port": "The port to listen at"}
+WRITTEN = "This page is made from the code by `make reference`."
+Json = Mapping[str, Any]
+
+
+def pages() -> dict[Path, str]:
+    """All pages by their path."""
+    description = create_app(Settings()).openapi()
+    made = {
+        "settings": settings(),
+        "commands": commands(),
+        "routes": routes(description),
+        "fields": fields(description),
+        "codes": codes(),
+        "metrics": metrics(),
+    }
+    return {FOLDER / f"{name}.md": text for name, text in made.items()}
+
+
+def page(title: str, introduction: str, parts: Iterable[str]) -> str:
+    """A page from its parts."""
+    return "\n\n".join([f"# {title}", f"{introduction} {WRITTEN}", *parts]) + "\n"
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table of Markdown; bars and line breaks in cells are escaped."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(_cell(cell) for cell in line) + " |" for line in lines)
+
+
+def _cell(text: str) -> str:
+    text = " ".join(text.split()).replace("\\|", "|").replace("|", "\\|")
+    return re.sub(r"<(?=[a-zA-Z/])", "&lt;", text)
+
+
+def settings() -> str:
+    """Every environment variable of the service and of the commands."""
+    rows = [
+        [f"`{PREFIX}{name.upper()}`", f"`{_default(field.default)}`", field.description or ""]
+        for name, field in Settings.model_fields.items()
+    ]
+    parts = [
+        "## The service",
+        "A wrong value ends the start with a line that names it. A name that is nearly a setting's is warned of.",
+        table(["environment", "default", "meaning"], rows),
+        "## The commands",
+        "Commands that talk to a service read two more.",
+        table(
+            ["environment", "meaning"],
+            [[f"`{name}`", meaning] for name, meaning in sorted(_command_variables().items())],
+        ),
+    ]
+    return page("Settings", "Settings come from the environment.", parts)
+
+
+def _default(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else "none" if value is None else str(value) or "none"
+
+
+def _command_variables() -> dict[str, str]:
+    found: dict[str, str] = {}
+    for _, command in walk():
+        for option in command.params:
+            for name in [option.envvar] if isinstance(option.envvar, str) else option.envvar or []:
+                found.setdefault(name, getattr(option, "help", None) or option.name or "")
+    for name in re.findall(rf'"({PREFIX}\w+)"', Path(options.__file__).read_text(encoding="utf-8")):
+        found.setdefault(name, "read by the commands")
+    return {
+        name: text for name, text in found.items() if name.removeprefix(PREFIX).lower() not in Settings.model_fields
+    }
+
+
+def walk() -> Iterator[tuple[str, click.Command]]:
+    """Every command by its whole name, in the order of `--help`."""
+
+    def below(name: str, command: click.Command) -> Iterator[tuple[str, click.Command]]:
+        children: dict[str, click.Command] = getattr(command, "commands", {})
+        if not children or getattr(command, "invoke_without_command", False):
+            yield name, command
+        for child, found in children.items():
+            yield from below(f"{name} {child}", found)
+
+    for name, command in typer.main.get_command(command_line.app).commands.items():  # type: ignore[attr-defined]
+        yield from below(f"clutchlife {name}", command)
+
+
+def commands() -> str:
+    """Every command with its arguments and options."""
+    parts = []
+    for name, command in walk():
+        rows = [
+            [
+                ", ".join(f"`{each}`" for each in _names(option)),
+                _meaning(option),
+            ]
+            for option in command.params
+            if not getattr(option, "hidden", False)
+        ]
+        text = re.sub(r"\n\n\s*", "\n\n", (command.help or "").strip())
+        parts += [f"## {name}", text, table(["argument or option", "meaning"], rows)] if rows else [f"## {name}", text]
+    introduction = (
+        "`clutchlife COMMAND --help` says the same. A command ends with 0 where it did what it was asked for."
+    )
+    return page("Commands", introduction, parts)
+
+
+def _meaning(option: click.Parameter) -> str:
+    return getattr(option, "help", None) or PLAIN.get(option.name or "", "")
+
+
+def _names(option: click.Parameter) -> list[str]:
+    if isinstance(option, click.Argument) or option.param_type_name == "argument":
+        return [(option.name or "").upper()]
+    return [*option.opts, *option.secondary_opts]
+
+
+def routes(description: Json) -> str:
+    """Every address with its arguments, body and answers, by the description's tags."""
+    by_tag: dict[str, list[str]] = {}
+    for address, methods in description["paths"].items():
+        for method, route in methods.items():
+            tag = (route.get("tags") or ["service"])[0]
+            by_tag.setdefault(tag, []).append(_route(method.upper(), address, route))
+    parts = [part for tag, found in by_tag.items() for part in (f"## {tag[0].upper()}{tag[1:]}", *found)]
+    introduction = (
+        "The addresses of the service; [the API by example](api.md) shows their use, and `/docs` of a running service lets "
+        "you try them. Types with a capital letter are in [Fields](fields.md). Every address below `/v1` may also answer 401, "
+        "403, 422, 429 and 503 ([Errors](codes.md))."
+    )
+    return page("Routes", introduction, parts)
+
+
+def _route(method: str, address: str, route: Json) -> str:
+    parts = [f"### {method} {address}".replace("{", "\\{").replace("}", "\\}"), _text(route.get("description", ""))]
+    arguments = [
+        [f"`{each['name']}`", each["in"], kind(each["schema"]), each.get("description", "")]
+        for each in route.get("parameters", [])
+    ]
+    if arguments:
+        parts.append(table(["argument", "in", "type", "meaning"], arguments))
+    body = route.get("requestBody", {}).get("content", {})
+    if body:
+        parts.append("Body: " + ", ".join(f"`{media}` {kind(each.get('schema', {}))}" for media, each in body.items()))
+    answers = [
+        [status, each.get("description", ""), ", ".join(sorted({kind(c.get("schema", {})) for c in _contents(each)}))]
+        for status, each in route["responses"].items()
+        if int(status) not in ANYWHERE
+    ]
+    parts.append(table(["status", "when", "content"], answers))
+    return "\n\n".join(part for part in parts if part)
+
+
+def _contents(answer: Json) -> Iterable[Json]:
+    return answer.get("content", {}).values()
+
+
+def kind(schema: Json) -> str:
+    """A schema's type in a few words, a link where it has a name."""
+    if "$ref" in schema:
+        name = schema["$ref"].rpartition("/")[2]
+        return f"[{name}](fields.md#{name.lower()})"
+    for joint in ("anyOf", "oneOf", "allOf"):
+        if joint in schema:
+            return " or ".join(dict.fromkeys(kind(each) for each in schema[joint]))
+    if "enum" in schema:
+        return ", ".join(f"`{value}`" for value in schema["enum"])
+    if "const" in schema:
+        return f"`{schema['const']}`"
+    if schema.get("type") == "array":
+        return f"list of {kind(schema.get('items', {}))}"
+    if schema.get("type") == "object" and isinstance(schema.get("additionalProperties"), Mapping):
+        return f"object of {kind(schema['additionalProperties'])}"
+    if schema.get("title") == "Problem":
+        return "[Problem](fields.md#problem)"
+    return str(schema.get("type", "any"))
+
+
+def fields(description: Json) -> str:
+    """Every field of every body and answer."""
+    parts = []
+    for name, schema in sorted(description["components"]["schemas"].items()):
+        parts += [f"## {name}", _text(schema.get("description", ""))]
+        required = set(schema.get("required", ()))
+        rows = [
+            [f"`{field}`{'' if field in required else ' (optional)'}", kind(each), each.get("description", "")]
+            for field, each in schema.get("properties", {}).items()
+        ]
+        parts.append(table(["field", "type", "meaning"], rows) if rows else f"One of {kind(schema)}.")
+    return page(
+        "Fields", "What goes over the wire. A unit is in the name of its field.", [part for part in parts if part]
+    )
+
+
+def _text(docstring: str) -> str:
+    return re.sub(r"<(?=[a-zA-Z/])", "&lt;", docstring.strip())
+
+
+def codes() -> str:
+    """Problems by their type, and the codes of errors and warnings with what they say."""
+    problems = [
+        [f"`urn:clutchlife:problem:{each.slug}`", str(each.status), each.title, (each.__doc__ or "").strip()]
+        for each in sorted(_kinds(errors.ServiceError), key=lambda each: (each.status, each.slug))
+    ]
+    said: dict[str, dict[str, str]] = {"FieldError": {}, "Notice": {}}
+    for name, code, message in messages():
+        said[name].setdefault(code, message if re.search(r"\w", message) else "its message says what is wrong")
+    parts = [
+        "## Problems",
+        "The `type` of `application/problem+json`, the status, and when.",
+        table(["type", "status", "title", "when"], problems),
+        "## Errors of a place",
+        "The `code` of an entry of `errors`; `…` stands for the value. Codes of pydantic (`missing`, `extra_forbidden`, "
+        "`greater_than_equal` and the like) say that a field is not there, not known or out of its range.",
+        table(["code", "message"], [[f"`{code}`", message] for code, message in sorted(said["FieldError"].items())]),
+        "## Warnings and doubts",
+        "The `code` of an entry of `warnings` or `doubts`: something was noticed, and the run was taken in.",
+        table(["code", "message"], [[f"`{code}`", message] for code, message in sorted(said["Notice"].items())]),
+    ]
+    return page("Errors and warnings", "What the service may object to or notice.", parts)
+
+
+def _kinds(base: type[errors.ServiceError]) -> list[type[errors.ServiceError]]:
+    return [base, *(found for child in base.__subclasses__() for found in _kinds(child))]
+
+
+def messages() -> Iterator[tuple[str, str, str]]:
+    """(FieldError or Notice, code, message) wherever the code makes one with a code that stands there; notes of the
+    numerics, pairs of a code and a sentence, are notices too."""
+    paths = [path for folder in ("service", "models") for path in sorted((ROOT / folder).rglob("*.py"))]
+    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in paths]
+    constants = dict(pair for tree in trees for pair in _constants(tree))
+    for tree in trees:
+        for function in ast.walk(tree):
+            if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
+                yield from _of_function(function, constants)
+
+
+def _constants(tree: ast.Module) -> Iterator[tuple[str, str]]:
+    """Names of a module, or of its enumerations, that stand for a text."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Assign) and len(node.targets) == 1:
+            target, value = node.targets[0], node.value
+            together = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
+            pairs = zip(target.elts, value.elts, strict=False) if together else [(target, value)]  # type: ignore[attr-defined]
+            for name, text in pairs:
+                if isinstance(name, ast.Name) and isinstance(text, ast.Constant) and isinstance(text.value, str):
+                    yield name.id, text.value
+
+
+def _of_function(function: ast.AST, constants: Mapping[str, str]) -> Iterator[tuple[str, str, str]]:
+    assigned = [node for node in ast.walk(function) if isinstance(node, ast.Assign | ast.Return)]
+    for node in ast.walk(function):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("FieldError", "Notice"):
+            given = {each.arg: each.value for each in node.keywords}
+            for code in _codes(given.get("code"), constants):
+                yield node.func.id, code, _said(given.get("message"), assigned, node.lineno)  # type: ignore[attr-defined]
+        elif isinstance(node, ast.Tuple) and len(node.elts) == 2:
+            code, sentence = node.elts
+            if isinstance(code, ast.Constant) and re.fullmatch(r"[a-z]+(_[a-z]+)+", str(code.value)):
+                words = _said(sentence, assigned, node.lineno)
+                if isinstance(sentence, ast.JoinedStr) or words.endswith("."):
+                    yield "Notice", str(code.value), words
+
+
+def _codes(node: ast.expr | None, constants: Mapping[str, str]) -> list[str]:
+    if isinstance(node, ast.Constant):
+        return [str(node.value)]
+    if isinstance(node, ast.Name) and node.id in constants:
+        return [constants[node.id]]
+    if isinstance(node, ast.Attribute) and node.attr in constants:
+        return [constants[node.attr]]
+    if isinstance(node, ast.IfExp):
+        return _codes(node.body, constants) + _codes(node.orelse, constants)
+    return []
+
+
+def _said(node: ast.expr | None, assigned: Sequence[ast.Assign | ast.Return], line: int) -> str:
+    """The words of an expression; of a name those that it was last given above that line."""
+    if isinstance(node, ast.Constant):
+        return str(node.value)
+    if isinstance(node, ast.JoinedStr):
+        return "".join(str(part.value) if isinstance(part, ast.Constant) else "…" for part in node.values)
+    if isinstance(node, ast.BinOp):
+        return _said(node.left, assigned, line) + _said(node.right, assigned, line)
+    if isinstance(node, ast.IfExp):
+        return _said(node.body, assigned, line)
+    if isinstance(node, ast.Name):
+        before = [
+            each
+            for each in assigned
+            if isinstance(each, ast.Assign)
+            and each.lineno < line
+            and any(isinstance(target, ast.Name) and target.id == node.id for target in each.targets)
+        ]
+        return _said(max(before, key=lambda each: each.lineno).value, [], line) if before else "…"
+    return "…"
+
+
+def metrics() -> str:
+    """Every series of `/metrics`."""
+    with TemporaryDirectory() as folder:
+        database = open_database(f"sqlite:///{folder}/metrics.db", serving=False)
+        try:
+            text = Metrics(each_clutch=True).exposition(database).decode()
+        finally:
+            database.close()
+    rows = sorted(
+        [f"`{family.name}{'_total' if family.type == 'counter' else ''}`", family.type, family.documentation]
+        for family in text_string_to_metric_families(text)
+    )
+    introduction = (
+        "`/metrics` in Prometheus' format, with a key of scope `read` that is bound to no clutch. Series "
+        "`clutchlife_clutch_…` are there with `CLUTCHLIFE_CLUTCH_METRICS=true` only."
+    )
+    return page("Metrics", introduction, [table(["series", "type", "meaning"], rows)])

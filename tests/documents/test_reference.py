@@ -1,0 +1,85 @@
+"""Every setting, command, route, field, code and metric is documented, in pages that are those of the code."""
+
+import re
+from pathlib import Path
+
+import pytest
+from fastapi import FastAPI
+
+from service.app import create_app
+from service.settings import PREFIX, Settings
+from tests.documents import reference
+from tests.documents.reference import FOLDER, ROOT
+
+SOURCES = [path.read_text(encoding="utf-8") for path in (ROOT / "service").rglob("*.py")]
+
+
+def written(name: str) -> str:
+    return (FOLDER / f"{name}.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def pages() -> dict[Path, str]:
+    return reference.pages()
+
+
+def test_the_pages_are_those_of_the_code(pages: dict[Path, str]) -> None:
+    stale = [path.name for path, text in pages.items() if path.read_text(encoding="utf-8") != text]
+    assert stale == [], "make reference"
+
+
+def test_every_row_says_something(pages: dict[Path, str]) -> None:
+    silent = [
+        f"{path.name}: {line}"
+        for path, text in pages.items()
+        for line in text.splitlines()
+        if line.startswith("| `") and re.search(r"\|\s*\|$", line)
+    ]
+    assert silent == []
+
+
+def test_every_setting_is_documented() -> None:
+    text = written("settings")
+    assert [name for name in Settings.model_fields if f"`{PREFIX}{name.upper()}`" not in text] == []
+
+
+def test_every_command_is_documented() -> None:
+    """By the words of the source, where a command is registered."""
+    main = (ROOT / "service" / "cli" / "main.py").read_text(encoding="utf-8")
+    registered = re.findall(r'add_typer\(\w+\.app, name="(\w+)"\)', main)
+    registered += re.findall(r'app\.command\("([\w-]+)"\)', main) + re.findall(r"app\.command\(\)\(\w+\.(\w+)\)", main)
+    assert len(registered) > 25
+    text = written("commands")
+    assert [name for name in registered if f"## clutchlife {name.rstrip('_')}" not in text] == []
+
+
+def test_every_route_and_field_is_documented() -> None:
+    app: FastAPI = create_app(Settings())
+    routes, fields = written("routes").replace("\\", ""), written("fields")
+    described = app.openapi()
+    assert [
+        f"{method} {address}"
+        for address, methods in described["paths"].items()
+        for method in methods
+        if f"### {method.upper()} {address}\n" not in routes
+    ] == []
+    for name, schema in described["components"]["schemas"].items():
+        part = fields.partition(f"## {name}\n")[2].partition("\n## ")[0]
+        assert [field for field in schema.get("properties", {}) if f"`{field}`" not in part] == [], name
+
+
+def test_every_code_is_documented() -> None:
+    """Codes as they stand in the service's source, found without its syntax."""
+    found = {code for text in SOURCES for code in re.findall(r'\bcode="([a-z_]+)"', text)}
+    assert len(found) > 30
+    text = written("codes")
+    assert [code for code in sorted(found) if f"`{code}`" not in text] == []
+    slugs = {slug for text in SOURCES for slug in re.findall(r'^    slug = "([a-z-]+)"', text, flags=re.MULTILINE)}
+    assert [slug for slug in sorted(slugs) if f":problem:{slug}`" not in text] == []
+
+
+def test_every_metric_is_documented() -> None:
+    found = {name for text in SOURCES for name in re.findall(r'"(clutchlife_[a-z_]+)"', text)}
+    assert len(found) > 8
+    text = written("metrics")
+    assert [name for name in sorted(found) if f"`{name}" not in text] == []
