@@ -154,8 +154,8 @@ def routes(description: Json) -> str:
     parts = [part for tag, found in by_tag.items() for part in (f"## {tag[0].upper()}{tag[1:]}", *found)]
     introduction = (
         "The addresses of the service; [the API by example](api.md) shows their use, and `/docs` of a running service lets "
-        "you try them. Types with a capital letter are in [Fields](fields.md). Every address below `/v1` may also answer 401, "
-        "403, 422, 429 and 503 ([Errors](codes.md))."
+        "you try them. Types with a capital letter are in [Fields](fields.md). Every address below `/v1` may also answer "
+        "401, 403, 422, 429 and 503 ([Errors](codes.md))."
     )
     return page("Routes", introduction, parts)
 
