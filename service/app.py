@@ -10,6 +10,7 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi_offline import FastAPIOffline
 
+from service.alarms.outbox import Outbox
 from service.dashboard import assets, site
 from service.dashboard import pages as dashboard
 from service.jobs import kinds
@@ -29,6 +30,7 @@ from service.web.readiness import Needs, Readiness
 from service.web.revalidation import Revalidation
 from service.web.root_path import RootPath
 from service.web.routes import (
+    alarms,
     clutches,
     description,
     diagnoses,
@@ -102,14 +104,17 @@ def create_app(settings: Settings) -> FastAPI:
         )
         queue = JobQueue(database, settings, _kinds(database, workers))
         readiness = Readiness(database, workers, queue, Needs(disk=settings.least_free, memory=settings.least_memory))
+        outbox = Outbox(database, settings)
         try:
             workers.warm()
             queue.start()
+            outbox.start()
             app.state.context = Context(
                 database=database,
                 cache=AnswerCache(MOST_CACHED_BYTES),
                 metrics=metrics,
                 jobs=queue,
+                outbox=outbox,
                 settings=settings,
                 workers=workers,
                 revalidation=Revalidation(MOST_REVALIDATED_BYTES),
@@ -119,6 +124,7 @@ def create_app(settings: Settings) -> FastAPI:
             yield
         finally:
             readiness.close()
+            outbox.close()
             queue.close()
             workers.close()
             database.close()
@@ -140,10 +146,11 @@ def create_app(settings: Settings) -> FastAPI:
         redoc_url=None,
     )
     problems.install(app)
-    for part in (health, clutches, files, runs, inspections, life, diagnoses, jobs, fleet, rigs):
+    for part in (health, clutches, files, runs, inspections, life, diagnoses, jobs, fleet, rigs, alarms):
         app.include_router(part.router)
     for beside in (clutches.fleet_router, exports.router, exports.fleet_router, description.router, rigs.import_router):
         app.include_router(beside)
+    app.include_router(alarms.webhook_router)
     app.include_router(dashboard.router(assets.load()))
     app.include_router(site.router())
     openapi.install(app, settings.root_path)

@@ -19,6 +19,7 @@ from models.friction.identification import FitStatus, StribeckFit
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
 from models.prognosis.ended_lives import EndedLife
 from models.prognosis.fleet import FleetPrior
+from service.alarms import raising
 from service.columns import whole
 from service.errors import BusyError, NotFoundError
 from service.lives.assumptions import ALL_PRESSURES, FLEET, LearnedPrior, kind_of, severity_name, severity_under
@@ -278,6 +279,7 @@ def store(connection: Connection, clutch_id: str, computed: Results) -> None:
             state=state_of(computed.summary, disputed=False)["name"],
             if_disputed=state_of(computed.summary, disputed=True)["name"],
         )
+        raising.evaluate(connection, clutch_id)
 
 
 def ask_fleet_refresh(connection: Connection, *, by: str, at: str) -> None:

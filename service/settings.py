@@ -127,6 +127,10 @@ class Settings(BaseSettings):
     root_path: Annotated[str, AfterValidator(_below)] = Field(
         default="", description="the path that a proxy adds before the service's own addresses, as `/clutch`"
     )
+    private_receivers: bool | None = Field(
+        default=None,
+        description="whether alarms may be sent to this machine and to private networks; left out, while no key was made",
+    )
     insecure_local: bool = Field(
         default=False, description="without keys, answer also what a proxy on this machine passes on"
     )

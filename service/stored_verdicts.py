@@ -6,13 +6,11 @@ from typing import Any
 from sqlalchemy import Connection
 
 from service import records
-from service.lives.condition import state_of, top_line
+from service.alarms import raising
+from service.lives.condition import DISAGREES, state_of, top_line
 from storage import clutches, verdicts
 from storage.clutches import ClutchRow
 from storage.verdicts import VerdictRow
-
-#: Verdicts by which data and model disagree.
-DISAGREES = frozenset({"cause_named", "cause_ambiguous", "unexplained_structure"})
 
 
 def latest(connection: Connection, row: ClutchRow, verdict: VerdictRow | None) -> dict[str, Any] | None:
@@ -33,12 +31,12 @@ def latest(connection: Connection, row: ClutchRow, verdict: VerdictRow | None) -
 
 def state(connection: Connection, row: ClutchRow) -> dict[str, str]:
     """The clutch's state and why."""
-    return state_of(row.summary, disputed=_disputed(connection, row))
+    return state_of(row.summary, disputed=_disputed(connection, row), silent=row.silent)
 
 
 def first_line(connection: Connection, row: ClutchRow, diagnosis: dict[str, Any] | None) -> dict[str, str]:
     """What stands first of the clutch: `headline` and `action`; `diagnosis` is its newest one as it goes out."""
-    return top_line(row.summary, disputed=_disputed(connection, row), diagnosis=diagnosis)
+    return top_line(row.summary, disputed=_disputed(connection, row), diagnosis=diagnosis, silent=row.silent)
 
 
 def _disputed(connection: Connection, row: ClutchRow) -> bool:
@@ -52,6 +50,7 @@ def note_dispute(connection: Connection, clutch_id: str) -> None:
     disputed = None if verdict is None or verdict.adopted or verdict.verdict not in DISAGREES else verdict.life
     row = replace(records.clutch(connection, clutch_id), disputed=disputed)
     clutches.set_disputed(connection, clutch_id, disputed, state=state(connection, row)["name"])
+    raising.evaluate(connection, clutch_id)
 
 
 def _present_life(connection: Connection, row: ClutchRow) -> str:

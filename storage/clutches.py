@@ -17,7 +17,8 @@ class ClutchRow:
     """A clutch. `record` has its defaults filled in, `created_at` is ISO 8601, lists sort by `rank`, ascending.
 
     `registered` is the record as it was first posted where it was edited since, else None. `state` is the name of the
-    clutch's state, `disputed` the life of which the newest finished diagnosis leaves data and model in dispute.
+    clutch's state, `disputed` the life of which the newest finished diagnosis leaves data and model in dispute, `silent`
+    since when its rig has sent nothing, where that is an alarm.
     """
 
     clutch_id: str
@@ -31,6 +32,7 @@ class ClutchRow:
     registered: Json | None = None
     state: str = "check"
     disputed: str | None = None
+    silent: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,6 +82,7 @@ _set_summary = (
 _set_disputed = (
     update(clutch).where(_of_wanted).values(disputed=bindparam("new_disputed"), state=bindparam("new_state"))
 )
+_set_silent = update(clutch).where(_of_wanted).values(silent=bindparam("new_silent"), state=bindparam("new_state"))
 _set_record = (
     update(clutch)
     .where(_of_wanted)
@@ -112,6 +115,7 @@ def insert(connection: Connection, row: ClutchRow) -> None:
         "registered": None if row.registered is None else to_text(row.registered),
         "state": row.state,
         "disputed": row.disputed,
+        "silent": row.silent,
         "searched": _searched(row.clutch_id, row.record),
     }
     connection.execute(_insert, values)
@@ -225,6 +229,14 @@ def set_disputed(connection: Connection, clutch_id: str, disputed: str | None, *
         connection.execute(_set_disputed, {"wanted": clutch_id, "new_disputed": disputed, "new_state": state}).rowcount
         != 1
     ):
+        raise LookupError(f"clutch {clutch_id!r} is not stored")
+
+
+def set_silent(connection: Connection, clutch_id: str, silent: str | None, *, state: str) -> None:
+    """Note since when a clutch's rig has sent nothing, None: it has, and the state that follows. Raises LookupError on an
+    unknown clutch."""
+    values = {"wanted": clutch_id, "new_silent": silent, "new_state": state}
+    if connection.execute(_set_silent, values).rowcount != 1:
         raise LookupError(f"clutch {clutch_id!r} is not stored")
 
 

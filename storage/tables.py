@@ -26,7 +26,8 @@ OPEN_ONLY = text("state IN ('waiting', 'running')")
 #: `record` is the record in force, defaults filled in, `registered` that which was posted, where it was edited since; `rank`
 #: sorts lists, worst first ascending; `archived` is 1 for a clutch that lists leave out. `state` is the name of its state
 #: (NAMUR NE 107), which follows from the summary and `disputed`: the life of which the newest finished diagnosis found that
-#: data and model disagree, null where there is none or its model is adopted. `searched` is what a search looks into, folded.
+#: data and model disagree, null where there is none or its model is adopted. `searched` is what a search looks into,
+#: folded. `silent`: since when its rig has sent nothing, where an alarm of that is raised.
 clutch = Table(
     "clutch",
     metadata,
@@ -40,6 +41,7 @@ clutch = Table(
     Column("state", TEXT, nullable=False, server_default="check"),
     Column("disputed", TEXT),
     Column("searched", TEXT, nullable=False, server_default=text("''")),
+    Column("silent", TEXT),
     Index("clutch_worst_first", "archived", "rank", "clutch_id"),
     Index("clutch_by_state", "archived", "state", "rank", "clutch_id"),
 )
@@ -271,6 +273,77 @@ rig = Table(
     Column("name", TEXT, primary_key=True),
     Column("version", WHOLE, nullable=False),
     *_required(TEXT, "content", "saved_at", "saved_by"),
+)
+
+#: Rules of alarms. `content` is the rule (JSON) in force; `clutch_id` null: of all clutches, or of those that `content`
+#: names.
+alarm = Table(
+    "alarm",
+    metadata,
+    Column("alarm_id", TEXT, primary_key=True),
+    Column("clutch_id", TEXT, ForeignKey("clutch.clutch_id")),
+    Column("enabled", WHOLE, nullable=False),
+    *_required(TEXT, "content", "saved_at", "saved_by"),
+)
+
+#: The value stands in the text, as that of HELD_ONLY.
+NOT_CLEARED = text("cleared_at IS NULL")
+
+#: What rules have raised: once for a clutch until it is cleared. `mark` tells what raised it from what would raise it again
+#: (a diagnosis' verdict); `content` is what is said of it (JSON). The rule may be gone.
+alarm_event = Table(
+    "alarm_event",
+    metadata,
+    Column("event_key", WHOLE, primary_key=True),
+    Column("event_id", TEXT, nullable=False),
+    Column("alarm_id", TEXT, nullable=False),
+    Column("clutch_id", TEXT, ForeignKey("clutch.clutch_id"), nullable=False),
+    *_required(TEXT, "quantity", "mark", "content", "raised_at"),
+    Column("acknowledged_at", TEXT),
+    Column("acknowledged_by", TEXT),
+    Column("note", TEXT, nullable=False, server_default=text("''")),
+    Column("cleared_at", TEXT),
+    UniqueConstraint("event_id", name="alarm_event_once"),
+    Index(
+        "alarm_event_open",
+        "clutch_id",
+        "alarm_id",
+        unique=True,
+        sqlite_where=NOT_CLEARED,
+        postgresql_where=NOT_CLEARED,
+    ),
+)
+
+#: Receivers of alarms. `address` may hold a password, and `secret` signs what is sent.
+webhook = Table(
+    "webhook",
+    metadata,
+    Column("webhook_id", TEXT, primary_key=True),
+    *_required(TEXT, "address", "secret", "content", "created_at", "created_by"),
+)
+
+#: The value stands in the text, as that of HELD_ONLY.
+WAITING_ONLY = text("state = 'waiting'")
+
+#: The outbox: what a receiver is to be sent, in the transaction that raised it; `event_id` null: a test. It is tried at
+#: `due` (seconds by the database's clock), which whoever tries it moves on first, until it is delivered or given up.
+delivery = Table(
+    "delivery",
+    metadata,
+    Column("delivery_key", WHOLE, primary_key=True),
+    Column("delivery_id", TEXT, nullable=False),
+    Column("webhook_id", TEXT, ForeignKey("webhook.webhook_id"), nullable=False),
+    Column("event_id", TEXT),
+    *_required(TEXT, "body", "state", "created_at"),
+    Column("due", NUMBER, nullable=False),
+    Column("attempts", WHOLE, nullable=False),
+    Column("last_attempt_at", TEXT),
+    Column("delivered_at", TEXT),
+    Column("status", WHOLE),
+    Column("problem", TEXT),
+    UniqueConstraint("delivery_id", name="delivery_once"),
+    Index("delivery_due", "due", sqlite_where=WAITING_ONLY, postgresql_where=WAITING_ONLY),
+    Index("delivery_of_webhook", "webhook_id", "delivery_key"),
 )
 
 #: The audit trail: who changed what of a clutch (`run_id` null) or of one of its runs, when and why, and the revision from

@@ -30,6 +30,8 @@ STATES = FAILURE, MAINTENANCE, CHECK, OUT_OF_SPECIFICATION, NORMAL = (
 STATE_WORDS = dict(
     zip(STATES, ("Failure", "Maintenance required", "Function check", "Out of specification", "Normal"), strict=True)
 )
+#: Verdicts by which data and model disagree.
+DISAGREES = ("cause_named", "cause_ambiguous", "unexplained_structure")
 #: What of a prediction is stored with a clutch.
 SUMMARY = (
     "status",
@@ -130,10 +132,11 @@ def _interval_in_words(remaining: Mapping[str, float | None]) -> str:
     return f"{median:,.0f} (90 %: {low:,.0f} to {upper})"
 
 
-def state_of(summary: Mapping[str, Any], *, disputed: bool) -> dict[str, str]:
+def state_of(summary: Mapping[str, Any], *, disputed: bool, silent: str | None = None) -> dict[str, str]:
     """A clutch's state after NAMUR NE 107 by its summary, and why; `disputed`: its newest diagnosis found that data and
-    model disagree, and nobody has acted on it. The name is stored with the clutch whenever the summary is."""
-    name, reason = _state_and_reason(summary, disputed=disputed)
+    model disagree, and nobody has acted on it; `silent`: since when its rig has sent nothing, where that is an alarm. The
+    name is stored with the clutch whenever the summary is."""
+    name, reason = _state_and_reason(summary, disputed=disputed, silent=silent)
     if "status" not in summary:
         return {"name": name, "why": reason}
     among = summary.get("with_held")
@@ -141,7 +144,7 @@ def state_of(summary: Mapping[str, Any], *, disputed: bool) -> dict[str, str]:
     return {"name": name, "why": f"{reason}: {says}" if reason else says}
 
 
-def _state_and_reason(summary: Mapping[str, Any], *, disputed: bool) -> tuple[str, str]:
+def _state_and_reason(summary: Mapping[str, Any], *, disputed: bool, silent: str | None) -> tuple[str, str]:
     """The first state that holds, and why as a clause; no reason where the statement of the remaining life is one."""
     held = summary.get("held", 0)
     if "status" not in summary:
@@ -154,19 +157,29 @@ def _state_and_reason(summary: Mapping[str, Any], *, disputed: bool) -> tuple[st
         (MAINTENANCE, near),
         (CHECK, held_in_words(held) if held else None),
         (CHECK, _tests(summary["runs_used"]) if status == INSUFFICIENT else None),
+        (CHECK, (silent and status != ENDED and silence_in_words(silent)) or None),
         (OUT_OF_SPECIFICATION, "data and model disagree, see the diagnosis" if disputed and status != ENDED else None),
         (NORMAL, ""),
     )
     return next((name, reason) for name, reason in rules if reason is not None)
 
 
+def silence_in_words(since: str) -> str:
+    """That no run arrived since a moment (ISO 8601), as a clause."""
+    return f"the rig is silent, no run arrived since {since[:16].replace('T', ' ')} UTC"
+
+
 def top_line(
-    summary: Mapping[str, Any], *, disputed: bool, diagnosis: Mapping[str, Any] | None = None
+    summary: Mapping[str, Any],
+    *,
+    disputed: bool,
+    diagnosis: Mapping[str, Any] | None = None,
+    silent: str | None = None,
 ) -> dict[str, str]:
     """What stands first on a clutch's page and in `clutchlife status`: `headline`, its state in words, the safe bound with
     its date at this pace, and the median; `action`, one sentence of what to do. `diagnosis`: the newest one as it goes out.
     """
-    name, reason = _state_and_reason(summary, disputed=disputed)
+    name, reason = _state_and_reason(summary, disputed=disputed, silent=silent)
     words = STATE_WORDS[name]
     if "status" not in summary:
         return {"headline": f"{words}: {reason}", "action": _action(name, summary, None, diagnosis)}
@@ -203,6 +216,8 @@ def _action(name: str, summary: Mapping[str, Any], date: str | None, diagnosis: 
         return "Replace it soon." if date is None else f"Replace before {date}."
     if name == CHECK and held:
         return "Confirm, correct or withdraw " + ("one held run." if held == 1 else f"{held} held runs.")
+    if name == CHECK and summary.get("status", INSUFFICIENT) != INSUFFICIENT:
+        return "See why the rig sends nothing."
     if name == CHECK:
         missing = FEWEST_TESTS - summary.get("runs_used", 0)
         tests = "one more stationary test" if missing == 1 else f"{missing} stationary tests at different cycles"

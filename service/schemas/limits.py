@@ -58,3 +58,6 @@ LONGEST_SEARCH, MOST_OFFSET = 200, 10_000_000
 #: Characters of a column's title in a rig profile, columns of one, lines above its table, and words that stand for a kind of
 #: run. Derived: what the readers take as a title, and as many columns as they read; chosen: more than any rig has.
 LONGEST_TITLE, MOST_COLUMNS, MOST_SKIPPED, MOST_WORDS = 1000, 1000, 10_000, 20
+#: Characters of a receiver's address and of the secret that signs what it is sent. Chosen: a query of tokens fits, and what
+#: is shorter can be guessed.
+LONGEST_ADDRESS, SHORTEST_SECRET, LONGEST_SECRET = 2000, 8, 200

@@ -7,6 +7,7 @@ from typing import Annotated
 from fastapi import Header, Query
 
 from models.prognosis.criteria import HORIZON
+from service.alarms.outbox import Outbox
 from service.jobs.queue import JobQueue
 from service.jobs.workers import Workers
 from service.lists import ALL_ITEMS, LONGEST_CURSOR
@@ -29,6 +30,7 @@ class Context:
     cache: AnswerCache
     metrics: Metrics
     jobs: JobQueue
+    outbox: Outbox
     workers: Workers
     settings: Settings
     revalidation: Revalidation

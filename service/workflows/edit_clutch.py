@@ -11,6 +11,7 @@ from typing import Any
 from sqlalchemy import Connection
 
 from service import measured_lives, records, stored_runs
+from service.alarms import raising
 from service.identity import content_of
 from service.lives.history import stationary_tests_of
 from service.lives.outlook import summarised
@@ -117,6 +118,7 @@ def _store(connection: Connection, edited: _Edited, *, reason: str, by: str, at:
         stored_runs.store_recomputed(connection, clutch_id, edited.results)
     elif edited.results is not None:
         records.store(connection, clutch_id, edited.results)
+    raising.evaluate(connection, clutch_id)  # an archived one has no alarms
     revision = clutches.bump_revision(connection, clutch_id)
     for action, before, after in _entries(edited):
         change = NewChange(

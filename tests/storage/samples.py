@@ -168,6 +168,13 @@ def integrity(path: Path) -> list[str]:
 
 #: By migration, what takes back all that it made, the newest first; a column of SQLite's that refers to a table stays.
 TAKEN_BACK = {
+    "s0014_alarms": (
+        "DROP TABLE delivery",
+        "DROP TABLE webhook",
+        "DROP TABLE alarm_event",
+        "DROP TABLE alarm",
+        "ALTER TABLE clutch DROP COLUMN silent",
+    ),
     "s0013_corrected_cof_draws": ("ALTER TABLE corrected_cof DROP COLUMN mean_cof_draws",),
     "s0012_rigs": ("DROP TABLE rig",),
     "s0011_unbiased_covariance": ("ALTER TABLE fit DROP COLUMN unbiased_covariance",),

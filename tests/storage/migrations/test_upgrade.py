@@ -89,7 +89,7 @@ def test_a_second_start_changes_nothing(database: Database) -> None:
 def insert_as_before(connection: Connection) -> None:
     """A clutch and a run as the first release stored them, in the columns that it had."""
     row = {field.name: getattr(clutch_row(), field.name) for field in fields(clutch_row())}
-    for name in ("archived", "registered", "state", "disputed"):
+    for name in ("archived", "registered", "state", "disputed", "silent"):
         del row[name]
     row |= {name: to_text(row[name]) for name in ("record", "summary")}
     connection.execute(insert(tables.clutch), row)

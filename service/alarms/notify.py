@@ -1,0 +1,132 @@
+"""Receivers by whatever way: a web address is asked by the service itself, all others by Apprise in a process of its own.
+
+    python -m service.alarms.notify     reads one message as JSON, sends it, answers in a line
+
+Apprise knows mail, Teams, Slack, ntfy and a hundred others, and opens connections itself. The process may connect to
+addresses that alarms may go to, start nothing, and read no file but those of the installation; it is ended after a while.
+"""
+
+import importlib.util
+import ipaddress
+import json
+import subprocess
+import sys
+from contextlib import redirect_stdout
+from typing import Any
+from urllib.parse import urlsplit
+
+from service.alarms.receivers import ATTEMPT_SECONDS, Attempt, NotAllowedError, allowed, post, why_not, wrong_address
+from service.alarms.receivers import require_web_address as require_web
+
+_WEB = ("http", "https")
+#: Addresses of Apprise that stay on this machine, or that say where else to read.
+_LOCAL = {"dbus", "file", "gio", "glib", "gnome", "growl", "kde", "macosx", "qt", "syslog", "windows"}
+#: [s] The process may take in all: it loads a large library first.
+_SECONDS = 3 * ATTEMPT_SECONDS
+#: What a process that sends must not do: start others, or load code that no hook sees.
+_FORBIDDEN = ("subprocess.", "os.exec", "os.fork", "os.posix_spawn", "os.spawn", "os.system", "os.startfile", "ctypes.")
+#: Files that a connection needs, beside those of the installation.
+_SYSTEM_FILES = ("/etc/", "/usr/share/", "/usr/lib/ssl", "/dev/null", "/dev/urandom", "/var/lib/ca-certificates")
+
+
+def require_address(url: str, *, private: bool) -> None:
+    """Raise InvalidError where a receiver cannot have this address: it is none, or one that may not be asked."""
+    scheme = urlsplit(url).scheme.lower() if "://" in url else ""
+    if scheme not in _WEB:
+        _require_apprise(url, scheme)
+        return
+    parts = require_web(url)
+    try:
+        allowed(parts.hostname or "", parts.port or (443 if scheme == "https" else 80), private=private)
+    except NotAllowedError as error:
+        raise wrong_address(f"url is not allowed: {error}") from error
+    except OSError:
+        return  # it may be known later; each attempt asks again
+
+
+def _require_apprise(url: str, scheme: str) -> None:
+    if not scheme or scheme in _LOCAL:
+        raise wrong_address("url must be a web address such as https://example.org/hook, or one of Apprise's")
+    if importlib.util.find_spec("apprise") is None:
+        raise wrong_address(
+            f"url begins with {scheme[:20]}://, which needs the extra `notify`: pip install 'clutchlife[notify]'"
+        )
+    if _instantiated(url) is None:
+        raise wrong_address(f"url is no address that Apprise understands ({scheme[:20]}://)")
+
+
+def _instantiated(url: str) -> Any:
+    import apprise  # an extra
+
+    return apprise.Apprise.instantiate(url, suppress_exceptions=True)
+
+
+def send(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool) -> Attempt:
+    """One attempt to send a delivery."""
+    if urlsplit(url).scheme.lower() in _WEB:
+        return post(url, body, secret=secret, delivery_id=delivery_id, private=private)
+    content = json.loads(body)
+    event = content["event"]
+    over = content["type"] == "alarm.cleared"
+    title = f"Clutchlife: {event['name'] or event['quantity'].replace('_', ' ')}" + (" is over" if over else "")
+    task = {"url": url, "title": title, "body": event["message"], "private": private}
+    command = [sys.executable, "-m", "service.alarms.notify"]
+    try:
+        done = subprocess.run(  # noqa: S603  (our own module)
+            command, input=json.dumps(task), capture_output=True, text=True, timeout=_SECONDS, check=False
+        )
+        said = json.loads(done.stdout or "{}")
+    except subprocess.TimeoutExpired:
+        return Attempt(problem=f"it was not sent within {_SECONDS:g} s")
+    except ValueError:
+        said = {}
+    return Attempt(problem=said.get("problem", "it could not be sent")) if not said.get("sent") else Attempt()
+
+
+def confine(private: bool) -> None:
+    """Have this process refuse what a sender has no need of, until it ends."""
+    places = tuple({sys.prefix, sys.base_prefix, *(path for path in sys.path if path)}) + _SYSTEM_FILES
+
+    def watch(event: str, arguments: tuple[Any, ...]) -> None:
+        if event in ("socket.connect", "socket.sendto"):
+            _require_connectable(arguments[-1], private=private)
+        elif event == "open":
+            path = arguments[0]
+            if isinstance(path, (str, bytes)) and not str(path if isinstance(path, str) else path.decode()).startswith(
+                places
+            ):
+                raise PermissionError("a file that a sender has no need of")
+        elif event.startswith(_FORBIDDEN):
+            raise PermissionError(event)
+
+    sys.addaudithook(watch)
+
+
+def _require_connectable(address: Any, *, private: bool) -> None:
+    if not isinstance(address, tuple):
+        raise PermissionError("a socket of this machine")
+    try:
+        reason = why_not(ipaddress.ip_address(str(address[0]).partition("%")[0]), private=private)
+    except ValueError:
+        reason = "a name that was not resolved"
+    if reason is not None:
+        raise NotAllowedError(reason)
+
+
+def main() -> None:
+    """Send what standard input says, and answer."""
+    task = json.load(sys.stdin)
+    with redirect_stdout(sys.stderr):
+        receiver = _instantiated(task["url"])
+        refused: list[str] = []
+        confine(task["private"])
+        try:
+            sent = receiver is not None and bool(receiver.notify(body=task["body"], title=task["title"]))
+        except (NotAllowedError, PermissionError) as error:
+            sent, refused = False, [f"not asked: {error}"]
+    answer = {"sent": sent} if sent else {"sent": False, "problem": (refused or ["the receiver did not take it"])[0]}
+    sys.stdout.write(json.dumps(answer))
+
+
+if __name__ == "__main__":
+    main()

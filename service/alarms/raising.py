@@ -1,0 +1,239 @@
+"""Alarms raised and cleared, in the transaction that stores what a clutch's results are; what receivers are to learn of it
+goes into the outbox with it.
+
+An alarm is raised once: while it is not cleared, its rule raises no other of the clutch. It is cleared when its value has
+come back by the hysteresis, or when nothing can be said any more: after a rebuild, where the rule is gone.
+"""
+
+import json
+import secrets
+from collections.abc import Iterable
+from dataclasses import replace
+from datetime import UTC, datetime
+from functools import partial
+from typing import Any
+
+from sqlalchemy import Connection
+
+from service.alarms import rules
+from service.alarms.rules import Facts, Finding
+from service.lives.assumptions import ALL_PRESSURES
+from service.lives.condition import SHOWN, state_of
+from service.lives.history import STATIONARY
+from service.lives.plausibility.wording import OFF_COURSE
+from service.lives.prediction_notices import OFF_TRACK
+from service.schemas.alarm import AlarmIn
+from service.schemas.clutch import ClutchIn
+from storage import alarms, clutches, results, runs, verdicts, webhooks
+from storage.alarms import AlarmRow, EventRow, NewEvent
+from storage.clutches import ClutchRow
+from storage.encoding.json_text import Json
+from storage.results import FitRow
+from storage.webhooks import NewDelivery, WebhookRow
+
+SILENT = "silent_hours"
+#: What a body is about.
+RAISED, CLEARED, TEST = "alarm.raised", "alarm.cleared", "alarm.test"
+
+
+def evaluate(connection: Connection, clutch_id: str) -> None:
+    """Raise and clear a clutch's alarms by what is stored of it now."""
+    in_use, before = alarms.enabled(connection, clutch_id), alarms.open_of_clutch(connection, clutch_id)
+    if not in_use and not before:
+        return
+    row = clutches.get(connection, clutch_id)
+    if row is None:
+        raise LookupError(f"clutch {clutch_id!r} is not stored")
+    record, at = ClutchIn.model_validate(row.record), _now()
+    own = [] if row.archived else [(rule_row, rule) for rule_row, rule in _rules(in_use) if concerns(rule, record)]
+    kept: set[str] = set()
+    for of_silence in (True, False):  # a silent rig is a state, which other rules look at
+        facts = _facts(connection, row, record, at)
+        for rule_row, rule in own:
+            if (rule.quantity == SILENT) is of_silence:
+                kept |= _judged(connection, rule_row, rule, facts, before.get(rule_row.alarm_id))
+        if of_silence:
+            row = _with_silence(connection, row, kept, facts)
+    for alarm_id, event in before.items():
+        if alarm_id not in kept:
+            _clear(connection, event, at)
+
+
+def concerns(rule: AlarmIn, record: ClutchIn) -> bool:
+    """Whether a rule is of a clutch."""
+    if rule.clutch_id is not None:
+        return rule.clutch_id == record.clutch_id
+    wanted = {} if rule.kind is None else rule.kind.model_dump(exclude_none=True)
+    return all(getattr(record, name) == value for name, value in wanted.items())
+
+
+def rule_of(row: AlarmRow) -> AlarmIn:
+    """A stored rule."""
+    return AlarmIn.model_validate(row.content)
+
+
+def event_out(row: EventRow) -> dict[str, Any]:
+    """An alarm as it goes out."""
+    return {
+        "event_id": row.event_id,
+        "alarm_id": row.alarm_id,
+        "clutch_id": row.clutch_id,
+        "quantity": row.quantity,
+        **row.content,
+        "state": row.state,
+        "raised_at": row.raised_at,
+        "acknowledged_at": row.acknowledged_at,
+        "acknowledged_by": row.acknowledged_by,
+        "note": row.note,
+        "cleared_at": row.cleared_at,
+    }
+
+
+def to_receivers(connection: Connection, kind: str, event: EventRow, receivers: Iterable[WebhookRow]) -> list[str]:
+    """Put an alarm into the outbox of receivers; the names of the deliveries."""
+    names = []
+    for receiver in receivers:
+        delivery_id = secrets.token_hex(8)
+        body = {"type": kind, "delivery_id": delivery_id, "event": event_out(event)}
+        row = NewDelivery(
+            delivery_id=delivery_id,
+            webhook_id=receiver.webhook_id,
+            event_id=None if kind == TEST else event.event_id,
+            body=json.dumps(body, ensure_ascii=False, allow_nan=False),
+            created_at=_now(),
+        )
+        webhooks.insert_delivery(connection, row)
+        names.append(delivery_id)
+    return names
+
+
+def receivers_of(connection: Connection, clutch_id: str | None) -> list[WebhookRow]:
+    """The receivers of a clutch's alarms; None: of those of all clutches."""
+    return [row for row in webhooks.page(connection) if row.content["clutch_id"] in (None, clutch_id)]
+
+
+def test_event(row: AlarmRow) -> EventRow:
+    """An alarm as the rule would raise it, for a test; it is stored nowhere."""
+    rule = rule_of(row)
+    content = {"name": rule.name, "value": None, "limit": rule.limit, "message": _TEST, "as_of_cycles": None}
+    return EventRow(
+        event_id="test",
+        alarm_id=row.alarm_id,
+        clutch_id=rule.clutch_id or "",
+        quantity=rule.quantity,
+        mark="",
+        content=content,
+        raised_at=_now(),
+        event_key=0,
+        acknowledged_at=None,
+        acknowledged_by=None,
+        note="",
+        cleared_at=None,
+    )
+
+
+_TEST = "This is a test of the alarm: nothing is wrong."
+
+
+def _rules(rows: Iterable[AlarmRow]) -> list[tuple[AlarmRow, AlarmIn]]:
+    return [(row, rule_of(row)) for row in rows]
+
+
+def _judged(connection: Connection, row: AlarmRow, rule: AlarmIn, facts: Facts, before: EventRow | None) -> set[str]:
+    """Raise an alarm where its rule does; the rule's name where an alarm that was there stays."""
+    finding = rules.finding(rule, facts)
+    if before is not None and finding is not None and rules.keeps(rule, finding) and before.mark == finding.mark:
+        return {row.alarm_id}
+    if finding is not None and rules.raises(rule, finding):
+        if before is not None:
+            _clear(connection, before, facts.now)
+        _raise(connection, row, rule, facts, finding)
+        return {row.alarm_id}
+    return set()
+
+
+def _raise(connection: Connection, row: AlarmRow, rule: AlarmIn, facts: Facts, finding: Finding) -> None:
+    content: Json = {
+        "name": rule.name,
+        "value": finding.value,
+        "limit": rule.limit,
+        "message": rules.message(rule, facts, finding),
+        "as_of_cycles": facts.summary.get("as_of_cycles"),
+    }
+    new = NewEvent(
+        event_id=secrets.token_hex(8),
+        alarm_id=row.alarm_id,
+        clutch_id=facts.clutch_id,
+        quantity=rule.quantity,
+        mark=finding.mark,
+        content=content,
+        raised_at=facts.now,
+    )
+    alarms.insert_event(connection, new)
+    _tell(connection, RAISED, new.event_id, receivers_of(connection, facts.clutch_id))
+
+
+def _clear(connection: Connection, event: EventRow, at: str) -> None:
+    alarms.clear(connection, event.event_id, at)
+    receivers = [row for row in receivers_of(connection, event.clutch_id) if row.content["cleared"]]
+    _tell(connection, CLEARED, event.event_id, receivers)
+
+
+def _tell(connection: Connection, kind: str, event_id: str, receivers: list[WebhookRow]) -> None:
+    event = alarms.event(connection, event_id)
+    if event is not None and receivers:
+        to_receivers(connection, kind, event, receivers)
+
+
+def _with_silence(connection: Connection, row: ClutchRow, kept: set[str], facts: Facts) -> ClutchRow:
+    """The clutch with since when its rig is silent: none but rules of silence were judged so far, `kept` are their
+    alarms."""
+    silent = facts.heard() if kept else None
+    if silent is None and row.silent is None:
+        return row
+    state = state_of(row.summary, disputed=_is_disputed(row), silent=silent)
+    clutches.set_silent(connection, row.clutch_id, silent, state=state["name"])
+    return replace(row, silent=silent, state=state["name"])
+
+
+def _facts(connection: Connection, row: ClutchRow, record: ClutchIn, at: str) -> Facts:
+    return Facts(
+        clutch_id=row.clutch_id,
+        summary=row.summary,
+        state=state_of(row.summary, disputed=_is_disputed(row), silent=row.silent),
+        geometry=record.geometry.to_model(),
+        verdict=verdicts.newest(connection, [row.clutch_id]).get(row.clutch_id),
+        now=at,
+        newest_fits=partial(_newest_fits, connection, row.clutch_id),
+        off_course=partial(_off_course, connection, row.clutch_id),
+        heard=partial(_heard, connection, row.clutch_id),
+    )
+
+
+def _is_disputed(row: ClutchRow) -> bool:
+    return row.disputed is not None and row.disputed == row.summary.get("life", "")
+
+
+def _newest_fits(connection: Connection, clutch_id: str) -> list[FitRow]:
+    """Those of the stationary test of most cycles, where it counts and has curves."""
+    fits = results.fits_of(connection, clutch_id)
+    tests = [row for row in runs.in_order(connection, clutch_id) if row.kind == STATIONARY and row.run_key in fits]
+    return fits[tests[-1].run_key] if tests else []
+
+
+def _off_course(connection: Connection, clutch_id: str) -> str | None:
+    """Why the newest test is off the course of those before it: the warning of the prediction, or the doubt of a held
+    run."""
+    newest = results.prediction_at(connection, clutch_id, SHOWN, ALL_PRESSURES)
+    notices = [] if newest is None else [notice for notice in newest.payload["warnings"] if notice["code"] == OFF_TRACK]
+    for row in runs.page(connection, clutch_id, state=runs.HELD):
+        notices += [doubt for doubt in row.doubts if doubt["code"] == OFF_COURSE]
+    return notices[0]["message"] if notices else None
+
+
+def _heard(connection: Connection, clutch_id: str) -> str | None:
+    return alarms.last_heard(connection, [clutch_id]).get(clutch_id)
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="milliseconds")

@@ -1,0 +1,228 @@
+"""What a rule watches: one value of a clutch against a limit, or a state or verdict among some."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from scipy.special import ndtri
+
+from models.clutch import Geometry
+from models.friction.slope import slope_gradient
+from models.friction.stribeck import StribeckParameters, slope
+from models.prognosis.first_passage import PassageStatus
+from service.columns import RADIANS_PER_SECOND_PER_RPM, bar
+from service.lives.condition import (
+    DISAGREES,
+    NORMAL,
+    SHOWN,
+    STATE_WORDS,
+    bound_in_words,
+    lower_bound,
+    silence_in_words,
+)
+from service.lives.payloads import ENDED, INSUFFICIENT
+from service.schemas.alarm import AlarmIn
+from storage.results import FitRow
+from storage.verdicts import VerdictRow
+
+_SECONDS_PER_HOUR, _SECONDS_PER_DAY = 3600.0, 86400.0
+#: The quantile that is the safe bound.
+_SAFE = 0.05
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Facts:
+    """What is stored of a clutch, as rules look at it. What few rules need is asked for when one does: `newest_fits`, those
+    of the newest stationary test, `off_course`, why its last test is off its course, `heard`, when its last run arrived.
+    """
+
+    clutch_id: str
+    summary: Mapping[str, Any]
+    state: Mapping[str, str]
+    geometry: Geometry
+    verdict: VerdictRow | None
+    now: str
+    newest_fits: Callable[[], list[FitRow]]
+    off_course: Callable[[], str | None]
+    heard: Callable[[], str | None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """What a rule finds: its value, the clause that says it, and a `mark` of what it is about; the same mark, the same
+    alarm."""
+
+    value: float | None
+    words: str
+    mark: str = ""
+
+
+def finding(rule: AlarmIn, facts: Facts) -> Finding | None:
+    """What a rule finds of a clutch; None where there is nothing to compare."""
+    return _QUANTITIES[rule.quantity](rule, facts)
+
+
+def raises(rule: AlarmIn, found: Finding | None) -> bool:
+    """Whether a finding raises an alarm."""
+    return found is not None and _passes(rule, found, 0.0)
+
+
+def keeps(rule: AlarmIn, found: Finding | None) -> bool:
+    """Whether an alarm that is raised stays: until the value has come back by the hysteresis."""
+    return found is not None and _passes(rule, found, rule.hysteresis)
+
+
+def message(rule: AlarmIn, facts: Facts, found: Finding) -> str:
+    """An alarm as a sentence."""
+    unit = _UNITS.get(rule.quantity)
+    limit = "" if rule.limit is None or unit is None else f" (limit: {rule.limit:,.6g}{unit})"
+    return f"{facts.clutch_id}: {found.words}{limit}"
+
+
+def _passes(rule: AlarmIn, found: Finding, hysteresis: float) -> bool:
+    if found.value is None:
+        return True
+    if rule.below is not None:
+        return found.value < rule.below + hysteresis * abs(rule.below)
+    return rule.above is not None and found.value > rule.above - hysteresis * abs(rule.above)
+
+
+def slope_quantile(rule: AlarmIn, fit: FitRow, geometry: Geometry) -> float | None:
+    """dμ/dv [s/m] of a fitted curve at the rule's speed, at the quantile of its standard error; None of one without
+    friction.
+
+    dμ/dv = (dS/dv) / (torque of a unit COF), sd = √(gᵀ Σ g) / (torque of a unit COF), as `models.friction.slope` has them.
+    """
+    parameters = StribeckParameters(
+        static_torque=fit.static_torque,
+        coulomb_ratio=fit.coulomb_ratio,
+        stribeck_velocity=fit.stribeck_velocity,
+        viscous_coefficient=fit.viscous_coefficient,
+    )
+    velocity = geometry.sliding_velocity(np.array(rule.speed_rpm * RADIANS_PER_SECOND_PER_RPM))
+    gradient = slope_gradient(float(velocity), parameters)
+    variance = float(gradient @ np.reshape(fit.unbiased_covariance or fit.covariance, (4, 4)) @ gradient)
+    if not variance > 0.0:
+        return None
+    margin = float(slope(velocity, parameters)) + float(ndtri(rule.probability)) * math.sqrt(variance)
+    return margin / geometry.torque_per_cof(fit.mean_pressure)
+
+
+def _remaining(rule: AlarmIn, facts: Facts) -> float | None:
+    """The remaining cycles at the rule's quantile; inf where they are beyond the horizon, None where nothing is known."""
+    summary = facts.summary
+    if summary.get("status", INSUFFICIENT) in (INSUFFICIENT, ENDED):
+        return None
+    if summary["status"] == PassageStatus.REACHED.value:
+        return 0.0
+    if rule.probability == _SAFE:
+        among = summary.get("with_held")
+        bound = lower_bound(summary["at_least"], among and among[SHOWN])
+        return math.inf if bound is None else float(bound)
+    quantile = summary["remaining_cycles"][f"{rule.probability:g}"]
+    return math.inf if quantile is None else float(quantile)
+
+
+def _remaining_cycles(rule: AlarmIn, facts: Facts) -> Finding | None:
+    value = _remaining(rule, facts)
+    if value is None or math.isinf(value):
+        return None
+    return Finding(value=value, words=_left(rule, value))
+
+
+def _left(rule: AlarmIn, cycles: float) -> str:
+    if rule.probability == _SAFE:
+        return bound_in_words(cycles)
+    return f"at most {cycles:,.0f} cycles are left with a probability of {rule.probability:.0%}"
+
+
+def _remaining_days(rule: AlarmIn, facts: Facts) -> Finding | None:
+    value, pace = _remaining(rule, facts), facts.summary.get("pace")
+    if value is None or math.isinf(value) or pace is None:
+        return None
+    days = value / pace["cycles_per_second"] / _SECONDS_PER_DAY
+    return Finding(value=days, words=f"{_left(rule, value)}, {days:,.3g} days at the pace of its runs")
+
+
+def _health(_rule: AlarmIn, facts: Facts) -> Finding | None:
+    health = (facts.summary.get("current") or {}).get("health")
+    if health is None or facts.summary.get("status") == ENDED:
+        return None
+    return Finding(value=float(health), words=f"its health is {health:.0%}")
+
+
+def _shudder_margin(rule: AlarmIn, facts: Facts) -> Finding | None:
+    """The least slope dμ/dv over the pressures of the newest test, at the quantile of its standard error."""
+    fits = facts.newest_fits()
+    margins = [
+        (margin, fit.pressure) for fit in fits if (margin := slope_quantile(rule, fit, facts.geometry)) is not None
+    ]
+    if not margins:
+        return None
+    margin, pressure = min(margins)
+    words = f"the friction's slope at {rule.speed_rpm:g} rpm and {bar(pressure):g} bar is {margin:.3g} s/m or more with 95 %"
+    if rule.probability != _SAFE:
+        words = words.replace("or more with 95 %", f"at the quantile {rule.probability:g}")
+    return Finding(value=margin, words=words)
+
+
+def _held_runs(_rule: AlarmIn, facts: Facts) -> Finding | None:
+    count = facts.summary.get("held", 0)
+    return Finding(
+        value=float(count), words=f"{count} held {'run waits' if count == 1 else 'runs wait'} for a decision"
+    )
+
+
+def _off_course(_rule: AlarmIn, facts: Facts) -> Finding | None:
+    why = facts.off_course()
+    return None if why is None else Finding(value=None, words=f"off its course: {why}")
+
+
+def _verdict(rule: AlarmIn, facts: Facts) -> Finding | None:
+    newest = facts.verdict
+    wanted = tuple(DISAGREES) if rule.any_of is None else rule.any_of
+    if newest is None or newest.adopted or newest.verdict not in wanted or newest.life != facts.summary.get("life", ""):
+        return None
+    causes = ", ".join(cause.replace("_", " ") for cause in newest.causes)
+    words = str(newest.verdict).replace("_", " ") + (f" ({causes})" if causes else "")
+    return Finding(value=None, words=f"the newest diagnosis says: {words}", mark=f"{newest.verdict}:{causes}")
+
+
+def _state(rule: AlarmIn, facts: Facts) -> Finding | None:
+    name = facts.state["name"]
+    if name not in (rule.any_of or [other for other in STATE_WORDS if other != NORMAL]):
+        return None
+    return Finding(value=None, words=f"{STATE_WORDS[name].lower()}: {facts.state['why']}", mark=name)
+
+
+def _silent_hours(_rule: AlarmIn, facts: Facts) -> Finding | None:
+    heard = facts.heard()
+    if heard is None or facts.summary.get("status") == ENDED:
+        return None
+    silence = datetime.fromisoformat(facts.now) - datetime.fromisoformat(heard)
+    hours = silence.total_seconds() / _SECONDS_PER_HOUR
+    return Finding(value=hours, words=silence_in_words(heard))
+
+
+_QUANTITIES: dict[str, Callable[[AlarmIn, Facts], Finding | None]] = {
+    "remaining_cycles": _remaining_cycles,
+    "remaining_days": _remaining_days,
+    "health": _health,
+    "shudder_margin": _shudder_margin,
+    "held_runs": _held_runs,
+    "off_course": _off_course,
+    "verdict": _verdict,
+    "state": _state,
+    "silent_hours": _silent_hours,
+}
+#: The units of limits that a message states.
+_UNITS = {
+    "remaining_cycles": " cycles",
+    "remaining_days": " days",
+    "health": "",
+    "shudder_margin": " s/m",
+    "silent_hours": " h",
+}

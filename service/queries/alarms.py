@@ -1,0 +1,130 @@
+"""`/v1/alarms`, `/v1/alarms/events`, `/v1/webhooks`: rules, what they have raised, receivers, what these were sent."""
+
+from collections.abc import Collection
+from datetime import UTC, datetime
+from typing import Any
+
+from service.alarms import raising, receivers
+from service.errors import NotFoundError
+from service.lists import Place
+from service.lists import page as page_of
+from storage import alarms, webhooks
+from storage.alarms import AlarmRow
+from storage.engine.database import Database
+from storage.webhooks import DeliveryRow, WebhookRow
+
+
+def rule_out(row: AlarmRow) -> dict[str, Any]:
+    """A rule as it goes out."""
+    rule = raising.rule_of(row).model_dump(mode="json")
+    return rule | {"alarm_id": row.alarm_id, "saved_at": row.saved_at, "saved_by": row.saved_by}
+
+
+def page(database: Database, *, limit: int, after: Place | None, only: Collection[str] | None = None) -> dict[str, Any]:
+    """A page of rules, of `only` these clutches, behind the name at which another ended."""
+    with database.reading() as connection:
+        rows = alarms.page(connection, limit=limit + 1, after="" if after is None else after[1], only=only)
+    following = (0.0, rows[limit - 1].alarm_id) if len(rows) > limit else None
+    return page_of([rule_out(row) for row in rows[:limit]], following)
+
+
+def look_up(database: Database, alarm_id: str, *, only: Collection[str] | None = None) -> dict[str, Any]:
+    """A rule, of `only` these clutches. Raises NotFoundError."""
+    with database.reading() as connection:
+        row = alarms.get(connection, alarm_id)
+    if row is None or (only is not None and row.clutch_id not in only):
+        raise NotFoundError(f"no alarm is known as {alarm_id[:80]!r}")
+    return rule_out(row)
+
+
+def events(
+    database: Database,
+    *,
+    limit: int,
+    after: Place | None,
+    state: str | None = None,
+    alarm_id: str | None = None,
+    only: Collection[str] | None = None,
+) -> dict[str, Any]:
+    """A page of what was raised, newest first, of `only` these clutches."""
+    before = None if after is None else after[0]
+    with database.reading() as connection:
+        rows = alarms.events(connection, limit=limit + 1, before=before, state=state, alarm_id=alarm_id, only=only)
+    following = (float(rows[limit - 1].event_key), "") if len(rows) > limit else None
+    return page_of([raising.event_out(row) for row in rows[:limit]], following)
+
+
+def event(database: Database, event_id: str, *, only: Collection[str] | None = None) -> dict[str, Any]:
+    """What was raised. Raises NotFoundError."""
+    with database.reading() as connection:
+        row = alarms.event(connection, event_id)
+    if row is None or (only is not None and row.clutch_id not in only):
+        raise NotFoundError(f"no event of an alarm is known as {event_id[:80]!r}")
+    return raising.event_out(row)
+
+
+def receiver_out(row: WebhookRow, *, secret: str | None = None) -> dict[str, Any]:
+    """A receiver as it goes out: without what is secret, but for a `secret` that was made just now."""
+    return {
+        "webhook_id": row.webhook_id,
+        "url": receivers.shown(row.address),
+        "secret": secret,
+        **row.content,
+        "created_at": row.created_at,
+        "created_by": row.created_by,
+    }
+
+
+def receiver_page(database: Database, *, limit: int, after: Place | None) -> dict[str, Any]:
+    """A page of receivers behind the name at which another ended."""
+    with database.reading() as connection:
+        rows = webhooks.page(connection, limit=limit + 1, after="" if after is None else after[1])
+    following = (0.0, rows[limit - 1].webhook_id) if len(rows) > limit else None
+    return page_of([receiver_out(row) for row in rows[:limit]], following)
+
+
+def receiver(database: Database, webhook_id: str) -> dict[str, Any]:
+    """A receiver. Raises NotFoundError."""
+    with database.reading() as connection:
+        return receiver_out(_receiver(webhooks.get(connection, webhook_id), webhook_id))
+
+
+def deliveries(database: Database, webhook_id: str, *, limit: int, after: Place | None) -> dict[str, Any]:
+    """A page of what a receiver was sent or is to be sent, newest first. Raises NotFoundError."""
+    before = None if after is None else after[0]
+    with database.reading() as connection:
+        _receiver(webhooks.get(connection, webhook_id), webhook_id)
+        rows = webhooks.deliveries(connection, webhook_id, limit=limit + 1, before=before)
+    following = (float(rows[limit - 1].delivery_key), "") if len(rows) > limit else None
+    return page_of([delivery_out(row) for row in rows[:limit]], following)
+
+
+def delivered(database: Database, delivery_ids: Collection[str]) -> list[dict[str, Any]]:
+    """These deliveries as they are now; those of a receiver that is gone are left out."""
+    with database.reading() as connection:
+        rows = [webhooks.find_delivery(connection, delivery_id) for delivery_id in delivery_ids]
+    return [delivery_out(row) for row in rows if row is not None]
+
+
+def delivery_out(row: DeliveryRow) -> dict[str, Any]:
+    """A delivery as it goes out."""
+    again = row.state == webhooks.WAITING and row.due > 0.0
+    return {
+        "delivery_id": row.delivery_id,
+        "webhook_id": row.webhook_id,
+        "event_id": row.event_id,
+        "state": row.state,
+        "attempts": row.attempts,
+        "status": row.status,
+        "problem": row.problem,
+        "created_at": row.created_at,
+        "last_attempt_at": row.last_attempt_at,
+        "delivered_at": row.delivered_at,
+        "next_attempt_at": datetime.fromtimestamp(row.due, UTC).isoformat(timespec="seconds") if again else None,
+    }
+
+
+def _receiver(row: WebhookRow | None, webhook_id: str) -> WebhookRow:
+    if row is None:
+        raise NotFoundError(f"no webhook is known as {webhook_id[:80]!r}")
+    return row

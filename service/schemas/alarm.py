@@ -1,0 +1,255 @@
+"""Alarms: rules, what they raise, receivers, and what these were sent."""
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import AfterValidator, Field, StringConstraints, model_validator
+
+from models.prognosis.criteria import QUANTILES
+from service.schemas.base import Answer, Identifier, Next, NotNegativeNumber, PositiveNumber, Reason, Schema
+from service.schemas.limits import (
+    LARGEST_LIMIT,
+    LONGEST_ADDRESS,
+    LONGEST_NAME,
+    LONGEST_SECRET,
+    MOST_SPEED_RPM,
+    SHORTEST_SECRET,
+)
+
+WatchedQuantity = Literal[
+    "remaining_cycles",
+    "remaining_days",
+    "health",
+    "shudder_margin",
+    "held_runs",
+    "off_course",
+    "verdict",
+    "state",
+    "silent_hours",
+]
+#: Which side of its limit a quantity is watched at, and the limit where none is given (None: it must be); quantities that
+#: have no limit are not here.
+LIMITS: dict[str, tuple[Literal["below", "above"], float | None]] = {
+    "remaining_cycles": ("below", None),
+    "remaining_days": ("below", None),
+    "health": ("below", None),
+    "shudder_margin": ("below", 0.0),
+    "held_runs": ("above", 0.0),
+    "silent_hours": ("above", None),
+}
+
+
+def _quantile(sent: float) -> float:
+    if sent not in QUANTILES:
+        raise ValueError(
+            f"probability must be one of {', '.join(f'{quantile:g}' for quantile in QUANTILES)}, got {sent:g}"
+        )
+    return sent
+
+
+Probability = Annotated[
+    float, Field(strict=True, json_schema_extra={"enum": list(QUANTILES)}), AfterValidator(_quantile)
+]
+Limit = Annotated[float, Field(ge=-LARGEST_LIMIT, le=LARGEST_LIMIT, allow_inf_nan=False, strict=True)]
+Material = Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_NAME)]
+StateName = Literal["failure", "maintenance", "check", "out_of_specification", "normal"]
+VerdictName = Literal["model_adequate", "cause_named", "cause_ambiguous", "unexplained_structure", "insufficient_data"]
+EventState = Literal["raised", "acknowledged", "cleared"]
+
+
+class KindIn(Schema):
+    """A kind of clutch: what is left out may be any."""
+
+    friction_material: Material | None = Field(default=None, description="The friction material")
+    reaction_plate: Material | None = Field(default=None, description="The reaction plate's material")
+    fluid: Material | None = Field(default=None, description="The fluid")
+
+
+class AlarmIn(Schema):
+    """A rule: when an alarm is raised, of which clutches."""
+
+    name: Annotated[str, StringConstraints(max_length=LONGEST_NAME)] = Field(
+        default="", description="What people call it"
+    )
+    clutch_id: Identifier | None = Field(default=None, description="The clutch; left out, all of them")
+    kind: KindIn | None = Field(default=None, description="Clutches of this kind only")
+    quantity: WatchedQuantity = Field(
+        description="What is watched: `remaining_cycles` (to the first criterion that ends the life), `remaining_days` at "
+        "the pace of the runs, `health`, `shudder_margin` (slope of the newest test's curves, s/m), `held_runs`, "
+        "`off_course`, `verdict` of the newest diagnosis, `state`, `silent_hours` since the last run arrived"
+    )
+    probability: Probability = Field(
+        default=0.05, description="The quantile that is compared: 0.05 is the safe bound, of the shudder margin too"
+    )
+    below: Limit | None = Field(default=None, description="It is raised where the value is below this")
+    above: Limit | None = Field(default=None, description="It is raised where the value is above this")
+    any_of: tuple[StateName | VerdictName, ...] | None = Field(
+        default=None,
+        description="States or verdicts that raise it; left out: every state but `normal`, every verdict by which data and "
+        "model disagree",
+    )
+    speed_rpm: Annotated[PositiveNumber, Field(le=MOST_SPEED_RPM)] = Field(
+        default=100.0, description="Speed at which the shudder margin is taken, rpm"
+    )
+    hysteresis: Annotated[NotNegativeNumber, Field(le=1.0)] = Field(
+        default=0.1, description="By which share of the limit the value must come back before the alarm is cleared"
+    )
+    enabled: bool = Field(default=True, strict=True, description="Whether the rule is in use")
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        """A limit on the side that the quantity is watched at, and nothing that says nothing."""
+        side, usual = LIMITS.get(self.quantity, (None, None))
+        for name in ("below", "above"):
+            given = getattr(self, name)
+            if given is not None and name != side:
+                instead = f"its limit is {side!r}" if side else "it has no limit"
+                raise ValueError(f"{self.quantity} cannot be watched with {name!r}: {instead}")
+        if side is not None and getattr(self, side) is None:
+            if usual is None:
+                raise ValueError(f"{self.quantity} needs {side!r}, its limit")
+            object.__setattr__(self, side, usual)
+        if self.quantity == "silent_hours" and not (self.above or 0.0) > 0.0:
+            raise ValueError(f"silent_hours needs a limit above 0, got {self.above}")
+        if self.any_of is not None and self.quantity not in ("state", "verdict"):
+            raise ValueError(f"any_of is of the quantities state and verdict, not of {self.quantity}")
+        if self.clutch_id is not None and self.kind is not None:
+            raise ValueError("give clutch_id or kind, not both")
+        return self
+
+    @property
+    def limit(self) -> float | None:
+        """Its limit, None where the quantity has none."""
+        return self.below if self.above is None else self.above
+
+
+class AlarmOut(AlarmIn):
+    """A rule in force."""
+
+    alarm_id: str = Field(description="The rule's name")
+    saved_at: str = Field(description="When it was saved")
+    saved_by: str = Field(description="Who saved it")
+
+
+class AlarmPage(Answer):
+    """Rules by name."""
+
+    items: list[AlarmOut] = Field(description="The rules")
+    next: Next
+
+
+class EventOut(Answer):
+    """An alarm that was raised."""
+
+    event_id: str = Field(description="The alarm's name")
+    alarm_id: str = Field(description="The rule that raised it; it may be deleted since")
+    name: str = Field(description="What the rule was called")
+    clutch_id: str = Field(description="The clutch")
+    quantity: WatchedQuantity = Field(description="What is watched")
+    value: float | None = Field(description="The value that raised it; null where it is none")
+    limit: float | None = Field(description="The limit that it passed; null where there is none")
+    message: str = Field(description="What is so, in a sentence")
+    as_of_cycles: float | None = Field(description="Duty cycles since new of the clutch's latest run by then")
+    state: EventState = Field(description="Whether it waits for somebody, was acknowledged, or is over")
+    raised_at: str = Field(description="When it was raised")
+    acknowledged_at: str | None = Field(description="When it was acknowledged")
+    acknowledged_by: str | None = Field(description="Who acknowledged it")
+    note: str = Field(description="What they remarked")
+    cleared_at: str | None = Field(description="When what raised it was over")
+
+
+class EventPage(Answer):
+    """Alarms, newest first."""
+
+    items: list[EventOut] = Field(description="The alarms")
+    next: Next
+
+
+class AcknowledgeIn(Schema):
+    """An alarm is acknowledged."""
+
+    note: Reason = Field(default="", description="A remark")
+
+
+class WebhookIn(Schema):
+    """A receiver of alarms."""
+
+    url: Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_ADDRESS, strip_whitespace=True)] = Field(
+        description="`https://...` or `http://...`; with the extra `notify` also an address of Apprise, as `mailtos://...`, "
+        "`msteams://...`, `slack://...`, `ntfys://...`"
+    )
+    secret: Annotated[str, StringConstraints(max_length=LONGEST_SECRET)] | None = Field(
+        default=None, description="What signs the requests; left out, one is made and answered this once"
+    )
+    name: Annotated[str, StringConstraints(max_length=LONGEST_NAME)] = Field(
+        default="", description="What people call it"
+    )
+    clutch_id: Identifier | None = Field(default=None, description="Alarms of this clutch only")
+    cleared: bool = Field(default=False, strict=True, description="Whether it is also sent that an alarm is over")
+
+    @model_validator(mode="after")
+    def _long_enough(self) -> Self:
+        if self.secret and len(self.secret) < SHORTEST_SECRET:
+            raise ValueError(f"secret must have at least {SHORTEST_SECRET} characters, or be left out")
+        return self
+
+
+class WebhookOut(Answer):
+    """A receiver; its address without passwords."""
+
+    webhook_id: str = Field(description="The receiver's name")
+    url: str = Field(description="Its address, without what may be secret in it")
+    secret: str | None = Field(
+        description="The secret, where it was made by the service and only when it was; else null"
+    )
+    name: str = Field(description="What people call it")
+    clutch_id: str | None = Field(description="Alarms of this clutch only; null: of all")
+    cleared: bool = Field(description="Whether it is also sent that an alarm is over")
+    created_at: str = Field(description="When it was made")
+    created_by: str = Field(description="Who made it")
+
+
+class WebhookPage(Answer):
+    """Receivers by name."""
+
+    items: list[WebhookOut] = Field(description="The receivers")
+    next: Next
+
+
+class DeliveryOut(Answer):
+    """What a receiver was sent, or is to be sent."""
+
+    delivery_id: str = Field(description="Its name, the header `Clutchlife-Delivery`; the same at each attempt")
+    webhook_id: str = Field(description="The receiver")
+    event_id: str | None = Field(description="The alarm; null: a test")
+    state: Literal["waiting", "delivered", "failed"] = Field(
+        description="Whether it is to be tried, was taken, or was given up"
+    )
+    attempts: int = Field(description="How often it was tried")
+    status: int | None = Field(description="The HTTP status of the last attempt")
+    problem: str | None = Field(description="Why the last attempt failed")
+    created_at: str = Field(description="When it was put into the outbox")
+    last_attempt_at: str | None = Field(description="When it was tried last")
+    delivered_at: str | None = Field(description="When it was taken")
+    next_attempt_at: str | None = Field(description="When it is tried again; null where it is not")
+
+
+class DeliveryPage(Answer):
+    """Deliveries, newest first."""
+
+    items: list[DeliveryOut] = Field(description="The deliveries")
+    next: Next
+
+
+class TestedOut(Answer):
+    """What a test sent to each receiver."""
+
+    deliveries: list[DeliveryOut] = Field(description="A delivery a receiver; `waiting` where it is tried again")
+    message: str = Field(description="How it went, in a sentence")
+
+
+EXAMPLE: dict[str, Any] = {
+    "clutch_id": "bench3-017",
+    "quantity": "remaining_cycles",
+    "probability": 0.05,
+    "below": 4000,
+}

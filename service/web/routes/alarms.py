@@ -1,0 +1,251 @@
+"""Alarms: rules, what they have raised, receivers, and what these were sent."""
+
+from functools import partial
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Request
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import Response
+from pydantic import Field
+
+from service.alarms.notify import require_address
+from service.lists import from_cursor
+from service.queries import alarms
+from service.queries.cache import to_json
+from service.run_files.json_run import checked
+from service.schemas import alarm as schemas
+from service.schemas.alarm import (
+    AcknowledgeIn,
+    AlarmIn,
+    AlarmOut,
+    AlarmPage,
+    DeliveryPage,
+    EventOut,
+    EventPage,
+    TestedOut,
+    WebhookIn,
+    WebhookOut,
+    WebhookPage,
+)
+from service.schemas.limits import IDENTIFIER_PATTERN, LONGEST_IDENTIFIER
+from service.web.answers import JSON_TYPE, answer, described_body, json_body, now
+from service.web.auth import (
+    Admin,
+    OwnAdmin,
+    OwnIngester,
+    OwnReader,
+    Reader,
+    name_of_caller,
+    own_clutches,
+    require_clutch,
+)
+from service.web.context import Context, Cursor, Limit
+from service.web.limits import USUAL_ITEMS
+from service.web.problems import CHANGING, READING, SENDING
+from service.web.routes.waiting import until_ended
+from service.workflows import change_alarms, change_webhooks
+
+router = APIRouter(prefix="/v1/alarms", tags=["alarms"])
+webhook_router = APIRouter(prefix="/v1/webhooks", tags=["alarms"])
+
+#: [s] That a test waits for its deliveries. Chosen: a little longer than one attempt may take.
+_TEST_SECONDS = 12.0
+
+AlarmId = Annotated[str, Field(description="The rule's name")]
+EventId = Annotated[str, Field(description="The alarm's name")]
+WebhookId = Annotated[str, Field(description="The receiver's name")]
+OfEventState = Annotated[
+    Literal["open", "raised", "acknowledged", "cleared"] | None,
+    Query(description="Alarms in this state only; `open`: those that are not cleared. Left out, all"),
+]
+OfAlarm = Annotated[
+    str | None, Query(max_length=LONGEST_IDENTIFIER, description="Alarms of this rule only; left out, of all")
+]
+OfClutch = Annotated[
+    str | None, Query(pattern=IDENTIFIER_PATTERN, description="Alarms of this clutch only; left out, of all")
+]
+
+
+@router.get("", response_model=AlarmPage, responses=READING)
+async def list_alarms(
+    request: Request, context: OwnReader, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
+) -> Response:
+    """Rules by name; of a key that is bound to clutches, those of these clutches."""
+    after, own = from_cursor(cursor), own_clutches(request)
+    return await answer(request, lambda: alarms.page(context.database, limit=limit, after=after, only=own))
+
+
+@router.post(
+    "",
+    status_code=201,
+    response_model=AlarmOut,
+    responses=SENDING | {200: {"model": AlarmOut, "description": "The rule is there already"}},
+    openapi_extra=described_body(AlarmIn, schemas.EXAMPLE),
+)
+async def post_alarm(request: Request, context: OwnIngester) -> Response:
+    """Make a rule; what it raises of the clutches as they are is raised at once."""
+    return await _saved(request, context, None)
+
+
+@router.get("/events", response_model=EventPage, responses=READING)
+async def list_events(
+    request: Request,
+    context: OwnReader,
+    state: OfEventState = None,
+    alarm_id: OfAlarm = None,
+    clutch_id: OfClutch = None,
+    limit: Limit = USUAL_ITEMS,
+    cursor: Cursor = None,
+) -> Response:
+    """What rules have raised, newest first; of a key that is bound to clutches, of these."""
+    after, own = from_cursor(cursor), own_clutches(request)
+    if clutch_id is not None:
+        require_clutch(request, clutch_id)
+        own = frozenset({clutch_id})
+    listed = partial(
+        alarms.events, context.database, limit=limit, after=after, state=state, alarm_id=alarm_id, only=own
+    )
+    return await answer(request, listed)
+
+
+@router.get("/events/{event_id}", response_model=EventOut, responses=READING)
+async def read_event(request: Request, context: OwnReader, event_id: EventId) -> Response:
+    """One alarm."""
+    own = own_clutches(request)
+    return await answer(request, lambda: alarms.event(context.database, event_id, only=own))
+
+
+@router.post(
+    "/events/{event_id}/acknowledge",
+    response_model=EventOut,
+    responses=CHANGING,
+    openapi_extra=described_body(AcknowledgeIn, {"note": "a new set is ordered"})
+    | {"requestBody": described_body(AcknowledgeIn, {"note": "ordered"})["requestBody"] | {"required": False}},
+)
+async def acknowledge_event(request: Request, context: OwnIngester, event_id: EventId) -> Response:
+    """Say that somebody has seen an alarm; the body may be left out."""
+    body = await json_body(request) if await request.body() else b"{}"
+    seen = checked(AcknowledgeIn, body)
+    await run_in_threadpool(alarms.event, context.database, event_id, only=own_clutches(request))
+    acknowledge = partial(change_alarms.acknowledge, note=seen.note, by=name_of_caller(request), at=now())
+    return _json(await run_in_threadpool(acknowledge, context.database, event_id))
+
+
+@router.get("/{alarm_id}", response_model=AlarmOut, responses=READING)
+async def read_alarm(request: Request, context: OwnReader, alarm_id: AlarmId) -> Response:
+    """A rule in force."""
+    own = own_clutches(request)
+    return await answer(request, lambda: alarms.look_up(context.database, alarm_id, only=own))
+
+
+@router.put(
+    "/{alarm_id}",
+    response_model=AlarmOut,
+    responses=CHANGING,
+    openapi_extra=described_body(AlarmIn, schemas.EXAMPLE),
+)
+async def put_alarm(request: Request, context: OwnAdmin, alarm_id: AlarmId) -> Response:
+    """Replace a rule; what it has raised is cleared where the new one would not keep it."""
+    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=own_clutches(request))
+    return await _saved(request, context, alarm_id)
+
+
+@router.delete("/{alarm_id}", status_code=204, response_class=Response, responses=READING)
+async def delete_alarm(request: Request, context: OwnAdmin, alarm_id: AlarmId) -> Response:
+    """Delete a rule; what it has raised is cleared and stays listed."""
+    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=own_clutches(request))
+    await run_in_threadpool(change_alarms.remove, context.database, alarm_id)
+    return Response(status_code=204)
+
+
+@router.post("/{alarm_id}/test", response_model=TestedOut, responses=CHANGING)
+async def test_alarm(request: Request, context: OwnAdmin, alarm_id: AlarmId) -> Response:
+    """Send a test to each of the rule's receivers, and say how it went."""
+    await run_in_threadpool(alarms.look_up, context.database, alarm_id, only=own_clutches(request))
+    names = await run_in_threadpool(change_alarms.test, context.database, alarm_id)
+    return await _tested(context, names)
+
+
+@webhook_router.get("", response_model=WebhookPage, responses=READING)
+async def list_webhooks(
+    request: Request, context: Reader, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
+) -> Response:
+    """Receivers, without what is secret in their addresses."""
+    after = from_cursor(cursor)
+    return await answer(request, lambda: alarms.receiver_page(context.database, limit=limit, after=after))
+
+
+@webhook_router.post(
+    "",
+    status_code=201,
+    response_model=WebhookOut,
+    responses=SENDING,
+    openapi_extra=described_body(WebhookIn, {"url": "https://example.org/hook", "secret": "wet-clutch-7000"}),
+)
+async def post_webhook(request: Request, context: Admin) -> Response:
+    """Add a receiver. Where no secret is given one is made, and answered this once."""
+    receiver = checked(WebhookIn, await json_body(request))
+    private = await run_in_threadpool(
+        change_webhooks.inside_allowed, context.database, context.settings.private_receivers
+    )
+    await run_in_threadpool(require_address, receiver.url, private=private)
+    add = partial(change_webhooks.add, by=name_of_caller(request), at=now())
+    row = await run_in_threadpool(add, context.database, receiver)
+    made = None if receiver.secret else row.secret
+    content = alarms.receiver_out(row, secret=made)
+    return _json(content, status=201, headers={"Location": f"/v1/webhooks/{row.webhook_id}"})
+
+
+@webhook_router.get("/{webhook_id}", response_model=WebhookOut, responses=READING)
+async def read_webhook(request: Request, context: Reader, webhook_id: WebhookId) -> Response:
+    """A receiver, without what is secret in its address."""
+    return await answer(request, lambda: alarms.receiver(context.database, webhook_id))
+
+
+@webhook_router.delete("/{webhook_id}", status_code=204, response_class=Response, responses=READING)
+async def delete_webhook(context: Admin, webhook_id: WebhookId) -> Response:
+    """Delete a receiver, its secret and its deliveries; what waits for it is not sent."""
+    await run_in_threadpool(change_webhooks.remove, context.database, webhook_id)
+    return Response(status_code=204)
+
+
+@webhook_router.get("/{webhook_id}/deliveries", response_model=DeliveryPage, responses=READING)
+async def list_deliveries(
+    request: Request, context: Reader, webhook_id: WebhookId, limit: Limit = USUAL_ITEMS, cursor: Cursor = None
+) -> Response:
+    """What a receiver was sent or is to be sent, newest first."""
+    after = from_cursor(cursor)
+    return await answer(request, lambda: alarms.deliveries(context.database, webhook_id, limit=limit, after=after))
+
+
+@webhook_router.post("/{webhook_id}/test", response_model=TestedOut, responses=CHANGING)
+async def test_webhook(context: Admin, webhook_id: WebhookId) -> Response:
+    """Send a test to a receiver, and say how it went."""
+    names = await run_in_threadpool(change_webhooks.test, context.database, webhook_id, at=now())
+    return await _tested(context, names)
+
+
+async def _saved(request: Request, context: Context, alarm_id: str | None) -> Response:
+    rule = checked(AlarmIn, await json_body(request))
+    require_clutch(request, rule.clutch_id)
+    save = partial(change_alarms.save, by=name_of_caller(request), at=now(), alarm_id=alarm_id)
+    row, new = await run_in_threadpool(save, context.database, rule)
+    context.outbox.wake()
+    headers = {"Location": f"/v1/alarms/{row.alarm_id}"}
+    return _json(alarms.rule_out(row), status=201 if new else 200, headers=headers)
+
+
+async def _tested(context: Context, names: list[str]) -> Response:
+    context.outbox.wake()
+    items = await until_ended(
+        partial(alarms.delivered, context.database, names),
+        lambda rows: all(row["state"] != "waiting" for row in rows),
+        _TEST_SECONDS,
+    )
+    taken = sum(row["state"] == "delivered" for row in items)
+    message = f"{taken} of {len(items)} receivers took the test" if items else "there is no receiver: add a webhook"
+    return _json({"deliveries": items, "message": message})
+
+
+def _json(content: object, *, status: int = 200, headers: dict[str, str] | None = None) -> Response:
+    return Response(content=to_json(content), status_code=status, media_type=JSON_TYPE, headers=headers)

@@ -1,0 +1,192 @@
+"""Rules of alarms, and what they have raised: once for a rule and a clutch until it is cleared, newest first."""
+
+from collections.abc import Collection
+from dataclasses import asdict, dataclass, fields
+
+import sqlalchemy as sa
+from sqlalchemy import Connection, Double, Row, Text, bindparam, delete, func, or_, select, update
+
+from storage.dialects import ALL_ROWS, among, upsert
+from storage.encoding.json_text import Json, to_object, to_text
+from storage.tables import NOT_CLEARED, alarm, alarm_event, run
+
+RAISED, ACKNOWLEDGED, CLEARED = "raised", "acknowledged", "cleared"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlarmRow:
+    """A rule in force: `content` as it was posted with its defaults, of one clutch or (None) several; who saved it when."""
+
+    alarm_id: str
+    clutch_id: str | None
+    enabled: bool
+    content: Json
+    saved_at: str
+    saved_by: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewEvent:
+    """An alarm that is about to be raised; `mark` is what it is raised for, `content` what is said of it."""
+
+    event_id: str
+    alarm_id: str
+    clutch_id: str
+    quantity: str
+    mark: str
+    content: Json
+    raised_at: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EventRow(NewEvent):
+    """A stored alarm; the later it was raised, the greater its key."""
+
+    event_key: int
+    acknowledged_at: str | None
+    acknowledged_by: str | None
+    note: str
+    cleared_at: str | None
+
+    @property
+    def state(self) -> str:
+        """Raised, acknowledged or cleared."""
+        return CLEARED if self.cleared_at is not None else RAISED if self.acknowledged_at is None else ACKNOWLEDGED
+
+
+_put = upsert(alarm)
+_by_id = select(alarm).where(alarm.c.alarm_id == bindparam("wanted"))
+_in_order = select(alarm).where(alarm.c.alarm_id > bindparam("after")).order_by(alarm.c.alarm_id)
+_enabled = select(alarm).where(alarm.c.enabled == 1).order_by(alarm.c.alarm_id)
+_of_or_all = or_(alarm.c.clutch_id.is_(None), alarm.c.clutch_id == bindparam("of_clutch"))
+_delete = delete(alarm).where(alarm.c.alarm_id == bindparam("wanted"))
+_insert_event = sa.insert(alarm_event)
+_event_by_id = select(alarm_event).where(alarm_event.c.event_id == bindparam("wanted"))
+_open = select(alarm_event).where(NOT_CLEARED, alarm_event.c.clutch_id == bindparam("of_clutch"))
+_open_of_alarm = select(alarm_event).where(NOT_CLEARED, alarm_event.c.alarm_id == bindparam("of_alarm"))
+_newest = (
+    select(alarm_event)
+    .where(
+        alarm_event.c.event_key < bindparam("before", type_=Double),
+        or_(bindparam("of_alarm", type_=Text).is_(None), alarm_event.c.alarm_id == bindparam("of_alarm")),
+    )
+    .order_by(alarm_event.c.event_key.desc())
+    .limit(bindparam("most"))
+)
+_clear = update(alarm_event).where(alarm_event.c.event_id == bindparam("wanted")).values(cleared_at=bindparam("at"))
+_acknowledge = (
+    update(alarm_event)
+    .where(alarm_event.c.event_id == bindparam("wanted"))
+    .values(acknowledged_at=bindparam("at"), acknowledged_by=bindparam("by"), note=bindparam("new_note"))
+)
+_last_heard = (
+    select(run.c.clutch_id, func.max(run.c.received_at)).where(among(run.c.clutch_id, "of_clutches"))
+).group_by(run.c.clutch_id)
+_IN_STATE = {
+    RAISED: NOT_CLEARED & alarm_event.c.acknowledged_at.is_(None),
+    ACKNOWLEDGED: NOT_CLEARED & alarm_event.c.acknowledged_at.is_not(None),
+    CLEARED: alarm_event.c.cleared_at.is_not(None),
+    "open": NOT_CLEARED,
+}
+
+
+def put(connection: Connection, row: AlarmRow) -> None:
+    """Store a rule, in the place of the one of that name."""
+    values = asdict(row) | {"enabled": int(row.enabled), "content": to_text(row.content)}
+    connection.execute(_put[connection.dialect.name], values)
+
+
+def get(connection: Connection, alarm_id: str) -> AlarmRow | None:
+    """The rule in force, or None."""
+    row = connection.execute(_by_id, {"wanted": alarm_id}).first()
+    return None if row is None else _rule(row)
+
+
+def remove(connection: Connection, alarm_id: str) -> None:
+    """Delete a rule; what it has raised stays."""
+    connection.execute(_delete, {"wanted": alarm_id})
+
+
+def page(connection: Connection, *, limit: int, after: str = "", only: Collection[str] | None = None) -> list[AlarmRow]:
+    """Rules by name behind the name `after`; those of `only` these clutches."""
+    query, values = _in_order.limit(limit), {"after": after}
+    if only is not None:
+        query, values = query.where(among(alarm.c.clutch_id, "of_only")), values | {"of_only": to_text(sorted(only))}
+    return [_rule(row) for row in connection.execute(query, values)]
+
+
+def enabled(connection: Connection, clutch_id: str | None = None) -> list[AlarmRow]:
+    """The rules that are in use, those that may be of a clutch where it is named."""
+    query = _enabled if clutch_id is None else _enabled.where(_of_or_all)
+    return [_rule(row) for row in connection.execute(query, {} if clutch_id is None else {"of_clutch": clutch_id})]
+
+
+def insert_event(connection: Connection, row: NewEvent) -> None:
+    """Raise an alarm. Raises IntegrityError where the rule's alarm of the clutch is not cleared yet."""
+    values = {field.name: getattr(row, field.name) for field in fields(NewEvent)}
+    connection.execute(_insert_event, values | {"content": to_text(row.content)})
+
+
+def event(connection: Connection, event_id: str) -> EventRow | None:
+    """An alarm, or None."""
+    row = connection.execute(_event_by_id, {"wanted": event_id}).first()
+    return None if row is None else _event(row)
+
+
+def open_of_clutch(connection: Connection, clutch_id: str) -> dict[str, EventRow]:
+    """alarm_id -> the alarm of a clutch that is not cleared."""
+    return {row.alarm_id: _event(row) for row in connection.execute(_open, {"of_clutch": clutch_id})}
+
+
+def open_of_alarm(connection: Connection, alarm_id: str) -> list[EventRow]:
+    """What a rule has raised and is not cleared."""
+    return [_event(row) for row in connection.execute(_open_of_alarm, {"of_alarm": alarm_id})]
+
+
+def events(
+    connection: Connection,
+    *,
+    limit: int | None = None,
+    before: float | None = None,
+    state: str | None = None,
+    alarm_id: str | None = None,
+    only: Collection[str] | None = None,
+) -> list[EventRow]:
+    """Alarms, newest first: in a state (`open`: raised or acknowledged), of a rule, of `only` these clutches; `before` is
+    the key of the last of the page before."""
+    query = _newest if state is None else _newest.where(_IN_STATE[state])
+    values: dict[str, object] = {
+        "most": ALL_ROWS if limit is None else limit,
+        "before": 2.0**62 if before is None else before,
+        "of_alarm": alarm_id,
+    }
+    if only is not None:
+        query = query.where(among(alarm_event.c.clutch_id, "of_only"))
+        values["of_only"] = to_text(sorted(only))
+    return [_event(row) for row in connection.execute(query, values)]
+
+
+def clear(connection: Connection, event_id: str, at: str) -> None:
+    """Note that what raised an alarm is over."""
+    connection.execute(_clear, {"wanted": event_id, "at": at})
+
+
+def acknowledge(connection: Connection, event_id: str, *, at: str, by: str, note: str) -> None:
+    """Note who has seen an alarm, when, and what they remarked."""
+    connection.execute(_acknowledge, {"wanted": event_id, "at": at, "by": by, "new_note": note})
+
+
+def last_heard(connection: Connection, clutch_ids: Collection[str]) -> dict[str, str]:
+    """clutch_id -> when its last run arrived, of those of these clutches that have one."""
+    rows = connection.execute(_last_heard, {"of_clutches": to_text(sorted(clutch_ids))})
+    return {row.clutch_id: row[1] for row in rows}
+
+
+def _rule(row: Row[tuple[object, ...]]) -> AlarmRow:
+    values = row._asdict()
+    return AlarmRow(**values | {"enabled": bool(values["enabled"]), "content": to_object(values["content"])})
+
+
+def _event(row: Row[tuple[object, ...]]) -> EventRow:
+    values = row._asdict()
+    return EventRow(**values | {"content": to_object(values["content"])})

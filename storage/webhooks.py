@@ -1,0 +1,196 @@
+"""Receivers of alarms, and the outbox of what they are to be sent.
+
+A delivery waits until it is `due`. Whoever tries it moves that on first (a lease): where its process is killed meanwhile,
+it is due again when the lease has run out. So each is sent at least once.
+"""
+
+from collections.abc import Collection
+from dataclasses import asdict, dataclass, fields
+
+import sqlalchemy as sa
+from sqlalchemy import Connection, Double, Row, bindparam, delete, func, select, update
+
+from storage.dialects import now_in_seconds
+from storage.encoding.json_text import Json, to_object, to_text
+from storage.tables import WAITING_ONLY, delivery, webhook
+
+WAITING, DELIVERED, FAILED = "waiting", "delivered", "failed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WebhookRow:
+    """A receiver: its `address`, which may hold a password, the `secret` that signs, and what else was posted."""
+
+    webhook_id: str
+    address: str
+    secret: str
+    content: Json
+    created_at: str
+    created_by: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewDelivery:
+    """What a receiver is to be sent, of an alarm or (None) as a test: the bytes of the body, as text."""
+
+    delivery_id: str
+    webhook_id: str
+    event_id: str | None
+    body: str
+    created_at: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeliveryRow(NewDelivery):
+    """A stored delivery: `status` and `problem` are of the last attempt, `due` of the next, in seconds since 1970."""
+
+    delivery_key: int
+    state: str
+    due: float
+    attempts: int
+    last_attempt_at: str | None
+    delivered_at: str | None
+    status: int | None
+    problem: str | None
+
+
+_insert = sa.insert(webhook)
+_by_id = select(webhook).where(webhook.c.webhook_id == bindparam("wanted"))
+_in_order = select(webhook).where(webhook.c.webhook_id > bindparam("after")).order_by(webhook.c.webhook_id)
+_delete = delete(webhook).where(webhook.c.webhook_id == bindparam("wanted"))
+_delete_deliveries = delete(delivery).where(delivery.c.webhook_id == bindparam("wanted"))
+_insert_delivery = sa.insert(delivery)
+_delivery = select(delivery).where(delivery.c.delivery_id == bindparam("wanted"))
+_newest = (
+    select(delivery)
+    .where(delivery.c.webhook_id == bindparam("wanted"), delivery.c.delivery_key < bindparam("before", type_=Double))
+    .order_by(delivery.c.delivery_key.desc())
+    .limit(bindparam("most"))
+)
+_of_same = delivery.alias("of_same")
+_oldest_of_each = (
+    select(func.min(_of_same.c.delivery_key))
+    .where(_of_same.c.state == WAITING, _of_same.c.due <= now_in_seconds())
+    .group_by(_of_same.c.webhook_id)
+)
+_due = (
+    select(delivery.c.delivery_key)
+    .where(
+        WAITING_ONLY,
+        delivery.c.delivery_key.in_(_oldest_of_each),
+        delivery.c.webhook_id.not_in(bindparam("passing", expanding=True)),
+    )
+    .order_by(delivery.c.due)
+    .limit(bindparam("most"))
+    .with_for_update(skip_locked=True, of=delivery)
+)
+_any_due = select(sa.exists(select(delivery.c.delivery_key).where(WAITING_ONLY, delivery.c.due <= now_in_seconds())))
+_number = delivery.c.delivery_key == bindparam("wanted")
+_claim = (
+    update(delivery)
+    .where(_number)
+    .values(due=now_in_seconds() + bindparam("lease", type_=Double), attempts=delivery.c.attempts + 1)
+)
+_claimed = select(delivery).where(_number)
+_end = (
+    update(delivery)
+    .where(_number, WAITING_ONLY)
+    .values(
+        state=bindparam("new_state"),
+        due=now_in_seconds() + bindparam("pause", type_=Double),
+        last_attempt_at=bindparam("at"),
+        delivered_at=bindparam("new_delivered"),
+        status=bindparam("new_status"),
+        problem=bindparam("new_problem"),
+    )
+)
+_release_all = update(delivery).where(WAITING_ONLY, delivery.c.last_attempt_at.is_(None)).values(due=0.0)
+_waiting = select(func.count()).select_from(delivery).where(WAITING_ONLY)
+
+
+def insert(connection: Connection, row: WebhookRow) -> None:
+    """Store a receiver. Raises IntegrityError where its name is taken."""
+    connection.execute(_insert, asdict(row) | {"content": to_text(row.content)})
+
+
+def get(connection: Connection, webhook_id: str) -> WebhookRow | None:
+    """A receiver, or None."""
+    row = connection.execute(_by_id, {"wanted": webhook_id}).first()
+    return None if row is None else _receiver(row)
+
+
+def page(connection: Connection, *, limit: int | None = None, after: str = "") -> list[WebhookRow]:
+    """Receivers by name, behind the name `after`."""
+    query = _in_order if limit is None else _in_order.limit(limit)
+    return [_receiver(row) for row in connection.execute(query, {"after": after})]
+
+
+def remove(connection: Connection, webhook_id: str) -> None:
+    """Delete a receiver with its secret, and all that was sent or is to be sent to it."""
+    connection.execute(_delete_deliveries, {"wanted": webhook_id})
+    connection.execute(_delete, {"wanted": webhook_id})
+
+
+def insert_delivery(connection: Connection, row: NewDelivery) -> None:
+    """Put what is to be sent into the outbox, due at once."""
+    values = {field.name: getattr(row, field.name) for field in fields(NewDelivery)}
+    connection.execute(_insert_delivery, values | {"state": WAITING, "due": 0.0, "attempts": 0})
+
+
+def find_delivery(connection: Connection, delivery_id: str) -> DeliveryRow | None:
+    """A delivery, or None."""
+    row = connection.execute(_delivery, {"wanted": delivery_id}).first()
+    return None if row is None else DeliveryRow(**row._asdict())
+
+
+def deliveries(
+    connection: Connection, webhook_id: str, *, limit: int, before: float | None = None
+) -> list[DeliveryRow]:
+    """What was sent or is to be sent to a receiver, newest first; `before` is the key of the last of the page before."""
+    values = {"wanted": webhook_id, "most": limit, "before": 2.0**62 if before is None else before}
+    return [DeliveryRow(**row._asdict()) for row in connection.execute(_newest, values)]
+
+
+def any_due(connection: Connection) -> bool:
+    """Whether something is to be sent now."""
+    return bool(connection.execute(_any_due).scalar_one())
+
+
+def claim(connection: Connection, *, lease: float, most: int, passing: Collection[str] = ()) -> list[DeliveryRow]:
+    """At most so many that are due, the oldest of each receiver but of those `passing` over: the caller's for `lease`
+    [s]."""
+    keys = list(connection.execute(_due, {"most": most, "passing": sorted(passing)}).scalars())
+    if keys:
+        connection.execute(_claim, [{"wanted": key, "lease": lease} for key in keys])
+    rows = [connection.execute(_claimed, {"wanted": key}).one() for key in keys]
+    return [DeliveryRow(**row._asdict()) for row in rows]
+
+
+def end(
+    connection: Connection,
+    delivery_key: int,
+    state: str,
+    *,
+    at: str,
+    status: int | None,
+    problem: str | None,
+    pause: float = 0.0,
+) -> None:
+    """Store how an attempt ended: delivered, given up, or (`waiting`) to be tried again after `pause` [s]."""
+    values = {"wanted": delivery_key, "new_state": state, "at": at, "new_status": status, "new_problem": problem}
+    connection.execute(_end, values | {"pause": pause, "new_delivered": at if state == DELIVERED else None})
+
+
+def release_all(connection: Connection) -> None:
+    """Have what was claimed for its first attempt be due now: no process runs that could be sending it."""
+    connection.execute(_release_all)
+
+
+def count_waiting(connection: Connection) -> int:
+    """How many wait to be sent."""
+    return int(connection.execute(_waiting).scalar_one())
+
+
+def _receiver(row: Row[tuple[object, ...]]) -> WebhookRow:
+    values = row._asdict()
+    return WebhookRow(**values | {"content": to_object(values["content"])})

@@ -1,0 +1,316 @@
+"""Rules and events as a script uses them: raised once, acknowledged, cleared by the hysteresis; receivers learn of it."""
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from service.alarms import outbox
+from tests.service.alarms.receiving import SECRET, Receiver, receiving, signed_rightly
+from tests.support import stationary
+
+CYCLES = (0.0, 1000.0, 2000.0, 3000.0)
+
+
+@pytest.fixture
+def receiver() -> Iterator[Receiver]:
+    with receiving() as made:
+        yield made
+
+
+@pytest.fixture
+def life(client: TestClient) -> TestClient:
+    """A clutch `e` with as many tests as a prognosis needs."""
+    client.post("/v1/clutches", json={"clutch_id": "e"})
+    for cycles in CYCLES:
+        assert client.post("/v1/clutches/e/runs", json=stationary(cycles)).status_code == 201
+    return client
+
+
+def rule(client: TestClient, **fields: Any) -> dict[str, Any]:
+    answer = client.post("/v1/alarms", json={"clutch_id": "e", **fields})
+    assert answer.status_code == 201, answer.text
+    made: dict[str, Any] = answer.json()
+    return made
+
+
+def events(client: TestClient, **arguments: str) -> list[dict[str, Any]]:
+    answer = client.get("/v1/alarms/events", params=arguments)
+    assert answer.status_code == 200, answer.text
+    items: list[dict[str, Any]] = answer.json()["items"]
+    return items
+
+
+def at_least(client: TestClient) -> float:
+    bound: float = client.get("/v1/clutches/e/remaining-useful-life").json()["at_least"]
+    return bound
+
+
+def test_a_posted_run_raises_an_alarm_once(life: TestClient) -> None:
+    limit = at_least(life) - 1
+    rule(life, quantity="remaining_cycles", probability=0.05, below=limit)
+    assert events(life) == []
+    for cycles in (3500, 4000):
+        duty = {"kind": "duty_cycles", "cycles": cycles, "duty": {"cycles": 500}}
+        assert life.post("/v1/clutches/e/runs", json=duty).status_code == 201
+    (raised,) = events(life)
+    assert raised["state"] == "raised"
+    assert raised["value"] < limit == raised["limit"]
+    assert raised["message"].startswith("e: at least ")
+
+
+def test_a_rule_looks_at_clutches_as_they_are(life: TestClient) -> None:
+    rule(life, quantity="remaining_cycles", below=1e9)
+    assert [event["clutch_id"] for event in events(life)] == ["e"]
+
+
+def test_the_rule_of_the_contract_is_the_same_made_twice(life: TestClient) -> None:
+    body = {"clutch_id": "e", "quantity": "remaining_cycles", "probability": 0.05, "below": 4000}
+    first = life.post("/v1/alarms", json=body)
+    again = life.post("/v1/alarms", json=body)
+    assert (first.status_code, again.status_code) == (201, 200)
+    assert again.json()["alarm_id"] == first.json()["alarm_id"]
+    assert life.get(first.headers["Location"]).json() == first.json()
+    assert [item["alarm_id"] for item in life.get("/v1/alarms").json()["items"]] == [first.json()["alarm_id"]]
+
+
+def test_an_acknowledged_alarm_is_not_raised_again(life: TestClient) -> None:
+    rule(life, quantity="remaining_cycles", below=1e9)
+    (raised,) = events(life)
+    address = f"/v1/alarms/events/{raised['event_id']}"
+    seen = life.post(f"{address}/acknowledge", json={"note": "ordered"})
+    assert seen.status_code == 200
+    assert (seen.json()["state"], seen.json()["note"], seen.json()["acknowledged_by"]) == (
+        "acknowledged",
+        "ordered",
+        "local",
+    )
+    life.post("/v1/clutches/e/runs", json=stationary(4000.0))
+    (still,) = events(life, state="open")
+    assert still == seen.json() == life.get(address).json()
+    assert life.post(f"{address}/acknowledge").json() == still
+
+
+def test_it_is_cleared_by_the_hysteresis_and_raised_again(life: TestClient) -> None:
+    value = at_least(life)
+    made = rule(life, quantity="remaining_cycles", below=value + 1, hysteresis=0.0)
+    (raised,) = events(life, state="raised")
+    address = f"/v1/alarms/{made['alarm_id']}"
+    body = {name: made[name] for name in ("clutch_id", "quantity")}
+    # the value lies above the new limit, and within its hysteresis
+    assert life.put(address, json=body | {"below": value - 1, "hysteresis": 0.5}).status_code == 200
+    assert [event["event_id"] for event in events(life, state="raised")] == [raised["event_id"]]
+    life.put(address, json=body | {"below": value - 1, "hysteresis": 0.0})
+    assert events(life, state="open") == []
+    life.put(address, json=body | {"below": value + 1})
+    assert [event["state"] for event in events(life)] == ["raised", "cleared"]
+
+
+def test_a_deleted_rule_clears_what_it_raised(life: TestClient) -> None:
+    made = rule(life, quantity="remaining_cycles", below=1e9)
+    assert life.delete(f"/v1/alarms/{made['alarm_id']}").status_code == 204
+    assert [event["state"] for event in events(life)] == ["cleared"]
+    assert life.get(f"/v1/alarms/{made['alarm_id']}").status_code == 404
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"quantity": "remaining_cycles", "probability": 0.5, "below": 1e9}, "cycles are left"),
+        ({"quantity": "health", "below": 1.0}, "its health is"),
+        ({"quantity": "shudder_margin", "below": 100.0}, "slope at 100 rpm"),
+        ({"quantity": "off_course"}, "off its course"),
+        ({"quantity": "held_runs"}, "1 held run waits"),
+        ({"quantity": "state"}, "function check"),
+    ],
+    ids=lambda part: str(part)[:40],
+)
+def test_each_quantity_raises(life: TestClient, fields: dict[str, Any], words: str) -> None:
+    """A test whose torque has risen is held, and off the course of those before it."""
+    rule(life, **fields)
+    receipt = life.post("/v1/clutches/e/runs", json=stationary(4000.0, wear=0.0)).json()
+    assert receipt["state"] == "held"
+    (raised,) = events(life)
+    assert words in raised["message"]
+    assert raised["quantity"] == fields["quantity"]
+
+
+def test_a_confirmed_run_clears_the_alarm_of_held_runs(life: TestClient) -> None:
+    rule(life, quantity="held_runs")
+    receipt = life.post("/v1/clutches/e/runs", json=stationary(4000.0, wear=0.0)).json()
+    life.post(f"/v1/clutches/e/runs/{receipt['run_id']}/withdraw", json={"reason": "a slip"})
+    assert [event["state"] for event in events(life)] == ["cleared"]
+
+
+def test_days_are_counted_at_the_pace_of_the_runs(client: TestClient) -> None:
+    client.post("/v1/clutches", json={"clutch_id": "e"})
+    for day, cycles in enumerate(CYCLES, start=1):
+        client.post("/v1/clutches/e/runs", json=stationary(cycles) | {"started_at": f"2026-01-{day:02d}T08:00:00Z"})
+    rule(client, quantity="remaining_days", below=1000)
+    (raised,) = events(client)
+    assert raised["value"] == pytest.approx(at_least(client) / 1000, rel=1e-6)
+
+
+def test_a_new_verdict_is_an_alarm(life: TestClient) -> None:
+    rule(life, quantity="verdict", any_of=["model_adequate", "insufficient_data", "cause_named", "cause_ambiguous"])
+    report = life.post("/v1/clutches/e/diagnoses", json={}, headers={"Prefer": "wait=120"}).json()
+    (raised,) = events(life)
+    assert report["verdict"].replace("_", " ") in raised["message"]
+
+
+def test_a_silent_rig_is_an_alarm_and_a_state(life: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outbox, "CLOCK_SECONDS", 0.1)
+    rule(life, quantity="silent_hours", above=0.5 / 3600)
+    deadline = time.monotonic() + 20
+    while not events(life) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    (raised,) = events(life)
+    clutch = life.get("/v1/clutches/e").json()
+    assert clutch["state"]["name"] == "check"
+    assert "the rig is silent" in clutch["state"]["why"]
+    assert "the rig is silent" in clutch["headline"]
+    assert "e" in [item["clutch_id"] for item in life.get("/v1/clutches?state=check").json()["items"]]
+    made = life.put(f"/v1/alarms/{raised['alarm_id']}", json={"quantity": "silent_hours", "above": 1, "clutch_id": "e"})
+    assert made.status_code == 200
+    assert "silent" not in life.get("/v1/clutches/e").json()["state"]["why"]
+    assert [event["state"] for event in events(life)] == ["cleared"]
+
+
+def test_a_kind_is_watched_as_a_whole(client: TestClient) -> None:
+    for name, fluid in (("a", "ATF"), ("b", "other")):
+        client.post("/v1/clutches", json={"clutch_id": name, "fluid": fluid})
+    answer = client.post("/v1/alarms", json={"quantity": "state", "kind": {"fluid": "other"}})
+    assert answer.status_code == 201
+    assert [event["clutch_id"] for event in events(client)] == ["b"]
+
+
+def test_an_archived_clutch_has_no_alarms(life: TestClient) -> None:
+    rule(life, quantity="remaining_cycles", below=1e9)
+    life.patch("/v1/clutches/e", json={"archived": True})
+    assert [event["state"] for event in events(life)] == ["cleared"]
+    life.patch("/v1/clutches/e", json={"archived": False})
+    assert len(events(life, state="raised")) == 1
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        {"quantity": "remaining_cycles"},
+        {"quantity": "remaining_cycles", "above": 4},
+        {"quantity": "remaining_cycles", "below": 4, "probability": 0.3},
+        {"quantity": "held_runs", "below": 1},
+        {"quantity": "silent_hours", "above": 0},
+        {"quantity": "off_course", "above": 0},
+        {"quantity": "held_runs", "any_of": ["failure"]},
+        {"quantity": "held_runs", "clutch_id": "e", "kind": {}},
+        {"quantity": "unheard_of"},
+    ],
+    ids=str,
+)
+def test_a_rule_that_says_nothing_is_refused(client: TestClient, body: dict[str, Any]) -> None:
+    assert client.post("/v1/alarms", json=body).status_code == 422
+    assert client.get("/v1/alarms").json()["items"] == []
+
+
+def test_an_unknown_clutch_has_no_rules(client: TestClient) -> None:
+    assert client.post("/v1/alarms", json={"clutch_id": "nobody", "quantity": "held_runs"}).status_code == 404
+
+
+def webhook(client: TestClient, receiver: Receiver, **more: Any) -> str:
+    answer = client.post("/v1/webhooks", json={"url": receiver.url, "secret": SECRET, **more})
+    assert answer.status_code == 201, answer.text
+    assert SECRET not in answer.text
+    name: str = answer.json()["webhook_id"]
+    return name
+
+
+def test_a_receiver_is_sent_a_signed_request(life: TestClient, receiver: Receiver) -> None:
+    name = webhook(life, receiver)
+    rule(life, quantity="remaining_cycles", below=1e9)
+    (body,) = receiver.await_requests(1)
+    (path, headers, raw) = receiver.requests[0]
+    assert path == "/hook"
+    assert signed_rightly(headers, raw)
+    (raised,) = events(life)
+    assert body == {"type": "alarm.raised", "delivery_id": headers["Clutchlife-Delivery"], "event": raised}
+    life.post("/v1/clutches/e/runs", json=stationary(4000.0))
+    items = deliveries(life, name)
+    assert [item["state"] for item in items] == ["delivered"]
+    assert (items[0]["status"], items[0]["event_id"]) == (200, raised["event_id"])
+    assert len(receiver.requests) == 1
+
+
+def deliveries(client: TestClient, webhook_id: str, state: str = "delivered") -> list[dict[str, Any]]:
+    """A receiver's deliveries, once the newest is in that state."""
+    deadline = time.monotonic() + 20
+    while True:
+        items: list[dict[str, Any]] = client.get(f"/v1/webhooks/{webhook_id}/deliveries").json()["items"]
+        if (items and items[0]["state"] == state) or time.monotonic() > deadline:
+            return items
+        time.sleep(0.02)
+
+
+def test_a_receiver_that_fails_is_tried_again_with_the_same_body(life: TestClient, receiver: Receiver) -> None:
+    name = webhook(life, receiver)
+    receiver.status = 500
+    rule(life, quantity="remaining_cycles", below=1e9)
+    receiver.await_requests(1)
+    receiver.status = 204
+    receiver.await_requests(2)
+    first, second = receiver.requests[:2]
+    assert first[2] == second[2]
+    assert first[1]["Clutchlife-Delivery"] == second[1]["Clutchlife-Delivery"]
+    (item,) = deliveries(life, name)
+    assert (item["state"], item["attempts"], item["problem"]) == ("delivered", 2, None)
+
+
+def test_that_an_alarm_is_over_is_sent_where_it_is_wanted(life: TestClient, receiver: Receiver) -> None:
+    webhook(life, receiver, cleared=True)
+    made = rule(life, quantity="remaining_cycles", below=1e9)
+    receiver.await_requests(1)
+    life.delete(f"/v1/alarms/{made['alarm_id']}")
+    bodies = receiver.await_requests(2)
+    assert [body["type"] for body in bodies] == ["alarm.raised", "alarm.cleared"]
+
+
+def test_the_test_button_says_how_it_went(life: TestClient, receiver: Receiver) -> None:
+    made = rule(life, quantity="remaining_cycles", below=1)
+    nobody = life.post(f"/v1/alarms/{made['alarm_id']}/test").json()
+    assert nobody == {"deliveries": [], "message": "there is no receiver: add a webhook"}
+    name = webhook(life, receiver)
+    tested = life.post(f"/v1/alarms/{made['alarm_id']}/test").json()
+    assert tested["message"] == "1 of 1 receivers took the test"
+    assert receiver.bodies[0]["type"] == "alarm.test"
+    assert events(life) == []
+    receiver.status = 503
+    failed = life.post(f"/v1/webhooks/{name}/test").json()
+    assert failed["deliveries"][0]["state"] == "failed"
+    assert failed["deliveries"][0]["problem"] == "it answered 503"
+
+
+def test_a_receiver_of_one_clutch_learns_of_no_other(life: TestClient, receiver: Receiver) -> None:
+    webhook(life, receiver, clutch_id="c1")
+    rule(life, quantity="remaining_cycles", below=1e9)
+    life.post("/v1/alarms", json={"clutch_id": "c1", "quantity": "state"})
+    (body,) = receiver.await_requests(1)
+    assert body["event"]["clutch_id"] == "c1"
+
+
+def test_a_deleted_receiver_is_sent_nothing(life: TestClient, receiver: Receiver) -> None:
+    name = webhook(life, receiver)
+    receiver.status = 500
+    rule(life, quantity="remaining_cycles", below=1e9)
+    receiver.await_requests(1)
+    assert life.delete(f"/v1/webhooks/{name}").status_code == 204
+    assert life.get(f"/v1/webhooks/{name}/deliveries").status_code == 404
+    assert life.get("/v1/webhooks").json()["items"] == []
+
+
+def test_a_secret_that_the_service_makes_is_shown_once(client: TestClient, receiver: Receiver) -> None:
+    made = client.post("/v1/webhooks", json={"url": receiver.url}).json()
+    assert len(made["secret"]) >= 32
+    assert client.get(f"/v1/webhooks/{made['webhook_id']}").json()["secret"] is None
+    client.post(f"/v1/webhooks/{made['webhook_id']}/test")
+    assert signed_rightly(receiver.requests[0][1], receiver.requests[0][2], made["secret"])
