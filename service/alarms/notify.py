@@ -75,12 +75,12 @@ def send(url: str, body: bytes, *, secret: str, delivery_id: str, private: bool)
         done = subprocess.run(  # noqa: S603  (our own module)
             command, input=json.dumps(task), capture_output=True, text=True, timeout=_SECONDS, check=False
         )
-        said = json.loads(done.stdout or "{}")
+        reply = json.loads(done.stdout or "{}")
     except subprocess.TimeoutExpired:
         return Attempt(problem=f"it was not sent within {_SECONDS:g} s")
     except ValueError:
-        said = {}
-    return Attempt(problem=said.get("problem", "it could not be sent")) if not said.get("sent") else Attempt()
+        reply = {}
+    return Attempt(problem=reply.get("problem", "it could not be sent")) if not reply.get("sent") else Attempt()
 
 
 def confine(private: bool) -> None:

@@ -65,29 +65,29 @@ def finding(rule: AlarmIn, facts: Facts) -> Finding | None:
     return _QUANTITIES[rule.quantity](rule, facts)
 
 
-def raises(rule: AlarmIn, found: Finding | None) -> bool:
+def raises(rule: AlarmIn, result: Finding | None) -> bool:
     """Whether a finding raises an alarm."""
-    return found is not None and _passes(rule, found, 0.0)
+    return result is not None and _passes(rule, result, 0.0)
 
 
-def keeps(rule: AlarmIn, found: Finding | None) -> bool:
+def keeps(rule: AlarmIn, result: Finding | None) -> bool:
     """Whether an alarm that is raised stays: until the value has come back by the hysteresis."""
-    return found is not None and _passes(rule, found, rule.hysteresis)
+    return result is not None and _passes(rule, result, rule.hysteresis)
 
 
-def message(rule: AlarmIn, facts: Facts, found: Finding) -> str:
+def message(rule: AlarmIn, facts: Facts, result: Finding) -> str:
     """An alarm as a sentence."""
     unit = _UNITS.get(rule.quantity)
     limit = "" if rule.limit is None or unit is None else f" (limit: {rule.limit:,.6g}{unit})"
-    return f"{facts.clutch_id}: {found.words}{limit}"
+    return f"{facts.clutch_id}: {result.words}{limit}"
 
 
-def _passes(rule: AlarmIn, found: Finding, hysteresis: float) -> bool:
-    if found.value is None:
+def _passes(rule: AlarmIn, result: Finding, hysteresis: float) -> bool:
+    if result.value is None:
         return True
     if rule.below is not None:
-        return found.value < rule.below + hysteresis * abs(rule.below)
-    return rule.above is not None and found.value > rule.above - hysteresis * abs(rule.above)
+        return result.value < rule.below + hysteresis * abs(rule.below)
+    return rule.above is not None and result.value > rule.above - hysteresis * abs(rule.above)
 
 
 def slope_quantile(rule: AlarmIn, fit: FitRow, geometry: Geometry) -> float | None:

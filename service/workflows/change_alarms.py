@@ -25,9 +25,9 @@ def save(database: Database, rule: AlarmIn, *, by: str, at: str, alarm_id: str |
         if rule.clutch_id is not None:
             records.clutch(connection, rule.clutch_id)
         if alarm_id is None:
-            known = [row for row in alarms.page(connection, limit=ALL_ROWS) if row.content == content]
-            if known:
-                return known[0], False
+            same = [row for row in alarms.page(connection, limit=ALL_ROWS) if row.content == content]
+            if same:
+                return same[0], False
         else:
             find(connection, alarm_id)
         row = AlarmRow(

@@ -125,9 +125,9 @@ async def read_event(request: Request, context: OwnReader, event_id: EventId) ->
 async def acknowledge_event(request: Request, context: OwnIngester, event_id: EventId) -> Response:
     """Say that somebody has seen an alarm; the body may be left out."""
     body = await json_body(request) if await request.body() else b"{}"
-    seen = checked(AcknowledgeIn, body)
+    remark = checked(AcknowledgeIn, body)
     await run_in_threadpool(alarms.event, context.database, event_id, only=own_clutches(request))
-    acknowledge = partial(change_alarms.acknowledge, note=seen.note, by=name_of_caller(request), at=now())
+    acknowledge = partial(change_alarms.acknowledge, note=remark.note, by=name_of_caller(request), at=now())
     return _json(await run_in_threadpool(acknowledge, context.database, event_id))
 
 
