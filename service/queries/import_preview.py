@@ -17,7 +17,7 @@ from service.errors import InvalidError
 from service.lives.incoming_run import IncomingRun, SampledChannels
 from service.lives.payloads import fit_items, notice_items
 from service.lives.run_analysis import analyse
-from service.readers.column_names import ending_unit
+from service.readers.column_names import unit_in_title
 from service.readers.read_file import preview_file, read_file
 from service.readers.table import Reading
 from service.readers.unit_table import conversion, spellings
@@ -138,7 +138,7 @@ def _column(column: Mapping[str, Any], profile: RigProfile | None) -> dict[str, 
     own = next((item for item in profile.columns if item.title == title), None) if profile else None
     channel = None if own is None else own.channel
     unit = (
-        None if channel is None or own is None else own.unit or column["unit"] or ending_unit(channel, column["name"])
+        None if channel is None or own is None else own.unit or column["unit"] or unit_in_title(channel, column["name"])
     )
     understood = channel is not None and unit is not None and conversion(channel, unit) is not None
     return {

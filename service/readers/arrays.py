@@ -16,7 +16,6 @@ from models.arrays import FloatArray
 from service.errors import FieldError, InvalidError, Notice
 from service.readers.column_names import column_of, known_channel
 from service.readers.limits import Limits
-from service.readers.numerals import column_values
 from service.readers.table import Clock, Column, Reading, Table, only
 
 _UNITS = ("unit", "units", "unit_string", "yunit", "einheit")
@@ -97,7 +96,7 @@ def table_of(tree: Tree, reading: Reading, limits: Limits, unread: tuple[str, ..
         sources = [replace(source, column=replace(source.column, group="")) for source in sources]
 
     def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
-        return [_values(sources[index], channel, reading) for index, channel in taken.items()]
+        return [_values(sources[index]) for index in taken]
 
     notices = (Notice(code="not_read", message=f"only MATLAB reads {', '.join(unread[:10])}"),) if unread else ()
     return Table(
@@ -237,9 +236,5 @@ def _texts(value: Any) -> list[str]:
     return [_text(item) for item in array.reshape(-1)] if array.dtype.kind in _CHARACTERS else []
 
 
-def _values(source: _Source, channel: str, reading: Reading) -> NDArray[Any]:
-    values = np.asarray(source.leaf.data[source.index])
-    values = values.reshape(-1) if values.ndim != 1 else values
-    if values.dtype.kind in _CHARACTERS:
-        return column_values([channel], [[_text(item) for item in values.tolist()]], reading.decimal)[0]
-    return values
+def _values(source: _Source) -> NDArray[Any]:
+    return np.asarray(source.leaf.data[source.index]).reshape(-1)

@@ -17,13 +17,16 @@ from service.columns import LineOf, check_arrays
 from service.errors import MOST_QUOTED, FieldError, InvalidError, Notice, TooLargeError
 from service.readers.column_names import Taken, choose, is_counter, known_channel
 from service.readers.limits import Limits
-from service.readers.table import NO_TIME, Clock, Column, Reading, Table
+from service.readers.numerals import Numerals
+from service.readers.table import NO_TIME, Clock, Column, Reading, Table, only
 
 #: The code of the notice that lists unused columns.
 LEFT_OUT = "columns_left_out"
 _SECOND = np.timedelta64(1, "s")
 #: The channel on whose clock the others are brought, the first that is there.
 _LEADING = ("torque_nm", "speed_rpm", "pressure_bar")
+#: Steps of the time that repeated titles may interrupt a table for. Chosen: a printed page takes none, a new test minutes.
+_LONGEST_PAUSE = 10
 #: Columns that one notice names.
 _MOST_NAMED = 20
 
@@ -58,11 +61,30 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
     """
     taken = choose(table.columns, reading)
     clocks = {} if reading.time == NO_TIME else _clocks(table.columns, taken)
-    series, counts = _read(table, taken, clocks, limits)
+    series, counts = _read(table, taken, clocks, reading, limits)
     notices = [*table.notices, *_left_out(table.columns, taken, reading)]
     columns = _on_one_clock(series, notices)
-    check_arrays(columns, line_of=table.line_of)
-    return Channels(columns=columns, notices=tuple(notices), counts=counts, line_of=table.line_of, labels=labels(table))
+    columns, first = _one_table(columns, table, reading)
+    line_in_file = table.line_of
+    line_of = None if line_in_file is None else lambda row: line_in_file(first + row)
+    check_arrays(columns, line_of=line_of)
+    return Channels(columns=columns, notices=tuple(notices), counts=counts, line_of=line_of, labels=labels(table))
+
+
+def _one_table(columns: dict[str, FloatArray], table: Table, reading: Reading) -> tuple[dict[str, FloatArray], int]:
+    """The one table, or of several below each other the one that is named by its number, and its first row.
+
+    Titles that only interrupt a table, whose time goes on after them, begin no other.
+    """
+    time_s = columns.get("time_s")
+    if table.breaks and time_s is not None and (not reading.table or table.name):
+        steps = np.diff(time_s)
+        if all(0 < steps[row - 1] < _LONGEST_PAUSE * np.median(steps) for row in table.breaks):
+            return columns, 0
+    starts = [0, *table.breaks, next(iter(columns.values())).size]
+    tables = [str(number) for number in range(1, len(starts))]
+    number = only(tables, "" if table.name or not table.breaks else reading.table, "table")
+    return {name: column[starts[number] : starts[number + 1]] for name, column in columns.items()}, starts[number]
 
 
 def labels(table: Table) -> dict[str, str]:
@@ -99,18 +121,25 @@ def _clocks(columns: Sequence[Column], taken: Sequence[Taken]) -> dict[int, int 
 
 
 def _read(
-    table: Table, taken: Sequence[Taken], clocks: Mapping[int, int | Clock | None], limits: Limits
+    table: Table, taken: Sequence[Taken], clocks: Mapping[int, int | Clock | None], reading: Reading, limits: Limits
 ) -> tuple[dict[str, _Series], bool]:
     """The channels' values and times; and whether their one clock may only count."""
     indices = [column.index for column in taken]
     stated = sum(table.columns[index].rows or 0 for index in indices)
     if stated > limits.most_values:
         raise TooLargeError(f"a file must not hold more than {limits.most_values} values, got {stated}")
-    read = dict(zip(indices, table.read({column.index: column.channel for column in taken}), strict=True))
+    channels = {column.index: column.channel for column in taken}
+    read = dict(zip(indices, table.read(channels), strict=True))
+    cells = {index: _cells(column) for index, column in read.items() if column.dtype.kind in "OUS"}
+    named = {index: channels[index] for index in cells}
+    parsed = Numerals(reading.decimal).values(named, list(cells.values()), table.line_of)
+    read |= dict(zip(cells, parsed, strict=True))
     values: dict[int, FloatArray] = {}
     valid: dict[int, NDArray[np.bool_] | None] = {}
     for column in taken:
         values[column.index], valid[column.index] = _numbers(column, read.pop(column.index))
+        if column.channel == "time_s" and column.assumed:
+            _refuse_serials(table.columns[column.index], values[column.index])
     used = [clock for clock in clocks.values() if isinstance(clock, Clock)]
     times: dict[object, FloatArray] = {}
     for recorder_clock in used:
@@ -131,6 +160,10 @@ def _read(
         # LabVIEW's text files count where they have no clock
         counts = is_counter(table.columns[index]) and np.array_equal(values[index], np.arange(values[index].size))
     return series, counts
+
+
+def _cells(column: NDArray[Any]) -> list[Any]:
+    return [cell.decode("utf-8", "replace") if isinstance(cell, bytes) else cell for cell in column.tolist()]
 
 
 def _numbers(column: Taken, values: NDArray[Any]) -> tuple[FloatArray, NDArray[np.bool_] | None]:
@@ -154,6 +187,19 @@ def _numbers(column: Taken, values: NDArray[Any]) -> tuple[FloatArray, NDArray[n
     numbers = np.array(values, dtype=np.float64) if values.dtype != np.float64 or not values.flags.writeable else values
     column.conversion.apply(numbers)
     return numbers, valid
+
+
+def _refuse_serials(column: Column, times: FloatArray) -> None:
+    """Raise InvalidError where times without a unit may be days as spreadsheets count them: days since 1900 of our time,
+    less than five of them, and steps that would be shorter than a rig samples."""
+    days, steps = (times > 20_000) & (times < 80_000), np.diff(times)
+    if times.size > 1 and days.all() and np.ptp(times) < 5 and np.median(steps) < 1e-3:
+        name = column.title or column.name
+        message = (
+            f"{column.shown()} may be days, as spreadsheets count dates, or seconds, got {times[0]:.9g} and steps of "
+            f"{np.median(steps):.3g}: map=time_s:{name} [d], or [s], says which"
+        )
+        raise InvalidError(message, errors=[FieldError(pointer="/map", code="missing_unit", message=message)])
 
 
 def _left_out(columns: Sequence[Column], taken: Sequence[Taken], reading: Reading) -> list[Notice]:

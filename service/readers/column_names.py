@@ -15,18 +15,23 @@ from service.readers.unit_table import Conversion, conversion, is_unit, spelling
 _LETTERS = {"M": "torque_nm", "n": "speed_rpm", "p": "pressure_bar", "t": "time_s"}
 
 _WORDS = {
-    "time_s": "time zeit timestamp timestamps zeitstempel elapsed_time elapsed messzeit time_stamp x_value 时间",
+    "time_s": "time zeit timestamp timestamps zeitstempel elapsed_time elapsed messzeit time_stamp x_value datetime "
+    "date_time uhrzeit datum_zeit datum_uhrzeit datum/uhrzeit date/time temps tiempo tempo 时间 時間 時刻 время",
     "pressure_bar": "pressure druck line_pressure leitungsdruck anpressdruck kolbendruck "
-    "clutch_pressure kupplungsdruck piston_pressure druck_ist pressure_actual p_ist p_line 压力 油压",
+    "clutch_pressure kupplungsdruck piston_pressure druck_ist pressure_actual p_ist p_line pression presión presion "
+    "pressione 压力 油压 壓力 油壓 圧力 油圧 давление",
     "speed_rpm": "speed drehzahl rotational_speed rotation_speed shaft_speed differential_speed slip_speed motor_speed "
     "relative_speed drehgeschwindigkeit winkelgeschwindigkeit angular_velocity angular_speed differenzdrehzahl "
-    "schlupfdrehzahl motordrehzahl drehzahl_ist n_ist n_motor n_rel n_diff omega speed_actual rpm 转速",
+    "schlupfdrehzahl motordrehzahl drehzahl_ist n_ist n_motor n_rel n_diff omega speed_actual rpm vitesse "
+    "vitesse_de_rotation velocidad velocidad_de_giro velocità 转速 轉速 回転数 回転速度 частота_вращения обороты",
     "torque_nm": "torque drehmoment moment friction_torque reibmoment clutch_torque kupplungsmoment "
-    "drehmoment_ist torque_actual m_ist m_d md m_r 扭矩 转矩",
+    "drehmoment_ist torque_actual m_ist m_d md m_r couple couple_de_frottement par par_motor par_de_fricción coppia "
+    "扭矩 转矩 轉矩 トルク 摩擦トルク момент",
     "torque_sd_nm": "torque_sd torque_std torque_deviation standard_deviation_of_torque "
     "drehmoment_standardabweichung standardabweichung_drehmoment",
     "oil_temperature_c": "oil_temperature oil_temp oiltemperature oiltemp öltemperatur öltemp t_oil t_öl toil töl "
-    "temperature_oil temperatur_öl theta_oil theta_öl sump_temperature sumpftemperatur oil_sump_temperature 油温",
+    "temperature_oil temperatur_öl theta_oil theta_öl sump_temperature sumpftemperatur oil_sump_temperature "
+    "température_d'huile température_huile temperatura_del_aceite temperatura_aceite temperatura_olio 油温 油溫",
     "plate_temperature_front_c": "plate_temperature_front front_plate_temperature plate_temp_front t_plate_front "
     "temperature_plate_front theta_plate_front plattentemperatur_vorn plattentemperatur_vorne lamellentemperatur_vorn "
     "lamellentemperatur_vorne t_platte_vorn t_lamelle_vorn plate_temperature plate_temp t_plate plattentemperatur "
@@ -44,11 +49,15 @@ _MOST_NAMED = 10
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """A column that is taken: the file's `index`-th as `channel`, with its conversion to the channel's unit."""
+    """A column that is taken: the file's `index`-th as `channel`, with its conversion to the channel's unit.
+
+    `assumed`: neither file nor caller states a unit, and the channel's own was taken.
+    """
 
     channel: str
     index: int
     conversion: Conversion
+    assumed: bool = False
 
 
 def _key(name: str) -> str:
@@ -56,15 +65,20 @@ def _key(name: str) -> str:
 
     Composing letters takes time with the square of the length where accents are piled up: only short names are composed.
     """
-    plain = (unicodedata.normalize("NFC", name) if len(name) <= LONGEST_NAME else name).strip().casefold()
+    plain = (unicodedata.normalize("NFKC", name) if len(name) <= LONGEST_NAME else name).strip().casefold()
     plain = plain.replace("oel", "öl").replace("ϑ", "theta").replace("ω", "omega")
     return re.sub(r"[\s._\-]+", "_", plain).strip("_")
 
 
 _BY_KEY = {_key(word): channel for channel, words in _WORDS.items() for word in words.split()}
 _BY_KEY |= {name: name for name in CHANNELS}
-_WIDE = str.maketrans("（）［］｛｝，／：", "()[]{},/:")
-_BRACKETED = re.compile(r"(?P<name>.*?)[\[({<](?P<unit>[^\[\](){}<>]*)[\])}>]\s*", re.DOTALL)
+_WIDE = str.maketrans("（）［］｛｝，／：【】", "()[]{},/:[]")
+_BRACKETED = re.compile(
+    r"(?P<name>.*?)\s*/?\s*(?:\[(?P<square>[^\[\]]*)\]|[({<](?P<unit>[^\[\](){}<>]*)[)}>])[\s:.]*", re.DOTALL
+)
+#: Where a word of a title may begin: after what is no letter or digit, and at a capital after a small
+#: letter that is no prefix of a unit (kNm).
+_WORD_STARTS = re.compile(r"(?<![^\W_])(?=[^\W_°])|(?<=[a-jln-zäöüß])(?=[A-Z])|(?<!°)(?=°)")
 #: What may stand between a name and its unit: a comma, a slash, "in", blanks or underscores.
 _BETWEEN = re.compile(r"\s*[,;:|]\s*|\s*/\s*|\s+in\s+|[\s_]+")
 
@@ -104,7 +118,7 @@ def _taken_apart(title: str) -> tuple[str, str | None]:
     if known_channel(title):
         return title, None
     if match := _BRACKETED.fullmatch(title):
-        return match["name"].strip(), bare_unit(match["unit"])
+        return match["name"].strip(), bare_unit(match["square"] if match["unit"] is None else match["unit"])
     for name, unit in _endings(title):
         if is_unit(unit) and (known_channel(name) or _stands_apart(title, name, unit)):
             return name, unit
@@ -127,7 +141,8 @@ def _endings(title: str) -> Iterator[tuple[str, str]]:
 
 def bare_unit(text: str) -> str | None:
     """A unit without its brackets; None where nothing is stated."""
-    unit = text.translate(_WIDE).strip().strip("[](){}<>").strip()
+    unit = text.translate(_WIDE).strip()
+    unit = (unit[1:-1] if unit[:1] + unit[-1:] in ("[]", "()", "{}", "<>") else unit).strip().removeprefix("in ")
     return None if unit in ("", "-", "--", "_", "?") else unit
 
 
@@ -221,11 +236,15 @@ def choose(columns: Sequence[Column], reading: Reading) -> list[Taken]:
             raise _twice(channel, *(columns[index] for index in positions))
     if not indices:
         raise InvalidError(f"the file holds no known channel: it has {_list(columns)}; {remedy(columns)}")
-    taken = [
-        Taken(name, index, _conversion(name, columns[index], named.get(name) if index in by_map else None))
-        for name, positions in indices.items()
-        for index in positions
-    ]
+    taken = []
+    for channel, positions in indices.items():
+        for index in positions:
+            choice = named.get(channel) if index in by_map else None
+            unit = _unit(channel, columns[index], choice)
+            public = _key(columns[index].name) == channel
+            taken.append(
+                Taken(channel, index, _conversion(channel, columns[index], choice, unit), unit is None and not public)
+            )
     return sorted(taken, key=lambda column: column.index)
 
 
@@ -256,8 +275,11 @@ def _find(columns: Sequence[Column], channel: str, name: str) -> int:
 
 
 def _twice(channel: str, *columns: Column) -> InvalidError:
-    shown = " and ".join(column.shown() for column in columns[:_MOST_NAMED])
-    distinct = len({column.shown() for column in columns}) == len(columns)
+    names = [column.shown() for column in columns]
+    if len(set(names)) < len(names):
+        names = [column.title[:MOST_QUOTED] or column.shown() for column in columns]
+    shown = " and ".join(names[:_MOST_NAMED])
+    distinct = len(set(names)) == len(names)
     way = f"map={channel}:NAME chooses one" if distinct else "their names must differ"
     message = f"{channel} must be one column, got {shown}; {way}"
     return InvalidError(
@@ -270,28 +292,50 @@ def _list(columns: Sequence[Column]) -> str:
     return shown if len(columns) <= _MOST_NAMED else f"{shown} and {len(columns) - _MOST_NAMED} more"
 
 
-def ending_unit(channel: str, name: str) -> str | None:
-    """The unit of the channel that a name ends in, whatever parts them; None where it ends in none."""
-    return next((text for _, text in _endings(name) if conversion(channel, text)), None)
+def unit_in_title(channel: str, title: str) -> str | None:
+    """The unit of the channel that a title ends in, whatever parts them: `Time, ms`, `Mz_kNm`, `timeMs`, `Time..ms.`."""
+    if len(title) > LONGEST_NAME:
+        return None
+    words = [title[start.start() :].strip(" .:,;_-()[]") for start in _WORD_STARTS.finditer(title)]
+    return next((word for word in words if word and conversion(channel, word)), None)
 
 
-def _conversion(channel: str, column: Column, choice: Choice | None) -> Conversion:
+def _may_state(channel: str, title: str) -> str | None:
+    """A word within a title that is another unit than the channel's own (`Mz [kNm] filtered`); None where there is none."""
+    for word in re.finditer(r"[^\W\d_]{2,}(?:/[^\W\d_]+)?", title[:LONGEST_NAME]):
+        for part in (word[0], word[0][-3:]):
+            found = conversion(channel, part)
+            if found is not None and not found.is_identity():
+                return part
+    return None
+
+
+def _unit(channel: str, column: Column, choice: Choice | None) -> str | None:
+    """The unit that the file, the map or the profile states; None where none does.
+
+    A column that a map names may end in its unit, whatever parts them.
+    """
+    if choice is None:
+        return "s" if column.unit is None and _key(column.name) in _SECONDS else column.unit
+    public = _key(column.name) == channel
+    stated = column.unit or (None if public else unit_in_title(channel, column.name))
+    wanted = choice.unit or (None if choice.column == column.title else column_of(choice.column).unit)
+    if wanted and stated not in (None, choice.stated) and conversion(channel, stated) != conversion(channel, wanted):
+        rule = f"must be {wanted}, as its profile or map says"
+        raise _wrong_unit(channel, column, "mixed_units", rule, repr(stated[:MOST_QUOTED]))
+    unit = wanted or stated
+    if unit is None and not public and (word := _may_state(channel, column.name)):
+        rule = f"may be {word}: map={channel}:{column.name} [{word}], or [{CHANNELS[channel].unit}], says which"
+        raise _wrong_unit(channel, column, "missing_unit", rule, "no clear one")
+    return unit
+
+
+def _conversion(channel: str, column: Column, choice: Choice | None, unit: str | None) -> Conversion:
     """The conversion to the channel's unit. A public name states its unit: another unit beside it is a contradiction.
 
-    A column that a map names may end in its unit, whatever parts them; one without a unit is in the channel's unit.
+    A column that a map names without a unit is in the channel's unit.
     """
-    key = _key(column.name)
-    own, public, unit = CHANNELS[channel].unit, key == channel, column.unit
-    if choice is not None:
-        ending = ending_unit(channel, column.name)
-        stated = unit or (None if public else ending)
-        other = choice.unit and stated not in (None, choice.stated)
-        if other and conversion(channel, stated or "") != conversion(channel, choice.unit or ""):
-            rule = f"must be {choice.unit}, as its profile says"
-            raise _wrong_unit(channel, column, "mixed_units", rule, repr((stated or "")[:MOST_QUOTED]))
-        unit = choice.unit or stated
-    elif unit is None and key in _SECONDS:
-        unit = "s"
+    own, public = CHANNELS[channel].unit, _key(column.name) == channel
     if unit is None:
         converted: Conversion | None = Conversion()
         if not public and choice is None:

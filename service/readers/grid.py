@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 from itertools import zip_longest
 from typing import Any
 
-from service.errors import MOST_QUOTED, FieldError, InvalidError
-from service.readers.column_names import bare_unit, column_of, recognised
+from service.errors import MOST_QUOTED, FieldError, InvalidError, Notice
+from service.readers.column_names import bare_unit, column_of, known_channel, recognised
 from service.readers.limits import LONGEST_TITLE
+from service.readers.numerals import is_stamp
 from service.readers.table import Column
 from service.readers.unit_table import is_unit
 
@@ -28,24 +29,20 @@ _MOST_TITLE_ROWS = 4
 #: What a row begins with that names the units of the columns beside it.
 _UNIT_LABELS = re.compile(r"(y_)?units?(_label)?s?:?|einheit(en)?:?|单位", re.IGNORECASE)
 NUMERIC = re.compile(
-    r"[+-]?(\d[\d.,'’\u00a0\u202f\u2009]*+|[.,]\d++)( ?[eE][+-]?\d{1,4})?|[+-]?(nan|inf|infinity)",
+    r"[+−-]?(\d[\d.,'’\u00a0\u202f\u2009]*+|[.,]\d++)( ?[eE][+-]?\d{1,4})?|[+−-]?(nan|inf|infinity)",
     re.IGNORECASE | re.ASCII,
-)
-#: A point in time or a duration, with a clock's colon or a date's marks.
-TIMELIKE = re.compile(
-    r"[+-]?\d[\d./T ,+-]*:[\d:.,+Z -]*([AaPp][Mm])?|\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ].*)?|\d+ days? .*"
-    r"|\d{1,2}[- ][A-Za-z]{3}[- ]\d{4}( .*)?"
 )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layout:
     """Where a table is: of each column the title, unit, group and first cell; the row of its titles, the first row of data,
-    and a score by which layouts of other separators or encodings compare."""
+    how many rows with numbers beside a label stand between, and a score by which other separators or encodings compare."""
 
     headings: tuple[tuple[str, str, str, Any], ...]
     titles: int
     start: int
+    labelled: int
     score: tuple[int, int, int, int]
 
     def texts(self) -> tuple[tuple[str, str, str], ...]:
@@ -55,7 +52,9 @@ class Layout:
     def columns(self) -> tuple[Column, ...]:
         """The columns. Raises InvalidError on a title that is too long, or beside whose unit another is stated."""
         return tuple(
-            replace(column_of(title, group=group), unit="s") if _is_moment(cell) else column_of(title, unit, group)
+            replace(column_of(title, group=group), unit="s")
+            if _is_moment(cell) or _is_word(title, cell)
+            else column_of(title, unit, group)
             for title, unit, group, cell in self.headings
         )
 
@@ -88,6 +87,14 @@ def _runs(rows: Sequence[Row], comments: frozenset[int]) -> Iterator[tuple[int, 
         yield start, length
 
 
+def _without_labelled(rows: Sequence[Row], comments: frozenset[int], start: int, length: int) -> tuple[int, int]:
+    """Where a run begins without its first rows that hold numbers of another kind beside a label (`Length;12;12`), and
+    how many those are."""
+    run = [index for index in range(start, len(rows)) if index not in comments and not is_blank(rows[index])][:length]
+    labelled = next((k for k, index in enumerate(run) if not is_footer(rows[index], rows[run[length // 2]])), 0)
+    return (run[labelled], labelled) if run else (start, 0)
+
+
 def is_blank(row: Row) -> bool:
     """Whether a row holds nothing."""
     return all(cell is None or cell == "" for cell in row)
@@ -96,21 +103,36 @@ def is_blank(row: Row) -> bool:
 def is_value(cell: Any) -> bool:
     """Whether a cell is a number or a point in time."""
     if isinstance(cell, str):
-        return bool(cell) and (NUMERIC.fullmatch(cell) or TIMELIKE.fullmatch(cell)) is not None
+        return bool(cell) and (NUMERIC.fullmatch(cell) is not None or is_stamp(cell))
     return cell is not None and not isinstance(cell, bool)
+
+
+def is_footer(row: Row, other: Row) -> bool:
+    """Whether a row is none of the table of `other`: it begins with a word where that has none; or has no value."""
+    place, cell = next(((place, cell) for place, cell in enumerate(row) if cell not in (None, "")), (0, None))
+    if cell is None or is_value(cell):
+        return False
+    beside = other[place] if place < len(other) else None
+    return beside in (None, "") or is_value(beside) or not any(map(is_value, row))
 
 
 def _is_moment(cell: Any) -> bool:
     """Whether a cell is a point in time or a duration, which needs no unit."""
-    return TIMELIKE.fullmatch(cell) is not None if isinstance(cell, str) else hasattr(cell, "resolution")
+    return is_stamp(cell) if isinstance(cell, str) else hasattr(cell, "resolution")
+
+
+def _is_word(title: str, cell: Any) -> bool:
+    """Whether a column of the time holds words: no unit is what it lacks."""
+    return isinstance(cell, str) and bool(cell) and not is_value(cell) and known_channel(title) == "time_s"
 
 
 def _layout(
     rows: Sequence[Row], comments: frozenset[int], start: int, length: int, named: Sequence[str]
 ) -> Layout | None:
     """The layout of the data from row `start` on: the row above them that knows most channels has the titles."""
-    width = max((index + 1 for index, cell in enumerate(rows[start]) if cell not in (None, "")), default=0)
     above = _text_rows_above(rows, comments, start)
+    start, labelled = _without_labelled(rows[:-1], comments, start, length)
+    width = max((index + 1 for index, cell in enumerate(rows[start]) if cell not in (None, "")), default=0)
     best: tuple[tuple[int, int, int], list[str], int] | None = None
     for place, at in enumerate(above):
         for titles in _titles(rows, above[place:], width):
@@ -133,8 +155,8 @@ def _layout(
     headings = zip_longest(
         titles, units[: len(titles)], groups if twice else (), rows[start][: len(titles)], fillvalue=""
     )
-    score = (rank[0], rank[1], min(length, _LONG_RUN), sum(map(is_value, rows[start])))
-    return Layout(headings=tuple(headings), titles=at, start=start, score=score)
+    score = (rank[0], rank[1], min(length - labelled, _LONG_RUN), sum(map(is_value, rows[start])))
+    return Layout(headings=tuple(headings), titles=at, start=start, labelled=labelled, score=score)
 
 
 def _text_rows_above(rows: Sequence[Row], comments: frozenset[int], start: int) -> list[int]:
@@ -199,6 +221,12 @@ def _units(rows: Sequence[Row], below: Sequence[int], at: int, start: int) -> li
     if best is None:
         return []
     return ["" if _UNIT_LABELS.fullmatch(unit) else unit for unit in texts[best]]
+
+
+def left_out(number: int, where: str, first: str) -> Notice:
+    """The notice of lines that are no rows of the table."""
+    message = f"{number} lines {where} the table were left out, the first: {first.strip()[:MOST_QUOTED]!r}"
+    return Notice(code="lines_left_out", message=message)
 
 
 def no_table(line: int, got: str) -> InvalidError:

@@ -18,7 +18,6 @@ from models.arrays import FloatArray
 from service.errors import MOST_QUOTED, FieldError, InvalidError, Notice
 from service.readers.column_names import choices_of, column_of
 from service.readers.limits import Limits
-from service.readers.numerals import column_values
 from service.readers.table import Clock, Column, Reading, Table, cut_short
 from service.readers.unit_table import conversion
 
@@ -42,7 +41,7 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
         raise InvalidError(f"a file must not have more than {limits.most_columns} channels, got {len(places)}")
 
     def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
-        return [_values(file, places[index], channel, reading) for index, channel in taken.items()]
+        return [_values(file, places[index], channel) for index, channel in taken.items()]
 
     notices = []
     if head.startswith(b"UnFinMF"):
@@ -95,7 +94,7 @@ def _times(file: Any, group: int) -> FloatArray:
     return times
 
 
-def _values(file: Any, place: tuple[int, int], channel: str, reading: Reading) -> NDArray[Any]:
+def _values(file: Any, place: tuple[int, int], channel: str) -> NDArray[Any]:
     """A channel's physical values, masked where its recorder marks them invalid."""
     group, index = place
     _refuse_formula(file, group, index)
@@ -103,11 +102,7 @@ def _values(file: Any, place: tuple[int, int], channel: str, reading: Reading) -
     rows = int(file.groups[group].channel_group.cycles_nr)
     if len(signal.samples) != rows:
         raise cut_short(f"{channel} must have the {rows} rows that its group states, got {len(signal.samples)}")
-    samples = signal.samples
-    if samples.dtype.kind in "SUO":
-        texts = [text.decode("utf-8", "replace") if isinstance(text, bytes) else text for text in samples.tolist()]
-        samples = column_values([channel], [texts], reading.decimal)[0]
-    invalid = signal.invalidation_bits
+    samples, invalid = signal.samples, signal.invalidation_bits
     return samples if invalid is None else np.ma.MaskedArray(samples, mask=np.asarray(invalid, dtype=np.bool_))
 
 

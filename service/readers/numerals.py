@@ -1,14 +1,13 @@
-"""Columns of text -> float64: which sign is the decimal's and which groups thousands, and points in time.
+"""Cells -> numbers and points in time: which sign is the decimal's and which groups thousands, dates of every usual order.
 
-Numbers are parsed by jiter (pydantic-core's reader of JSON) where they are plain, else by `float`. A file has one decimal
-sign. Where each of its signs stands before exactly three digits, 1.100 may be 1.1 or 1100: that is refused, not guessed.
+A file has one decimal sign. Where each of its signs stands before exactly three digits, 1.100 may be 1.1 or 1100: that is
+refused, not guessed.
 """
 
 import contextlib
 import re
-from collections.abc import Callable, Sequence
-from datetime import date, datetime, timedelta
-from datetime import time as dt_time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from datetime import date, datetime, time, timedelta
 from decimal import Decimal
 from typing import Any
 
@@ -21,22 +20,23 @@ from service.errors import MOST_ERRORS, MOST_QUOTED, FieldError, InvalidError
 
 #: A number: no hexadecimals, no underscores, no words but nan and inf, which `check_arrays` refuses with their row. Digits
 #: are never given back, or a long run of them with a letter behind it would be tried from every digit to every other.
-NUMBER = re.compile(rb"[+-]?(\d++(\.\d*+)?|\.\d++)([eE][+-]?\d{1,4})?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
-_PLAIN = b"0123456789.eE+-\n"
-_GROUPERS = re.compile("(?<=\\d)['’\u00a0\u202f\u2009](?=\\d{3})".encode())
-_SIGNS = (b".", b",")
+NUMBER = re.compile(r"[+-]?(\d++(\.\d*+)?|\.\d++)([eE][+-]?\d{1,4})?|[+-]?(nan|inf|infinity)", re.IGNORECASE | re.ASCII)
+_PLAIN = dict.fromkeys(map(ord, "0123456789.eE+-\n"))
+#: Thousands apart by an apostrophe or a blank, at the beginning of a cell.
+_APART = re.compile(r"^[+-]?[1-9]\d{0,2}(?:['’ \u00a0\u202f\u2009]\d{3})+(?![\d'’ \u00a0\u202f\u2009])", re.MULTILINE)
+_SIGNS = (".", ",")
 
 
-def _patterns(sign: bytes, other: bytes) -> tuple[re.Pattern[bytes], re.Pattern[bytes], re.Pattern[bytes]]:
+def _patterns(sign: str, other: str) -> tuple[re.Pattern[str], re.Pattern[str], re.Pattern[str]]:
     """Cells that show `sign` to be the decimal's; that show it to group; and that hold it as groups may."""
     c, d = re.escape(sign), re.escape(other)
-    decimal = rb"^[+-]?(?:(?:0\d*|\d{4,}|)%b\d*|\d+%b(?:\d{0,2}|\d{4,})|\d*%b\d*[eE][+-]?\d+)$" % (c, c, c)
-    groups = rb"[+-]?(?!0)\d{1,3}(?:%b\d{2,3})*%b\d{3}" % (c, c)
-    grouping = rb"^(?:%b%b\d*|[+-]?\d{1,3}(?:%b\d{2,3})+%b\d{3})$" % (groups, d, c, c)
+    decimal = rf"^[+-]?(?:(?:0\d*|\d{{4,}}|){c}\d*|\d+{c}(?:\d{{0,2}}|\d{{4,}})|\d*{c}\d*[eE][+-]?\d+)$"
+    groups = rf"[+-]?(?!0)\d{{1,3}}(?:{c}\d{{2,3}})*{c}\d{{3}}"
+    grouping = rf"^(?:{groups}{d}\d*|[+-]?\d{{1,3}}(?:{c}\d{{2,3}})+{c}\d{{3}})$"
     return (
-        re.compile(decimal, re.MULTILINE),
-        re.compile(grouping, re.MULTILINE),
-        re.compile(groups + rb"(?:%b\d*)?" % d),
+        re.compile(decimal, re.MULTILINE | re.ASCII),
+        re.compile(grouping, re.MULTILINE | re.ASCII),
+        re.compile(rf"{groups}(?:{d}\d*)?", re.ASCII),
     )
 
 
@@ -45,110 +45,237 @@ _DECIMAL, _GROUPING, _GROUPED = (
 )  # fmt: skip
 
 
-class Undecided(Exception):  # noqa: N818 (no error: more of the file may decide)
-    """A cell that may be read in two ways, and nothing yet that says which."""
-
-
 class Numerals:
-    """The signs of one file: its decimal sign is settled by the caller, or by the first cell that can be read in one way."""
+    """The cells of one file: its decimal sign is given, or shown by the first cell that can be read in one way ("" until
+    then), and the dates of each column follow one order."""
 
     def __init__(self, decimal: str = "") -> None:
-        self.decimal = decimal.encode()
+        self.decimal = decimal
+        self._stamps: dict[int, Stamps] = {}
 
-    def settle(self, texts: Sequence[bytes]) -> None:
-        """Learn the decimal sign from columns, the cells of each apart by line feeds. Raises Undecided."""
-        if self.decimal:
-            return
-        doubtful, occurrences = False, []
-        for text in texts:
+    def settle(self, columns: Sequence[Sequence[Any]]) -> bool:
+        """Learn the decimal sign from columns of cells; whether it is still open and a cell may be read in two ways."""
+        doubtful, shown = False, []
+        for cells in columns if not self.decimal else ():
+            text = "\n".join([cell.strip() for cell in cells if isinstance(cell, str)])
             for sign, other in (_SIGNS, _SIGNS[::-1]):
                 if sign in text:
-                    occurrences += [(match.start(), sign) for match in (_DECIMAL[sign].search(text),) if match]
-                    occurrences += [(match.start(), other) for match in (_GROUPING[sign].search(text),) if match]
-                    doubtful = doubtful or any(_GROUPED[sign].fullmatch(cell) for cell in text.split(b"\n"))
-        if occurrences:
-            self.decimal = min(occurrences)[1]
-        elif doubtful:
-            raise Undecided
+                    shown += [(match.start(), sign) for match in (_DECIMAL[sign].search(text),) if match]
+                    shown += [(match.start(), other) for match in (_GROUPING[sign].search(text),) if match]
+                    doubtful = doubtful or any(map(_GROUPED[sign].fullmatch, text.split("\n")))
+        if shown:
+            self.decimal = min(shown)[1]
+        return doubtful and not shown
 
-    def doubtful(self, text: bytes) -> tuple[int, bytes, str, str] | None:
-        """A cell that may be read in two ways: its row, its text and both readings."""
-        for row, cell in enumerate(text.split(b"\n")):
-            for sign in _SIGNS:
-                if sign in cell and _GROUPED[sign].fullmatch(cell):
-                    return row, cell, f"{float(cell.replace(sign, b'.')):.9g}", cell.replace(sign, b"").decode()
-        return None
+    def values(
+        self,
+        channels: Mapping[int, str],
+        columns: Sequence[Sequence[Any]],
+        line_of: Callable[[int], int] | None = None,
+        before: int = 0,
+    ) -> list[NDArray[Any]]:
+        """Columns [n] by their index, each for a channel: numbers as float64, points in time as numpy has them.
 
-    def floats(self, text: bytes) -> FloatArray | None:
-        """A column's cells, apart by line feeds, as numbers; None where one is none, or not by this file's decimal sign."""
-        if b" " in text or b"\t" in text:
-            text = b"\n".join([cell.strip(b" \t") for cell in text.split(b"\n")])
-        if not text.isascii() or b"'" in text:
-            text = _GROUPERS.sub(b"", text)
-        other = b"," if self.decimal == b"." else b"."
+        `before` rows were read already. Raises InvalidError naming the rows of cells that are neither, or may be read in two
+        ways.
+        """
+        if self.settle(columns):
+            for name, cells in zip(channels.values(), columns, strict=True):
+                for row, cell in enumerate(cells):
+                    if isinstance(cell, str) and any(_GROUPED[sign].fullmatch(cell.strip()) for sign in _SIGNS):
+                        raise _doubtful(name, before + row, cell.strip(), line_of)
+        read: dict[int, NDArray[Any]] = {}
+        wrong: list[tuple[int, str, str, str]] = []
+        total = 0
+        given = zip(channels.items(), columns, strict=True)
+        for (index, name), cells in sorted(given, key=lambda item: item[0][1] == "time_s"):
+            # the time last: a block is read again where another column is wrong
+            values = self._moments(index, cells) if name == "time_s" and not wrong else None
+            values = self._floats(cells) if values is None else values
+            for row, rule in self._wrong(cells, name == "time_s") if values is None else ():
+                total += 1
+                if total <= MOST_ERRORS:
+                    wrong.append((before + row, name, _shown(cells[row]), rule))
+            if values is not None:
+                read[index] = values
+        if wrong:
+            raise _wrong(sorted(wrong), total, line_of, before + len(columns[0]) - 1)
+        return [read[index] for index in channels]
+
+    def _moments(self, index: int, cells: Sequence[Any]) -> NDArray[Any] | None:
+        """Dates, times of day, durations or their text; None where they are numbers or of several types."""
+        kinds = set(map(type, cells))
+        if kinds and kinds <= {datetime, date}:
+            plain = [
+                cell.replace(tzinfo=None) - (cell.utcoffset() or timedelta()) if isinstance(cell, datetime) else cell
+                for cell in cells
+            ]
+            return np.array(plain, dtype="datetime64[us]")
+        if kinds and kinds <= {time, timedelta}:
+            spans = [
+                cell
+                if isinstance(cell, timedelta)
+                else datetime.combine(date.min, cell.replace(tzinfo=None)) - datetime.min
+                for cell in cells
+            ]
+            return np.array(spans, dtype="timedelta64[us]")
+        if kinds != {str} or (index not in self._stamps and not is_stamp(cells[0])):
+            return None
+        return self._stamps.setdefault(index, Stamps()).since_first(cells)
+
+    def _floats(self, cells: Sequence[Any]) -> FloatArray | None:
+        """Cells as numbers; None where one is none, or not by this file's decimal sign."""
+        kinds = set(map(type, cells))
+        if kinds != {str}:
+            if kinds <= {int, float, Decimal}:
+                return np.array(cells, dtype=np.float64)
+            each = [self._floats([cell]) if type(cell) in (str, int, float, Decimal) else None for cell in cells]
+            known = [number for number in each if number is not None]
+            return np.concatenate(known) if len(known) == len(cells) else None
+        text = "\n".join(cells)
+        if " " in text or "\t" in text:
+            text = "\n".join([cell.strip() for cell in cells])
+        if not text.isascii() or "'" in text or " " in text:
+            text = _APART.sub(lambda match: re.sub(r"[^\d+-]", "", match[0]), text.replace("−", "-"))
+        other = "," if self.decimal == "." else "."
         if other in text and self.decimal:
-            if not all(_GROUPED[other].fullmatch(cell) for cell in text.split(b"\n") if other in cell):
+            if not all(_GROUPED[other].fullmatch(cell) for cell in text.split("\n") if other in cell):
                 return None
-            text = text.replace(other, b"")
-        text = text.replace(b",", b".")
-        if not text.translate(None, _PLAIN):
-            # +5, .5, 007 are numbers, and none of JSON's
+            text = text.replace(other, "")
+        text = text.replace(",", ".")
+        if not text.translate(_PLAIN):
+            # by jiter, to which +5, .5 and 007 are no numbers
             with contextlib.suppress(ValueError, OverflowError):
-                numbers = np.array(pydantic_core.from_json(b"[%b]" % text.replace(b"\n", b",")), dtype=np.float64)
-                return numbers if text else None
-        cells = text.split(b"\n")
+                numbers = np.array(pydantic_core.from_json(f"[{text.replace(chr(10), ',')}]"), dtype=np.float64)
+                return numbers if numbers.size == len(cells) else None
+        cells = text.split("\n")
         return np.array([float(cell) for cell in cells]) if all(map(NUMBER.fullmatch, cells)) else None
 
-    def wrong(self, text: bytes) -> list[tuple[int, str]]:
+    def _wrong(self, cells: Sequence[Any], timed: bool) -> Iterator[tuple[int, str]]:
         """The rows of a column that are no numbers, each with the rule that it breaks."""
-        broken_rules = []
-        for row, cell in enumerate(text.split(b"\n")):
-            if self.floats(cell) is None:
-                swapped = Numerals("," if self.decimal == b"." else ".")
+        swapped = Numerals("," if self.decimal == "." else ".")
+        for row, cell in enumerate(cells):
+            if self._floats([cell]) is None:
                 rule = "must be a number"
-                if self.decimal and swapped.floats(cell) is not None:
-                    rule = f"must have the decimal sign {self.decimal.decode()!r} as before"
-                broken_rules.append((row, rule))
-        return broken_rules
+                if self.decimal and isinstance(cell, str) and swapped._floats([cell]) is not None:
+                    rule = f"must have the decimal sign {self.decimal!r} as before"
+                yield (
+                    row,
+                    rule.replace("a number", "a number or a time such as 2026-11-02 07:00:00.5") if timed else rule,
+                )
 
 
-_DATE = r"(?P<date>\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}|\d{1,2}[- ][A-Za-z]{3}[- ]\d{4})"
+def _shown(cell: Any) -> str:
+    return str("" if cell is None else cell).strip()[:MOST_QUOTED]
+
+
+#: What helps where a cell is empty.
+_EMPTY = ": fill the cell, or take its row out of the file"
+
+
+def _place(name: str, row: int, line_of: Callable[[int], int] | None) -> str:
+    return f"{name}[{row}]" + (f" (line {line_of(row)})" if line_of else "")
+
+
+def _wrong(
+    wrong: Sequence[tuple[int, str, str, str]], total: int, line_of: Callable[[int], int] | None, last: int
+) -> InvalidError:
+    """The error of cells that are no numbers: row, channel, text and rule of each; `last` is the last row that was read."""
+    errors = [
+        FieldError(
+            pointer=f"/channels/{name}/{row}",
+            row=row + 1,
+            value=shown,
+            code="not_a_number",
+            message=f"{_place(name, row, line_of)} {rule}, got {shown!r}" + ("" if shown else _EMPTY),
+        )
+        for row, name, shown, rule in wrong
+    ]
+    end = f"line {line_of(last)}" if line_of else f"row {last + 1}"
+    more = "" if total == 1 else f"; {total} errors up to {end}"
+    return InvalidError(errors[0].message + more, errors=errors, total=total)
+
+
+def _doubtful(name: str, row: int, cell: str, line_of: Callable[[int], int] | None) -> InvalidError:
+    """The error of a cell that may be read in two ways, with both."""
+    sign, other = (",", ".") if "," in cell else (".", ",")
+    as_decimal, as_thousands = f"{float(cell.replace(sign, '.')):.9g}", cell.replace(sign, "")
+    message = (
+        f"{_place(name, row, line_of)} may be {as_decimal} or {as_thousands}, got {cell!r}: every {sign!r} of the file "
+        f"stands before exactly three digits; decimal={sign} reads {as_decimal}, decimal={other} reads {as_thousands}"
+    )
+    error = FieldError(pointer="/decimal", row=row + 1, value=cell, code="ambiguous_number", message=message)
+    return InvalidError(message, errors=[error])
+
+
+# --- points in time ---
+
+_DATE = r"(?P<date>\d{1,4}[-/.年]\d{1,2}[-/.月]\d{1,4}日?|\d{1,2}[- ][A-Za-z]{3}[- ]\d{4})"
 _STAMP = re.compile(
     rf"(?:{_DATE}[T ,]*)?(?:(?P<days>-?\d+) days?,? *)?"
     r"(?:(?P<sign>[+-]?)(?P<first>\d{1,4}):(?P<second>\d{1,2})(?::(?P<third>\d{1,2}))?(?:[.,:](?P<fraction>\d{1,9}))?)?"
     r" ?(?P<half>[AaPp][Mm])?(?: ?(?:Z|UTC)| ?(?P<zone>[+-]\d\d:?\d\d))?",
     re.ASCII,
 )
-
 #: Orders of a date's parts, but for those with slashes.
-_ORDERS = ("%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%d.%m.%Y", "%d-%m-%Y", "%d-%b-%Y", "%d %b %Y", "%d.%m.%y")
+_ORDERS = (
+    "%Y-%m-%d",
+    "%Y/%m/%d",
+    "%Y.%m.%d",
+    "%Y年%m月%d日",
+    "%d.%m.%Y",
+    "%d-%m-%Y",
+    "%d-%b-%Y",
+    "%d %b %Y",
+    "%d.%m.%y",
+)
+#: The day from which days are counted, so that nanoseconds fit 64 bits.
+_EPOCH = datetime(2000, 1, 1)
+_DAY = 86_400 * 10**9
+
+
+def is_stamp(cell: str) -> bool:
+    """Whether a text has the form of a point in time or of a duration with colons."""
+    match = _STAMP.fullmatch(cell.strip())
+    return match is not None and bool(match["date"] or match["first"])
 
 
 class Stamps:
-    """Points in time as text -> seconds since the first: dates of every usual order, times of day, durations."""
+    """Points in time as text -> nanoseconds since the first: dates of every usual order, times of day, durations."""
 
     def __init__(self) -> None:
         self._first: int | None = None
-        self._dates: dict[str, int] = {}
+        self._last = 0
+        self._days = 0
+        self._dates: dict[str, int | None] = {}
         self._orders: set[str] = {"%d/%m/%Y", "%m/%d/%Y"}
 
-    def seconds(self, cells: Sequence[str]) -> FloatArray | None:
-        """The next cells [n] as seconds [n]; None where one is no point in time. Raises InvalidError on unclear dates."""
+    def since_first(self, cells: Sequence[str]) -> NDArray[np.timedelta64] | None:
+        """The next cells [n]; None where one is no point in time. Raises InvalidError on unclear dates."""
         nanoseconds = self._iso(cells)
         if nanoseconds is None:
             self._narrow(cells)
             parsed = [self._nanoseconds(cell) for cell in cells]
-            if any(moment is None or abs(moment) >= 2**63 for moment in parsed):
+            if any(moment is None or abs(moment) >= 2**62 for moment in parsed):
                 return None
             nanoseconds = np.array(parsed, dtype=np.int64)
-        if self._first is None and nanoseconds.size:
+            if not self._dates:
+                nanoseconds = self._past_midnight(nanoseconds)
+        if self._first is None:
             self._first = int(nanoseconds[0])
-        return np.asarray((nanoseconds - (self._first or 0)) * 1e-9, dtype=np.float64)
+        return (nanoseconds - self._first).astype("timedelta64[ns]")
+
+    def _past_midnight(self, times: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Times of day that go on where they step back by more than half a day."""
+        before = self._last if self._first is not None else times[0]
+        days = self._days + np.cumsum(np.diff(times, prepend=before) < -_DAY // 2)
+        self._last, self._days = int(times[-1]), int(days[-1])
+        return times + days * _DAY
 
     def _iso(self, cells: Sequence[str]) -> NDArray[np.int64] | None:
         """By numpy where all are ISO 8601 without a zone."""
-        if not cells or any(
-            cell[:2] not in ("19", "20") or cell[4:5] != "-" or len(cell) < 16 or cell[-6:-5] in "+-" or cell[-1] == "Z"
+        if any(
+            cell[:2] not in ("19", "20") or len(cell) < 16 or cell.count("-") != 2 or "+" in cell or cell[-1] == "Z"
             for cell in cells
         ):
             return None
@@ -175,13 +302,8 @@ class Stamps:
         zone = (match["zone"] or "").replace(":", "")
         if zone:
             total -= (1 if zone[0] == "+" else -1) * (int(zone[1:3]) * 60 + int(zone[3:])) * 60 * 10**9
-        days = int(match["days"] or 0)
-        if match["date"]:
-            day = self._day(match["date"])
-            if day is None:
-                return None
-            days += day
-        return total + days * 86400 * 10**9
+        day = self._day(match["date"]) if match["date"] else 0
+        return None if day is None else total + (int(match["days"] or 0) + day) * _DAY
 
     def _narrow(self, cells: Sequence[str]) -> None:
         """Learn from dates with slashes whether the day or the month comes first.
@@ -190,118 +312,25 @@ class Stamps:
         """
         dates = {cell.strip().partition(" ")[0] for cell in cells if "/" in cell} - self._dates.keys()
         for written in dates:
-            possible = {order for order in self._orders if _day_by(written, order) is not None}
-            self._orders = possible or self._orders
+            self._orders = {order for order in self._orders if _day_by(written, order) is not None} or self._orders
         if len(self._orders) > 1 and len(dates | {written for written in self._dates if "/" in written}) > 1:
             shown = min(dates)[:MOST_QUOTED]
             message = (
                 f"the dates of the time column may be day/month or month/day, got {shown!r}: write them as 2026-11-02"
             )
-            raise InvalidError(
-                message, errors=[FieldError(pointer="/channels/time_s", code="ambiguous_date", message=message)]
-            )
+            error = FieldError(pointer="/channels/time_s", code="ambiguous_date", message=message)
+            raise InvalidError(message, errors=[error])
 
-    def _day(self, date: str) -> int | None:
+    def _day(self, written: str) -> int | None:
         """The day's number; None where it is no date."""
-        if date not in self._dates:
-            days = (_day_by(date, order) for order in (*_ORDERS, *sorted(self._orders)))
-            day = next((number for number in days if number is not None), None)
-            if day is None:
-                return None
-            self._dates[date] = day
-        return self._dates[date]
+        if written not in self._dates:
+            days = (_day_by(written, order) for order in (*_ORDERS, *sorted(self._orders)))
+            self._dates[written] = next((number for number in days if number is not None), None)
+        return self._dates[written]
 
 
-#: The day from which days are counted, so that nanoseconds fit 64 bits.
-_EPOCH = datetime(2000, 1, 1)
-
-
-def _day_by(date: str, order: str) -> int | None:
+def _day_by(written: str, order: str) -> int | None:
     try:
-        return (datetime.strptime(date, order) - _EPOCH).days
+        return (datetime.strptime(written, order) - _EPOCH).days
     except ValueError:
         return None
-
-
-def column_values(
-    channels: Sequence[str], columns: Sequence[Sequence[Any]], decimal: str, line_of: Callable[[int], int] | None = None
-) -> list[NDArray[Any]]:
-    """Columns of cells of any type, each for a channel: numbers as float64 [n], points in time as numpy has them [n].
-
-    Raises InvalidError naming the row of a cell that is neither, or of one that may be read in two ways.
-    """
-    numerals = Numerals(decimal)
-    texts = [b"\n".join(cell.strip().encode() for cell in cells if isinstance(cell, str)) for cells in columns]
-    try:
-        numerals.settle(texts)
-    except Undecided:
-        for name, text in zip(channels, texts, strict=True):
-            if doubt := numerals.doubtful(text):
-                raise doubtful_number(name, doubt, doubt[0], line_of) from None
-    return [_values(name, cells, numerals, line_of) for name, cells in zip(channels, columns, strict=True)]
-
-
-def _values(name: str, cells: Sequence[Any], numerals: Numerals, line_of: Callable[[int], int] | None) -> NDArray[Any]:
-    if cells and name == "time_s" and not isinstance(cells[0], int | float):
-        moments = _moments(cells)
-        if moments is not None:
-            return moments
-    values, wrong = np.empty(len(cells)), []
-    for row, cell in enumerate(cells):
-        number = numerals.floats(cell.strip().encode()) if isinstance(cell, str) else None
-        if number is not None and number.size == 1:
-            values[row] = number[0]
-        elif isinstance(cell, int | float | Decimal) and not isinstance(cell, bool):
-            values[row] = cell
-        else:
-            wrong.append(row)
-    if not wrong:
-        return values
-    errors = []
-    for row in wrong[:MOST_ERRORS]:
-        shown = str("" if cells[row] is None else cells[row])[:MOST_QUOTED]
-        place = f"{name}[{row}]" + (f" (line {line_of(row)})" if line_of else "")
-        message = f"{place} must be a number, got {shown!r}"
-        pointer = f"/channels/{name}/{row}"
-        errors.append(FieldError(pointer=pointer, row=row + 1, value=shown, code="not_a_number", message=message))
-    more = "" if len(wrong) == 1 else f"; {len(wrong)} errors in all"
-    raise InvalidError(errors[0].message + more, errors=errors, total=len(wrong))
-
-
-def _moments(cells: Sequence[Any]) -> NDArray[Any] | None:
-    """Dates, times of day, durations or their text; None where they are of several types."""
-    kinds = set(map(type, cells))
-    if kinds <= {datetime, date}:
-        plain = [
-            cell.replace(tzinfo=None) - (cell.utcoffset() or timedelta()) if isinstance(cell, datetime) else cell
-            for cell in cells
-        ]
-        return np.array(plain, dtype="datetime64[us]")
-    if kinds <= {dt_time}:
-        cells = [datetime.combine(date.min, cell.replace(tzinfo=None)) - datetime.min for cell in cells]
-        return np.array(cells, dtype="timedelta64[us]")
-    if kinds <= {timedelta}:
-        return np.array(cells, dtype="timedelta64[us]")
-    if kinds <= {str}:
-        seconds = Stamps().seconds(cells)
-        return None if seconds is None else (seconds * 1e9).astype("timedelta64[ns]")
-    return None
-
-
-def doubtful_number(
-    name: str, doubt: tuple[int, bytes, str, str], row: int, line_of: Callable[[int], int] | None
-) -> InvalidError:
-    """The error of a cell that may be read in two ways, with both."""
-    _, cell, as_decimal, as_thousands = doubt
-    sign, other = (",", ".") if b"," in cell else (".", ",")
-    place = f"{name}[{row}]" + (f" (line {line_of(row)})" if line_of else "")
-    message = (
-        f"{place} may be {as_decimal} or {as_thousands}, got {cell.decode()!r}: every {sign!r} of the file stands before "
-        f"exactly three digits; decimal={sign} reads {as_decimal}, decimal={other} reads {as_thousands}"
-    )
-    return InvalidError(
-        message,
-        errors=[
-            FieldError(pointer="/decimal", row=row + 1, value=cell.decode(), code="ambiguous_number", message=message)
-        ],
-    )

@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from service.errors import InvalidError
 from service.readers.column_names import column_of
 from service.readers.limits import Limits
-from service.readers.numerals import column_values
 from service.readers.table import Column, Reading, Table
 
 _UNITS = (b"unit", b"units", b"Unit")
 
 
-def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
+def read_table(path: Path, _: Reading, limits: Limits) -> Table:
     """The columns of the file. A null is NaN, which is refused."""
     file = parquet.ParquetFile(path, memory_map=True)
     fields = list(file.schema_arrow)
@@ -29,11 +28,8 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
         raise InvalidError(f"a file must not have more than {limits.most_columns} columns, got {len(fields)}")
 
     def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
-        columns = []
-        for index, channel in taken.items():  # one at a time: memory is that of a column
-            column = file.read(columns=[fields[index].name], use_threads=False).column(0)
-            columns.append(_values(column, channel, reading))
-        return columns
+        # one at a time: memory is that of a column
+        return [_values(file.read(columns=[fields[index].name], use_threads=False).column(0)) for index in taken]
 
     columns = [_column(field, file.metadata.num_rows) for field in fields]
     return Table(columns=tuple(columns), read=read)
@@ -47,13 +43,11 @@ def _column(field: Any, rows: int) -> Column:
     return Column(column.name, "s" if moment else column.unit, "", column.title, rows)
 
 
-def _values(column: Any, channel: str, reading: Reading) -> NDArray[Any]:
+def _values(column: Any) -> NDArray[Any]:
     kind = column.type.value_type if kinds.is_dictionary(column.type) else column.type
     if kinds.is_time(kind):
         column, kind = column.cast(f"duration[{kind.unit}]" if kind.unit != "s" else "int64"), kind
     if kinds.is_decimal(kind):
         column = column.cast("float64")
-    elif kinds.is_string(kind) or kinds.is_large_string(kind):
-        return column_values([channel], [column.to_pylist()], reading.decimal)[0]
     values = column.to_numpy()
     return values.astype(np.float64) if values.dtype == np.float16 else np.asarray(values)

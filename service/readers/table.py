@@ -82,15 +82,16 @@ class Column:
 
 
 #: Reads columns [n] by their index, each with the channel that it is for: `time_s` may be points in time, and errors name
-#: it. Numbers come as any numeric type, points in time as datetime64 or timedelta64; a masked array marks the samples that
-#: the recorder says are invalid.
+#: it. Numbers come as any numeric type, points in time as datetime64 or timedelta64, cells of any kind as texts or objects;
+#: a masked array marks the samples that the recorder says are invalid.
 Values = Callable[[Mapping[int, str]], Sequence[NDArray[Any]]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
     """A table as read. `above`: the lines over it; `first_line`: where its data begin (None: the format has no lines);
-    `head`: its first rows as text; `line_of` holds once the values are read."""
+    `head`: its first rows as text. Of several tables below each other, with the same titles, `breaks` has the first row of
+    each but one. `line_of`, `breaks` and `notices` hold once the values are read."""
 
     columns: tuple[Column, ...]
     read: Values
@@ -100,7 +101,8 @@ class Table:
     first_line: int | None = None
     head: tuple[tuple[str, ...], ...] = ()
     line_of: LineOf | None = None
-    notices: tuple[Notice, ...] = ()
+    breaks: Sequence[int] = ()
+    notices: Sequence[Notice] = ()
 
 
 def only(names: Sequence[str], wanted: str, kind: str) -> int:

@@ -16,7 +16,6 @@ from models.arrays import FloatArray
 from service.errors import MOST_QUOTED, FieldError, InvalidError
 from service.readers.column_names import column_of
 from service.readers.limits import Limits
-from service.readers.numerals import column_values
 from service.readers.table import Clock, Column, Reading, Table, cut_short
 from service.readers.unit_table import conversion
 
@@ -36,11 +35,7 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     clocks = _clocks(channels)
 
     def read(taken: Mapping[int, str]) -> list[NDArray[Any]]:
-        values = [channels[index][:] for index in taken]
-        return [
-            column_values([name], [list(column)], reading.decimal)[0] if column.dtype.kind in "OUS" else column
-            for name, column in zip(taken.values(), values, strict=True)
-        ]
+        return [channels[index][:] for index in taken]
 
     return Table(
         columns=tuple(

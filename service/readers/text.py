@@ -1,18 +1,20 @@
-"""Text of any make -> a table: encoding, separator and titles by what is understood best, data rows in blocks.
+"""Text of any make -> a table: encoding, separator and titles by what is understood best; then its rows, block by block.
 
-A block of plain cells is split whole; one with quotes, comments or missing ends goes through Python's reader of CSV. Both
-give columns of text, which `numerals` turns into numbers. Errors name line, column and value.
+A block of plain rows of numbers is numpy's; one with quotes, comments, dates or missing ends goes through Python's reader of
+CSV and `numerals`. Errors name line, column and value.
 """
 
 import codecs
 import csv
+import io
 import re
 import time
 from array import array
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,26 +22,24 @@ import pydantic_core
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from service.errors import MOST_ERRORS, MOST_QUOTED, FieldError, InvalidError, TooLargeError
-from service.readers.column_names import choices_of
+from service.errors import MOST_ERRORS, MOST_QUOTED, FieldError, InvalidError, Notice, TooLargeError
+from service.readers.column_names import choices_of, is_counter, recognised
 from service.readers.detect import ByteSource
-from service.readers.grid import MOST_ROWS, Layout, find_table, no_table
+from service.readers.grid import MOST_ROWS, Layout, find_table, is_footer, left_out, no_table
 from service.readers.limits import LIMITS, LONGEST_LINE_BYTES, Limits
-from service.readers.numerals import Numerals, Stamps, Undecided, doubtful_number
-from service.readers.table import Reading, Table
+from service.readers.numerals import NUMBER, Numerals, is_stamp
+from service.readers.table import Clock, Column, Reading, Table
 
 #: Bytes of the first block, which must hold the titles, and of each block after it.
 _FIRST_BLOCK, _BLOCK = 1 << 17, 1 << 18
-#: Bytes of text that wait for a number which shows the decimal sign. Chosen: a test of plateaus is a thousandth.
-_MOST_WAITING = 8 << 20
-#: What a block of nothing but numbers is made of.
-_BARE = b"0123456789.eE+-,\n"
-_NEWLINE, _COMMA = b"\n,"
 _COMMENTS = ("#", "%", "//")
+_NEWLINE, _COMMA = b"\n,"
 #: Encodings that are tried where text is not UTF-8; of those that read as many titles the first.
-_ENCODINGS = ("cp1252", "gb18030", "shift_jis", "big5", "euc_kr", "cp1251")
+_ENCODINGS = ("cp1252", "gb18030", "shift_jis", "euc_jp", "big5", "euc_kr", "cp1251")
 #: Pairs of bytes as Chinese text has them, and single ones as Western text has them.
 _CHINESE = re.compile(rb"(?:[\x00-\x7f]|[\xa1-\xf7][\xa1-\xfe])*")
+#: Lines that one cell in quotes may go over, in the rows of titles.
+_MOST_CELL_LINES = 5
 
 #: Opens the file's bytes from their beginning.
 Open = Callable[[], AbstractContextManager[ByteSource]]
@@ -72,15 +72,32 @@ def read_text(opened: Open, reading: Reading, limits: Limits) -> Table:
         raise wrong_line(1, "is empty, and no header came after it", "no_header")
     form = _form(first, reading, limits)
     body = _Body(opened, form, reading, limits)
-    titles = form.layout.titles
+    above = tuple(tuple(_cells(line, form.separator)) for line in form.lines[: form.at[form.layout.titles]])
     return Table(
-        columns=form.layout.columns(),
+        columns=tuple(_with_clocks(form.layout.columns(), above, body)),
         read=body.read,
-        above=tuple(tuple(_cells(line, form.separator)) for line in form.lines[: form.at[titles]]),
+        above=above,
         first_line=form.first_line,
         head=tuple(tuple(_cells(line, form.separator)) for line in form.lines[form.first_line - 1 :][:20]),
         line_of=body.lines.of,
+        breaks=body.breaks,
+        notices=body.notices,
     )
+
+
+def _with_clocks(columns: Sequence[Column], above: Sequence[Sequence[str]], body: "_Body") -> Iterator[Column]:
+    """Columns with the clocks that LabVIEW states above them where its column of times is empty: X0 + k · Delta_X."""
+    named = {row[0]: row for row in above if row}
+    stated = {name: named[name] for name in ("X0", "Delta_X") if name in named}
+    for place, column in enumerate(columns):
+        cells = [stated[name][place].replace(",", ".") for name in stated if len(stated[name]) > place]
+        if is_counter(column) and body.first[place : place + 1] == [""]:
+            yield Column("", title=column.title)
+        elif len(cells) == 2 and body.first[:1] == [""] and all(map(NUMBER.fullmatch, cells)):
+            start, step = map(float, cells)
+            yield replace(column, clock=Clock((start, step), partial(body.times, start, step), counts=step == 1.0))
+        else:
+            yield column
 
 
 # --- bytes -> lines ---
@@ -93,47 +110,44 @@ def _raw_blocks(source: ByteSource) -> Iterator[bytes]:
         block = source.read(_BLOCK)
 
 
-def _blocks(source: ByteSource, encoding: str) -> Iterator[bytes]:
-    """A file's text in UTF-8, in blocks of whole lines that all end in a line feed; a cell in quotes is not cut.
+def _blocks(source: ByteSource, encoding: str) -> Iterator[str]:
+    """A file's text in blocks of whole lines that all end in a line feed; a cell in quotes is not cut.
 
     Raises InvalidError on a line that is too long and on text that is not in its encoding.
     """
-    decoder = None if encoding == "utf-8" else codecs.getincrementaldecoder(encoding)()
-    rest, line, returns_alone = b"", 1, False
-    raw = _raw_blocks(source)
-    block: bytes | None = next(raw, None)
-    block = None if block is None else block.removeprefix(codecs.BOM_UTF8)
-    while block is not None or rest:
-        last = block is None
-        text = (block or b"") if decoder is None else _decoded(decoder, block or b"", last, line, encoding)
-        if line == 1 and not rest:
-            returns_alone = b"\r" in text and b"\n" not in text
-        if returns_alone:
-            text = text.replace(b"\r", b"\n")
-        text = rest + text + (b"\n" if last else b"")
-        end = text.rfind(b"\n") + 1
-        if not last and text.count(b'"', 0, end) % 2:
-            end = text.rfind(b"\n", 0, text.rfind(b'"', 0, end)) + 1
-        if len(text) - end > LONGEST_LINE_BYTES + _BLOCK * (b'"' in text[end:]):
+    decoder = codecs.getincrementaldecoder("utf-8-sig" if encoding == "utf-8" else encoding)()
+    lines = io.IncrementalNewlineDecoder(decoder, translate=True)
+    rest, line = "", 1
+    for block, last in _with_last(_raw_blocks(source)):
+        try:
+            text = rest + lines.decode(block, last)
+        except UnicodeError:
+            rule = f"or a line soon after it is not {encoding.upper()}, as the file's beginning says: save it as UTF-8"
+            raise wrong_line(line, rule, "not_text") from None
+        end = text.rfind("\n") + 1
+        if not last and text.count('"', 0, end) % 2:
+            end = text.rfind("\n", 0, text.rfind('"', 0, end)) + 1
+        if len(text) - end > LONGEST_LINE_BYTES + _BLOCK * ('"' in text[end:]):
             rule = f"must not be longer than {LONGEST_LINE_BYTES} bytes"
-            raise wrong_line(
-                line + text.count(b"\n", 0, end), rule, "line_too_long", _text(text[end : end + MOST_QUOTED])
-            )
-        whole, rest = text[:end].replace(b"\r\n", b"\n"), text[end:]
-        if (nul := whole.find(b"\0")) >= 0:
-            raise wrong_line(line + whole.count(b"\n", 0, nul), "must be text, got a NUL byte", "not_text")
+            raise wrong_line(line + text.count("\n", 0, end), rule, "line_too_long", text[end : end + MOST_QUOTED])
+        if last:
+            text += "" if end == len(text) else "\n"
+            end = len(text)
+        whole, rest = text[:end], text[end:]
+        if (nul := whole.find("\0")) >= 0:
+            raise wrong_line(line + whole.count("\n", 0, nul), "must be text, got a NUL byte", "not_text")
         if whole:
             yield whole
-        line += whole.count(b"\n")
-        block = None if last else next(raw, None)
+        line += whole.count("\n")
 
 
-def _decoded(decoder: codecs.IncrementalDecoder, block: bytes, last: bool, line: int, encoding: str) -> bytes:
-    try:
-        return decoder.decode(block, last).encode("utf-8")
-    except UnicodeError:
-        rule = f"or a line soon after it is not {encoding.upper()}, as the file's beginning says: save it as UTF-8"
-        raise wrong_line(line, rule, "not_text") from None
+def _with_last(items: Iterator[Any]) -> Iterator[tuple[Any, bool]]:
+    """Each item, and whether it is the last."""
+    for item in items:
+        for following in items:
+            yield item, False
+            item = following
+        yield item, True
 
 
 def _encodings(head: bytes) -> list[str]:
@@ -167,7 +181,7 @@ def _form(first: bytes, reading: Reading, limits: Limits) -> _Form:
     best: _Form | None = None
     text: list[str] = []
     for encoding in _encodings(first):
-        text = _text(b"".join(_blocks(_Head(first), encoding))).split("\n")[:-1]
+        text = "".join(_blocks(io.BytesIO(first), encoding)).split("\n")[:-1]
         for separator in _separators(text, reading.skip_rows):
             form = _with_separator(encoding, separator, text, reading)
             if form is not None and (best is None or form.layout.score > best.layout.score):
@@ -181,17 +195,6 @@ def _form(first: bytes, reading: Reading, limits: Limits) -> _Form:
         rule = f"must not have more than {limits.most_columns} columns, got {len(best.layout.headings)}"
         raise wrong_line(best.first_line, rule, "too_wide")
     return best
-
-
-class _Head:
-    """The first block as a source of its own."""
-
-    def __init__(self, head: bytes) -> None:
-        self._head = head
-
-    def read(self, _: int, /) -> bytes:
-        head, self._head = self._head, b""
-        return head
 
 
 def _separators(lines: Sequence[str], skipped: int) -> list[str]:
@@ -228,16 +231,10 @@ def _with_separator(encoding: str, separator: str, lines: list[str], reading: Re
     return _Form(encoding=encoding, separator=separator, layout=layout, lines=lines, at=at)
 
 
-#: Lines that one cell in quotes may go over, in the rows of titles.
-_MOST_CELL_LINES = 5
-
-
-def _text(block: bytes) -> str:
-    return block.decode("utf-8", "replace")
-
-
 def is_comment(line: str, separator: str) -> bool:
     """Whether a line is a comment; a semicolon begins one where it does not separate."""
+    if line[:1].isdigit():
+        return False
     bare = line.lstrip().lstrip('"')
     return bare.startswith(_COMMENTS) or (bare.startswith(";") and separator != ";")
 
@@ -271,258 +268,215 @@ class _Lines:
     """The line of each row: rows begin on line `first`; lines that are no rows are counted in where they stand."""
 
     def __init__(self, first: int) -> None:
-        self._first = first
+        self.first = first
         self._rows: array[int] = array("q")
 
     def skip(self, row: int, lines: int = 1) -> None:
-        """Count lines before row `row` that are no rows."""
-        self._rows.extend([row] * lines)
+        """Count lines before row `row` that are no rows; rows from there on that were counted before are no rows either."""
+        while self._rows and self._rows[-1] > row:
+            self._rows.pop()
+            lines += 1
+        for _ in range(lines):
+            self._rows.append(row)
 
     def of(self, row: int) -> int:
         """The line of a row: rows count from 0, lines from 1."""
-        return self._first + row + bisect_right(self._rows, row)
-
-
-@dataclass(slots=True)
-class _Block:
-    """A block of rows: its text, the columns taken as text, and whether comments and repeated titles were looked for."""
-
-    text: bytes
-    columns: list[bytes]
-    careful: bool
+        return self.first + row + bisect_right(self._rows, row)
 
 
 class _Body:
-    """The rows of data: block by block, columns of text into columns of numbers."""
+    """The rows of data, block by block: columns of text into columns of numbers."""
 
     def __init__(self, opened: Open, form: _Form, reading: Reading, limits: Limits) -> None:
         self._opened, self._form, self._limits = opened, form, limits
-        self._width = len(form.layout.headings)
+        self._separator = form.separator.strip(" ") or None
+        self._titles = form.lines[form.at[form.layout.titles]].strip()
+        self._above = {line.strip() for line in form.lines[: form.first_line - 1]}
+        self.first = (
+            _cells(form.lines[form.first_line - 1], form.separator) if form.first_line <= len(form.lines) else []
+        )
+        named = len(form.layout.headings)
+        self._width = named if any(self.first[named:]) else max(named, len(self.first))
         self._numerals = Numerals(reading.decimal)
-        self._stamps: dict[int, Stamps] = {}
-        self._indices: Sequence[int] = ()
-        self._channels: Mapping[int, str] = {}
-        self._rows = 0
         self.lines = _Lines(form.first_line)
+        self._rows = 0
+        self.breaks: list[int] = []
+        self.notices: list[Notice] = []
+        if labelled := form.layout.labelled:
+            first = form.lines[form.at[form.layout.start - labelled]]
+            self.notices.append(left_out(labelled, "above the first row of", first))
+
+    def times(self, start: float, step: float) -> FloatArray:
+        """The times of the rows that were read [n] s, by a clock that is stated above them."""
+        return start + step * np.arange(self._rows, dtype=np.float64)
 
     def read(self, channels: Mapping[int, str]) -> list[NDArray[Any]]:
         """The columns [n] by index. Raises InvalidError naming line and value, TooLargeError past the limits."""
-        self._channels, indices = channels, list(channels)
-        self._indices = indices
-        columns = [np.empty(0) for _ in indices]
-        waiting: list[_Block] = []
-        size, end = 0, time.monotonic() + self._limits.seconds
+        self._settle(channels)
+        dated = any(name == "time_s" and is_stamp("".join(self.first[at : at + 1])) for at, name in channels.items())
+        parts: list[list[NDArray[Any]]] = [[] for _ in channels]
+        most = self._limits.most_values // len(channels)
+        end = time.monotonic() + self._limits.seconds
         with self._opened() as source:
-            for text in self._data_blocks(source):
+            for block, last in _with_last(self._blocks(source)):
                 if time.monotonic() > end:
                     message = f"the CSV file cannot be read: it took longer than {self._limits.seconds} s"
                     raise InvalidError(message, errors=[FieldError(pointer="", code="too_slow", message=message)])
-                if not waiting and (rows := self._bare(text)) is not None:
-                    self._add(columns, [rows[:, index] for index in indices])
-                    continue
-                plain = self._plain(text)
-                block = _Block(text, plain or self._careful(text), careful=plain is None)
-                if not block.columns:
-                    continue
-                waiting.append(block)
-                try:
-                    self._numerals.settle(block.columns)
-                except Undecided:
-                    size += len(text)
-                    if size > _MOST_WAITING:
-                        break
-                    continue
-                for block in waiting:
-                    self._add(columns, self._numbers(block))
-                waiting, size = [], 0
-        for block in waiting:
-            self._refuse_doubt(block)
-        for index, column in enumerate(columns):
-            column.resize(self._rows, refcheck=False)
-            if indices[index] in self._stamps:
-                columns[index] = (column * 1e9).astype("timedelta64[ns]")
-        return columns
+                text = self._without_footer(block) if last else block
+                numbers = None if dated else self._plain(text)
+                if numbers is None:
+                    columns = self._split(text, channels) or self._careful(text, channels)
+                else:
+                    columns = [numbers[:, index].copy() for index in channels]
+                for part, column in zip(parts, columns, strict=True):
+                    part.append(column)
+                self._rows += columns[0].size
+                if self._rows > most:
+                    raise TooLargeError(f"a file of {len(channels)} channels must not have more than {most} rows")
+        joined = []
+        while parts:
+            joined.append(np.concatenate(parts.pop(0) or [np.empty(0)]))
+        return joined
 
-    def _add(self, columns: list[FloatArray], numbers: list[FloatArray]) -> None:
-        """Add rows to columns that grow in place, by a third. Raises TooLargeError past the limit."""
-        end = self._rows + (numbers[0].size if numbers else 0)
-        most = self._limits.most_values // max(len(columns), 1)
-        if end > most:
-            raise TooLargeError(f"a file of {len(columns)} channels must not have more than {most} rows")
-        for column, added in zip(columns, numbers, strict=True):
-            if end > column.size:
-                column.resize(end + end // 3, refcheck=False)
-            column[self._rows : end] = added
-        self._rows = end
-
-    def _data_blocks(self, source: ByteSource) -> Iterator[bytes]:
+    def _blocks(self, source: ByteSource) -> Iterator[str]:
         """The blocks from the first row of data on."""
         above = self._form.first_line - 1
         for block in _blocks(source, self._form.encoding):
             start = 0
             while above and start < len(block):
-                start = block.index(b"\n", start) + 1
+                start = block.index("\n", start) + 1
                 above -= 1
             if start < len(block):
                 yield block[start:]
 
-    def _bare(self, block: bytes) -> FloatArray | None:
-        """A block of nothing but numbers, once the decimal sign is known, [rows, columns]; None for any other block."""
-        separator, decimal = self._form.separator.encode(), self._numerals.decimal
-        if not decimal or self._stamps or not separator.strip(b" "):
+    def _settle(self, channels: Mapping[int, str]) -> None:
+        """Learn the decimal sign from the first cell that can be read in one way; a full stop where no cell has a sign."""
+        doubtful = False
+        with self._opened() as source:
+            for block in self._blocks(source):
+                if self._numerals.decimal:
+                    return
+                if "." in block or ("," in block and (self._separator != "," or '"' in block)):
+                    rows = [row for _, _, row in self._parsed(block) if len(row) > max(channels)]
+                    doubtful |= self._numerals.settle([[row[index] for row in rows] for index in channels])
+        self._numerals.decimal = self._numerals.decimal or ("" if doubtful else ".")
+
+    def _plain(self, block: str) -> FloatArray | None:
+        """A block of nothing but numbers [rows, columns], by jiter (pydantic-core's reader of JSON); None for any other."""
+        separator, decimal = self._separator, self._numerals.decimal
+        if not decimal or separator is None or (separator != "," and decimal == "." and "," in block):
             return None
-        if decimal == b",":
-            block = b"" if b"." in block else block.replace(b",", b".")
-        elif separator != b"," and b"," in block:
+        if decimal == ",":
+            block = "" if "." in block else block.replace(",", ".")
+        plain = block.replace(separator, ",").encode()
+        if not plain or plain.translate(None, b"0123456789.eE+-,\n"):
             return None
-        block = block.replace(separator, b",")
-        if not block or block.translate(None, _BARE):
-            return None
-        letters = np.frombuffer(block, np.uint8)
+        letters = np.frombuffer(plain, np.uint8)
         ends_line = (letters == _NEWLINE)[(letters == _NEWLINE) | (letters == _COMMA)]
-        if ends_line.size != self._width * block.count(b"\n") or not ends_line[self._width - 1 :: self._width].all():
+        if ends_line.size != self._width * plain.count(b"\n") or not ends_line[self._width - 1 :: self._width].all():
             return None  # not as many cells in each line
         try:
-            numbers = np.array(pydantic_core.from_json(b"[%b]" % block[:-1].replace(b"\n", b",")), dtype=np.float64)
+            cells = pydantic_core.from_json(b"[%b]" % plain[:-1].replace(b"\n", b","))
+            return np.array(cells, dtype=np.float64).reshape(-1, self._width)
         except (ValueError, OverflowError):
             return None
-        return numbers.reshape(-1, self._width)
 
-    def _plain(self, block: bytes) -> list[bytes] | None:
-        """The columns of a block of nothing but rows of as many cells, apart by line feeds; None for any other block."""
-        separator, width = self._form.separator.encode(), self._width
-        if not separator.strip(b" "):
-            block = re.sub(rb" ?\n ?", b"\n", re.sub(rb"[ \t]+", b" ", block)).lstrip(b" ")
-            separator = b" "
-        if block[:1] in (b"#", b"%", b"/") or any(mark in block for mark in (b"\n#", b"\n%", b"\n/")):
+    def _split(self, block: str, channels: Mapping[int, str]) -> list[NDArray[Any]] | None:
+        """The columns of a block of rows of as many cells, none in quotes; None for any other, and where a cell is wrong."""
+        if '"' in block or any(f"\n{mark}" in "\n" + block for mark in _COMMENTS):
             return None
-        if b'"' in block:
-            return self._quoted(block)
-        closing = separator + b"\n"
-        for _ in range(_MOST_CLOSING):
-            if closing not in block or block.count(separator, 0, block.index(b"\n")) < width:
-                break
-            block = block.replace(closing, b"\n")
-        rows = block.count(b"\n")
-        cells = block.replace(b"\n", separator + b"\n" + separator).split(separator)
-        if len(cells) != (width + 1) * rows + 1 or cells[width :: width + 1].count(b"\n") != rows:
+        separator, width = self._separator or " ", self._width
+        if separator == " ":
+            block = re.sub(r" ?\n ?", "\n", re.sub(r"[ \t]+", " ", block)).lstrip(" ")
+        rows = block.count("\n")
+        cells = block.replace("\n", f"{separator}\n{separator}").split(separator)
+        if len(cells) != (width + 1) * rows + 1 or cells[width :: width + 1].count("\n") != rows:
             return None
-        return [b"\n".join(cells[index : -1 : width + 1]) for index in self._indices]
-
-    def _quoted(self, block: bytes) -> list[bytes] | None:
-        """The same of rows with quotes, by Python's reader of CSV."""
+        columns = [cells[index : -1 : width + 1] for index in channels]
         try:
-            lines = _text(block).replace("\r", " ").split("\n")[:-1]
-            rows = list(csv.reader(lines, delimiter=self._form.separator, skipinitialspace=True, strict=True))
+            return self._numerals.values(channels, columns, self.lines.of, self._rows)
+        except InvalidError:
+            return None
+
+    def _parsed(self, block: str) -> Iterator[tuple[str, int, list[str]]]:
+        """Rows: the line that each begins with, how many it takes, and its cells."""
+        lines, at = block.split("\n")[:-1], 0
+        if self._separator is None or '"' not in block:
+            for line in lines:
+                yield line, 1, line.split(self._separator) if self._separator else _cells(line, " ")
+            return
+        reader = csv.reader([f"{line}\n" for line in lines], delimiter=self._separator, skipinitialspace=True)
+        try:
+            for row in reader:
+                yield lines[at], reader.line_num - at, row
+                at = reader.line_num
         except csv.Error:
-            return None
-        if len(rows) != len(lines) or set(map(len, rows)) != {self._width}:
-            return None
-        columns = list(zip(*rows, strict=True))
-        return ["\n".join(columns[index]).encode() for index in self._indices]
+            raise wrong_line(self.lines.of(self._rows) + at, "begins a quotation that does not end", "ragged") from None
 
-    def _careful(self, block: bytes) -> list[bytes]:
-        """The columns of any other block, without comments, blank lines and repeated titles; none where no row is left.
+    def _careful(self, block: str, channels: Mapping[int, str]) -> list[NDArray[Any]]:
+        """The columns of any other block, without comments, blank lines and repeated titles.
 
-        Raises InvalidError with every line of it that has too few or too many cells.
+        Raises InvalidError with every line of it that has too few or too many cells, or cells that are no numbers.
         """
+        rows: list[list[str]] = []
         separator = self._form.separator
-        repeated = {line.strip() for line in self._form.lines[: self._form.first_line - 1]}
-        rows: list[str] = []
-        for line in _text(block).split("\n")[:-1]:
+        left_out = 0
+        for line, taken, cells in self._parsed(block):
             bare = line.strip()
-            if bare.strip(separator) and bare not in repeated and not is_comment(bare, separator):
-                rows.append(line)
-            else:
-                self.lines.skip(self._rows + len(rows))
-        if not rows:
-            return []
-        return self._plain("".join(f"{row}\n" for row in rows).encode()) or self._by_line(rows)
-
-    def _by_line(self, lines: Sequence[str]) -> list[bytes]:
-        """The columns line by line: cells over several lines, and cells that are missing or empty at the ends."""
-        separator = self._form.separator
-        errors: list[FieldError] = []
-        cells: list[list[str]] = [[] for _ in self._indices]
-        rows = 0
-        left = iter(lines)
-        for line in left:
-            taken = 1
-            while line.count('"') % 2 and separator.strip() and taken < _MOST_CELL_LINES:
-                following = next(left, None)
-                if following is None:
-                    break
-                line, taken = f"{line}\n{following}", taken + 1
-            row = _cells(line, separator)
-            while len(row) > self._width and not row[-1]:
-                row.pop()
-            row += [""] * (self._width - len(row) if self._width - len(row) <= self._spare else 0)
-            if len(row) == self._width:
-                for column, index in zip(cells, self._indices, strict=True):
-                    column.append(row[index])
-            else:
-                errors.append(self._ragged(self._rows + rows, line, len(row)))
-            self.lines.skip(self._rows + rows + 1, taken - 1)
-            rows += 1
+            if bare and bare not in self._above and not is_comment(bare, separator) and bare.strip(separator):
+                if left_out:
+                    self.lines.skip(self._rows + len(rows), left_out)
+                rows.append(cells)
+                left_out = taken - 1
+                continue
+            left_out += taken
+            if bare == self._titles and self._rows + len(rows):
+                while rows and is_footer(rows[-1], self.first):
+                    rows.pop()  # lines above the titles of a further table
+                    left_out += 1
+                self.breaks.append(self._rows + len(rows))
+        self.lines.skip(self._rows + len(rows), left_out)
+        errors = []
+        for row, cells in enumerate(rows):
+            if len(cells) != self._width and not self._fit(cells, channels):
+                errors.append(self._ragged(self._rows + row, cells))
         if errors:
-            raise _many(errors, len(errors), self.lines.of(self._rows + rows - 1))
-        return ["\n".join(column).encode() for column in cells]
+            more = (
+                ""
+                if len(errors) == 1
+                else f"; {len(errors)} errors up to line {self.lines.of(self._rows + len(rows) - 1)}"
+            )
+            raise InvalidError(errors[0].message + more, errors=errors[:MOST_ERRORS], total=len(errors))
+        columns = [[cells[index] for cells in rows] for index in channels]
+        return self._numerals.values(channels, columns, self.lines.of, self._rows)
 
-    @property
-    def _spare(self) -> int:
-        """Columns at the end of a row that are not taken, and may be missing."""
-        return self._width - 1 - max(self._indices)
+    def _fit(self, cells: list[str], channels: Mapping[int, str]) -> bool:
+        """Whether a row is one with empty cells at its end, or none of those that are not taken; they are added."""
+        while len(cells) > self._width and not cells[-1].strip():
+            cells.pop()
+        if len(cells) > max(channels):
+            cells += [""] * (self._width - len(cells))
+        return len(cells) == self._width
 
-    def _ragged(self, row: int, line: str, cells: int) -> FieldError:
-        message = f"line {self.lines.of(row)} must have {self._width} cells, got {cells}: {line[:MOST_QUOTED]!r}"
-        return FieldError(pointer="", row=row + 1, value=line[:MOST_QUOTED], code="ragged", message=message)
+    def _ragged(self, row: int, cells: Sequence[str]) -> FieldError:
+        line = (self._separator or " ").join(cells)[:MOST_QUOTED]
+        message = f"line {self.lines.of(row)} must have {self._width} cells, got {len(cells)}: {line!r}"
+        if recognised(cells, ()) > 1:
+            message += ": another table begins there, send it in a file of its own"
+        return FieldError(pointer="", row=row + 1, value=line, code="ragged", message=message)
 
-    def _numbers(self, block: _Block) -> list[FloatArray]:
-        """A block's columns as numbers. Raises InvalidError with every cell of it that is none."""
-        if not block.columns:
-            return [np.empty(0) for _ in self._indices]
-        columns = [self._column(index, text) for index, text in zip(self._indices, block.columns, strict=True)]
-        numbers = [column for column in columns if column is not None]
-        if len(numbers) == len(columns):
-            return numbers
-        if not block.careful:
-            return self._numbers(_Block(block.text, self._careful(block.text), careful=True))
-        errors, total = [], 0
-        for index, text, column in zip(self._indices, block.columns, columns, strict=True):
-            for row, rule in self._numerals.wrong(text) if column is None else ():
-                total += 1
-                if total <= MOST_ERRORS:
-                    errors.append(self._wrong(index, text, row, rule))
-        rows = block.columns[0].count(b"\n")
-        raise _many(sorted(errors, key=lambda error: error.row or 0), total, self.lines.of(self._rows + rows))
-
-    def _column(self, index: int, text: bytes) -> FloatArray | None:
-        numbers = None if index in self._stamps else self._numerals.floats(text)
-        if numbers is None and self._channels[index] == "time_s":
-            stamps = self._stamps.setdefault(index, Stamps())
-            numbers = stamps.seconds(_text(text).split("\n"))
-            if numbers is None:
-                del self._stamps[index]
-        return numbers
-
-    def _wrong(self, index: int, text: bytes, row: int, rule: str) -> FieldError:
-        cell = _text(text.split(b"\n")[row])[:MOST_QUOTED]
-        name, row = self._channels[index], self._rows + row
-        message = f"{name}[{row}] (line {self.lines.of(row)}) {rule}, got {cell!r}"
-        pointer = f"/channels/{name}/{row}"
-        return FieldError(pointer=pointer, row=row + 1, value=cell, code="not_a_number", message=message)
-
-    def _refuse_doubt(self, block: _Block) -> None:
-        """Raise InvalidError where a cell may be read in two ways."""
-        for index, text in zip(self._indices, block.columns, strict=True):
-            if doubt := self._numerals.doubtful(text):
-                raise doubtful_number(self._channels[index], doubt, self._rows + doubt[0], self.lines.of)
-
-
-#: Separators at the ends of lines that are taken off. Chosen: as many as a tidy file has.
-_MOST_CLOSING = 16
-
-
-def _many(errors: Sequence[FieldError], total: int, line: int) -> InvalidError:
-    more = "" if total == 1 else f"; {total} errors up to line {line}"
-    return InvalidError(errors[0].message + more, errors=errors, total=total)
+    def _without_footer(self, block: str) -> str:
+        """The last block without what stands below the table: words, and rows that a word begins (`Mean;5;100;20`)."""
+        lines = block.split("\n")[:-1]
+        kept = end = len(lines)
+        while end:
+            cells = _cells(lines[end - 1], self._form.separator)
+            footer = is_footer(cells, self.first)
+            if not footer and any(cells):
+                break
+            end -= 1
+            if footer and not is_comment(lines[end], self._form.separator):
+                kept = end
+        if kept < len(lines):
+            self.notices.append(left_out(len(lines) - kept, "below", lines[kept]))
+        return "".join(f"{line}\n" for line in lines[:kept])

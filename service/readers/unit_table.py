@@ -1,5 +1,6 @@
 """Units that a file may state and their conversion to the channels' own units (`columns.CHANNELS`); no other is read."""
 
+import re
 import unicodedata
 from dataclasses import dataclass
 
@@ -30,104 +31,97 @@ class Conversion:
 _PASCALS_PER_PSI = 6894.757293168361
 _NEWTONS_PER_KILOPOND = 9.80665
 _NEWTON_METRES_PER_POUND_FOOT = 1.3558179483314004
-_NEWTON_METRES_PER_POUND_INCH = _NEWTON_METRES_PER_POUND_FOOT / 12
-_SAME = Conversion()
 
 
 def _spelled(factor: float, spellings: str, offset: float = 0.0) -> dict[str, Conversion]:
-    """Spellings apart by blanks, all of one conversion."""
+    """Spellings apart by blanks, all of one conversion. Capitals, dots and dashes need no spelling of their own."""
     return dict.fromkeys(spellings.split(), Conversion(factor, offset))
 
 
 _TIME = (
-    _spelled(1.0, "s S sec Sec secs second seconds Sekunde Sekunden 秒")
-    | _spelled(1e-3, "ms msec millisecond milliseconds Millisekunden 毫秒")
-    | _spelled(1e-6, "us µs usec µsec microseconds")
-    | _spelled(1e-9, "ns nsec nanoseconds")
-    | _spelled(60.0, "min mins minutes Minuten 分")
-    | _spelled(3600.0, "h hr hrs hours Stunden")
-    | _spelled(86400.0, "d days")
+    _spelled(
+        1.0, "s S sec secs second seconds sek sekunde sekunden seconde secondes segundo segundos secondi с сек 秒 초"
+    )
+    | _spelled(
+        1e-3, "ms msec millisecond milliseconds millisekunden millisecondes milisegundos millisecondi мс 毫秒 ミリ秒"
+    )
+    | _spelled(1e-6, "us µs usec µsec microsecond microseconds mikrosekunden microsecondes мкс 微秒 マイクロ秒")
+    | _spelled(1e-9, "ns nsec nanosecond nanoseconds nanosekunden")
+    | _spelled(60.0, "min mins minute minutes minuten minutos minuti мин 分 分钟 分鐘")
+    | _spelled(3600.0, "h hr hrs hour hours std stunde stunden heures horas ore ч 小时 小時 時間")
+    | _spelled(86400.0, "d day days tag tage jours días giorni 天")
 )
 _PRESSURE = (
-    _spelled(1.0, "bar Bar BAR barg bar_g")
+    _spelled(1.0, "bar barg бар 巴")
     | _spelled(1e-3, "mbar hPa")
-    | _spelled(1 / PASCALS_PER_BAR, "Pa N/m2 N/m^2 pascal")
-    | _spelled(1e3 / PASCALS_PER_BAR, "kPa KPa kpa")
-    | _spelled(1e6 / PASCALS_PER_BAR, "MPa N/mm2 N/mm^2")
-    | _spelled(_PASCALS_PER_PSI / PASCALS_PER_BAR, "psi PSI Psi psig lbf/in2 lbf/in^2")
-    | _spelled(_NEWTONS_PER_KILOPOND * 1e4 / PASCALS_PER_BAR, "kgf/cm2 kgf/cm^2 kg/cm2 kg/cm^2 kp/cm2 kp/cm^2")
+    | _spelled(1 / PASCALS_PER_BAR, "Pa N/m2 pascal")
+    | _spelled(1e3 / PASCALS_PER_BAR, "kPa кПа 千帕")
+    | _spelled(1e6 / PASCALS_PER_BAR, "MPa N/mm2 МПа 兆帕")
+    | _spelled(_PASCALS_PER_PSI / PASCALS_PER_BAR, "psi psig lbf/in2 lb/in2")
+    | _spelled(_NEWTONS_PER_KILOPOND * 1e4 / PASCALS_PER_BAR, "kgf/cm2 kg/cm2 kp/cm2 кгс/см2")
 )
 _SPEED = (
-    _spelled(1.0, "rpm RPM Rpm 1/min min-1 min^-1 /min U/min u/min r/min R/min rev/min Upm revolutions/min tr/min")
+    _spelled(
+        1.0,
+        "rpm 1/min min-1 /min U/min r/min rmin-1 rev/min revmin-1 Upm revolutions/min tr/min trs/min tr/mn giri/min",
+    )
+    | _spelled(1.0, "об/мин мин-1 转/分 转/分钟 轉/分 回転/分 回/分")
     | _spelled(1e3, "krpm")
-    | _spelled(60.0, "U/s r/s rev/s rps")
-    | _spelled(1 / RADIANS_PER_SECOND_PER_RPM, "rad/s rad/sec rad_s rad.s-1 rad*s^-1 rad*s-1")
+    | _spelled(60.0, "U/s r/s rev/s rps tr/s об/с 转/秒")
+    | _spelled(1 / RADIANS_PER_SECOND_PER_RPM, "rad/s rad/sec rads rads-1 рад/с 弧度/秒")
     | _spelled(1 / 6, "deg/s °/s")
 )
 _TORQUE = (
-    _spelled(1.0, "Nm N.m N*m N-m NM nm newtonmeter")
-    | _spelled(1e3, "kNm kN.m kN*m kN-m knm")
-    | _spelled(1e-3, "mNm mN.m mN*m mN-m Nmm N*mm N.mm N-mm")
-    | _spelled(1e-2, "Ncm N*cm N.cm N-cm")
-    | _spelled(_NEWTONS_PER_KILOPOND, "kgfm kgf.m kgf*m kgf-m kpm kp*m")
-    | _spelled(
-        _NEWTON_METRES_PER_POUND_FOOT,
-        "lbf.ft lbf*ft lbf-ft lb.ft lb*ft lb-ft lbft lbfft ft.lbf ft*lbf ft-lbf ftlbf ft.lb ft*lb ft-lb ft-lbs ftlb",
-    )
-    | _spelled(
-        _NEWTON_METRES_PER_POUND_INCH,
-        "lbf.in lbf*in lbf-in lb.in lb*in lb-in lbin lbfin in.lbf in*lbf in-lbf in.lb in*lb in-lb in-lbs inlb",
-    )
+    _spelled(1.0, "Nm newtonmeter newtonmetre Нм 牛米")
+    | _spelled(1e3, "kNm кНм 千牛米")
+    | _spelled(1e-3, "mNm Nmm")
+    | _spelled(1e-2, "Ncm")
+    | _spelled(_NEWTONS_PER_KILOPOND, "kgfm kpm кгсм")
+    | _spelled(_NEWTON_METRES_PER_POUND_FOOT, "lbfft lbft ftlbf ftlb ftlbs")
+    | _spelled(_NEWTON_METRES_PER_POUND_FOOT / 12, "lbfin lbin inlbf inlb inlbs")
 )
 _TEMPERATURE = (
-    _spelled(1.0, "°C degC DegC degreeC C °c Celsius celsius Cel")
-    | _spelled(1.0, "K kelvin Kelvin", -ZERO_CELSIUS)
-    | _spelled(5 / 9, "°F degF DegF F Fahrenheit fahrenheit", -160 / 9)
+    _spelled(1.0, "°C degC degreeC degreesC C celsius cel 摄氏度")
+    | _spelled(1.0, "K kelvin", -ZERO_CELSIUS)
+    | _spelled(5 / 9, "°F degF F fahrenheit", -160 / 9)
 )
-#: Units of no channel, and 1/s, which may be turns or radians: a title that ends in one is not taken for another.
-_FOREIGN = frozenset(
-    "V mV A mA N kN lbf W kW J kJ % ‰ m mm µm cm inch kg g deg ° rad l/min L/min l/h m/s mm/s m/s2 m/s^2 bara psia atm Hz "  # noqa: SIM905
-    "kHz 1/s s-1 s^-1".split()
-)
-
-#: By the channel's unit: the spellings that may be stated; capitals count (mPa is not MPa).
+#: By the channel's unit: the spellings that may be stated.
 UNITS = {"s": _TIME, "bar": _PRESSURE, "rpm": _SPEED, "Nm": _TORQUE, "°C": _TEMPERATURE}
-
-_AS_WRITTEN = str.maketrans(
-    {
-        "·": "*",
-        "⋅": "*",
-        "•": "*",
-        "∙": "*",
-        "×": "*",
-        "⁻": "-",
-        "−": "-",
-        "¹": "1",
-        "²": "2",
-        "º": "°",
-        "μ": "µ",
-        "℃": "°C",
-        "℉": "°F",
-        "／": "/",
-    }
+#: Units of no channel, and 1/s, which may be turns or radians: a title that ends in one is not taken for another.
+_FOREIGN = (
+    "V mV A mA N kN lbf W kW J kJ % ‰ m mm µm cm inch kg g deg ° rad l/min l/h m/s mm/s m/s2 bara psia "
+    "atm Hz kHz 1/s s-1"
 )
+
+
+def _key(unit: str) -> str:
+    """What the spellings of a unit have in common: no width, no capitals, no dots, dashes, carets, underscores or blanks.
+
+    Single letters keep their capitals (K is not k). So do mega and milli, which differ by nothing else: mPa is not MPa.
+    """
+    if len(unit) > LONGEST_UNIT:
+        return ""
+    plain = unicodedata.normalize("NFKC", unit.replace("º", "°")).replace("−", "-").strip()
+    key = re.sub(r"[\s·⋅•∙×*・.^_()-]+", "", plain)
+    if len(key) == 1:
+        return key
+    return key[:1] * (key[:1] in tuple("mM") and key[1:].casefold() in ("pa", "nm")) + key.casefold()
+
+
+_BY_KEY = {
+    name: {_key(spelling): conversion for spelling, conversion in table.items()} for name, table in UNITS.items()
+} | {"": dict.fromkeys(map(_key, _FOREIGN.split()), Conversion())}
 
 
 def conversion(channel: str, unit: str) -> Conversion | None:
     """From a stated unit to the channel's own; None where the unit is not in the table."""
-    table = UNITS[CHANNELS[channel].unit]
-    written = _written(unit)
-    return table.get(written) or table.get(written.replace(" ", "")) if written else None
+    return _BY_KEY[CHANNELS[channel].unit].get(_key(unit))
 
 
 def is_unit(text: str) -> bool:
     """Whether a text is the spelling of a unit, of any channel or of another quantity."""
-    return _written(text) in _FOREIGN or any(conversion(name, text) is not None for name in CHANNELS)
-
-
-def _written(unit: str) -> str:
-    """One spelling of what is written in several ways; empty for what is too long for a unit."""
-    return unicodedata.normalize("NFC", unit).translate(_AS_WRITTEN).strip() if len(unit) <= LONGEST_UNIT else ""
+    key = _key(text)
+    return any(key in table for table in _BY_KEY.values())
 
 
 def spellings(channel: str) -> str:

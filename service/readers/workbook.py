@@ -8,15 +8,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 from python_calamine import CalamineWorkbook, SheetTypeEnum
 
 from service.errors import InvalidError
 from service.readers.archive import check_archive
 from service.readers.column_names import choices_of, recognised
-from service.readers.grid import MOST_ROWS, Layout, find_table, is_blank, is_value, no_table
+from service.readers.grid import MOST_ROWS, Layout, find_table, is_blank, is_footer, is_value, left_out, no_table
 from service.readers.limits import Limits
-from service.readers.numerals import column_values
 from service.readers.table import Reading, Table, only
 
 #: Rows of data that a person is shown.
@@ -70,17 +70,32 @@ def _table(
     start, titles = layout.start + reading.skip_rows, layout.titles + reading.skip_rows
     if len(layout.headings) > limits.most_columns:
         raise InvalidError(f"a sheet must not have more than {limits.most_columns} columns, got {len(layout.headings)}")
-    headings = {tuple(map(str, row)) for row in rows[:start]}
-    lines = [
-        index
-        for index in range(start, len(rows))
-        if not is_blank(rows[index])
-        and (any(map(is_value, rows[index])) or tuple(map(str, rows[index])) not in headings)
+    above = {tuple(map(str, row)) for row in rows[:start] if not any(map(is_value, row))}
+    lines: list[int] = []
+    breaks: list[int] = []
+    for index in range(start, len(rows) + 1):
+        row = rows[index] if index < len(rows) else rows[titles]  # below the last table as above a further one
+        if row == rows[titles]:
+            while lines and is_footer(rows[lines[-1]], rows[start]):
+                lines.pop()
+            breaks.append(len(lines))
+        elif not is_blank(row) and tuple(map(str, row)) not in above:
+            lines.append(index)
+    footer = [
+        shown for row in rows[lines[-1] + 1 if lines else start :] if (shown := " ".join(map(_shown, row)).strip())
     ]
+    notices = [left_out(len(footer), "below", footer[0])] if footer else []
+
+    if layout.labelled:
+        shown = " ".join(map(_shown, rows[start - layout.labelled]))
+        notices.append(left_out(layout.labelled, "above the first row of", shown))
 
     def read(channels: Mapping[int, str]) -> list[NDArray[Any]]:
-        cells = [[rows[line][index] if index < len(rows[line]) else "" for line in lines] for index in channels]
-        return column_values(list(channels.values()), cells, reading.decimal, line_of)
+        columns = []
+        for index in channels:
+            columns.append(np.empty(len(lines), dtype=object))
+            columns[-1][:] = [rows[line][index] if index < len(rows[line]) else "" for line in lines]
+        return columns
 
     def line_of(row: int) -> int:
         return lines[row] + 1
@@ -94,4 +109,6 @@ def _table(
         first_line=start + 1,
         head=tuple(tuple(map(_shown, rows[line])) for line in lines[:_MOST_SHOWN]),
         line_of=line_of,
+        breaks=breaks[:-1],
+        notices=notices,
     )

@@ -66,8 +66,7 @@ def grouped(sign: str, decimal: str, quote: str = "") -> str:
     return "".join(separator.join(line) + "\n" for line in lines)
 
 
-def stamps(form: str) -> str:
-    first = datetime(2026, 11, 2, 7, 0, 0)
+def stamps(form: str, first: datetime = datetime(2026, 11, 2, 7)) -> str:
     lines = rows(names=PLATEAUS).splitlines()
     moments = [(first + timedelta(seconds=float(time))).strftime(form) for time in TIME]
     return (
@@ -137,6 +136,35 @@ TEXTS: dict[str, tuple[str | bytes, str | None]] = {
     "labview.lvm": ("LabVIEW Measurement\t\nDecimal_Separator\t,\nX_Columns\tOne\nTime\t08:00\n***End_of_Header***\t\n\t\n"
                     "Channels\t3\t\t\t\nY_Unit_Label\tbar\trpm\tNm\t\nX0\t0,0\t0,0\t0,0\t\nDelta_X\t0,01\t0,01\t0,01\t\n"
                     "***End_of_Header***\t\t\t\t\nX_Value\tDruck\tDrehzahl\tMoment\tComment\n" + rows("\t", ","), None),
+    "labview-without-times.lvm": ("LabVIEW Measurement\t\nX_Columns\tNo\n***End_of_Header***\t\n\t\nChannels\t3\n"
+                                  "Y_Unit_Label\tbar\trpm\tNm\nX0\t0.0\t0.0\t0.0\nDelta_X\t0.01\t0.01\t0.01\n"
+                                  "***End_of_Header***\nX_Value\tDruck\tDrehzahl\tMoment\tComment\n\t"
+                                  + rows("\t", names=PLATEAUS).replace("\n", "\n\t")[:-1], None),
+    "diadem.csv": ("TITLE;x\n"
+                   "ChannelName;Zeit;Druck;Drehzahl;Moment\nUnit;s;bar;1/min;Nm\nLength;12;12;12;12\nMaximum;1;5;1970;21\n"
+                   ";" + rows(";", ",").replace("\n", "\n;")[:-1], None),
+    "dewesoft.csv": ("Start time:,2026/11/02 08:00\nSample rate:,100\n\n"
+                     "Time (s),p/AVE (bar),n/AVE (rpm),M/AVE (Nm)\n" + rows(),
+                     "time_s:Time,pressure_bar:p/AVE,speed_rpm:n/AVE,torque_nm:M/AVE"),
+    "viewer.csv": ('"timestamps","p [bar]","n [rpm]","M [Nm]"\n' + rows(), None),
+    "french.csv": (("Temps (s);Pression (bar);Vitesse (tr/min);Couple (N.m)\n" + rows(";", ",")).encode("cp1252"), None),
+    "spanish.csv": (("Tiempo;Presión;Velocidad;Par\ns;bar;rpm;N·m\n" + rows(";", ",")).encode("cp1252"), None),
+    "japanese.csv": (("時間[s],圧力[bar],回転数[min-1],トルク[N・m]\n" + rows()).encode("shift_jis"), None),
+    "japanese-euc.csv": (("時間[s],圧力[bar],回転数[rpm],トルク[Nm]\n" + rows()).encode("euc_jp"), None),
+    "japanese-wide.csv": ("時刻 [ｓ],圧力 [ｂａｒ],回転数 [ｒｐｍ],トルク [Ｎｍ]\n" + rows(), None),
+    "chinese-slash.csv": ("时间/s,压力/bar,转速/(r/min),扭矩/(N·m)\n" + rows(), None),
+    "chinese-units.csv": (("时间（秒）,油压（巴）,转速（转/分）,转矩（牛·米）\n" + rows()).encode("gbk"), None),
+    "taiwanese.csv": (("時間(s),壓力(bar),轉速(rpm),扭矩(N-m)\n" + rows()).encode("big5"), None),
+    "capitals.csv": ("TIME (SEC),PRESSURE (BAR),SPEED (RPM),TORQUE (N-M)\n" + rows(), None),
+    "past-midnight.csv": (stamps("%H:%M:%S.%f", datetime(2026, 11, 2, 23, 59, 59, 950_000)), None),
+    "zone-without-colon.csv": (stamps("%Y-%m-%dT%H:%M:%S.%f+0100"), None),
+    "chinese-dates.csv": (stamps("%Y年%m月%d日 %H:%M:%S.%f"), None),
+    "thousands-french.csv": (GERMAN + "\n" + grouped("\u202f", ","), None),
+    "thousands-blanks.csv": (GERMAN + "\n" + grouped(" ", ","), None),
+    "means-below.csv": (HEAD + "\n" + rows() + "\nMean,5,1000,20\nMax,5,1970,21\n", None),
+    "means-below-numbers.csv": ("Nr," + HEAD + "\n1," + rows().replace("\n", "\n1,")[:-2] + "Mean,5,5,1000,20\n", None),
+    "words-below.csv": (GERMAN + "\n" + rows(";", ",") + "Ende der Messung\nPrüfer: Meier\n", None),
+    "minus.csv": (HEAD + "\n" + rows().replace("0.0000,", "−0.0000,", 1), None),
 }  # fmt: skip
 
 
@@ -166,7 +194,26 @@ REFUSED = {
     "ambiguous-dates": ("timestamp,M [Nm]\n01/02/2026 07:00:00,1\n02/02/2026 07:00:00,2\n", None, "day/month"),
     "hours-or-minutes": ("Zeit,M [Nm]\n07:30,1\n07:31,2\n", None, "must be a number"),
     "no-titles": ("1,2,3\n4,5,6\n", None, "line 1 must be a header"),
-    "a-footer": (HEAD + "\n" + rows() + "Mittelwert\n", None, "line 14 must have 4 cells"),
+    "words-in-a-column-of-times": (
+        "timestamp,M [Nm]\nMon 2 Nov,1\nTue 3 Nov,2\n",
+        None,
+        "a time such as 2026-11-02 07:00:00.5",
+    ),
+    "absolute-pressure": ("t [s];p [bar(a)]\n0;1\n", None, "'bar(a)'"),
+    "a-factor-in-the-unit": ("t [s];p [0.1 bar]\n0;1\n", None, "'0.1 bar'"),
+    "days-of-a-spreadsheet": (
+        "Datum;M [Nm]\n46000.25000012;1\n46000.25000023;2\n",
+        "time_s:Datum",
+        "map=time_s:Datum [d], or [s], says which",
+    ),
+    "two-tables": ("p [bar],M [Nm]\n5,1\n\nTest 2\np [bar],M [Nm]\n5,2\n", None, "holds 2 tables"),
+    "two-records": (HEAD + "\n" + rows() + "\nTest 2\n" + HEAD + "\n" + rows(), None, "holds 2 tables"),
+    "an-empty-cell": (
+        HEAD + "\n0,5,,20\n",
+        None,
+        "(line 2) must be a number, got '': fill the cell, or take its row out",
+    ),
+    "words-among-rows": (HEAD + "\n" + rows() + "Mittelwert\n" + rows(), None, "line 14 must have 4 cells"),
 }
 
 
@@ -177,6 +224,49 @@ def test_a_text_is_refused_with_words_that_help(tmp_path: Path, name: str) -> No
     with pytest.raises(InvalidError) as caught:
         read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of(mapping))
     assert words in caught.value.detail
+
+
+MS = ["t.ms", "Time..ms.", "timeMs", "T_MS", "time-ms", "Uhr, ms", "ms", "Time ms:", "Time (in ms)", "Time - ms",
+      "Zeit (Millisekunden)", "Uhr, мс", "Uhr, ミリ秒"]  # fmt: skip
+
+
+@pytest.mark.parametrize("title", MS)
+def test_a_mapped_title_that_ends_in_a_unit_is_that_unit(tmp_path: Path, title: str) -> None:
+    lines = [f"{title};M [Nm]", *(f"{1000 * time};1" for time in TIME)]
+    (tmp_path / "a.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    columns = read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of(f"time_s:{title}")).columns
+    np.testing.assert_allclose(columns["time_s"], TIME, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("title", "unit"), [("Mz [kNm] filtered", "kNm"), ("MzkNm", "kNm"), ("mean kNm of 3", "kNm"), ("MomNm", "mNm")]
+)
+def test_a_mapped_title_with_a_unit_that_is_not_clear_is_refused_until_the_map_states_it(
+    tmp_path: Path, title: str, unit: str
+) -> None:
+    (tmp_path / "a.csv").write_text(f"t [s];{title}\n0;1\n1;2\n", encoding="utf-8")
+    with pytest.raises(InvalidError, match=rf"may be {unit}: map=torque_nm:.* \[{unit}\]"):
+        read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of(f"torque_nm:{title}"))
+    stated = reading_of(f"torque_nm:{title} [{unit}]")
+    columns = read_file(tmp_path / "a.csv", filename="a.csv", reading=stated).columns
+    assert columns["torque_nm"].tolist() == [UNITS["Nm"][unit].factor, 2 * UNITS["Nm"][unit].factor]
+
+
+def test_a_unit_in_the_map_is_used_and_must_not_contradict_the_file(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("t [s];Mz;Mx [Nm]\n0;1;1\n1;2;2\n", encoding="utf-8")
+    columns = read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of("torque_nm:Mz [kNm]")).columns
+    assert columns["torque_nm"].tolist() == [1000, 2000]
+    with pytest.raises(InvalidError, match="must be kNm, as its profile or map says, got 'Nm'"):
+        read_file(tmp_path / "a.csv", filename="a.csv", reading=reading_of("torque_nm:Mx [kNm]"))
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_one_of_tables_below_each_other_is_read_by_its_number(tmp_path: Path, number: int) -> None:
+    (tmp_path / "a.csv").write_text(REFUSED["two-tables"][0], encoding="utf-8")
+    channels = read_file(tmp_path / "a.csv", filename="a.csv", reading=Reading(table=str(number)))
+    assert channels.columns["torque_nm"].tolist() == [number]
+    assert channels.line_of is not None
+    assert channels.line_of(0) == (2, 6)[number - 1]
 
 
 @pytest.mark.parametrize(("decimal", "speed"), [(",", 1100.0), (".", 1.1)])

@@ -110,7 +110,7 @@ WRONG = [
     ("\n\n", "no header"),
     ("1,2,3,4\n5,6,7,8\n", "line 1 must be a header"),
     (f"{HEADER}\n", "time_s must not be empty"),
-    (f"{HEADER}\n{ROWS}end of data\n", r"line 4 must have 4 cells, got 1: 'end of data'"),
+    (f"{HEADER}\n{ROWS}end of data\n0.2,5,100,20\n", r"line 4 must have 4 cells, got 1: 'end of data'"),
     (f"{HEADER}\n{ROWS}0.2,5,100\n", r"line 4 must have 4 cells, got 3"),
     (f"{HEADER}\n{ROWS}0.2,5,100,20,9\n", r"line 4 must have 4 cells, got 5"),
     (f"{HEADER}\n0.2,5,,20\n", r"speed_rpm\[0\] \(line 2\) must be a number, got ''"),
