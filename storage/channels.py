@@ -19,11 +19,9 @@ from numpy.typing import NDArray
 from sqlalchemy import ColumnElement, Connection, Row, and_, bindparam, func, or_, select, tuple_, update
 
 from storage.blobs import raw_stores
-from storage.blobs.opening import open_store
 from storage.blobs.raw_stores import RawStore
-from storage.blobs.store import fetched, name_of
-from storage.encoding.codec import CODEC, decode, encode
-from storage.encoding.decimals import DECIMAL_CODEC, LONG, decode_decimals, encode_decimals
+from storage.blobs.stores import fetched, name_of, open_store
+from storage.encoding.codec import CODEC, DECIMAL_CODEC, LONG, decode, decode_decimals, encode, encode_decimals
 from storage.engine.errors import DamagedData, DatabaseBusy
 from storage.tables import channel, raw_store, run
 

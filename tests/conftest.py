@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from storage.blobs.opening import open_store
+from storage.blobs.stores import open_store
 from storage.engine.database import Database
 from storage.engine.opening import open_database
 from tests.storage.blobs.stores import new_bucket, s3_server, use_endpoint

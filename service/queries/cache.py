@@ -19,9 +19,8 @@ from service.lists import LONGEST_CURSOR
 from service.settings import CODE_VERSION
 from storage import clutches
 from storage.encoding.json_text import to_text
-from storage.engine.database import Database
+from storage.engine.database import Database, SharedAnswer
 from storage.engine.errors import StorageError
-from storage.engine.shared_answers import SharedAnswer
 
 _log = logging.getLogger("clutchlife")
 

@@ -20,7 +20,7 @@ from fastapi import Depends, Request
 from service.errors import FieldError, ForbiddenError, InvalidError, UnauthorizedError
 from service.schemas.limits import LONGEST_IDENTIFIER
 from service.web.context import Context
-from storage.engine.watch import Glance, GrantedKey, Question
+from storage.engine.database import Glance, GrantedKey, Question
 from storage.keys import KeyRow
 
 Scope = Literal["read", "ingest", "admin"]

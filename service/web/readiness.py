@@ -13,7 +13,7 @@ from service.jobs.queue import JobQueue
 from service.jobs.workers import Workers
 from service.web.limits import LONGEST_LOOK_SECONDS, LONGEST_RAW_LOOK_SECONDS, RAW_LOOK_SECONDS
 from storage.blobs import raw_stores
-from storage.blobs.opening import open_store
+from storage.blobs.stores import open_store
 from storage.engine.database import Database
 from storage.engine.errors import RawStoreUnavailable, StorageError
 

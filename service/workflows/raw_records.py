@@ -8,9 +8,8 @@ from itertools import islice
 
 from storage import channels
 from storage.blobs import raw_stores
-from storage.blobs.opening import DATABASE, normal_address, open_store
 from storage.blobs.raw_stores import RawStore
-from storage.blobs.store import BlobStore, name_of
+from storage.blobs.stores import DATABASE, BlobStore, name_of, normal_address, open_store
 from storage.engine.database import Database
 
 #: Names that are looked up, and removed, at a time. Chosen: some ten milliseconds of the write lock.

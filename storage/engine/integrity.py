@@ -1,10 +1,13 @@
-"""Whether a database has the schema of this code."""
+"""Whether a database has the schema of this code, and is complete: one that is being filled from another is marked by a
+table with the source's name in its one row.
+"""
 
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
-from sqlalchemy import Connection
+from sqlalchemy import Column, Connection, MetaData, Table, inspect, select
 
-from storage.engine.errors import DatabaseTooNew, DatabaseTooOld
+from storage.dialects import TEXT
+from storage.engine.errors import DatabaseTooNew, DatabaseTooOld, UnfinishedMigration
 from storage.migrations.upgrade import current, head, revisions
 from storage.tables import metadata
 
@@ -32,3 +35,34 @@ def other_schema(connection: Connection) -> list[str]:
         connection, opts={"include_object": lambda _, name, kind, *__: not (kind == "table" and name in own)}
     )
     return [f"the schema differs: {difference}" for difference in compare_metadata(context, metadata)]
+
+
+_own = MetaData()
+_pending = Table("migration_pending", _own, Column("source", TEXT, primary_key=True))
+
+
+def pending(connection: Connection) -> str | None:
+    """The source that the database is being filled from; None where it is complete."""
+    if not inspect(connection).has_table(_pending.name):
+        return None
+    return str(connection.execute(select(_pending.c.source)).scalar_one())
+
+
+def mark(connection: Connection, source: str) -> None:
+    """From now on the database is incomplete."""
+    _own.create_all(connection)
+    connection.execute(_pending.insert(), {"source": source})
+
+
+def release(connection: Connection) -> None:
+    """The database is complete."""
+    _own.drop_all(connection)
+
+
+def refuse_pending(connection: Connection) -> None:
+    """Raise UnfinishedMigration where the database is incomplete."""
+    source = pending(connection)
+    if source is not None:
+        raise UnfinishedMigration(
+            f"a migration from {source} into this database has not ended: give `clutchlife migrate` once more"
+        )

@@ -2,14 +2,12 @@
 
 from contextlib import AbstractContextManager, nullcontext
 
-from storage.engine.database import Database
-from storage.engine.limits import LOCK_TIMEOUT
-from storage.engine.pending import refuse_pending
-from storage.engine.postgresql.connect import address_of, is_on_server
+from storage.engine.database import LOCK_TIMEOUT, Database
+from storage.engine.integrity import refuse_pending
+from storage.engine.postgresql.connect import address_of, is_on_server, migration_lock
 from storage.engine.postgresql.connect import shown as shown_server
 from storage.engine.postgresql.database import find_server, open_server, server_has_tables
-from storage.engine.postgresql.locks import migration_lock
-from storage.engine.sqlite import service_lock as file_lock
+from storage.engine.sqlite import connect as file_lock
 from storage.engine.sqlite.connect import path_of
 from storage.engine.sqlite.database import find_file, open_file
 

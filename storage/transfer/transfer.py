@@ -14,8 +14,8 @@ from sqlalchemy import Connection, Table, exists, func, insert, literal_column, 
 
 from storage.engine.database import Database
 from storage.engine.errors import DatabaseTooOld, TargetInUse
+from storage.engine.integrity import mark, pending, release
 from storage.engine.opening import find_database, open_unfinished, shown, sole_use
-from storage.engine.pending import mark, pending, release
 from storage.migrations.upgrade import current, head
 from storage.tables import metadata
 from storage.transfer.digest import digest, rows_of

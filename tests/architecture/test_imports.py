@@ -82,14 +82,14 @@ def test_imports_are_read_wherever_they_stand() -> None:
         "typing",
         "storage.engine.database",
         "plotly",
-        "storage.engine.sqlite.health",
+        "storage.engine.sqlite.database",
         "service.settings",
     }
     assert [statement.imported for statement in read.values() if statement.in_function] == [
         "plotly",
-        "storage.engine.sqlite.health",
+        "storage.engine.sqlite.database",
         "service.settings",
     ]
     assert [statement.imported for statement in read.values() if statement.for_types] == ["storage.engine.database"]
     assert read["plotly"].reason == ""
-    assert read["storage.engine.sqlite.health"].reason == "most starts need no health"
+    assert read["storage.engine.sqlite.database"].reason == "most starts need no health"

@@ -17,7 +17,7 @@ import numpy as np
 from service.workflows import raw_records
 from storage import channels, clutches, runs
 from storage.blobs import raw_stores
-from storage.blobs.opening import DATABASE
+from storage.blobs.stores import DATABASE
 from storage.engine.opening import open_database
 from tests.storage.blobs.stores import CREDENTIALS, new_bucket, s3_server
 from tests.storage.samples import clutch_row, new_run

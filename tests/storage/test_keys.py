@@ -6,8 +6,7 @@ import pytest
 from sqlalchemy.exc import IntegrityError
 
 from storage import keys
-from storage.engine.database import Database
-from storage.engine.watch import GrantedKey
+from storage.engine.database import Database, GrantedKey
 from storage.keys import KeyRow
 
 #: When the tests are.

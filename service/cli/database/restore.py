@@ -39,7 +39,7 @@ def restore(
             fail("a run is restored for a reason: give --reason", EX_USAGE)
         run_changes.restore(backup_or_clutch, run, reason, url, key, patience)
         return
-    from storage.engine.sqlite.restore import restore as put_back  # start-up time
+    from storage.engine.sqlite.backup import restore as put_back  # start-up time
 
     with errors_in_a_line():
         require_file(database, "put a dump back with pg_restore, while no service runs")

@@ -1,16 +1,82 @@
-"""How the server is reached: the address, and the settings of every connection.
+"""How the server is reached: its address, the settings of every connection, its errors as the store's own, its locks.
+
+Beside transactions stand `SingleStatements`: what a service asks with every request, and what services share.
+Advisory locks are of one database, and end with the transaction or the session that took them: of who writes, and of who
+serves while nobody migrates. The driver itself is loaded when a connection is made.
 
 Source: https://docs.sqlalchemy.org/en/20/dialects/postgresql.html (psycopg),
-https://www.postgresql.org/docs/current/runtime-config-client.html.
+https://www.postgresql.org/docs/current/runtime-config-client.html, .../errcodes-appendix.html, .../explicit-locking.html.
 """
 
+import hashlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
-from sqlalchemy import URL, Engine, create_engine, event, make_url
-from sqlalchemy.exc import ArgumentError
+from sqlalchemy import (
+    URL,
+    BigInteger,
+    Column,
+    Connection,
+    Engine,
+    Executable,
+    MetaData,
+    RowMapping,
+    Table,
+    create_engine,
+    event,
+    make_url,
+    text,
+    update,
+)
+from sqlalchemy.exc import ArgumentError, DataError, DBAPIError
+from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from sqlalchemy.pool import ConnectionPoolEntry
 
-from storage.engine.errors import StorageUnavailable
+from storage.engine.errors import DatabaseBusy, ServiceRuns, StorageError, StorageUnavailable, UnstorableText
+
+#: A lock that was not free in time, a serialization failure, a deadlock, and too many connections.
+LOCK_NOT_FREE = "55P03"
+_BUSY = {
+    LOCK_NOT_FREE: "another writer held the database for too long",
+    "40001": "another transaction was in the way",
+    "40P01": "another transaction was in the way",
+    "53300": "the server has no free connection",
+}
+_READ_ONLY = "25006"
+#: Classes of codes: connections, passwords, unknown databases, means of the server, its operator, its disk, its faults.
+_UNAVAILABLE = ("08", "28", "3D", "53", "57", "58", "XX")
+
+
+@contextmanager
+def translated(name: str) -> Iterator[None]:
+    """Raise the store's own errors, naming the database, for what driver and pool raise inside; all else passes."""
+    try:
+        yield
+    except (PoolTimeoutError, DBAPIError) as error:
+        own = _store_error(error, name)
+        if own is None:
+            raise
+        raise own from error
+
+
+def _store_error(error: Exception, name: str) -> StorageError | None:
+    """The store's own error, or None where it is the program's (a constraint, bad SQL)."""
+    if not isinstance(error, DBAPIError):
+        return DatabaseBusy(f"{name}: no free connection ({error})")
+    code: str | None = getattr(error.orig, "sqlstate", None)
+    reason = " ".join(str(error.orig).split())
+    if code in _BUSY:
+        return DatabaseBusy(f"{name}: {_BUSY[code]} ({reason})")
+    if code == _READ_ONLY:
+        return StorageUnavailable(f"{name}: the database is read-only ({reason})")
+    if isinstance(error, DataError) and "NUL" in reason:
+        return UnstorableText("text must not hold the character NUL (U+0000), which PostgreSQL cannot store")
+    # a connection that was refused or has broken has no code
+    if error.connection_invalidated or code is None or code.startswith(_UNAVAILABLE):
+        return StorageUnavailable(f"{name}: the server cannot be used ({reason})")
+    return None
+
 
 SCHEME = "postgresql+psycopg"
 #: Connections that a process keeps, and how many more it makes for a while. Chosen: a service's threads seldom ask at once,
@@ -86,3 +152,106 @@ def _engine(address: URL, lock_timeout: float, **options: Any) -> Engine:
         connection.commit()
 
     return engine
+
+
+server_tables = MetaData()
+#: One row: how many transactions that changed something were committed. Each raises it as its last statement, while it alone
+#: writes, so that who reads a number also sees all that was committed up to it; the numbers of a sequence do not promise it.
+#: PostgreSQL's alone: SQLite has `PRAGMA data_version`.
+commits = Table("commits", server_tables, Column("number", BigInteger, primary_key=True, autoincrement=False))
+count_commit = update(commits).values(number=commits.c.number + 1)
+
+
+class SingleStatements:
+    """Threads share it. `engine` is one of `connect.make_autocommit_engine`, `name` that of the database in errors."""
+
+    def __init__(self, engine: Engine, name: str) -> None:
+        self._engine = engine
+        self._name = name
+        self._closed = False
+
+    def rows(self, statement: Executable, values: dict[str, Any]) -> Sequence[RowMapping]:
+        """The rows that a statement returns, none where it returns none. After a lost connection it is run once more.
+
+        Raises StorageUnavailable where the server cannot be reached, or when this was closed, and DatabaseBusy where no
+        connection is free in time.
+        """
+        self._refuse_closed()
+        with translated(self._name):
+            try:
+                return self._run(statement, values)
+            except DBAPIError as error:
+                if not error.connection_invalidated:
+                    raise
+            # the server was started again: the connections of before have been dropped
+            self._refuse_closed()
+            return self._run(statement, values)
+
+    def close(self) -> None:
+        """Close the connections; any later use raises StorageUnavailable. May be called twice."""
+        self._closed = True
+        self._engine.dispose()
+
+    def _run(self, statement: Executable, values: dict[str, Any]) -> Sequence[RowMapping]:
+        with self._engine.connect() as connection:
+            result = connection.execute(statement, values)
+            return result.mappings().all() if result.returns_rows else ()
+
+    def _refuse_closed(self) -> None:
+        if self._closed:
+            raise StorageUnavailable(f"{self._name} has been closed")
+
+
+#: The keys of the program's locks: "CLUTCH" in ASCII, and a number.
+_PROGRAM = int.from_bytes(b"CLUTCH") << 8
+WRITE_KEY, SERVICE_KEY = _PROGRAM | 1, _PROGRAM | 2
+#: The class of the locks of single things, beside which each has a hash of its name: keys of two numbers are others than of
+#: one. Two things of the same hash wait for each other, which harms nothing.
+_OF_ONE = int.from_bytes(b"CLUT")
+
+_lock_all = text(f"SELECT pg_advisory_xact_lock({WRITE_KEY})")
+_lock_one = text(f"SELECT pg_advisory_xact_lock_shared({WRITE_KEY}), pg_advisory_xact_lock({_OF_ONE}, :hash)")
+
+
+def write_lock(connection: Connection, of: str | None) -> None:
+    """Have the transaction wait until it is the only one that writes `of` something, or at all, and remain so to its end."""
+    if of is None:
+        connection.execute(_lock_all)
+    else:
+        hashed = int.from_bytes(hashlib.sha256(of.encode("utf-8", "surrogateescape")).digest()[:4], signed=True)
+        connection.execute(_lock_one, {"hash": hashed})
+
+
+def hold_service_lock(engine: Engine, name: str) -> None:
+    """Have every connection of a service hold the services' lock, which many may: also those that are made after the server
+    was started again. Raises DatabaseBusy from then on where a migration takes longer than a connection waits for locks."""
+
+    @event.listens_for(engine, "connect")
+    def hold(connection: Any, _: ConnectionPoolEntry) -> None:
+        try:
+            connection.execute(f"SELECT pg_advisory_lock_shared({SERVICE_KEY})")
+            connection.commit()
+        except Exception as error:
+            if getattr(error, "sqlstate", None) == LOCK_NOT_FREE:
+                raise DatabaseBusy(f"{name}: the database is being migrated") from error
+            raise
+
+
+@contextmanager
+def migration_lock(address: URL, lock_timeout: float) -> Iterator[None]:
+    """Held inside: the lock under which no service runs. Raises ServiceRuns where one does not end within the time [s]."""
+    name = shown(address)
+    engine = make_engine(address, lock_timeout)
+    try:
+        with translated(name), engine.execution_options(isolation_level="AUTOCOMMIT").connect() as connection:
+            try:
+                with translated(name):
+                    connection.exec_driver_sql(f"SELECT pg_advisory_lock({SERVICE_KEY})")
+            except DatabaseBusy as error:
+                raise ServiceRuns(f"{name}: a service uses this database: stop it first") from error
+            try:
+                yield
+            finally:
+                connection.invalidate()  # closed with its lock, and not asked before: its server may be gone
+    finally:
+        engine.dispose()

@@ -1,27 +1,181 @@
-"""A database on a server: its transactions, and how its tables come to be.
+"""A database on a server: its transactions, how its tables come to be, what requests ask of it, and shared answers.
 
 Writers of one clutch queue for a lock of that clutch, so that its rows are committed in the order of the numbers that they
 get (revisions, keys); those of different clutches write at once. Who writes of all clutches together waits for all of them.
-`commits`, the number of all, is given last: from then until it is committed a transaction holds that row (`watch`).
+`commits`, the number of all, is given last: from then until it is committed a transaction holds that row.
+
+`ServerWatch` asks one statement for all requests, so that no answer is older than its question: one is under way in a
+thread, and requests that come meanwhile share the next. Computed answers are in a table that is not logged: a server that
+crashes empties it, and they are computed again.
 """
 
-from collections.abc import Iterator
+import asyncio
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager, nullcontext
 
-from sqlalchemy import URL, Connection, insert, inspect, text
+from sqlalchemy import (
+    URL,
+    BigInteger,
+    Column,
+    Connection,
+    LargeBinary,
+    Table,
+    Text,
+    bindparam,
+    inspect,
+    or_,
+    select,
+    text,
+)
+from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.exc import ProgrammingError, SQLAlchemyError
 
-from storage.engine.database import Database
+from storage.engine.database import Database, Glance, Question, SharedAnswer, SharedAnswers, Watch, granted
 from storage.engine.errors import DatabaseTooOld, StorageError, StorageUnavailable
 from storage.engine.integrity import refuse_newer
-from storage.engine.postgresql.connect import make_autocommit_engine, make_engine, shown
-from storage.engine.postgresql.driver_errors import translated
-from storage.engine.postgresql.locks import hold_service_lock, migration_lock, write_lock
-from storage.engine.postgresql.server_tables import commits, count_commit, server_tables
-from storage.engine.postgresql.shared_answers import ServerAnswers
-from storage.engine.postgresql.single_statements import SingleStatements
-from storage.engine.postgresql.watch import ServerWatch
+from storage.engine.postgresql.connect import (
+    SingleStatements,
+    commits,
+    count_commit,
+    hold_service_lock,
+    make_autocommit_engine,
+    make_engine,
+    migration_lock,
+    server_tables,
+    shown,
+    translated,
+    write_lock,
+)
 from storage.migrations.upgrade import current, head, make_all, upgrade
+
+shared_answer = Table(
+    "shared_answer",
+    server_tables,
+    Column("clutch_id", Text, primary_key=True),
+    Column("name", Text, primary_key=True),
+    Column("release", Text, nullable=False),
+    Column("revision", BigInteger, nullable=False),
+    Column("body", LargeBinary, nullable=False),
+    prefixes=["UNLOGGED"],
+)
+
+_newest = select(shared_answer).where(
+    shared_answer.c.clutch_id == bindparam("clutch"),
+    shared_answer.c.name == bindparam("asked"),
+    shared_answer.c.release == bindparam("by"),
+)
+_new = insert(shared_answer)
+#: Another build's answer is replaced, whatever its revision: a clutch has one row of a name.
+_keep = _new.on_conflict_do_update(
+    index_elements=["clutch_id", "name"],
+    set_={name: _new.excluded[name] for name in ("release", "revision", "body")},
+    where=or_(
+        shared_answer.c.release != _new.excluded["release"], shared_answer.c.revision <= _new.excluded["revision"]
+    ),
+)
+
+
+class ServerAnswers(SharedAnswers):
+    """Each is read and written by one statement outside transactions."""
+
+    def __init__(self, statements: SingleStatements) -> None:
+        self._statements = statements
+
+    def newest(self, clutch_id: str, name: str, release: str) -> SharedAnswer | None:
+        """The last one that a service of that build computed, None where there is none."""
+        rows = self._statements.rows(_newest, {"clutch": clutch_id, "asked": name, "by": release})
+        return SharedAnswer(**rows[0]) if rows else None
+
+    def keep(self, answer: SharedAnswer) -> None:
+        """Keep an answer, unless one of a later revision is kept."""
+        self._statements.rows(_keep, {column.name: getattr(answer, column.name) for column in shared_answer.columns})
+
+
+_GLANCE = text("""
+SELECT (SELECT number FROM commits) AS version,
+       EXISTS (SELECT 1 FROM access_key) AS keys_are_needed,
+       (SELECT json_object_agg(clutch_id, revision) FROM clutch WHERE clutch_id = ANY(:clutches)) AS revisions,
+       (SELECT json_object_agg(secret_sha256, json_build_array(key_id, scope, note, clutches, expires_at))
+          FROM access_key WHERE secret_sha256 = ANY(:secrets) AND revoked_at IS NULL) AS keys
+""")
+
+
+class ServerWatch(Watch):
+    """The questions, one at a time for all who ask from the event loop."""
+
+    def __init__(self, statements: SingleStatements) -> None:
+        self._statements = statements
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="watch")
+        self._waiting: list[tuple[Question, asyncio.Future[Glance]]] = []
+        self._asking: asyncio.Task[None] | None = None
+        self._closed = False
+
+    def glances(self, questions: Sequence[Question]) -> list[Glance]:
+        """What is so now, question by question, all at the same moment."""
+        # no clutch is named by what the server cannot store
+        clutches = sorted(
+            {
+                question.clutch_id
+                for question in questions
+                if question.clutch_id is not None and "\0" not in question.clutch_id
+            }
+        )
+        secrets = sorted({question.secret_sha256 for question in questions if question.secret_sha256 is not None})
+        [row] = self._statements.rows(_GLANCE, {"clutches": clutches, "secrets": secrets})
+        revisions, keys = row["revisions"] or {}, row["keys"] or {}
+        return [
+            Glance(
+                version=row["version"] or 0,
+                keys_are_needed=row["keys_are_needed"],
+                key=granted(tuple(keys[question.secret_sha256])) if question.secret_sha256 in keys else None,
+                revision=revisions.get(question.clutch_id),
+            )
+            for question in questions
+        ]
+
+    async def look(self, question: Question) -> Glance:
+        """What is so now, for one who asks from the event loop."""
+        self._refuse_closed()
+        answer: asyncio.Future[Glance] = asyncio.get_running_loop().create_future()
+        self._waiting.append((question, answer))
+        if self._asking is None:
+            self._asking = asyncio.create_task(self._ask())
+        return await answer
+
+    def close(self) -> None:
+        """End the thread; who asks from then on is told that the database was closed. May be called twice."""
+        self._closed = True
+        self._thread.shutdown()
+
+    async def _ask(self) -> None:
+        """Ask for all who wait, until nobody does."""
+        try:
+            while self._waiting:
+                questions, self._waiting = self._waiting, []
+                await self._ask_for(questions)
+        finally:
+            self._asking = None
+
+    async def _ask_for(self, questions: list[tuple[Question, asyncio.Future[Glance]]]) -> None:
+        try:
+            self._refuse_closed()
+            glances = await asyncio.get_running_loop().run_in_executor(
+                self._thread, self.glances, [question for question, _ in questions]
+            )
+        except Exception as error:  # noqa: BLE001  (raised again for each who asked)
+            for _, answer in questions:
+                if not answer.done():
+                    answer.set_exception(error)
+        else:
+            for (_, answer), glance in zip(questions, glances, strict=True):
+                if not answer.done():  # who asked may have gone
+                    answer.set_result(glance)
+
+    def _refuse_closed(self) -> None:
+        if self._closed:
+            raise StorageUnavailable("the database has been closed")
+
 
 #: A transaction that changed nothing has no number and is not counted.
 _COUNT = count_commit.where(text("pg_current_xact_id_if_assigned() IS NOT NULL"))
@@ -118,7 +272,7 @@ class ServerDatabase(Database):
                 upgrade(connection)
             server_tables.create_all(connection)
             if revision is None:
-                connection.execute(insert(commits).values(number=0))
+                connection.execute(commits.insert().values(number=0))
 
     def _refuse_closed(self) -> None:
         if self._closed:

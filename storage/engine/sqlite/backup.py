@@ -1,18 +1,55 @@
-"""A consistent copy of a database in use, by SQLite's online backup (https://www.sqlite.org/backup.html).
+"""Whole copies of a file: made of a database in use, put in its place, and checked.
 
-The source is only read, at whatever revision it is.
+A copy is SQLite's online backup (https://www.sqlite.org/backup.html): the source is only read, at whatever revision it is.
+A restored one takes the database's name so that at every moment one of the two has it.
+Source of the checks: https://www.sqlite.org/pragma.html#pragma_integrity_check.
 """
 
 import filecmp
 import itertools
 import os
+import shutil
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
-from storage.engine.sqlite.connect import read_only
-from storage.engine.sqlite.private_files import make_if_missing, make_new
+from sqlalchemy import Connection
+
+from storage.engine.database import LOCK_TIMEOUT
+from storage.engine.errors import DatabaseBusy, StorageUnavailable
+from storage.engine.sqlite.connect import (
+    DRIVER_ERRORS,
+    WriteLock,
+    make_if_missing,
+    make_new,
+    path_of,
+    read_only,
+    service_lock,
+    translated,
+)
+
+#: Findings of one kind that are listed. Chosen: a screenful; SQLite's own default is 100.
+_MOST_LISTED = 20
+
+
+def damage(connection: Connection) -> list[str]:
+    """What is wrong with the pages, the indexes and the references of a database; empty where nothing is."""
+    pages = [str(row[0]) for row in connection.exec_driver_sql(f"PRAGMA integrity_check({_MOST_LISTED})")]
+    broken = connection.exec_driver_sql("PRAGMA foreign_key_check").fetchmany(_MOST_LISTED)
+    return [f"integrity: {line}" for line in pages if line != "ok"] + [
+        f"row {row} of {table} refers to a row of {other} that is missing" for table, row, other, _ in broken
+    ]
+
+
+def require_whole(path: Path) -> None:
+    """Raise sqlite3.DatabaseError unless the file at `path` is a whole database of this program, at whatever revision."""
+    with closing(sqlite3.connect(read_only(path), uri=True)) as connection:
+        (line,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
+        if line != "ok":
+            raise sqlite3.DatabaseError(f"it is damaged: {line}")
+        if not connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'alembic_version'").fetchone():
+            raise sqlite3.DatabaseError("it is not a database of this program")
 
 
 def copy(source: Path, target: Path, *, lock_timeout: float) -> None:
@@ -82,3 +119,69 @@ def copy_whole(source: Path, target: Path, lock_timeout: float) -> None:
         origin.backup(copied)
         # One file without a log beside it, which any SQLite may open.
         copied.execute("PRAGMA journal_mode=DELETE")
+
+
+#: What SQLite keeps beside a file: commits that are not in it yet, and what readers share.
+_LOG, _SHARED = "-wal", "-shm"
+
+
+def restore(url: str, backup: Path, *, lock_timeout: float = LOCK_TIMEOUT) -> Path | None:
+    """Put the database in the file `backup` in the place of the one at `url`, whatever the revisions of the two.
+
+    Returns where the replaced file is kept, `FILE-replaced` beside it, None where there was none. Raises ServiceRuns while a
+    service uses the database, DatabaseBusy while anything else does, StorageUnavailable where `backup` is no whole database;
+    then nothing has changed.
+    """
+    path = path_of(url)
+    if not backup.is_file():
+        raise FileNotFoundError(f"there is no backup at {backup}")
+    if path.exists() and path.samefile(backup):
+        raise ValueError(f"{backup} is the database itself")
+    partial = path.with_name(f"{path.name}-restored.partial")
+    with service_lock(path), closing(WriteLock(path, lock_timeout)) as lock, lock.held():
+        partial.unlink(missing_ok=True)
+        try:
+            with translated(backup):
+                try:
+                    require_whole(backup)
+                    copy_whole(backup, partial, lock_timeout)
+                except sqlite3.DatabaseError as error:
+                    raise StorageUnavailable(f"{backup} cannot be restored: {error}") from error
+            kept = _kept(path) if path.exists() else None
+            renamed(partial, path)
+        finally:
+            partial.unlink(missing_ok=True)
+    return kept
+
+
+def _kept(path: Path) -> Path:
+    """The file under a second name, with its log; nothing beside it that would be taken for the restored one's log."""
+    _settle(path)
+    kept = next(name for name in names_beside(path, "replaced") if not name.exists())
+    log = path.with_name(path.name + _LOG)
+    if log.exists():
+        _second_name(log, kept.with_name(kept.name + _LOG))
+    _second_name(path, kept)
+    log.unlink(missing_ok=True)
+    path.with_name(path.name + _SHARED).unlink(missing_ok=True)
+    return kept
+
+
+def _settle(path: Path) -> None:
+    """Bring the log's commits into the file, so that the file is all there is; a damaged one is left with its log."""
+    try:
+        with closing(sqlite3.connect(path, timeout=0.0, isolation_level=None)) as connection:
+            connection.execute("PRAGMA journal_mode=DELETE")
+    except DRIVER_ERRORS as error:
+        code = getattr(error, "sqlite_errorcode", 0) & 0xFF
+        if code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
+            raise DatabaseBusy(f"{path}: another process has the database open: end it first") from error
+        if code not in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB):
+            raise
+
+
+def _second_name(path: Path, name: Path) -> None:
+    try:
+        os.link(path, name)
+    except OSError:  # a volume without links: bytes instead
+        shutil.copyfile(path, name)

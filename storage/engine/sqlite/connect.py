@@ -1,23 +1,86 @@
-"""How the file is opened: its path from the URL, its journal mode, and the settings of every connection.
+"""How the file is opened: its mode, its path from the URL, its journal, the settings of every connection, and its locks.
 
-The driver's own transaction control is switched off: `transactions.py` begins every transaction explicitly.
+Files are private from the moment they are made: they hold what keys protect. SQLite gives its log, and the index of its
+log, the mode of the database file; a file that is there keeps its mode. The driver's own transaction control is switched
+off: `database.py` begins every transaction explicitly.
+
+One writer at a time, among the threads of this process and among processes, by a lock beside the file (`FILE-lock`): SQLite
+before 3.51.3 may lose commits of a write-ahead log where one connection checkpoints while another commits
+(https://www.sqlite.org/wal.html, "the WAL-reset bug"). Every write transaction, with the checkpoint that its commit may run,
+is made under this lock, so that no two ever meet. Readers do not take it.
+One service of a file at a time (`FILE-service`): a second one would take the first one's diagnoses for those of a service
+that has died. Commands hold that lock only while they change what every service relies on: the schema, or the whole file.
 
 Source: https://docs.sqlalchemy.org/en/20/dialects/sqlite.html (transactions with the pysqlite driver),
-https://www.sqlite.org/wal.html; why any release of SQLite may use the log here: `write_lock`.
+https://www.sqlite.org/wal.html, https://www.sqlite.org/rescode.html (the low byte of a result code is its class).
 """
 
+import fcntl
 import math
+import os
 import re
 import sqlite3
+import threading
 import time
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
+from typing import BinaryIO
 
-from sqlalchemy import Engine, create_engine, event
+from sqlalchemy import Connection, Engine, create_engine, event
+from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool, QueuePool
 
-from storage.engine.errors import StorageUnavailable
+from storage.engine.errors import DatabaseBusy, ServiceRuns, StorageError, StorageUnavailable
+
+#: Its owner reads and writes, nobody else does either.
+MODE = 0o600
+
+
+def make_new(path: Path) -> None:
+    """Make an empty file. Raises FileExistsError where something is there."""
+    os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, MODE))
+
+
+def make_if_missing(path: Path) -> None:
+    """Make an empty file where nothing is there."""
+    with suppress(FileExistsError):
+        make_new(path)
+
+
+_BUSY = {sqlite3.SQLITE_BUSY: "the database is locked", sqlite3.SQLITE_LOCKED: "a table of the database is locked"}
+_UNAVAILABLE = {
+    sqlite3.SQLITE_FULL: "the database or its disk is full",
+    sqlite3.SQLITE_READONLY: "the database is read-only",
+    sqlite3.SQLITE_CANTOPEN: "the database file cannot be opened",
+    sqlite3.SQLITE_PERM: "access to the database file is denied",
+    sqlite3.SQLITE_IOERR: "reading or writing the database file failed",
+    sqlite3.SQLITE_CORRUPT: "the database file is damaged",
+    sqlite3.SQLITE_NOTADB: "the file is not a database",
+}
+
+
+#: Everything that driver and pool raise.
+DRIVER_ERRORS = (PoolTimeoutError, DBAPIError, sqlite3.Error)
+
+
+def store_error(error: Exception, path: Path) -> StorageError | None:
+    """The store's own error for one of DRIVER_ERRORS, or None where it is the program's (a constraint, bad SQL)."""
+    if isinstance(error, PoolTimeoutError):
+        return DatabaseBusy(f"{path}: no free connection ({error})")
+    origin = error.orig if isinstance(error, DBAPIError) else error
+    code = getattr(origin, "sqlite_errorcode", None)
+    if code is None:
+        return None
+    primary = code & 0xFF
+    if primary in _BUSY:
+        return DatabaseBusy(f"{path}: {_BUSY[primary]} ({origin})")
+    if primary in _UNAVAILABLE:
+        return StorageUnavailable(f"{path}: {_UNAVAILABLE[primary]} ({origin})")
+    return None
+
 
 #: Write-ahead logging: readers and a commit do not wait for each other.
 JOURNAL_MODE = "wal"
@@ -118,3 +181,116 @@ def make_engine(
         connection.execute("PRAGMA cache_spill=OFF")
 
     return engine
+
+
+#: [s] Between two attempts to take the lock from another process: first and longest. Chosen: a commit takes 1 to 5 ms.
+_FIRST_RETRY, _LONGEST_RETRY = 0.0005, 0.005
+
+
+class WriteLock:
+    """The lock of one database file, `FILE-lock`; every process that writes the file takes it. `close` it at the end."""
+
+    def __init__(self, path: Path, timeout: float) -> None:
+        self._path = path.with_name(f"{path.name}-lock")
+        self._timeout = timeout
+        self._thread_lock = threading.Lock()
+        self._file: int | None = None
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Hold the lock inside.
+
+        Raises DatabaseBusy where it is not free in time, StorageUnavailable where its file cannot be made.
+        """
+        deadline = time.monotonic() + self._timeout
+        if not self._thread_lock.acquire(timeout=self._timeout):
+            raise DatabaseBusy(f"another writer of this process held the database for more than {self._timeout:g} s")
+        try:
+            file = self._opened()
+            self._take(file, deadline)
+            try:
+                yield
+            finally:
+                fcntl.flock(file, fcntl.LOCK_UN)
+        finally:
+            self._thread_lock.release()
+
+    def close(self) -> None:
+        """Close the file. The lock may be held again afterwards."""
+        with self._thread_lock:
+            if self._file is not None:
+                os.close(self._file)
+                self._file = None
+
+    def _opened(self) -> int:
+        if self._file is None:
+            try:
+                self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, MODE)
+            except OSError as error:
+                raise StorageUnavailable(
+                    f"{self._path}: the lock of the database cannot be opened ({error})"
+                ) from error
+        return self._file
+
+    def _take(self, file: int, deadline: float) -> None:
+        pause = _FIRST_RETRY
+        while True:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                if time.monotonic() > deadline:
+                    raise DatabaseBusy(
+                        f"{self._path}: another process held the database for more than {self._timeout:g} s"
+                    ) from None
+                time.sleep(pause)
+                pause = min(2 * pause, _LONGEST_RETRY)
+            else:
+                return
+
+
+@contextmanager
+def service_lock(path: Path) -> Iterator[None]:
+    """Hold the lock of the database at `path` inside.
+
+    Raises ServiceRuns where another holds it, StorageUnavailable where its file cannot be made.
+    """
+    beside = path.with_name(f"{path.name}-service")
+    with closing(_lock_file(beside)) as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            holder = file.read(20).decode(errors="replace").strip()
+            raise ServiceRuns(
+                f"{path}: a service uses this database already (process {holder or 'unknown'}): stop it first"
+            ) from None
+        file.truncate(0)
+        file.write(str(os.getpid()).encode())
+        file.flush()
+        yield
+
+
+def _lock_file(path: Path) -> BinaryIO:
+    try:
+        return open(os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, MODE), "rb+")  # noqa: PTH123  (a descriptor)
+    except OSError as error:
+        raise StorageUnavailable(f"{path}: the lock of the database cannot be opened ({error})") from error
+
+
+@contextmanager
+def translated(path: Path) -> Iterator[None]:
+    """Raise the store's own errors, naming the file, for what driver and pool raise inside; all else passes."""
+    try:
+        yield
+    except DRIVER_ERRORS as error:
+        own = store_error(error, path)
+        if own is None:
+            raise
+        raise own from error
+
+
+@contextmanager
+def transaction(engine: Engine, begin: str) -> Iterator[Connection]:
+    """A connection inside a transaction that the statement `begin` has begun: committed at the end, or rolled back."""
+    with engine.begin() as connection:
+        connection.exec_driver_sql(begin)
+        yield connection

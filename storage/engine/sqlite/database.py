@@ -1,31 +1,207 @@
-"""A database that is one file: how it comes to be, its migration, and its backup."""
+"""A database that is one file: its transactions, how it comes to be and is migrated, what requests ask of it, its health.
 
+Readers begin by BEGIN, writers by BEGIN IMMEDIATE, so that a writer either has the lock before its first statement or has
+changed nothing. Writers of all threads and processes queue for the lock of `connect.WriteLock`.
+"""
+
+import os
+import shutil
 import sqlite3
-from collections.abc import Iterator
+import threading
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager, nullcontext
 from pathlib import Path
+from typing import Any
 
 from sqlalchemy import Connection
 from sqlalchemy.exc import OperationalError
 
+from storage.engine.database import LOCK_TIMEOUT, Database, Glance, Question, Watch, granted
 from storage.engine.errors import DatabaseTooOld, StorageUnavailable
 from storage.engine.integrity import refuse_newer
-from storage.engine.limits import LOCK_TIMEOUT
-from storage.engine.sqlite.backup import copy, copy_beside
+from storage.engine.sqlite.backup import copy, copy_beside, damage
 from storage.engine.sqlite.connect import (
+    DRIVER_ERRORS,
+    JOURNAL_MODE,
+    WriteLock,
+    connect_shared,
     found_journal_mode,
     make_engine,
+    make_if_missing,
     path_of,
+    read_only,
+    service_lock,
     set_journal_mode,
+    store_error,
+    transaction,
+    translated,
     wanted_journal_mode,
 )
-from storage.engine.sqlite.health import faults
-from storage.engine.sqlite.integrity import damage
-from storage.engine.sqlite.private_files import make_if_missing
-from storage.engine.sqlite.service_lock import service_lock
-from storage.engine.sqlite.transactions import Transactions, transaction, translated
-from storage.engine.sqlite.write_lock import WriteLock
 from storage.migrations.upgrade import current, head, upgrade
+
+
+def faults(path: Path, *, journal_mode: str, least_free: int) -> dict[str, str]:
+    """What is wrong with the file (`database`) and with the space on its disk (`disk`), in words; empty where nothing is.
+
+    `least_free` [byte] is the space that must be free. Who writes now holds nothing up: a reader of the write-ahead log
+    waits for no writer, and where there is none a commit in progress shows that the file is in use.
+    """
+    wrong = {}
+    try:
+        fault = _fault_of_file(path, journal_mode)
+    except OSError as error:
+        fault = f"the file cannot be read: {error.strerror}"
+    if fault is not None:
+        wrong["database"] = fault
+    try:
+        free = shutil.disk_usage(path.parent).free
+    except OSError as error:
+        wrong["disk"] = f"the disk does not answer: {error.strerror}"
+    else:
+        if free < least_free:
+            wrong["disk"] = f"{free >> 20} MiB are free on the database's disk, {least_free >> 20} are needed"
+    return wrong
+
+
+def _fault_of_file(path: Path, journal_mode: str) -> str | None:
+    """What is wrong with the file: it is not there, does not answer at the code's revision, or may not be written."""
+    if not path.exists():
+        return "the file is not there"
+    try:
+        with closing(sqlite3.connect(read_only(path), uri=True, timeout=0.0)) as connection:
+            (revision,) = connection.execute("SELECT version_num FROM alembic_version").fetchone()
+    except sqlite3.Error as error:
+        busy = getattr(error, "sqlite_errorcode", 0) & 0xFF == sqlite3.SQLITE_BUSY
+        if journal_mode == JOURNAL_MODE or not busy:
+            return f"the file cannot be read: {error}"
+    else:
+        if revision != head():
+            return f"the file is at revision {revision}, this release needs {head()}"
+    if not (os.access(path, os.W_OK) and os.access(path.parent, os.W_OK)):
+        return "the file or its folder cannot be written"
+    return None
+
+
+#: Rows that are kept at most. Chosen: some clutches and keys; all are forgotten when there are more.
+_MOST_ROWS = 10_000
+_REVISION = "SELECT revision FROM clutch WHERE clutch_id = ?"
+_ANY_KEY = "SELECT EXISTS (SELECT 1 FROM access_key)"
+_KEY = "SELECT key_id, scope, note, clutches, expires_at FROM access_key WHERE secret_sha256 = ? AND revoked_at IS NULL"
+
+
+class FileWatch(Watch):
+    """A connection of its own, shared by threads. With a write-ahead log it waits for nobody."""
+
+    def __init__(self, path: Path, lock_timeout: float, *, writable: bool = True) -> None:
+        self._path = path
+        self._lock = threading.Lock()
+        self._rows: dict[tuple[str, tuple[object, ...]], tuple[Any, ...] | None] = {}
+        self._rows_version = -1
+        self._closed = False
+        self._connection = connect_shared(path, lock_timeout, writable=writable)
+
+    def glances(self, questions: Sequence[Question]) -> list[Glance]:
+        """What is so now, question by question, all at the same moment."""
+        with self._lock:
+            version = self._version()
+            if version != self._rows_version or len(self._rows) > _MOST_ROWS:
+                self._rows.clear()
+                self._rows_version = version
+            return [self._glance(version, question) for question in questions]
+
+    async def look(self, question: Question) -> Glance:
+        """What is so now, for one who asks from the event loop: the file answers at once."""
+        return self.glances([question])[0]
+
+    def _glance(self, version: int, question: Question) -> Glance:
+        any_key = self._row(_ANY_KEY)
+        key = None if question.secret_sha256 is None else self._row(_KEY, question.secret_sha256)
+        revision = None if question.clutch_id is None else self._row(_REVISION, question.clutch_id)
+        return Glance(
+            version=version,
+            keys_are_needed=any_key is not None and bool(any_key[0]),
+            key=None if key is None else granted(key),
+            revision=None if revision is None else int(revision[0]),
+        )
+
+    def _row(self, query: str, *values: object) -> tuple[Any, ...] | None:
+        """The first row of a query by key as it is now, None where there is none; asked of the file once a commit."""
+        key = (query, values)
+        if key not in self._rows:
+            self._rows[key] = self._first(query, values)
+        return self._rows[key]
+
+    def close(self) -> None:
+        """Close the connection; any later question raises StorageUnavailable."""
+        with self._lock:
+            self._closed = True
+            self._connection.close()
+
+    def _version(self) -> int:
+        row = self._first("PRAGMA data_version", ())
+        return 0 if row is None else int(row[0])
+
+    def _first(self, query: str, values: tuple[object, ...]) -> tuple[Any, ...] | None:
+        if self._closed:
+            raise StorageUnavailable(f"the database {self._path} has been closed")
+        try:
+            # fetched to the end: an open statement would keep the log from being written back
+            rows = self._connection.execute(query, values).fetchall()
+        except DRIVER_ERRORS as error:
+            own = store_error(error, self._path)
+            if own is None:
+                raise
+            raise own from error
+        return rows[0] if rows else None
+
+
+class Transactions(Database):
+    """The transactions of a database file. Threads share it; `close` it at the end."""
+
+    path: Path
+    watch: FileWatch
+
+    def __init__(self, path: Path, lock_timeout: float, *, writable: bool = True) -> None:
+        self.path = path
+        self.lock_timeout = lock_timeout
+        self._write_lock = WriteLock(path, lock_timeout)
+        self._closed = False
+        self._engine = make_engine(path, lock_timeout, writable=writable)
+        with translated(path):
+            self.watch = FileWatch(path, lock_timeout, writable=writable)
+
+    @contextmanager
+    def reading(self) -> Iterator[Connection]:
+        """A connection that sees one state of the database until the block ends. Keep it short: the log grows meanwhile."""
+        self.refuse_closed()
+        with translated(self.path), transaction(self._engine, "BEGIN") as connection:
+            yield connection
+
+    @contextmanager
+    def writing(self, *, of: str | None = None) -> Iterator[Connection]:  # noqa: ARG002  (a file has one writer)
+        """A connection that holds the write lock: committed when the block ends, rolled back on any exception.
+
+        Raises DatabaseBusy where the lock is not free in time, StorageUnavailable where the file cannot be written.
+        """
+        self.refuse_closed()
+        with (
+            self._write_lock.held(),
+            translated(self.path),
+            transaction(self._engine, "BEGIN IMMEDIATE") as connection,
+        ):
+            yield connection
+
+    def close(self) -> None:
+        """Close all connections; any later use raises StorageUnavailable. May be called twice."""
+        self._closed = True
+        self.watch.close()
+        self._engine.dispose()
+        self._write_lock.close()
+
+    def refuse_closed(self) -> None:
+        """Raise StorageUnavailable after `close`."""
+        if self._closed:
+            raise StorageUnavailable(f"the database {self.path} has been closed")
 
 
 class FileDatabase(Transactions):

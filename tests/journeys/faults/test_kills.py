@@ -23,8 +23,8 @@ from service.workflows.adopt_model import adopt
 from storage import assumptions, channels, clutches, runs
 from storage.engine.integrity import other_schema
 from storage.engine.opening import find_database, open_database
+from storage.engine.sqlite.backup import restore
 from storage.engine.sqlite.database import back_up
-from storage.engine.sqlite.restore import restore
 from storage.migrations.upgrade import head
 from tests.service.workflows.benches import Bench, body, stood_in
 from tests.storage.samples import OLD, integrity, old_database, revision

@@ -13,10 +13,9 @@ from service.queries.cache import AnswerCache, build_of, revision_and_json, shar
 from service.settings import CODE_VERSION
 from service.web.limits import MOST_CACHED_BYTES
 from storage import clutches
-from storage.engine.database import Database
+from storage.engine.database import Database, SharedAnswer, SharedAnswers
 from storage.engine.errors import StorageUnavailable
 from storage.engine.opening import open_database
-from storage.engine.shared_answers import SharedAnswer, SharedAnswers
 from tests.storage.samples import clutch_row
 
 

@@ -29,7 +29,7 @@ from storage.diagnoses import NewDiagnosis
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData
 from storage.engine.opening import open_database
-from storage.engine.sqlite.transactions import Transactions
+from storage.engine.sqlite.database import Transactions
 from storage.jobs import NewJob
 from tests.service.workflows import stand_in_engine
 from tests.support import stationary

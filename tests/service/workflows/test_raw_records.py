@@ -14,8 +14,7 @@ from service import stored_runs
 from service.workflows import raw_records
 from storage import channels, clutches, runs
 from storage.blobs import raw_stores
-from storage.blobs.folder import FolderStore
-from storage.blobs.opening import DATABASE, open_store
+from storage.blobs.stores import DATABASE, FolderStore, open_store
 from storage.channels import Encoded
 from storage.engine.database import Database
 from storage.engine.errors import DamagedData, DatabaseBusy, RawStoreUnavailable

@@ -8,7 +8,7 @@ import httpx2
 import pytest
 from moto.server import ThreadedMotoServer
 
-from storage.blobs.opening import open_store
+from storage.blobs.stores import open_store
 
 CREDENTIALS = {"AWS_ACCESS_KEY_ID": "an id", "AWS_SECRET_ACCESS_KEY": "a-very-secret-key", "AWS_REGION": "us-east-1"}
 

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from storage.blobs import objects
-from storage.blobs.opening import normal_address, open_store
-from storage.blobs.store import BlobStore, copy_blobs, fetched, name_of
+from storage.blobs import stores
+from storage.blobs.stores import BlobStore, copy_blobs, fetched, name_of, normal_address, open_store
 from storage.engine.errors import DamagedData, MissingBlob, RawStoreUnavailable
 
 DATA = bytes(range(256)) * 3000
@@ -101,8 +100,8 @@ def test_a_full_or_read_only_folder_says_so_and_keeps_nothing_half(in_folder: st
     store.set_mark("ours")
     script = (
         "import resource, signal, sys\n"
-        "from storage.blobs.opening import open_store\n"
-        "from storage.blobs.store import name_of\n"
+        "from storage.blobs.stores import open_store\n"
+        "from storage.blobs.stores import name_of\n"
         "from storage.engine.errors import RawStoreUnavailable\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
@@ -133,7 +132,7 @@ def test_a_server_that_is_away_is_told_in_a_line_without_secrets(
 
 
 def test_without_the_client_a_bucket_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(objects, "find_spec", lambda _: None)
+    monkeypatch.setattr(stores, "find_spec", lambda _: None)
     open_store.cache_clear()
     with pytest.raises(RawStoreUnavailable, match=r"install clutchlife\[objects\]"):
         open_store("s3://bucket/prefix")

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from storage.encoding.codec import encode
-from storage.encoding.decimals import decode_decimals, encode_decimals
+from storage.encoding.codec import decode_decimals, encode, encode_decimals
 from storage.engine.errors import DamagedData
 from tests.storage.encoding.floats import same_bits
 

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from service.app import create_app
 from service.cli.main import app
 from service.settings import Settings
-from storage.engine.sqlite.service_lock import service_lock
+from storage.engine.sqlite.connect import service_lock
 from tests.storage.samples import OLD, integrity, old_database, revision
 from tests.support import stationary
 

@@ -16,8 +16,7 @@ from service.app import create_app
 from service.cli.main import app
 from service.settings import Settings
 from service.web import readiness
-from storage.blobs.opening import DATABASE, open_store
-from storage.blobs.store import BlobStore
+from storage.blobs.stores import DATABASE, BlobStore, open_store
 from tests.support import stationary
 
 SAMPLES = 20_000

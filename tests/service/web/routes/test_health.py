@@ -111,7 +111,7 @@ def test_a_disk_that_hangs_is_not_ready_in_time(client: TestClient, monkeypatch:
     hangs = threading.Event()
     monkeypatch.setattr(readiness, "LONGEST_LOOK_SECONDS", 0.2)
     usage = shutil.disk_usage
-    monkeypatch.setattr("storage.engine.sqlite.health.shutil.disk_usage", lambda path: hangs.wait(30) and usage(path))
+    monkeypatch.setattr("storage.engine.sqlite.database.shutil.disk_usage", lambda path: hangs.wait(30) and usage(path))
     for _ in range(2):
         answer = client.get("/readyz")
         assert answer.status_code == 503

@@ -9,12 +9,10 @@ import pytest
 from sqlalchemy import make_url, text
 
 from storage import clutches
-from storage.engine.database import Database
+from storage.engine.database import Database, Question, SharedAnswer
 from storage.engine.errors import ServiceRuns, StorageUnavailable
 from storage.engine.opening import open_database
-from storage.engine.postgresql.locks import SERVICE_KEY, migration_lock
-from storage.engine.shared_answers import SharedAnswer
-from storage.engine.watch import Question
+from storage.engine.postgresql.connect import SERVICE_KEY, migration_lock
 from tests.storage.engine.postgresql.server import postgresql_server
 from tests.storage.samples import clutch_row
 

@@ -7,9 +7,8 @@ import pytest
 from sqlalchemy import text
 
 from storage import clutches
-from storage.engine.database import Database
+from storage.engine.database import Database, SharedAnswer, SharedAnswers
 from storage.engine.opening import open_database
-from storage.engine.shared_answers import SharedAnswer, SharedAnswers
 from tests.storage.samples import clutch_row
 
 FIRST = SharedAnswer(clutch_id="c1", name="degradation", release="1.0", revision=3, body=b"\x00first")

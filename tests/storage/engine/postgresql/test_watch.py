@@ -9,11 +9,10 @@ import pytest
 from sqlalchemy import create_engine
 
 from storage import clutches
-from storage.engine.database import Database
+from storage.engine.database import Database, Glance, Question
 from storage.engine.errors import StorageUnavailable
-from storage.engine.postgresql.single_statements import SingleStatements
-from storage.engine.postgresql.watch import ServerWatch
-from storage.engine.watch import Glance, Question
+from storage.engine.postgresql.connect import SingleStatements
+from storage.engine.postgresql.database import ServerWatch
 from tests.storage.samples import clutch_row
 
 

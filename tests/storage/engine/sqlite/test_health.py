@@ -29,10 +29,10 @@ def test_ready_while_the_file_is_there_and_open(database: Database) -> None:
 
 def test_not_ready_on_a_full_disk(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "storage.engine.sqlite.health.shutil.disk_usage", lambda _: SimpleNamespace(free=LEAST_FREE - 1)
+        "storage.engine.sqlite.database.shutil.disk_usage", lambda _: SimpleNamespace(free=LEAST_FREE - 1)
     )
     assert database.faults(least_free=LEAST_FREE)
-    monkeypatch.setattr("storage.engine.sqlite.health.shutil.disk_usage", lambda _: SimpleNamespace(free=LEAST_FREE))
+    monkeypatch.setattr("storage.engine.sqlite.database.shutil.disk_usage", lambda _: SimpleNamespace(free=LEAST_FREE))
     assert not database.faults(least_free=LEAST_FREE)
 
 
@@ -47,7 +47,7 @@ def test_not_ready_where_nothing_can_be_written(
         for unwritable in (database.path, database.path.parent):
             with monkeypatch.context() as patch:
                 patch.setattr(
-                    "storage.engine.sqlite.health.os.access",
+                    "storage.engine.sqlite.database.os.access",
                     lambda path, how, no=unwritable: path != no and access(path, how),
                 )
                 assert database.faults(least_free=LEAST_FREE) == {

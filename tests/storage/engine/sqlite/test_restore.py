@@ -10,9 +10,9 @@ import pytest
 from storage import clutches, runs
 from storage.engine.errors import DatabaseBusy, ServiceRuns, StorageUnavailable
 from storage.engine.opening import open_database
+from storage.engine.sqlite.backup import restore
+from storage.engine.sqlite.connect import service_lock
 from storage.engine.sqlite.database import back_up
-from storage.engine.sqlite.restore import restore
-from storage.engine.sqlite.service_lock import service_lock
 from tests.storage.samples import OLD, clutch_row, integrity, old_database, revision, store_run
 
 CLUTCH = "bench3-017"

@@ -9,13 +9,13 @@ import pytest
 
 from storage.engine.errors import ServiceRuns, StorageUnavailable
 from storage.engine.opening import open_database
-from storage.engine.sqlite.service_lock import service_lock
+from storage.engine.sqlite.connect import service_lock
 from tests.storage.samples import OLD, child, integrity, old_database, revision
 
 HOLDER = """
 import sys, time
 from pathlib import Path
-from storage.engine.sqlite.service_lock import service_lock
+from storage.engine.sqlite.connect import service_lock
 with service_lock(Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(600)

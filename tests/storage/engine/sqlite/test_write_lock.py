@@ -16,7 +16,7 @@ from storage import clutches
 from storage.engine.database import Database
 from storage.engine.errors import DatabaseBusy, StorageUnavailable
 from storage.engine.opening import open_database
-from storage.engine.sqlite.write_lock import WriteLock
+from storage.engine.sqlite.connect import WriteLock
 from tests.storage.samples import clutch_row
 
 IN_TIME = 60.0

@@ -1,0 +1,366 @@
+"""A store of blobs: what every kind does, a folder, a bucket that speaks S3, and the one that an address names.
+
+A folder holds FOLDER/ab/cd/abcd..., readable for its owner alone. A file is written under another name, synced and then
+renamed, so that a crash or a power cut leaves it whole or not at all. In a bucket a request that is answered has stored the
+whole object or nothing; S3 is consistent when it is read after that
+(https://docs.aws.amazon.com/AmazonS3/latest/userguide/Welcome.html#ConsistencyModel); credentials, region and endpoint are
+those of the environment (AWS_*). Both hold a mark: a store that is not there is not taken for an empty one, nor written to.
+"""
+
+import hashlib
+import logging
+import os
+import re
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from datetime import timedelta
+from functools import lru_cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Protocol, TypeVar
+
+from storage.engine.errors import DamagedData, MissingBlob, RawStoreUnavailable
+
+#: What a store holds beside blobs: the mark of the one database that it belongs to.
+MARK = "clutchlife-store"
+
+
+class BlobStore(Protocol):
+    """A store; threads share it. All methods raise RawStoreUnavailable where it is away, full, or has no mark."""
+
+    @property
+    def address(self) -> str:
+        """Where it is, without anything secret."""
+
+    def put(self, name: str, data: bytes | bytearray) -> None:
+        """Store bytes under a name; they are there, whole, when this returns, and at no time in part.
+
+        Again under the same name: they are written again, which mends what was damaged and makes them new to `names`.
+        """
+
+    def get(self, name: str) -> bytes:
+        """The bytes as they are stored. Raises MissingBlob where the store has none of that name."""
+
+    def exists(self, name: str) -> bool:
+        """Whether there is one of that name."""
+
+    def names(self) -> Iterator[tuple[str, float]]:
+        """Each name with the time of its last `put` [s since 1970], also of what an interrupted one has left."""
+
+    def delete(self, name: str) -> None:
+        """Remove one; nothing happens where there is none."""
+
+    def mark(self) -> str | None:
+        """What `set_mark` wrote, None in a place that no database has used yet."""
+
+    def set_mark(self, mark: str) -> None:
+        """Make the place a store that belongs to the database of that mark."""
+
+
+def name_of(data: bytes | bytearray) -> str:
+    """The name of a blob: the SHA-256 of its bytes, in hexadecimal digits."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def fetched(store: BlobStore, name: str) -> bytes:
+    """The blob of that name, held against it. Raises DamagedData where it is missing or another."""
+    data = store.get(name)
+    sha256 = name_of(data)
+    if sha256 != name:
+        raise DamagedData(f"the blob {name} in {store.address} is damaged: its sha256 is {sha256}")
+    return data
+
+
+def copy_blobs(source: BlobStore, target: BlobStore, names: Iterable[str]) -> int:
+    """Copy blobs that the target lacks, each held against its name; how many were copied. May be interrupted and repeated.
+
+    Raises DamagedData where one is missing or damaged in the source.
+    """
+    copied = 0
+    for name in names:
+        if not target.exists(name):
+            target.put(name, fetched(source, name))
+            copied += 1
+    return copied
+
+
+_FOLDER_MODE = 0o700
+#: Where files are until they are whole; what is left there was interrupted.
+_PARTIAL = "partial"
+
+
+class FolderStore:
+    """A folder. Made by `opening`."""
+
+    def __init__(self, root: Path) -> None:
+        self._root = root
+
+    @property
+    def address(self) -> str:
+        """Where it is."""
+        return f"folder://{self._root}"
+
+    def put(self, name: str, data: bytes | bytearray) -> None:
+        """Write a file whole, in place of one of that name."""
+        with self._usable():
+            self._require_mark()
+            self._write(self._path(name), data)
+
+    def get(self, name: str) -> bytes:
+        """The bytes of a file."""
+        with self._usable():
+            try:
+                return self._path(name).read_bytes()
+            except FileNotFoundError:
+                self._require_mark()
+                raise MissingBlob(f"there is no blob {name} in {self.address}") from None
+
+    def exists(self, name: str) -> bool:
+        """Whether there is such a file."""
+        with self._usable():
+            self._require_mark()
+            return self._path(name).is_file()
+
+    def names(self) -> Iterator[tuple[str, float]]:
+        """All files but the mark, by the time of their last change."""
+        with self._usable():
+            self._require_mark()
+            for path in self._root.glob("*/*/*"):
+                yield path.name, path.stat().st_mtime
+            for path in (self._root / _PARTIAL).glob("*"):
+                yield f"{_PARTIAL}/{path.name}", path.stat().st_mtime
+
+    def delete(self, name: str) -> None:
+        """Remove a file."""
+        with self._usable():
+            self._require_mark()
+            self._path(name).unlink(missing_ok=True)
+
+    def mark(self) -> str | None:
+        """The content of the mark's file."""
+        with self._usable():
+            path = self._root / MARK
+            return path.read_text(encoding="utf-8") if path.is_file() else None
+
+    def set_mark(self, mark: str) -> None:
+        """Make the folder, where it is not there, and the mark in it."""
+        with self._usable():
+            self._root.mkdir(mode=_FOLDER_MODE, parents=True, exist_ok=True)
+            self._write(self._root / MARK, mark.encode())
+
+    def _path(self, name: str) -> Path:
+        if name.startswith(f"{_PARTIAL}/"):
+            return self._root / name
+        return self._root / name[:2] / name[2:4] / name
+
+    def _write(self, path: Path, data: bytes | bytearray) -> None:
+        partial = self._root / _PARTIAL
+        for folder in (partial, path.parent.parent, path.parent):
+            if folder.is_relative_to(self._root):
+                _make(folder)
+        descriptor, temporary = tempfile.mkstemp(dir=partial)  # its owner's alone
+        try:
+            with os.fdopen(descriptor, "wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(descriptor)
+            Path(temporary).replace(path)
+        except BaseException:
+            Path(temporary).unlink(missing_ok=True)
+            raise
+        _sync(path.parent)
+
+    def _require_mark(self) -> None:
+        if not (self._root / MARK).is_file():
+            raise RawStoreUnavailable(
+                f"{self.address} is no store of raw records, or its disk is not mounted: it has no file {MARK}"
+            )
+
+    @contextmanager
+    def _usable(self) -> Iterator[None]:
+        """The system's errors as the store's own."""
+        try:
+            yield
+        except OSError as error:
+            raise RawStoreUnavailable(
+                f"{self.address} cannot be used: {error.strerror or type(error).__name__}"
+            ) from error
+
+
+def _make(folder: Path) -> None:
+    """Make a folder, so that a power cut does not take it away with what is in it."""
+    try:
+        folder.mkdir(mode=_FOLDER_MODE)
+    except FileExistsError:
+        return
+    _sync(folder.parent)
+
+
+def _sync(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+#: Seconds until a connection stands, and until a request is answered (1 GiB at 10 MB/s); how often and how long [s] one that
+#: failed is repeated, so that a post is answered within some ten seconds. Chosen; no table.
+_CONNECT_SECONDS, _REQUEST_SECONDS = 3, 110
+_RETRIES, _RETRY_SECONDS = 2, 6
+_EXTRA = "objects"
+
+_log = logging.getLogger("clutchlife")
+_Answer = TypeVar("_Answer")
+
+
+class ObjectStore:
+    """A bucket, or what begins with a prefix in it. Made by `opening`; RawStoreUnavailable where no client is installed."""
+
+    def __init__(self, bucket: str, prefix: str) -> None:
+        if find_spec("obstore") is None:
+            raise RawStoreUnavailable(
+                f"raw records in s3://{bucket} need a client that is not installed: install clutchlife[{_EXTRA}]"
+            )
+        from obstore.store import S3Store  # start-up time, optional package
+
+        self._name = f"s3://{bucket}/{prefix}".rstrip("/")
+        plain = os.environ.get("AWS_ENDPOINT_URL_S3", os.environ.get("AWS_ENDPOINT_URL", "")).startswith("http://")
+        self._store = S3Store(
+            bucket,
+            prefix=prefix or None,
+            client_options={
+                "allow_http": plain,
+                "connect_timeout": f"{_CONNECT_SECONDS}s",
+                "timeout": f"{_REQUEST_SECONDS}s",
+            },
+            retry_config={"max_retries": _RETRIES, "retry_timeout": timedelta(seconds=_RETRY_SECONDS)},
+        )
+
+    @property
+    def address(self) -> str:
+        """Where it is."""
+        return self._name
+
+    def put(self, name: str, data: bytes | bytearray) -> None:
+        """Put an object, in place of one of that name, in one request."""
+        import obstore  # start-up time, optional package
+
+        self._request(lambda: obstore.put(self._store, name, bytes(data), use_multipart=False))
+
+    def get(self, name: str) -> bytes:
+        """The bytes of an object."""
+        data = self._bytes_of(name)
+        if data is None:
+            self._require_mark()
+            raise MissingBlob(f"there is no blob {name} in {self.address}")
+        return data
+
+    def exists(self, name: str) -> bool:
+        """Whether there is such an object."""
+        import obstore  # start-up time, optional package
+
+        try:
+            self._request(lambda: obstore.head(self._store, name), absent=True)
+        except FileNotFoundError:
+            self._require_mark()
+            return False
+        return True
+
+    def names(self) -> Iterator[tuple[str, float]]:
+        """All objects but the mark, by the time of their last change."""
+        import obstore  # start-up time, optional package
+
+        pages = iter(obstore.list(self._store))
+        while (page := self._request(lambda: next(pages, None))) is not None:
+            for item in page:
+                if item["path"] != MARK:
+                    yield item["path"], item["last_modified"].timestamp()
+
+    def delete(self, name: str) -> None:
+        """Remove an object."""
+        import obstore  # start-up time, optional package
+
+        self._request(lambda: obstore.delete(self._store, name))
+
+    def mark(self) -> str | None:
+        """The content of the mark's object."""
+        data = self._bytes_of(MARK)
+        return None if data is None else data.decode()
+
+    def set_mark(self, mark: str) -> None:
+        """Put the mark's object; the bucket must be there."""
+        self.put(MARK, mark.encode())
+
+    def _bytes_of(self, name: str) -> bytes | None:
+        import obstore  # start-up time, optional package
+
+        try:
+            return bytes(self._request(lambda: obstore.get(self._store, name).bytes(), absent=True))
+        except FileNotFoundError:
+            return None
+
+    def _require_mark(self) -> None:
+        if self._bytes_of(MARK) is None:
+            raise RawStoreUnavailable(
+                f"{self.address} is no store of raw records, or there is no such bucket: it has no object {MARK}"
+            )
+
+    def _request(self, request: Callable[[], _Answer], *, absent: bool = False) -> _Answer:
+        """What the request gives; the client's errors as the store's own, but for what is `absent` where that is expected.
+
+        What the client says may be long: the log has it, the error one line.
+        """
+        from obstore.exceptions import (  # start-up time, optional package
+            BaseError,
+            PermissionDeniedError,
+            UnauthenticatedError,
+        )
+
+        try:
+            return request()
+        except FileNotFoundError as error:
+            if absent:
+                raise
+            raise RawStoreUnavailable(f"{self.address} cannot be used: there is no such bucket") from error
+        except (PermissionDeniedError, UnauthenticatedError) as error:
+            raise RawStoreUnavailable(f"{self.address} cannot be used: it refuses these credentials") from error
+        except (BaseError, OSError) as error:
+            _log.warning("%s: %s", self.address, " ".join(str(error).split())[:1000])
+            raise RawStoreUnavailable(f"{self.address} cannot be used: it does not answer as a store does") from error
+
+
+#: The address that names no store: raw records are in the database.
+DATABASE = "database"
+
+_FOLDER = re.compile(r"folder://(/.+)")
+_BUCKET = re.compile(r"s3://([a-z0-9][a-z0-9.-]{1,61}[a-z0-9])(?:/([A-Za-z0-9._/-]*))?")
+#: Stores that a process keeps open; one is in use, and another while records move.
+_MOST_OPEN = 8
+
+
+def normal_address(address: str) -> str:
+    """The one way in which an address is written. Raises ValueError, without the address, which may hold a secret."""
+    if address == DATABASE:
+        return address
+    folder, bucket = _FOLDER.fullmatch(address), _BUCKET.fullmatch(address)
+    if folder:
+        return f"folder://{Path(folder[1])}"
+    if bucket:
+        return f"s3://{bucket[1]}/{(bucket[2] or '').strip('/')}".rstrip("/")
+    raise ValueError(
+        "raw records are kept in `database`, `folder:///absolute/path` or `s3://bucket/prefix` (credentials and endpoint "
+        "are taken from AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and AWS_ENDPOINT_URL): the address is none of them"
+    )
+
+
+@lru_cache(_MOST_OPEN)
+def open_store(address: str) -> BlobStore:
+    """The store at an address. Raises ValueError as `normal_address`, RawStoreUnavailable where its client is missing."""
+    address = normal_address(address)
+    if folder := _FOLDER.fullmatch(address):
+        return FolderStore(Path(folder[1]))
+    if bucket := _BUCKET.fullmatch(address):
+        return ObjectStore(bucket[1], (bucket[2] or "").strip("/"))
+    raise ValueError("the database itself is no store of blobs")
