@@ -13,26 +13,20 @@ from fastapi_offline import FastAPIOffline
 from service.alarms.outbox import Outbox
 from service.dashboard import assets, site
 from service.dashboard import pages as dashboard
-from service.jobs import kinds
-from service.jobs.kinds import Kind
-from service.jobs.queue import JobQueue
-from service.jobs.workers import CHANGE_SECONDS, Lane, Workers, in_processes, in_threads
 from service.queries.cache import AnswerCache
 from service.settings import CODE_VERSION, Settings
 from service.web import openapi, problems
-from service.web.answers import Encodings, now
+from service.web.answers import now
 from service.web.context import Context
 from service.web.files import emptied_folder
 from service.web.limits import MOST_CACHED_BYTES, MOST_REVALIDATED_BYTES
 from service.web.metrics import Metrics
-from service.web.middleware import BodyLimit, Edge, Heads, Polls, Shares
+from service.web.middleware import BodyLimit, Edge, Encodings, Heads, Polls, RootPath, Shares
 from service.web.readiness import Needs, Readiness
 from service.web.revalidation import Revalidation
-from service.web.root_path import RootPath
 from service.web.routes import (
     alarms,
     clutches,
-    description,
     diagnoses,
     exports,
     files,
@@ -44,6 +38,8 @@ from service.web.routes import (
     rigs,
     runs,
 )
+from service.work.queue import JobQueue, Kind, diagnosis_work, workflow_work
+from service.work.workers import CHANGE_SECONDS, Lane, Workers, in_processes, in_threads
 from service.workflows import adopt_model, ask_job, raw_records, run_diagnosis
 from storage.engine.database import Database
 from storage.engine.opening import open_database, service_lock
@@ -76,10 +72,10 @@ def _kinds(database: Database, workers: Workers) -> Sequence[Mapping[str, Kind]]
         ask_job.finish(database, job, ended, at=now())
 
     return (
-        {DIAGNOSIS: Kind(kinds.diagnosis, finish_diagnosis)},
+        {DIAGNOSIS: Kind(diagnosis_work, finish_diagnosis)},
         {
-            REPLAY: Kind(kinds.workflow("service.workflows.replay:as_job"), finish),
-            FLEET_REFRESH: Kind(kinds.workflow("service.workflows.learn_fleet:as_job"), finish),
+            REPLAY: Kind(workflow_work("service.workflows.replay:as_job"), finish),
+            FLEET_REFRESH: Kind(workflow_work("service.workflows.learn_fleet:as_job"), finish),
         },
     )
 
@@ -148,7 +144,13 @@ def create_app(settings: Settings) -> FastAPI:
     problems.install(app)
     for part in (health, clutches, files, runs, inspections, life, diagnoses, jobs, fleet, rigs, alarms):
         app.include_router(part.router)
-    for beside in (clutches.fleet_router, exports.router, exports.fleet_router, description.router, rigs.import_router):
+    for beside in (
+        clutches.fleet_router,
+        exports.router,
+        exports.fleet_router,
+        health.description_router,
+        rigs.import_router,
+    ):
         app.include_router(beside)
     app.include_router(alarms.webhook_router)
     app.include_router(dashboard.router(assets.load()))

@@ -1,30 +1,32 @@
-"""Rows <-> values: a clutch's state loaded in one sweep, results stored in another.
+"""Rows <-> values: a clutch's state loaded in one sweep, results stored in another; verdicts and inspections as they go out.
 
 A workflow reads a `ClutchState`, computes outside any transaction, and stores with `unchanged` and `store`.
 """
+
+from __future__ import annotations
 
 import json
 import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from sqlalchemy import Connection
 
 from models.degradation.severity import Severity
-from models.diagnosis.extension import Extension
 from models.friction.criteria import ACCEPTABLE_MSE
 from models.friction.identification import FitStatus, StribeckFit
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
 from models.prognosis.ended_lives import EndedLife
 from models.prognosis.fleet import FleetPrior
 from service.alarms import raising
-from service.columns import whole
+from service.columns import content_of, instant, whole
 from service.errors import BusyError, NotFoundError
 from service.lives.assumptions import ALL_PRESSURES, FLEET, LearnedPrior, kind_of, severity_name, severity_under
-from service.lives.condition import rank_of, state_of
+from service.lives.condition import DISAGREES, rank_of, state_of, top_line
 from service.lives.history import ByPressure, Event, Shown, duty_block, moment_of, of_maintenance, order
+from service.lives.model_correction import extension_of
 from service.lives.payloads import notice_items
 from service.lives.plausibility.doubts import Judged
 from service.lives.recomputation import Adoption, ClutchState, Levels, Results, Tracking, newest_adoption
@@ -34,13 +36,18 @@ from service.logging import request_id
 from service.schemas.clutch import ClutchIn
 from service.schemas.rig import RigOut
 from service.settings import CODE_VERSION
-from storage import assumptions, changes, clutches, diagnoses, jobs, results, rigs, runs
+from storage import assumptions, changes, clutches, diagnoses, inspections, jobs, results, rigs, runs
 from storage.changes import NewChange
 from storage.clutches import ClutchRow
+from storage.diagnoses import VerdictRow
+from storage.inspections import InspectionRow, PhotographRow
 from storage.jobs import NewJob
 from storage.results import FilterStateRow, FitRow, PredictionRow
 from storage.rigs import RigRow
 from storage.runs import NewRun, RunInOrder
+
+if TYPE_CHECKING:
+    from models.diagnosis.extension import Extension
 
 #: How often what depends on a clutch's history is computed where others change it meanwhile. Derived: beside three services
 #: that change it all the time, each as often as this one, one in a hundred gives up (0.75^16).
@@ -128,7 +135,7 @@ def _adoptions(connection: Connection, clutch_id: str) -> tuple[Adoption | None,
         if diagnosed is None or diagnosed.extension is None:
             return (*adopted.values(), None)
         if diagnosed.life not in adopted:
-            extension = Extension.from_dict(diagnosed.extension)
+            extension = extension_of(diagnosed.extension)
             adopted[diagnosed.life] = Adoption(
                 diagnosis_id=diagnosed.diagnosis_id, life=diagnosed.life, extension=extension
             )
@@ -409,3 +416,90 @@ def _level_fit(row: FitRow) -> LevelFit:
         acceptable=row.mse_percent is not None and row.mse_percent < ACCEPTABLE_MSE,
     )
     return LevelFit(mean_pressure=row.mean_pressure, speeds=row.speeds, fit=fit)
+
+
+def latest_diagnosis(connection: Connection, row: ClutchRow, verdict: VerdictRow | None) -> dict[str, Any] | None:
+    """The newest finished diagnosis as it goes out; one of a life that a rebuild has ended is past."""
+    if verdict is None:
+        return None
+    earlier = verdict.life != _present_life(connection, row)
+    return {
+        "diagnosis_id": verdict.diagnosis_id,
+        "verdict": verdict.verdict,
+        "causes": list(verdict.causes),
+        "advice": {name: verdict.advice[0][name] for name in ("test", "separates")} if verdict.advice else None,
+        "adoptable": verdict.adoptable and not earlier,
+        "adopted": verdict.adopted and not earlier,
+        "earlier_life": earlier,
+    }
+
+
+def condition(connection: Connection, row: ClutchRow) -> dict[str, str]:
+    """The clutch's state and why."""
+    return state_of(row.summary, disputed=_disputed(connection, row), silent=row.silent)
+
+
+def first_line(connection: Connection, row: ClutchRow, diagnosis: dict[str, Any] | None) -> dict[str, str]:
+    """What stands first of the clutch: `headline` and `action`; `diagnosis` is its newest one as it goes out."""
+    return top_line(row.summary, disputed=_disputed(connection, row), diagnosis=diagnosis, silent=row.silent)
+
+
+def _disputed(connection: Connection, row: ClutchRow) -> bool:
+    return row.disputed is not None and row.disputed == _present_life(connection, row)
+
+
+def note_dispute(connection: Connection, clutch_id: str) -> None:
+    """Note whether data and model are in dispute, and the state that follows: where a diagnosis has been finished, a model
+    adopted or the baseline restored. A dispute stays noted of its life, and counts while that is the present one."""
+    verdict = diagnoses.newest(connection, [clutch_id]).get(clutch_id)
+    disputed = None if verdict is None or verdict.adopted or verdict.verdict not in DISAGREES else verdict.life
+    row = replace(clutch(connection, clutch_id), disputed=disputed)
+    clutches.set_disputed(connection, clutch_id, disputed, state=condition(connection, row)["name"])
+    raising.evaluate(connection, clutch_id)
+
+
+def _present_life(connection: Connection, row: ClutchRow) -> str:
+    life: str | None = row.summary.get("life")  # what was stored by earlier releases does not hold it
+    return present_life(connection, row.clutch_id) if life is None else life
+
+
+def inspection(connection: Connection, clutch_id: str, inspection_id: str) -> InspectionRow:
+    """The inspection, or NotFoundError."""
+    row = inspections.get(connection, clutch_id, inspection_id)
+    if row is None:
+        raise NotFoundError(f"clutch {clutch_id!r} has no inspection {inspection_id!r}")
+    return row
+
+
+def inspection_hash(content: Mapping[str, Any]) -> str:
+    """The sha256 of what an inspection states."""
+    return content_of({**content, "performed_at": instant(content["performed_at"])})
+
+
+def inspection_answers(connection: Connection, rows: Sequence[InspectionRow]) -> list[dict[str, Any]]:
+    """Inspections as they are answered."""
+    photographs = inspections.photographs(connection, [row.inspection_key for row in rows])
+    return [
+        {"clutch_id": row.clutch_id, "inspection_id": row.inspection_id}
+        | row.content
+        | {
+            "content_sha256": row.content_sha256,
+            "received_at": row.received_at,
+            "received_by": row.received_by,
+            "state": row.state,
+            "duplicate": False,
+            "photographs": [photograph_answer(photograph) for photograph in photographs[row.inspection_key]],
+        }
+        for row in rows
+    ]
+
+
+def photograph_answer(row: PhotographRow) -> dict[str, Any]:
+    """A photograph as it is answered."""
+    return {
+        "photograph_id": row.sha256,
+        "media_type": row.media_type,
+        "bytes": row.bytes,
+        "received_at": row.received_at,
+        "received_by": row.received_by,
+    }

@@ -1,5 +1,6 @@
-"""Stored runs as they were sent, each read in a transaction of its own when it is asked for, and all results of a clutch
-computed anew from them."""
+"""Stored runs as they were sent, each read in a transaction of its own when it is asked for; what was measured of a clutch;
+and all results of a clutch computed again from its runs.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,12 +11,13 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection
 
 from service import records
+from service.columns import whole
 from service.errors import InvalidError, NotFoundError
-from service.lives.engagements.over_life import stored_engagement
+from service.lives.engagements import DUTY_KINDS, StoredEngagement, stored_engagement
 from service.lives.history import ByPressure, Event, order
 from service.lives.incoming_run import IncomingRun
 from service.lives.model_correction import RunReader
-from service.lives.outlook import Evidence, summarised
+from service.lives.outlook import Evidence, engagement_rows, needs_evidence, summarised
 from service.lives.payloads import receipt
 from service.lives.plausibility.doubts import doubts_alone
 from service.lives.recomputation import (
@@ -34,6 +36,35 @@ from storage import channels, results, runs
 from storage.blobs import raw_stores
 from storage.engine.database import Database
 from storage.runs import RunRow
+
+
+def evidence(connection: Connection, clutch_id: str) -> Evidence:
+    """What was measured of a clutch, of held runs too; without a reader of its runs."""
+    return Evidence(
+        levels=records.levels(connection, clutch_id),
+        receipts=records.receipts(connection, clutch_id),
+        engagements=_engagements(connection, clutch_id),
+    )
+
+
+def evidence_for(database: Database, state: ClutchState, reader: RunReader) -> Evidence | None:
+    """What a clutch's summary follows from beside its tracks; None where these are enough."""
+    if not needs_evidence(state):
+        return None
+    with database.reading() as connection:
+        return replace(evidence(connection, state.clutch_id), reader=reader)
+
+
+def engagements(connection: Connection, clutch_id: str) -> list[dict[str, Any]]:
+    """The accepted engagements of a clutch with all indicators, by life and cycles."""
+    stored = _engagements(connection, clutch_id)
+    return engagement_rows(records.events(connection, clutch_id), stored) if stored else []
+
+
+def _engagements(connection: Connection, clutch_id: str) -> dict[str, StoredEngagement]:
+    rows = [row for kind in DUTY_KINDS for row in runs.page(connection, clutch_id, kind=kind)]
+    stored = {row.run_id: stored_engagement(row.receipt | {"cycles": whole(row.cycles)}, row.details) for row in rows}
+    return {run_id: engagement for run_id, engagement in stored.items() if engagement is not None}
 
 
 def run(connection: Connection, clutch_id: str, run_id: str) -> RunRow:

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 
 from models.arrays import FloatArray
 from models.engagements.criteria import (
@@ -150,6 +149,8 @@ class _Contact:
 
 def _contact_of(time: FloatArray, torque: FloatArray, slowing: int) -> _Contact | Refusal:
     """From the rows before the end of slip; the shaft is fast up to row `slowing`."""
+    from scipy.ndimage import uniform_filter1d  # start-up time: what answers cuts no record
+
     smooth = uniform_filter1d(torque, max(3, (time.size - slowing) // 100), mode="nearest")
     highest_row = int(np.argmax(smooth))
     highest = float(smooth[highest_row])

@@ -8,7 +8,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
 from scipy.optimize import minimize_scalar
 
 from models.arrays import FloatArray
@@ -40,6 +39,8 @@ class Standstill:
 
 def standstill_of(time: FloatArray, speed: FloatArray) -> Standstill | Refusal:
     """How a shaft of time [n] s and speed [n] rad/s comes to rest, the first time that it does; or why it does not."""
+    from scipy.ndimage import median_filter  # start-up time: what answers cuts no record
+
     smooth = median_filter(speed, 5, mode="nearest")
     highest = float(smooth.max())
     if highest < LEAST_SPEED:

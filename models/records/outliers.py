@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 from models.arrays import FloatArray
 from models.records.criteria import NEIGHBOURS, OUTLIER, OUTLIER_SHARE
@@ -19,6 +18,8 @@ def inliers(residual: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
 
 def beside(value: FloatArray) -> NDArray[np.bool_]:
     """[n]: value [n] near its neighbours' median."""
+    from scipy.ndimage import median_filter  # start-up time: what answers cuts no record
+
     return near(value - median_filter(value, size=min(NEIGHBOURS, value.size), mode="nearest"), value)
 
 

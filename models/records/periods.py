@@ -16,7 +16,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from models.arrays import FloatArray
 from models.records.criteria import (
@@ -168,6 +167,8 @@ def _with_corners(time: FloatArray, value: FloatArray, cycle: Cycle) -> Cycle:
 
 def _following(time: FloatArray, value: FloatArray, cycle: Cycle) -> slice:
     """Without the ends that do not follow the swing: holds between two pressures, the way to where the next begins."""
+    from scipy.ndimage import median_filter  # start-up time: what answers cuts no record
+
     residual = value - cycle.value(cycle.phase(time))
     usual = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
     smooth = median_filter(residual, size=min(NEIGHBOURS, residual.size), mode="nearest")
@@ -178,6 +179,8 @@ def _following(time: FloatArray, value: FloatArray, cycle: Cycle) -> slice:
 
 def _without_rest(time: FloatArray, value: FloatArray, period: float) -> slice:
     """Without standing still before and after, where that lasts for a swing of this period [s] at most."""
+    from scipy.ndimage import median_filter  # start-up time: what answers cuts no record
+
     smooth = median_filter(value, size=min(3, value.size), mode="nearest")
     swing, noise = float(np.ptp(smooth)), float(np.median(np.abs(value - smooth)))
     least = min(SWING_SHARE * swing + 4 * noise, MOST_SWING_SHARE * swing)
@@ -201,6 +204,8 @@ def _without_rest(time: FloatArray, value: FloatArray, period: float) -> slice:
 
 def _coarse_frequency(time: FloatArray, value: FloatArray) -> float:
     """The periodogram's highest frequency, then the best sine about it: within a twentieth of 1/duration."""
+    from scipy.ndimage import median_filter  # start-up time: what answers cuts no record
+
     duration = float(time[-1] - time[0])
     points = int(min(4096, max(64, time.size)))
     grid = np.linspace(0.0, duration, points)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 from models.arrays import FloatArray
 from models.records.criteria import MEDIAN_DURATION, OFF_LEVEL, OFF_LEVEL_SHARE, RAMP_WIDTHS, SHORTEST_STRETCH, STRAIGHT
@@ -34,6 +33,8 @@ def pressure_stretches(time: FloatArray, pressure: FloatArray) -> Iterator[Press
     pressure still moves towards the level or already away from it is cut off. Ramps between levels give stretches that
     are too short (under 2 s) to count, or straight lines, which do not count either.
     """
+    from scipy.ndimage import median_filter  # start-up time: what answers cuts no record
+
     smooth = median_filter(pressure, size=min(5, pressure.size), mode="nearest")
     block = np.floor((time - time[0]) / max(MEDIAN_DURATION, 5 * sample_interval(time))).astype(np.int64)
     edges = np.concatenate([[0], np.flatnonzero(np.diff(block)) + 1, [time.size]])

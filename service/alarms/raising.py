@@ -20,11 +20,11 @@ from service.alarms.rules import Facts, Finding
 from service.lives.assumptions import ALL_PRESSURES
 from service.lives.condition import SHOWN, state_of
 from service.lives.history import STATIONARY
-from service.lives.plausibility.wording import OFF_COURSE
-from service.lives.prediction_notices import OFF_TRACK
+from service.lives.payloads import OFF_TRACK
+from service.lives.plausibility.doubts import OFF_COURSE
 from service.schemas.alarm import AlarmIn
 from service.schemas.clutch import ClutchIn
-from storage import alarms, clutches, results, runs, verdicts, webhooks
+from storage import alarms, clutches, diagnoses, results, runs, webhooks
 from storage.alarms import AlarmRow, EventRow, NewEvent
 from storage.clutches import ClutchRow
 from storage.encoding.json_text import Json
@@ -202,7 +202,7 @@ def _facts(connection: Connection, row: ClutchRow, record: ClutchIn, at: str) ->
         summary=row.summary,
         state=state_of(row.summary, disputed=_is_disputed(row), silent=row.silent),
         geometry=record.geometry.to_model(),
-        verdict=verdicts.newest(connection, [row.clutch_id]).get(row.clutch_id),
+        verdict=diagnoses.newest(connection, [row.clutch_id]).get(row.clutch_id),
         now=at,
         newest_fits=partial(_newest_fits, connection, row.clutch_id),
         off_course=partial(_off_course, connection, row.clutch_id),

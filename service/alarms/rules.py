@@ -25,8 +25,8 @@ from service.lives.condition import (
 )
 from service.lives.payloads import ENDED, INSUFFICIENT
 from service.schemas.alarm import AlarmIn
+from storage.diagnoses import VerdictRow
 from storage.results import FitRow
-from storage.verdicts import VerdictRow
 
 _SECONDS_PER_HOUR, _SECONDS_PER_DAY = 3600.0, 86400.0
 #: The quantile that is the safe bound.

@@ -71,7 +71,7 @@ def _safe(name: str) -> str:
 
 
 def _results(service: Service, clutch: str, folder: Path) -> None:
-    from service.schemas.prognosis.life import MethodName  # start-up time
+    from service.schemas.life import MethodName  # start-up time
 
     base = f"/v1/clutches/{clutch}"
     for method in get_args(MethodName):

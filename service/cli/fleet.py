@@ -8,7 +8,7 @@ import typer
 from service.cli.options import DATABASE, Database, Scheduler, err, executor, existing, out, read_only
 
 if TYPE_CHECKING:
-    from service.background import AtOnce
+    from service.work.background import AtOnce
     from service.workflows.learn_fleet import Refreshed
 
 app = typer.Typer(help="The priors learned from earlier clutches.")
@@ -36,8 +36,8 @@ def refresh(
     quiet: Annotated[bool, typer.Option("--quiet", help="Print changes only")] = False,
 ) -> None:
     """Learn every kind's prior anew, and update the predictions of clutches whose prior has changed."""
-    from service.background import in_background  # start-up time
-    from service.executors.progress import progress  # start-up time
+    from service.work.background import in_background  # start-up time
+    from service.work.progress import progress  # start-up time
 
     def learn(at_once: "AtOnce") -> "tuple[Refreshed, list[dict[str, Any]]]":
         from service.queries.fleet_priors import newest  # start-up time, in the background

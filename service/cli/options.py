@@ -14,7 +14,7 @@ from service.errors import NotFoundError
 from storage.engine.errors import StorageError
 
 if TYPE_CHECKING:
-    from service.executors.executor import Executor
+    from service.work.executor import Executor
     from storage.engine.database import Database as Opened
 
 #: Exit codes of sysexits.h: the input is wrong, the service is away (try again later), the call is wrong.
@@ -82,8 +82,8 @@ def read_only(url: str) -> Iterator["Opened"]:
 @contextmanager
 def executor(scheduler: str) -> Iterator["Executor"]:
     """The executor of an option, closed at the end; that it cannot be used ends the command with a line."""
-    from service.executors.choice import executor_of  # start-up time: few commands compute
-    from service.executors.executor import ExecutorUnavailableError  # start-up time: few commands compute
+    from service.work.cluster import executor_of  # start-up time: few commands compute
+    from service.work.executor import ExecutorUnavailableError  # start-up time: few commands compute
 
     with errors_in_a_line():
         try:

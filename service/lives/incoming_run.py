@@ -10,9 +10,8 @@ from models.arrays import FloatArray
 from models.records.criteria import UNLOADED
 from models.records.pressure_levels import levels_of
 from models.records.runs import Plateaus, Record
-from service.columns import CHANNELS, PLATE_TEMPERATURES
+from service.columns import CHANNELS, PLATE_TEMPERATURES, content_with_columns, instant
 from service.errors import FieldError, InvalidError
-from service.identity import content_with_columns, instant
 from service.lives.criteria import LEAST_TORQUE_SD, MOST_LEVELS
 
 

@@ -8,17 +8,19 @@ Of a sampled record before it only the moment and one point stand in, for to cut
 more than the run. The fits and receipts of the baseline stay as they are.
 """
 
+from __future__ import annotations
+
 import logging
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.diagnosis.campaign import Campaign, StationaryRun
-from models.diagnosis.extension import Extension, NotFiniteError
 from models.prognosis.criteria import HORIZON
 from models.records.runs import Plateaus, loaded
 from service.lives.assumptions import ALL_PRESSURES, Course, ModelInForce
@@ -28,6 +30,9 @@ from service.lives.history import STATIONARY, Corrected, Event, Life, reference_
 from service.lives.incoming_run import IncomingRun
 from service.lives.run_analysis import levels_of, mean_cofs
 from service.schemas.clutch import ClutchIn
+
+if TYPE_CHECKING:
+    from models.diagnosis.extension import Extension
 
 _log = logging.getLogger("clutchlife")
 
@@ -73,6 +78,13 @@ class RunReader:
 def _placed(run: IncomingRun, event: Event) -> IncomingRun:
     """A run at the cycles at which the history has it."""
     return replace(run, cycles=event.cycles)
+
+
+def extension_of(content: Mapping[str, Any]) -> Extension:
+    """A stored extension."""
+    from models.diagnosis.extension import Extension  # start-up time: it loads the whole diagnosis
+
+    return Extension.from_dict(content)
 
 
 def corrected_cofs(
@@ -157,6 +169,8 @@ def course_of(extension: Extension, life: Life, geometry: Geometry) -> Course | 
     """
     if life.speed_range is None or not life.reference or not extension.has_course:
         return None
+    from models.diagnosis.extension import NotFiniteError  # start-up time: it loads the whole diagnosis
+
     # every fifth of the protocol's speeds: their mean is that of all of them to half a per cent of the course
     velocities = reference_velocities(life.speed_range, geometry)[2::5]
     reference = np.array(sorted(life.reference))

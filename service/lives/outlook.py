@@ -10,18 +10,15 @@ from typing import Any
 from models.diagnosis.campaign import StationaryRun
 from service.errors import NotFoundError
 from service.lives.condition import SHOWN, SUMMARY, recent
-from service.lives.engagements.over_life import StoredEngagement, engagements_over_life
+from service.lives.engagements import StoredEngagement, engagements_over_life
 from service.lives.history import Event, Life, lives_of, moment_at, order, pace_of
 from service.lives.model_correction import RunReader
 from service.lives.payloads import ended
-from service.lives.prediction_at import predict_at
-from service.lives.quantities.answer import criteria_answer
-from service.lives.quantities.chosen_life import ChosenLife, chosen_life
-from service.lives.quantities.ends import CriterionEnd, criterion_end
-from service.lives.quantities.measured import MeasuredLife
+from service.lives.quantities.ends import CriterionEnd, criteria_answer, criterion_end
+from service.lives.quantities.measured import ChosenLife, MeasuredLife, chosen_life
 from service.lives.recomputation import ClutchState, Levels, Receipt, Tracking, with_cofs
-from service.lives.tracks import CARRIED, States
-from service.schemas.prognosis.criteria import CriterionIn
+from service.lives.tracks import CARRIED, States, predict_at
+from service.schemas.life import CriterionIn
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,37 +1,45 @@
 """A clutch's state as one value, and everything that is computed of it anew; nothing here reads or writes a database.
 
 A workflow loads a `ClutchState`, computes `Results` with the functions below, and stores them in one short transaction that
-checks that the state's revision is still the newest.
+checks that the state's revision is still the newest. An `Arrival` is a run as it comes in, among the stored ones.
 """
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from models.clutch import Geometry
 from models.degradation.severity import Severity
 from models.diagnosis.campaign import StationaryRun
-from models.diagnosis.extension import Extension
+from service.errors import Notice
 from service.lives.assumptions import Assumptions, LearnedPrior, ModelInForce, severity_under
 from service.lives.condition import SHOWN
+from service.lives.diagnosis.campaign import tested
 from service.lives.history import (
+    STATIONARY,
     ByPressure,
     Corrected,
     Event,
     Life,
     Series,
+    Shown,
     life_with,
     lives_of,
     order,
     reference_velocities,
     stationary_tests_of,
 )
+from service.lives.incoming_run import IncomingRun
 from service.lives.model_correction import RunReader, corrected_cofs, model_in_force
-from service.lives.payloads import fit_items, loop_items, warned_anew
-from service.lives.prediction_notices import OF_HISTORY, OFF_TRACK
-from service.lives.run_analysis import LevelFit, loops_of, mean_cofs
+from service.lives.payloads import OF_HISTORY, OFF_TRACK, fit_items, loop_items, warned_anew
+from service.lives.run_analysis import Analysis, LevelFit, loops_of, mean_cofs
 from service.lives.tracks import CARRIED, Prediction, States, follow
 from service.schemas.clutch import ClutchIn
+
+if TYPE_CHECKING:
+    from models.diagnosis.extension import Extension
 
 #: The levels of stationary tests by run_id.
 Levels = Mapping[str, Sequence[LevelFit]]
@@ -307,3 +315,51 @@ def loops_anew(
                 loops_of(reader.read(run_id).channels, state.geometry, state.record.torque_filter, own)
             )
     return loops
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arrival:
+    """A run by itself: as it came in, whether it is a sampled record, its own results, what its rows show of friction and
+    what is odd about them, and when it was received."""
+
+    run: IncomingRun
+    sampled: bool
+    analysis: Analysis
+    shown: Shown | None
+    odd: tuple[Notice, ...]
+    received_at: str
+
+    @property
+    def kept(self) -> dict[str, Any]:
+        """What is kept beside the run's channels."""
+        return self.analysis.kept_beside(self.run) | ({} if self.shown is None else {"shown": self.shown.to_list()})
+
+
+def test_of(arrival: Arrival, life: Life) -> StationaryRun | None:
+    """The run as a stationary test of a life, by the plateaus that were cut already."""
+    plateaus = arrival.analysis.plateaus
+    if plateaus is None:
+        return None
+    return tested(arrival.run, plateaus, arrival.analysis.times, origin=life.origin)
+
+
+def tests_with(reader: RunReader, life: Life, arrival: Arrival) -> Iterator[StationaryRun]:
+    """The stationary tests of a life in order, the run that comes in among them."""
+    for event in life.events:
+        if event.run_id != arrival.run.run_id:
+            yield from reader.stationary_tests(replace(life, events=(event,)))
+        elif event.kind == STATIONARY:
+            test = test_of(arrival, life)
+            if test is not None:
+                yield test
+
+
+def reader_with(stored: RunReader, arrival: Arrival) -> RunReader:
+    """The stored runs, and the one that comes in."""
+    name = arrival.run.run_id
+    return replace(
+        stored,
+        read=lambda run_id: arrival.run if run_id == name else stored.read(run_id),
+        describe=lambda run_id: arrival.run if run_id == name else stored.describe(run_id),
+        sampled=stored.sampled | ({name} if arrival.sampled else frozenset()),
+    )

@@ -23,7 +23,7 @@ from models.records.torque_filter import filtered_as_torque
 from service.columns import PASCALS_PER_BAR
 from service.errors import FieldError, InvalidError, Notice
 from service.lives.criteria import FEWEST_SPEEDS, POOR_FIT, WIDE_LEVEL
-from service.lives.engagements.evaluation import Engagement, course_item, engagement_notes, evaluated
+from service.lives.engagements import Engagement, course_item, engagement_notes, evaluated
 from service.lives.incoming_run import IncomingRun, SampledChannels, sampled_record, stationary_plateaus
 
 #: A value and its deviation.

@@ -1,13 +1,14 @@
-"""Tracking a life: three filters over a series, and the prediction of each after every event.
+"""Tracking a life: three filters over a series, the prediction of each after every event, and predictions that are not
+stored.
 
 A run that comes last in order of cycles carries the stored filter states one step on; any other run makes the life be
-tracked anew from its first test. Both ways give the same answer: the random numbers of a step depend on clutch, series
-and step alone. Where a fleet's prior stands beside the weak one a filter runs under both, and its draws are put together
-by their evidence (`models.prognosis.fleet`).
+tracked anew from its first test. Both ways give the same answer: the random numbers of a step depend on clutch, series and
+step alone. Where a fleet's prior stands beside the weak one a filter runs under both, and its draws are put together by
+their evidence (`models.prognosis.fleet`).
 """
 
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -25,12 +26,12 @@ from models.tracking.filters.ukf import Ukf, UkfState
 from models.tracking.measurement import Measurement
 from models.tracking.posterior import Posterior, Tracker, mixture
 from models.tracking.prior import Prior
-from service.errors import Notice
-from service.lives.assumptions import WEAK, Assumptions
+from service.columns import PASCALS_PER_BAR, bar
+from service.errors import NotFoundError, Notice
+from service.lives.assumptions import ALL_PRESSURES, WEAK, Assumptions
 from service.lives.criteria import FEWEST_PARTICLES, PREDICTION_DRAWS
-from service.lives.history import Life, Series
-from service.lives.payloads import ended, insufficient, predicted
-from service.lives.prediction_notices import off_track
+from service.lives.history import Event, Life, Series, lives_of, nearest_pressure
+from service.lives.payloads import ended, insufficient, off_track, predicted
 
 FilterState = ParticleState | UkfState | GridState
 
@@ -331,3 +332,44 @@ def mean_offset_of(series: Series, assumptions: Assumptions) -> Offset | None:
     if assumptions.model.course is None:
         return None
     return lambda progress: assumptions.offset(series.quantity, series.pressure, series.scale.cycles(progress))[None]
+
+
+def predict_at(
+    clutch_id: str,
+    events: Sequence[Event],
+    assumptions: Assumptions,
+    fraction: float,
+    *,
+    method: str,
+    pressure_bar: float | None = None,
+    at_cycles: float | None = None,
+    back_cast: BackCast | None = None,
+    carried: Tracked | None = None,
+) -> dict[str, Any]:
+    """The prediction at one pressure of the reference test, or over all, as it would have been made at `at_cycles`.
+
+    A `back_cast` that is known is not made again: of the exact filter it takes most of the time. A filter that was `carried`
+    through the first of the measurements is carried on. Raises NotFoundError where
+    the reference test did not measure that pressure.
+    """
+    lives = lives_of(events)
+    level = ALL_PRESSURES if pressure_bar is None else _level(lives[-1] if lives else None, pressure_bar)
+    happened = [event for event in events if at_cycles is None or event.cycles <= at_cycles]
+    if not happened:
+        return insufficient(assumptions, None, level, fraction)
+    life = lives_of(happened)[-1]
+    cycles = happened[-1].cycles
+    series = life.pooled(assumptions) if pressure_bar is None else life.at(assumptions, level)
+    if not series.measurements:
+        return ended(insufficient(assumptions, cycles, level, fraction), life.end)
+    tracked = advance(clutch_id, method, series, assumptions, carried, len(series.measurements), back_cast=back_cast)
+    return ended(predict(clutch_id, method, series, assumptions, tracked, cycles, fraction), life.end)
+
+
+def _level(life: Life | None, pressure_bar: float) -> float:
+    levels = [] if life is None else sorted(life.reference)
+    level = nearest_pressure(pressure_bar * PASCALS_PER_BAR, levels)
+    if level is None:
+        measured = ", ".join(f"{bar(level):g}" for level in levels) or "none"
+        raise NotFoundError(f"no track at {pressure_bar:g} bar; the pressures of the first stationary test: {measured}")
+    return level

@@ -1,21 +1,53 @@
-"""`/v1/clutches`: clutches worst first or by name, as lists show them; `/v1/fleet/totals`: how many there are."""
+"""`/v1/clutches`: clutches worst first or by name, as lists show them; `/v1/fleet/totals`: how many there are; and six
+numbers of all that is stored, for the metrics.
+"""
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 from sqlalchemy import Connection
 
 from models.prognosis.criteria import HORIZON
-from service import records, stored_verdicts
+from service import records
 from service.lists import Place, page_as_bytes
 from service.lives.condition import STATES, stated
 from service.queries.cache import AnswerCache, to_json
-from storage import clutches, runs, verdicts
+from storage import assumptions, clutches, diagnoses, jobs, runs
 from storage.clutches import Choice, ClutchRow
 from storage.engine.database import Database
+
+#: Remaining cycles up to which clutches are counted, ascending; 0: at the end of life. Chosen: days and weeks of a rig.
+WITHIN = (0.0, 1e3, 1e4)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Totals:
+    """Clutches, archived ones too; how many of those in use have at most so many remaining cycles (the median); runs, and
+    how many of them are held; ended lives that the fleets' priors know of; diagnoses that wait or run."""
+
+    clutches: int
+    within: dict[float, int]
+    runs: int
+    held: int
+    ended_lives: int
+    diagnoses: int
+
+
+def service_totals(database: Database) -> Totals:
+    """The numbers as they are now."""
+    with database.reading() as connection:
+        return Totals(
+            clutches=clutches.count(connection),
+            within=clutches.count_within(connection, WITHIN),
+            runs=runs.count(connection),
+            held=runs.count_held(connection),
+            ended_lives=assumptions.count_ended_lives(connection),
+            diagnoses=jobs.count_open(connection, jobs.DIAGNOSIS),
+        )
+
 
 #: Share of the clutches whose bars fit, and the cycles at the bars' end where nothing is predicted. Chosen: one that lasts
 #: much longer than the others must not shorten their bars to nothing; a rig's usual life.
@@ -103,12 +135,12 @@ def _shown(
     """Clutches, each with the number of its held runs, its newest finished diagnosis as it goes out, and its state with
     headline and action."""
     names = [row.clutch_id for row in rows]
-    newest, held = verdicts.newest(connection, names), runs.held(connection, names)
+    newest, held = diagnoses.newest(connection, names), runs.held(connection, names)
     shown = []
     for row in rows:
-        diagnosis = stored_verdicts.latest(connection, row, newest.get(row.clutch_id))
-        first = stored_verdicts.first_line(connection, row, diagnosis)
-        state = {"state": stored_verdicts.state(connection, row)}
+        diagnosis = records.latest_diagnosis(connection, row, newest.get(row.clutch_id))
+        first = records.first_line(connection, row, diagnosis)
+        state = {"state": records.condition(connection, row)}
         shown.append((row, held.get(row.clutch_id, 0), diagnosis, state | first))
     return shown
 

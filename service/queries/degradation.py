@@ -14,7 +14,7 @@ from models.prognosis.criteria import FEWEST_TESTS, HORIZON, QUANTILES
 from models.prognosis.first_passage import ends_of_life
 from models.prognosis.first_passage import paths as track_paths
 from models.prognosis.from_parameters import CofPaths, Disagreement, disagreement, far_apart, mean_cof_paths
-from service import measured_lives, records
+from service import records, stored_runs
 from service.errors import Notice
 from service.lives.assumptions import ALL_PRESSURES, Assumptions
 from service.lives.condition import held_notices
@@ -22,12 +22,21 @@ from service.lives.criteria import SEVERITY_EXPONENTS
 from service.lives.history import Series, reference_velocities
 from service.lives.outlook import measured_life
 from service.lives.payloads import notice_items
-from service.lives.quantities.chosen_life import chosen_life
 from service.lives.quantities.items import COEFFICIENTS, paths_item, track_item, trajectory_cycles
-from service.lives.quantities.levels import ParameterTracks, pressure_level, slopes_along
-from service.lives.quantities.measured import MeasuredLife
-from service.lives.quantities.names import QUANTITIES, Family, Quantity, quantity_named
-from service.lives.quantities.parameters import Track, parameter_tracks, posterior_of
+from service.lives.quantities.measured import (
+    QUANTITIES,
+    Family,
+    MeasuredLife,
+    ParameterTracks,
+    Quantity,
+    Track,
+    chosen_life,
+    parameter_tracks,
+    posterior_of,
+    pressure_level,
+    quantity_named,
+    slopes_along,
+)
 from service.lives.severity_estimate import SeverityEstimate, severity_estimate
 from service.lives.tracks import offset_of, step_rng
 from storage.engine.database import Database
@@ -61,7 +70,7 @@ def degradation(
     with database.reading() as connection:
         state = records.state(connection, clutch_id)
         chosen = chosen_life(state, life, at_cycles)
-        evidence = measured_lives.evidence(connection, clutch_id)
+        evidence = stored_runs.evidence(connection, clutch_id)
     measured = measured_life(state, chosen, evidence)
     held = held_notices(len(state.held))
     head = {"clutch_id": clutch_id, "revision": state.revision, "method": method, "life": chosen.item()}

@@ -1,16 +1,24 @@
-"""`/diagnoses`: reports as they are stored, and whether they still hold."""
+"""`/diagnoses`: reports as they are stored, and whether they still hold; `/model`: what was adopted of them."""
 
-from typing import Any
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import Connection
 
 from service import records
 from service.columns import whole
 from service.errors import NotFoundError
+from service.lives.assumptions import BASELINE
 from service.lives.diagnosis.report import empty
-from storage import changes, diagnoses
+from service.lives.model_correction import extension_of
+from storage import assumptions, changes, diagnoses
+from storage.assumptions import AdoptedRow
 from storage.diagnoses import DiagnosisRow
 from storage.engine.database import Database
+
+if TYPE_CHECKING:
+    from models.diagnosis.extension import Extension
 
 #: What a list does not show.
 _LARGE = ("maps", "loops")
@@ -73,3 +81,40 @@ def _with_former_name(answer: dict[str, Any]) -> dict[str, Any]:
     """The answer, a number of the gain under its former name, too: scripts may read it."""
     gain = answer["gain"]
     return answer | {"gain": gain | {FORMER_NAME: gain["prediction_log_score_gain"]}}
+
+
+def model(database: Database, clutch_id: str) -> dict[str, Any]:
+    """The model in force and all versions, newest first. Raises NotFoundError."""
+    with database.reading() as connection:
+        records.clutch(connection, clutch_id)
+        rows = assumptions.adoptions_of(connection, clutch_id)
+        adoption = records.adoption(connection, clutch_id)
+        life = records.present_life(connection, clutch_id)
+        in_force = adoption if adoption is not None and adoption.life == life else None
+        return {
+            "clutch_id": clutch_id,
+            "model": _name(None if in_force is None else in_force.extension),
+            "version": rows[0].version if rows else 0,
+            "diagnosis_id": None if in_force is None else in_force.diagnosis_id,
+            "versions": [
+                {
+                    "version": row.version,
+                    "diagnosis_id": row.diagnosis_id,
+                    "adopted_at": row.adopted_at,
+                    "model": _name(_extension(connection, clutch_id, row)),
+                }
+                for row in rows
+            ],
+        }
+
+
+def _name(extension: Extension | None) -> dict[str, Any]:
+    """The model as answers name it."""
+    return dict(BASELINE) if extension is None else {"name": "extended", "effects": list(extension.effects)}
+
+
+def _extension(connection: Connection, clutch_id: str, row: AdoptedRow) -> Extension | None:
+    if row.diagnosis_id is None:
+        return None
+    diagnosed = diagnoses.get(connection, clutch_id, row.diagnosis_id)
+    return None if diagnosed is None or diagnosed.extension is None else extension_of(diagnosed.extension)

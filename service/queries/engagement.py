@@ -14,14 +14,14 @@ from models.engagements.measured import MeasuredEngagement, trace_times
 from models.engagements.simulation import Drive, Engagement, PressureProfile, engage
 from models.friction.stribeck import PARAMETER_NAMES, StribeckParameters
 from models.prognosis.first_passage import weighted_quantiles
-from service import measured_lives, records, stored_runs
+from service import records, stored_runs
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, whole
 from service.errors import NotFoundError
 from service.lives.assumptions import Assumptions
-from service.lives.engagements.evaluation import evaluated, public_channels
+from service.lives.engagements import evaluated, public_channels
 from service.lives.history import Life, Series, lives_of
 from service.lives.incoming_run import IncomingRun
-from service.lives.quantities.parameters import parameter_series, posterior_of, tests_of
+from service.lives.quantities.measured import parameter_series, posterior_of, tests_of
 from service.lives.run_analysis import LevelFit
 from storage.engine.database import Database
 
@@ -34,7 +34,7 @@ def engaged(database: Database, clutch_id: str, at_cycles: float | None, run_id:
     """
     with database.reading() as connection:
         state, levels = records.state(connection, clutch_id), records.levels(connection, clutch_id)
-        measured = measured_lives.engagements(connection, clutch_id)
+        measured = stored_runs.engagements(connection, clutch_id)
     happened = [event for event in state.events if at_cycles is None or event.cycles <= at_cycles]
     if not lives_of(happened):
         raise NotFoundError("there is no stationary test by then, and so no clutch to engage")

@@ -6,7 +6,7 @@ from typing import Any
 from service import records
 from service.errors import NotFoundError
 from service.lists import Place
-from service.stored_inspections import answers, inspection
+from service.records import inspection, inspection_answers
 from storage import inspections
 from storage.engine.database import Database
 
@@ -23,7 +23,7 @@ def page(
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
         rows = inspections.page(connection, clutch_id, limit=limit + 1, after=after)
-        items = answers(connection, rows[:limit])
+        items = inspection_answers(connection, rows[:limit])
     return items, (rows[limit - 1].cycles, rows[limit - 1].inspection_id) if len(rows) > limit else None
 
 
@@ -37,7 +37,7 @@ def look_up(database: Database, clutch_id: str, inspection_id: str) -> dict[str,
     """One inspection. Raises NotFoundError."""
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
-        return answers(connection, [inspection(connection, clutch_id, inspection_id)])[0]
+        return inspection_answers(connection, [inspection(connection, clutch_id, inspection_id)])[0]
 
 
 def media_type(database: Database, clutch_id: str, inspection_id: str, photograph_id: str) -> str:

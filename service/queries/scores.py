@@ -19,8 +19,7 @@ from service.columns import whole
 from service.lives.assumptions import ALL_PRESSURES, Assumptions
 from service.lives.history import Event, Life
 from service.lives.payloads import INSUFFICIENT
-from service.lives.prediction_at import predict_at
-from service.lives.tracks import CARRIED
+from service.lives.tracks import CARRIED, predict_at
 from storage import results
 from storage.engine.database import Database
 

@@ -8,15 +8,22 @@ from typing import Any
 
 from models.clutch import Geometry
 from models.friction.criteria import Z90
-from service import measured_lives, records
+from service import records, stored_runs
 from service.columns import bar, whole
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF
 from service.lives.condition import SHOWN
-from service.lives.engagements.over_life import ALL_INDICATORS
+from service.lives.engagements import ALL_INDICATORS
 from service.lives.history import DYNAMIC, STATIONARY
 from service.lives.payloads import INSUFFICIENT, PARAMETER_UNITS
-from service.lives.quantities.measured import LOOP_COLUMNS, curves_of, rounded_frequency, slope_of
-from service.lives.quantities.names import QUANTITIES, SLOPE, SLOPE_SPEEDS
+from service.lives.quantities.measured import (
+    LOOP_COLUMNS,
+    QUANTITIES,
+    SLOPE,
+    SLOPE_SPEEDS,
+    curves_of,
+    rounded_frequency,
+    slope_of,
+)
 from service.lives.run_analysis import LevelFit
 from service.schemas.clutch import ClutchIn
 from storage import results, runs
@@ -40,7 +47,7 @@ def series(database: Database, clutch_id: str, quantity: str | None) -> list[dic
         levels = records.levels(connection, clutch_id) if quantity in (None, SLOPE) else {}
         of_loops = quantity is None or quantity in LOOP_COLUMNS
         dynamic = runs.page(connection, clutch_id, kind=DYNAMIC, state=runs.ACCEPTED) if of_loops else []
-        engaged = measured_lives.engagements(connection, clutch_id)
+        engaged = stored_runs.engagements(connection, clutch_id)
         predicted = results.predictions_of(connection, clutch_id, SHOWN, ALL_PRESSURES)
         held = runs.held(connection, [clutch_id]).get(clutch_id, 0)
     measured = (item for row in rows for fit in row.receipt["fits"] for item in _measured(row.receipt, fit))

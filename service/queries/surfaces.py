@@ -22,7 +22,7 @@ from service.errors import NotFoundError
 from service.lives.assumptions import Assumptions
 from service.lives.history import Event, lives_of
 from service.lives.payloads import PARAMETER_UNITS
-from service.lives.quantities.parameters import Track, parameter_tracks, tests_of
+from service.lives.quantities.measured import Track, parameter_tracks, tests_of
 from service.lives.run_analysis import LevelFit
 from storage.engine.database import Database
 

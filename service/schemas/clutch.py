@@ -21,6 +21,18 @@ from service.schemas.base import (
     Schema,
     WholeNumber,
 )
+from service.schemas.life import (
+    AtLeast,
+    AtLeastAt,
+    Criterion,
+    CriterionIn,
+    Current,
+    DeclaredEnd,
+    Held,
+    ModelName,
+    Quantiles,
+    Statement,
+)
 from service.schemas.limits import (
     LEAST_LENGTH_MM,
     LEAST_PRESSURE_FACTOR,
@@ -32,18 +44,6 @@ from service.schemas.limits import (
     MOST_PRESSURE_FACTOR,
     MOST_SEVERITY_EXPONENT,
     MOST_TORQUE_FILTER_MS,
-)
-from service.schemas.prognosis.criteria import CriterionIn
-from service.schemas.prognosis.life import (
-    AtLeast,
-    AtLeastAt,
-    Criterion,
-    Current,
-    DeclaredEnd,
-    Held,
-    ModelName,
-    Quantiles,
-    Statement,
 )
 
 Name = Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_NAME)]

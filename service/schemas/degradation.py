@@ -3,7 +3,7 @@
 from pydantic import Field
 
 from service.schemas.base import Answer, ClutchName, Next, Revision
-from service.schemas.prognosis.life import LifeNumber, MethodName, Model, Prior, Quantiles, SeverityUsed
+from service.schemas.life import LifeNumber, MethodName, Model, Prior, Quantiles, SeverityUsed
 from service.schemas.run import Warned
 
 

@@ -5,8 +5,8 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from service.schemas.base import Answer, ClutchName, Identifier, Next, Revision, Schema
+from service.schemas.life import ModelName
 from service.schemas.limits import LONGEST_DIAGNOSIS_ID
-from service.schemas.prognosis.life import ModelName
 
 Number = float | None
 Numbers = list[float | None]

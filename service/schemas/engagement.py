@@ -5,8 +5,8 @@ from typing import Literal
 from pydantic import Field
 
 from service.schemas.base import Answer, ClutchName, Origin, RunCycles, RunName
-from service.schemas.indicators import IndicatorEstimate, Indicators
-from service.schemas.prognosis.life import Model
+from service.schemas.life import Model
+from service.schemas.run import IndicatorEstimate, Indicators
 
 
 class EngagementChannels(Answer):

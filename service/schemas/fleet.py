@@ -3,7 +3,7 @@
 from pydantic import Field
 
 from service.schemas.base import Answer, ClutchName, Next, Origin, Revision
-from service.schemas.prognosis.life import Method, Model, Prior, Quantiles, SeverityUsed
+from service.schemas.life import Method, Model, Prior, Quantiles, SeverityUsed
 
 
 class Kind(Answer):

@@ -6,6 +6,7 @@ from pydantic import BeforeValidator, Field
 
 from service.schemas.base import StartedAt
 from service.schemas.diagnosis import JobState
+from service.schemas.life import SeriesQuantity
 from service.schemas.limits import (
     IDENTIFIER_PATTERN,
     LONGEST_FILENAME,
@@ -19,7 +20,6 @@ from service.schemas.limits import (
     MOST_POINTS,
     MOST_SKIPPED,
 )
-from service.schemas.prognosis.quantities import SeriesQuantity
 
 
 def _short(value: object) -> object:

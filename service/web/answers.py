@@ -1,46 +1,86 @@
 """Bodies in, answers out: JSON or CSV with a strong entity tag, 304 where the asker has it already, cursors for pages.
 
 What follows from a clutch's revision alone is made once and kept (`clutch_answer`); what takes long is computed by a worker
-(`computed_answer`).
+(`computed_answer`); what a job does is waited for (`until_ended`).
 """
 
+import asyncio
+import csv
+import io
 import json
 import re
-from collections.abc import Callable, Hashable, Mapping, Sequence
+import time
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
+from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, TypeVar
 
 from fastapi import Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 from pydantic import BaseModel
-from starlette.datastructures import MutableHeaders
-from starlette.middleware.gzip import GZipMiddleware
 from starlette.requests import ClientDisconnect
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.errors import NotFoundError, UnsupportedMediaTypeError
-from service.jobs.workers import Lane
-from service.lists import ALL_ITEMS, from_cursor, sliced
+from service.lists import ALL_ITEMS, Place, from_cursor, sliced
 from service.queries.cache import Answer, Page, name_of, revision_and_json, shared_answer, to_json
-from service.web.auth import glance_of, name_of_caller
-from service.web.context import Context
-from service.web.files import PARQUET_TYPE
-from service.web.limits import LEAST_PACKED_BYTES, LONGEST_WAIT_SECONDS, PACKING_LEVEL, WAIT_SECONDS
+from service.schemas.parameters import ClutchId
+from service.web.auth import Reader, glance_of, name_of_caller
+from service.web.context import Context, Cursor, Whole
+from service.web.limits import LONGEST_WAIT_SECONDS, WAIT_SECONDS
 from service.web.middleware import Again, remember
-from service.web.problems import refused
 from service.web.revalidation import Made
-from service.web.tables import Rows, RowsAndNext, encode_page, sliced_rows
-from service.web.unpacking import Unpacked
+from service.work.workers import Lane
 from storage import clutches
+
+Rows = Iterable[Mapping[str, Any]]
+#: Rows of a page, and the cursor of the next one; None on the last.
+RowsAndNext = tuple[Rows, str | None]
+#: How a text begins that spreadsheets take for a formula. Source: https://owasp.org/www-community/attacks/CSV_Injection.
+_FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
+
+
+def sliced_rows(rows: Rows, limit: int, after: Place | None) -> RowsAndNext:
+    """A page of rows that are known whole."""
+    page = sliced(list(rows), limit, after)
+    return page["items"], page["next"]
+
+
+def encode_page(columns: Sequence[str], rows: Rows, following: str | None) -> Page:
+    """A page of a table as CSV."""
+    return Page(encode_table(columns, rows), following)
+
+
+def encode_table(columns: Sequence[str], rows: Rows) -> bytes:
+    """CSV after RFC 4180 in UTF-8, a header row first; null is an empty field.
+
+    A first row with other names than `columns` gives the columns. Text that a spreadsheet would take for a formula has an
+    apostrophe before it: a note that a rig has sent must compute nothing, and send nothing, where an engineer opens it.
+    """
+    text = io.StringIO()
+    writer: csv.DictWriter[str] | None = None
+    for row in rows:
+        if writer is None:
+            names = columns if row.keys() == set(columns) else tuple(row)
+            writer = csv.DictWriter(text, fieldnames=names, extrasaction="raise", restval="")
+            writer.writeheader()
+        writer.writerow({name: _cell(value) for name, value in row.items()})
+    if writer is None:
+        csv.writer(text).writerow(columns)
+    return text.getvalue().encode()
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, str) and value.startswith(_FORMULA):
+        return f"'{value}"
+    return "" if value is None else value
+
 
 JSON_TYPE = "application/json"
 CSV_TYPE = "text/csv; charset=utf-8"
 
 _WAIT = re.compile(r'(?:^|[,;\s])wait\s*=\s*"?(\d{1,9})"?\s*(?:$|[,;])', re.IGNORECASE)
-#: The end of an entity tag of packed bytes.
-_PACKED = '-gzip"'
 
 
 def now() -> str:
@@ -89,19 +129,13 @@ async def clutch_answer(
 
 
 async def clutch_table(
-    request: Request,
-    context: Context,
-    clutch_id: str,
-    name: str,
-    make: Callable[[], RowsAndNext],
-    columns: Sequence[str],
-    *arguments: Hashable,
+    of: "TablePage", name: str, make: Callable[[], RowsAndNext], columns: Sequence[str], *arguments: Hashable
 ) -> Response:
     """The CSV export of an answer that follows from a clutch's revision, a page of it. Raises NotFoundError."""
-    revision = _revision(request, clutch_id)
-    key = (clutch_id, f"{name}.csv", *arguments)
-    exported = await kept(context, key, revision, lambda: encode_page(columns, *make()))
-    return tagged(request, exported, CSV_TYPE, revision)
+    revision = _revision(of.request, of.clutch_id)
+    key = (of.clutch_id, f"{name}.csv", *arguments, of.limit, of.after)
+    exported = await kept(of.context, key, revision, lambda: encode_page(columns, *make()))
+    return tagged(of.request, exported, CSV_TYPE, revision)
 
 
 async def computed_answer(
@@ -133,28 +167,46 @@ async def computed_answer(
 
 
 async def computed_table(
-    request: Request,
-    context: Context,
-    clutch_id: str,
+    of: "TablePage",
     query: Callable[..., dict[str, Any]],
     rows: Callable[[Any], Rows],
     columns: Sequence[str],
     *arguments: Hashable,
-    limit: int = ALL_ITEMS,
-    cursor: str | None = None,
     prefer: str | None = None,
+    paged_by_query: bool = False,
 ) -> Response:
-    """The CSV export of the same: a page of the `rows` of its JSON, which may be a page itself. Raises NotFoundError."""
-    after = from_cursor(cursor)
-    revision = _revision(request, clutch_id)
-    revision, whole = await _computed(request, context, clutch_id, revision, query, arguments, prefer)
+    """The CSV export of the same: a page of the `rows` of its JSON, which is a page itself where the query takes `limit` and
+    `after` as its last arguments. Raises NotFoundError."""
+    limit, after = (ALL_ITEMS, None) if paged_by_query else (of.limit, of.after)
+    if paged_by_query:
+        arguments = (*arguments, of.limit, of.after)
+    revision = _revision(of.request, of.clutch_id)
+    revision, whole = await _computed(of.request, of.context, of.clutch_id, revision, query, arguments, prefer)
 
     def one_page() -> Page:
         items, following = sliced_rows(rows(json.loads(whole.body)), limit, after)
         return encode_page(columns, items, following or whole.next)
 
-    key = (clutch_id, f"{name_of(query)}.csv", *arguments, limit, after)
-    return tagged(request, await kept(context, key, revision, one_page), CSV_TYPE, revision)
+    key = (of.clutch_id, f"{name_of(query)}.csv", *arguments, limit, after)
+    return tagged(of.request, await kept(of.context, key, revision, one_page), CSV_TYPE, revision)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TablePage:
+    """A request for a table of one clutch: which page of it."""
+
+    request: Request
+    context: Context
+    clutch_id: str
+    limit: int
+    after: Place | None
+
+
+async def table_page(
+    request: Request, context: Reader, clutch_id: ClutchId, limit: Whole = ALL_ITEMS, cursor: Cursor = None
+) -> TablePage:
+    """A dependency: the page that a request for a table asks for, allowed to those who may read the clutch."""
+    return TablePage(request=request, context=context, clutch_id=clutch_id, limit=limit, after=from_cursor(cursor))
 
 
 async def computed_of_each(
@@ -287,44 +339,20 @@ def described_body(schema: type[BaseModel] | dict[str, Any], example: dict[str, 
     return {"requestBody": {"required": True, "content": content}}
 
 
-class Encodings:
-    """Bodies packed by gzip, both ways, unless they are files that are packed already; any other encoding sent is a 415.
+Looked = TypeVar("Looked")
+#: [s] Between two looks whether a job has ended: first, by how much longer each, and longest. Chosen: a look reads a few
+#: rows, and the quickest job takes a second.
+_FIRST_PAUSE, _GROWTH, _LONGEST_PAUSE = 0.05, 1.5, 0.4
 
-    An answer's entity tag names its bytes, so the packed ones have a tag of their own: the same with a mark.
-    """
 
-    def __init__(self, app: ASGIApp) -> None:
-        self.app = app
-        self.packing = GZipMiddleware(app, LEAST_PACKED_BYTES, PACKING_LEVEL)
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        headers = MutableHeaders(scope=scope)
-        encoding = headers.get("content-encoding", "identity").strip().lower()
-        if encoding not in ("identity", "gzip"):
-            detail = f"send the body plain or packed by gzip, not by {encoding[:80]!r}"
-            response = refused(UnsupportedMediaTypeError, detail)
-            response.headers["Accept-Encoding"] = "gzip"
-            await response(scope, receive, send)
-            return
-        if encoding == "gzip":
-            del headers["content-encoding"], headers["content-length"]
-            receive = Unpacked(receive)
-        wanted_tags = headers.get("if-none-match", "")
-        if _PACKED in wanted_tags:
-            headers["if-none-match"] = wanted_tags.replace(_PACKED, '"')
-
-        async def tagged(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                answered = MutableHeaders(scope=message)
-                tag = answered.get("etag", "").removesuffix('"') + _PACKED
-                packed = answered.get("content-encoding") == "gzip"
-                if "etag" in answered and (packed or (message["status"] == 304 and tag in wanted_tags)):
-                    answered["etag"] = tag
-            await send(message)
-
-        packed_by_itself = PARQUET_TYPE in headers.get("accept", "") or "/photographs/" in scope["path"]
-        app = self.app if packed_by_itself else self.packing
-        await app(scope, receive, tagged)
+async def until_ended(look: Callable[[], Looked], has_ended: Callable[[Looked], bool], wait: float) -> Looked:
+    """What a look gives once that has ended, or as it is after `wait` [s]."""
+    deadline = time.monotonic() + wait
+    pause = _FIRST_PAUSE
+    while True:
+        state = await run_in_threadpool(look)
+        left = deadline - time.monotonic()
+        if has_ended(state) or left <= 0:
+            return state
+        await asyncio.sleep(min(pause, left))
+        pause = min(_GROWTH * pause, _LONGEST_PAUSE)

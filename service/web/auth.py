@@ -13,7 +13,7 @@ from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from functools import lru_cache
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from fastapi import Depends, Request
 
@@ -275,8 +275,7 @@ def _refuse_unknown_arguments(request: Request) -> None:
     """A mistyped argument must not be answered as if it had not been there."""
     if not request.scope["query_string"]:
         return
-    route = request.scope["route"]
-    arguments = {field.alias for field in route.dependant.query_params}
+    arguments = _arguments_of(request.scope["route"])
     unknown = [name for name in request.query_params if name not in arguments]
     if unknown:
         errors = [
@@ -289,6 +288,14 @@ def _refuse_unknown_arguments(request: Request) -> None:
             for name in unknown
         ]
         raise InvalidError(errors[0].message, errors=errors)
+
+
+def _arguments_of(route: Any) -> frozenset[str]:
+    """The names of a route's arguments, those of what it depends on among them."""
+    parts = [route.dependant]
+    for part in parts:
+        parts += part.dependencies
+    return frozenset(field.alias for part in parts for field in part.query_params)
 
 
 Reader = Annotated[Context, Depends(allowed("read"))]

@@ -14,10 +14,10 @@ from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.multiprocess import MultiProcessCollector, mark_process_dead
 from prometheus_client.registry import Collector
 
-from service.jobs.workers import Lane
 from service.queries import clutch_list
-from service.queries.totals import totals
+from service.queries.clutch_list import service_totals
 from service.web.limits import METRICS_PAGE
+from service.work.workers import Lane
 from storage.engine.database import Database
 
 #: Where several processes keep their numbers, for prometheus_client, which reads it when it is imported.
@@ -96,7 +96,7 @@ class Present(Collector):
 
     def collect(self) -> Iterator[Metric]:
         """The gauges, from a few statements that give a row each."""
-        numbers = totals(self._database)
+        numbers = service_totals(self._database)
         yield GaugeMetricFamily("clutchlife_clutches", "Clutches, archived ones too", value=numbers.clutches)
         text = "Clutches in use that have at most so many cycles left (the median); 0: at their end of life"
         within = GaugeMetricFamily("clutchlife_clutches_within", text, labels=["cycles"])

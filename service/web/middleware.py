@@ -1,8 +1,5 @@
-"""What stands before every address: ids, counts, logs, shares, bounds on bodies, safe headers, what polls ask again.
-
-A page asks the same again and again. A route that has answered leaves behind how its answer is found again (`remember`):
-where the same address is asked for with the same arguments, and the answer of the revision as it is now is held, that is
-sent, or 304; in every other case, an unknown caller or a changed clutch, the request takes its usual way.
+"""What stands before every address: ids, counts, logs, shares, bounds on bodies, compression both ways, safe headers, what
+polls ask again, and the path that a proxy adds.
 """
 
 import asyncio
@@ -10,22 +7,35 @@ import hashlib
 import math
 import secrets
 import time
+import zlib
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from logging import DEBUG, INFO, WARNING
 from typing import Any
+from urllib.parse import urlsplit
 
 from fastapi.dependencies.utils import request_params_to_args
 from fastapi.responses import Response
-from starlette.datastructures import MutableHeaders, QueryParams
+from starlette.datastructures import Headers, MutableHeaders, QueryParams
+from starlette.middleware.gzip import GZipMiddleware
 from starlette.requests import ClientDisconnect, Request
+from starlette.responses import RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.errors import BusyError, ServiceError, TooLargeError, TooManyError, TooSlowError
+from service.errors import (
+    BusyError,
+    InvalidError,
+    ServiceError,
+    TooLargeError,
+    TooManyError,
+    TooSlowError,
+    UnsupportedMediaTypeError,
+)
 from service.logging import access, log_request, request_id, sane
 from service.web import limits
 from service.web.auth import UNMATCHED, authorise, caller_of, clutch_of, context_of, glance_at, route_of
+from service.web.files import PARQUET_TYPE
 from service.web.metrics import Metrics
 from service.web.problems import refused, unexpected
 from storage.engine.errors import StorageError
@@ -391,3 +401,132 @@ def _arguments(route: Any, query: bytes) -> Hashable:
     if errors or not sent.keys() <= {field.alias for field in fields}:
         return None
     return tuple(values.values())
+
+
+#: The end of an entity tag of packed bytes.
+_PACKED = '-gzip"'
+#: Bytes that are unpacked at once. Chosen: a few of a socket's reads.
+_PIECE = 1 << 18
+#: zlib's word for the format: gzip, with the largest window.
+_GZIP = 16 + zlib.MAX_WBITS
+
+
+class Unpacked:
+    """Receives in place of `receive`. Raises InvalidError where it is no gzip, is cut off or goes on after its end."""
+
+    def __init__(self, receive: Receive) -> None:
+        self._receive = receive
+        self._unpacker = zlib.decompressobj(_GZIP)
+        self._packed = b""
+        self._more = True
+        self._ended = False
+
+    async def __call__(self) -> Message:
+        """The next piece of the body, unpacked; then what follows a body."""
+        while not self._ended:
+            if not self._packed and self._more:
+                message = await self._receive()
+                if message["type"] != "http.request":
+                    return message
+                self._packed, self._more = message.get("body", b""), message.get("more_body", False)
+            piece = self._piece()
+            if piece or self._ended:
+                return {"type": "http.request", "body": piece, "more_body": not self._ended}
+        return await self._receive()
+
+    def _piece(self) -> bytes:
+        try:
+            piece = self._unpacker.decompress(self._packed, _PIECE)
+        except zlib.error as error:
+            raise InvalidError(f"the body is said to be packed by gzip and is not: {error}") from error
+        self._packed = self._unpacker.unconsumed_tail
+        if self._unpacker.unused_data:
+            raise InvalidError("the body goes on after the end of what was packed by gzip")
+        if not piece and not self._packed and not self._more:
+            if not self._unpacker.eof:
+                raise InvalidError("the body was packed by gzip and is cut off")
+            self._ended = True
+        return piece
+
+
+class Encodings:
+    """Bodies packed by gzip, both ways, unless they are files that are packed already; any other encoding sent is a 415.
+
+    An answer's entity tag names its bytes, so the packed ones have a tag of their own: the same with a mark.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+        self.packing = GZipMiddleware(app, limits.LEAST_PACKED_BYTES, limits.PACKING_LEVEL)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        headers = MutableHeaders(scope=scope)
+        encoding = headers.get("content-encoding", "identity").strip().lower()
+        if encoding not in ("identity", "gzip"):
+            detail = f"send the body plain or packed by gzip, not by {encoding[:80]!r}"
+            response = refused(UnsupportedMediaTypeError, detail)
+            response.headers["Accept-Encoding"] = "gzip"
+            await response(scope, receive, send)
+            return
+        if encoding == "gzip":
+            del headers["content-encoding"], headers["content-length"]
+            receive = Unpacked(receive)
+        wanted_tags = headers.get("if-none-match", "")
+        if _PACKED in wanted_tags:
+            headers["if-none-match"] = wanted_tags.replace(_PACKED, '"')
+
+        async def tagged(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                answered = MutableHeaders(scope=message)
+                tag = answered.get("etag", "").removesuffix('"') + _PACKED
+                packed = answered.get("content-encoding") == "gzip"
+                if "etag" in answered and (packed or (message["status"] == 304 and tag in wanted_tags)):
+                    answered["etag"] = tag
+            await send(message)
+
+        packed_by_itself = PARQUET_TYPE in headers.get("accept", "") or "/photographs/" in scope["path"]
+        app = self.app if packed_by_itself else self.packing
+        await app(scope, receive, tagged)
+
+
+class RootPath:
+    """Middleware outside of all others. `root` is the path as `/clutch`, or empty."""
+
+    def __init__(self, app: ASGIApp, root: str) -> None:
+        self.app = app
+        self.root = root
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        host = Headers(scope=scope).get("host", "")
+        path = scope["path"]
+
+        async def addressed(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                if "location" in headers:
+                    headers["location"] = self._below(_without_origin(headers["location"], host))
+                if headers.get("link", "").startswith("<"):
+                    headers["link"] = "<" + self._below(headers["link"].removeprefix("<"))
+            await send(message)
+
+        if self.root and path == self.root:  # relative addresses of a page need the slash
+            await RedirectResponse("/", 308)(scope, receive, addressed)
+            return
+        if self.root and path.startswith(self.root + "/"):
+            scope = {**scope, "path": path.removeprefix(self.root)}
+        await self.app(scope, receive, addressed)
+
+    def _below(self, address: str) -> str:
+        return self.root + address if address.startswith("/") else address
+
+
+def _without_origin(address: str, host: str) -> str:
+    """An address of this service without scheme and host, which a proxy may have changed; others as they are."""
+    parts = urlsplit(address)
+    return parts._replace(scheme="", netloc="").geturl() if parts.netloc == host else address

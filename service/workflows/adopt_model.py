@@ -10,10 +10,10 @@ from typing import Any
 
 from sqlalchemy import Connection
 
-from models.diagnosis.extension import Extension
-from service import measured_lives, records, stored_runs, stored_verdicts
+from service import records, stored_runs
 from service.errors import NotFoundError, NothingToAdoptError
 from service.lives.history import stationary_tests_of
+from service.lives.model_correction import extension_of
 from service.lives.outlook import summarised
 from service.lives.recomputation import Adoption, ClutchState, Results, Tracking, computed_anew
 from storage import assumptions, changes, clutches, diagnoses, jobs
@@ -58,7 +58,7 @@ def finish_and_adopt(
         return False
     with database.reading() as connection:
         life = _diagnosed(connection, clutch_id, diagnosis_id).life
-    adoption = Adoption(diagnosis_id=diagnosis_id, life=life, extension=Extension.from_dict(ended["extension"]))
+    adoption = Adoption(diagnosis_id=diagnosis_id, life=life, extension=extension_of(ended["extension"]))
 
     def finish(connection: Connection) -> None:
         if changes.last_of_history(connection, clutch_id) > _diagnosed(connection, clutch_id, diagnosis_id).revision:
@@ -103,7 +103,7 @@ def _change(
             row = AdoptedRow(version=version, diagnosis_id=diagnosis_id, adopted_at=adopted_at)
             assumptions.insert_adoption(connection, clutch_id, row)
             records.store(connection, clutch_id, results)
-            stored_verdicts.note_dispute(connection, clutch_id)
+            records.note_dispute(connection, clutch_id)
             change = NewChange(
                 clutch_id=clutch_id,
                 run_id=None,
@@ -132,7 +132,7 @@ def _computed(database: Database, clutch_id: str, adoption: Adoption | None) -> 
     tests = reader.stationary_tests(state.lives[-1]) if state.events else iter(())
     evaluated = stationary_tests_of(state.events)
     final, results = computed_anew(state, levels, receipts, tests, reader, evaluated=evaluated)
-    evidence = measured_lives.evidence_for(database, final, reader)
+    evidence = stored_runs.evidence_for(database, final, reader)
     return state, replace(results, summary=summarised(final, results.tracking or Tracking(), evidence))
 
 
@@ -156,7 +156,7 @@ def _adoptable(row: DiagnosisRow) -> Adoption:
     if row.extension is None:
         why = "has not finished" if row.report is None else "found nothing to adopt"
         raise NothingToAdoptError(f"diagnosis {row.diagnosis_id!r} {why}")
-    return Adoption(diagnosis_id=row.diagnosis_id, life=row.life, extension=Extension.from_dict(row.extension))
+    return Adoption(diagnosis_id=row.diagnosis_id, life=row.life, extension=extension_of(row.extension))
 
 
 def _of_present_life(database: Database, clutch_id: str, adoption: Adoption) -> bool:

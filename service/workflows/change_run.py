@@ -15,7 +15,7 @@ from typing import Any
 
 from sqlalchemy import Connection
 
-from service import measured_lives, records, stored_runs
+from service import records, stored_runs
 from service.columns import whole
 from service.errors import NotPossibleNowError
 from service.lives.history import (
@@ -28,18 +28,19 @@ from service.lives.history import (
     stationary_tests_of,
 )
 from service.lives.incoming_run import IncomingRun
-from service.lives.late_run import Arrival, reader_with
 from service.lives.model_correction import RunReader
 from service.lives.outlook import held_part, summarised
 from service.lives.payloads import notice_items, receipt
 from service.lives.plausibility.doubts import Judged, doubts_alone, doubts_together
 from service.lives.recomputation import (
+    Arrival,
     ClutchState,
     Levels,
     Receipt,
     Results,
     cofs_among,
     computed_anew,
+    reader_with,
     set_aside,
 )
 from service.lives.run_analysis import analyse
@@ -326,7 +327,7 @@ def _computed(database: Database, loaded: _Loaded, row: RunRow) -> _Changed:
         name = other.run_id
         aside[name], receipts[name] = set_aside(after, other, loaded.levels, receipts[name], reader)
     changed = {name: receipts[name] for name in (run_id, *aside)} | dict(computed.receipts)
-    evidence = measured_lives.evidence_for(database, after, reader)
+    evidence = stored_runs.evidence_for(database, after, reader)
     if evidence is not None:
         evidence = replace(evidence, levels=loaded.levels, receipts={**receipts, **changed})
     if computed.tracking is None:

@@ -10,9 +10,9 @@ from typing import Any
 
 from sqlalchemy import Connection
 
-from service import measured_lives, records, stored_runs
+from service import records, stored_runs
 from service.alarms import raising
-from service.identity import content_of
+from service.columns import content_of
 from service.lives.history import stationary_tests_of
 from service.lives.outlook import summarised
 from service.lives.recomputation import Results, Tracking, computed_anew
@@ -84,7 +84,7 @@ def _results(database: Database, before: ClutchIn, record: ClutchIn) -> Results 
     tests = reader.stationary_tests(state.lives[-1]) if state.events else iter(())
     evaluated = stationary_tests_of(state.events)
     state, results = computed_anew(state, levels, receipts, tests, reader, evaluated=evaluated)
-    evidence = measured_lives.evidence_for(database, state, reader)
+    evidence = stored_runs.evidence_for(database, state, reader)
     return replace(results, summary=summarised(state, results.tracking or Tracking(), evidence))
 
 

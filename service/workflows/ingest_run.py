@@ -13,9 +13,9 @@ from typing import Any
 from sqlalchemy import Connection
 
 from models.clutch import Geometry
-from service import measured_lives, records, stored_runs
+from service import records, stored_runs
 from service.errors import ArchivedError, BusyError, ConflictError, Notice, TooLargeError
-from service.lives.engagements.over_life import stored_engagement
+from service.lives.engagements import stored_engagement
 from service.lives.history import (
     DYNAMIC,
     STATIONARY,
@@ -31,11 +31,11 @@ from service.lives.history import (
     stationary_tests_of,
 )
 from service.lives.incoming_run import IncomingRun
-from service.lives.late_run import Arrival, reader_with, test_of, tests_with
 from service.lives.outlook import Evidence, held_part, needs_evidence, summarised
 from service.lives.payloads import history_warnings, notice_items, receipt, warned_anew
 from service.lives.plausibility.doubts import Judged, doubts_alone, doubts_together
 from service.lives.recomputation import (
+    Arrival,
     ClutchState,
     Levels,
     Results,
@@ -44,7 +44,10 @@ from service.lives.recomputation import (
     computed_anew,
     corrected_newest,
     loops_anew,
+    reader_with,
     set_aside,
+    test_of,
+    tests_with,
     track,
 )
 from service.lives.run_analysis import LevelFit, analyse, loops_of
@@ -311,7 +314,7 @@ def _evidence(database: Database, state: ClutchState, arrival: Arrival, answer: 
     """What was measured of the clutch, by the run that comes in too."""
     name = arrival.run.run_id
     with database.reading() as connection:
-        stored = measured_lives.evidence(connection, state.clutch_id)
+        stored = stored_runs.evidence(connection, state.clutch_id)
     reader = reader_with(stored_runs.run_reader(database, state.clutch_id), arrival)
     engagement = stored_engagement(answer, arrival.analysis.kept_beside(arrival.run))
     return Evidence(

@@ -10,9 +10,9 @@ from sqlalchemy import Connection
 
 from service import records
 from service.errors import FieldError, InvalidError, NotPossibleNowError
+from service.records import inspection, inspection_answers, inspection_hash, photograph_answer
 from service.schemas.inspection import InspectionIn, MediaType
 from service.schemas.limits import MOST_PHOTOGRAPHS
-from service.stored_inspections import answers, content_hash, inspection, photograph_answer
 from storage import changes, clutches, inspections
 from storage.changes import NewChange
 from storage.engine.database import Database
@@ -29,7 +29,7 @@ def inspect(database: Database, clutch_id: str, sent: InspectionIn, *, by: str, 
     Raises NotFoundError. An archived clutch takes inspections too: it may be taken apart when all tests are made.
     """
     content = sent.model_dump(mode="json")
-    content_sha256 = content_hash(content)
+    content_sha256 = inspection_hash(content)
     with database.writing(of=clutch_id) as connection:
         records.clutch(connection, clutch_id)
         row = NewInspection(
@@ -130,4 +130,4 @@ def _summary(row: InspectionRow, state: str) -> dict[str, Any]:
 
 
 def _answer(connection: Connection, clutch_id: str, inspection_id: str) -> dict[str, Any]:
-    return answers(connection, [inspection(connection, clutch_id, inspection_id)])[0]
+    return inspection_answers(connection, [inspection(connection, clutch_id, inspection_id)])[0]

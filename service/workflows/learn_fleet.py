@@ -13,11 +13,7 @@ from models.prognosis.criteria import FEWEST_CLUTCHES, FEWEST_TESTS_TO_LEARN, HO
 from models.prognosis.ended_lives import EndedLife, declared_end, ended_life, representative, value_when_new
 from models.prognosis.fleet import Taught, population, taught
 from models.prognosis.scoring import measured_end
-from service import measured_lives, records, stored_runs
-from service.background import AtOnce, directly
-from service.executors.executor import Executor
-from service.executors.in_process import InProcess
-from service.executors.rounds import Ended, Ending, in_rounds
+from service import records, stored_runs
 from service.lives.assumptions import ALL_PRESSURES, Assumptions, kind_of
 from service.lives.criteria import MOST_ATTEMPTS
 from service.lives.history import WORN, Life
@@ -26,6 +22,9 @@ from service.lives.payloads import warned_anew
 from service.lives.recomputation import ClutchState, Receipt, Results, track
 from service.lives.tracks import CARRIED, mean_offset_of
 from service.settings import CODE_VERSION
+from service.work.background import AtOnce, directly
+from service.work.executor import Executor, InProcess
+from service.work.rounds import Ended, Ending, in_rounds
 from storage import assumptions, clutches, results
 from storage.assumptions import NOBODY, FleetPriorRow
 from storage.encoding.json_text import Json, to_text
@@ -258,7 +257,7 @@ def _brought_up(
         evidence = None
         if needs_evidence(state):
             reader = stored_runs.recorded(database, state, whole=executor.elsewhere).reader
-            evidence = measured_lives.evidence_for(database, state, reader)
+            evidence = stored_runs.evidence_for(database, state, reader)
         return _Tracked(state=state, receipts=receipts, evidence=evidence)
 
     def store(tracked: _Tracked, retracked: Results) -> bool:

@@ -1,7 +1,7 @@
 """A clutch is registered; what is known already is not changed by posting."""
 
+from service.columns import content_of
 from service.errors import ConflictError
-from service.identity import content_of
 from service.lives.condition import RANK_UNKNOWN
 from service.schemas.clutch import ClutchIn
 from storage import clutches

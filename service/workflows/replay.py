@@ -4,13 +4,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from service import records, stored_runs
-from service.background import AtOnce, directly
 from service.errors import BusyError, ServiceError
-from service.executors.executor import Executor, WorkerLostError
-from service.executors.in_process import InProcess
-from service.executors.rounds import Ending, in_rounds
 from service.lives.criteria import MOST_ATTEMPTS
 from service.stored_runs import Recomputed, Recorded
+from service.work.background import AtOnce, directly
+from service.work.executor import Executor, InProcess, WorkerLostError
+from service.work.rounds import Ending, in_rounds
 from storage import clutches
 from storage.encoding.json_text import Json
 from storage.engine.database import Database

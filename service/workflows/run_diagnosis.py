@@ -4,7 +4,7 @@ import secrets
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from service import records, stored_verdicts
+from service import records
 from service.errors import BusyError
 from service.lives.history import lives_of
 from service.settings import CODE_VERSION
@@ -91,7 +91,7 @@ def finish(
             if jobs.end(connection, job.job_id, state, at, problem=problem, claimer=job.claimed_by):
                 if problem is None:
                     diagnoses.finish(connection, job.job_id, at, ended["report"], ended["extension"])
-                    stored_verdicts.note_dispute(connection, newest.clutch_id)
+                    records.note_dispute(connection, newest.clutch_id)
                 else:
                     diagnoses.fail(connection, job.job_id, at, problem)
             return

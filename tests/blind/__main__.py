@@ -14,9 +14,9 @@ from typing import TypeVar
 
 from rich.console import Console
 
-from service.executors.choice import executor_of
-from service.executors.executor import Executor
-from service.executors.progress import progress
+from service.work.cluster import executor_of
+from service.work.executor import Executor
+from service.work.progress import progress
 from tests.blind import lives, table
 from tests.blind.rows import trials
 from tests.blind.trials import Outcome, judge

@@ -29,12 +29,12 @@ from models.tracking.filters import ukf
 from models.tracking.filters.grid import Grid
 from models.tracking.filters.particle import Particle
 from service import records, stored_runs
-from service.executors.choice import executor_of
 from service.lives import tracks
 from service.queries.cache import to_json
 from service.run_files.json_run import read_run
 from service.run_files.simulated import simulated_body
 from service.schemas.clutch import ClutchIn
+from service.work.cluster import executor_of
 from service.workflows.ingest_run import ingest
 from service.workflows.register_clutch import register
 from service.workflows.replay import clutch_ids, replay
@@ -43,7 +43,7 @@ from storage.engine.opening import open_database
 from storage.tables import clutch, corrected_cof, filter_state, fit, prediction, run
 from storage.transfer.digest import digest
 from tests.scale.copies import multiply, name
-from tests.service.executors.clusters import local_cluster
+from tests.service.work.clusters import local_cluster
 
 AT = "2026-01-01T00:00:00+00:00"
 #: The tables that hold results.

@@ -12,8 +12,8 @@ from functools import partial
 from rich.console import Console
 
 from service.defaults import SCHEDULERS
-from service.executors.choice import executor_of
-from service.executors.progress import progress
+from service.work.cluster import executor_of
+from service.work.progress import progress
 from tests.score import off_prior, on_prior, paper
 from tests.score.after_end import after_end
 from tests.score.belief import belief

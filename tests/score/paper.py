@@ -13,9 +13,8 @@ from models.rig.sampled import DynamicTest
 from models.rig.truth import PROTOCOL_PRESSURES, SimulatedClutch, draw
 from service.columns import RADIANS_PER_SECOND_PER_RPM
 from service.lives.quantities.ends import criterion_end
-from service.lives.quantities.names import QUANTITIES, SLOPE_SPEEDS
-from service.lives.quantities.parameters import posterior_of
-from service.schemas.prognosis.criteria import CriterionIn
+from service.lives.quantities.measured import QUANTITIES, SLOPE_SPEEDS, posterior_of
+from service.schemas.life import CriterionIn
 from tests.score.measured_lives import LEVEL, PLACE, measured_life, until
 
 SHUDDER_RPM = 100.0

@@ -2,12 +2,11 @@
 
 import pytest
 
-from storage import assumptions, clutches, diagnoses, verdicts
+from storage import assumptions, clutches, diagnoses
 from storage.assumptions import AdoptedRow
 from storage.clutches import ClutchRow
-from storage.diagnoses import FAILED, FINISHED, RUNNING, NewDiagnosis
+from storage.diagnoses import FAILED, FINISHED, RUNNING, NewDiagnosis, VerdictRow
 from storage.engine.database import Database
-from storage.verdicts import VerdictRow
 from tests.storage.samples import store_diagnoses
 
 CLUTCH = "bench3-017"
@@ -84,9 +83,9 @@ def stored(database: Database) -> Database:
 
 def test_the_newest_that_finished_is_told(stored: Database) -> None:
     with stored.reading() as connection:
-        said = verdicts.newest(connection, ["a", "b", "nobody"])
-        assert verdicts.newest(connection, []) == {}
-        assert verdicts.newest(connection, ["b"]) == {}
+        said = diagnoses.newest(connection, ["a", "b", "nobody"])
+        assert diagnoses.newest(connection, []) == {}
+        assert diagnoses.newest(connection, ["b"]) == {}
     causes, advice = ("oil_change",), ({"test": "another sweep"},)
     expected = VerdictRow(
         diagnosis_id="d1", life="", verdict="cause_named", causes=causes, advice=advice, adoptable=True, adopted=False
@@ -101,4 +100,4 @@ def test_adopted_is_what_the_model_in_force_came_from(stored: Database) -> None:
                 connection, "a", AdoptedRow(version=version, diagnosis_id=diagnosis_id, adopted_at=AT)
             )
         with stored.reading() as connection:
-            assert verdicts.newest(connection, ["a"])["a"].adopted == (diagnosis_id == "d1")
+            assert diagnoses.newest(connection, ["a"])["a"].adopted == (diagnosis_id == "d1")

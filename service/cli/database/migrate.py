@@ -16,9 +16,11 @@ def migrate(
     Interrupted, it goes on where it was when the command is given again. The target is used by no service until all tables
     are the same on both sides, and every run is as it was sent.
     """
-    from service.executors.progress import progress  # start-up time
-    from service.queries.verification.content import check_runs  # start-up time
-    from service.queries.verification.surfaces import check_inspections  # start-up time
+    from service.queries.verification import (
+        check_inspections,  # start-up time
+        check_runs,  # start-up time
+    )
+    from service.work.progress import progress  # start-up time
     from storage import clutches  # start-up time
     from storage.transfer.transfer import transfer  # start-up time
 

@@ -7,7 +7,7 @@ import typer
 from service.cli.options import DATABASE, Database, Scheduler, err, executor, existing, fail, out
 
 if TYPE_CHECKING:
-    from service.background import AtOnce
+    from service.work.background import AtOnce
 
 
 def replay(
@@ -19,8 +19,8 @@ def replay(
 
     A clutch with a run that this code cannot evaluate keeps the results that it has; the others are gone on with.
     """
-    from service.background import in_background  # start-up time: only this command needs it
-    from service.executors.progress import progress  # start-up time: only this command needs it
+    from service.work.background import in_background  # start-up time: only this command needs it
+    from service.work.progress import progress  # start-up time: only this command needs it
 
     def replay_all(at_once: "AtOnce") -> list[str]:
         from service.workflows import replay as workflow  # start-up time, in the background

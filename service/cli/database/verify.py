@@ -19,10 +19,12 @@ def verify(
 
     Prints what is wrong, a line each; ends with 1 where anything is. Also while the service runs, and for a backup.
     """
-    from service.background import use_one_blas_thread  # start-up time
-    from service.queries.verification.content import check_runs  # start-up time
-    from service.queries.verification.results import check_results  # start-up time
-    from service.queries.verification.surfaces import check_inspections  # start-up time
+    from service.queries.verification import (
+        check_inspections,  # start-up time
+        check_results,  # start-up time
+        check_runs,  # start-up time
+    )
+    from service.work.background import use_one_blas_thread  # start-up time
     from storage import clutches  # start-up time
     from storage.engine.integrity import other_schema  # start-up time
 

@@ -18,9 +18,9 @@ from uvicorn.config import STARTUP_FAILURE
 from uvicorn.supervisors import Multiprocess
 
 from service.app import create_app
-from service.connections import allow_many, bounded
 from service.logging import configure
 from service.settings import Settings
+from service.web.connections import allow_many, bounded
 from service.web.metrics import FOLDER_VARIABLE
 
 #: [s] After which a process that does not answer its parent is taken for hung, and replaced. Chosen: one that starts loads

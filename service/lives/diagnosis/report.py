@@ -1,16 +1,20 @@
 """A report of the diagnosis in the public shape: names and units of the edge, every number finite or null."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from models.arrays import FloatArray
-from models.diagnosis.detection.lack_of_fit import Misfit
-from models.diagnosis.report.report import LoopTrace, Maps, Report
-from models.diagnosis.validation.held_out import Gain
 from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, bar
+
+if TYPE_CHECKING:  # start-up time: they load the whole diagnosis
+    from models.diagnosis.detection.lack_of_fit import Misfit
+    from models.diagnosis.report.report import LoopTrace, Maps, Report
+    from models.diagnosis.validation.held_out import Gain
 
 #: Maps and traces are looked at: more digits than these only weigh.
 _DIGITS = 6

@@ -14,7 +14,7 @@ from models.tracking.sampling import thinned
 from service.columns import whole
 from service.lives.assumptions import Assumptions
 from service.lives.history import Series
-from service.lives.quantities.names import Quantity, place_of
+from service.lives.quantities.measured import Quantity, place_of
 
 #: The coefficients of eq. 6 by their public names.
 COEFFICIENTS = ("initial", "change", "scale_cycles", "exponent")

@@ -1,22 +1,211 @@
-"""A life with all that was measured in it: the series of any quantity, at each pressure, speed or frequency."""
+"""The quantities that are followed along a life, and a life with all that was measured in it.
+
+Public names, units and places; the series of any quantity at each pressure, speed or frequency; the eq. 6 of a series by any
+filter, and of every Stribeck parameter; and what is known of all four parameters together at one pressure.
+"""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
 
+from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.friction.slope import cof_slope
-from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
-from service.lives.assumptions import ALL_PRESSURES, Assumptions
-from service.lives.criteria import FEWEST_SPEEDS
-from service.lives.history import DYNAMIC, Life, Series, nearest, nearest_pressure
-from service.lives.quantities.names import SLOPE, SLOPE_SPEEDS, Family, Quantity
-from service.lives.quantities.parameters import parameter_series, tests_of
+from models.friction.stribeck import PARAMETER_NAMES
+from models.prognosis.back_cast import BackCast
+from models.prognosis.criteria import FEWEST_TESTS
+from models.prognosis.from_parameters import PressureLevel
+from models.prognosis.slope_paths import slope_paths
+from models.tracking.filters.grid import Grid
+from models.tracking.posterior import Posterior, mixture
+from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, bar, whole
+from service.errors import FieldError, InvalidError, NotFoundError
+from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions
+from service.lives.criteria import FEWEST_SPEEDS, TRAJECTORY_DRAWS, TRAJECTORY_LATTICE
+from service.lives.engagements import ALL_INDICATORS
+from service.lives.history import DYNAMIC, Life, Series, lives_of, nearest, nearest_pressure
+from service.lives.payloads import PARAMETER_UNITS
+from service.lives.recomputation import ClutchState
 from service.lives.run_analysis import LevelFit, Value
-from service.lives.tracks import States
+from service.lives.tracks import States, advance, drawn, step_rng
+from service.schemas.life import ALIASES
+
+
+class Family(StrEnum):
+    """What a quantity comes from: mean COF, a fitted parameter, a curve's slope, a friction loop, an engagement."""
+
+    MEAN_COF = "mean_cof"
+    PARAMETER = "parameter"
+    SLOPE = "slope"
+    LAG = "lag"
+    ENGAGEMENT = "engagement"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantity:
+    """A quantity by its public name, the name that series of it have, its unit and its family."""
+
+    name: str
+    internal: str
+    unit: str
+    family: Family
+
+
+SLOPE = "slope"
+#: The speeds [rpm] at which slopes are stated where nothing else is said. Chosen: where a driveline shudders, creeping.
+SLOPE_SPEEDS = (50.0, 100.0, 500.0)
+
+QUANTITIES: Mapping[str, Quantity] = {
+    quantity.name: quantity
+    for quantity in (
+        Quantity(name=MEAN_COF, internal=MEAN_COF, unit="1", family=Family.MEAN_COF),
+        *(
+            Quantity(name=public, internal=internal, unit=unit, family=Family.PARAMETER)
+            for internal, (public, unit) in PARAMETER_UNITS.items()
+        ),
+        Quantity(name=SLOPE, internal=SLOPE, unit="s/m", family=Family.SLOPE),
+        Quantity(name="attractor", internal="attractor", unit="Nm/s", family=Family.LAG),
+        Quantity(name="film_time", internal="film_time", unit="s", family=Family.LAG),
+        Quantity(name="loop_area", internal="loop_area", unit="Nm·m/s", family=Family.LAG),
+        *(
+            Quantity(name=name, internal=name, unit=indicator.unit, family=Family.ENGAGEMENT)
+            for name, indicator in ALL_INDICATORS.items()
+        ),
+    )
+}
+_BY_INTERNAL = {quantity.internal: quantity for quantity in QUANTITIES.values()}
+
+
+def quantity_named(name: str) -> Quantity:
+    """The quantity of a public name, of another name that criteria may have, or of a parameter's name without its unit.
+
+    Raises InvalidError for any other.
+    """
+    quantity = QUANTITIES.get(ALIASES.get(name, name)) or _BY_INTERNAL.get(name)
+    if quantity is None:
+        message = f"quantity must be one of {', '.join(QUANTITIES)}, got {name!r}"
+        raise InvalidError(message, errors=[FieldError(pointer="/query/quantity", code="unknown", message=message)])
+    return quantity
+
+
+def place_of(series: Series) -> dict[str, float | None]:
+    """Where a series was measured, as answers show it; null: over all pressures, or at no speed or frequency of its own."""
+    pressure = None if series.pressure == ALL_PRESSURES else bar(series.pressure)
+    return {"pressure_bar": pressure, "speed_rpm": series.speed_rpm, "frequency_hz": series.frequency_hz}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChosenLife:
+    """A life (None: there was none yet), what it is tracked under, its number from 1 on and how many lives there are."""
+
+    life: Life | None
+    assumptions: Assumptions
+    number: int
+    of: int
+
+    def item(self) -> dict[str, Any]:
+        """As answers name it."""
+        return {
+            "number": self.number,
+            "of": self.of,
+            "from_cycles": None if self.life is None else whole(self.life.origin),
+            "rebuild": None if self.life is None else self.life.name or None,
+        }
+
+
+def chosen_life(state: ClutchState, number: int | None = None, at_cycles: float | None = None) -> ChosenLife:
+    """Life `number` of a clutch (None: the one that lasts at `at_cycles`, or at present), up to `at_cycles`.
+
+    Each life is tracked under what was adopted for it. Raises NotFoundError where there is no such life.
+    """
+    lives = state.lives
+    if number is not None and not 1 <= number <= len(lives):
+        raise NotFoundError(f"the clutch has {len(lives)} lives, there is no life {number}")
+    until = lives if at_cycles is None else lives_of([event for event in state.events if event.cycles <= at_cycles])
+    index = len(until) if number is None else number
+    if not 1 <= index <= len(until):
+        return ChosenLife(life=None, assumptions=state.assumptions(), number=max(index, 1), of=len(lives))
+    life = until[index - 1]
+    adopted = next((a for a in state.adoptions if a is not None and a.life == lives[index - 1].name), None)
+    under = state.extension if index == len(lives) else None if adopted is None else adopted.extension
+    return ChosenLife(
+        life=life, assumptions=state.assumptions_under(under, lives[index - 1]), number=index, of=len(lives)
+    )
+
+
+#: A series and a weighted sample of its eq. 6.
+Track = tuple[Series, Posterior]
+
+_NODES, _ROWS, _LEVELS = TRAJECTORY_LATTICE
+_GRID = Grid(nodes=_NODES, rows=_ROWS, levels=_LEVELS)
+
+
+def posterior_of(clutch_id: str, series: Series, assumptions: Assumptions, method: str = _GRID.name) -> Posterior:
+    """A weighted sample of a series' eq. 6, the same each time; by the exact filter on a lattice fit for plots, else by the
+    filter of that name taken through all measurements."""
+    if method != _GRID.name:
+        runs = len(series.measurements)
+        tracked = advance(clutch_id, method, series, assumptions, None, runs, back_cast=BackCast.nothing())
+        return drawn(clutch_id, method, series, assumptions, tracked)
+    parts = []
+    for weight, measurements in series.weighted:
+        posteriors = {}
+        for name, prior in assumptions.priors(series.quantity, measurements[0], series.scale).items():
+            state = _GRID.from_history(prior, measurements)
+            rng = step_rng(clutch_id, f"trajectory-{name}", series, len(measurements))
+            posteriors[name] = _GRID.posterior(state, math.ceil(TRAJECTORY_DRAWS / len(series.weighted)), rng)
+        parts.append((weight, assumptions.pooled(posteriors, measurements[0], series.scale)))
+    return parts[0][1] if len(parts) == 1 else mixture(parts)
+
+
+def tests_of(life: Life, fits: Mapping[str, Sequence[LevelFit]]) -> list[Sequence[LevelFit]]:
+    """The levels of each of a life's events, none where it is no test."""
+    return [fits.get(event.run_id, ()) for event in life.events]
+
+
+def parameter_series(
+    life: Life, assumptions: Assumptions, tests: Sequence[Sequence[LevelFit]], name: str
+) -> list[Series]:
+    """One Stribeck parameter at every reference pressure, by the fits that determine it."""
+    column = PARAMETER_NAMES.index(name)
+    values = [_parameter(levels, name, column) for levels in tests]
+    return [
+        life.series(assumptions, name, level, [nearest(level, of_test) for of_test in values])
+        for level in life.reference
+    ]
+
+
+def parameter_tracks(
+    clutch_id: str,
+    life: Life,
+    assumptions: Assumptions,
+    tests: Sequence[Sequence[LevelFit]],
+    method: str = _GRID.name,
+    pressures: Collection[float] | None = None,
+) -> dict[tuple[str, float], Track]:
+    """The eq. 6 of Stribeck parameters at every reference pressure where they are known, by name and pressure [Pa]."""
+    return {
+        (name, series.pressure): (series, posterior_of(clutch_id, series, assumptions, method))
+        for name in PARAMETER_NAMES
+        for series in parameter_series(life, assumptions, tests, name)
+        if series.measurements and (pressures is None or series.pressure in pressures)
+    }
+
+
+def _parameter(levels: Sequence[LevelFit], name: str, column: int) -> dict[float, Value]:
+    return {
+        level.fit.pressure: (
+            float(level.fit.parameters.as_array()[column]),
+            float(level.fit.covariance[column, column] ** 0.5),
+        )
+        for level in levels
+        if name not in level.fit.undetermined
+    }
+
 
 #: What a receipt's loop calls the quantities of the lag and their deviations.
 LOOP_COLUMNS = {
@@ -132,3 +321,58 @@ def _values(loops: Sequence[Mapping[str, Any]], columns: tuple[str, str], freque
 def rounded_frequency(frequency: float) -> float:
     """A frequency > 0 [Hz] to _DIGITS significant digits."""
     return round(frequency, _DIGITS - 1 - math.floor(math.log10(frequency)))
+
+
+#: Tracks of the parameters by name and pressure [Pa].
+ParameterTracks = Mapping[tuple[str, float], Track]
+
+
+def pressure_level(measured: MeasuredLife, tracks: ParameterTracks, direct: Track, pressure: float) -> PressureLevel:
+    """What is known at a reference pressure [Pa]: its tracks, and the tests whose fit determines all four parameters.
+
+    `direct` is mean COF at that pressure. Raises KeyError where a parameter has no track there.
+    """
+    series, posterior = direct
+    progress, fits = [], []
+    for event, levels in zip(measured.life.events, measured.tests, strict=True):
+        determined = {level.fit.pressure: level.fit for level in levels if not level.fit.undetermined}
+        near = nearest_pressure(pressure, list(determined))
+        if near is not None:
+            progress.append(float(series.scale.progress(event.cycles)))
+            fits.append(determined[near])
+    return PressureLevel(
+        progress=np.array(progress),
+        parameters=np.array([fit.parameters.as_array() for fit in fits]),
+        covariance=np.array([fit.unbiased_covariance for fit in fits]),
+        parameter_tracks=[tracks[name, pressure][1] for name in PARAMETER_NAMES],
+        tests=series.events,
+        cof_progress=np.array([measurement.progress for measurement in series.measurements]),
+        cof=np.array([measurement.value for measurement in series.measurements]),
+        cof_track=posterior,
+        torque_per_cof=_torque_per_cof(measured, pressure),
+        reference_cof=measured.life.reference[pressure][0],
+    )
+
+
+def slopes_along(
+    measured: MeasuredLife, tracks: ParameterTracks, direct: Track, speed_rpm: float, progress: FloatArray
+) -> FloatArray | None:
+    """dμ/dv [k, n] at a speed and progress [k] in joint draws of the parameters at the pressure of the `direct` track of
+    mean COF, the same each time; None with too few tests."""
+    series, _ = direct
+    if not all((name, series.pressure) in tracks for name in PARAMETER_NAMES):
+        return None
+    level = pressure_level(measured, tracks, direct, series.pressure)
+    if np.unique(level.progress).size < FEWEST_TESTS:
+        return None
+    velocity = float(measured.geometry.sliding_velocity(np.array(speed_rpm * RADIANS_PER_SECOND_PER_RPM)))
+    rng = step_rng(measured.clutch_id, f"slope@{speed_rpm:g}rpm", series, level.progress.size)
+    return slope_paths(level, velocity, progress, rng)
+
+
+def _torque_per_cof(measured: MeasuredLife, pressure: float) -> float:
+    """Torque [Nm] of a COF of one at a level, by the pressure that the reference test measured there."""
+    tests = zip(measured.life.events, measured.tests, strict=True)
+    reference = next((levels for event, levels in tests if event.cofs and levels), ())
+    means = {level.fit.pressure: (level.mean_pressure, 0.0) for level in reference}
+    return measured.geometry.torque_per_cof((nearest(pressure, means) or (pressure, 0.0))[0])

@@ -28,7 +28,7 @@ from service.schemas.alarm import (
     WebhookPage,
 )
 from service.schemas.limits import IDENTIFIER_PATTERN, LONGEST_IDENTIFIER
-from service.web.answers import JSON_TYPE, answer, described_body, json_body, now
+from service.web.answers import JSON_TYPE, answer, described_body, json_body, now, until_ended
 from service.web.auth import (
     Admin,
     OwnAdmin,
@@ -42,7 +42,6 @@ from service.web.auth import (
 from service.web.context import Context, Cursor, Limit
 from service.web.limits import USUAL_ITEMS
 from service.web.problems import CHANGING, READING, SENDING
-from service.web.routes.waiting import until_ended
 from service.workflows import change_alarms, change_webhooks
 
 router = APIRouter(prefix="/v1/alarms", tags=["alarms"])

@@ -8,7 +8,6 @@ from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
-from service.jobs.workers import CHANGE_SECONDS, Lane
 from service.lists import from_cursor, page
 from service.queries import clutch_list, runs
 from service.queries.cache import to_json
@@ -43,6 +42,7 @@ from service.web.context import Context, Cursor, Limit
 from service.web.limits import USUAL_ITEMS
 from service.web.middleware import remember
 from service.web.problems import CHANGING, READING, SENDING
+from service.work.workers import CHANGE_SECONDS, Lane
 from service.workflows import register_clutch as registration
 from service.workflows.edit_clutch import edit
 from storage.clutches import Choice

@@ -8,20 +8,19 @@ from fastapi import APIRouter, Header, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
-from service.jobs.workers import CHANGE_SECONDS, Lane
 from service.lists import from_cursor, page
 from service.logging import request_id
-from service.queries import diagnoses, model
+from service.queries import diagnoses
 from service.queries.cache import to_json
 from service.run_files.json_run import checked
 from service.schemas.diagnosis import DiagnosisIn, DiagnosisOut, DiagnosisPage, ModelIn, ModelOut
 from service.schemas.parameters import ClutchId, DiagnosisId
-from service.web.answers import JSON_TYPE, answer, described_body, json_body, now, preferred_wait
+from service.web.answers import JSON_TYPE, answer, described_body, json_body, now, preferred_wait, until_ended
 from service.web.auth import Admin, Ingester, Reader, name_of_caller, require
 from service.web.context import Cursor, Limit
 from service.web.limits import USUAL_ITEMS, WAIT_SECONDS
 from service.web.problems import READING, SENDING
-from service.web.routes.waiting import until_ended
+from service.work.workers import CHANGE_SECONDS, Lane
 from service.workflows import adopt_model, run_diagnosis
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["diagnosis"])
@@ -83,7 +82,7 @@ async def read_diagnosis(request: Request, context: Reader, clutch_id: ClutchId,
 @router.get("/model", response_model=ModelOut, responses=READING)
 async def read_model(request: Request, context: Reader, clutch_id: ClutchId) -> Response:
     """The model that tracking and remaining life use, and all that were adopted."""
-    return await answer(request, lambda: model.model(context.database, clutch_id))
+    return await answer(request, lambda: diagnoses.model(context.database, clutch_id))
 
 
 @router.put(
@@ -106,5 +105,5 @@ async def put_model(request: Request, context: Admin, clutch_id: ClutchId) -> Re
         seconds=CHANGE_SECONDS,
     )
     await asyncio.wrap_future(adopting)
-    answered = await run_in_threadpool(model.model, context.database, clutch_id)
+    answered = await run_in_threadpool(diagnoses.model, context.database, clutch_id)
     return Response(content=to_json(answered), media_type=JSON_TYPE)

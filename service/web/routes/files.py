@@ -10,9 +10,8 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
 from service.errors import NoRoomError
-from service.jobs.workers import Lane
 from service.queries import rigs
-from service.queries.raw_run.answer import copy_file, file_sha256
+from service.queries.raw_run import copy_file, file_sha256
 from service.readers.read_file import reading_of
 from service.run_files.upload import read_file_run
 from service.schemas.base import Origin
@@ -36,6 +35,7 @@ from service.web.answers import JSON_TYPE, now, unchanged
 from service.web.auth import Ingester, Reader, name_of_caller
 from service.web.files import received, streamed
 from service.web.problems import READING, SENDING, described
+from service.work.workers import Lane
 from service.workflows.ingest_run import ingest_posted
 from storage.encoding.json_text import to_text
 

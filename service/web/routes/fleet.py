@@ -6,7 +6,7 @@ from fastapi.responses import Response
 from service.lists import ALL_ITEMS, from_cursor, sliced
 from service.queries import fleet_priors, scores
 from service.schemas.fleet import FleetPriorPage, FleetScores
-from service.schemas.prognosis.life import Method
+from service.schemas.life import Method
 from service.web.answers import answer, computed_of_each
 from service.web.auth import Reader
 from service.web.context import Cursor, Whole

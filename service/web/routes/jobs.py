@@ -7,19 +7,18 @@ from fastapi import APIRouter, Header, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
-from service.jobs import listing
 from service.lists import from_cursor, page
 from service.logging import request_id
+from service.queries import jobs
 from service.queries.cache import to_json
 from service.run_files.json_run import checked
 from service.schemas.diagnosis import JobIn, JobOut, JobPage
 from service.schemas.parameters import JobId, OfState
-from service.web.answers import JSON_TYPE, answer, described_body, json_body, now, preferred_wait
+from service.web.answers import JSON_TYPE, answer, described_body, json_body, now, preferred_wait, until_ended
 from service.web.auth import OwnAdmin, OwnReader, name_of_caller, own_clutches, require_clutch
 from service.web.context import Cursor, Limit
 from service.web.limits import USUAL_ITEMS
 from service.web.problems import READING, SENDING
-from service.web.routes.waiting import until_ended
 from service.workflows import ask_job, cancel_job
 from storage.jobs import OPEN
 
@@ -52,13 +51,13 @@ async def post_job(request: Request, context: OwnAdmin, prefer: Prefer = None) -
     new_or_open = await run_in_threadpool(ask, context.database, wanted.kind, wanted.clutch_id)
     context.jobs.wake()
     wait = preferred_wait(prefer)
-    look = partial(listing.find, context.database, new_or_open.job_id, only=None)
+    look = partial(jobs.find, context.database, new_or_open.job_id, only=None)
     row = await until_ended(look, lambda job: job.state not in OPEN, wait or 0)
     headers = {"Location": f"/v1/jobs/{row.job_id}"}
     if wait is not None:
         headers["Preference-Applied"] = f"wait={wait}"
     status = 202 if row.state in OPEN else 200
-    return Response(content=to_json(listing.shown(row)), status_code=status, media_type=JSON_TYPE, headers=headers)
+    return Response(content=to_json(jobs.shown(row)), status_code=status, media_type=JSON_TYPE, headers=headers)
 
 
 @router.get("", response_model=JobPage, responses=READING)
@@ -67,7 +66,7 @@ async def list_jobs(
 ) -> Response:
     """Jobs of the clutches that the key is for, newest first."""
     after, own = from_cursor(cursor), own_clutches(request)
-    listed = partial(listing.page, context.database, limit=limit, after=after, state=state, only=own)
+    listed = partial(jobs.page, context.database, limit=limit, after=after, state=state, only=own)
     return await answer(request, lambda: page(*listed()))
 
 
@@ -75,13 +74,13 @@ async def list_jobs(
 async def read_job(request: Request, context: OwnReader, job_id: JobId) -> Response:
     """One job, how far it has come and how it ended."""
     own = own_clutches(request)
-    return await answer(request, lambda: listing.shown(listing.find(context.database, job_id, only=own)))
+    return await answer(request, lambda: jobs.shown(jobs.find(context.database, job_id, only=own)))
 
 
 @router.delete("/{job_id}", response_model=JobOut, responses=READING)
 async def delete_job(request: Request, context: OwnAdmin, job_id: JobId) -> Response:
     """Cancel a job: one that waits is not begun, one that runs is ended in seconds. One that has ended stays as it is."""
-    row = await run_in_threadpool(listing.find, context.database, job_id, only=own_clutches(request))
+    row = await run_in_threadpool(jobs.find, context.database, job_id, only=own_clutches(request))
     cancel = partial(cancel_job.cancel, context.database, row, by=name_of_caller(request), at=now())
     cancelled = await run_in_threadpool(cancel)
-    return Response(content=to_json(listing.shown(cancelled)), media_type=JSON_TYPE)
+    return Response(content=to_json(jobs.shown(cancelled)), media_type=JSON_TYPE)

@@ -5,7 +5,6 @@ import asyncio
 from fastapi import APIRouter, Request
 from fastapi.responses import Response
 
-from service.jobs.workers import Lane
 from service.lists import ALL_ITEMS, from_cursor, paged
 from service.lives.tracks import CARRIED
 from service.queries import runs, scores
@@ -15,23 +14,22 @@ from service.queries.cache import to_json
 from service.queries.degradation import arguments as degradation_arguments
 from service.queries.degradation import degradation as degradation_of
 from service.queries.engagement import engaged
-from service.queries.life.criteria import life_by_criteria
-from service.queries.life.planned_duty import planned_life
-from service.queries.life.remaining_life import NO_CRITERIA, criteria_of, remaining_life
+from service.queries.planned_duty import planned_life
+from service.queries.remaining_life import NO_CRITERIA, criteria_of, life_by_criteria, remaining_life
 from service.queries.surfaces import surface
 from service.run_files.json_run import checked
 from service.schemas.curves import LoopPage, SeriesPage, StribeckPage
 from service.schemas.degradation import Degradation, Surfaces
 from service.schemas.engagement import EngagementOut
 from service.schemas.fleet import Scores
+from service.schemas.life import Method, PlannedLife, ProgrammeIn, RemainingLife
 from service.schemas.parameters import ClutchId, Draws, EngagementRun, LifeNumber, Quantity, TrackedQuantity
-from service.schemas.prognosis.life import Method, RemainingLife
-from service.schemas.prognosis.programme import PlannedLife, ProgrammeIn
 from service.web.answers import JSON_TYPE, clutch_answer, clutch_bytes, computed_answer, described_body, json_body
 from service.web.auth import Reader
 from service.web.context import AtCycles, Cursor, Limit, Prefer, PressureBar, Whole
 from service.web.limits import USUAL_ITEMS
 from service.web.problems import CHANGING, READING
+from service.work.workers import Lane
 
 router = APIRouter(prefix="/v1/clutches/{clutch_id}", tags=["remaining life"])
 

@@ -10,7 +10,6 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
 from service.errors import FieldError, InvalidError
-from service.jobs.workers import Lane
 from service.lists import from_cursor
 from service.queries import rigs
 from service.queries.cache import to_json
@@ -25,6 +24,7 @@ from service.web.context import Context, Cursor, Limit
 from service.web.files import received
 from service.web.limits import USUAL_ITEMS
 from service.web.problems import CHANGING, READING, SENDING
+from service.work.workers import Lane
 from service.workflows.save_rig import save
 
 router = APIRouter(prefix="/v1/rigs", tags=["rigs"])

@@ -12,10 +12,9 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import Response
 
 from service.errors import NotAcceptableError, NotFoundError
-from service.jobs.workers import CHANGE_SECONDS, Lane
 from service.lists import from_cursor
 from service.queries import runs
-from service.queries.raw_run.answer import Kind, entity_tag, write_run
+from service.queries.raw_run import Kind, entity_tag, write_run
 from service.run_files.json_run import checked, read_run, read_run_on_disk
 from service.schemas.parameters import ClutchId, Points, RunId, State
 from service.schemas.run import RUN_IN, Confirmation, Correction, Receipt, RunOut, RunPage, Withdrawal
@@ -25,6 +24,7 @@ from service.web.context import Context, Cursor, Limit
 from service.web.files import PARQUET_TYPE, kept_body, preferred, streamed
 from service.web.limits import LARGE_BODY_BYTES, USUAL_ITEMS
 from service.web.problems import CHANGING, READING, SENDING, described
+from service.work.workers import CHANGE_SECONDS, Lane
 from service.workflows import change_run
 from service.workflows.ingest_run import ingest_posted
 from storage.encoding.json_text import to_text

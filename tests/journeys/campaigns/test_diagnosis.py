@@ -61,7 +61,7 @@ def _children_end(database: Path) -> bool:
     deadline = time.monotonic() + 120
     while time.monotonic() < deadline:
         commands = [path.read_bytes() for path in Path("/proc").glob("[0-9]*/cmdline") if _readable(path)]
-        if not any(b"service.jobs.diagnosis" in command and str(database).encode() in command for command in commands):
+        if not any(b"service.work.diagnosis" in command and str(database).encode() in command for command in commands):
             return True
         time.sleep(0.1)
     return False

@@ -17,8 +17,7 @@ import httpx2
 import numpy as np
 import pytest
 
-from service.queries.verification.content import check_runs
-from service.queries.verification.results import check_results
+from service.queries.verification import check_results, check_runs
 from service.workflows.adopt_model import adopt
 from storage import assumptions, channels, clutches, runs
 from storage.engine.integrity import other_schema

@@ -10,10 +10,9 @@ import pytest
 from models.prognosis.criteria import QUANTILES
 from service.lives.condition import STATES, bound_in_words, state_of, top_line
 from service.queries import clutch_list, degradation, series
-from service.queries.life.criteria import life_by_criteria
-from service.queries.life.planned_duty import planned_life
-from service.queries.life.remaining_life import remaining_life, rows
-from service.schemas.prognosis.programme import ProgrammeIn
+from service.queries.planned_duty import planned_life
+from service.queries.remaining_life import life_by_criteria, remaining_life, rows
+from service.schemas.life import ProgrammeIn
 from service.workflows.replay import replay_clutch
 from tests.service.workflows.benches import CLUTCH, Bench, body, stood_in
 

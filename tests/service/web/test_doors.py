@@ -17,8 +17,8 @@ from service.queries import scores
 from service.web import limits
 from storage.encoding.json_text import to_text
 from tests.service.clients import client_on
-from tests.service.test_connections import resident
 from tests.service.web.routes.granting import context_of
+from tests.service.web.test_connections import resident
 from tests.service.web.test_stopping import family
 from tests.support import ONCE, serving, stationary
 

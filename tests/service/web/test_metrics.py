@@ -137,7 +137,7 @@ def test_series_of_every_clutch_are_there_where_they_are_asked_for(database_url:
 #: One of several processes at a port: it counts two requests and a call, then says all metrics.
 ONE_OF_SEVERAL = """
 import sys
-from service.jobs.workers import Lane
+from service.work.workers import Lane
 from service.web.metrics import Metrics
 from storage.engine.opening import open_database
 metrics = Metrics()

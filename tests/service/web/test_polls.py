@@ -15,7 +15,7 @@ from service.web.context import Context
 from service.web.middleware import Polls
 from storage import keys
 from storage.engine.errors import DatabaseBusy
-from tests.service.test_connections import resident
+from tests.service.web.test_connections import resident
 from tests.support import serving, stationary
 
 POLLED = (

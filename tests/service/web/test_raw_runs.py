@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from service.queries.raw_run import answer
+from service.queries import raw_run
 from storage import channels
 from tests.support import stationary
 
@@ -86,7 +86,7 @@ def test_without_the_extra_parquet_is_406(
     def missing(name: str) -> str:
         raise metadata.PackageNotFoundError(name)
 
-    monkeypatch.setattr("service.queries.raw_run.formats.version", missing)
+    monkeypatch.setattr("service.queries.raw_run.version", missing)
     problem = client.get(f"{RUNS}/raw", headers={"Accept": PARQUET})
     assert (problem.status_code, problem.headers["content-type"]) == (406, "application/problem+json")
     assert "pip install -e '.[parquet]'" in problem.json()["detail"]
@@ -105,7 +105,7 @@ def test_what_is_known_is_not_decoded_nor_sent(
     assert tag.startswith('"')
     assert client.get(f"{RUNS}/raw{question}", headers=headers).content == first.content
     monkeypatch.setattr(channels, "stored", None)
-    monkeypatch.setattr(answer, "write_run", None)
+    monkeypatch.setattr(raw_run, "write_run", None)
     held = client.get(f"{RUNS}/raw{question}", headers=headers | {"If-None-Match": f'"other", W/{tag}'})
     assert (held.status_code, held.content, held.headers["etag"]) == (304, b"", tag)
 

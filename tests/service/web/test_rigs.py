@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from service.queries.verification.content import check_runs
-from service.queries.verification.results import check_results
+from service.queries.verification import check_results, check_runs
 from storage.channels import FILE
 from storage.engine.opening import open_database
 from storage.tables import channel

@@ -17,8 +17,7 @@ from models.diagnosis.extension import Extension
 from service.errors import Notice
 from service.lives.history import Shown
 from service.lives.plausibility.doubts import Judged
-from service.queries import clutch_list, degradation, runs, scores, series, stribeck
-from service.queries.life import remaining_life
+from service.queries import clutch_list, degradation, remaining_life, runs, scores, series, stribeck
 from service.run_files.json_run import read_run
 from service.schemas.clutch import ClutchIn
 from service.web.answers import to_json

@@ -180,6 +180,6 @@ def raising(campaign: Campaign, *, rng: np.random.Generator) -> Report:  # noqa:
 
 
 _main = sys.modules["__main__"].__spec__
-if _main is not None and _main.name == "service.jobs.diagnosis":
+if _main is not None and _main.name == "service.work.diagnosis":
     for _name, _method in METHODS.items():
         setattr(Extension, _name, _method)

@@ -11,7 +11,7 @@ from service.errors import ConflictError, NotFoundError, NotPossibleNowError
 from service.lives.plausibility import doubts as rules
 from service.queries import diagnoses as diagnosis_query
 from service.queries import runs as run_query
-from service.queries.raw_run.answer import write_run
+from service.queries.raw_run import write_run
 from service.run_files.json_run import read_run
 from service.web.answers import to_json
 from service.workflows import change_run, ingest_run, run_diagnosis

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from service.queries import clutch_list
-from service.queries.life.remaining_life import remaining_life
+from service.queries.remaining_life import remaining_life
 from service.workflows import replay, run_diagnosis
 from service.workflows.edit_clutch import edit
 from storage import clutches, diagnoses, jobs

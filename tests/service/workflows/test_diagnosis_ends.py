@@ -11,8 +11,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from models.diagnosis.extension import Extension
-from service.jobs.queue import MOST_ATTEMPTS
 from service.schemas.diagnosis import DiagnosisOut, JobPage
+from service.work.queue import MOST_ATTEMPTS
 from service.workflows import adopt_model
 from tests.service.workflows import stand_in_engine
 from tests.service.workflows.diagnosing import BASE, diagnosed, post_tests, service
@@ -39,7 +39,7 @@ def test_a_diagnosis_that_breaks_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, engine: str, problem: str
 ) -> None:
     if engine == "endless":
-        monkeypatch.setattr("service.jobs.kinds.CLOCK_PER_PROCESSOR_SECOND", 0.05)
+        monkeypatch.setattr("service.work.queue.CLOCK_PER_PROCESSOR_SECOND", 0.05)
     with service(tmp_path, engine, diagnosis_seconds=4 if engine == "computing" else 120) as client:
         answer = client.post(f"{BASE}/diagnoses", json={"adopt": True}, headers={"Prefer": "wait=120"})
         DiagnosisOut.model_validate(answer.json())

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from service.cli import connection
 from service.cli.main import app
 from tests.models.engagements.closed_forms import constant
-from tests.service.lives.engagements.test_over_life import engaged, sent
+from tests.service.lives.test_over_life import engaged, sent
 from tests.support import stationary
 
 Terminal = Callable[..., str]

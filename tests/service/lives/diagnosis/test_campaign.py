@@ -10,9 +10,9 @@ from fastapi.testclient import TestClient
 from models.diagnosis.campaign import Campaign, EventKind
 from models.diagnosis.design.design import build_design
 from models.records.runs import Record
-from service.jobs.diagnosis import read_life
 from service.lives.diagnosis import campaign as campaign_module
 from service.lives.diagnosis.campaign import DiagnosedLife, thinned
+from service.work.diagnosis import read_life
 from storage.engine.opening import open_database
 from tests.service.run_files.test_upload import dynamic_record, raw_record
 from tests.support import PRESSURES_BAR, SPEEDS_RPM, stationary

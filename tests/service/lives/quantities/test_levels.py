@@ -4,8 +4,7 @@ import numpy as np
 
 from models.loops.lag_fit import StationaryCurve
 from models.rig.truth import draw
-from service.lives.quantities.levels import pressure_level
-from service.lives.quantities.parameters import parameter_tracks, posterior_of
+from service.lives.quantities.measured import parameter_tracks, posterior_of, pressure_level
 from tests.score.measured_lives import PLACE, measured_life
 
 

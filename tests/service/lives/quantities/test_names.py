@@ -2,8 +2,8 @@
 
 from typing import get_args
 
-from service.lives.quantities.names import QUANTITIES, Family
-from service.schemas.prognosis.quantities import EngagementQuantity, LoopQuantity, ParameterQuantity, QuantityName
+from service.lives.quantities.measured import QUANTITIES, Family
+from service.schemas.life import EngagementQuantity, LoopQuantity, ParameterQuantity, QuantityName
 
 
 def test_every_quantity_that_is_followed_may_be_asked_for_and_no_other() -> None:

@@ -8,7 +8,7 @@ from models.tracking.prior import weak
 from service.lives.assumptions import ALL_PRESSURES, MEAN_COF, Assumptions, Scale
 from service.lives.history import Series
 from service.lives.quantities.items import track_item
-from service.lives.quantities.names import QUANTITIES
+from service.lives.quantities.measured import QUANTITIES
 from tests.models.prognosis.test_course_shares import accelerating
 from tests.models.tracking.tracked_series import CAMPAIGN
 

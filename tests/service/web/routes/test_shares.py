@@ -13,10 +13,10 @@ from fastapi.testclient import TestClient
 
 from service.app import create_app
 from service.errors import BusyError
-from service.jobs.workers import Lane
 from service.settings import Settings
-from tests.service.jobs import calls
+from service.work.workers import Lane
 from tests.service.web.routes.granting import context_of, granted
+from tests.service.work import calls
 from tests.support import serving, stationary
 
 CLUTCHES = "/v1/clutches"

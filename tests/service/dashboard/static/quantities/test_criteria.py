@@ -5,7 +5,7 @@ from typing import Any, get_args
 
 import pytest
 
-from service.schemas.prognosis.quantities import QuantityName
+from service.schemas.life import QuantityName
 from tests.browser.modules import Module
 
 pytestmark = pytest.mark.browser

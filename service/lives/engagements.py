@@ -1,0 +1,238 @@
+"""Measured engagements: that of one run, evaluated in the public names and units, and those of a clutch over its lives.
+
+The reference of a life is made of its first engagements after the run-in; those of another initial speed or pressure than
+the very first are of another duty, and are neither part of it nor compared with it.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.clutch import Geometry
+from models.engagements.comparison import Comparison, Reference, SpeedCourse, compared, reference_of, same_duty
+from models.engagements.criteria import REFERENCES
+from models.engagements.local_fit import Estimate
+from models.engagements.measured import MeasuredEngagement, measured_engagement
+from models.engagements.refusal import Refusal
+from service.columns import CHANNELS, PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
+from service.lives.incoming_run import IncomingRun, sampled_record
+
+#: The indicators of a run's engagement, or why it has none.
+Engagement: TypeAlias = MeasuredEngagement | Refusal
+
+#: Kinds of runs that may carry the record of an engagement.
+DUTY_KINDS = ("duty_cycles", "run_in")
+#: Where a run's own comparison course stands among what is kept beside its channels.
+COURSE = "engagement_course"
+DETERMINED = "determined"
+NO_ENGAGEMENT = "no_engagement"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Indicator:
+    """An indicator at the edge: public value = SI value / factor."""
+
+    unit: str
+    factor: float = 1.0
+
+
+#: The indicators of one engagement by public name; `models.engagements.measured` has them under the names beside.
+INDICATORS: Mapping[str, Indicator] = {
+    "stop_time_s": Indicator(unit="s"),
+    "engagement_energy_kj": Indicator(unit="kJ", factor=1000.0),
+    "peak_power_kw": Indicator(unit="kW", factor=1000.0),
+    "initial_cof": Indicator(unit="1"),
+    "midpoint_cof": Indicator(unit="1"),
+    "endpoint_cof": Indicator(unit="1"),
+    "breakaway_cof": Indicator(unit="1"),
+    "initial_cof_ratio": Indicator(unit="1"),
+    "endpoint_cof_ratio": Indicator(unit="1"),
+    "breakaway_cof_ratio": Indicator(unit="1"),
+    "torque_rise": Indicator(unit="1"),
+}
+_FIELDS = (
+    "stop_time", "energy", "peak_power", "initial_cof", "midpoint_cof", "endpoint_cof", "breakaway_cof",
+    "initial_ratio", "endpoint_ratio", "breakaway_ratio", "torque_rise",
+)  # fmt: skip
+
+
+def evaluated(run: IncomingRun, geometry: Geometry) -> Engagement | None:
+    """The engagement that a block of duty carries; None for a run without one."""
+    if run.kind not in DUTY_KINDS or not run.channels:
+        return None
+    return measured_engagement(sampled_record(run.channels), geometry)
+
+
+def engagement_notes(engagement: Engagement) -> list[tuple[str, str]]:
+    """A code and a sentence where a record that was sent holds no engagement."""
+    if not isinstance(engagement, Refusal):
+        return []
+    return [(NO_ENGAGEMENT, f"the record of the engagement is kept and not evaluated: {engagement.message}")]
+
+
+def engagement_item(engagement: Engagement) -> dict[str, Any]:
+    """An engagement as a receipt shows it; null is what the record does not determine."""
+    if isinstance(engagement, Refusal):
+        nothing = ("start_s", "end_s", "initial_speed_rpm", "maximum_pressure_bar")
+        return {
+            "status": engagement.status.value,
+            "message": engagement.message,
+            **dict.fromkeys(nothing),
+            "indicators": dict.fromkeys(INDICATORS),
+        }
+    values = (getattr(engagement, field) for field in _FIELDS)
+    slip = engagement.slip
+    return {
+        "status": DETERMINED,
+        "message": f"The clutch slipped for {engagement.stop_time.value:.3g} s.",
+        "start_s": slip.start.value,
+        "end_s": slip.end.value,
+        "initial_speed_rpm": engagement.initial_speed.value / RADIANS_PER_SECOND_PER_RPM,
+        "maximum_pressure_bar": engagement.maximum_pressure / PASCALS_PER_BAR,
+        "indicators": {
+            name: estimate_item(value, indicator.factor)
+            for (name, indicator), value in zip(INDICATORS.items(), values, strict=True)
+        },
+    }
+
+
+def estimate_item(estimate: Estimate | None, factor: float = 1.0) -> dict[str, float] | None:
+    """A value with its standard error in the public unit."""
+    return None if estimate is None else {"value": estimate.value / factor, "sd": estimate.sd / factor}
+
+
+def course_item(engagement: Engagement | None) -> dict[str, Any]:
+    """What is kept of the sliding speed beside a run's channels; empty for a run without an engagement."""
+    if not isinstance(engagement, MeasuredEngagement):
+        return {}
+    course = engagement.course
+    return {
+        COURSE: {
+            "duration_s": course.duration.value,
+            "duration_sd_s": course.duration.sd,
+            "speed_rpm": (course.speed / RADIANS_PER_SECOND_PER_RPM).round(3).tolist(),
+            "noise_rpm": course.noise / RADIANS_PER_SECOND_PER_RPM,
+        }
+    }
+
+
+def course_of(item: Mapping[str, Any]) -> SpeedCourse:
+    """The kept course as the models take it."""
+    return SpeedCourse(
+        duration=Estimate(value=item["duration_s"], sd=item["duration_sd_s"]),
+        speed=np.array(item["speed_rpm"]) * RADIANS_PER_SECOND_PER_RPM,
+        noise=item["noise_rpm"] * RADIANS_PER_SECOND_PER_RPM,
+    )
+
+
+def public_channels(columns: Mapping[str, FloatArray]) -> dict[str, list[float]]:
+    """Channels of a trace [n] in SI by public name -> in their public units."""
+    return {
+        name: ((column - CHANNELS[name].offset) / CHANNELS[name].factor).round(6).tolist()
+        for name, column in columns.items()
+    }
+
+
+#: The indicators of an engagement against the first ones of its life, by public name.
+COMPARED: Mapping[str, Indicator] = {
+    "normalised_duration": Indicator(unit="1"),
+    "euclidean_distance": Indicator(unit="1"),
+    "spectral_angle_rad": Indicator(unit="rad"),
+}
+#: All indicators by public name, in the order in which answers have them.
+ALL_INDICATORS: Mapping[str, Indicator] = {**INDICATORS, **COMPARED}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StoredEngagement:
+    """What is stored of a run with an engagement: its receipt, and the course of speed where it was evaluated."""
+
+    receipt: Mapping[str, Any]
+    course: SpeedCourse | None
+
+    @property
+    def run_id(self) -> str:
+        """The run's name."""
+        return str(self.receipt["run_id"])
+
+    @property
+    def item(self) -> Mapping[str, Any]:
+        """The engagement as the receipt has it."""
+        item: Mapping[str, Any] = self.receipt["engagement"]
+        return item
+
+    def of_duty(self, other: "StoredEngagement") -> bool:
+        """Whether it is of the same duty as another, both evaluated."""
+        return all(
+            same_duty(self.item[name], other.item[name]) for name in ("initial_speed_rpm", "maximum_pressure_bar")
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IndicatorColumns:
+    """One indicator over a clutch's runs [n]: cycles since new, value and standard error in the public unit."""
+
+    unit: str
+    run_ids: tuple[str, ...]
+    cycles: FloatArray
+    value: FloatArray
+    sd: FloatArray
+
+
+def stored_engagement(receipt: Mapping[str, Any], details: Mapping[str, Any]) -> StoredEngagement | None:
+    """A stored run's engagement; None where it has none, or was evaluated by a release that knew of none."""
+    if receipt.get("engagement") is None:
+        return None
+    return StoredEngagement(receipt=receipt, course=course_of(details[COURSE]) if COURSE in details else None)
+
+
+def engagements_over_life(stored: Sequence[StoredEngagement], lives: Sequence[Collection[str]]) -> list[dict[str, Any]]:
+    """The evaluated engagements in the order given, each with all indicators; `lives` are the run_ids of each life."""
+    rows = []
+    for life in lives:
+        own = [engagement for engagement in stored if engagement.run_id in life and engagement.course is not None]
+        first = [engagement for engagement in own if engagement.receipt["kind"] == DUTY_KINDS[0]]
+        first = [engagement for engagement in first if engagement.of_duty(first[0])][:REFERENCES]
+        courses = [engagement.course for engagement in first if engagement.course is not None]
+        reference = reference_of(courses) if courses else None
+        for engagement in own:
+            basis = None if reference is None or not engagement.of_duty(first[0]) else reference
+            rows.append(_row(engagement, basis))
+    return rows
+
+
+def indicator_columns(rows: Sequence[Mapping[str, Any]]) -> dict[str, IndicatorColumns]:
+    """The rows of `engagements_over_life` as columns by the indicator's public name, an indicator without values left out.
+
+    This is what a track over life takes: a value and its standard error by cycles since new.
+    """
+    columns = {}
+    for name, indicator in ALL_INDICATORS.items():
+        values = [(row, row["indicators"][name]) for row in rows if row["indicators"][name] is not None]
+        if values:
+            columns[name] = IndicatorColumns(
+                unit=indicator.unit,
+                run_ids=tuple(row["run_id"] for row, _ in values),
+                cycles=np.array([row["cycles"] for row, _ in values], dtype=np.float64),
+                value=np.array([estimate["value"] for _, estimate in values]),
+                sd=np.array([estimate["sd"] for _, estimate in values]),
+            )
+    return columns
+
+
+def _row(engagement: StoredEngagement, reference: Reference | None) -> dict[str, Any]:
+    head = {name: engagement.receipt[name] for name in ("run_id", "cycles", "kind")}
+    item = {name: engagement.item[name] for name in ("initial_speed_rpm", "maximum_pressure_bar")}
+    time = {"time": engagement.receipt["started_at"] or engagement.receipt["received_at"]}
+    difference = None if reference is None or engagement.course is None else compared(engagement.course, reference)
+    return head | time | item | {"indicators": engagement.item["indicators"] | _comparison_items(difference)}
+
+
+def _comparison_items(comparison: Comparison | None) -> dict[str, dict[str, float] | None]:
+    if comparison is None:
+        return dict.fromkeys(COMPARED)
+    values = (comparison.normalised_duration, comparison.euclidean_distance, comparison.spectral_angle)
+    return {name: estimate_item(value) for name, value in zip(COMPARED, values, strict=True)}

@@ -1,0 +1,186 @@
+"""`/remaining-useful-life/forecast`: the remaining useful life under a programme of planned duty. Nothing is stored.
+
+How far ζ has to go to the end of life is what the filter says, as every answer states it; the programme decides how many
+cycles lead there. An adopted model's course over ζ is that of recent duty.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.special import ndtri
+
+from models.arrays import FloatArray
+from models.clutch import Geometry
+from models.degradation.programme import Programme, uncertain_work
+from models.degradation.severity import Block, Severity, SeverityBasis, SeverityMap, counted
+from models.prognosis.criteria import HORIZON, QUANTILES
+from models.prognosis.first_passage import PassageStatus, weighted_quantiles
+from models.prognosis.stated_end import StatedEnd
+from service import records, stored_runs
+from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM
+from service.errors import Notice
+from service.lives.condition import beside_held
+from service.lives.history import Event, Series, date_of, moment_at, pace_of
+from service.lives.outlook import with_held
+from service.lives.payloads import ENDED, INSUFFICIENT, SAFE, by_quantile, ended, notice_items
+from service.lives.recomputation import ClutchState
+from service.lives.tracks import advance, drawn, end_of_life, predict, predict_at, step_rng
+from service.schemas.life import PlannedBlock, ProgrammeIn
+from storage.engine.database import Database
+
+_SECONDS_PER_HOUR = 3600.0
+#: Draws of what a plan leaves open, evenly spread, in another order for each block.
+_PLANS = 500
+_NORMALS = ndtri((np.arange(_PLANS) + 0.5) / _PLANS)
+
+Blocks = Sequence[PlannedBlock]
+
+
+def planned_life(database: Database, clutch_id: str, method: str, planned: ProgrammeIn) -> dict[str, Any]:
+    """The remaining useful life of the present life under a programme, by one filter. Raises NotFoundError."""
+    with database.reading() as connection:
+        state = records.state(connection, clutch_id, carried=True)
+    events = state.lives[-1].events if state.events else ()
+    stated = planned.pace_cycles_per_hour
+    of_runs = pace_of(events)
+    pace = stated or (None if of_runs is None else of_runs * _SECONDS_PER_HOUR)
+    prediction = _prediction(state, method, planned)
+    among = None
+    if state.held:
+        evidence = stored_runs.evidence_for(database, state, stored_runs.run_reader(database, clutch_id))
+        among = None if evidence is None else _prediction(with_held(state, evidence), method, planned)
+    summary: dict[str, Any] = {"held": len(state.held)}
+    if pace is not None and events:
+        a_second = pace / _SECONDS_PER_HOUR
+        summary["pace"] = {"cycles_per_second": a_second, "moment": moment_at(events, a_second, events[-1].cycles)}
+    return prediction | {
+        "clutch_id": clutch_id,
+        "method": method,
+        "revision": state.revision,
+        "origin": state.record.origin,
+        "end_of_life_at": _dates(prediction["end_of_life_cycles"], events, pace),
+        "pace_cycles_per_hour": pace,
+        "pace_from": None if pace is None else "runs" if stated is None else "request",
+        **beside_held(prediction, summary, among),
+    }
+
+
+def _prediction(state: ClutchState, method: str, planned: ProgrammeIn) -> dict[str, Any]:
+    """The prediction under recent duty, and in its place what the programme makes of it."""
+    clutch_id, assumptions, fraction = state.clutch_id, state.assumptions(), state.fraction
+    series = state.lives[-1].pooled(assumptions) if state.events else None
+    unknown = {"remaining_blocks": by_quantile({}), "block_severity": [None] * len(planned.programme)}
+    if series is None or not series.measurements:
+        recent = predict_at(clutch_id, state.events, assumptions, fraction, method=method)
+        return recent | {"recent_duty_cycles": by_quantile({})} | unknown
+    now, runs = state.lives[-1].events[-1].cycles, len(series.measurements)
+    tracked = advance(clutch_id, method, series, assumptions, (state.filters or {}).get(method), runs)
+    sample = drawn(clutch_id, method, series, assumptions, tracked)
+    tracked = replace(tracked, sample=sample)
+    recent = ended(predict(clutch_id, method, series, assumptions, tracked, now, fraction), state.lives[-1].end)
+    recent["recent_duty_cycles"] = recent["remaining_cycles"]
+    if recent["status"] in (INSUFFICIENT, ENDED):
+        return recent | unknown
+    duty = _Counted(severity=assumptions.severity, scale=series.scale.severity, geometry=state.geometry)
+    rng = step_rng(clutch_id, f"{method}-programme", series, runs)
+    programme = duty.programme(planned.programme, recent["current"]["mean_cof"], rng)
+    most = max(series.scale.origin + HORIZON - now, 0.0)
+    horizon = float(series.scale.progress(now)) + most * float(programme.rates.max())
+    end = end_of_life(sample, series, assumptions, tracked, now, fraction, horizon)
+    answer = _planned_answer(programme, end, series, now=now, most=most)
+    if recent["status"] != PassageStatus.REACHED:
+        open_ended = None in answer["remaining_cycles"].values()
+        recent["status"] = (PassageStatus.MAY_NEVER_REACH if open_ended else PassageStatus.PREDICTED).value
+    recent["warnings"] = recent["warnings"] + notice_items(duty.notices(planned.programme))
+    return recent | answer
+
+
+def _planned_answer(programme: Programme, end: StatedEnd, series: Series, *, now: float, most: float) -> dict[str, Any]:
+    """When the life ends, in the public shape: as it was where that is behind, else after as many cycles as ζ takes to get
+    there, up to `most`."""
+    draws = np.arange(end.ends.size) % programme.rates.shape[0]
+    ahead = end.ends - float(series.scale.progress(now))
+    spread = Programme(cycles=programme.cycles, rates=programme.rates[draws])
+    with np.errstate(invalid="ignore"):
+        left = np.where(ahead > 0.0, spread.cycles_until(np.maximum(ahead, 0.0)), series.scale.cycles(end.ends) - now)
+    stated = weighted_quantiles(np.minimum(left, 10.0 * (most + HORIZON)), end.weight, QUANTILES).tolist()
+    ends = {q: x if x <= most else None for q, x in zip(QUANTILES, stated, strict=True)}
+    remaining = {q: None if x is None else max(x, 0.0) for q, x in ends.items()}
+    rates = programme.rates / series.scale.severity.rate
+    return {
+        "remaining_cycles": by_quantile(remaining),
+        "end_of_life_cycles": by_quantile({q: None if x is None else now + x for q, x in ends.items()}),
+        "remaining_blocks": by_quantile(
+            {q: None if x is None else programme.blocks_in(x) for q, x in remaining.items()}
+        ),
+        "block_severity": [float(median) for median in np.median(rates, axis=0)],
+        "at_least": most if remaining[SAFE] is None else remaining[SAFE],
+        "probability_of_reaching": min(1.0, float(end.weight @ (left <= most))),
+    }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Counted:
+    """How the severity of a life is counted: its ζ so far, and the disc that turns speed and pressure into energy."""
+
+    severity: Severity
+    scale: SeverityMap
+    geometry: Geometry
+
+    def programme(self, blocks: Blocks, cof: float, rng: np.random.Generator) -> Programme:
+        """The programme, by draws of what it leaves open; what states no severity is as severe as recent duty."""
+        rates = np.full((_PLANS, len(blocks)), self.scale.rate)
+        for place, block in enumerate(blocks):
+            work = self._work(block, cof, rng.permutation(_NORMALS))
+            if work is not None and self.scale.reference is not None:
+                rates[:, place] = counted(work, self.scale.reference, self.severity.exponent)
+        return Programme(cycles=np.array([block.cycles for block in blocks]), rates=rates)
+
+    def notices(self, blocks: Blocks) -> list[Notice]:
+        """A warning where what the programme plans cannot be counted."""
+        basis = self.severity.basis.value.replace("_", " ")
+        if self.severity.basis is SeverityBasis.CYCLES:
+            why = "the clutch's record counts duty cycles, whatever their severity (`severity.basis`)"
+        elif self.scale.reference is None:
+            why = f"no duty run of this life states a {basis} to compare with"
+        else:
+            none = np.zeros(1)
+            unstated = [str(n) for n, block in enumerate(blocks, start=1) if self._work(block, 0.1, none) is None]
+            if not unstated:
+                return []
+            why = f"block {', '.join(unstated)} of the programme states no {basis}"
+        return [Notice(code="severity_not_counted", message=f"{why}: its cycles count as those of recent duty")]
+
+    def _work(self, block: PlannedBlock, cof: float, normals: FloatArray) -> FloatArray | None:
+        """The energy [J] or slid angle [rad] of a cycle, by draw [n]; None where the block states none."""
+        if self.severity.basis is SeverityBasis.CYCLES:
+            return None
+        speed = block.initial_speed_rpm
+        angle = Block(
+            end=block.cycles,
+            cycles=block.cycles,
+            speed=None if speed is None else speed * RADIANS_PER_SECOND_PER_RPM,
+            duration=block.engagement_duration_s,
+        ).work(SeverityBasis.SLIDING_DISTANCE)
+        if self.severity.basis is SeverityBasis.SLIDING_DISTANCE:
+            return None if angle is None else np.full(normals.size, angle)
+        if block.energy_per_cycle_kj is not None:
+            return uncertain_work(1e3 * block.energy_per_cycle_kj, 1e3 * block.sd, normals)
+        if angle is None or block.maximum_pressure_bar is None:
+            return None
+        energy = self.geometry.torque(cof, PASCALS_PER_BAR * block.maximum_pressure_bar) * angle
+        return np.full(normals.size, energy)
+
+
+def _dates(
+    ends: Mapping[str, float | None], events: Sequence[Event], pace: float | None
+) -> dict[str, str | None] | None:
+    """When cycles since new by quantile have been run at a pace an hour; None without a pace or a run."""
+    if pace is None or not events:
+        return None
+    return {
+        quantile: None if end is None else date_of(moment_at(events, pace / _SECONDS_PER_HOUR, end))
+        for quantile, end in ends.items()
+    }

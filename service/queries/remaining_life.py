@@ -1,0 +1,244 @@
+"""`/remaining-useful-life`: a stored prediction, or one computed from the clutch's state where none is stored; by other
+criteria than mean COF alone too: any quantity, several limits at once, an earlier life.
+"""
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from service import records, stored_runs
+from service.errors import NotFoundError
+from service.lives.assumptions import ALL_PRESSURES, MEAN_COF
+from service.lives.condition import beside_held
+from service.lives.outlook import Evidence, measured_life, with_held
+from service.lives.payloads import ended
+from service.lives.quantities.ends import criteria_answer, criterion_end
+from service.lives.quantities.measured import (
+    SLOPE_SPEEDS,
+    ChosenLife,
+    Family,
+    MeasuredLife,
+    chosen_life,
+    quantity_named,
+)
+from service.lives.recomputation import ClutchState
+from service.lives.tracks import CARRIED, predict_at
+from service.schemas.clutch import EndOfLifeIn
+from service.schemas.life import CriterionIn
+from storage import clutches, results
+from storage.engine.database import Database
+
+#: What `criteria_of` says of a clutch whose life ends by mean COF alone.
+NO_CRITERIA = b"[]"
+#: What a criterion says of itself.
+_GIVEN = ("quantity", "pressure_bar", "speed_rpm", "frequency_hz", "fraction", "below", "above")
+
+
+def criteria_of(database: Database, clutch_id: str) -> bytes:
+    """The criteria of a clutch's record as a JSON array, empty where mean COF alone counts. Raises NotFoundError."""
+    with database.reading() as connection:
+        row = clutches.get(connection, clutch_id)
+    if row is None:
+        raise NotFoundError(f"no clutch is known as {clutch_id!r}")
+    return json.dumps(row.record["end_of_life"].get("criteria", [])).encode()
+
+
+def remaining_life(
+    database: Database, clutch_id: str, method: str, pressure_bar: float | None, at_cycles: float | None
+) -> dict[str, Any]:
+    """The remaining useful life as it is now, or as it would have been predicted at `at_cycles`.
+
+    The carried filters' predictions over all pressures are stored; those of the exact filter and at one pressure are
+    computed. Raises NotFoundError for an unknown clutch or a pressure that its first stationary test did not measure.
+    """
+    with database.reading() as connection:
+        row = clutches.get(connection, clutch_id)
+        if row is None:
+            raise NotFoundError(f"no clutch is known as {clutch_id!r}")
+        stored = (
+            results.prediction_at(connection, clutch_id, method, ALL_PRESSURES, at_cycles)
+            if pressure_bar is None
+            else None
+        )
+        carried_on = pressure_bar is None and at_cycles is None
+        state = records.state(connection, clutch_id, carried=carried_on) if stored is None else None
+    head = {
+        "clutch_id": clutch_id,
+        "method": method,
+        "revision": row.revision,
+        "origin": row.record.get("origin", "measured"),  # earlier releases stored none
+    }
+    now = at_cycles is None or at_cycles >= row.summary.get("as_of_cycles", math.inf)
+    summary = row.summary if now else {}
+    if stored is not None:
+        payload, among = stored.payload, (summary.get("with_held") or {}).get(method)
+    elif state is None:
+        raise AssertionError("a prediction is stored, or the state was loaded")
+    else:
+        payload = _predicted(state, method, pressure_bar, at_cycles)
+        among = _with_held(database, state, method, pressure_bar) if state.held and now else None
+    answer = head | payload | beside_held(payload, summary, among)
+    return answer | {"criteria": _criteria(payload)}
+
+
+def _predicted(state: ClutchState, method: str, pressure_bar: float | None, at_cycles: float | None) -> dict[str, Any]:
+    carried = (state.filters or {}).get(CARRIED[0])
+    return predict_at(
+        state.clutch_id,
+        state.events,
+        state.assumptions(),
+        state.fraction,
+        method=method,
+        pressure_bar=pressure_bar,
+        at_cycles=at_cycles,
+        back_cast=None if carried is None else carried.back_cast,
+    )
+
+
+def _with_held(database: Database, state: ClutchState, method: str, pressure_bar: float | None) -> dict[str, Any]:
+    """The same with the held runs, where it is not stored."""
+    evidence = stored_runs.evidence_for(database, state, stored_runs.run_reader(database, state.clutch_id))
+    if evidence is None:
+        raise AssertionError("runs are held: the evidence was loaded")
+    return _predicted(with_held(state, evidence), method, pressure_bar, None)
+
+
+def _criteria(payload: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The one criterion of a stored prediction, as `criteria` lists it: mean COF, which is surely the first."""
+    criterion, current = payload["criterion"], payload["current"]
+    given = {name: criterion.get(name) for name in _GIVEN}
+    return [
+        given
+        | {"initial": criterion["initial_mean_cof"], "limit": criterion["threshold_mean_cof"]}
+        | {name: payload[name] for name in ("end_of_life_cycles", "remaining_cycles", "probability_of_reaching")}
+        | {"current": {"value": current["mean_cof"], "sd": current["mean_cof_sd"]}}
+        | {"probability_first": 1.0, "tests": payload["runs_used"]}
+    ]
+
+
+def rows(payload: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """The quantiles as rows of a table."""
+    held = payload["held_runs"]
+    for quantile, remaining in payload["remaining_cycles"].items():
+        yield {
+            "as_of_cycles": payload["as_of_cycles"],
+            "status": payload["status"],
+            "quantile": quantile,
+            "remaining_cycles": remaining,
+            "end_of_life_cycles": payload["end_of_life_cycles"][quantile],
+            "at_least": payload["at_least"],
+            "held_runs": 0 if held is None else held["count"],
+            "remaining_cycles_with_held": None if held is None else held["remaining_cycles"][quantile],
+        }
+
+
+COLUMNS = (
+    "as_of_cycles",
+    "status",
+    "quantile",
+    "remaining_cycles",
+    "end_of_life_cycles",
+    "at_least",
+    "held_runs",
+    "remaining_cycles_with_held",
+)
+
+
+#: What is said of mean COF's course and of its forecasts, where another quantity is asked for.
+_NOT_OF_MEAN_COF: dict[str, Any] = {"course": None, "back_cast": None, "ended_lives": 0, "sample": None}
+
+
+def life_by_criteria(
+    database: Database,
+    clutch_id: str,
+    method: str,
+    pressure_bar: float | None = None,
+    at_cycles: float | None = None,
+    quantity: str | None = None,
+    criterion: str | None = None,
+    life: int | None = None,
+) -> dict[str, Any]:
+    """The remaining life by a clutch's criteria, by those of one `criterion`'s quantity, or by one `quantity` at a pressure.
+
+    As it was at `at_cycles`, of the present life or of an earlier one by its number. Raises NotFoundError, and InvalidError
+    for a quantity that is none.
+    """
+    with database.reading() as connection:
+        row = records.clutch(connection, clutch_id)
+        state = records.state(connection, clutch_id)
+        evidence = stored_runs.evidence(connection, clutch_id)
+    request = _Request(method=method, quantity=quantity, criterion=criterion, pressure_bar=pressure_bar)
+    chosen = chosen_life(state, life, at_cycles)
+    answer = _by_criteria(state, chosen, evidence, request)
+    now = chosen.number == chosen.of and (at_cycles is None or at_cycles >= row.summary.get("as_of_cycles", math.inf))
+    among = None
+    if state.held and now:
+        evidence = replace(evidence, reader=stored_runs.run_reader(database, clutch_id))
+        held = with_held(state, evidence)
+        among = _by_criteria(held, chosen_life(held), evidence, request)
+    head = {"clutch_id": clutch_id, "method": method, "revision": row.revision, "origin": state.record.origin}
+    return head | answer | beside_held(answer, row.summary if now else {}, among)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Request:
+    """By which filter and criteria an answer is asked for."""
+
+    method: str
+    quantity: str | None
+    criterion: str | None
+    pressure_bar: float | None
+
+
+def _by_criteria(state: ClutchState, chosen: ChosenLife, evidence: Evidence, request: _Request) -> dict[str, Any]:
+    events = () if chosen.life is None else chosen.life.events
+    by_mean_cof = predict_at(state.clutch_id, events, chosen.assumptions, state.fraction, method=request.method)
+    answer = by_mean_cof | {"life": chosen.item(), "criteria": []}
+    measured = measured_life(state, chosen, evidence)
+    if measured is None:
+        return answer
+    wanted = _wanted(state.record.end_of_life, measured, request.quantity, request.criterion, request.pressure_bar)
+    if all(criterion_in.quantity != MEAN_COF for criterion_in in wanted):
+        answer |= _NOT_OF_MEAN_COF
+    ends = [criterion_end(measured, criterion_in, request.method) for criterion_in in wanted]
+    return ended(answer | criteria_answer(measured, ends, answer["current"]), measured.life.end)
+
+
+def _wanted(
+    record: EndOfLifeIn,
+    measured: MeasuredLife,
+    quantity: str | None,
+    criterion: str | None,
+    pressure_bar: float | None,
+) -> Sequence[CriterionIn]:
+    """The criteria that an answer is by."""
+    own = record.criteria or (CriterionIn(quantity="mean_cof", fraction=record.cof_fraction),)
+    if quantity is None and criterion is None and pressure_bar is None:
+        return own
+    name = quantity_named(quantity or criterion or MEAN_COF).name
+    chosen = [given for given in own if given.quantity == name and pressure_bar in (None, given.pressure_bar)]
+    if chosen:
+        return chosen
+    if criterion is not None:
+        raise NotFoundError(
+            f"the clutch has no criterion on {name}; it has: {', '.join(given.quantity for given in own)}"
+        )
+    return [_usual(name, record.cof_fraction, measured, pressure_bar)]
+
+
+def _usual(name: str, fraction: float, measured: MeasuredLife, pressure_bar: float | None) -> CriterionIn:
+    """What would end a life by a quantity that its clutch has no criterion on: its fraction, of a slope 0; at the lowest
+    pressure and frequency where it is measured, unless one is given."""
+    quantity = quantity_named(name)
+    tracks = measured.series(quantity)
+    if not tracks:
+        raise NotFoundError(f"{name} is not measured in this life")
+    first = min(tracks, key=lambda series: (series.frequency_hz or 0.0, series.pressure))
+    given: dict[str, Any] = {"quantity": name, "pressure_bar": pressure_bar}
+    if pressure_bar is None and quantity.family is not Family.MEAN_COF:
+        given["pressure_bar"] = first.pressure / 1e5
+    if quantity.family is Family.SLOPE:
+        return CriterionIn(**given, speed_rpm=SLOPE_SPEEDS[1])
+    return CriterionIn(**given, fraction=fraction, frequency_hz=first.frequency_hz)

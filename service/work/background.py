@@ -1,0 +1,112 @@
+"""Work that waits for all other: diagnoses, answers made anew, clutches tracked anew under another fleet prior, replays.
+
+python -m service.work.background MODULE ...    runs a module so, what it imports and all
+"""
+
+import multiprocessing
+import os
+import queue
+import runpy
+import sys
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from functools import partial
+from typing import Any, Protocol, TypeVar
+
+from threadpoolctl import threadpool_limits
+
+Result = TypeVar("Result")
+
+#: What libraries of linear algebra read when they are loaded.
+_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+class AtOnce(Protocol):
+    """How work in the background has something done that others wait for, as they do for who holds the write lock."""
+
+    def __call__(self, function: Callable[..., Result], /, *arguments: Any) -> Result:
+        """What `function(*arguments)` returns or raises."""
+
+
+def directly(function: Callable[..., Result], /, *arguments: Any) -> Result:
+    """`AtOnce` for work that does not yield."""
+    return function(*arguments)
+
+
+def use_one_blas_thread() -> None:
+    """Have linear algebra in this process use no threads of its own, whether its libraries are loaded or are to be."""
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    threadpool_limits(limits=1, user_api="blas")
+
+
+def yield_to_others() -> None:
+    """Have the calling thread, or process before it starts threads, run where the processors have nothing else to do.
+
+    On Linux by the policy SCHED_IDLE: what wakes takes such a processor as idle, and need not wait for the next balancing
+    as it does beside a thread of the lowest priority (`nice` 19), which is what other systems give, and those that refuse
+    the policy. The threads in which libraries of linear algebra help do not yield: in this process they no longer do.
+    """
+    use_one_blas_thread()
+    if hasattr(os, "SCHED_IDLE"):
+        try:
+            os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+        except OSError:  # as in a container whose filter of system calls is strict
+            os.nice(19)
+    else:
+        os.nice(19)
+
+
+def end_with_parent() -> None:
+    """Have this process end when the one that started it has, however that ended."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(3)
+
+
+def in_background(work: Callable[[AtOnce], Result]) -> Result:
+    """What `work` returns, done in a thread that yields; what it has done at once the calling thread does.
+
+    An interrupt (Ctrl-C) ends the call without waiting for the work, which ends with the process. It stores nothing
+    itself: a transaction is one of the calling thread, which the interrupt rolls back.
+    """
+    done: Future[Result] = Future()
+    calls: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
+
+    def at_once(function: Callable[..., Any], /, *arguments: Any) -> Any:
+        answer: Future[Any] = Future()
+        calls.put(partial(_answer, answer, function, *arguments))
+        return answer.result()
+
+    def whole() -> None:
+        try:
+            yield_to_others()
+            done.set_result(work(at_once))
+        except BaseException as error:  # noqa: BLE001  (raised again by the calling thread)
+            done.set_exception(error)
+        finally:
+            calls.put(None)
+
+    threading.Thread(target=whole, name="background", daemon=True).start()
+    while (call := calls.get()) is not None:
+        call()
+    return done.result()
+
+
+def _answer(answer: "Future[Result]", function: Callable[..., Result], *arguments: Any) -> None:
+    """Give the future what the function returns or the error it raises; an interrupt ends the calling thread's wait."""
+    try:
+        answer.set_result(function(*arguments))
+    except Exception as error:  # noqa: BLE001  (raised again for who waits)
+        answer.set_exception(error)
+
+
+if __name__ == "__main__":
+    yield_to_others()
+    sys.argv = sys.argv[1:]
+    runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)

@@ -1,0 +1,159 @@
+"""The process of one job. The service starts and watches it (`Child`), ends it where it takes too long, reads its answer;
+the process itself ends when the service does, says how far it has come, and answers.
+"""
+
+import json
+import logging
+import os
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import IO, Any
+
+from service.settings import DATABASE_VARIABLE
+from storage.encoding.json_text import Json, to_text
+
+#: Of what a job's process said, so many bytes are logged: its last ones hold the traceback.
+_TAIL = 8000
+#: Memory that arrays gave back is kept for the next ones: having it mapped anew each time takes as long as what is
+#: computed in it.
+_MEMORY = {
+    "MALLOC_MMAP_THRESHOLD_": str(32 << 20),
+    "MALLOC_TRIM_THRESHOLD_": str(1 << 30),
+}
+#: With this begins a line that says how far the job has come, JSON; its last line is the answer.
+PROGRESS = b"progress "
+#: The status with which a process ends that the database was away from: the job is to be done again.
+AWAY = os.EX_TEMPFAIL
+_log = logging.getLogger("clutchlife")
+
+
+class AwayError(Exception):
+    """The job did not come to its end, because the database was away for a while: it is to be done again."""
+
+
+class FailedError(Exception):
+    """The job did not come to its end; the message says why to the one who asked."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Work:
+    """What a process is to do: `modules` run with `task` as their argument, JSON, for at most `longest` [s] by the clock.
+
+    `processor_seconds` is the processor time after which it ends itself, by SIGXCPU; None: it does not.
+    """
+
+    modules: tuple[str, ...]
+    task: Mapping[str, Any]
+    longest: float
+    processor_seconds: int | None = None
+
+
+class Child:
+    """A running process. Made by `running`."""
+
+    def __init__(self, process: "subprocess.Popen[bytes]", answer: IO[bytes], errors: IO[bytes], work: Work) -> None:
+        self._process, self._answer, self._errors, self._work = process, answer, errors, work
+        self._deadline = time.monotonic() + work.longest
+
+    def ends_within(self, seconds: float) -> bool:
+        """Wait for its end, at most so long. Raises FailedError where it has taken too long by the clock."""
+        try:
+            self._process.wait(timeout=max(0.0, min(seconds, self._deadline - time.monotonic())))
+        except subprocess.TimeoutExpired:
+            if time.monotonic() < self._deadline:
+                return False
+            raise FailedError(f"it took longer than {self._work.longest:g} s by the clock") from None
+        return True
+
+    def progress(self) -> Json | None:
+        """How far it says it has come; None where it has not said so yet."""
+        steps = [line for line in self._lines() if line.startswith(PROGRESS)]
+        return json.loads(steps[-1].removeprefix(PROGRESS)) if steps else None
+
+    def written(self, name: str) -> dict[str, Any]:
+        """What it wrote at its end. Raises FailedError, AwayError; what it complained of is logged under its `name`."""
+        code = self._process.returncode
+        if code == -signal.SIGXCPU:
+            raise FailedError(f"it took longer than {self._work.processor_seconds} s of processor time")
+        self._errors.seek(max(0, self._errors.seek(0, os.SEEK_END) - _TAIL))
+        output = self._errors.read().decode(errors="replace")
+        if output:
+            level = logging.ERROR if code else logging.WARNING
+            _log.log(level, "%s: %s", name, output)
+        if code == AWAY:
+            raise AwayError
+        if code != 0:
+            raise FailedError(f"its process ended with {_ending(code)}: see the log")
+        try:
+            written = json.loads(self._lines()[-1])
+        except (ValueError, IndexError):
+            written = None
+        if not isinstance(written, dict):
+            _log.error("%s: its process gave no answer that can be read", name)
+            raise FailedError("its process gave no answer that can be read")
+        return written
+
+    def _lines(self) -> list[bytes]:
+        """The whole lines that it has written so far: it alone moves the place in the file."""
+        size = os.fstat(self._answer.fileno()).st_size
+        return os.pread(self._answer.fileno(), size, 0).split(b"\n")[:-1]
+
+
+@contextmanager
+def running(work: Work, database_url: str) -> Iterator[Child]:
+    """A process that does the work; killed at the end where it runs still."""
+    # warnings of numerics are logged, those of libraries to their authors are not
+    warned = "-W", "ignore", "-W", "default::RuntimeWarning"
+    command = [sys.executable, "-P", *warned, "-m", *work.modules, json.dumps(work.task)]
+    environment = os.environ | _MEMORY | {DATABASE_VARIABLE: database_url}  # not an argument: others see those
+    with tempfile.TemporaryFile() as answer, tempfile.TemporaryFile() as errors:
+        # it ends when its standard input does, which is when this process does, however that comes
+        process = subprocess.Popen(  # noqa: S603  (our own interpreter and module)
+            command, stdin=subprocess.PIPE, stdout=answer, stderr=errors, env=environment
+        )
+        try:
+            yield Child(process, answer, errors, work)
+        finally:
+            process.kill()
+            process.wait()
+            if process.stdin is not None:
+                process.stdin.close()
+
+
+def _ending(code: int) -> str:
+    try:
+        return signal.Signals(-code).name if code < 0 else f"status {code}"
+    except ValueError:
+        return f"signal {-code}"
+
+
+def end_with_the_service() -> None:
+    """Have this process end when its service does, however that comes; what it held in memory goes to no file."""
+    threading.Thread(target=_end_with_standard_input, daemon=True).start()
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def say(progress: Json) -> None:
+    """Say how far the job has come."""
+    sys.stdout.write(f"{PROGRESS.decode()}{to_text(progress)}\n")
+    sys.stdout.flush()
+
+
+def answer(ended: Mapping[str, Any]) -> None:
+    """Write the last line: how the job ended."""
+    sys.stdout.write(f"{json.dumps(ended, allow_nan=False)}\n")
+
+
+def _end_with_standard_input() -> None:
+    """It is a pipe whose other end nobody writes to: it ends when the service does."""
+    while os.read(0, 1):  # not by way of sys.stdin, whose lock would be in the way when this process ends
+        pass
+    os._exit(3)

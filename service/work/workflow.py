@@ -1,0 +1,69 @@
+"""The process in which a workflow is done as a job: it works on the database itself, as the workflow's command does."""
+
+import importlib
+import json
+import os
+import sys
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from service.settings import DATABASE_VARIABLE
+from service.work import process
+from service.work.background import AtOnce, in_background
+from service.work.process import AWAY
+from storage.encoding.json_text import Json
+from storage.engine.database import Database
+from storage.engine.errors import DatabaseBusy, StorageUnavailable
+from storage.engine.opening import open_database
+
+#: Of so many clutches that were left it is kept why; of all of them the log says it. Chosen: an answer stays a page.
+MOST_REASONS = 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """What is to be done: `function` (module:function) for the clutch, None: for all; `at` is when it was begun."""
+
+    function: str
+    clutch_id: str | None
+    at: str
+
+
+def main() -> None:
+    """Do what the first argument names, JSON, to the database of the environment. The last line is the answer.
+
+    Where the database is away meanwhile, the process ends so that the service has it done again: it takes hours, and a
+    restart of the database takes seconds.
+    """
+    task = Task(**json.loads(sys.argv[1]))
+    process.end_with_the_service()
+    try:
+        with closing(open_database(os.environ[DATABASE_VARIABLE])) as database:
+            process.answer(in_background(partial(done, database, task, process.say)))
+    except (DatabaseBusy, StorageUnavailable) as error:
+        sys.stderr.write(f"{error}\n")
+        sys.exit(AWAY)
+
+
+def done(database: Database, task: Task, say: Callable[[Json], None], at_once: AtOnce) -> dict[str, Any]:
+    """The result, in numbers and with the reasons why clutches were left, and the progress that was said last."""
+    module, _, name = task.function.partition(":")
+    function = getattr(importlib.import_module(module), name)  # in the background, as all that it computes
+    steps: list[Json] = []
+
+    def say_and_keep(progress: Json) -> None:
+        steps[:] = [progress]
+        say(progress)
+
+    counts, left = function(database, task.clutch_id, at=task.at, say=say_and_keep, at_once=at_once)
+    for clutch_id, reason in left.items():
+        sys.stderr.write(f"{clutch_id}: left as it was: {reason}\n")
+    reasons = [{"clutch_id": clutch_id, "reason": reason} for clutch_id, reason in left.items()]
+    return {"result": counts | {"left": len(left), "reasons": reasons[:MOST_REASONS]}, "progress": steps[-1]}
+
+
+if __name__ == "__main__":
+    main()

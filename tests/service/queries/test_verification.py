@@ -1,0 +1,121 @@
+"""What is stored is held against itself: a stored bit that is changed is found, and nothing else is."""
+
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+from service.app import create_app
+from service.queries.verification import CheckedResults, CheckedRuns, check_results, check_runs
+from service.settings import Settings
+from storage.engine.opening import find_database
+from storage.engine.sqlite.database import back_up
+from tests.support import stationary
+
+BASE = "/v1/clutches/c1"
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A clutch with runs of all kinds, one that is held, one corrected, one that came late and one withdrawn."""
+    path = tmp_path_factory.mktemp("stored") / "clutchlife.db"
+    app = create_app(Settings(workers=0, database=f"sqlite:///{path}"))
+    with TestClient(app, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
+        assert client.post("/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
+        fill(client)
+    return path
+
+
+@pytest.fixture
+def life(stored: Path, tmp_path: Path) -> str:
+    """A copy of it that a test may change."""
+    back_up(f"sqlite:///{stored}", tmp_path / "copy.db")
+    return f"sqlite:///{tmp_path}/copy.db"
+
+
+def fill(client: TestClient) -> None:
+    channels = {"time_s": [0, 1, 2], "pressure_bar": [5, 5, 5], "speed_rpm": [0, 9, 1], "torque_nm": [1, 2, 3]}
+    bodies = [stationary(cycles, run_id=f"s{cycles}") for cycles in (0, 1000, 3000, 2000)]
+    bodies += [
+        {"kind": "duty_cycles", "cycles": 3000, "duty": {"cycles": 1000, "energy_per_cycle_kj": 18}},
+        {"kind": "dynamic_stribeck", "cycles": 3000, "channels": channels, "run_id": "d"},
+        {"kind": "maintenance", "cycles": 3000, "event": "oil_change", "started_at": "2026-11-02T08:00:00+01:00"},
+        stationary(40_000_000, run_id="zeros", wear=0.3),
+        stationary(4000, run_id="gone"),
+    ]
+    for body in bodies:
+        assert client.post(f"{BASE}/runs", json=body).status_code == 201
+    changes = (
+        ("PATCH", "s3000", {"cycles": 3500, "reason": "mistyped"}),
+        ("POST", "gone/withdraw", {"reason": "unplugged"}),
+    )
+    for method, address, change in changes:
+        assert client.request(method, f"{BASE}/runs/{address}", json=change).status_code == 200
+    states = {item["run_id"]: item["state"] for item in client.get(f"{BASE}/runs").json()["items"]}
+    assert (states["zeros"], states["gone"]) == ("held", "withdrawn")
+
+
+def test_nothing_is_found_where_all_is_as_it_was_stored_and_the_file_is_only_read(life: str, tmp_path: Path) -> None:
+    before = (tmp_path / "copy.db").read_bytes()
+    with closing(find_database(life)) as database:
+        assert check_runs(database, "c1") == CheckedRuns(runs=9, findings=())
+        assert check_results(database, "c1") == CheckedResults(findings=(), earlier={})
+    assert (tmp_path / "copy.db").read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir()] == ["copy.db"]
+
+
+@pytest.mark.parametrize(
+    ("tampered", "says"),
+    [
+        ("UPDATE run SET cycles = 1001 WHERE run_id = 's1000'", "run s1000 is not what was sent"),
+        ("UPDATE run SET started_at = '2026-01-01T00:00:00+00:00' WHERE run_id = 's0'", "run s0 is not what was sent"),
+        ("UPDATE channel SET data = zeroblob(9) WHERE run_key = 1 AND position = 0", "run s0 is damaged"),
+        ("DELETE FROM channel WHERE run_key = 1 AND position = 0", "run s0 is not what was sent"),
+    ],
+)
+def test_a_run_that_is_not_what_was_sent_is_named(life: str, tampered: str, says: str) -> None:
+    execute(life, tampered)
+    with closing(find_database(life)) as database:
+        findings = check_runs(database, "c1").findings
+    assert len(findings) == 1
+    assert says in findings[0]
+
+
+@pytest.mark.parametrize(
+    ("tampered", "says"),
+    [
+        ("UPDATE fit SET static_torque = 1.001 * static_torque WHERE run_key = 2", "the fit of run s1000"),
+        ("DELETE FROM prediction WHERE cycles = 1000 AND method = 'ukf'", "follows from the runs and is not stored"),
+        (
+            "UPDATE prediction SET payload = json_set(payload, '$.remaining_cycles.\"0.5\"', 7) WHERE cycles = 2000",
+            "/remaining_cycles/0.5 is 7",
+        ),
+    ],
+)
+def test_a_result_that_does_not_follow_from_the_runs_is_named(life: str, tampered: str, says: str) -> None:
+    execute(life, tampered)
+    with closing(find_database(life)) as database:
+        findings = check_results(database, "c1").findings
+    assert any(says in line for line in findings), findings
+
+
+def test_a_run_that_cannot_be_evaluated_is_a_finding(life: str) -> None:
+    execute(life, "UPDATE channel SET data = zeroblob(9) WHERE run_key = 1 AND position = 0")
+    with closing(find_database(life)) as database:
+        (finding,) = check_results(database, "c1").findings
+    assert "results cannot be computed anew: channel" in finding
+
+
+def test_results_of_an_earlier_release_are_counted_and_no_finding(life: str) -> None:
+    execute(life, "UPDATE fit SET code_version = '0.1.0', static_torque = 1")
+    with closing(find_database(life)) as database:
+        results = check_results(database, "c1")
+    assert results.findings == ()
+    assert set(results.earlier) == {"0.1.0"}
+
+
+def execute(url: str, statement: str) -> None:
+    with closing(sqlite3.connect(url.removeprefix("sqlite:///"))) as connection, connection:
+        assert connection.execute(statement).rowcount > 0

@@ -1,0 +1,168 @@
+"""Who opens connections and says nothing cannot keep others from being answered."""
+
+import asyncio
+import resource
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.types import Receive, Scope, Send
+from uvicorn.config import Config
+from uvicorn.server import ServerState
+
+from service.web.connections import bounded
+from tests.support import ONCE, serving, stationary
+
+BEGUN = b"GET /livez HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: a"
+OTHER_ADDRESS = "127.0.0.2"
+
+
+@contextmanager
+def connections(port: int, number: int, begun: bytes, address: str = OTHER_ADDRESS) -> Iterator[list[socket.socket]]:
+    """So many connections from an address, each of which has sent no more than `begun`."""
+    with ExitStack() as stack:
+        held = []
+        for _ in range(number):
+            line = stack.enter_context(
+                socket.create_connection(("127.0.0.1", port), timeout=10, source_address=(address, 0))
+            )
+            line.sendall(begun)
+            held.append(line)
+        yield held
+
+
+@pytest.mark.parametrize("begun", [b"", BEGUN], ids=["nothing", "half a head"])
+def test_connections_that_say_nothing_leave_others_their_own(tmp_path: Path, begun: bytes) -> None:
+    with serving(tmp_path / "a.db", loaded=True, environment={"CLUTCHLIFE_CONNECTIONS_AT_ONCE": "20"}) as server:
+        with connections(server.port, 21, begun) as held:
+            refused = held[-1].recv(65536)
+            assert refused.startswith(b"HTTP/1.1 429")
+            assert b"retry-after: 1\r\n" in refused
+            assert refused.endswith(b"one address may have 20 connections at once")
+            assert ONCE.get(f"{server.url}/livez").status_code == 200
+            assert ONCE.post(f"{server.url}/v1/clutches", json={"clutch_id": "c1"}).status_code == 201
+            assert ONCE.post(f"{server.url}/v1/clutches/c1/runs", json=stationary(0.0)).status_code == 201
+        until = time.monotonic() + 10
+        while time.monotonic() < until:  # the server sees that they have gone
+            with connections(server.port, 1, b"GET /livez HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n") as (line,):
+                if (answer := line.recv(65536)).startswith(b"HTTP/1.1 200"):
+                    break
+        assert answer.startswith(b"HTTP/1.1 200"), "and who has closed them may come again"
+
+
+async def app(_scope: Scope, _receive: Receive, send: Send) -> None:
+    """Answers at once, without the body."""
+    await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"2")]})
+    await send({"type": "http.response.body", "body": b"ok"})
+
+
+async def seconds_until_closed(sent: list[bytes], pause: float) -> tuple[bytes, float]:
+    """What is answered to pieces that are sent a pause apart where a head has half a second, and when the server closes."""
+    config = Config(log_config=None, app=app, http=bounded(9, 0.5), lifespan="off", timeout_keep_alive=60)
+    config.load()
+    state = ServerState()
+    loop = asyncio.get_running_loop()
+    factory: Any = config.http_protocol_class
+    server = await loop.create_server(lambda: factory(config=config, server_state=state, app_state={}), "127.0.0.1", 0)
+    async with server:
+        reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname())
+        begun = loop.time()
+        reading = asyncio.create_task(reader.read())
+        for piece in sent:
+            writer.write(piece)
+            await asyncio.wait([reading], timeout=pause)
+            if reading.done():
+                break
+        answered = await asyncio.wait_for(reading, 10)
+        writer.close()
+        return answered, loop.time() - begun
+
+
+WHOLE = b"GET / HTTP/1.1\r\nHost: a\r\n\r\n"
+
+
+@pytest.mark.parametrize(
+    ("sent", "answers"),
+    [
+        ([b""], 0),
+        ([b"GET / HTTP/1.1\r\n", *[b"X: a\r\n"] * 90], 0),
+        ([WHOLE, b"GET / HTTP/1.1\r\n", *[b"X: a\r\n"] * 90], 1),
+        ([b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 100\r\n\r\n", *[b"a"] * 90], 1),
+    ],
+    ids=["nothing", "a head that trickles in", "a second head that trickles in", "a body after its answer"],
+)
+def test_a_connection_that_asks_for_nothing_is_closed(sent: list[bytes], answers: int) -> None:
+    answered, seconds = asyncio.run(seconds_until_closed(sent, 0.1))
+    assert answered.count(b"HTTP/1.1 200") == answers
+    assert 0.4 < seconds < 4
+
+
+@pytest.mark.parametrize(
+    ("sent", "answer"),
+    [
+        ([b"GET / HTTP/1.1\r\n", *[b"X: a\r\n"] * 90], b"HTTP/1.1 408"),
+        ([b"GET /" + b"a" * 70_000], b"HTTP/1.1 431"),
+        ([b"GET / HTTP/1.1\r\nX: ", *[b"a" * 30_000] * 9], b"HTTP/1.1 431"),
+        ([b"GET / HTTP/1.1\r\n" + b"X: a\r\n" * 12_000 + b"\r\n"], b"HTTP/1.1 431"),
+        ([b"GET / HTTP/1.1\r\n" + b"X: a\r\n" * 6_000, b"X: a\r\n" * 6_000], b"HTTP/1.1 431"),
+        ([WHOLE, b"GET / HTTP/1.1\r\nX: " + b"a" * 70_000], b"HTTP/1.1 431"),
+        ([b"\r\n" * 70_000], b"HTTP/1.1 431"),
+    ],
+    ids=["slow", "address", "one line", "lines at once", "lines", "second head", "empty lines"],
+)
+def test_a_head_that_is_too_long_or_too_slow_is_told_so_and_closed(sent: list[bytes], answer: bytes) -> None:
+    answered, seconds = asyncio.run(seconds_until_closed(sent, 0.1))
+    assert answer in answered
+    assert b"connection: close" in answered
+    assert seconds < 4
+
+
+def test_a_head_of_60_kib_is_read() -> None:
+    head = b"GET / HTTP/1.1\r\nX: " + b"a" * 60_000 + b"\r\n\r\n"
+    answered, _ = asyncio.run(seconds_until_closed([head[:50_000], head[50_000:], b"GET / "], 0.1))
+    assert answered.count(b"HTTP/1.1 200") == 1
+
+
+#: What one connection sends before any key is asked for: how it begins, and what it goes on with.
+ENDLESS = {
+    "header lines": (b"GET / HTTP/1.1\r\n", b"X-Line: abcdefghijklmnop\r\n"),
+    "one header line": (b"GET / HTTP/1.1\r\nX-Line: ", b"abcdefghijklmnop"),
+    "an address": (b"GET /", b"abcdefghijklmnop"),
+    "trailers": (
+        b"POST /v1/clutches HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n\r\n1\r\na\r\n0\r\n",
+        b"X-Line: abcdefghijklmnop\r\n",
+    ),
+    "requests ahead": (b"", b"GET /v1/clutches HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"),
+}
+
+
+def test_what_one_connection_sends_before_any_key_is_asked_for_is_not_kept(tmp_path: Path) -> None:
+    """64 MiB of each, as long as the service reads: 240 MiB of header lines were all kept."""
+    with serving(tmp_path / "a.db", loaded=True) as server:
+        assert ONCE.get(f"{server.url}/v1/clutches").status_code == 200
+        before = resident(server.pid)
+        for name, (begun, going_on) in ENDLESS.items():
+            piece = going_on * (2**20 // len(going_on))
+            with socket.create_connection(("127.0.0.1", server.port), timeout=30) as line:
+                line.sendall(begun)
+                with suppress(ConnectionError):  # it is closed while it sends
+                    for _ in range(64):
+                        line.sendall(piece)
+                assert resident(server.pid) - before < 24 << 20, name
+        assert ONCE.get(f"{server.url}/livez").status_code == 200
+
+
+def resident(pid: int) -> int:
+    """Bytes of memory that a process holds."""
+    return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * resource.getpagesize()
+
+
+def test_a_connection_that_goes_on_asking_stays_open() -> None:
+    """Twelve requests over three times as long as one head may take."""
+    answered, seconds = asyncio.run(seconds_until_closed([WHOLE] * 12 + [b"GET / "], 0.12))
+    assert answered.count(b"HTTP/1.1 200") == 12
+    assert seconds > 1.4

@@ -1,0 +1,21 @@
+"""A job's process that fails, or ends well; `python -m tests.service.work.failing`."""
+
+import json
+import os
+import signal
+import sys
+
+from service.work import process
+
+if __name__ == "__main__":
+    how = json.loads(sys.argv[1])["how"]
+    if how == "dies":
+        os.kill(os.getpid(), signal.SIGKILL)
+    elif how == "raises":
+        raise RuntimeError(how)
+    elif how == "writes garbage":
+        sys.stdout.write("garbage\n")
+    elif how == "writes a list":
+        sys.stdout.write("[1]\n")
+    elif how != "says nothing":
+        process.answer({"result": how})

@@ -1,0 +1,123 @@
+"""Clutches that are to be replayed by a job, seen and ended midway: what the tests of replays as jobs share."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx2
+from fastapi.testclient import TestClient
+from sqlalchemy import text
+
+from service.app import create_app
+from service.run_files.json_run import read_run
+from service.schemas.clutch import ClutchIn
+from service.settings import Settings
+from service.web.answers import to_json
+from service.work.executor import InProcess
+from service.workflows.ingest_run import ingest
+from service.workflows.register_clutch import register
+from service.workflows.replay import clutch_ids, replay
+from storage import jobs
+from storage.engine.database import Database
+from storage.tables import filter_state, fit, prediction
+from storage.transfer.digest import digest
+from tests.support import ONCE, Server, stationary
+
+AT = "2026-11-02T10:00:00+00:00"
+#: So many that a replay is seen midway.
+CLUTCHES = 6
+WAIT = {"Prefer": "wait=120"}
+RESULTS = (fit, prediction, filter_state)
+#: What code versions each clutch's results have.
+VERSIONS = (
+    "SELECT run.clutch_id, fit.code_version FROM fit JOIN run ON run.run_key = fit.run_key "
+    "UNION SELECT clutch_id, code_version FROM prediction UNION SELECT clutch_id, code_version FROM filter_state"
+)
+OLD = "0.0.1"
+
+
+def stock(database: Database, clutches: int = CLUTCHES, tests: int = 2) -> dict[str, tuple[int, str]]:
+    """Clutches with some tests each; what a replay in this process stores of them."""
+    for number in range(clutches):
+        register(database, ClutchIn(clutch_id=f"c{number}"), created_at=AT)
+        for each in range(tests):
+            sent = stationary(1000 * each + number, run_id=f"r{each}", pressures=(5.0,))
+            ingest(database, f"c{number}", read_run(to_json(sent)), received_at=AT)
+    assert all(replayed.error is None for replayed in replay(database, clutch_ids(database), InProcess()))
+    return stored(database)
+
+
+def stored(database: Database) -> dict[str, tuple[int, str]]:
+    with database.reading() as connection:
+        return {table.name: digest(connection, table) for table in RESULTS}
+
+
+def age(database: Database) -> None:
+    """Have all results be those of an earlier release, with other numbers."""
+    with database.writing() as connection:
+        for table in RESULTS:
+            connection.execute(table.update().values(code_version=OLD))
+        connection.execute(text("UPDATE fit SET mean_cof = 0.25"))
+
+
+def aged(database: Database) -> set[str]:
+    """The clutches whose results are old; of none some are."""
+    with database.reading() as connection:
+        rows = [tuple(row) for row in connection.execute(text(VERSIONS))]
+    old = {clutch_id for clutch_id, version in rows if version == OLD}
+    assert old.isdisjoint(clutch_id for clutch_id, version in rows if version != OLD), "a clutch is half done"
+    return old
+
+
+def midway(get: Callable[[str], httpx2.Response], job_id: str, url: str) -> None:
+    """Wait until some of a replay is done, of the database at the address."""
+    deadline = time.monotonic() + 120
+    while True:
+        job = get(f"/v1/jobs/{job_id}").json()
+        if job["progress"] is not None and job["progress"]["done"] > 0:
+            assert (job["state"], len(processes(url))) == ("running", 1), job
+            return
+        assert time.monotonic() < deadline, job
+        time.sleep(0.02)
+
+
+def processes(url: str) -> list[str]:
+    """The processes of replays and refreshes on the database at that address."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            command, environment = (path / "cmdline").read_bytes(), (path / "environ").read_bytes()
+        except OSError:  # it has ended, or is another user's
+            continue
+        if b"service.work.workflow" in command and url.encode() in environment:
+            found.append(path.name)
+    return found
+
+
+def until_none(url: str) -> None:
+    deadline = time.monotonic() + 60
+    while processes(url):
+        assert time.monotonic() < deadline, "its process goes on"
+        time.sleep(0.05)
+
+
+def ended(server: Server, job_id: str) -> dict[str, Any]:
+    """The job once it has ended; the database may be away for a while."""
+    deadline = time.monotonic() + 180
+    while True:
+        answer = ONCE.get(f"{server.url}/v1/jobs/{job_id}")
+        job: dict[str, Any] = answer.json()
+        if answer.status_code == 200 and job["state"] not in jobs.OPEN:
+            return job
+        assert time.monotonic() < deadline, job
+        time.sleep(0.1)
+
+
+@contextmanager
+def client_of(database: Database, **settings: Any) -> Iterator[TestClient]:
+    """A service in this process on the database."""
+    application = create_app(Settings(workers=0, database=database.url, **settings))
+    with TestClient(application, base_url="http://127.0.0.1", client=("127.0.0.1", 50000)) as client:
+        yield client

@@ -1,0 +1,139 @@
+"""How the process of a job is started, and which jobs wait for which."""
+
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service.settings import DATABASE_VARIABLE, Settings
+from service.work import process
+from service.work.process import Work
+from service.work.queue import JobQueue, Kind
+from storage import jobs
+from storage.engine.database import Database
+from storage.jobs import JobRow, NewJob
+
+ADDRESS = "postgresql+psycopg://u:s3cr3t@host/db"
+AT = "2026-11-02T10:00:00+00:00"
+WORK = Work(modules=("tests.service.work.sleeping",), task={"clutch_id": "c1"}, longest=60.0)
+
+
+class StartedError(Exception):
+    """In place of a process."""
+
+
+def test_no_argument_shows_the_address_of_the_database(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Other users of the machine see the arguments of a process, but not its environment."""
+    started: dict[str, Any] = {}
+
+    def start(command: list[str], **options: Any) -> None:
+        started.update(options, command=command)
+        raise StartedError
+
+    monkeypatch.setattr(process.subprocess, "Popen", start)
+    with pytest.raises(StartedError), process.running(WORK, ADDRESS):
+        pytest.fail("it was not started")
+    assert "s3cr3t" not in " ".join(started["command"])
+    assert started["env"][DATABASE_VARIABLE] == ADDRESS
+
+
+def ask(database: Database, job_id: str, kind: str) -> None:
+    new = NewJob(
+        job_id=job_id, kind=kind, clutch_id=None, asked_at=AT, asked_by="local", arguments={"request": ""}
+    )  # fmt: skip
+    with database.writing() as connection:
+        jobs.insert(connection, new)
+
+
+def states(database: Database) -> dict[str, str]:
+    with database.reading() as connection:
+        return {row.job_id: row.state for row in jobs.page(connection, limit=9)}
+
+
+def test_of_a_group_one_is_done_at_a_time_and_other_groups_do_not_wait(
+    in_file: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A diagnosis is made while a replay of the whole fleet runs; a fleet refresh waits for its end."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
+
+    def finish(job: JobRow, ended: Mapping[str, Any]) -> None:
+        with in_file.writing() as connection:
+            problem = ended.get("problem")
+            jobs.end(connection, job.job_id, jobs.FAILED, AT, problem=problem, claimer=job.claimed_by)
+
+    endless = Kind(lambda _job, _settings: WORK, finish)
+    quick = Kind(lambda _job, _settings: Work(modules=("this",), task={}, longest=0.0), finish)
+    groups = [{jobs.DIAGNOSIS: quick}, {jobs.REPLAY: endless, jobs.FLEET_REFRESH: endless}]
+    for job_id, kind in (("r", jobs.REPLAY), ("f", jobs.FLEET_REFRESH), ("d", jobs.DIAGNOSIS), ("other", "unheard of")):
+        ask(in_file, job_id, kind)
+    queue = JobQueue(in_file, Settings(job_lease_seconds=1), groups)
+    queue.start()
+    try:
+        deadline = time.monotonic() + 60
+        while states(in_file) != {"r": "running", "f": "waiting", "d": "failed", "other": "waiting"}:
+            assert time.monotonic() < deadline, states(in_file)
+            time.sleep(0.05)
+        assert queue.is_working()
+        with in_file.writing() as connection:
+            assert jobs.end(connection, "r", jobs.CANCELLED, AT)
+        while states(in_file) != {"r": "cancelled", "f": "running", "d": "failed", "other": "waiting"}:
+            assert time.monotonic() < deadline, states(in_file)
+            time.sleep(0.05)
+    finally:
+        queue.close()
+    assert not queue.is_working()
+    assert states(in_file) == {"r": "cancelled", "f": "waiting", "d": "failed", "other": "waiting"}, "given back"
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        "dies",
+        "raises",
+        "writes garbage",
+        "writes a list",
+        "says nothing",
+        "cannot start",
+        "cannot be stored",
+        "cannot end",
+    ],
+)
+def test_a_job_that_fails_in_any_way_is_marked_failed_and_the_next_one_runs(
+    in_file: Database, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, how: str
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
+
+    def finish(job: JobRow, ended: Mapping[str, Any]) -> None:
+        problem = ended.get("problem")
+        if job.job_id == "bad" and (how == "cannot end" or (how == "cannot be stored" and problem is None)):
+            raise KeyError("adopt_by")
+        with in_file.writing() as connection:
+            state = jobs.FINISHED if problem is None else jobs.FAILED
+            jobs.end(connection, job.job_id, state, AT, problem=problem, claimer=job.claimed_by)
+
+    def work(job: JobRow, _: Settings) -> Work:
+        if job.job_id == "bad" and how == "cannot start":
+            raise OSError("no process can be started")
+        task = {"how": how if job.job_id == "bad" else "ends well"}
+        return Work(modules=("tests.service.work.failing",), task=task, longest=60.0)
+
+    ask(in_file, "bad", jobs.REPLAY)
+    ask(in_file, "next", jobs.REPLAY)
+    queue = JobQueue(in_file, Settings(job_lease_seconds=1), [{jobs.REPLAY: Kind(work, finish)}])
+    queue.start()
+    try:
+        deadline = time.monotonic() + 60
+        while states(in_file) != {"bad": "failed", "next": "finished"}:
+            assert time.monotonic() < deadline, states(in_file)
+            time.sleep(0.05)
+        assert queue.is_working()
+    finally:
+        queue.close()
+    with in_file.reading() as connection:
+        row = jobs.get(connection, "bad")
+    assert row is not None
+    assert row.problem
+    if how not in ("dies",):
+        assert any(record.levelname == "ERROR" for record in caplog.records), "it is logged"
