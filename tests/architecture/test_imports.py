@@ -71,7 +71,7 @@ def test_imports_are_read_wherever_they_stand() -> None:
         "    from storage.engine.database import Database\n"
         "def f() -> None:\n"
         "    import plotly  # noqa: PLC0415\n"
-        "    from storage.engine.sqlite import health  # most starts need no health\n"
+        "    from storage.engine.sqlite import backup  # most starts make no copy\n"
         "    from . import settings\n"
     )
     read = {statement.imported: statement for statement in imports_of(module)}
@@ -82,14 +82,14 @@ def test_imports_are_read_wherever_they_stand() -> None:
         "typing",
         "storage.engine.database",
         "plotly",
-        "storage.engine.sqlite.database",
+        "storage.engine.sqlite.backup",
         "service.settings",
     }
     assert [statement.imported for statement in read.values() if statement.in_function] == [
         "plotly",
-        "storage.engine.sqlite.database",
+        "storage.engine.sqlite.backup",
         "service.settings",
     ]
     assert [statement.imported for statement in read.values() if statement.for_types] == ["storage.engine.database"]
     assert read["plotly"].reason == ""
-    assert read["storage.engine.sqlite.database"].reason == "most starts need no health"
+    assert read["storage.engine.sqlite.backup"].reason == "most starts make no copy"
