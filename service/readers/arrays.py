@@ -4,6 +4,7 @@ A vector is a column; a matrix is several, with the names that a list of as many
 what stands beside an array under the usual names: attributes of HDF5, fields and variables of MATLAB.
 """
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -13,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.arrays import FloatArray
-from service.errors import FieldError, InvalidError, Notice
+from service.errors import MOST_QUOTED, FieldError, InvalidError, Notice
 from service.readers.column_names import column_of, known_channel
 from service.readers.limits import Limits
 from service.readers.table import Clock, Column, Reading, Table, only
+from service.readers.unit_table import conversion
 
 _UNITS = ("unit", "units", "unit_string", "yunit", "einheit")
 _NAMES = (
@@ -32,19 +34,13 @@ _NAMES = (
     "variablenames",
 )
 _DATA = ("data", "values", "value", "y", "samples")
-_STEPS = (
-    "dt",
-    "ts",
-    "delta_t",
-    "delta_x",
-    "wf_increment",
-    "sample_interval",
-    "sampling_interval",
-    "sample_time",
-    "t_s",
-)
-_RATES = ("fs", "sample_rate", "sampling_rate", "samplerate", "samplingrate", "sampling_frequency", "rate", "f_s")
-_STARTS = ("t0", "x0", "wf_start_offset")
+#: What states a clock: a step, a rate or a start, with the units that each may have. A name may end in its unit (`dt_ms`).
+_STEPS = "dt|ts|delta_t|delta_x|wf_increment|sampl(?:e|ing)_(?:interval|time|period)|t_s"
+_RATES = "fs|f_s|sampl(?:e|ing)_?(?:rate|frequency)|rate"
+_STARTS = "t0|x0|wf_start_offset"
+_HERTZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6, "1/s": 1.0, "s/s": 1.0, "sps": 1.0, "samples/s": 1.0}
+#: Factors that a file states beside raw counts; whether they were applied already only its program knows.
+_GAINS, _OFFSETS = ("gain", "scale", "factor", "slope", "multiplier", "sensitivity", "calibration"), ("offset", "zero")
 _CHARACTERS = "SUO"
 #: Folders in folders, at most. Chosen: recorders have three.
 _DEEPEST = 8
@@ -130,6 +126,7 @@ def _sources(tree: Tree, group: str, depth: int) -> Iterator[_Source]:
                 label = _text(lowered.get("label")) or _text(lowered.get("name")) or name
                 times = [_source(key, node[key], path, node) for key in node if known_channel(key) == "time_s"]
                 yield from (time for time in times if time is not None)
+                data = replace(data, attributes={**node, **data.attributes})
                 yield from _columns(label, data, path if times else group, node)
             elif depth < _DEEPEST:
                 yield from _sources(node, path, depth + 1)
@@ -193,20 +190,45 @@ def _rows(leaf: Leaf) -> int:
 
 
 def _clock(leaf: Leaf, beside: Tree, rows: int) -> Clock | None:
-    """A clock that is stated as a step or a rate, at the array or beside it."""
-    stated = {
-        key.lower(): number
-        for key, value in {**beside, **leaf.attributes}.items()
-        if (number := _number(value)) is not None
-    }
-    step = next((stated[key] for key in _STEPS if key in stated), None)
-    rate = next((stated[key] for key in _RATES if key in stated), None)
+    """A clock that is stated as a step or a rate, at the array or beside it. Raises InvalidError on an unknown unit."""
+    held = {"_".join(key.lower().split()): value for key, value in {**beside, **leaf.attributes}.items()}
+    step, rate, start = (_stated(held, names) for names in (_STEPS, _RATES, _STARTS))
     if step is None and rate:
         step = 1.0 / rate
     if step is None or not step > 0:
         return None
-    start = next((stated[key] for key in _STARTS if key in stated), 0.0)
+    start = start or 0.0
     return Clock((start, step, rows), partial(_times, start, step, rows), counts=step == 1.0 and start == 0.0)
+
+
+def _stated(held: Mapping[str, Any], names: str) -> float | None:
+    """A number that stands under one of the names, in s or Hz by its unit: in the name, the text, or an attribute."""
+    for key, value in held.items():
+        match = re.fullmatch(rf"(?:{names})(?:_?[\[(]?(?P<unit>[^\W_]+/?[^\W_]*)[\])]?)?", key)
+        number, unit = _number(value), match["unit"] if match else None
+        if match is None or (unit and _factor(names, unit) is None):
+            continue
+        text = re.fullmatch(r"\s*([\d.]+(?:[eE][+-]?\d+)?)\s*(\D*)", _text(value))
+        if number is None and text:
+            number, unit = float(text[1]), unit or text[2].strip()
+        if number is None:
+            continue
+        attributes = value.attributes if isinstance(value, Leaf) else {}
+        beside = [held.get(f"{key}_{name}") for name in _UNITS] + [attributes.get(name) for name in _UNITS]
+        unit = unit or next((_text(stated) for stated in beside if _text(stated)), "")
+        factor = _factor(names, unit)
+        if factor is None:
+            message = f"the unit of {key} must be known, got {unit[:MOST_QUOTED]!r}"
+            raise InvalidError(message, errors=[FieldError(pointer="", code="unknown_unit", message=message)])
+        return number * factor
+    return None
+
+
+def _factor(names: str, unit: str) -> float | None:
+    if names == _RATES:
+        return _HERTZ.get(unit.lower())
+    found = conversion("time_s", unit or "s")
+    return None if found is None else found.factor
 
 
 def _times(start: float, step: float, rows: int) -> FloatArray:
@@ -237,4 +259,23 @@ def _texts(value: Any) -> list[str]:
 
 
 def _values(source: _Source) -> NDArray[Any]:
-    return np.asarray(source.leaf.data[source.index]).reshape(-1)
+    """The values, scaled as NetCDF's conventions say; values that stand for none are masked.
+
+    Raises InvalidError on raw counts beside a factor of another name. Source: CF Conventions, 8.1, packed data.
+    """
+    values = np.asarray(source.leaf.data[source.index]).reshape(-1)
+    stated = {key.lower(): _number(value) for key, value in source.leaf.attributes.items()}
+    for names, neutral in ((_GAINS, 1.0), (_OFFSETS, 0.0)):
+        name = next((name for name in names if stated.get(name) not in (None, neutral)), None)
+        if name is not None and values.dtype.kind in "iu":
+            shown = f"{source.column.shown()} holds whole numbers beside {name} = {stated[name]:g}"
+            message = (
+                f"{shown}: save its physical values, or name the factor scale_factor where it is still to be applied"
+            )
+            raise InvalidError(message, errors=[FieldError(pointer="", code="raw_counts", message=message)])
+    factor, offset = (stated.get(name, default) for name, default in (("scale_factor", 1.0), ("add_offset", 0.0)))
+    none = [stated[name] for name in ("_fillvalue", "missing_value") if stated.get(name) is not None]
+    invalid = np.isin(values, none) if none and values.dtype.kind in "iuf" else None
+    if (factor, offset) != (1.0, 0.0):
+        values = values * (1.0 if factor is None else factor) + (0.0 if offset is None else offset)
+    return values if invalid is None or not invalid.any() else np.ma.MaskedArray(values, mask=invalid)

@@ -72,18 +72,19 @@ def to_channels(table: Table, reading: Reading, limits: Limits) -> Channels:
 
 
 def _one_table(columns: dict[str, FloatArray], table: Table, reading: Reading) -> tuple[dict[str, FloatArray], int]:
-    """The one table, or of several below each other the one that is named by its number, and its first row.
+    """The one table, or of several below each other the one that is named by its number (`2`, `Sheet/2`), and its first row.
 
     Titles that only interrupt a table, whose time goes on after them, begin no other.
     """
     time_s = columns.get("time_s")
-    if table.breaks and time_s is not None and (not reading.table or table.name):
+    starts = [0, *table.breaks, next(iter(columns.values())).size]
+    tables = [f"{table.name}/{number}" if table.name else str(number) for number in range(1, len(starts))]
+    if table.breaks and time_s is not None and reading.table not in tables:
         steps = np.diff(time_s)
         if all(0 < steps[row - 1] < _LONGEST_PAUSE * np.median(steps) for row in table.breaks):
             return columns, 0
-    starts = [0, *table.breaks, next(iter(columns.values())).size]
-    tables = [str(number) for number in range(1, len(starts))]
-    number = only(tables, "" if table.name or not table.breaks else reading.table, "table")
+    wanted = reading.table if table.breaks and reading.table != table.name else ""
+    number = only(tables, wanted, "table")
     return {name: column[starts[number] : starts[number + 1]] for name, column in columns.items()}, starts[number]
 
 
@@ -190,14 +191,14 @@ def _numbers(column: Taken, values: NDArray[Any]) -> tuple[FloatArray, NDArray[n
 
 
 def _refuse_serials(column: Column, times: FloatArray) -> None:
-    """Raise InvalidError where times without a unit may be days as spreadsheets count them: days since 1900 of our time,
-    less than five of them, and steps that would be shorter than a rig samples."""
-    days, steps = (times > 20_000) & (times < 80_000), np.diff(times)
+    """Raise InvalidError where times without a unit may be days as spreadsheets or MATLAB count them: days of our time since
+    1900 or the year 0, less than five of them, and steps that would be shorter than a rig samples."""
+    days, steps = ((times > 20_000) & (times < 80_000)) | ((times > 700_000) & (times < 800_000)), np.diff(times)
     if times.size > 1 and days.all() and np.ptp(times) < 5 and np.median(steps) < 1e-3:
         name = column.title or column.name
         message = (
-            f"{column.shown()} may be days, as spreadsheets count dates, or seconds, got {times[0]:.9g} and steps of "
-            f"{np.median(steps):.3g}: map=time_s:{name} [d], or [s], says which"
+            f"{column.shown()} may be days, as spreadsheets and MATLAB count dates, or seconds, got {times[0]:.9g} and "
+            f"steps of {np.median(steps):.3g}: map=time_s:{name} [d], or [s], says which"
         )
         raise InvalidError(message, errors=[FieldError(pointer="/map", code="missing_unit", message=message)])
 

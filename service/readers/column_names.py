@@ -236,16 +236,35 @@ def choose(columns: Sequence[Column], reading: Reading) -> list[Taken]:
             raise _twice(channel, *(columns[index] for index in positions))
     if not indices:
         raise InvalidError(f"the file holds no known channel: it has {_list(columns)}; {remedy(columns)}")
-    taken = []
+    taken, without_unit = [], []
     for channel, positions in indices.items():
         for index in positions:
             choice = named.get(channel) if index in by_map else None
             unit = _unit(channel, columns[index], choice)
             public = _key(columns[index].name) == channel
+            if unit is None and choice is None and not public:
+                without_unit.append((channel, columns[index]))
+                continue
             taken.append(
                 Taken(channel, index, _conversion(channel, columns[index], choice, unit), unit is None and not public)
             )
+    if without_unit:
+        raise _no_unit(without_unit, reading)
     return sorted(taken, key=lambda column: column.index)
+
+
+def _no_unit(columns: Sequence[tuple[str, Column]], reading: Reading) -> InvalidError:
+    """The error of columns whose units nobody states, with the one map that takes all of them for the channels' own."""
+    errors = []
+    for channel, column in columns:
+        message = f"{channel} (column {column.shown()!r}): the unit must be stated ({spellings(channel)})"
+        errors.append(FieldError(pointer=f"/channels/{channel}", code="missing_unit", message=message))
+    named = {channel: choice.column for channel, choice in reading.mapping.items()}
+    titles = {channel: column.title or column.shown() for channel, column in columns}
+    way = ",".join(f"{channel}:{title}" for channel, title in {**named, **titles}.items())
+    own = ", ".join(CHANNELS[channel].unit for channel in titles)
+    message = "; ".join(error.message for error in errors)
+    return InvalidError(f"{message}, in brackets or in a unit row; map={way} takes it for {own}", errors=errors)
 
 
 def remedy(columns: Sequence[Column]) -> str:
@@ -338,10 +357,6 @@ def _conversion(channel: str, column: Column, choice: Choice | None, unit: str |
     own, public = CHANNELS[channel].unit, _key(column.name) == channel
     if unit is None:
         converted: Conversion | None = Conversion()
-        if not public and choice is None:
-            rule = f"must be stated ({spellings(channel)}), in brackets or in a unit row"
-            rule += f"; map={channel}:{column.title or column.name} takes it for {own}"
-            raise _wrong_unit(channel, column, "missing_unit", rule, "none")
     else:
         converted = conversion(channel, unit)
     if converted is None:

@@ -111,15 +111,11 @@ class Numerals:
                 for cell in cells
             ]
             return np.array(plain, dtype="datetime64[us]")
-        if kinds and kinds <= {time, timedelta}:
-            spans = [
-                cell
-                if isinstance(cell, timedelta)
-                else datetime.combine(date.min, cell.replace(tzinfo=None)) - datetime.min
-                for cell in cells
-            ]
-            return np.array(spans, dtype="timedelta64[us]")
-        if kinds != {str} or (index not in self._stamps and not is_stamp(cells[0])):
+        if kinds == {timedelta}:
+            return np.array(cells, dtype="timedelta64[us]")
+        if kinds == {time}:
+            cells = [cell.isoformat() for cell in cells]
+        elif kinds != {str} or (index not in self._stamps and not is_stamp(cells[0])):
             return None
         return self._stamps.setdefault(index, Stamps()).since_first(cells)
 

@@ -46,7 +46,8 @@ def _column(field: Any, rows: int) -> Column:
 def _values(column: Any) -> NDArray[Any]:
     kind = column.type.value_type if kinds.is_dictionary(column.type) else column.type
     if kinds.is_time(kind):
-        column, kind = column.cast(f"duration[{kind.unit}]" if kind.unit != "s" else "int64"), kind
+        whole = column.cast("int64" if kinds.is_time64(kind) else "int32").to_numpy()
+        return np.asarray(whole.astype(f"timedelta64[{kind.unit}]"))
     if kinds.is_decimal(kind):
         column = column.cast("float64")
     values = column.to_numpy()

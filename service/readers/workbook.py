@@ -33,7 +33,8 @@ def read_table(path: Path, reading: Reading, limits: Limits) -> Table:
     sheets = [sheet.name for sheet in book.sheets_metadata if sheet.typ == SheetTypeEnum.WorkSheet]
     named = [choice.column for choice in choices_of(reading).values()]
     if reading.table or len(sheets) == 1:
-        sheets = [sheets[only(sheets, reading.table, "sheet")]]
+        sheet, _, number = reading.table.rpartition("/")  # of tables below each other on a sheet
+        sheets = [sheets[only(sheets, sheet if sheet in sheets and number.isdecimal() else reading.table, "sheet")]]
     tables: dict[str, tuple[list[Sequence[Any]], Layout]] = {}
     refused: list[InvalidError] = []
     for name in sheets:

@@ -20,6 +20,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from service.errors import InvalidError, TooLargeError
+from service.readers import hdf5 as hdf5_reader
+from service.readers.channels import Channels, to_channels
+from service.readers.limits import LIMITS
 from service.readers.read_file import preview_file, read_file, reading_of
 from service.readers.table import Choice, Reading
 from service.readers.unit_table import UNITS
@@ -379,6 +382,110 @@ def test_a_preview_shows_the_table_and_what_is_understood(tmp_path: Path) -> Non
     assert (shown["table"], shown["tables"], shown["first_line"]) == ("Messung", ["Messung", "Notizen"], 6)
     assert [column["channel"] for column in shown["columns"]] == [*RECORD, None]
     assert read_file(tmp_path / "a.xlsx", filename="a.xlsx").labels["Lastspiele"] == "7000"
+
+
+def test_files_of_libreoffice_in_three_languages_give_their_numbers() -> None:
+    for path in sorted((Path(__file__).parent / "libreoffice").glob("*.[cox]*s*")):
+        require_record(path)
+
+
+# --- clocks, factors and marks that HDF5 and MATLAB files state ---
+
+
+def rig(file: h5py.File, *, without: tuple[str, ...] = ("time_s",)) -> None:
+    for channel, unit in (("time_s", "s"), ("pressure_bar", "bar"), ("speed_rpm", "1/min"), ("torque_nm", "Nm")):
+        if channel not in without:
+            file.create_dataset(channel.rpartition("_")[0], data=RECORD[channel]).attrs["unit"] = unit
+
+
+def read_hdf5(path: Path, fill: Callable[[h5py.File], object]) -> Channels:
+    with h5py.File(path, "w") as file:
+        fill(file)
+    return to_channels(hdf5_reader.read_table(path, Reading(), LIMITS), Reading(), LIMITS)
+
+
+@pytest.mark.parametrize(
+    "stated",
+    [{"dt": 10.0, "dt_unit": "ms"}, {"dt_ms": 10.0}, {"sample_rate_khz": 0.1}, {"sample_rate": "100 Hz"}, {"fs": "0.1 kHz"},
+     {"Sample Rate (Hz)": 100.0}, {"sampling_interval": 0.01}],
+    ids=str,
+)  # fmt: skip
+def test_a_clock_in_any_unit_is_used(tmp_path: Path, stated: dict[str, object]) -> None:
+    columns = read_hdf5(tmp_path / "a.h5", lambda file: (rig(file), file.attrs.update(stated))).columns
+    np.testing.assert_allclose(columns["time_s"], TIME, rtol=0, atol=1e-12)
+
+
+def test_a_clock_in_an_unknown_unit_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidError, match="the unit of dt must be known, got 'ticks'"):
+        read_hdf5(tmp_path / "a.h5", lambda file: (rig(file), file.attrs.update({"dt": 10.0, "dt_unit": "ticks"})))
+
+
+def counts(**attributes: float) -> Callable[[h5py.File], object]:
+    def fill(file: h5py.File) -> None:
+        rig(file, without=("torque_nm",))
+        counted = file.create_dataset("torque", data=np.round(RECORD["torque_nm"] * 1e4).astype(np.int32))
+        counted.attrs.update({"unit": "Nm", **attributes})
+
+    return fill
+
+
+def test_packed_data_is_unpacked_and_raw_counts_are_refused(tmp_path: Path) -> None:
+    columns = read_hdf5(tmp_path / "a.h5", counts(scale_factor=1e-4, add_offset=0.0)).columns
+    np.testing.assert_allclose(columns["torque_nm"], RECORD["torque_nm"], rtol=1e-12)
+    with pytest.raises(InvalidError, match=r"torque holds whole numbers beside gain = 0\.0001"):
+        read_hdf5(tmp_path / "b.h5", counts(gain=1e-4))
+
+
+def test_values_that_stand_for_none_are_left_out_with_a_warning(tmp_path: Path) -> None:
+    fill = counts(scale_factor=1e-4, _FillValue=round(RECORD["torque_nm"][3] * 1e4))
+    channels = read_hdf5(tmp_path / "a.h5", fill)
+    np.testing.assert_allclose(channels.columns["time_s"], np.delete(TIME, 3), rtol=1e-12)
+    assert [notice.code for notice in channels.notices] == ["invalid_samples"]
+
+
+# --- bombs ---
+
+
+def with_entities(text: str) -> bytes:
+    """The XML with entities that unfold to 3 GB, and a use of them."""
+    entities = "".join(f'<!ENTITY e{level} "{f"&e{level - 1};" * 10}">' for level in range(1, 10))
+    body = text.partition("?>")[2] if text.startswith("<?xml") else text
+    return f'<?xml version="1.0"?><!DOCTYPE x [<!ENTITY e0 "lol">{entities}]>{body}'.encode()
+
+
+def repacked(path: Path, source: Path, member: str, change: Callable[[str], bytes]) -> Path:
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as new:
+        for name in old.namelist():
+            content = old.read(name)
+            new.writestr(name, change(content.decode()) if name == member else content)
+    return path
+
+
+ODS = Path(__file__).parent / "libreoffice" / "german.ods"
+BOMBS: dict[str, tuple[str, Callable[[str], bytes]]] = {
+    "entities.xlsx": (
+        "xl/worksheets/sheet1.xml",
+        lambda xml: with_entities(xml.replace("</row>", '<c t="inlineStr"><is><t>&e9;</t></is></c></row>', 1)),
+    ),
+    "a-far-cell.xlsx": ("xl/worksheets/sheet1.xml", lambda xml: xml.replace('r="B2"', 'r="XFD1048576"').encode()),
+    "entities.ods": ("content.xml", lambda xml: with_entities(xml.replace("Druck", "&e9;"))),
+    "repeated-rows.ods": (
+        "content.xml",
+        lambda xml: xml.replace(
+            "<table:table-row", '<table:table-row table:number-rows-repeated="1000000"', 1
+        ).encode(),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_bombs_in_xml_are_refused(tmp_path: Path, name: str) -> None:
+    member, change = BOMBS[name]
+    plain = tmp_path / "plain.xlsx"
+    frame().to_excel(plain, index=False)
+    path = repacked(tmp_path / name, ODS if name.endswith("ods") else plain, member, change)
+    with pytest.raises((InvalidError, TooLargeError)):
+        read_file(path, filename=name)
 
 
 @pytest.mark.parametrize("inner", ["xl/worksheets/sheet1.xml", "run.csv"])
