@@ -274,7 +274,7 @@ def _values(source: _Source) -> NDArray[Any]:
             )
             raise InvalidError(message, errors=[FieldError(pointer="", code="raw_counts", message=message)])
     factor, offset = (stated.get(name, default) for name, default in (("scale_factor", 1.0), ("add_offset", 0.0)))
-    none = [stated[name] for name in ("_fillvalue", "missing_value") if stated.get(name) is not None]
+    none = [value for name in ("_fillvalue", "missing_value") if (value := stated.get(name)) is not None]
     invalid = np.isin(values, none) if none and values.dtype.kind in "iuf" else None
     if (factor, offset) != (1.0, 0.0):
         values = values * (1.0 if factor is None else factor) + (0.0 if offset is None else offset)

@@ -4,7 +4,10 @@ Other bodies that are JSON come in here too. Whatever is sent, memory stays with
 """
 
 import codecs
+import re
 from collections.abc import Callable
+from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,9 +18,8 @@ from service.columns import CHANNELS, check_columns
 from service.errors import MOST_ERRORS, MOST_QUOTED, FieldError, InvalidError
 from service.lives.history import END_OF_LIFE, WORN
 from service.lives.incoming_run import IncomingRun, name_run
-from service.run_files.json_marks import Fields, invalid_json, too_many_marks
 from service.schemas.limits import LONGEST_NOTE, MOST_MARKS
-from service.schemas.run import RUN_IN, Duty, DutyRunIn, DynamicRunIn, MaintenanceRunIn, StationaryRunIn
+from service.schemas.run import RUN_IN, DutyRunIn, MaintenanceRunIn
 
 #: Items of a list and characters of a name that are checked by a schema: more than a message quotes.
 _MOST_SHOWN = 100
@@ -30,21 +32,21 @@ _MARKS = (
     (codecs.BOM_UTF16_BE, "UTF-16"),
 )
 
+#: Errors of a beginning that what follows may mend.
+_OF_THE_END = ("missing", "ragged", "empty")
+
 Answer = TypeVar("Answer")
 Body = TypeVar("Body", bound=pydantic.BaseModel)
 
-#: The fields that any run may have.
-_FIELDS: Fields = {
-    "": {name for run in (StationaryRunIn, DynamicRunIn, DutyRunIn, MaintenanceRunIn) for name in run.model_fields},
-    "channels": CHANNELS.keys(),
-    "duty": Duty.model_fields.keys(),
-}
 _KINDS = ("stationary_stribeck", "dynamic_stribeck", "duty_cycles", "run_in", "maintenance")
 
 
 def read_run(body: bytes) -> IncomingRun:
     """The run in a JSON body; raises InvalidError naming every place that is wrong."""
-    sent = _parsed(body, _FIELDS)
+    return _parsed(body, _run)
+
+
+def _run(sent: Any) -> IncomingRun:
     run = _validated(RUN_IN.validate_json, sent)
     channels = getattr(run, "channels", None)
     given = () if channels is None else channels.model_dump(exclude_none=True)
@@ -76,19 +78,56 @@ def read_run_on_disk(path: Path) -> IncomingRun:
 
 def checked(schema: type[Body], body: bytes) -> Body:
     """Any other JSON body as its schema has it; raises InvalidError naming every place that is wrong."""
-    return _validated(schema.model_validate_json, _parsed(body, {"": schema.model_fields.keys()}))
+    return _parsed(body, partial(_validated, schema.model_validate_json))
 
 
-def _parsed(body: bytes, fields: Fields) -> Any:
-    """What the body says, in memory of some ten times its size. Raises InvalidError."""
+def _parsed(body: bytes, read: Callable[[Any], Answer]) -> Answer:
+    """What `read` makes of the body's value, in memory of some ten times its size. Raises InvalidError."""
     body = _in_utf8(body)
     if sum(map(body.count, (b'"', b"[", b"{"))) > MOST_MARKS:
-        raise too_many_marks(body, fields)
+        raise _too_many_marks(body, read)
     try:
-        return pydantic_core.from_json(body)
+        sent = pydantic_core.from_json(body)
     except ValueError as error:
         _require_utf8(body)
-        raise invalid_json(str(error)) from None
+        message = f"the body: Invalid JSON: {error}"
+        raise InvalidError(message, errors=[FieldError(pointer="", code="json_invalid", message=message)]) from None
+    return read(sent)
+
+
+def _too_many_marks(body: bytes, read: Callable[[Any], object]) -> InvalidError:
+    """The error of a body with more names, texts and lists than any that is right: what is wrong with its beginning.
+
+    A value in memory is some fifty bytes, whether the body spends two on it or twenty: such a body is not parsed whole.
+    """
+    try:
+        end = next(islice(re.finditer(rb'["\[{]', body), MOST_MARKS, None)).start()
+        head = pydantic_core.from_json(body[:end], allow_partial=True)
+        errors: list[FieldError] = []
+        total = 0
+        for look in (read, _check_channels):
+            try:
+                look(head)
+            except InvalidError as error:
+                present = [field for field in error.errors if field.code not in _OF_THE_END]
+                total += len(present) and error.total - (len(error.errors) - len(present))
+                errors += present
+        if errors:
+            detail = f"{errors[0].message}; {total} errors or more"
+            return InvalidError(detail, errors=errors, total=total)
+    except ValueError:
+        pass  # nested too deeply, or no JSON from its beginning on
+    message = f"the body must not hold more than {MOST_MARKS} quotation marks and opening brackets, got more"
+    return InvalidError(message, errors=[FieldError(pointer="", code="too_many_marks", message=message)])
+
+
+def _check_channels(sent: Any) -> None:
+    """Raise InvalidError where a channel's values are no numbers."""
+    channels = sent.get("channels") if isinstance(sent, dict) else None
+    if isinstance(channels, dict):
+        check_columns(
+            {name: values for name, values in channels.items() if name in CHANNELS and isinstance(values, list)}
+        )
 
 
 def _in_utf8(body: bytes) -> bytes:

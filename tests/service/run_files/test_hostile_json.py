@@ -42,6 +42,14 @@ def refused(body: bytes) -> InvalidError:
     return raised.value
 
 
+def require_total(found: InvalidError, count: int) -> None:
+    """All of a body's errors are counted, those of one that is too long at least as far as its beginning goes."""
+    if found.detail.endswith(" errors or more"):
+        assert min(count, 3000) < found.total <= count
+    else:
+        assert found.total == count
+
+
 KINDS: dict[str, Callable[[int], bytes]] = {
     "unknown fields": unknown_fields,
     "unknown channels": unknown_channels,
@@ -74,17 +82,18 @@ def test_work_is_linear(kind: str) -> None:
 def test_each_unknown_field_is_an_error(count: int) -> None:
     """By whatever means it is found."""
     found = refused(unknown_fields(count))
-    assert found.total == count + (count < 5000)  # where the body is parsed, its channels are missing too
+    require_total(found, count + (count < 5000))  # where the body is parsed, its channels are missing too
     error = next(error for error in found.errors if error.code == "extra_forbidden")
     assert (error.pointer, error.message.split(":")[0]) == ("/a0", "a0")
 
 
 def test_unknown_channels_and_parts_of_duty_are_errors() -> None:
-    assert refused(unknown_channels(10_000)).total == 10_000
-    assert refused(unknown_channels(10_000)).errors[49].pointer == "/channels/a49"
+    require_total(refused(unknown_channels(10_000)), 10_000)
+    assert refused(unknown_channels(10_000)).errors[30].pointer == "/channels/a30"
     body = '{"kind":"run_in","cycles":0,"duty":{"cycles":1,' + ",".join(f'"b/{n}":"x"' for n in range(10_000)) + "}}"
     found = refused(body.encode())
-    assert (found.total, found.errors[7].pointer) == (10_000, "/duty/b~17")
+    require_total(found, 10_000)
+    assert found.errors[7].pointer == "/duty/b~17"
 
 
 @pytest.mark.parametrize("count", [100, 4000, 60_000])
@@ -92,7 +101,7 @@ def test_each_number_that_is_a_text_is_an_error_with_its_row(count: int) -> None
     body = stationary(0)
     body["channels"] = {name: [1.5, 2, *["7,5"] * count, 3] for name in body["channels"]}
     found = refused(json.dumps(body, indent=count % 3).encode())
-    assert found.total == 3 * count
+    require_total(found, 3 * count)
     assert (found.errors[0].pointer, found.errors[0].row, found.errors[0].code) == (
         "/channels/pressure_bar/2",
         3,
@@ -110,8 +119,8 @@ def test_errors_that_are_too_many_to_count_are_said_to_be_more() -> None:
 
 def test_many_marks_that_are_no_known_error_are_one_error() -> None:
     assert [error.code for error in refused(nested("[")(20_000)).errors] == ["too_many_marks"]
-    body = json.dumps({"kind": "maintenance", "cycles": 0, "event": "other", "note": ["x"] * 20_000}).encode()
-    assert [error.code for error in refused(body).errors] == ["too_many_marks"]
+    body = json.dumps({"kind": "maintenance", "cycles": 0, "event": "other", "note": "x", "run_id": "a"})[:-1]
+    assert [error.code for error in refused((body + ',"a":' + "[" * 20_000).encode()).errors] == ["too_many_marks"]
 
 
 def test_the_longest_note_of_quotation_marks_is_a_note() -> None:
@@ -125,7 +134,7 @@ def test_other_bodies_know_their_own_fields() -> None:
     body = '{"clutch_id":"a",' + ",".join(f'"channels{number}":1' for number in range(20_000)) + "}"
     with pytest.raises(InvalidError) as raised:
         checked(ClutchIn, body.encode())
-    assert raised.value.total == 20_000
+    require_total(raised.value, 20_000)
     assert raised.value.errors[0].pointer == "/channels0"
 
 
