@@ -45,7 +45,7 @@ def refused(body: bytes) -> InvalidError:
 def require_total(found: InvalidError, count: int) -> None:
     """All of a body's errors are counted, those of one that is too long at least as far as its beginning goes."""
     if found.detail.endswith(" errors or more"):
-        assert min(count, 3000) < found.total <= count
+        assert min(count, 2000) < found.total <= count
     else:
         assert found.total == count
 
