@@ -68,7 +68,8 @@ check: $(VENV)/.tests $(JAVASCRIPT)/.package-lock.json
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(JAVASCRIPT)/.bin/prettier --config tests/javascript/prettier.json --check "service/dashboard/static/**/*.{js,css,ts}" tests/javascript
+	$(JAVASCRIPT)/.bin/prettier --config tests/javascript/prettier.json --check "service/dashboard/static/**/*.{js,css,ts}" "tests/javascript/*.json"
+	$(BIN)/python -m tests.javascript.types
 	$(JAVASCRIPT)/.bin/tsc --project tests/javascript
 
 # what the oldest releases deprecate among themselves is theirs; our own tests stay strict in `test`. Every dependency is met:

@@ -7,7 +7,7 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy import Connection, Row, Select, Text, bindparam, case, func, select, tuple_, update
 
-from storage.dialects import among
+from storage.dialects import among, json_fields
 from storage.encoding.json_text import Json, to_object, to_text
 from storage.tables import HELD_ONLY, clutch, run
 
@@ -64,6 +64,8 @@ _rows = select(clutch).where(clutch.c.clutch_id.in_(bindparam("wanted", expandin
 _ids_of_page = select(clutch.c.clutch_id).limit(bindparam("most")).offset(bindparam("left_out"))
 _worst_first = _ids_of_page.order_by(clutch.c.rank, clutch.c.clutch_id)
 _by_name = _ids_of_page.order_by(clutch.c.clutch_id)
+_kind = json_fields(clutch.c.record, "friction_material", "reaction_plate", "fluid")
+_by_kind = _ids_of_page.order_by(_kind, clutch.c.rank, clutch.c.clutch_id)
 _after = tuple_(clutch.c.rank, clutch.c.clutch_id) > tuple_(bindparam("after_rank"), bindparam("after_id"))
 _after_name = clutch.c.clutch_id > bindparam("after_id")
 _with_held_runs = clutch.c.clutch_id.in_(select(run.c.clutch_id).where(HELD_ONLY))
@@ -135,11 +137,12 @@ def page(
     after: tuple[float, str] | None = None,
     left_out: int = 0,
     by_name: bool = False,
+    by_kind: bool = False,
 ) -> list[ClutchRow]:
     """At most `limit` clutches of a choice, worst first, or by their ids: then none is left out or repeated however ranks
     change between two pages. `after` is the (rank, clutch_id) of the last clutch of the page before; the first `left_out`
-    behind it are passed over."""
-    query, values = _chosen(_by_name if by_name else _worst_first, choice)
+    behind it are passed over. `by_kind`: those of the same materials and fluid together, worst first; without `after`."""
+    query, values = _chosen(_by_kind if by_kind else _by_name if by_name else _worst_first, choice)
     values |= {"most": limit, "left_out": left_out}
     if after is not None:
         query = query.where(_after_name if by_name else _after)

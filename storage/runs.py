@@ -182,10 +182,11 @@ def receipts(
     limit: int,
     after: tuple[float, str] | None = None,
     state: str | None = None,
+    kind: str | None = None,
 ) -> list[ReceiptRow]:
-    """The same of any kind, as much as a list shows."""
+    """The same, as much as a list shows."""
     query, values = _behind(_receipts, after)
-    values |= {"of_clutch": clutch_id, "of_kind": None, "of_state": state, "most": limit}
+    values |= {"of_clutch": clutch_id, "of_kind": kind, "of_state": state, "most": limit}
     return [ReceiptRow(**row._asdict()) for row in connection.execute(query, values)]
 
 

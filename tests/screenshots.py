@@ -9,7 +9,7 @@ from pathlib import Path
 import httpx2
 from playwright.sync_api import Browser, Page
 
-from tests.browser.driving import chromium, pointed_at
+from tests.browser.driving import chromium, pointed_at, turned
 from tests.browser.lives import demo, post
 from tests.support import serving, stationary
 
@@ -33,13 +33,14 @@ def main() -> None:
         with _page(browser, 1280, 960) as page:
             _opened(page, f"{server.url}/clutches/sim-2")
             _take(page, "clutch")
-            page.locator("#diagnosis").get_by_role("button", name="Run the diagnosis").click()
+            turned(page, "diagnosis").locator("#diagnosis").get_by_role("button", name="Run the diagnosis").click()
             page.locator("#diagnosis .verdict").wait_for(timeout=600_000)
-            _section(page, "diagnosis", height=1240)
-            _section(page, "stribeck", height=720)
+            _section(page, "diagnosis", "diagnosis", height=1240)
+            _section(page, "curves", "stribeck", height=720)
         with _page(browser, 1280, 900, scheme="dark") as page:
             _opened(page, f"{server.url}/clutches/sim-2")
-            _section(page, "parameters", height=900, name="dark")
+            _section(page, "curves", "parameters", height=900, name="dark")
+            turned(page, "overview")
             page.locator("#report img").nth(1).wait_for(state="attached")
             page.emulate_media(media="print")
             page.set_viewport_size({"width": 760, "height": 1040})
@@ -72,11 +73,11 @@ def _page(browser: Browser, width: int, height: int, scheme: str = "light") -> I
 def _opened(page: Page, address: str) -> None:
     page.goto(address)
     pointed_at(page)
-    page.locator("#runs .runs details").first.wait_for()
 
 
-def _section(page: Page, section: str, *, height: int, name: str = "") -> None:
-    """A section from its heading on, its charts drawn."""
+def _section(page: Page, tab: str, section: str, *, height: int, name: str = "") -> None:
+    """A section of a tab from its heading on, its charts drawn."""
+    turned(page, tab)
     size = page.viewport_size
     assert size is not None
     page.set_viewport_size({"width": size["width"], "height": height})

@@ -15,6 +15,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -77,6 +78,7 @@ class Assets:
             _MODULE.sub(self._announced, raw.body.decode())
             .replace("{assets}", f"{root}assets/{self.digest}")
             .replace("{root}", root)
+            .replace("{release}", version("clutchlife"))
         )
         return Asset(name=name, media_type=raw.media_type, body=text.encode())
 

@@ -11,14 +11,22 @@ REVALIDATE = "no-cache"
 
 
 def router(assets: Assets) -> APIRouter:
-    """`/`, `/clutches/{clutch_id}` and `/assets/...`."""
-    pages = {name: assets.page(name, root) for name, root in (("fleet.html", "./"), ("clutch.html", "../"))}
+    """`/`, `/compare`, `/clutches/{clutch_id}` and `/assets/...`."""
+    pages = {
+        name: assets.page(name, root)
+        for name, root in (("fleet.html", "./"), ("compare.html", "./"), ("clutch.html", "../"))
+    }
     routes = APIRouter(include_in_schema=False)
 
     @routes.get("/")
     def fleet(request: Request) -> Response:
         """Every clutch, worst first."""
         return answer(request, pages["fleet.html"], REVALIDATE)
+
+    @routes.get("/compare")
+    def compare(request: Request) -> Response:
+        """Clutches, lives and states over one another."""
+        return answer(request, pages["compare.html"], REVALIDATE)
 
     @routes.get("/clutches/{clutch_id}")
     def clutch(request: Request, clutch_id: str) -> Response:  # noqa: ARG001  (the page reads its own address)

@@ -79,11 +79,17 @@ def page_as_json(
     limit: int,
     after: Place | None = None,
     offset: int = 0,
-    by_name: bool = False,
+    sort: str = "worst",
 ) -> bytes:
-    """A page of the clutches of a choice as JSON; each clutch's item is made once for its revision and verdict."""
+    """A page of the clutches of a choice as JSON; each clutch's item is made once for its revision and verdict. By kind a
+    page's place is how many clutches are before it."""
+    by_name, by_kind = sort == "name", sort == "kind"
+    if by_kind:
+        offset, after = offset + (0 if after is None else int(after[0])), None
     with database.reading() as connection:
-        rows = clutches.page(connection, choice, limit=limit + 1, after=after, left_out=offset, by_name=by_name)
+        rows = clutches.page(
+            connection, choice, limit=limit + 1, after=after, left_out=offset, by_name=by_name, by_kind=by_kind
+        )
         clutches_shown = _shown(connection, rows[:limit])
     items = [
         cache.answer(
@@ -93,7 +99,8 @@ def page_as_json(
         )
         for row, held, verdict, state in clutches_shown
     ]
-    return page_as_bytes([item.body for item in items], _next(rows, limit, by_name=by_name))
+    more = (float(offset + limit), "") if by_kind and len(rows) > limit else None
+    return page_as_bytes([item.body for item in items], more if by_kind else _next(rows, limit, by_name=by_name))
 
 
 def totals(database: Database, choice: Choice) -> dict[str, Any]:

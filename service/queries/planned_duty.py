@@ -14,7 +14,7 @@ from scipy.special import ndtri
 from models.arrays import FloatArray
 from models.clutch import Geometry
 from models.degradation.programme import Programme, uncertain_work
-from models.degradation.severity import Block, Severity, SeverityBasis, SeverityMap, counted
+from models.degradation.severity import Block, Severity, SeverityBasis, SeverityMap, counted, severity_map
 from models.prognosis.criteria import HORIZON, QUANTILES
 from models.prognosis.first_passage import PassageStatus, weighted_quantiles
 from models.prognosis.stated_end import StatedEnd
@@ -71,7 +71,12 @@ def _prediction(state: ClutchState, method: str, planned: ProgrammeIn) -> dict[s
     """The prediction under recent duty, and in its place what the programme makes of it."""
     clutch_id, assumptions, fraction = state.clutch_id, state.assumptions(), state.fraction
     series = state.lives[-1].pooled(assumptions) if state.events else None
-    unknown = {"remaining_blocks": by_quantile({}), "block_severity": [None] * len(planned.programme)}
+    basis = assumptions.severity.basis.value
+    unknown = {
+        "remaining_blocks": by_quantile({}),
+        "block_severity": [None] * len(planned.programme),
+        "counted_by": basis,
+    }
     if series is None or not series.measurements:
         recent = predict_at(clutch_id, state.events, assumptions, fraction, method=method)
         return recent | {"recent_duty_cycles": by_quantile({})} | unknown
@@ -83,7 +88,7 @@ def _prediction(state: ClutchState, method: str, planned: ProgrammeIn) -> dict[s
     recent["recent_duty_cycles"] = recent["remaining_cycles"]
     if recent["status"] in (INSUFFICIENT, ENDED):
         return recent | unknown
-    duty = _Counted(severity=assumptions.severity, scale=series.scale.severity, geometry=state.geometry)
+    duty = _counted(state, assumptions.severity, series, planned)
     rng = step_rng(clutch_id, f"{method}-programme", series, runs)
     programme = duty.programme(planned.programme, recent["current"]["mean_cof"], rng)
     most = max(series.scale.origin + HORIZON - now, 0.0)
@@ -94,7 +99,7 @@ def _prediction(state: ClutchState, method: str, planned: ProgrammeIn) -> dict[s
         open_ended = None in answer["remaining_cycles"].values()
         recent["status"] = (PassageStatus.MAY_NEVER_REACH if open_ended else PassageStatus.PREDICTED).value
     recent["warnings"] = recent["warnings"] + notice_items(duty.notices(planned.programme))
-    return recent | answer
+    return recent | answer | {"counted_by": duty.severity.basis.value}
 
 
 def _planned_answer(programme: Programme, end: StatedEnd, series: Series, *, now: float, most: float) -> dict[str, Any]:
@@ -121,13 +126,32 @@ def _planned_answer(programme: Programme, end: StatedEnd, series: Series, *, now
     }
 
 
+def _counted(state: ClutchState, severity: Severity, series: Series, planned: ProgrammeIn) -> "_Counted":
+    """How planned duty counts: as the record says; where that counts cycles and both the programme and the life's duty state
+    energies, by its energy beside the mean of recent duty, in proportion."""
+    plain = _Counted(severity=severity, scale=series.scale.severity, geometry=state.geometry)
+    stated = any(block.energy_per_cycle_kj is not None for block in planned.programme)
+    if severity.basis is not SeverityBasis.CYCLES or planned.counted_by == "cycles" or not stated:
+        return plain
+    origin = series.scale.origin
+    blocks = [event.duty.since(origin) for event in state.lives[-1].events if event.duty and event.duty.end > origin]
+    energy = Severity(basis=SeverityBasis.DISSIPATED_ENERGY)
+    of_energy = severity_map(energy, blocks)
+    if of_energy.reference is None:
+        return plain
+    recent = replace(series.scale.severity, reference=of_energy.reference * of_energy.rate)
+    return _Counted(severity=energy, scale=recent, geometry=state.geometry, assumed=True)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Counted:
-    """How the severity of a life is counted: its ζ so far, and the disc that turns speed and pressure into energy."""
+    """How the severity of a life is counted: its ζ so far, and the disc that turns speed and pressure into energy;
+    `assumed`: by energy, though the record counts cycles."""
 
     severity: Severity
     scale: SeverityMap
     geometry: Geometry
+    assumed: bool = False
 
     def programme(self, blocks: Blocks, cof: float, rng: np.random.Generator) -> Programme:
         """The programme, by draws of what it leaves open; what states no severity is as severe as recent duty."""
@@ -141,6 +165,10 @@ class _Counted:
     def notices(self, blocks: Blocks) -> list[Notice]:
         """A warning where what the programme plans cannot be counted."""
         basis = self.severity.basis.value.replace("_", " ")
+        if self.assumed and self.scale.reference is not None:
+            recent = f"{self.scale.reference / 1e3:.3g} kJ a cycle of recent duty"
+            message = f"the record counts duty cycles; here a cycle counts by its energy beside the {recent}"
+            return [Notice(code="counted_by_energy", message=message)]
         if self.severity.basis is SeverityBasis.CYCLES:
             why = "the clutch's record counts duty cycles, whatever their severity (`severity.basis`)"
         elif self.scale.reference is None:

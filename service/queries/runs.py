@@ -20,15 +20,21 @@ TRAIL_COLUMNS = changes.SHOWN
 
 
 def page_as_json(
-    database: Database, clutch_id: str, *, limit: int, after: Place | None, state: str | None = None
+    database: Database,
+    clutch_id: str,
+    *,
+    limit: int,
+    after: Place | None,
+    state: str | None = None,
+    kind: str | None = None,
 ) -> bytes:
-    """Receipts by cycles, of runs in one state or all, as JSON. Raises NotFoundError.
+    """Receipts by cycles, of runs in one state or all, of one kind or all, as JSON. Raises NotFoundError.
 
     A receipt's text goes out as it is stored, and what the run is now behind it.
     """
     with database.reading() as connection:
         records.clutch(connection, clutch_id)
-        rows = runs.receipts(connection, clutch_id, limit=limit + 1, after=after, state=state)
+        rows = runs.receipts(connection, clutch_id, limit=limit + 1, after=after, state=state, kind=kind)
     items = [_as_json(row) for row in rows[:limit]]
     return page_as_bytes(items, (rows[limit - 1].cycles, rows[limit - 1].run_id) if len(rows) > limit else None)
 

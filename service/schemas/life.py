@@ -384,6 +384,11 @@ class ProgrammeIn(Schema):
     pace_cycles_per_hour: PositiveNumber | None = Field(
         default=None, description="Duty cycles an hour, idle hours included; left out, that of the dated runs"
     )
+    counted_by: Literal["dissipated_energy", "cycles"] | None = Field(
+        default=None,
+        description="On a clutch whose record counts cycles: whether a planned cycle counts by its energy beside that of "
+        "recent duty, or as one cycle; left out, by its energy where blocks and duty runs state one",
+    )
 
 
 class PlannedLife(RemainingLife):
@@ -398,6 +403,9 @@ class PlannedLife(RemainingLife):
     )
     end_of_life_at: dict[str, str | None] | None = Field(
         description="Quantiles of the date of the end, UTC, ISO 8601; null where no pace is known"
+    )
+    counted_by: Literal["cycles", "sliding_distance", "dissipated_energy"] = Field(
+        description="What a planned cycle was counted by"
     )
     pace_cycles_per_hour: float | None = Field(description="Duty cycles an hour that dates were computed with")
     pace_from: Literal["request", "runs"] | None = Field(

@@ -76,6 +76,10 @@ LifeNumber = Annotated[
 Draws = Annotated[
     int, SHORT, Field(ge=0, le=MOST_DRAWS, description="Joint draws of the coefficients of eq. 6 for each track")
 ]
+RunKind = Annotated[
+    Literal["stationary_stribeck", "dynamic_stribeck", "duty_cycles", "run_in", "maintenance"] | None,
+    Field(description="Runs of this kind only; left out, all"),
+]
 State = Annotated[
     Literal["accepted", "held", "withdrawn"] | None, Field(description="Runs in this state only; left out, all")
 ]
@@ -94,11 +98,11 @@ Find = Annotated[
     ),
 ]
 Sort = Annotated[
-    Literal["worst", "name"],
+    Literal["worst", "name", "kind"],
     Field(
         description="`worst`: the fewest remaining cycles first, a view of the moment: a clutch whose remaining cycles "
         "change between two pages may be on both or on neither. `name`: by name; a walk from page to page meets each "
-        "clutch once"
+        "clutch once. `kind`: those of the same friction material, reaction plate and fluid together, the worst first"
     ),
 ]
 Offset = Annotated[

@@ -59,6 +59,15 @@ def pointed_at(page: Page, chart: str = "fan") -> None:
     page.locator(f"#chart-{chart}[data-drawn]").wait_for()
 
 
+def turned(page: Page, tab: str) -> Page:
+    """A clutch's page with that tab in sight, as by its link."""
+    page.locator("#tabs").wait_for()
+    if not page.locator(f"#tab-{tab}").is_visible():
+        page.locator(f"#tabs a[href='#/{tab}']").click()
+    page.locator(f"#tab-{tab}").wait_for()
+    return page
+
+
 class Watched:
     """A page of the service, and what it asked for, said and violated."""
 

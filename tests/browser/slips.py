@@ -6,7 +6,7 @@ from typing import Any
 import httpx2
 from playwright.sync_api import Locator, Page, expect
 
-from tests.browser.driving import Watched
+from tests.browser.driving import Watched, turned
 from tests.browser.lives import loops, post
 from tests.support import ONCE, stationary
 
@@ -75,16 +75,18 @@ def accepted_part(found: dict[str, Any]) -> dict[str, Any]:
 
 
 def opened(watched: Watched) -> Page:
-    page = watched.open("/clutches/bench")
+    page = watched.open("/clutches/bench#/runs")
     page.locator("#runs .runs details").first.wait_for()
     return page
 
 
 def run_in(page: Page, run_id: str) -> Locator:
     """A run in the list, opened."""
+    turned(page, "runs")
     details = page.locator(f"#runs details[data-run='{run_id}']")
+    details.wait_for()
     if details.get_attribute("open") is None:
-        details.locator("summary").click()
+        details.locator("summary").first.click()
     return details
 
 
@@ -108,8 +110,9 @@ def done(page: Page, text: str) -> None:
 
 def settled(page: Page, held: int) -> None:
     """The page shows so many held runs at its top."""
+    turned(page, "overview")
     if held == 0:
-        expect(page.locator("#held")).to_be_hidden()
+        expect(page.locator("#held")).to_have_count(0)
         expect(page.locator("#head .mark-held")).to_have_count(0)
     else:
         expect(page.locator("#held")).to_contain_text(f"{held} run is held")
@@ -118,5 +121,7 @@ def settled(page: Page, held: int) -> None:
 
 def trail(page: Page) -> list[list[str]]:
     """What, who and why in the audit trail."""
-    rows = page.locator("#runs .changes tbody tr")
+    turned(page, "history")
+    rows = page.locator("#changes tbody tr")
+    expect(page.locator("#changes tbody")).to_be_visible()
     return [[row.locator("td").nth(cell).inner_text() for cell in (1, 3, 4)] for row in rows.all()]

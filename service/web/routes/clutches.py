@@ -108,7 +108,7 @@ async def list_clutches(
 
     def make() -> bytes:
         return clutch_list.page_as_json(
-            context.database, context.cache, choice, limit=limit, after=after, offset=offset, by_name=sort == "name"
+            context.database, context.cache, choice, limit=limit, after=after, offset=offset, sort=sort
         )
 
     return await _of_all(request, context, ("clutches", choice, limit, after, offset, sort), make)

@@ -16,7 +16,7 @@ from service.lists import from_cursor
 from service.queries import runs
 from service.queries.raw_run import Kind, entity_tag, write_run
 from service.run_files.json_run import checked, read_run, read_run_on_disk
-from service.schemas.parameters import ClutchId, Points, RunId, State
+from service.schemas.parameters import ClutchId, Points, RunId, RunKind, State
 from service.schemas.run import RUN_IN, Confirmation, Correction, Receipt, RunOut, RunPage, Withdrawal
 from service.web.answers import JSON_TYPE, clutch_answer, described_body, json_body, now, require_json, unchanged
 from service.web.auth import Admin, Ingester, Reader, name_of_caller
@@ -83,6 +83,7 @@ async def list_runs(
     context: Reader,
     clutch_id: ClutchId,
     state: State = None,
+    kind: RunKind = None,
     limit: Limit = USUAL_ITEMS,
     cursor: Cursor = None,
 ) -> Response:
@@ -90,9 +91,9 @@ async def list_runs(
     after = from_cursor(cursor)
 
     def make() -> bytes:
-        return runs.page_as_json(context.database, clutch_id, limit=limit, after=after, state=state)
+        return runs.page_as_json(context.database, clutch_id, limit=limit, after=after, state=state, kind=kind)
 
-    return await clutch_answer(request, context, clutch_id, "runs", make, state, limit, after)
+    return await clutch_answer(request, context, clutch_id, "runs", make, state, kind, limit, after)
 
 
 @router.get("/{run_id}", response_model=RunOut, responses=READING_RUN)

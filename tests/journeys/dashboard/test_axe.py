@@ -8,7 +8,7 @@ import pytest
 from axe_playwright_python.base import AXE_SCRIPT
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.driving import Watched, pointed_at, serving_with_engine
+from tests.browser.driving import Watched, pointed_at, serving_with_engine, turned
 from tests.browser.lives import post, worn
 from tests.support import stationary
 
@@ -72,20 +72,31 @@ def test_a_clutch_with_a_diagnosis_and_all_that_opens(
     watched = Watched(browser, url, color_scheme=scheme, viewport=viewport)
     page = watched.open("/clutches/bench")
     pointed_at(page)
-    page.locator("#diagnosis .verdict").wait_for()
     page.locator("#chart-fan summary").click()
     page.locator("#chart-fan table").wait_for()
-    for run_id in ("odd", "aside"):
-        page.locator(f"#runs details[data-run='{run_id}'] summary").click()
-    expect(page.locator("#runs .facts")).to_have_count(2)
-    page.locator("#held").get_by_text("1 run is held").wait_for()
-    page.locator("#runs .changes tbody tr").first.wait_for()
+    page.get_by_text("More", exact=True).click()
+    page.locator("#units summary").click()
     assert violations(page) == []
+    page.keyboard.press("Escape")
+    for tab in ("curves", "loops", "engagements"):
+        turned(page, tab).locator(f"#tab-{tab} figure.chart").first.wait_for()
+        assert violations(page) == [], tab
+    turned(page, "runs")
+    for run_id in ("odd", "aside"):
+        page.locator(f"#runs details[data-run='{run_id}'] > summary").click()
+    expect(page.locator("#runs .facts")).to_have_count(2)
+    expect(page.locator("#runs .run-charts figure")).to_have_count(6)
+    assert violations(page) == []
+    turned(page, "history").locator("#changes tbody tr").first.wait_for()
+    assert violations(page) == []
+    turned(page, "diagnosis").locator("#diagnosis .verdict").wait_for()
+    assert violations(page) == []
+    turned(page, "overview").locator("#held").get_by_text("1 run is held").wait_for()
     for button in ("Confirm", "Correct the cycles", "Withdraw"):
         page.locator("#held").get_by_role("button", name=button).click()
         assert violations(page) == []
         page.keyboard.press("Escape")
-    page.get_by_role("button", name="Adopt the extended model").click()
+    turned(page, "diagnosis").get_by_role("button", name="Adopt the extended model").click()
     assert violations(page) == []
     page.keyboard.press("Escape")
     with page.expect_file_chooser() as chooser:
@@ -130,6 +141,8 @@ DRAWN = (
     "fresh",
     "midlife",
     "worn",
+    "low",
+    "high",
 )
 
 
@@ -164,7 +177,8 @@ def test_all_that_is_drawn_stands_out_three_to_one(browser: Browser, url: str, s
 def test_what_was_done_and_an_archived_clutch(browser: Browser, url: str) -> None:
     watched = Watched(browser, url, viewport=PHONE)
     page = watched.open("/clutches/waiting")
-    page.get_by_role("button", name="Archive").click()
+    page.get_by_text("More", exact=True).click()
+    page.get_by_role("button", name="Archive …").click()
     page.get_by_role("dialog").get_by_role("button", name="Archive").click()
     page.locator(".done").get_by_text("waiting is archived").wait_for()
     page.locator("#archived").get_by_role("button", name="Bring it back").wait_for()

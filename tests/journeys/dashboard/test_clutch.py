@@ -7,10 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import httpx2
+import openpyxl
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
-from tests.browser.driving import Watched, launched, pointed_at
+from tests.browser.driving import Watched, launched, pointed_at, turned
 from tests.browser.lives import demo, post
 from tests.browser.pixels import seen
 from tests.support import ONCE, Server, serving, stationary
@@ -18,26 +19,39 @@ from tests.support import ONCE, Server, serving, stationary
 pytestmark = pytest.mark.browser
 
 CHARTS = {
-    "fan": "Mean COF against its threshold",
-    "predicted": "Remaining cycles, as predicted",
-    "cof": "Mean COF by pressure",
-    "stribeck": "Stribeck curves",
-    "surface": "Stribeck curves in 3D",
-    "static-torque-nm": "Static torque Ms",
-    "coulomb-ratio": "Coulomb ratio M̄c",
-    "stribeck-velocity-m-s": "Stribeck velocity VS",
-    "viscous-coefficient": "Viscous coefficient Cv",
-    "landscape": "A parameter over cycles and pressure",
-    "pressure-law": "A parameter over pressure",
-    "shudder": "Slope of friction over speed",
-    "loop-curves": "Loops: torque over speed",
-    "lag-cycles": "Lag over cycles",
-    "lag-pressure": "Lag over pressure",
-    "engagement-indicators": "An indicator over cycles",
-    "engagement-trace": "An engagement against the model",
-    "roughness": "Roughness Ra",
-    "skewness": "Skewness Rsk",
+    "overview": {
+        "fan": "Mean COF against its threshold",
+        "cof": "Mean COF by pressure",
+        "shudder": "Shudder margin",
+    },
+    "curves": {
+        "stribeck": "Stribeck curves",
+        "surface": "Stribeck curves in 3D",
+        "static-torque-nm": "Static torque Ms",
+        "coulomb-ratio": "Coulomb ratio M̄c",
+        "stribeck-velocity-m-s": "Stribeck velocity VS",
+        "viscous-coefficient": "Viscous coefficient Cv",
+        "landscape": "A parameter over cycles and pressure",
+        "pressure-law": "A parameter over pressure",
+    },
+    "loops": {
+        "loop-curves": "Loops: torque over speed",
+        "lag-cycles": "Lag over cycles",
+        "lag-pressure": "Lag over pressure",
+    },
+    "engagements": {
+        "engagement-indicators": "An indicator over cycles",
+        "engagement-trace": "An engagement against the model",
+    },
+    "history": {
+        "predicted": "Remaining cycles, as predicted",
+        "roughness": "Roughness Ra",
+        "skewness": "Skewness Rsk",
+    },
 }
+TAB_OF = {name: tab for tab, names in CHARTS.items() for name in names}
+#: The highest that the overview may be at 1280 x 800, and how soon the top line stands after the answer.
+MAX_OVERVIEW_PX, MAX_TOP_LINE_MS = 1700, 1000
 
 
 @pytest.fixture(scope="module")
@@ -60,17 +74,16 @@ def watched(browser: Browser, life: Server) -> Iterator[Watched]:
 
 
 def opened(watched: Watched) -> Page:
-    if watched.page.url.endswith("/clutches/sim-1"):
+    if "/clutches/sim-1" in watched.page.url:
         return watched.page
     page = watched.open("/clutches/sim-1")
     pointed_at(page)
-    page.locator("#runs .runs details").first.wait_for()
     return page
 
 
 def drawn(page: Page, name: str) -> Locator:
     """The chart, scrolled to and drawn."""
-    chart = page.locator(f"#chart-{name}")
+    chart = turned(page, TAB_OF[name]).locator(f"#chart-{name}")
     chart.scroll_into_view_if_needed()
     page.locator(f"#chart-{name}[data-drawn]").wait_for()
     page.wait_for_timeout(100)
@@ -80,16 +93,93 @@ def drawn(page: Page, name: str) -> Locator:
 @pytest.mark.slow
 def test_every_chart_is_drawn(browser: Browser, watched: Watched) -> None:
     page = opened(watched)
-    expect(page.locator("figure.chart:visible h3")).to_have_text(list(CHARTS.values()))
-    for name in CHARTS:
-        found = seen(browser, drawn(page, name).locator(".plot").screenshot())
-        assert found.is_chart, (name, found)
-        assert not found.is_dark, name
+    for tab, names in CHARTS.items():
+        turned(page, tab)
+        expect(page.locator("figure.chart:visible h3")).to_have_text(list(names.values()))
+        for name in names:
+            found = seen(browser, drawn(page, name).locator(".plot").screenshot())
+            assert found.is_chart, (name, found)
+            assert not found.is_dark, name
+    turned(page, "overview")
     # the check itself can fail: what is no chart is not taken for one
     assert not seen(browser, page.locator("#chart-fan figcaption .note").screenshot()).is_chart
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("size", [(1280, 800), (390, 844)], ids=["wide", "phone"])
+def test_the_page_answers_first(browser: Browser, life: Server, size: tuple[int, int]) -> None:
+    """State, safe bound and what to do stand in the first screen within a second of the clutch's answer; the overview is
+    short."""
+    watched = Watched(browser, life.url, viewport={"width": size[0], "height": size[1]})
+    page = watched.page
+    with page.expect_response("**/v1/clutches/sim-1") as answered:
+        watched.open("/clutches/sim-1")
+    said = answered.value.json()
+    page.locator("#action").wait_for()
+    ready, shown = page.evaluate(
+        """() => [performance.getEntriesByName(new URL("/v1/clutches/sim-1", location.href).href)[0].responseEnd,
+        performance.getEntriesByName("head-shown")[0].startTime]"""
+    )
+    assert 0 <= shown - ready < MAX_TOP_LINE_MS
+    headline = " ".join(page.locator("#headline").inner_text().split())
+    assert said["headline"].partition(": ")[2] in headline
+    assert page.locator("#action").inner_text() == said["action"]
+    box = page.locator("#action").bounding_box()
+    assert box is not None
+    assert box["y"] + box["height"] <= size[1]
+    assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
+    page.locator("#chart-shudder[data-sketched]").wait_for()
+    if size[0] == 1280:
+        assert page.evaluate("document.documentElement.scrollHeight") <= MAX_OVERVIEW_PX
+    watched.close()
+
+
+def test_a_tab_has_an_address_and_the_way_back(watched: Watched) -> None:
+    page = opened(watched)
+    for tab in ("curves", "runs", "history"):
+        turned(page, tab)
+        assert page.url.endswith(f"#/{tab}")
+        expect(page.locator("#tabs [aria-current]")).to_have_attribute("href", f"#/{tab}")
+    page.go_back()
+    page.locator("#tab-runs").wait_for()
+    page.go_back()
+    page.locator("#tab-curves").wait_for()
+    assert not page.locator("#tab-runs").is_visible()
+
+
+def test_a_run_opens_to_its_curve_what_the_fit_leaves_and_its_record(watched: Watched) -> None:
+    page = opened(watched)
+    runs = ONCE.get(f"{watched.url}/v1/clutches/sim-1/runs?kind=stationary_stribeck&limit=1").json()["items"]
+    page.goto(f"{watched.url}/clutches/sim-1#/runs/{runs[0]['run_id']}")
+    details = page.locator(f"#runs details[data-run='{runs[0]['run_id']}']")
+    for title in ("Curve and fit", "What the fit leaves", "The record as it was sent"):
+        chart = details.locator("figure.chart").filter(has=page.get_by_role("heading", name=title))
+        chart.scroll_into_view_if_needed()
+        expect(chart.locator(".plot svg").first).to_be_visible()
+    details.get_by_label("Channel").select_option("Speed, rpm")
+
+
+def test_units_are_chosen_and_kept(browser: Browser, life: Server) -> None:
+    watched = Watched(browser, life.url)
+    page = watched.open("/clutches/sim-1#/curves")
+    note = page.locator("#chart-stribeck .note")
+    expect(note).to_contain_text("At 5.0 bar")
+    page.locator("#units summary").click()
+    page.get_by_role("button", name="US: lbf·ft, psi, ft/s").click()
+    expect(note).to_contain_text("At 73 psi")
+    page.locator("#units summary").click()
+    page.get_by_role("button", name="Friction as µ").click()
+    expect(page.locator("#chart-stribeck .plot")).to_contain_text("coefficient of friction µ")
+    page.reload()
+    expect(note).to_contain_text("At 73 psi")
+    with page.expect_download() as sheet:
+        page.locator("#chart-stribeck").get_by_role("button", name="XLSX").click()
+    rows = list(openpyxl.load_workbook(sheet.value.path()).active.iter_rows(values_only=True))
+    assert rows[0] == ("kind", "cycles", "pressure, bar", "speed, rpm", "coefficient of friction µ")
+    assert 0.05 < rows[1][4] < 0.25
+    watched.close()
+
+
 def test_dark_and_light_are_chosen_and_the_charts_follow(browser: Browser, watched: Watched) -> None:
     page = opened(watched)
     button = page.locator("#theme")
@@ -125,15 +215,17 @@ def test_what_the_page_says_is_what_the_service_says(watched: Watched) -> None:
     assert f"{round(100 * said['current']['health'])} %" in page.locator(".tiles").inner_text()
     assert f"{said['as_of_cycles']:,}" in page.locator(".tiles").inner_text()
     assert page.locator("h1 .tag").inner_text() == "simulated"
+    turned(page, "runs")
+    page.locator("#runs .runs > details").first.wait_for()
     # a note is text, never markup
     assert page.locator("#runs").get_by_text("<img src=x onerror=alert(1)>").is_visible()
     warned = page.locator("#runs details").filter(has=page.locator(".warned")).first
-    warned.locator("summary").click()
+    warned.locator("summary").first.click()
     warned.locator(".warnings li").first.wait_for()
     tested = page.locator("#runs details").filter(has_text="stationary").first
     if tested.get_attribute("open") is None:
-        tested.locator("summary").click()
-    tested.locator("table").wait_for()
+        tested.locator("summary").first.click()
+    tested.locator("table").first.wait_for()
 
 
 def test_every_chart_has_a_table_a_png_and_a_csv(watched: Watched) -> None:
@@ -148,7 +240,7 @@ def test_every_chart_has_a_table_a_png_and_a_csv(watched: Watched) -> None:
         head = Path(png.value.path()).read_bytes()
         assert head.startswith(b"\x89PNG")
         assert len(head) > 20_000
-    for chart in page.locator("figure.chart:visible").all():
+    for chart in turned(page, "overview").locator("figure.chart:visible").all():
         assert chart.get_by_role("button", name="PNG").is_visible()
         assert chart.get_by_role("button", name="CSV").is_visible()
         assert chart.locator("summary").inner_text() == "Table"
@@ -161,7 +253,7 @@ def test_every_chart_has_a_table_a_png_and_a_csv(watched: Watched) -> None:
 
 
 def test_pressure_and_view_are_chosen_by_keyboard(watched: Watched) -> None:
-    page = opened(watched)
+    page = turned(opened(watched), "curves")
     chart = page.locator("#chart-stribeck")
     chart.scroll_into_view_if_needed()
     select = chart.get_by_label(re.compile(r"^\s*Pressure"))
@@ -191,14 +283,13 @@ def test_a_run_posted_while_the_page_is_open_appears(browser: Browser, tmp_path:
         page.evaluate("window.same = true")
         post(http, "live", stationary(0))
         pointed_at(page)
-        expect(page.locator("#runs .runs details")).to_have_count(1)
-        assert page.locator("#chart-predicted").get_by_text("From the third stationary test on").is_visible()
-        page.locator("#chart-loop-curves").scroll_into_view_if_needed()
-        assert page.locator("#chart-loop-curves").get_by_text("No dynamic Stribeck test yet").is_visible()
+        expect(turned(page, "runs").locator("#runs .runs > details")).to_have_count(1)
+        turned(page, "history").locator("#chart-predicted").get_by_text("From the third stationary test on").wait_for()
+        turned(page, "loops").locator("#chart-loop-curves").get_by_text("No dynamic Stribeck test yet").wait_for()
         for cycles in (1000, 2000):
             post(http, "live", stationary(cycles))
-        expect(page.locator("#runs .runs details")).to_have_count(3)
-        page.locator("#chart-predicted").scroll_into_view_if_needed()
+        expect(turned(page, "runs").locator("#runs .runs > details")).to_have_count(3)
+        turned(page, "history")
         page.locator("#chart-predicted[data-drawn]").wait_for()
         assert page.evaluate("window.same")
         watched.close()
@@ -213,7 +304,7 @@ def test_the_report_is_one_page_and_light(browser: Browser, life: Server) -> Non
     page.emulate_media(media="print", color_scheme="dark")
     assert not page.locator("main").is_visible()
     report = page.locator("#report")
-    for part in ("sim-1", "Remaining cycles", "Threshold", "Diagnosis:", "The last tests"):
+    for part in ("sim-1", "Remaining cycles", "Threshold", "Diagnosis:", "The last tests", "Made of: Clutchlife 0."):
         assert part in report.inner_text()
     assert not seen(browser, report.screenshot()).is_dark
     watched.close()
@@ -223,7 +314,7 @@ def test_the_report_is_one_page_and_light(browser: Browser, life: Server) -> Non
 def test_without_webgl_the_page_says_so_and_keeps_the_numbers(browser: Browser, life: Server) -> None:
     other = launched(browser.browser_type, more=("--disable-3d-apis",))
     watched = Watched(other, life.url)
-    page = opened(watched)
+    page = watched.open("/clutches/sim-1#/curves")
     surface = page.locator("#chart-surface")
     surface.scroll_into_view_if_needed()
     surface.get_by_text("This browser does not draw in 3D").wait_for()

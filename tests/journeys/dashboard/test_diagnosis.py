@@ -7,7 +7,7 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.driving import Watched, serving_with_engine
+from tests.browser.driving import Watched, serving_with_engine, turned
 from tests.browser.lives import post, worn
 from tests.browser.pixels import seen
 from tests.support import ONCE, stationary
@@ -33,7 +33,7 @@ def told(url: str, path: str) -> dict[str, Any]:
 
 def test_a_diagnosis_is_run_adopted_and_taken_back(browser: Browser, url: str) -> None:
     watched = Watched(browser, url)
-    page = watched.open("/clutches/bench")
+    page = watched.open("/clutches/bench#/diagnosis")
     section = page.locator("#diagnosis")
     section.get_by_text("No diagnosis has been run yet").wait_for()
     section.get_by_role("button", name="Run the diagnosis").click()
@@ -49,9 +49,10 @@ def test_a_diagnosis_is_run_adopted_and_taken_back(browser: Browser, url: str) -
     adopt(page, agree=True)
     expect(section).to_contain_text("This diagnosis is adopted")
     assert told(url, "/remaining-useful-life")["model"]["effects"] == report["causes"]
-    expect(page.locator(".tiles")).to_contain_text("Torque zero shift")
+    turned(page, "overview")
+    expect(page.locator(".tiles")).to_contain_text("For torque zero shift")
     expect(page.locator("#head .verdict")).not_to_contain_text("Out of specification")
-    page.evaluate("scrollTo(0, 0)")
+    turned(page, "diagnosis")
 
     section.get_by_role("button", name="Go back to the baseline").click()
     dialog = page.get_by_role("dialog", name="Go back to the baseline?")
@@ -59,7 +60,8 @@ def test_a_diagnosis_is_run_adopted_and_taken_back(browser: Browser, url: str) -
     dialog.get_by_role("button", name="Go back").click()
     section.get_by_role("button", name="Adopt the extended model").wait_for()
     assert told(url, "/remaining-useful-life")["model"]["name"] == "baseline"
-    expect(page.locator(".tiles")).to_contain_text("without extension")
+    turned(page, "overview")
+    expect(page.locator(".tiles")).to_contain_text("no diagnosis is adopted")
 
     page.goto(f"{url}/")
     row = page.locator("tr[data-clutch='bench']")
@@ -104,7 +106,7 @@ def test_a_rebuild_ends_what_a_diagnosis_said(browser: Browser, url: str) -> Non
             post(http, "bench", stationary(cycles, wear=(cycles - 5000) / 26_000))
     expect(row).to_contain_text("Normal")
     expect(row.locator("td[data-label='Diagnosis']")).to_contain_text("before the rebuild")
-    watched.open("/clutches/bench")
+    watched.open("/clutches/bench#/diagnosis")
     page.locator("#diagnosis").get_by_text("this is of its earlier life").wait_for()
     expect(page.locator("#head .verdict")).to_contain_text("Normal")
     expect(page.get_by_role("button", name="Adopt the extended model")).to_have_count(0)
@@ -131,7 +133,7 @@ def test_a_failed_diagnosis_says_why(browser: Browser, url: str) -> None:
             route.continue_()
 
     page.route("**/diagnoses*", refuse)
-    watched.open("/clutches/bench")
+    watched.open("/clutches/bench#/diagnosis")
     page.get_by_role("button", name="Run the diagnosis").click()
     page.locator("#diagnosis").get_by_text("16 diagnoses wait already").wait_for()
     assert page.get_by_role("button", name="Run the diagnosis").is_enabled()

@@ -42,7 +42,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 def opened(browser: Browser, server: Server, clutch_id: str, **context: object) -> tuple[Watched, Page]:
     watched = Watched(browser, server.url, **context)
-    page = watched.open(f"/clutches/{clutch_id}")
+    page = watched.open(f"/clutches/{clutch_id}#/history")
     page.locator("#inspections").scroll_into_view_if_needed()
     return watched, page
 
@@ -109,7 +109,7 @@ def test_photographs_are_kept_small_and_drawn_again_only_where_they_changed(brow
         http.post(f"{address}/photographs", content=png(size=1200), headers={"Content-Type": "image/png"})
         watched = Watched(browser, bench.url)
         watched.page.add_init_script(_COUNTING)
-        page = watched.open("/clutches/large")
+        page = watched.open("/clutches/large#/history")
         section = page.locator("#inspections")
         section.locator(".thumbnail").scroll_into_view_if_needed()
         drawing = section.locator(".thumbnail canvas").first
@@ -218,7 +218,7 @@ def test_with_keys_photographs_are_shown_and_sent_with_the_readers_key(browser: 
         with closing(open_database(f"sqlite:///{server.database}")) as database, database.writing() as connection:
             keys.insert(connection, row)
         watched = Watched(browser, server.url)
-        page = watched.open("/clutches/secret")
+        page = watched.open("/clutches/secret#/history")
         page.get_by_role("textbox", name="Key").fill(text)
         page.keyboard.press("Enter")
         section = page.locator("#inspections")

@@ -7,7 +7,7 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.driving import Watched
+from tests.browser.driving import Watched, turned
 from tests.browser.lives import worn
 from tests.browser.pixels import seen
 from tests.support import Server, serving
@@ -61,7 +61,6 @@ def test_the_library_takes_the_place_of_the_light_drawing(
     page.route(LIBRARY, lambda route: held.append(route))
     watched.open("/clutches/bench")
     page.locator("#chart-fan[data-sketched]").wait_for()
-    page.locator("#runs .runs details").first.wait_for()
     chart = page.locator("#chart-fan .plot")
     chart.scroll_into_view_if_needed()
     found = seen(browser, chart.screenshot())
@@ -101,19 +100,18 @@ def test_without_the_library_the_light_charts_stay(browser: Browser, life: Serve
     page = watched.page
     page.route(LIBRARY, lambda route: route.abort())
     watched.open("/clutches/bench")
-    for name in (
-        "fan",
-        "predicted",
-        "cof",
-        "stribeck",
-        "static-torque-nm",
-        "pressure-law",
-        "loop-curves",
-        "lag-cycles",
-    ):
-        page.locator(f"#chart-{name}").scroll_into_view_if_needed()
-        page.locator(f"#chart-{name}[data-sketched]").wait_for()
-        assert seen(browser, page.locator(f"#chart-{name} .plot").screenshot()).is_chart, name
+    drawn = {
+        "overview": ("fan", "cof"),
+        "history": ("predicted",),
+        "loops": ("loop-curves", "lag-cycles"),
+        "curves": ("stribeck", "static-torque-nm", "pressure-law"),
+    }
+    for tab, names in drawn.items():
+        turned(page, tab)
+        for name in names:
+            page.locator(f"#chart-{name}").scroll_into_view_if_needed()
+            page.locator(f"#chart-{name}[data-sketched]").wait_for()
+            assert seen(browser, page.locator(f"#chart-{name} .plot").screenshot()).is_chart, name
     page.locator("#chart-surface").scroll_into_view_if_needed()
     page.locator("#chart-surface").get_by_text("The plotting library did not load").wait_for()
     page.get_by_text("Live, as of").wait_for()

@@ -43,9 +43,9 @@ def page(browser: Browser, bench: Server) -> Iterator[Page]:
 
 
 def test_a_plan_is_typed_by_keyboard_and_answered_with_cycles_blocks_and_dates(page: Page, bench: Server) -> None:
-    page.get_by_label("Duty cycles", exact=True).fill("5000")
+    page.get_by_label("Energy per cycle, kJ").fill("25,5")
     page.keyboard.press("Tab")
-    page.keyboard.type("36")
+    page.keyboard.type("5000")
     page.keyboard.press("Tab")
     page.keyboard.type("2")
     page.keyboard.press("Tab")
@@ -53,7 +53,7 @@ def test_a_plan_is_typed_by_keyboard_and_answered_with_cycles_blocks_and_dates(p
     page.keyboard.press("Enter")
     table = page.get_by_role("table", name="Remaining life under planned duty, by probability")
     expect(table).to_contain_text("Remaining blocks")
-    plan = {"programme": [{"cycles": 5000, "energy_per_cycle_kj": 36, "sd": 2}], "pace_cycles_per_hour": 120}
+    plan = {"programme": [{"cycles": 5000, "energy_per_cycle_kj": 25.5, "sd": 2}], "pace_cycles_per_hour": 120}
     said = ONCE.post(f"{bench.url}{BASE}/remaining-useful-life/forecast", json=plan).json()
     median = said["remaining_cycles"]["0.5"]
     assert median is not None
@@ -65,7 +65,7 @@ def test_a_plan_is_typed_by_keyboard_and_answered_with_cycles_blocks_and_dates(p
 def test_what_is_wrong_is_said_at_its_field_and_can_be_mended(page: Page) -> None:
     page.get_by_role("button", name="Add a block").click()
     second = page.get_by_role("group", name="Block 2")
-    expect(second.get_by_label("Duty cycles")).to_be_focused()
+    expect(second.get_by_label("Energy per cycle, kJ")).to_be_focused()
     second.get_by_label("Duty cycles").fill("-5")
     page.get_by_role("button", name="Predict", exact=True).click()
     wrong = second.get_by_label("Duty cycles")
@@ -74,6 +74,10 @@ def test_what_is_wrong_is_said_at_its_field_and_can_be_mended(page: Page) -> Non
     expect(wrong).to_have_accessible_description(re.compile("^Input should be greater than"))
     expect(page.get_by_role("group", name="Block 1").locator("[aria-invalid]")).to_have_count(0)
     assert violations(page) == []
+    for typed in ("1,000", "ten"):
+        wrong.fill(typed)
+        page.get_by_role("button", name="Predict", exact=True).click()
+        expect(wrong).to_have_accessible_description(re.compile("^Write a number as 25.5 or 25,5"))
     # a standard deviation without an energy is an error of the block
     wrong.fill("1000")
     second.get_by_label("Its standard deviation, kJ").fill("3")

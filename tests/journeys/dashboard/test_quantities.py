@@ -6,7 +6,7 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser, expect, sync_playwright
 
-from tests.browser.driving import Watched, launched
+from tests.browser.driving import Watched, launched, turned
 from tests.browser.lives import loops, post
 from tests.journeys.dashboard.test_axe import violations
 from tests.support import ONCE, Server, serving, stationary
@@ -50,18 +50,20 @@ def test_the_margin_and_the_lag_are_read_when_they_are_looked_at_and_again_when_
 ) -> None:
     watched = Watched(browser, life.url, color_scheme="dark")
     page = watched.open("/clutches/bench")
-    rows = page.locator("#criteria tbody tr")
+    rows = page.locator(".limits tbody tr")
     expect(rows).to_have_count(2)
-    expect(rows.nth(0)).to_contain_text("Mean COF")
-    expect(rows.nth(1)).to_contain_text("Slope dμ/dv, 100 rpm, 5.0 bar")
+    expect(page.locator(".limits")).to_contain_text("Mean COF")
+    expect(page.locator(".limits")).to_contain_text("Slope dμ/dv, 100 rpm, 5.0 bar")
     ends = ONCE.get(f"{life.url}/v1/clutches/bench/remaining-useful-life").json()["criteria"]
     assert [end["quantity"] for end in ends] == ["mean_cof", "slope"]
 
-    page.locator("#chart-stribeck").scroll_into_view_if_needed()
+    page.goto(f"{life.url}/")  # another document, so that the tab of the curves is the first that is opened
+    watched.asked.clear()
+    watched.open("/clutches/bench#/curves")
     page.locator("#chart-stribeck[data-sketched]").wait_for()
     assert asked(watched, "degradation?quantity") == 0
 
-    margin = page.locator("#chart-shudder")
+    margin = turned(page, "overview").locator("#chart-shudder")
     margin.scroll_into_view_if_needed()
     expect(margin.locator(".note")).to_contain_text("At 5.0 bar")
     expect(margin.locator(".note")).to_contain_text("At 100 rpm")
@@ -76,7 +78,7 @@ def test_the_margin_and_the_lag_are_read_when_they_are_looked_at_and_again_when_
     expect(margin.locator(".note")).to_contain_text("At 100 rpm")
     assert asked(watched, "remaining-useful-life?quantity=slope&pressure_bar=4") == 1
 
-    lag = page.locator("#chart-lag-cycles")
+    lag = turned(page, "loops").locator("#chart-lag-cycles")
     lag.scroll_into_view_if_needed()
     expect(lag.locator(".note")).to_contain_text("at 0.1 Hz")
     lag.get_by_label("Quantity").select_option("Attractor C")
@@ -87,7 +89,8 @@ def test_the_margin_and_the_lag_are_read_when_they_are_looked_at_and_again_when_
     before = asked(watched, "degradation?quantity=slope")
     with httpx2.Client(base_url=life.url, timeout=60) as http:
         post(http, "bench", {"kind": "maintenance", "cycles": 4000, "event": "oil_change"})
-    expect(page.locator("#runs .runs details")).to_have_count(6)
+    expect(turned(page, "runs").locator("#runs .runs > details")).to_have_count(6)
+    turned(page, "overview")
     margin.scroll_into_view_if_needed()
     expect(margin.locator(".plot")).to_contain_text("oil change")
     assert asked(watched, "degradation?quantity=slope") == before + 1
@@ -96,7 +99,7 @@ def test_the_margin_and_the_lag_are_read_when_they_are_looked_at_and_again_when_
 
 def test_curves_of_one_state_and_its_pressure_law(browser: Browser, life: Server) -> None:
     watched = Watched(browser, life.url)
-    page = watched.open("/clutches/bench")
+    page = watched.open("/clutches/bench#/curves")
     curves = page.locator("#chart-stribeck")
     curves.scroll_into_view_if_needed()
     curves.get_by_label("Colour by").select_option("pressure")
@@ -117,7 +120,7 @@ def test_remaining_life_by_any_quantity_and_pressure_is_chosen_on_the_page(brows
     page = watched.open("/clutches/bench")
     assert asked(watched, "remaining-useful-life?quantity") == 0  # nothing is computed before it is opened
     page.get_by_text("Remaining life by another quantity").click()
-    part = page.locator("#life .by-quantity")
+    part = page.locator("details.planned").filter(has_text="Remaining life by another quantity")
     quantity, pressure = (part.get_by_role("combobox", name=name) for name in ("Quantity", "Pressure"))
     table = part.get_by_role("table", name="Remaining life by a quantity")
     expect(table).to_contain_text("Static torque, 5.0 bar")

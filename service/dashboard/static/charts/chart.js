@@ -3,7 +3,8 @@
 // chart; until someone points at it, and where the plotting library does not load, its drawing is a light one), then life.js:
 // like fan.js, loops.js, parameters.js and stribeck.js it says what its charts show; the others say how a chart is drawn.
 
-import { h, save, saveText, scrolling, symbol, table } from "../shared/dom.js";
+import { h, save, scrolling, symbol, table } from "../shared/dom.js";
+import { saveTable } from "../shared/files.js";
 import { settled } from "./frame.js";
 import { base, config } from "./layout.js";
 import { colours } from "./palette.js";
@@ -55,7 +56,7 @@ export class Chart {
     this.stale = false;
     this.visible = false;
     this.turn = 0;
-    this.note = h("p", { class: "note" });
+    this.note = h("p", { class: "note" }, "Being computed …");
     this.controls = h("div", { class: "controls" });
     const style = { "min-height": `${height}px` };
     const watched = { onpointerenter: pointed, onclick: want };
@@ -66,7 +67,8 @@ export class Chart {
       "div",
       { class: "tools" },
       this.button("PNG", "save as PNG", () => this.savePng()),
-      this.button("CSV", "save data as CSV", () => this.saveCsv()),
+      this.button("CSV", "save data as CSV", () => this.saveTable("csv")),
+      this.button("XLSX", "save data as XLSX", () => this.saveTable("xlsx")),
     );
     const heading = h("h3", {}, title, letter && [" ", symbol(...letter)]);
     this.element = h(
@@ -213,11 +215,11 @@ export class Chart {
     save(`${this.name()}-${this.id}.png`, image);
   }
 
-  saveCsv() {
+  /** @param {"csv" | "xlsx"} format */
+  saveTable(format) {
     if (!this.spec?.rows) return;
     const { columns, rows } = this.spec;
-    const lines = [columns.map(({ name }) => name), ...rows].map((row) => row.map(quoted).join(","));
-    saveText(`${this.name()}-${this.id}.csv`, `${lines.join("\r\n")}\r\n`, "text/csv");
+    saveTable(`${this.name()}-${this.id}.${format}`, [columns.map(({ name }) => name), ...rows]);
   }
 }
 
@@ -228,16 +230,6 @@ export class Chart {
 function cellText(value, { text }) {
   if (value === null || value === undefined) return "–";
   return text && typeof value === "number" ? text(value) : String(value);
-}
-
-/**
- * A field after RFC 4180; a name that a spreadsheet would run as a formula is kept from it.
- * @param {Cell} value
- */
-function quoted(value) {
-  if (value === null || value === undefined) return "";
-  const text = typeof value === "string" && /^[=+\-@\t\r]/.test(value) ? `'${value}` : String(value);
-  return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }
 
 /**

@@ -2,6 +2,7 @@
 // The columns that the charts' tables share, and the rows of a quantity that is measured and follows eq. 6.
 
 import { fixed, significant } from "../shared/format.js";
+import { named, units } from "../shared/units.js";
 
 /** @import { Measured, Trajectory } from "../shared/types.js" */
 /** @import { Cell, Column } from "./types.js" */
@@ -27,6 +28,9 @@ export const column = (name, decimals = 0) => ({ name, text: (value) => fixed(va
  * @returns {Column}
  */
 export const digitsColumn = (name, digits) => ({ name, text: (value) => significant(value, digits) });
+
+/** The torque or the coefficient that is shown, in its unit. */
+export const torqueColumn = () => column(named(units().torque), units().torque.decimals);
 
 export const CYCLES = column("cycles");
 export const PRESSURE = column("pressure, bar", 1);

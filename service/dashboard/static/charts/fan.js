@@ -29,6 +29,7 @@ export function fan({ life, pooled, predictions, events }) {
     rows: [...measuredAndLaw(pooled, { measured: "measured", law: "law" }), ...endRows(life)],
     figure: (c) => {
       const marks = eventMarks(events, c);
+      const safe = safeBound(life, last, c);
       const limit = threshold === null ? { shapes: [], annotations: [] } : thresholdMarks(threshold, c);
       return {
         data: [
@@ -40,8 +41,8 @@ export function fan({ life, pooled, predictions, events }) {
         layout: {
           xaxis: { ...titled("duty cycles"), range: [-0.01 * last, last] },
           yaxis: titled("mean COF"),
-          shapes: [...marks.shapes, ...limit.shapes],
-          annotations: [...marks.annotations, ...limit.annotations],
+          shapes: [...marks.shapes, ...limit.shapes, ...safe.shapes],
+          annotations: [...marks.annotations, ...limit.annotations, ...safe.annotations],
         },
       };
     },
@@ -107,6 +108,26 @@ function thresholdMarks(y, c) {
 }
 
 /**
+ * Up to where the life lasts with 95 %: a line, where it is on the paper.
+ * @param {RemainingLife} life
+ * @param {number} last cycles on the paper
+ * @param {Colours} c
+ * @returns {{ shapes: Shape[], annotations: Annotation[] }}
+ */
+function safeBound({ at_least: left, as_of_cycles: now, status }, last, c) {
+  const x = (now ?? 0) + (left ?? 0);
+  if (left === null || left < 1 || x > last || status === "reached") return { shapes: [], annotations: [] };
+  const font = { color: c.normal, size: 12 };
+  const text = `safe until ${cycles(x, 0, 1000)} (95 %)`;
+  return {
+    shapes: [
+      { type: "line", x0: x, x1: x, y0: 0, y1: 1, yref: "paper", line: { color: c.normal, width: 2, dash: "dot" } },
+    ],
+    annotations: [{ x, y: 0, yref: "paper", yanchor: "bottom", xanchor: "right", text, showarrow: false, font }],
+  };
+}
+
+/**
  * @param {Measured} measured
  * @param {Colours} c
  * @returns {PlainTrace}
@@ -158,9 +179,9 @@ function law(trajectory, life, c) {
       ? { x: [...trajectory.cycles, at], y: [...values, threshold] }
       : { x: trajectory.cycles, y: values };
   return [
-    ...band("90 % of its law", joined(trajectory.lower, end["0.05"]), joined(trajectory.upper, end["0.95"]), c),
+    ...band("its 90 % band", joined(trajectory.lower, end["0.05"]), joined(trajectory.upper, end["0.95"]), c),
     {
-      name: "law (eq. 6)",
+      name: "ageing as tracked",
       mode: "lines",
       ...joined(trajectory.median, median),
       line: { color: c.accent, width: 2.2 },

@@ -21,11 +21,17 @@ export function remainingCycles({ life, predictions, events }) {
   });
   if (made.length === 0) return { empty: "From the third stationary test on the remaining cycles are predicted." };
   const end = life.end_of_life_cycles["0.5"];
-  const top = 1.12 * Math.max(1, ...made.map(({ value, upper }) => Math.min(upper ?? Infinity, 2.2 * value + 1)));
+  // the scale is that of the later half: a first forecast that was far off leaves the paper and does not flatten the rest
+  const later = made.slice(Math.floor(made.length / 2));
+  const top =
+    1.12 * Math.max(1, end ?? 0, ...later.map(({ value, upper }) => Math.min(upper ?? Infinity, 2.2 * value + 1)));
+  const above = made.filter(({ value }) => value > top).length;
+  const beyond =
+    above > 0 ? ` ${above} early ${above === 1 ? "prediction lies" : "predictions lie"} above the chart.` : "";
   const comparison =
     end === null ? "" : "A perfect prediction would have followed the dashed line down to today's end of life.";
   return {
-    note: `The median and its 90 % interval, as predicted then. ${comparison}`,
+    note: `The median and its 90 % interval, as predicted then. ${comparison}${beyond}`,
     columns: [CYCLES, column("remaining cycles"), column("lower, 5 %"), column("upper, 95 %")],
     rows: predictions.map(({ at, remaining: r }) => [at, r.value, r.lower, r.upper]),
     figure: (c) => ({

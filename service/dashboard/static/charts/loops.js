@@ -3,8 +3,9 @@
 // one state (fig. 13).
 
 import { fixed } from "../shared/format.js";
-import { column, CYCLES, distinct, KIND, PRESSURE } from "./columns.js";
-import { rampOf } from "./palette.js";
+import { named, pressureText, units } from "../shared/units.js";
+import { column, CYCLES, distinct, KIND, PRESSURE, torqueColumn } from "./columns.js";
+import { pressureRampOf, rampOf } from "./palette.js";
 import { curveOf } from "./stribeck_law.js";
 import { titled } from "./traces.js";
 
@@ -27,12 +28,14 @@ export const loopPressures = (loops) => distinct(loops.map((loop) => loop.pressu
  * The record near a pressure, in its order, thinned evenly: speed and torque.
  * @param {Channels} channels
  * @param {number} pressure
+ * @param {ClutchOut} clutch
  */
-function traceOf({ pressure_bar: p, speed_rpm: n, torque_nm: m }, pressure) {
+function traceOf({ pressure_bar: p, speed_rpm: n, torque_nm: m }, pressure, clutch) {
+  const { of } = units().torque;
   /** @type {[number, number][]} */
   const points = [];
   for (let index = 0; index < n.length; index += 1) {
-    if (Math.abs(p[index] - pressure) <= NEAR) points.push([n[index], m[index]]);
+    if (Math.abs(p[index] - pressure) <= NEAR) points.push([n[index], of(m[index], pressure, clutch)]);
   }
   const step = Math.ceil(points.length / MOST);
   return step > 1 ? points.filter((_, index) => index % step === 0) : points;
@@ -50,7 +53,9 @@ function stationaryOf({ cycles, pressure_bar: pressure }, trace, tests, clutch) 
   const fits = tests.filter((test) => test.cycles === cycles).flatMap((test) => test.fits);
   const fit = fits.find(({ pressure_bar: level }) => Math.abs(level - pressure) <= NEAR);
   const fastest = trace.reduce((most, [speed]) => Math.max(most, speed), 0);
-  return fit ? curveOf(fit, clutch, 0, fastest) : [];
+  const { of } = units().torque;
+  const curve = fit ? curveOf(fit, clutch, 0, fastest) : [];
+  return curve.map(({ speed, torque }) => ({ speed, torque: of(torque, pressure, clutch) }));
 }
 
 /** @type {Record<string, string>} */
@@ -96,27 +101,27 @@ export function loopCurves({ loops, tests, clutch, channels, over, pressure, run
   const byState = over === "state";
   const drawn = loops
     .filter((loop) => channels[loop.run_id] && (byState ? loop.pressure_bar === pressure : loop.run_id === run))
-    .map((loop) => ({ loop, trace: traceOf(channels[loop.run_id], loop.pressure_bar) }))
+    .map((loop) => ({ loop, trace: traceOf(channels[loop.run_id], loop.pressure_bar, clutch) }))
     .filter(({ trace }) => trace.length > 2)
     .map(({ loop, trace }) => ({ loop, trace, stationary: stationaryOf(loop, trace, tests, clutch) }));
   if (drawn.length === 0) return { empty: NO_LOOPS };
   /** @param {LoopItem} loop */
-  const label = (loop) => (byState ? `${fixed(loop.cycles)} cycles` : `${fixed(loop.pressure_bar, 1)} bar`);
+  const label = (loop) => (byState ? `${fixed(loop.cycles)} cycles` : pressureText(loop.pressure_bar));
   const place = byState
-    ? `At ${fixed(pressure, 1)} bar, from the first dynamic test to the last.`
+    ? `At ${pressureText(pressure)}, from the first dynamic test to the last.`
     : `After ${fixed(drawn[0].loop.cycles)} cycles, at every pressure.`;
   return {
     note: `${place} Dashed: the stationary curve of the same state. ${lagNote(
       drawn.map(({ loop }) => loop),
       label,
     )}`,
-    columns: [KIND, CYCLES, PRESSURE, column("speed, rpm", 1), column("torque, Nm", 2)],
+    columns: [KIND, CYCLES, PRESSURE, column("speed, rpm", 1), torqueColumn()],
     rows: drawn.flatMap(({ loop: { cycles, pressure_bar: level }, trace, stationary }) => [
       ...trace.map(([speed, torque]) => ["loop", cycles, level, speed, torque]),
       ...stationary.map(({ speed, torque }) => ["stationary curve", cycles, level, speed, torque]),
     ]),
     figure: (c) => {
-      const colors = drawn.map((_, index) => rampOf(c, index, drawn.length));
+      const colors = drawn.map((_, index) => (byState ? rampOf : pressureRampOf)(c, index, drawn.length));
       return {
         data: [
           ...stationaryTraces(drawn, colors),
@@ -126,10 +131,10 @@ export function loopCurves({ loops, tests, clutch, channels, over, pressure, run
             x: trace.map(([speed]) => speed),
             y: trace.map(([, torque]) => torque),
             line: { color: colors[index], width: 1.3 },
-            hovertemplate: `${label(loop)}<br>%{x:.0f} rpm, %{y:.2f} Nm<br>${lagText(loop)}<extra></extra>`,
+            hovertemplate: `${label(loop)}<br>%{x:.0f} rpm, %{y:.4~g} ${units().torque.unit}<br>${lagText(loop)}<extra></extra>`,
           })),
         ],
-        layout: { xaxis: titled("sliding speed, rpm"), yaxis: titled("friction torque, Nm") },
+        layout: { xaxis: titled("sliding speed, rpm"), yaxis: titled(named(units().torque)) },
       };
     },
   };
@@ -152,6 +157,6 @@ function stationaryTraces(drawn, colors) {
       x: stationary.map(({ speed }) => speed),
       y: stationary.map(({ torque }) => torque),
       line: { color, width: 2, dash: "dash" },
-      hovertemplate: "stationary curve<br>%{x:.0f} rpm, %{y:.2f} Nm<extra></extra>",
+      hovertemplate: `stationary curve<br>%{x:.0f} rpm, %{y:.4~g} ${units().torque.unit}<extra></extra>`,
     }));
 }

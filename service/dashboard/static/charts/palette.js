@@ -19,6 +19,8 @@ const NAMES = [
   "fresh",
   "midlife",
   "worn",
+  "low",
+  "high",
 ];
 
 /**
@@ -39,7 +41,11 @@ export function colours(scheme = null) {
   probe.remove();
   /** @type {Record<ColourName, string>} */
   const named = Object.fromEntries(entries);
-  return { ...named, ramp: (share) => between([named.fresh, named.midlife, named.worn], share) };
+  return {
+    ...named,
+    ramp: (share) => between([named.fresh, named.midlife, named.worn], share),
+    pressureRamp: (share) => between([named.low, named.high], share),
+  };
 }
 
 /**
@@ -67,6 +73,14 @@ function between(stops, share) {
  * @param {number} count
  */
 export const rampOf = (c, index, count) => c.ramp(count > 1 ? index / (count - 1) : 0);
+
+/**
+ * The colour of the n-th of several pressures, from the lowest to the highest.
+ * @param {Colours} c
+ * @param {number} index
+ * @param {number} count
+ */
+export const pressureRampOf = (c, index, count) => c.pressureRamp(count > 1 ? index / (count - 1) : 0);
 
 /**
  * The colour, partly transparent.

@@ -71,19 +71,19 @@ export function parameter({ items, name, pressure, events }) {
   const scale = inWords(k.scale_cycles.value, k.scale_cycles.sd, " cycles");
   const x = trajectory.cycles;
   return {
-    note: `Eq. 6: value when new ${initial}, change in the end ${change}, scale ${scale}.`,
+    note: `Value when new ${initial}, change in the end ${change}, scale ${scale}.`,
     columns: COLUMNS,
     rows: rowsOf(item),
     figure: (c) => ({
       data: [
         ...band("90 % band", { x, y: trajectory.lower }, { x, y: trajectory.upper }, c),
         {
-          name: "eq. 6",
+          name: "tracked",
           mode: "lines",
           x,
           y: trajectory.median,
           line: { color: c.accent, width: 2 },
-          hovertemplate: "%{x:,.0f} cycles<br>eq. 6: %{y:.4g}<extra></extra>",
+          hovertemplate: "%{x:,.0f} cycles<br>tracked: %{y:.4g}<extra></extra>",
         },
         {
           name: "identified",
@@ -139,7 +139,7 @@ export function landscape({ items, name }) {
   const end = (/** @type {Trajectory} */ law) => law.cycles.at(-1) ?? 0;
   const longest = laws.reduce((a, b) => (end(b) > end(a) ? b : a)).cycles;
   return {
-    note: `${PARAMETERS[name].title} at every pressure: points identified, surface eq. 6. Drag to turn.`,
+    note: `${PARAMETERS[name].title} at every pressure: points identified, surface tracked. Drag to turn.`,
     columns: COLUMNS,
     rows: own.flatMap(({ item }) => rowsOf(item)),
     figure: (c) => ({
@@ -152,7 +152,7 @@ export function landscape({ items, name }) {
           colorscale: scaleOf(c),
           opacity: 0.86,
           showscale: false,
-          hovertemplate: "%{x:,.0f} cycles, %{y} bar<br>eq. 6: %{z:.4g}<extra></extra>",
+          hovertemplate: "%{x:,.0f} cycles, %{y} bar<br>tracked: %{z:.4g}<extra></extra>",
         },
         {
           type: "scatter3d",

@@ -3,8 +3,9 @@
 // state (figs. 6b, 8) or of several (fig. 7a), or over cycles.
 
 import { fixed } from "../shared/format.js";
-import { column, CYCLES, distinct, KIND } from "./columns.js";
-import { faint, rampOf, scaleOf } from "./palette.js";
+import { named, pressureText, units } from "../shared/units.js";
+import { column, CYCLES, distinct, KIND, torqueColumn } from "./columns.js";
+import { faint, pressureRampOf, rampOf, scaleOf } from "./palette.js";
 import { curveOf, measuredOf } from "./stribeck_law.js";
 import { titled } from "./traces.js";
 
@@ -21,7 +22,7 @@ import { titled } from "./traces.js";
  */
 /** @typedef {{ cycles: number, pressure: number, measured: CurvePoint[], fitted: CurvePoint[] }} Drawn */
 
-const COLUMNS = [KIND, CYCLES, column("pressure, bar", 2), column("speed, rpm"), column("torque, Nm", 2)];
+const columnsOf = () => [KIND, CYCLES, column("pressure, bar", 2), column("speed, rpm"), torqueColumn()];
 
 /**
  * A few items spread evenly over all, the first and the last among them.
@@ -45,6 +46,17 @@ const fastest = (channels) =>
   Object.values(channels).reduce((most, { speed_rpm: speeds }) => speeds.reduce((a, b) => Math.max(a, b), most), 100);
 
 /**
+ * Points in the chosen unit of torque.
+ * @param {CurvePoint[]} points
+ * @param {number} pressure bar
+ * @param {ClutchOut} clutch
+ */
+function shown(points, pressure, clutch) {
+  const { of } = units().torque;
+  return points.map(({ speed, torque }) => ({ speed, torque: of(torque, pressure, clutch) }));
+}
+
+/**
  * Some tests at some pressures: measured points where the channels have been read, the fit in any case.
  * @param {Answers} answers
  * @param {StribeckItem[]} tests
@@ -59,8 +71,12 @@ function drawnOf({ channels, clutch }, tests, wanted) {
       .map((fit) => ({
         cycles: test.cycles,
         pressure: fit.pressure_bar,
-        measured: channels[test.run_id] ? measuredOf(channels[test.run_id], fit.pressure_bar) : [],
-        fitted: curveOf(fit, clutch, 0, end),
+        measured: shown(
+          channels[test.run_id] ? measuredOf(channels[test.run_id], fit.pressure_bar) : [],
+          fit.pressure_bar,
+          clutch,
+        ),
+        fitted: shown(curveOf(fit, clutch, 0, end), fit.pressure_bar, clutch),
       })),
   );
 }
@@ -92,17 +108,19 @@ export function flat(answers) {
   const drawn = drawnOf(answers, chosen, (level) => !byState || level === pressure);
   if (drawn.length === 0) return { empty: "No stationary Stribeck test yet at this pressure." };
   const place = byState
-    ? `At ${fixed(pressure, 1)} bar: points measured, lines fitted (eq. 3), from the first test to the last.`
-    : `After ${fixed(drawn[0].cycles)} cycles, at every pressure: points measured, lines fitted (eq. 3).`;
+    ? `At ${pressureText(pressure)}: points measured, lines fitted, from the first test to the last.`
+    : `After ${fixed(drawn[0].cycles)} cycles, at every pressure: points measured, lines fitted.`;
   /** @param {Drawn} curve */
-  const label = (curve) => (byState ? `${fixed(curve.cycles)} cycles` : `${fixed(curve.pressure, 1)} bar`);
+  const label = (curve) => (byState ? `${fixed(curve.cycles)} cycles` : pressureText(curve.pressure));
   return {
     note: place,
-    columns: COLUMNS,
+    columns: columnsOf(),
     rows: rowsOf(drawn),
     figure: (c) => ({
-      data: drawn.flatMap((curve, index) => flatTraces(curve, label(curve), rampOf(c, index, drawn.length), c)),
-      layout: { xaxis: { ...titled("sliding speed, rpm"), rangemode: "tozero" }, yaxis: titled("friction torque, Nm") },
+      data: drawn.flatMap((curve, index) =>
+        flatTraces(curve, label(curve), (byState ? rampOf : pressureRampOf)(c, index, drawn.length), c),
+      ),
+      layout: { xaxis: { ...titled("sliding speed, rpm"), rangemode: "tozero" }, yaxis: titled(named(units().torque)) },
     }),
   };
 }
@@ -115,7 +133,7 @@ export function flat(answers) {
  * @returns {PlainTrace[]}
  */
 function flatTraces({ measured, fitted }, name, color, c) {
-  const hovertemplate = `${name}<br>%{x:.0f} rpm, %{y:.2f} Nm<extra></extra>`;
+  const hovertemplate = `${name}<br>%{x:.0f} rpm, %{y:.4~g} ${units().torque.unit}<extra></extra>`;
   const shared = { legendgroup: name, name, hovertemplate };
   const marker = { color: faint(c.panel, 1), size: 5, line: { color, width: 1.4 } };
   return [
@@ -146,11 +164,11 @@ export function surface(answers) {
   }
   const states = distinct(drawn.map(({ cycles }) => cycles));
   const after = `After ${states.map((cycles) => fixed(cycles)).join(", ")} cycles`;
-  const place = byPressure ? after : `At ${fixed(pressure, 1)} bar over the life`;
+  const place = byPressure ? after : `At ${pressureText(pressure)} over the life`;
   const drawing = over === "states" ? "the fitted surface, a colour a state" : "points measured, surface fitted";
   return {
     note: `${place}: ${drawing}. Drag to turn.`,
-    columns: COLUMNS,
+    columns: columnsOf(),
     rows: rowsOf(drawn),
     figure: (c) => ({
       data:
@@ -162,7 +180,7 @@ export function surface(answers) {
         scene: {
           xaxis: titled("speed, rpm"),
           yaxis: titled(byPressure ? "pressure, bar" : "duty cycles"),
-          zaxis: titled("torque, Nm"),
+          zaxis: titled(named(units().torque)),
         },
       },
     }),
@@ -195,7 +213,7 @@ function stateSurface(drawn, cycles, color) {
     ],
     opacity: 0.8,
     showscale: false,
-    hovertemplate: `${fixed(cycles)} cycles<br>%{x:.0f} rpm, %{y} bar<br>fit %{z:.2f} Nm<extra></extra>`,
+    hovertemplate: `${fixed(cycles)} cycles<br>%{x:.0f} rpm, %{y} bar<br>fit %{z:.4~g} ${units().torque.unit}<extra></extra>`,
   };
 }
 
@@ -218,7 +236,7 @@ function surfaceTraces(drawn, byPressure, c) {
       colorscale: scale.map(([at], index) => [at, scale[scale.length - 1 - index][1]]),
       opacity: 0.86,
       showscale: false,
-      hovertemplate: `%{x:.0f} rpm, %{y}<br>fit %{z:.2f} Nm<extra></extra>`,
+      hovertemplate: `%{x:.0f} rpm, %{y}<br>fit %{z:.4~g} ${units().torque.unit}<extra></extra>`,
     },
     {
       type: "scatter3d",
@@ -227,7 +245,7 @@ function surfaceTraces(drawn, byPressure, c) {
       y: drawn.flatMap((curve) => curve.measured.map(() => depth(curve))),
       z: drawn.flatMap(({ measured }) => torques(measured)),
       marker: { size: 2.2, color: c.ink },
-      hovertemplate: `%{x:.0f} rpm<br>measured %{z:.2f} Nm<extra></extra>`,
+      hovertemplate: `%{x:.0f} rpm<br>measured %{z:.4~g} ${units().torque.unit}<extra></extra>`,
     },
   ];
 }

@@ -27,6 +27,17 @@ function torqueAt(v, parameters) {
   return mS * (1 + (mC - 1) * e) + cV * v ** GAMMA;
 }
 
+/** @param {Pick<ClutchOut, "geometry">} clutch */
+const metresPerSecond = (clutch) => (meanRadius(clutch) * 2 * Math.PI) / 60;
+
+/**
+ * The fitted torque, Nm, at a speed, rpm.
+ * @param {number} speed
+ * @param {Fit} fit
+ * @param {Pick<ClutchOut, "geometry">} clutch
+ */
+export const torqueAtSpeed = (speed, fit, clutch) => torqueAt(speed * metresPerSecond(clutch), fit.parameters);
+
 /**
  * The fitted curve of one pressure between two speeds, rpm; closer points near rest, where it is curved most.
  * @param {Fit} fit
@@ -37,10 +48,9 @@ function torqueAt(v, parameters) {
  * @returns {CurvePoint[]}
  */
 export function curveOf(fit, clutch, from, to, count = 80) {
-  const perRpm = (meanRadius(clutch) * 2 * Math.PI) / 60;
   return Array.from({ length: count }, (_, index) => {
     const speed = from + (to - from) * (index / (count - 1)) ** 2;
-    return { speed, torque: torqueAt(speed * perRpm, fit.parameters) };
+    return { speed, torque: torqueAtSpeed(speed, fit, clutch) };
   });
 }
 

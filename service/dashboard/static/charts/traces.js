@@ -1,9 +1,9 @@
 // @ts-check
 // The traces that several charts draw: bands between two edges, and points or lines with error bars.
 
-import { fixed } from "../shared/format.js";
+import { pressureText } from "../shared/units.js";
 import { HALF_OF_90 } from "./columns.js";
-import { faint, rampOf } from "./palette.js";
+import { faint, pressureRampOf } from "./palette.js";
 
 /** @import { Colours, ErrorBars, PlainTrace } from "./types.js" */
 
@@ -82,8 +82,8 @@ export const measuredLine = (name, values, { size, bars, text }, color) => ({
 export function linesByPressure(pressures, valuesAt, { size, bars, text }, c) {
   return pressures.map((pressure, index) => {
     const values = valuesAt(pressure).map(({ cycles, value, sd }) => ({ x: cycles, value, sd }));
-    const name = `${fixed(pressure, 1)} bar`;
+    const name = pressureText(pressure);
     const under = `%{x:,.0f} cycles, ${name}<br>${text}`;
-    return measuredLine(name, values, { size, bars, text: under }, rampOf(c, index, pressures.length));
+    return measuredLine(name, values, { size, bars, text: under }, pressureRampOf(c, index, pressures.length));
   });
 }

@@ -14,8 +14,8 @@ export type Spec =
   | { empty: string; note?: undefined; columns?: undefined; rows?: undefined; figure?: undefined }
   | { empty?: undefined; note: string; columns: Column[]; rows: Cell[][]; figure: (colours: Colours) => Figure };
 
-/** Colours as CSS; `ramp` gives one between fresh (0) and worn (1). */
-export type Colours = Record<ColourName, string> & { ramp: (share: number) => string };
+/** Colours as CSS; `ramp` gives one between fresh (0) and worn (1), `pressureRamp` between the lowest and the highest pressure. */
+export type Colours = Record<ColourName, string> & Record<"ramp" | "pressureRamp", (share: number) => string>;
 export type ColourName =
   | "ink"
   | "quiet"
@@ -30,7 +30,9 @@ export type ColourName =
   | "maintenance"
   | "fresh"
   | "midlife"
-  | "worn";
+  | "worn"
+  | "low"
+  | "high";
 export type Scheme = "light" | "dark" | null;
 
 export interface Figure {

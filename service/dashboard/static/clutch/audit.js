@@ -1,8 +1,9 @@
 // @ts-check
 // The audit trail: who changed what, when and why; the newest first, page by page.
 
-import { clutchPath, read, readText } from "../shared/api.js";
-import { h, saveText, scrolling, table } from "../shared/dom.js";
+import { clutchPath, read } from "../shared/api.js";
+import { h, scrolling, table } from "../shared/dom.js";
+import { files } from "../shared/files.js";
 import { fixed, moment, words } from "../shared/format.js";
 import { runLink } from "./warnings.js";
 
@@ -33,11 +34,9 @@ export class AuditTrail {
   /**
    * @param {HTMLElement} place
    * @param {string} clutchId
-   * @param {(runId: string) => void} reveal shows a run in the list of runs
    */
-  constructor(place, clutchId, reveal) {
+  constructor(place, clutchId) {
     this.place = place;
-    this.reveal = reveal;
     this.clutchId = clutchId;
     this.pages = 1;
   }
@@ -66,7 +65,7 @@ export class AuditTrail {
     /** @param {string | null} id */
     const subject = (id) => {
       const run = named.get(id ?? "");
-      return run ? runLink(run, this.reveal) : id === null ? "the clutch" : id;
+      return run ? runLink(run) : id === null ? "the clutch" : id;
     };
     const rows = changes.map((change) => [
       moment(change.at),
@@ -75,26 +74,18 @@ export class AuditTrail {
       change.by === "local" ? "this machine" : change.by.replace(/^key:\s*/, "key "),
       change.reason || "–",
     ]);
-    const address = `${clutchPath(this.clutchId)}/changes.csv`;
-    /** @param {Event} event */
-    const save = async (event) => {
-      event.preventDefault();
-      saveText(`${this.clutchId}-changes.csv`, await readText(address), "text/csv");
-    };
     const next = () => {
       this.pages += 1;
       this.show(runs);
     };
     this.place.replaceChildren(
-      h("h3", {}, "Changes"),
       changes.length === 0
         ? h("p", { class: "quiet" }, "Nothing was held, corrected, withdrawn, edited or adopted.")
         : h(
             "p",
             { class: "quiet" },
-            "Who changed what and why, the newest first. As a table: ",
-            h("a", { href: address, onclick: save }, "CSV"),
-            ".",
+            "Who changed what and why, the newest first. ",
+            files(`${this.clutchId}-changes`, `${clutchPath(this.clutchId)}/changes.csv`),
           ),
       rows.length > 0 ? h("div", { class: "panel" }, scrolling("Changes", table("Changes", COLUMNS, rows))) : "",
       more ? h("button", { type: "button", onclick: next }, "Show earlier changes") : "",

@@ -114,7 +114,7 @@ async function restore(run, reason) {
  * @param {Receipt} run
  * @returns {number | undefined}
  */
-export const likelyCycles = ({ doubts }) => doubts.find((doubt) => doubt.likely_cycles !== undefined)?.likely_cycles;
+export const likelyCycles = ({ doubts }) => doubts.find((doubt) => doubt.likely_cycles)?.likely_cycles ?? undefined;
 
 /** @typedef {"right" | "likely" | "other"} Answer the run is right, its cycles are those asked about, or it is another clutch's */
 

@@ -1,222 +1,184 @@
 // @ts-check
-// The page of one clutch: its answers of the API are read when they change, and shown in sections that are drawn when seen.
-// Open this file first, then head.js (its state in one look), board.js (its charts and their choices), planned_duty.js, stored.js (its runs,
-// warnings and changes) and report.js (the printed page).
+// The page of one clutch: what is known and what to do stand first, then tabs that read their answers when they are opened.
+// Open this file first, then head.js (the first lines), reader.js (what is read) and a tab: overview.js, curves.js, loops.js,
+// runs.js, history.js; stored.js and changes.js say what may be changed, report.js makes the printed page.
 
 import { Diagnosis } from "../diagnosis/diagnosis.js";
-import { Inspections } from "../inspections/inspections.js";
-import { criteriaTable } from "../quantities/criteria.js";
-import { RemainingBy } from "../quantities/remaining.js";
+import { Alarms } from "../alarms/alarms.js";
+import { painted } from "../charts/plotting.js";
+import { Engagements } from "../engagements/engagements.js";
 import { sender } from "../sending/sending.js";
-import { clutchPath, Problem, read, readAll } from "../shared/api.js";
+import { Problem, read } from "../shared/api.js";
 import { byId, h, within } from "../shared/dom.js";
 import { withKey } from "../shared/key.js";
 import { Live } from "../shared/live.js";
 import { liveBar } from "../shared/live_bar.js";
-import { firstRun } from "../shared/welcome.js";
-import { Board } from "./board.js";
+import { placeUnits } from "../shared/units.js";
+import { Curves } from "./curves.js";
 import { head } from "./head.js";
-import { PlannedDuty } from "./planned_duty.js";
+import { History } from "./history.js";
+import { Loops } from "./loops.js";
+import { Overview } from "./overview.js";
+import { Reader } from "./reader.js";
 import { makeReport } from "./report.js";
-import { counts } from "./states.js";
+import { Runs } from "./runs.js";
 import { Stored } from "./stored.js";
 
-/** @import { ClutchOut, DegradationItem, LoopItem, Receipt, RemainingLife, SeriesItem, StribeckItem, Warned } from "../shared/types.js" */
-/** @import { Answers } from "./board.js" */
+/** @import { ClutchOut } from "../shared/types.js" */
 
-const ID = decodeURIComponent(location.pathname.split("/").at(-1) ?? "");
-const PATH = clutchPath(ID);
+/** @typedef {{ reader: Reader, store: Stored, refresh: () => Promise<void> }} Page what every tab is given */
+
+/**
+ * @typedef {object} Tab
+ * @property {(item: string) => Promise<void>} show reads and draws; `item` is what the address opens in it
+ * @property {() => Promise<void>} [poll] looks for what changes without the clutch
+ */
+
 const INTERVAL = 2000; // ms
-const SECTIONS = ["life", "diagnosis", "stribeck", "parameters", "shudder", "loops", "lag", "engagements", "runs"];
-/** @type {Receipt[]} before the runs are read */
-const NO_EVENTS = [];
-const fileName = () => ID.replaceAll(/[^\w.-]+/g, "_");
-
-/**
- * What is shown now.
- * @type {Answers | null}
- */
-let shown = null;
-let due = true;
-/**
- * The clutch as it was read last: another part of the page may have read a newer one meanwhile.
- * @type {ClutchOut | null}
- */
-let latest = null;
-/**
- * The page's parts, once there is something to put into them.
- * @type {{ board: Board, diagnosis: Diagnosis, remaining: RemainingBy } | null}
- */
-let parts = null;
+const ID = decodeURIComponent(location.pathname.split("/").at(-1) ?? "");
 document.title = `${ID} · Clutchlife`;
+const reader = new Reader(ID);
+const refresh = () => live.now();
+const store = new Stored(ID, refresh);
+/** @type {Page} */
+const page = { reader, store, refresh };
+
+/** @type {Record<string, (place: HTMLElement) => Tab>} */
+const TABS = {
+  overview: (place) => new Overview(place, page),
+  diagnosis: () => {
+    const diagnosis = new Diagnosis(within("diagnosis", ".body"), ID, reader.name, refresh);
+    const show = async () => {
+      diagnosis.setModel((await reader.life()).model);
+      await diagnosis.poll();
+    };
+    return { show: () => (reader.present().runs > 0 ? show() : diagnosis.poll()), poll: () => diagnosis.poll() };
+  },
+  curves: (place) => new Curves(place, page),
+  loops: (place) => new Loops(place, page),
+  engagements: () => {
+    const engagements = new Engagements(ID, reader.name, within("engagements", ".charts"));
+    return { show: async () => engagements.show(await reader.runs(), await reader.events()) };
+  },
+  runs: () => new Runs(within("runs", ".body"), page),
+  history: (place) => new History(place, page),
+  alarms: (place) => {
+    const alarms = new Alarms(place, ID);
+    return { show: () => alarms.show(), poll: () => alarms.show() };
+  },
+};
+
+/** @type {Map<string, Tab>} those that were opened */
+const opened = new Map();
+/** @type {Map<string, string>} what each shows: the clutch as it was read, and what the address opens in it */
+const shown = new Map();
+
+/** The tab of the address, and the run that it opens. */
+function wanted() {
+  const [, name = "", ...rest] = location.hash.split("/");
+  return { name: name in TABS ? name : "overview", item: text(rest.join("/")) };
+}
+
+/** @param {string} encoded */
+function text(encoded) {
+  try {
+    return decodeURIComponent(encoded);
+  } catch {
+    return encoded; // no address of ours
+  }
+}
+
+/** @param {string} name */
+function tab(name) {
+  const before = opened.get(name);
+  if (before) return before;
+  const made = TABS[name](byId(`tab-${name}`));
+  opened.set(name, made);
+  return made;
+}
+
+/** The tab of the address in sight; its answers follow. */
+function turn() {
+  const { name } = wanted();
+  for (const key of Object.keys(TABS)) byId(`tab-${key}`).hidden = key !== name;
+  for (const link of byId("tabs").querySelectorAll("a")) {
+    if (link.hash === `#/${name}`) link.setAttribute("aria-current", "page");
+    else link.removeAttribute("aria-current");
+  }
+}
 
 async function poll() {
   /** @type {{ body: ClutchOut }} */
   let answer;
   try {
-    answer = await read(PATH);
+    answer = await read(reader.path);
   } catch (problem) {
     if (!(problem instanceof Problem && problem.status === 404)) throw problem;
     showUnregistered();
     return;
   }
-  due ||= answer.body !== latest; // until all of it is read: an error midway is made good at the next poll
-  latest = answer.body;
-  byId("inspections").hidden = false;
-  if (due) {
-    await refresh(answer.body);
-    due = false;
-  } else if (parts !== null) {
-    await parts.diagnosis.poll();
-    drawHead();
+  if (answer.body !== reader.clutch) {
+    reader.renew(answer.body);
+    drawHead(answer.body);
+    byId("tabs").hidden = false;
+    turn();
   }
-  await inspections.poll(shown?.events ?? NO_EVENTS);
+  const { name, item } = wanted();
+  const key = JSON.stringify([answer.body, item]);
+  const part = tab(name);
+  if (shown.get(name) === key) await part.poll?.();
+  else await part.show(item);
+  shown.set(name, key); // after all of it is read: an error midway is made good at the next poll
+  if (name === "overview") await drawReport();
 }
 
-/**
- * @param {ClutchOut} clutch
- * @returns {Answers}
- */
-const nothingOf = (clutch) => ({
-  clutch,
-  life: null,
-  items: [],
-  predictions: [],
-  tests: [],
-  loops: [],
-  runs: [],
-  events: [],
-});
-
 /** @param {ClutchOut} clutch */
-async function refresh(clutch) {
+function drawHead(clutch) {
+  byId("head").replaceChildren(...head(clutch, { archive: () => store.archive(true), end: endOrTakeBack }));
+  painted().then(() => performance.mark("head-shown"));
   store.showArchived(clutch);
-  if (shown === null || clutch.runs === 0) {
-    shown = nothingOf(clutch);
-    drawHead();
-  }
-  if (clutch.runs === 0) {
-    await showUncounted();
-    return;
-  }
-  // what the first chart needs and what waits for someone come first, neither after the other
-  const [{ board, diagnosis, warned, first }, stored] = await Promise.all([showLife(clutch), showStored()]);
-  const { tests, loops } = await readTests();
-  const runs = stored.filter(counts);
-  const events = runs.filter((run) => run.kind === "maintenance");
-  shown = { clutch, ...first, tests, loops, runs, events };
-  store.showWarnings({ runs: stored, tests, warned });
-  if (events.length > 0) board.life({ ...shown, ...first });
-  parts?.remaining.show(shown);
-  await board.rest(shown);
-  makeReport(byId("report"), shown, board, diagnosis.latest);
+  makeReport(byId("report"), { clutch });
 }
 
-/** @param {ClutchOut} clutch */
-async function showLife(clutch) {
-  const { warned, ...first } = await readLife();
-  const { board, diagnosis } = begin();
-  const now = { ...(shown ?? nothingOf(clutch)), clutch, ...first };
-  shown = now;
-  drawHead();
-  diagnosis.setModel(first.life.model);
-  byId("criteria").replaceChildren(...criteriaTable(first.life));
-  board.life(now);
-  await diagnosis.poll();
-  drawHead();
-  return { board, diagnosis, warned, first };
+async function endOrTakeBack() {
+  const { ended, as_of_cycles: cycles } = await reader.life();
+  await store.end(ended, cycles ?? 0);
 }
 
-/** The runs, whether they count or not. */
-async function showStored() {
-  /** @type {{ items: Receipt[] }} */
-  const { items } = await readAll(`${PATH}/runs?limit=1000`);
-  if (items.length > 0) byId("runs").hidden = false;
-  await store.show(items);
-  return items;
-}
-
-/** A clutch without a run that counts: what to do first, and the runs that are held or withdrawn. */
-async function showUncounted() {
-  showSections([]);
-  store.showWarnings({ runs: [], tests: [], warned: [] });
-  await showStored();
-  if (!document.getElementById("first")) byId("archived").before(h("div", { id: "first" }, firstRun(ID)));
-}
-
-/** @param {string[]} names */
-function showSections(names) {
-  for (const section of SECTIONS) byId(section).hidden = !names.includes(section);
-  byId("sections").hidden = names.length < SECTIONS.length;
-}
-
-/** Remaining life, degradation and the earlier predictions. */
-async function readLife() {
-  /** @type {[{ body: RemainingLife }, { body: { items: DegradationItem[], warnings: Warned[] } }, { items: SeriesItem[] }, { items: SeriesItem[] }]} */
-  const [life, degradation, remaining, cof] = await Promise.all([
-    read(`${PATH}/remaining-useful-life`),
-    read(`${PATH}/degradation`),
-    readAll(`${PATH}/series?quantity=remaining_cycles`),
-    readAll(`${PATH}/series?quantity=mean_cof`),
-  ]);
-  const pooled = cof.items.filter((row) => row.pressure_bar === null && row.run_id === null);
-  const cofAt = new Map(pooled.map((row) => [row.cycles, row.value]));
-  const predictions = remaining.items.map((row) => {
-    return { at: row.cycles, cof: cofAt.get(row.cycles) ?? null, remaining: row };
-  });
-  const warned = [...life.body.warnings, ...degradation.body.warnings];
-  return { life: life.body, items: degradation.body.items, predictions, warned };
-}
-
-async function readTests() {
-  /** @type {[{ items: StribeckItem[] }, { items: LoopItem[] }]} */
-  const [tests, loops] = await Promise.all([readAll(`${PATH}/stribeck?limit=1000`), readAll(`${PATH}/loops`)]);
-  return { tests: tests.items, loops: loops.items };
-}
-
-/** The page's parts, made when there is first something to put into them. */
-function begin() {
-  document.getElementById("first")?.remove();
-  showSections(SECTIONS);
-  if (parts !== null) return parts;
-  const board = new Board(ID, fileName, (section) => within(section, ".charts"));
-  const diagnosis = new Diagnosis(within("diagnosis", ".body"), ID, fileName, () => live.now());
-  const remaining = new RemainingBy(within("life", ".by-quantity"), ID);
-  new PlannedDuty(within("life", ".planning"), ID);
-  parts = { board, diagnosis, remaining };
-  return parts;
-}
-
-/** The head, drawn again where something in it is another than before. */
-function drawHead() {
-  if (shown === null) return;
-  const { clutch, life } = shown;
-  const text = JSON.stringify([clutch, life]);
-  const place = byId("head");
-  if (place.dataset.shown === text) return;
-  place.dataset.shown = text;
-  place.replaceChildren(
-    ...head(clutch, life, {
-      archive: () => store.archive(true),
-      end: () => store.end(life?.ended ?? null, life?.as_of_cycles ?? 0),
-    }),
-  );
+/** The printed page, made beside the overview whenever that is drawn. */
+async function drawReport() {
+  const clutch = reader.present();
+  const overview = opened.get("overview");
+  if (clutch.runs === 0 || !(overview instanceof Overview)) return;
+  const [life, tests, events] = await Promise.all([reader.life(), reader.tests(), reader.events()]);
+  makeReport(byId("report"), { clutch, life, tests, events, charts: [overview.fan, overview.shudder] });
 }
 
 function showUnregistered() {
-  const text = `No clutch is registered as “${ID}”. It appears here as soon as it is. `;
+  const sentence = `No clutch is registered as “${ID}”. It appears here as soon as it is. `;
   const link = h("a", { href: "/" }, "All clutches");
-  const notice = h("div", { class: "notice bad" }, h("h1", {}, "No such clutch"), h("p", {}, text, link));
-  byId("head").replaceChildren(notice);
-  delete byId("head").dataset.shown;
+  byId("head").replaceChildren(
+    h("div", { class: "notice bad" }, h("h1", {}, "No such clutch"), h("p", {}, sentence, link)),
+  );
 }
 
-byId("print").addEventListener("click", () => {
-  if (shown && parts) makeReport(byId("report"), shown, parts.board, parts.diagnosis.latest);
+byId("print").addEventListener("click", async () => {
+  if (reader.clutch !== null && reader.clutch.runs > 0) {
+    await tab("overview").show("");
+    await drawReport();
+  }
   print();
 });
-const store = new Stored(ID, () => live.now());
-const inspections = new Inspections(within("inspections", ".body"), ID, fileName, store.change);
+addEventListener("hashchange", () => {
+  turn();
+  live.now();
+});
+document.addEventListener("unitschange", () => {
+  shown.clear();
+  live.now();
+});
 const live = new Live(withKey(poll), liveBar(byId("live")), INTERVAL);
 sender(byId("send"), { clutch: ID, sent: () => live.now() });
+placeUnits(byId("units"));
+turn();
 live.start();

@@ -9,6 +9,7 @@ import { runLink } from "./warnings.js";
 
 /** @import { Receipt } from "../shared/types.js" */
 /** @import { Answer, RunAction } from "./changes.js" */
+/** @import { Page } from "./clutch.js" */
 /** @typedef {(answer: Answer, runs: Receipt[]) => unknown} Say */
 
 /** Held runs that are shown at the top; the others are in the list of runs. */
@@ -16,9 +17,10 @@ const MOST_SHOWN = 5;
 
 /**
  * @param {Receipt[]} runs
- * @param {{ act: (action: RunAction, run: Receipt) => unknown, say: Say, reveal: (runId: string) => void }} page
+ * @param {Page} page
  */
-export function heldView(runs, { act, say, reveal }) {
+export function heldView(runs, { store }) {
+  const { act, say } = store;
   const count = runs.length === 1 ? "1 run is held" : `${runs.length} runs are held`;
   const rest = runs.length - MOST_SHOWN;
   return h(
@@ -35,9 +37,9 @@ export function heldView(runs, { act, say, reveal }) {
     h(
       "ul",
       { class: "held" },
-      runs.slice(0, MOST_SHOWN).map((run) => item(run, { act, say, reveal })),
+      runs.slice(0, MOST_SHOWN).map((run) => item(run, { act, say })),
     ),
-    rest > 0 ? h("p", { class: "quiet" }, `${rest} more in the list of runs.`) : "",
+    rest > 0 ? h("p", { class: "quiet" }, h("a", { href: "#/runs" }, `${rest} more in the list of runs`)) : "",
   );
 }
 
@@ -64,18 +66,13 @@ function together(runs, say) {
 
 /**
  * @param {Receipt} run
- * @param {{ act: (action: RunAction, run: Receipt) => unknown, say: Say, reveal: (runId: string) => void }} page
+ * @param {{ act: (action: RunAction, run: Receipt) => unknown, say: Say }} page
  */
-function item(run, { act, say, reveal }) {
+function item(run, { act, say }) {
   return h(
     "li",
     {},
-    h(
-      "p",
-      {},
-      h("b", {}, runLink(run, reveal)),
-      h("span", { class: "quiet" }, ` · received ${moment(run.received_at)}`),
-    ),
+    h("p", {}, h("b", {}, runLink(run)), h("span", { class: "quiet" }, ` · received ${moment(run.received_at)}`)),
     doubtList(run),
     h(
       "div",

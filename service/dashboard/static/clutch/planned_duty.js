@@ -3,7 +3,7 @@
 
 import { clutchPath, Problem, sendJson } from "../shared/api.js";
 import { field, h, scrolling, table } from "../shared/dom.js";
-import { fixed, significant, sentence } from "../shared/format.js";
+import { fixed, NOT_A_NUMBER, numberOf, significant, sentence } from "../shared/format.js";
 import { problemView } from "../shared/problem_view.js";
 
 /** @import { PlannedLife, ProblemError, Quantiles } from "../shared/types.js" */
@@ -12,8 +12,8 @@ import { problemView } from "../shared/problem_view.js";
 
 /** @type {Entry[]} */
 const OF_BLOCK = [
-  { name: "cycles", label: "Duty cycles", value: "1000" },
   { name: "energy_per_cycle_kj", label: "Energy per cycle, kJ" },
+  { name: "cycles", label: "Duty cycles", value: "1000" },
   { name: "sd", label: "Its standard deviation, kJ" },
 ];
 /** @type {Entry} */
@@ -28,6 +28,8 @@ export class PlannedDuty {
    */
   constructor(place, clutchId) {
     this.address = `${clutchPath(clutchId)}/remaining-useful-life/forecast`;
+    /** @type {string | undefined} what a planned cycle counts by; undefined: as the service assumes */
+    this.countedBy = undefined;
     this.blocks = h("div", { class: "blocks" });
     this.pace = h("div", { class: "fields" }, number(`/${PACE.name}`, PACE));
     this.answer = h("div", { class: "answer", "aria-live": "polite" });
@@ -37,7 +39,7 @@ export class PlannedDuty {
     this.form = h("form", { novalidate: true, onsubmit: this.submit }, this.blocks, this.pace, buttons, this.answer);
     const about =
       "Blocks are run one after the other, over and over until the end of life. An empty field is left open.";
-    place.replaceChildren(
+    place.append(
       h(
         "details",
         { class: "planned" },
@@ -97,13 +99,25 @@ export class PlannedDuty {
 
   submit = async (/** @type {SubmitEvent} */ event) => {
     event.preventDefault();
+    this.countedBy = undefined;
+    await this.ask();
+  };
+
+  async ask() {
     this.clear();
+    const unread = [...this.form.querySelectorAll("input")].filter((input) => numberOf(input.value) === undefined);
+    for (const input of unread) this.mark({ pointer: input.dataset.pointer ?? "", message: NOT_A_NUMBER });
+    if (unread.length > 0) {
+      this.answer.replaceChildren();
+      focus(this.form, "[aria-invalid]");
+      return;
+    }
     this.go.disabled = true;
     this.answer.replaceChildren(h("p", { class: "quiet" }, "Computing …"));
     try {
       /** @type {{ body: PlannedLife }} */
       const { body } = await sendJson("POST", this.address, this.programme());
-      this.answer.replaceChildren(...shown(body));
+      this.answer.replaceChildren(...shown(body), this.other(body));
     } catch (problem) {
       if (!(problem instanceof Problem)) throw problem;
       const elsewhere = problem.errors.filter((error) => !this.mark(error));
@@ -114,11 +128,27 @@ export class PlannedDuty {
     } finally {
       this.go.disabled = false;
     }
-  };
+  }
+
+  /**
+   * The other way to count, in one click, where the service assumed one.
+   * @param {PlannedLife} life
+   */
+  other({ counted_by: by, warnings }) {
+    const assumed = warnings.some(({ code }) => code === "counted_by_energy");
+    if (!assumed && this.countedBy === undefined) return "";
+    const [next, label] =
+      by === "cycles" ? ["dissipated_energy", "Count by energy"] : ["cycles", "Count every cycle as one"];
+    const ask = () => {
+      this.countedBy = next;
+      this.ask();
+    };
+    return h("button", { type: "button", onclick: ask }, label);
+  }
 
   programme() {
     const programme = [...this.blocks.querySelectorAll("fieldset")].map((block) => numbersIn(block));
-    return { programme, ...numbersIn(this.pace) };
+    return { programme, ...numbersIn(this.pace), counted_by: this.countedBy };
   }
 
   clear() {
@@ -134,7 +164,7 @@ export class PlannedDuty {
 
   /**
    * An error at the field or the block that it is about; whether there is one.
-   * @param {ProblemError} error
+   * @param {Pick<ProblemError, "pointer" | "message">} error
    */
   mark({ pointer, message }) {
     const places = [...this.form.querySelectorAll("[data-pointer]")];
@@ -169,15 +199,15 @@ const idOf = (pointer) => `planned${pointer.replaceAll("/", "-")}`;
  * @param {Entry} entry
  */
 function number(pointer, { name, label, value = "" }) {
-  const attributes = { type: "number", step: "any", inputmode: "decimal", autocomplete: "off" };
+  const attributes = { inputmode: "decimal", autocomplete: "off" };
   const input = h("input", { id: idOf(pointer), name, value, "data-pointer": pointer, ...attributes });
   return field(input, label, h("p", { class: "wrong", hidden: true }));
 }
 
 /** @param {HTMLElement} place */
 function numbersIn(place) {
-  const filled = [...place.querySelectorAll("input")].filter((input) => input.value !== "");
-  return Object.fromEntries(filled.map((input) => [input.name, Number(input.value)]));
+  const filled = [...place.querySelectorAll("input")].filter((input) => input.value.trim() !== "");
+  return Object.fromEntries(filled.map((input) => [input.name, numberOf(input.value)]));
 }
 
 /** @param {PlannedLife} life */

@@ -5,43 +5,74 @@ import { sentence } from "../diagnosis/report.js";
 import { byMeanCof } from "../quantities/criteria.js";
 import { h, table } from "../shared/dom.js";
 import { aboutCycles, estimate, fixed, interval, moment, percent, probability, words } from "../shared/format.js";
-import { stateIcon, STATES } from "../shared/state.js";
+import { stateIcon } from "../shared/state.js";
 
-/** @import { ClutchOut, DiagnosisOut, Receipt, RemainingLife, StribeckItem } from "../shared/types.js" */
-/** @import { Board } from "./board.js" */
+/** @import { Chart } from "../charts/chart.js" */
+/** @import { ClutchOut, Receipt, RemainingLife, StribeckItem } from "../shared/types.js" */
 
+/** The service's release, which the page names. */
+const RELEASE = document.querySelector("meta[name=release]")?.getAttribute("content") ?? "";
 const LAST_TESTS = 6;
 const LAST_EVENTS = 6;
 const COLUMNS = ["Cycles", "Test", "Mean COF, mean of pressures", "Fits acceptable"];
 
 /**
- * @param {HTMLElement} place
- * @param {{ clutch: ClutchOut, life: RemainingLife | null, tests: StribeckItem[], events: Receipt[], runs: Receipt[] }} answers
- * @param {Board} board
- * @param {DiagnosisOut | null} latest
+ * @typedef {object} Answers what is known of the clutch; before its overview was read, itself alone
+ * @property {ClutchOut} clutch
+ * @property {RemainingLife} [life]
+ * @property {StribeckItem[]} [tests]
+ * @property {Receipt[]} [events]
+ * @property {Chart[]} [charts]
  */
-export function makeReport(place, { clutch, life, tests, events, runs }, board, latest) {
-  if (life === null) return;
-  const size = { width: 760, height: 255 };
-  const drawings = [board.charts.fan, board.charts.remaining].map((chart) => chart.light({ ...size, scheme: "light" }));
-  const { state } = clutch;
+
+/**
+ * @param {HTMLElement} place
+ * @param {Answers} answers
+ */
+export function makeReport(place, { clutch, life, tests = [], events = [], charts = [] }) {
+  const drawings = charts.map((chart) => chart.light({ width: 760, height: 255, scheme: "light" }));
+  const { state, headline, action } = clutch;
   const simulated = clutch.origin === "simulated" ? ", simulated" : "";
   const kind = `Wet clutch, ${clutch.friction_material} on ${clutch.reaction_plate}, ${clutch.fluid}${simulated}`;
-  const values = facts(life, runs).flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]);
+  const values = life ? facts(clutch, life).flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]) : [];
+  const last = tests.slice(-LAST_TESTS);
   place.replaceChildren(
     h(
       "header",
       {},
       h("div", {}, h("h1", {}, clutch.clutch_id), h("p", {}, kind)),
-      h("p", { class: "made" }, "Clutchlife", h("br"), moment(new Date().toISOString())),
+      h("p", { class: "made" }, `Clutchlife ${RELEASE}`, h("br"), moment(new Date().toISOString())),
     ),
-    h("p", { class: "state" }, stateIcon(state.name), h("b", {}, STATES[state.name].word), ` – ${state.why}`),
+    h("p", { class: "state" }, stateIcon(state.name), h("span", {}, headline)),
+    h("p", { class: "action" }, action),
     h("dl", { class: "facts" }, values),
     ...drawings.flatMap((src) => (src === null ? [] : [h("img", { src, alt: "" })])),
-    h("p", {}, h("b", {}, "Diagnosis: "), diagnosisText(latest)),
-    table("The last tests", COLUMNS, tests.slice(-LAST_TESTS).map(testRow), { shown: true }),
+    h("p", {}, h("b", {}, "Diagnosis: "), diagnosisText(clutch.diagnosis)),
+    last.length > 0 ? table("The last tests", COLUMNS, last.map(testRow), { shown: true }) : "",
     events.length > 0 ? h("p", {}, h("b", {}, "Events: "), events.slice(-LAST_EVENTS).map(eventText).join("; ")) : "",
+    h("p", { class: "basis" }, h("b", {}, "Made of: "), basis(clutch, life, tests)),
   );
+}
+
+/**
+ * The release, the settings and the data that a report is of.
+ * @param {ClutchOut} clutch
+ * @param {RemainingLife | undefined} life
+ * @param {StribeckItem[]} tests
+ */
+function basis(clutch, life, tests) {
+  const { severity, geometry, revision } = clutch;
+  const disc = `${geometry.inner_diameter_mm}/${geometry.outer_diameter_mm} mm, ${geometry.friction_faces} faces, pressure factor ${geometry.pressure_factor}`;
+  return [
+    `Clutchlife ${RELEASE}`,
+    life ? `${life.method} filter, horizon ${fixed(life.horizon_cycles)} cycles` : "",
+    `ageing counted in ${severity.basis.replaceAll("_", " ")}`,
+    disc,
+    `revision ${revision} of the clutch's data, ${clutch.runs} runs`,
+    tests.length > 0 ? `tests ${tests[0].run_id} to ${tests[tests.length - 1].run_id}` : "",
+  ]
+    .filter(Boolean)
+    .join("; ");
 }
 
 /** @param {Receipt} event */
@@ -49,19 +80,18 @@ function eventText({ event, note, cycles: at }) {
   return `${words(event)}${note ? ` (${note.slice(0, 80)})` : ""} at ${fixed(at)} cycles`;
 }
 
-/** @param {DiagnosisOut | null} latest */
+/** @param {ClutchOut["diagnosis"]} latest */
 function diagnosisText(latest) {
-  if (latest === null || latest.status === "running") return "not run.";
-  if (latest.status === "failed") return `failed. ${latest.problem ?? ""}`;
+  if (latest === null) return "not run.";
   const earlier = latest.earlier_life ? "That was before the rebuild." : "";
-  return `${sentence(latest)} ${latest.adopted ? "The extended model is adopted." : earlier}`;
+  return `${sentence(latest)} ${latest.adopted ? "Its model is adopted." : earlier}`;
 }
 
 /**
+ * @param {ClutchOut} clutch
  * @param {RemainingLife} life
- * @param {Receipt[]} runs
  */
-function facts(life, runs) {
+function facts(clutch, life) {
   const { current, model, remaining_cycles: q } = life;
   const { criterion } = byMeanCof(life);
   const predicted = `${aboutCycles(q)} (90 %: ${interval(q)})`;
@@ -69,7 +99,6 @@ function facts(life, runs) {
   const cof = estimate(current.mean_cof, current.mean_cof_sd);
   return [
     ["Remaining cycles", ["predicted", "may_never_reach"].includes(life.status) ? predicted : words(life.status)],
-    ["What is certain", life.statement],
     ["Health", percent(current.health)],
     [
       "Mean COF",
@@ -77,9 +106,9 @@ function facts(life, runs) {
     ],
     ["Threshold", `${fixed(criterion.threshold_mean_cof, 4)} (${percent(criterion.fraction)} of new)`],
     ["Duty cycles so far", fixed(life.as_of_cycles)],
-    ["Tests and runs", `${life.runs_used} tests, ${runs.length} runs`],
+    ["Tests and runs", `${life.runs_used} tests, ${clutch.runs} runs`],
     ["Reaches end of life", `${chance} within ${fixed(life.horizon_cycles)} cycles`],
-    ["Model", [words(model.name), ...model.effects.map(words)].join(", ")],
+    ["Corrected for", model.effects.length > 0 ? model.effects.map(words).join(", ") : "nothing"],
   ];
 }
 

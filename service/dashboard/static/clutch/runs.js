@@ -1,41 +1,45 @@
 // @ts-check
-// Every run with its state, its receipt and what can be done to it, the latest cycles first, page by page.
+// The tab of the runs: every run with its state, its receipt, its curves and what can be done to it, the latest cycles first, page
+// by page. `#/runs/RUN` opens one.
 
 import { doubtList, fitTable, loopTable, warnings } from "../sending/receipt.js";
-import { clutchPath, readText } from "../shared/api.js";
-import { h, saveText } from "../shared/dom.js";
+import { h } from "../shared/dom.js";
+import { files } from "../shared/files.js";
 import { fixed, kindName, moment, words } from "../shared/format.js";
 import { buttons } from "./held.js";
+import { runCharts } from "./run_view.js";
 import { isCorrected, stateMark } from "./states.js";
 
 /** @import { Receipt } from "../shared/types.js" */
-/** @import { RunAction } from "./changes.js" */
+/** @import { Page } from "./clutch.js" */
 
 /** Runs on a page of the list. */
 const PAGE = 25;
 
-export class RunList {
+export class Runs {
   /**
    * @param {HTMLElement} place
-   * @param {string} clutchId
-   * @param {{ act: (action: RunAction, run: Receipt) => unknown, undo: (run: Receipt) => unknown }} page
+   * @param {Page} page
    */
-  constructor(place, clutchId, page) {
+  constructor(place, { reader, store }) {
     this.place = place;
-    this.clutchId = clutchId;
-    this.page = page;
+    this.reader = reader;
+    this.store = store;
     this.first = 0;
     /** @type {Receipt[]} the latest first */
     this.runs = [];
     /** @type {Set<string>} */
     this.open = new Set();
+    this.revealed = "";
   }
 
-  /** @param {Receipt[]} runs by cycles */
-  show(runs) {
+  /** @param {string} runId that the address opens */
+  async show(runId) {
     const focused = this.focusedRun();
-    this.runs = [...runs].reverse();
-    this.draw();
+    this.runs = [...(await this.reader.runs())].reverse();
+    if (runId && runId !== this.revealed) this.reveal(runId);
+    else this.draw();
+    this.revealed = runId;
     if (focused !== null) this.summaryOf(focused)?.focus({ preventScroll: true });
   }
 
@@ -70,19 +74,12 @@ export class RunList {
     const { length } = this.runs;
     if (this.first >= length) this.first = 0;
     const listed = this.runs.slice(this.first, this.first + PAGE);
-    const address = `${clutchPath(this.clutchId)}/runs.csv`;
-    /** @param {Event} event */
-    const save = async (event) => {
-      event.preventDefault(); // with a key a plain link would be refused: the file is fetched as the page fetches everything
-      saveText(`${this.clutchId}-runs.csv`, await readText(address), "text/csv");
-    };
     this.place.replaceChildren(
       h(
         "p",
         { class: "quiet" },
-        `${this.summary()} As a table: `,
-        h("a", { href: address, onclick: save }, "CSV"),
-        ".",
+        `${this.summary()} `,
+        files(`${this.reader.name()}-runs`, `${this.reader.path}/runs.csv`),
       ),
       h(
         "div",
@@ -147,14 +144,25 @@ export class RunList {
     details.addEventListener("toggle", () => {
       if (details.open) this.open.add(run.run_id);
       else this.open.delete(run.run_id);
-      if (details.open && !inside.hasChildNodes()) inside.append(...this.inside(run));
+      if (details.open && !inside.hasChildNodes()) this.fill(inside, run);
     });
     return details;
   }
 
+  /**
+   * @param {HTMLElement} inside
+   * @param {Receipt} run
+   */
+  async fill(inside, run) {
+    const charts = h("div", { class: "run-charts" });
+    inside.append(...this.inside(run), charts, ...receipt(run));
+    if (run.kind === "maintenance") return;
+    charts.append((await runCharts(run, this.reader)) ?? "");
+  }
+
   /** @param {Receipt} run */
   inside(run) {
-    const { act, undo } = this.page;
+    const { act, undo } = this.store;
     const changes = buttons(run, act);
     if (isCorrected(run) && run.state !== "withdrawn") {
       changes.append(h("button", { type: "button", onclick: () => undo(run) }, "Undo the correction …"));
@@ -169,7 +177,6 @@ export class RunList {
         ? h("div", {}, run.state === "held" ? "" : h("b", {}, "It was held because:"), doubtList(run))
         : "",
       changes,
-      ...receipt(run),
     ];
   }
 }

@@ -92,17 +92,27 @@ function candidates({ candidates: all = [], causes = [] }) {
     return [
       h("span", { class: causes.includes(effect) ? "named" : null, title: effect }, title || words(effect)),
       h("span", { class: "chance" }, chance(candidate.probability), probability(candidate.probability)),
-      fixed(candidate.log_evidence_gain, 1),
+      evidence(candidate.log_evidence_gain),
       estimated(candidate),
     ];
   });
-  const columns = ["Cause", "Probability", "Evidence gain, nats", "Estimate"];
+  const columns = ["Cause", "Probability", "Evidence", "Estimate"];
   return h(
     "div",
     { class: "part wide" },
     h("h3", {}, "Candidates"),
     scrolling("Candidates", table("Candidate causes", columns, rows)),
   );
+}
+
+/**
+ * Log evidence in a word (thresholds of Kass and Raftery, 1, 3 and 5 in natural logarithms); the number under the pointer.
+ * @param {number | null} value
+ */
+function evidence(value) {
+  if (value === null) return "–";
+  const word = value < 1 ? "none" : value < 3 ? "weak" : value < 5 ? "moderate" : "strong";
+  return h("span", { title: `log evidence ${fixed(value, 1)}` }, word);
 }
 
 /** @param {CandidateOut} candidate */
@@ -166,19 +176,19 @@ function errorGain(gained) {
 
 /**
  * @param {string} place
- * @param {number | null | undefined} nats
+ * @param {number | null | undefined} gained
  */
-const scoreText = (place, nats) =>
-  nats === null || nats === undefined ? "" : `log score ${nats >= 0 ? "+" : ""}${fixed(nats, 1)} nats ${place}`;
+const scoreText = (place, gained) =>
+  gained === null || gained === undefined ? "" : `log score ${gained >= 0 ? "+" : ""}${fixed(gained, 1)} ${place}`;
 
 /** @param {DiagnosisOut} diagnosis */
 function where({ baseline }) {
   const axes = baseline?.where ?? [];
   if (axes.length === 0) return null;
   const rows = axes.slice(0, MOST_ROWS).map(({ axis, strength, p_value: p }) => {
-    return [quantity(axis), significant(strength, 3), p !== null && p < 0.001 ? "< 0.001" : significant(p, 2)];
+    return [quantity(axis), evidence(strength), p !== null && p < 0.001 ? "< 0.001" : significant(p, 2)];
   });
-  return part("Where the baseline falls short", table("Where", ["Along", "Strength, nats", "p"], rows));
+  return part("Where the baseline falls short", table("Where", ["Along", "Evidence", "p"], rows));
 }
 
 /** @param {DiagnosisOut} diagnosis */

@@ -3,15 +3,18 @@
 // first, come out. Searching, filtering and sorting are the service's.
 // Open this file first (what is asked for and shown), then rows.js (which rows are drawn), row.js (one of them), chips.js.
 
+import { Alarms } from "../alarms/alarms.js";
+import { confirm } from "../diagnosis/confirm.js";
 import { register } from "../sending/registration.js";
 import { sender } from "../sending/sending.js";
 import { at } from "../shared/address.js";
-import { read } from "../shared/api.js";
+import { clutchPath, read, sendJson } from "../shared/api.js";
 import { byId, h } from "../shared/dom.js";
 import { age } from "../shared/format.js";
 import { withKey } from "../shared/key.js";
 import { Live } from "../shared/live.js";
 import { liveBar } from "../shared/live_bar.js";
+import { problemView } from "../shared/problem_view.js";
 import { welcome } from "../shared/welcome.js";
 import { countOf, drawChips } from "./chips.js";
 import { Rows } from "./rows.js";
@@ -32,7 +35,13 @@ let only = null;
 let totals = null;
 /** The address of the list that is shown, "" where it must be shown again. */
 let shown = "";
-const rows = new Rows(() => live.now());
+const SORT = /** @type {HTMLSelectElement} */ (byId("sort"));
+const rows = new Rows(
+  () => live.now(),
+  () => drawPicked(),
+);
+
+const alarms = new Alarms(byId("tab-alarms"), null);
 
 /** What totals and the list are asked for: archived or not, and what is searched for. */
 function wanted() {
@@ -51,10 +60,25 @@ function chosen() {
   return question.toString();
 }
 
+/** The tab of the address in sight: the clutches, or the alarms of all of them. */
+function turn() {
+  const name = location.hash === "#/alarms" ? "alarms" : "clutches";
+  for (const key of ["clutches", "alarms"]) byId(`tab-${key}`).hidden = key !== name;
+  for (const link of byId("tabs").querySelectorAll("a")) {
+    if (link.hash === `#/${name}`) link.setAttribute("aria-current", "page");
+    else link.removeAttribute("aria-current");
+  }
+  return name;
+}
+
 async function poll() {
+  if (turn() === "alarms") {
+    await alarms.show();
+    return;
+  }
   const question = chosen();
   const part = rows.wanted();
-  const list = `/v1/clutches?${question}${question && "&"}offset=${part.offset}&limit=${part.limit}`;
+  const list = `/v1/clutches?${question}${question && "&"}sort=${SORT.value}&offset=${part.offset}&limit=${part.limit}`;
   const before = shown;
   shown = ""; // until both are read: an error midway is made good at the next poll
   /** @type {[{ body: FleetTotals, changed: boolean }, { body: ListPage<ClutchOut>, changed: boolean }]} */
@@ -95,8 +119,54 @@ function choose(choice) {
   restart();
 }
 
+/** What can be done to the clutches that are chosen. */
+function drawPicked() {
+  const ids = [...rows.chosen];
+  const query = ids.map((id) => `clutch=${encodeURIComponent(id)}`).join("&");
+  const clear = () => {
+    rows.chosen.clear();
+    for (const box of rows.element.querySelectorAll("input")) box.checked = false;
+    drawPicked();
+  };
+  byId("picked").hidden = ids.length === 0;
+  byId("picked").replaceChildren(
+    h("b", {}, `${ids.length} chosen`),
+    h("a", { href: `/compare?${query}`, class: "button" }, "Compare"),
+    h("button", { type: "button", onclick: () => archive(ids) }, ARCHIVED.checked ? "Bring back …" : "Archive …"),
+    h("button", { type: "button", onclick: clear }, "Choose none"),
+  );
+}
+
+/** @param {string[]} ids */
+async function archive(ids) {
+  const archived = !ARCHIVED.checked;
+  const count = ids.length === 1 ? "1 clutch" : `${ids.length} clutches`;
+  const agreed = await confirm({
+    title: archived ? `Archive ${count}?` : `Bring ${count} back?`,
+    points: [
+      archived
+        ? "They leave the list and take no new runs. Nothing is deleted: they can be brought back."
+        : "They are in the list again and take new runs.",
+      ids.join(", "),
+    ],
+    action: archived ? "Archive" : "Bring back",
+  });
+  if (!agreed) return;
+  try {
+    for (const id of ids) {
+      await sendJson("PATCH", clutchPath(id), { archived, reason: "" });
+      rows.chosen.delete(id);
+    }
+  } catch (problem) {
+    byId("picked").after(problemView(problem, "Not all of them were changed. "));
+  }
+  drawPicked();
+  await live.now();
+}
+
 /** Another list is wanted: from its beginning, at once. */
 function restart() {
+  rows.grouped = SORT.value === "kind";
   rows.restart();
   live.now();
 }
@@ -114,10 +184,14 @@ FIND.addEventListener("input", () => {
   clearTimeout(typing);
   typing = setTimeout(restart, PAUSE);
 });
+SORT.addEventListener("change", restart);
 ARCHIVED.addEventListener("change", () => {
   only = null;
+  rows.chosen.clear();
+  drawPicked();
   restart();
 });
+addEventListener("hashchange", () => live.now());
 setInterval(updateAges, 15_000);
 const live = new Live(withKey(poll), liveBar(byId("live")), INTERVAL);
 sender(byId("send"), { sent: () => live.now() });

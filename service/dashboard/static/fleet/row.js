@@ -11,6 +11,7 @@ import { heldText, stateIcon, STATES, VERDICTS } from "../shared/state.js";
 /** @import { ClutchOut, ClutchSummary } from "../shared/types.js" */
 
 export const COLUMNS = [
+  h("span", { class: "hidden" }, "Choose"),
   "State",
   "Clutch",
   "Health",
@@ -21,21 +22,25 @@ export const COLUMNS = [
 ];
 
 /**
- * The row; `scale` is the cycles at the right end of every interval's bar.
+ * The row; `scale` is the cycles at the right end of every interval's bar, `group` the kind that begins with it.
  * @param {ClutchOut} clutch
- * @param {number} scale
+ * @param {{ scale: number, group: string | null, chosen: boolean, choose: (chosen: boolean) => void }} options
  */
-export function row(clutch, scale) {
+export function row(clutch, { scale, group, chosen, choose }) {
   const { summary, state } = clutch;
+  const box = h("input", { type: "checkbox", checked: chosen, "aria-label": `Choose ${clutch.clutch_id}` });
+  box.addEventListener("change", () => choose(box.checked));
   const address = `/clutches/${encodeURIComponent(clutch.clutch_id)}`;
   const label = h("span", {}, STATES[state.name].word, small(state.why));
   return h(
     "tr",
-    { role: "row", "data-clutch": clutch.clutch_id },
+    { role: "row", "data-clutch": clutch.clutch_id, class: group === null ? null : "begins" },
+    cell("", box),
     cell("State", h("span", { class: "state" }, stateIcon(state.name), label)),
     h(
       "th",
       { role: "rowheader", scope: "row", "data-label": "Clutch" },
+      group !== null && h("span", { class: "group" }, group),
       h("a", { href: address }, clutch.clutch_id),
       clutch.origin === "simulated" && h("span", { class: "tag" }, "simulated"),
       small(`${clutch.friction_material} on ${clutch.reaction_plate}`),
@@ -47,6 +52,10 @@ export function row(clutch, scale) {
     cell("Diagnosis", ...diagnosis(clutch, address)),
   );
 }
+
+/** @param {ClutchOut} clutch */
+export const kindOf = ({ friction_material: material, reaction_plate: plate, fluid }) =>
+  `${words(material)} on ${plate}, ${fluid}`;
 
 /**
  * @param {string} name
@@ -117,7 +126,7 @@ function lastRun({ recent }) {
  * @param {string} address
  */
 function held({ held: count }, address) {
-  return count > 0 && h("a", { href: `${address}#held`, class: "mark-held" }, heldText(count));
+  return count > 0 && h("a", { href: address, class: "mark-held" }, heldText(count));
 }
 
 /**
@@ -130,7 +139,7 @@ function diagnosis({ diagnosis: latest }, address) {
   const causes = latest.causes.map(words).join(", ");
   const remarks = [causes, latest.adopted && "adopted", latest.earlier_life && "before the rebuild"];
   return [
-    h("a", { href: `${address}#diagnosis` }, VERDICTS[verdict] ?? words(verdict)),
+    h("a", { href: `${address}#/diagnosis` }, VERDICTS[verdict] ?? words(verdict)),
     small(remarks.filter(Boolean).join(" · ")),
   ];
 }

@@ -3,7 +3,7 @@
 // What lies above and below them is empty space of the height that they would take.
 
 import { h } from "../shared/dom.js";
-import { COLUMNS, row } from "./row.js";
+import { COLUMNS, kindOf, row } from "./row.js";
 
 /** @import { ClutchOut } from "../shared/types.js" */
 
@@ -20,9 +20,17 @@ const BLOCK = 40;
 const USUAL_HEIGHT = 64;
 
 export class Rows {
-  /** @param {() => void} moved hears that another part of the list is to be shown */
-  constructor(moved) {
+  /**
+   * @param {() => void} moved hears that another part of the list is to be shown
+   * @param {() => void} picked hears that other clutches are chosen
+   */
+  constructor(moved, picked) {
     this.moved = moved;
+    this.picked = picked;
+    /** @type {Set<string>} clutches that are chosen, to compare or to archive */
+    this.chosen = new Set();
+    /** Whether clutches of a kind stand together, each kind under its name. */
+    this.grouped = false;
     this.above = space();
     this.body = h("tbody", { role: "rowgroup" });
     this.below = space();
@@ -77,7 +85,9 @@ export class Rows {
   show(items, { offset, limit }, total, scale) {
     const first = this.first();
     const before = this.topOf(first);
-    this.arrange(items.map((clutch) => this.drawn(clutch, scale)));
+    const kinds = this.grouped ? items.map(kindOf) : [];
+    const group = (/** @type {number} */ index) => (kinds[index] === kinds[index - 1] ? null : (kinds[index] ?? null));
+    this.arrange(items.map((clutch, index) => this.drawn(clutch, scale, group(index))));
     const present = new Set(items.map((clutch) => clutch.clutch_id));
     for (const id of this.entries.keys()) if (!present.has(id)) this.entries.delete(id);
     [...this.body.children].forEach((element, index) =>
@@ -100,13 +110,19 @@ export class Rows {
   }
 
   /** The row's element: a clutch that did not change keeps its row, so nothing flickers. */
-  drawn(/** @type {ClutchOut} */ clutch, /** @type {number} */ scale) {
-    const text = `${scale} ${JSON.stringify(clutch)}`;
-    const before = this.entries.get(clutch.clutch_id);
+  drawn(/** @type {ClutchOut} */ clutch, /** @type {number} */ scale, /** @type {string | null} */ group) {
+    const { clutch_id: id } = clutch;
+    const text = `${scale} ${group} ${JSON.stringify(clutch)}`;
+    const before = this.entries.get(id);
     if (before?.text === text) return before.element;
-    const element = row(clutch, scale);
+    const choose = (/** @type {boolean} */ chosen) => {
+      if (chosen) this.chosen.add(id);
+      else this.chosen.delete(id);
+      this.picked();
+    };
+    const element = row(clutch, { scale, group, chosen: this.chosen.has(id), choose });
     if (before !== undefined) element.classList.add("fresh");
-    this.entries.set(clutch.clutch_id, { text, element });
+    this.entries.set(id, { text, element });
     return element;
   }
 

@@ -4,8 +4,9 @@
 // form.js (an inspection sent with its photographs).
 
 import { Chart } from "../charts/chart.js";
-import { clutchPath, readAll, readText } from "../shared/api.js";
-import { h, saveText, scrolling, symbol, table } from "../shared/dom.js";
+import { clutchPath, readAll } from "../shared/api.js";
+import { h, scrolling, symbol, table } from "../shared/dom.js";
+import { files } from "../shared/files.js";
 import { fixed, moment, significant } from "../shared/format.js";
 import { surfaceOverLife } from "./charts.js";
 import { InspectionForm } from "./form.js";
@@ -72,18 +73,12 @@ export class Inspections {
 
   /** @param {InspectionOut[]} items */
   table(items) {
-    const address = `${clutchPath(this.clutchId)}/inspections.csv`;
-    /** @param {Event} event */
-    const save = async (event) => {
-      event.preventDefault();
-      saveText(`${this.clutchId}-inspections.csv`, await readText(address), "text/csv");
-    };
     const rows = items.map((item) => this.row(item));
     const roughness = h("span", {}, symbol("R", "a"), ", µm");
     const measured = [roughness, symbol("R", "sk")];
     const columns = ["Duty cycles", "Inspected", "Lining", ...measured, "Note", "Photographs", "Change"];
     return [
-      h("p", { class: "quiet" }, "As a table: ", h("a", { href: address, onclick: save }, "CSV"), "."),
+      h("p", { class: "quiet" }, files(`${this.clutchId}-inspections`, `${clutchPath(this.clutchId)}/inspections.csv`)),
       h("div", { class: "panel" }, scrolling("Inspections", table("Inspections, by duty cycles", columns, rows))),
     ];
   }

@@ -3,6 +3,7 @@
 
 import { distinct } from "../charts/columns.js";
 import { fixed } from "../shared/format.js";
+import { pressureText } from "../shared/units.js";
 
 /** @import { DegradationItem } from "../shared/types.js" */
 
@@ -32,7 +33,7 @@ export const levelsOf = (items) =>
  * @param {number[]} levels
  * @returns {[number, string][]}
  */
-export const levelOptions = (levels) => levels.map((level) => [level, `${fixed(level, 1)} bar`]);
+export const levelOptions = (levels) => levels.map((level) => [level, pressureText(level)]);
 
 /**
  * @param {{ run_id: string, cycles: number }[]} tests

@@ -1,8 +1,11 @@
 // @ts-check
-// What ends a clutch's life: its criteria, when each is reached, and how probably it is the first.
+// Quantities that are tracked and may end a life: answers of the API go in, charts and tables come out. Open this file first (what
+// ends a life: its criteria, when each is reached, and how probably it is the first), then shudder.js, lag.js and pressure_laws.js;
+// lazy.js reads an answer that takes seconds when its chart is looked at, and again only when the clutch has changed.
 
 import { h, scrolling, table } from "../shared/dom.js";
 import { cycles, fixed, interval, percent, probability, significant, withSd } from "../shared/format.js";
+import { pressureText } from "../shared/units.js";
 import { QUANTITIES } from "./names.js";
 
 /** @import { CriterionIn, CriterionOutcome, RemainingLife } from "../shared/types.js" */
@@ -26,7 +29,7 @@ export function placeText({ quantity, pressure_bar: pressure, speed_rpm: speed, 
   const at = [
     speed === null ? [] : `${fixed(speed)} rpm`,
     frequency === null ? [] : `${significant(frequency, 2)} Hz`,
-    pressure === null ? [] : `${fixed(pressure, 1)} bar`,
+    pressure === null ? [] : pressureText(pressure),
   ].flat();
   return [QUANTITIES[quantity].title, ...at].join(", ");
 }
@@ -80,23 +83,19 @@ export function criterionRow(criterion) {
 }
 
 /**
- * The criteria as a table; nothing where mean COF alone ends the life.
+ * What ends the life first: one criterion as a line, several as a table, the most probable first.
  * @param {RemainingLife} life
  */
 export function criteriaTable({ criteria }) {
-  if (criteria.length === 0 || (criteria.length === 1 && criteria[0].quantity === "mean_cof")) return [];
-  const rows = criteria.map((criterion) => [...criterionRow(criterion), probability(criterion.probability_first)]);
-  const style = { "margin-bottom": "16px" };
-  const text = "The first to be reached ends the life. The charts of mean COF below show its own end.";
-  return [
-    h(
-      "div",
-      { class: "panel", style },
-      h("h3", {}, "Criteria"),
-      h("p", { class: "quiet" }, text),
-      scrolling("Criteria: table", table("Criteria", COLUMNS, rows)),
-    ),
-  ];
+  if (criteria.length === 0) return [];
+  if (criteria.length === 1) {
+    const [only] = criteria;
+    return [h("p", { class: "limits" }, h("b", {}, "What limits first: "), `${placeText(only)}, ${limitText(only)}.`)];
+  }
+  const ordered = [...criteria].sort((a, b) => b.probability_first - a.probability_first);
+  const rows = ordered.map((criterion) => [...criterionRow(criterion), probability(criterion.probability_first)]);
+  const caption = scrolling("What limits first", table("What limits first", COLUMNS, rows));
+  return [h("div", { class: "panel limits" }, h("h3", {}, "What limits first"), caption)];
 }
 
 /**

@@ -7,6 +7,7 @@ import { rampOf } from "../charts/palette.js";
 import { spread } from "../charts/stribeck.js";
 import { band, linesByPressure, measuredLine, titled } from "../charts/traces.js";
 import { fixed } from "../shared/format.js";
+import { pressureText } from "../shared/units.js";
 import { levelsOf } from "./choices.js";
 
 /** @import { DegradationItem, Receipt } from "../shared/types.js" */
@@ -20,7 +21,7 @@ export const LAG = {
     title: "Loop area",
     axis: "loop area, Nm·m/s",
     unit: "Nm·m/s",
-    meaning: "Area of whole closed periods (eq. 8), positive where torque is higher in acceleration",
+    meaning: "Area of whole closed periods, positive where torque is higher in acceleration",
   },
   attractor: {
     title: "Attractor C",
@@ -32,7 +33,7 @@ export const LAG = {
     title: "Film time",
     axis: "film time, s",
     unit: "s",
-    meaning: "The time constant of the squeezed film (eq. 7)",
+    meaning: "The time constant of the squeezed film",
   },
 };
 
@@ -108,7 +109,7 @@ export function lagOverCycles({ items, name, pressure, events }) {
  * @returns {PlainTrace[]}
  */
 function track({ pressure_bar: level, trajectory }, unit, c) {
-  const name = `tracked, ${fixed(level, 1)} bar`;
+  const name = `tracked, ${pressureText(level)}`;
   const x = trajectory.cycles;
   return [
     ...band("90 % band", { x, y: trajectory.lower }, { x, y: trajectory.upper }, c),

@@ -64,9 +64,10 @@ export class RemainingBy {
       this.controls,
       this.answer,
     );
-    place.replaceChildren(this.details);
+    place.append(this.details);
     /** @type {{ tests: StribeckItem[], loops: LoopItem[] }} */
     this.answers = { tests: [], loops: [] };
+    this.readLoops = async () => /** @type {LoopItem[]} */ ([]);
     this.name = "static_torque_nm";
     /** @type {number | undefined} bar; undefined: over all pressures, or the usual one */
     this.level = undefined;
@@ -74,10 +75,11 @@ export class RemainingBy {
     this.revision = 0;
   }
 
-  /** @param {{ life: RemainingLife | null, tests: StribeckItem[], loops: LoopItem[] }} answers */
+  /** @param {{ life: RemainingLife, tests: StribeckItem[], loops: () => Promise<LoopItem[]> }} answers */
   show({ life, tests, loops }) {
-    this.answers = { tests, loops };
-    this.revision = life?.revision ?? 0;
+    this.answers = { ...this.answers, tests };
+    this.readLoops = loops;
+    this.revision = life.revision;
     this.draw();
     this.ask();
   }
@@ -115,6 +117,10 @@ export class RemainingBy {
 
   /** The answer to what is chosen, where it is looked at and not there yet. */
   async ask() {
+    if (this.details.open && OF_LOOPS.includes(this.name)) {
+      this.answers.loops = await this.readLoops();
+      this.draw();
+    }
     const place = this.level === undefined ? "" : `&pressure_bar=${this.level}`;
     const query = `quantity=${this.name}${place}`;
     const wanted = `${this.revision} ${query}`;

@@ -3,9 +3,9 @@
 
 import { CYCLES, column, digitsColumn, KIND, measuredAndLaw, PRESSURE } from "../charts/columns.js";
 import { eventMarks } from "../charts/layout.js";
-import { rampOf } from "../charts/palette.js";
 import { band, errorBars, titled } from "../charts/traces.js";
 import { fixed } from "../shared/format.js";
+import { pressureText } from "../shared/units.js";
 import { reachedText } from "./criteria.js";
 
 /** @import { CriterionOutcome, DegradationItem, Receipt } from "../shared/types.js" */
@@ -35,14 +35,14 @@ export function shudderMargin({ items, limits, events }) {
   if (items.length === 0) return { empty: NO_SLOPES };
   const when = limits === null ? "When the margin is used up is being computed …" : limits.map(limitText).join(" ");
   return {
-    note: `At ${fixed(items[0].pressure_bar, 1)} bar. Below the dashed line friction falls with speed, and the driveline may shudder. ${when}`,
+    note: `At ${pressureText(items[0].pressure_bar)}. Below the dashed line friction falls with speed, and the driveline may shudder. ${when}`,
     columns: COLUMNS,
     rows: items.flatMap((item) =>
       measuredAndLaw(item, { measured: "measured", law: "tracked", before: [item.pressure_bar, item.speed_rpm] }),
     ),
     figure: (c) => ({
       data: [
-        ...items.flatMap((item, index) => slopeTraces(item, rampOf(c, index, items.length), c)),
+        ...items.flatMap((item, index) => slopeTraces(item, [c.accent, c.check, c.normal][index % 3], c)),
         zeroLine(items, c),
       ],
       layout: { xaxis: titled("duty cycles"), yaxis: titled("dμ/dv, s/m"), ...eventMarks(events, c) },

@@ -11,8 +11,8 @@ import { cycles, fixed, kindName, sentence, significant, withSd, words } from ".
 
 /** What is said of a run that does not count, by its state: that, and where on the clutch's page it is made to count. */
 const UNCOUNTED = {
-  held: ["It does not count yet. ", "#held", "Confirm, correct or withdraw it"],
-  withdrawn: ["It was withdrawn since, and stays so. ", "#runs", "Restore it in the list of runs"],
+  held: ["It does not count yet. ", "#/overview", "Confirm, correct or withdraw it"],
+  withdrawn: ["It was withdrawn since, and stays so. ", "#/runs", "Restore it in the list of runs"],
 };
 
 /**

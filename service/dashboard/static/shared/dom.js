@@ -129,6 +129,36 @@ export const scrolling = (label, ...content) =>
   h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": label }, ...content);
 
 /**
+ * Rare actions behind a button: opened and closed by it, left by Escape.
+ * @param {string} label
+ * @param {{ label: string, onclick: () => unknown, checked?: boolean }[]} entries
+ */
+export function menu(label, entries) {
+  const details = h("details", { class: "menu" }, h("summary", {}, label));
+  const close = () => {
+    details.open = false;
+  };
+  const items = entries.map(({ label: text, onclick, checked }) => {
+    const choose = () => {
+      close();
+      onclick();
+    };
+    const pressed = checked === undefined ? null : String(checked);
+    return h("button", { type: "button", onclick: choose, "aria-pressed": pressed }, text);
+  });
+  details.append(h("div", { class: "entries" }, items));
+  details.addEventListener("keydown", (event) => {
+    if (event.key !== "Escape" || !details.open) return;
+    close();
+    details.querySelector("summary")?.focus();
+  });
+  details.addEventListener("focusout", (event) => {
+    if (event.relatedTarget instanceof Node && !details.contains(event.relatedTarget)) close();
+  });
+  return details;
+}
+
+/**
  * Give an address's content to the user as a file.
  * @param {string} name
  * @param {string} address
@@ -141,13 +171,12 @@ export function save(name, address) {
 }
 
 /**
- * Give a text to the user as a file.
+ * Give content to the user as a file.
  * @param {string} name
- * @param {string} text
- * @param {string} type
+ * @param {Blob} content
  */
-export function saveText(name, text, type) {
-  const address = URL.createObjectURL(new Blob([text], { type }));
+export function saveBlob(name, content) {
+  const address = URL.createObjectURL(content);
   save(name, address);
   setTimeout(() => URL.revokeObjectURL(address), 10_000);
 }

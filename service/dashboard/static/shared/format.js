@@ -222,3 +222,18 @@ export const seconds = (milliseconds) =>
   milliseconds < 60_000
     ? `${Math.max(1, Math.round(milliseconds / 1000))} s`
     : `${Math.round(milliseconds / 60_000)} min`;
+
+export const NOT_A_NUMBER =
+  "Write a number as 25.5 or 25,5; a comma before exactly three digits could be either, so 1,000 is 1000 or 1.0.";
+
+/**
+ * A number as it is typed: 25.5 and 25,5 are the same; null where nothing is, undefined where it cannot be read for certain.
+ * @param {string} text
+ */
+export function numberOf(text) {
+  const typed = text.replaceAll(/\s/g, "");
+  if (typed === "") return null;
+  if (/^\d{1,3}(,\d{3})+$/.test(typed) && !typed.startsWith("0,")) return undefined;
+  const number = Number(typed.replace(/^([^.,]*),([^.,]*)$/, "$1.$2"));
+  return Number.isFinite(number) ? number : undefined;
+}

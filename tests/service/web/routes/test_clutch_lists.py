@@ -36,6 +36,8 @@ def test_a_list_is_of_what_was_asked_for(fleet: TestClient) -> None:
     for question, expected in (
         ("", ["ended", "ageing", "c1"]),
         ("sort=name", ["ageing", "c1", "ended"]),
+        ("sort=kind", ["ageing", "ended", "c1"]),
+        ("sort=kind&offset=1&limit=1", ["ended"]),
         ("state=failure", ["ended"]),
         ("state=check", ["c1"]),
         ("state=normal", ["ageing"]),
@@ -59,6 +61,13 @@ def test_a_walk_by_name_follows_its_cursor(fleet: TestClient) -> None:
     assert [item["clutch_id"] for item in first["items"]] == ["ageing", "c1"]
     second = fleet.get(f"/v1/clutches?sort=name&limit=2&cursor={first['next']}").json()
     assert ([item["clutch_id"] for item in second["items"]], second["next"]) == (["ended"], None)
+
+
+def test_a_walk_by_kind_follows_its_cursor(fleet: TestClient) -> None:
+    first = fleet.get("/v1/clutches?sort=kind&limit=2").json()
+    second = fleet.get(f"/v1/clutches?sort=kind&limit=2&cursor={first['next']}").json()
+    assert [item["clutch_id"] for item in first["items"] + second["items"]] == ["ageing", "ended", "c1"]
+    assert second["next"] is None
 
 
 def test_a_clutch_says_its_state_and_why(fleet: TestClient) -> None:

@@ -77,6 +77,26 @@ def test_twice_the_energy_halves_the_cycles_and_blocks_take_turns(aged: TestClie
     assert "severity_not_counted" not in [warning["code"] for warning in harsh["warnings"]]
 
 
+def test_planned_energy_counts_on_a_record_that_counts_cycles_and_the_answer_says_so(aged: TestClient) -> None:
+    assert aged.post("/v1/clutches", json={"clutch_id": "plain"}).status_code == 201
+    for place in range(5):
+        duty = {"kind": "duty_cycles", "cycles": 1000.0 * place, "duty": {"cycles": 1000, "energy_per_cycle_kj": 20}}
+        test = stationary(1000.0 * place, pressures=(5.0,), speeds=(20, 120, 520, 1020, 1970))
+        send(aged, "plain", *([duty, test] if place else [test]))
+    harsh = {"cycles": 100, "energy_per_cycle_kj": 40}
+    by_energy, by_cycles = (
+        planned(aged, harsh, clutch="plain"),
+        planned(aged, harsh, clutch="plain", counted_by="cycles"),
+    )
+    assert (by_energy["counted_by"], by_cycles["counted_by"]) == ("dissipated_energy", "cycles")
+    assert (by_energy["block_severity"], by_cycles["block_severity"]) == ([pytest.approx(2.0)], [1.0])
+    recent = by_energy["recent_duty_cycles"]["0.05"]
+    assert by_energy["remaining_cycles"]["0.05"] == pytest.approx(recent / 2, rel=1e-3)
+    assert by_cycles["remaining_cycles"]["0.05"] == pytest.approx(recent, rel=1e-3)
+    said = {warning["code"]: warning["message"] for warning in by_energy["warnings"]}
+    assert "20 kJ a cycle of recent duty" in said["counted_by_energy"]
+
+
 def test_an_uncertain_plan_is_a_wider_answer(aged: TestClient) -> None:
     def width(sd: float) -> float:
         left = planned(aged, {"cycles": 100, "energy_per_cycle_kj": 40, "sd": sd})["remaining_cycles"]

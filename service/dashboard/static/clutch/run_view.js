@@ -1,0 +1,129 @@
+// @ts-check
+// A run opened: its curves with their fits, what the fits leave, and the record as it was sent.
+
+import { Chart, choice, setControls } from "../charts/chart.js";
+import { column } from "../charts/columns.js";
+import { pressureRampOf } from "../charts/palette.js";
+import { flat } from "../charts/stribeck.js";
+import { measuredOf, torqueAtSpeed } from "../charts/stribeck_law.js";
+import { titled } from "../charts/traces.js";
+import { h } from "../shared/dom.js";
+import { fixed, quantity } from "../shared/format.js";
+import { named, pressureText, units } from "../shared/units.js";
+
+/** @import { Spec } from "../charts/types.js" */
+/** @import { Channels, ClutchOut, Receipt } from "../shared/types.js" */
+/** @import { Reader } from "./reader.js" */
+
+/**
+ * The charts of a run; empty for one without channels.
+ * @param {Receipt} run
+ * @param {Reader} reader
+ */
+export async function runCharts(run, reader) {
+  await reader.records([run.run_id]);
+  const channels = reader.channels[run.run_id];
+  const names = Object.keys(channels).filter((name) => name !== "time_s" && channels[name].length > 1);
+  if (names.length === 0) return null;
+  const name = () => `${reader.name()}-${run.run_id.replaceAll(/[^\w.-]+/g, "_")}`;
+  const id = `run-${run.run_id}`;
+  const record = new Chart({ name, id: `${id}-record`, title: "The record as it was sent", height: 300, wide: true });
+  const draw = (/** @type {string} */ channel) => {
+    setControls(record, [
+      choice(
+        "Channel",
+        names.map((key) => [key, quantity(key)]),
+        channel,
+        draw,
+      ),
+    ]);
+    record.show(recordOf(channels, channel));
+  };
+  draw(names.includes("torque_nm") ? "torque_nm" : names[0]);
+  if (run.fits.length === 0) return h("div", { class: "charts" }, record.element);
+  const test = { ...run, pressure_laws: null };
+  const curves = new Chart({ name, id: `${id}-curve`, title: "Curve and fit", height: 300 });
+  const residuals = new Chart({ name, id: `${id}-residuals`, title: "What the fit leaves", height: 300 });
+  const clutch = reader.present();
+  curves.show(
+    flat({
+      tests: [test],
+      by: "pressure",
+      run: run.run_id,
+      pressure: undefined,
+      channels: { [run.run_id]: channels },
+      clutch,
+    }),
+  );
+  residuals.show(residualsOf(run, channels, clutch));
+  return h("div", { class: "charts" }, curves.element, residuals.element, record.element);
+}
+
+/**
+ * @param {Receipt} run
+ * @param {Channels} channels
+ * @param {ClutchOut} clutch
+ * @returns {Spec}
+ */
+function residualsOf({ fits }, channels, clutch) {
+  const torque = units().torque;
+  const levels = fits.map((fit) => ({
+    level: fit.pressure_bar,
+    points: measuredOf(channels, fit.pressure_bar).map(({ speed, torque: measured }) => ({
+      speed,
+      left: torque.of(measured - torqueAtSpeed(speed, fit, clutch), fit.pressure_bar, clutch),
+    })),
+  }));
+  const titles = ["sliding speed, rpm", named({ ...torque, name: "measured less fitted" })];
+  return {
+    note: "Measured less fitted, a colour a pressure: a good fit leaves no pattern.",
+    columns: [
+      column("pressure, bar", 2),
+      column("speed, rpm"),
+      { name: titles[1], text: (value) => fixed(value, torque.decimals + 1) },
+    ],
+    rows: levels.flatMap(({ level, points }) => points.map(({ speed, left }) => [level, speed, left])),
+    figure: (c) => ({
+      data: levels.map(({ level, points }, index) => ({
+        name: pressureText(level),
+        mode: "markers",
+        x: points.map(({ speed }) => speed),
+        y: points.map(({ left }) => left),
+        marker: { color: pressureRampOf(c, index, levels.length), size: 5 },
+        hovertemplate: `%{x:.0f} rpm<br>%{y:.3g} ${torque.unit}<extra></extra>`,
+      })),
+      layout: { xaxis: { ...titled(titles[0]), rangemode: "tozero" }, yaxis: titled(titles[1]) },
+    }),
+  };
+}
+
+/**
+ * @param {Channels} channels
+ * @param {string} channel
+ * @returns {Spec}
+ */
+function recordOf(channels, channel) {
+  const { [channel]: values, time_s: time } = channels;
+  const x = time ?? values.map((_, index) => index + 1);
+  const along = time ? "time, s" : "row";
+  const long =
+    values.length >= 2000 ? " Long records are thinned to their extremes; CSV and Parquet of the API hold all." : "";
+  return {
+    note: `${fixed(values.length)} values.${long}`,
+    columns: [column(along, time ? 3 : 0), column(quantity(channel), 3)],
+    rows: values.map((value, index) => [x[index], value]),
+    figure: (c) => ({
+      data: [
+        {
+          name: quantity(channel),
+          mode: time ? "lines" : "lines+markers",
+          x,
+          y: values,
+          line: { color: c.accent, width: 1.2 },
+          marker: { size: 4 },
+        },
+      ],
+      layout: { xaxis: titled(along), yaxis: titled(quantity(channel)) },
+    }),
+  };
+}

@@ -1,0 +1,274 @@
+// @ts-check
+// Clutches, lives and states over one another: the address names them, so a link leads to the same view; answers of the API go in, two
+// charts come out, a quantity over the cycles of each life and the Stribeck curves of its states, as measured or normalised to new.
+// Its form changes the address, and the address is what is shown.
+
+import { Chart, choice } from "../charts/chart.js";
+import { column, CYCLES, KIND } from "../charts/columns.js";
+import { spread } from "../charts/stribeck.js";
+import { curveOf } from "../charts/stribeck_law.js";
+import { titled } from "../charts/traces.js";
+import { usual } from "../quantities/choices.js";
+import { QUANTITIES } from "../quantities/names.js";
+import { clutchPath, read, readAll } from "../shared/api.js";
+import { byId, h } from "../shared/dom.js";
+import { fixed } from "../shared/format.js";
+import { withKey } from "../shared/key.js";
+import { Live } from "../shared/live.js";
+import { liveBar } from "../shared/live_bar.js";
+import { named, placeUnits, pressureText, units } from "../shared/units.js";
+
+/** @import { Colours, PlainTrace, Spec } from "../charts/types.js" */
+/** @import { ClutchOut, Degradation, DegradationItem, StribeckItem } from "../shared/types.js" */
+
+/**
+ * @typedef {object} Life a life of a clutch, as it is compared
+ * @property {string} label
+ * @property {ClutchOut} clutch
+ * @property {Degradation} answer
+ * @property {StribeckItem[]} tests of this life
+ */
+
+/** Quantities that every stationary test gives, and how many states of a life are drawn. */
+const CHOICES = ["mean_cof", "static_torque_nm", "coulomb_ratio", "stribeck_velocity_m_s", "viscous_coefficient"];
+const STATES = 3;
+const DASHES = ["solid", "dash", "dot"];
+const name = () => "comparison";
+const overLife = new Chart({ name, id: "over-life", title: "Over the cycles of each life", wide: true, height: 400 });
+const curves = new Chart({
+  name,
+  id: "curves",
+  title: "Stribeck curves, first, middle and last test",
+  wide: true,
+  height: 400,
+});
+
+/** What is compared: the address. `clutch=a` is its present life, `clutch=a:1` its first. */
+function question() {
+  const query = new URLSearchParams(location.search);
+  return {
+    query,
+    lives: query.getAll("clutch"),
+    quantity: query.get("quantity") ?? "mean_cof",
+    share: query.get("as") !== "measured",
+  };
+}
+
+/** @param {(query: URLSearchParams) => void} change */
+function go(change) {
+  const { query } = question();
+  change(query);
+  history.pushState(null, "", `${location.pathname}?${query}`);
+  live.now();
+}
+
+/**
+ * @param {string} entry
+ * @param {string} quantity
+ * @returns {Promise<Life>}
+ */
+async function lifeOf(entry, quantity) {
+  const [, id, life] = /^(.*?)(?::(\d+))?$/.exec(entry) ?? ["", entry, undefined];
+  const path = clutchPath(id);
+  const number = life === undefined ? "" : `&life=${life}`;
+  /** @type {[{ body: ClutchOut }, { body: Degradation }, { items: StribeckItem[] }]} */
+  const [clutch, degradation, all] = await Promise.all([
+    read(path),
+    read(`${path}/degradation?quantity=${quantity}${number}`),
+    readAll(`${path}/stribeck?limit=1000`),
+  ]);
+  const { life: own, items } = degradation.body;
+  const measured = new Set(items.flatMap((item) => item.measured.cycles));
+  const label = own.of > 1 ? `${id}, life ${own.number}` : id;
+  const tests = all.items.filter(({ cycles }) => measured.has(cycles));
+  return { label, clutch: clutch.body, answer: degradation.body, tests };
+}
+
+/** @param {DegradationItem[]} items */
+const pooled = (items) =>
+  items.find((item) => item.pressure_bar === null) ??
+  items.find(
+    (item) =>
+      item.pressure_bar ===
+      usual(
+        items.map(({ pressure_bar: level }) => level ?? 0),
+        undefined,
+      ),
+  );
+
+/** @param {Colours} c */
+const palette = (c) => [c.accent, c.worn, c.high, c.midlife, c.low, c.ink];
+
+/**
+ * @param {Life[]} lives
+ * @param {string} quantity
+ * @param {boolean} share
+ * @returns {Spec}
+ */
+function overLifeOf(lives, quantity, share) {
+  const drawn = lives.flatMap(({ label, answer }) => {
+    const item = pooled(answer.items);
+    if (!item || item.measured.value.length === 0) return [];
+    const unit = share ? item.measured.value[0] : 1;
+    const from = answer.life.from_cycles ?? 0;
+    const scaled = (/** @type {number[]} */ x, /** @type {number[]} */ y) => ({
+      x: x.map((at) => at - from),
+      y: y.map((value) => value / unit),
+    });
+    const { measured, trajectory } = item;
+    return [
+      { label, points: scaled(measured.cycles, measured.value), line: scaled(trajectory.cycles, trajectory.median) },
+    ];
+  });
+  if (drawn.length === 0) return { empty: "No life that is compared has a stationary test yet." };
+  const { title, unit } = QUANTITIES[quantity];
+  const axis = share ? `${title}, share of new` : `${title}${unit && `, ${unit}`}`;
+  return {
+    note: share
+      ? "Each life from its own first test on: 1 is new."
+      : "As measured; cycles count from the begin of each life.",
+    columns: [{ name: "life" }, KIND, CYCLES, column(axis, 4)],
+    rows: drawn.flatMap(({ label, points, line }) => [
+      ...points.x.map((at, index) => [label, "measured", at, points.y[index]]),
+      ...line.x.map((at, index) => [label, "tracked", at, line.y[index]]),
+    ]),
+    figure: (c) => ({
+      data: drawn.flatMap(({ label, points, line }, index) => {
+        const color = palette(c)[index % 6];
+        /** @type {PlainTrace[]} */
+        const traces = [
+          { name: label, mode: "lines", ...line, line: { color, width: 2 } },
+          { name: label, showlegend: line.x.length === 0, mode: "markers", ...points, marker: { color, size: 6 } },
+        ];
+        return traces;
+      }),
+      layout: { xaxis: titled("duty cycles of the life"), yaxis: titled(axis) },
+    }),
+  };
+}
+
+/**
+ * @param {Life[]} lives
+ * @param {boolean} share
+ * @returns {Spec}
+ */
+function curvesOf(lives, share) {
+  const { torque } = units();
+  const drawn = lives.flatMap(({ label, clutch, tests, answer }, index) => {
+    const level = usual(
+      (tests[0]?.fits ?? []).map((fit) => fit.pressure_bar),
+      undefined,
+    );
+    const fits = spread(tests, STATES).flatMap(({ cycles, fits: all }) => {
+      const fit = all.find(({ pressure_bar: bar }) => bar === level);
+      return fit ? [{ fit, cycles: cycles - (answer.life.from_cycles ?? 0) }] : [];
+    });
+    const unit = share ? (fits[0]?.fit.parameters.static_torque_nm ?? 1) : 1;
+    return fits.map(({ fit, cycles }, state) => ({
+      name: `${label}, ${fixed(cycles)} cycles, ${pressureText(level)}`,
+      index,
+      state,
+      points: curveOf(fit, clutch, 0, 2000).map(({ speed, torque: nm }) => ({
+        speed,
+        value: share ? nm / unit : torque.of(nm, fit.pressure_bar, clutch),
+      })),
+    }));
+  });
+  if (drawn.length === 0) return { empty: "No life that is compared has a stationary test yet." };
+  const axis = share ? "torque, share of the static torque when new" : named(torque);
+  return {
+    note: "Fitted curves; a colour a life, solid the first test, dashed the middle one, dotted the last.",
+    columns: [{ name: "curve" }, column("speed, rpm"), column(axis, 4)],
+    rows: drawn.flatMap((curve) => curve.points.map(({ speed, value }) => [curve.name, speed, value])),
+    figure: (c) => ({
+      data: drawn.map(({ name: curve, index, state, points }) => ({
+        name: curve,
+        mode: "lines",
+        x: points.map(({ speed }) => speed),
+        y: points.map(({ value }) => value),
+        line: { color: palette(c)[index % 6], width: 2, ...(state > 0 ? { dash: DASHES[state] } : {}) },
+      })),
+      layout: { xaxis: { ...titled("sliding speed, rpm"), rangemode: "tozero" }, yaxis: titled(axis) },
+    }),
+  };
+}
+
+/** @param {Life[]} lives */
+function drawForm(lives) {
+  const { quantity, share } = question();
+  const entries = lives.map((life, index) => {
+    const id = life.clutch.clutch_id;
+    const numbers = Array.from(
+      { length: life.answer.life.of },
+      (_, n) => /** @type {[string, string]} */ ([`${id}:${n + 1}`, `life ${n + 1}`]),
+    );
+    const replace = (/** @type {string | null} */ value) =>
+      go((query) => {
+        const all = query.getAll("clutch");
+        query.delete("clutch");
+        all.forEach((old, at) => (at !== index ? query.append("clutch", old) : value && query.append("clutch", value)));
+      });
+    return h(
+      "li",
+      {},
+      h("a", { href: `/clutches/${encodeURIComponent(id)}` }, id),
+      " ",
+      numbers.length > 1 && choice("Life", numbers, `${id}:${life.answer.life.number}`, replace),
+      h(
+        "button",
+        { type: "button", class: "small", "aria-label": `Leave ${life.label} out`, onclick: () => replace(null) },
+        "Leave out",
+      ),
+    );
+  });
+  const input = h("input", { id: "add", placeholder: "clutch", autocomplete: "off", required: true });
+  const add = (/** @type {Event} */ event) => {
+    event.preventDefault();
+    go((query) => query.append("clutch", input.value.trim()));
+  };
+  byId("choices").replaceChildren(
+    h("ul", { class: "compared" }, entries),
+    h("form", { class: "finding", onsubmit: add }, h("label", { for: "add" }, "Add"), input, h("button", {}, "Add")),
+    h(
+      "div",
+      { class: "controls" },
+      choice(
+        "Quantity",
+        CHOICES.map((key) => [key, QUANTITIES[key].title]),
+        quantity,
+        (value) => go((query) => query.set("quantity", value)),
+      ),
+      choice(
+        "Values",
+        [
+          ["share", "normalised to new"],
+          ["measured", "as measured"],
+        ],
+        share ? "share" : "measured",
+        (value) => go((query) => query.set("as", value)),
+      ),
+    ),
+  );
+}
+
+let shown = "";
+async function poll() {
+  const { lives: entries, quantity, share } = question();
+  const lives = await Promise.all(entries.map((entry) => lifeOf(entry, quantity)));
+  const text = JSON.stringify([location.search, lives.map(({ answer }) => answer.revision)]);
+  if (text === shown) return;
+  shown = text;
+  drawForm(lives);
+  overLife.show(overLifeOf(lives, quantity, share));
+  curves.show(curvesOf(lives, share));
+}
+
+byId("compared").append(overLife.element, curves.element);
+addEventListener("popstate", () => live.now());
+document.addEventListener("unitschange", () => {
+  shown = "";
+  live.now();
+});
+const live = new Live(withKey(poll), liveBar(byId("live")), 5000);
+placeUnits(byId("units"));
+live.start();

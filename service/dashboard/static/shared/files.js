@@ -1,0 +1,199 @@
+// @ts-check
+// Tables that the reader takes along: CSV after RFC 4180, and XLSX, a zip of four small XML files, numbers as numbers.
+
+import { readText } from "./api.js";
+import { h, saveBlob } from "./dom.js";
+
+/** @typedef {string | number | null | undefined} Cell */
+
+/**
+ * A table of the API as links that save it. With a key a plain link would be refused: the page fetches it as everything else.
+ * @param {string} name of the file
+ * @param {string} address of the CSV
+ */
+export function files(name, address) {
+  const csv = async (/** @type {Event} */ event) => {
+    event.preventDefault();
+    saveBlob(`${name}.csv`, new Blob([await readText(address)], { type: "text/csv" }));
+  };
+  const xlsx = async () => saveTable(`${name}.xlsx`, parsed(await readText(address)));
+  return h(
+    "span",
+    { class: "files" },
+    h("a", { href: address, onclick: csv }, "CSV"),
+    " ",
+    h("button", { type: "button", class: "link", onclick: xlsx }, "XLSX"),
+  );
+}
+
+/**
+ * Rows that the page has, the first of them the header, as buttons that save them.
+ * @param {string} name of the file
+ * @param {Cell[][]} rows
+ */
+export const rowFiles = (name, rows) =>
+  h(
+    "span",
+    { class: "files" },
+    ["csv", "xlsx"].map((format) =>
+      h(
+        "button",
+        { type: "button", class: "link", onclick: () => saveTable(`${name}.${format}`, rows) },
+        format.toUpperCase(),
+      ),
+    ),
+  );
+
+/**
+ * Save rows, the first of them the header, in the format that the name's ending says.
+ * @param {string} name
+ * @param {Cell[][]} rows
+ */
+export function saveTable(name, rows) {
+  if (name.endsWith(".xlsx")) return saveBlob(name, xlsxOf(rows));
+  const text = rows.map((row) => row.map(quoted).join(",")).join("\r\n");
+  return saveBlob(name, new Blob([`${text}\r\n`], { type: "text/csv" }));
+}
+
+/**
+ * A field after RFC 4180; a name that a spreadsheet would run as a formula is kept from it.
+ * @param {Cell} value
+ */
+function quoted(value) {
+  if (value === null || value === undefined) return "";
+  const text = typeof value === "string" && /^[=+\-@\t\r]/.test(value) ? `'${value}` : String(value);
+  return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+}
+
+/**
+ * The cells of a CSV; what reads as a number is one.
+ * @param {string} csv
+ * @returns {Cell[][]}
+ */
+export function parsed(csv) {
+  /** @type {Cell[][]} */
+  const rows = [[]];
+  for (const [, quotes, plain, end] of csv.matchAll(/(?:"((?:[^"]|"")*)"|([^",\r\n]*))(,|\r?\n|$)/g)) {
+    const text = quotes === undefined ? plain : quotes.replaceAll('""', '"');
+    const number = quotes === undefined && /^-?\d+(\.\d+)?([eE][+-]?\d+)?$/.test(text);
+    rows[rows.length - 1].push(number ? Number(text) : text);
+    if (end === "") break;
+    if (end !== ",") rows.push([]);
+  }
+  return rows.filter((row) => row.length > 1 || row[0] !== "");
+}
+
+const HEAD = '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>\n';
+const OFFICE = "http://schemas.openxmlformats.org";
+const TYPE = "application/vnd.openxmlformats-officedocument.spreadsheetml";
+/** @type {[string, string][]} all of the file but the rows */
+const PARTS = [
+  [
+    "[Content_Types].xml",
+    `<Types xmlns="${OFFICE}/package/2006/content-types"><Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/><Override PartName="/xl/workbook.xml" ContentType="${TYPE}.sheet.main+xml"/><Override PartName="/xl/sheet.xml" ContentType="${TYPE}.worksheet+xml"/></Types>`,
+  ],
+  [
+    "_rels/.rels",
+    `<Relationships xmlns="${OFFICE}/package/2006/relationships"><Relationship Id="r1" Type="${OFFICE}/officeDocument/2006/relationships/officeDocument" Target="xl/workbook.xml"/></Relationships>`,
+  ],
+  [
+    "xl/workbook.xml",
+    `<workbook xmlns="${OFFICE}/spreadsheetml/2006/main" xmlns:r="${OFFICE}/officeDocument/2006/relationships"><sheets><sheet name="Data" sheetId="1" r:id="r1"/></sheets></workbook>`,
+  ],
+  [
+    "xl/_rels/workbook.xml.rels",
+    `<Relationships xmlns="${OFFICE}/package/2006/relationships"><Relationship Id="r1" Type="${OFFICE}/officeDocument/2006/relationships/worksheet" Target="sheet.xml"/></Relationships>`,
+  ],
+];
+
+/** @param {string} text */
+const escaped = (text) =>
+  // oxlint-disable-next-line no-control-regex
+  text
+    .replaceAll(/[\u0000-\u0008\u000b\u000c\u000e-\u001f]/g, "")
+    .replaceAll("&", "&amp;")
+    .replaceAll("<", "&lt;");
+
+/** @param {Cell} value */
+function cell(value) {
+  if (value === null || value === undefined || value === "") return "<c/>";
+  if (typeof value === "number" && Number.isFinite(value)) return `<c><v>${value}</v></c>`;
+  return `<c t="inlineStr"><is><t xml:space="preserve">${escaped(String(value))}</t></is></c>`;
+}
+
+/** @param {Cell[][]} rows */
+export function xlsxOf(rows) {
+  const lines = rows.map((row) => `<row>${row.map(cell).join("")}</row>`).join("");
+  const sheet = `<worksheet xmlns="${OFFICE}/spreadsheetml/2006/main"><sheetData>${lines}</sheetData></worksheet>`;
+  return new Blob(zipped([...PARTS, ["xl/sheet.xml", sheet]]), { type: `${TYPE}.sheet` });
+}
+
+/**
+ * Texts as a zip file, not compressed.
+ * @param {[string, string][]} parts
+ * @returns {Uint8Array<ArrayBuffer>[]}
+ */
+function zipped(parts) {
+  const encoder = new TextEncoder();
+  /** @type {Uint8Array<ArrayBuffer>[]} */
+  const local = [];
+  /** @type {Uint8Array<ArrayBuffer>[]} */
+  const central = [];
+  let offset = 0;
+  for (const [path, text] of parts) {
+    const [name, data] = [encoder.encode(path), encoder.encode(HEAD + text)];
+    // version, flags, method, time, date; checksum, sizes; lengths of the name and of nothing more
+    const shared = [
+      [20, 2],
+      [0, 2],
+      [0, 2],
+      [0, 2],
+      [33, 2],
+      [crc32(data), 4],
+      [data.length, 4],
+      [data.length, 4],
+      [name.length, 2],
+      [0, 2],
+    ];
+    const head = bytes([[0x04034b50, 4], ...shared]);
+    central.push(bytes([[0x02014b50, 4], [20, 2], ...shared, [0, 2], [0, 2], [0, 2], [0, 4], [offset, 4]]), name);
+    local.push(head, name, data);
+    offset += head.length + name.length + data.length;
+  }
+  const size = central.reduce((sum, part) => sum + part.length, 0);
+  const count = parts.length;
+  const end = bytes([
+    [0x06054b50, 4],
+    [0, 2],
+    [0, 2],
+    [count, 2],
+    [count, 2],
+    [size, 4],
+    [offset, 4],
+    [0, 2],
+  ]);
+  return [...local, ...central, end];
+}
+
+/**
+ * Numbers in as many bytes as each says, the least first.
+ * @param {number[][]} fields
+ */
+function bytes(fields) {
+  return new Uint8Array(
+    fields.flatMap(([value, size]) => Array.from({ length: size }, (_, n) => (value >>> (8 * n)) & 255)),
+  );
+}
+
+const TABLE = Uint32Array.from({ length: 256 }, (_, n) => {
+  let c = n;
+  for (let bit = 0; bit < 8; bit += 1) c = c & 1 ? 0xedb88320 ^ (c >>> 1) : c >>> 1;
+  return c >>> 0;
+});
+
+/** @param {Uint8Array} data */
+function crc32(data) {
+  let c = 0xffffffff;
+  for (const byte of data) c = TABLE[(c ^ byte) & 255] ^ (c >>> 8);
+  return (c ^ 0xffffffff) >>> 0;
+}

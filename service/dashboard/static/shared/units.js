@@ -1,0 +1,103 @@
+// @ts-check
+// Units that the reader chooses, kept by the browser: friction as torque or as coefficient, SI or US. Files name the unit that they hold.
+
+import { menu } from "./dom.js";
+import { fixed } from "./format.js";
+
+/** @import { ClutchOut } from "./types.js" */
+
+/** @typedef {{ name: string, unit: string, decimals: number, of: (value: number, bar?: number, clutch?: Pick<ClutchOut, "geometry">) => number }} Unit */
+
+const KEY = "clutchlife-units";
+const PSI_PER_BAR = 14.5038;
+const LBF_FT_PER_NM = 0.737562;
+const FT_PER_M = 3.28084;
+
+/** @returns {{ system: "si" | "us", friction: "torque" | "cof" }} */
+function chosen() {
+  try {
+    return { system: "si", friction: "torque", ...JSON.parse(localStorage.getItem(KEY) ?? "{}") };
+  } catch {
+    return { system: "si", friction: "torque" }; // a browser that stores nothing
+  }
+}
+
+/**
+ * Torque over the torque at a coefficient of friction of 1: faces x pressure x lining area x mean radius.
+ * @param {number} nm
+ * @param {number} [bar]
+ * @param {Pick<ClutchOut, "geometry">} [clutch]
+ */
+function cofOf(nm, bar, clutch) {
+  if (bar === undefined || clutch === undefined) return NaN;
+  const { inner_diameter_mm: inner, outer_diameter_mm: outer, friction_faces: faces } = clutch.geometry;
+  const { mean_radius_mm: radius, pressure_factor: factor } = clutch.geometry;
+  const area = (Math.PI / 4) * (outer ** 2 - inner ** 2) * 1e-6; // m²
+  return nm / (faces * 1e5 * bar * factor * area * ((radius ?? (inner + outer) / 4) / 1000));
+}
+
+/** @returns {{ torque: Unit, pressure: Unit, velocity: Unit, plainTorque: Unit }} how values are shown now */
+export function units() {
+  const { system, friction } = chosen();
+  const us = system === "us";
+  /** @type {Unit} */
+  const plainTorque = us
+    ? { name: "friction torque", unit: "lbf·ft", decimals: 2, of: (nm) => LBF_FT_PER_NM * nm }
+    : { name: "friction torque", unit: "Nm", decimals: 2, of: (nm) => nm };
+  return {
+    plainTorque,
+    torque: friction === "cof" ? { name: "coefficient of friction µ", unit: "", decimals: 4, of: cofOf } : plainTorque,
+    pressure: us
+      ? { name: "pressure", unit: "psi", decimals: 0, of: (bar) => PSI_PER_BAR * bar }
+      : { name: "pressure", unit: "bar", decimals: 1, of: (bar) => bar },
+    velocity: us
+      ? { name: "speed", unit: "ft/s", decimals: 2, of: (v) => FT_PER_M * v }
+      : { name: "speed", unit: "m/s", decimals: 2, of: (v) => v },
+  };
+}
+
+/**
+ * The name of an axis or a column with its unit.
+ * @param {Unit} unit
+ */
+export const named = ({ name, unit }) => (unit ? `${name}, ${unit}` : name);
+
+/**
+ * A pressure as it is shown.
+ * @param {number | null | undefined} bar
+ */
+export function pressureText(bar) {
+  const { unit, decimals, of } = units().pressure;
+  return `${fixed(bar === null || bar === undefined ? bar : of(bar), decimals)} ${unit}`;
+}
+
+/** The choice of units, for the bar at the top. */
+export function unitsMenu() {
+  const now = chosen();
+  /** @type {(label: string, part: Partial<typeof now>) => { label: string, checked: boolean, onclick: () => void }} */
+  const entry = (label, part) => ({
+    label,
+    checked: Object.entries(part).every(([name, value]) => now[/** @type {keyof typeof now} */ (name)] === value),
+    onclick: () => {
+      try {
+        localStorage.setItem(KEY, JSON.stringify({ ...now, ...part }));
+      } catch {
+        /* a browser that stores nothing keeps the usual units */
+      }
+      document.dispatchEvent(new Event("unitschange"));
+    },
+  });
+  return menu("Units", [
+    entry("Friction as torque", { friction: "torque" }),
+    entry("Friction as µ", { friction: "cof" }),
+    entry("SI: Nm, bar, m/s", { system: "si" }),
+    entry("US: lbf·ft, psi, ft/s", { system: "us" }),
+  ]);
+}
+
+/** @param {HTMLElement} place in the bar at the top */
+export function placeUnits(place) {
+  const draw = () => place.replaceChildren(unitsMenu());
+  document.addEventListener("unitschange", draw);
+  draw();
+}

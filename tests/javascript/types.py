@@ -1,0 +1,62 @@
+"""The types of the API's answers for the checks of the dashboard's JavaScript, from the OpenAPI document.
+
+`python -m tests.javascript.types` writes `generated/shared/types.d.ts` beside this file, an interface a schema;
+`tsconfig.json` lays that folder over the pages' own, so that modules import `../shared/types.js`. Browsers never load it.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from service.app import create_app
+from service.settings import Settings
+
+FILE = Path(__file__).parent / "generated" / "shared" / "types.d.ts"
+#: What no single schema is.
+GENERAL = """\
+export type Quantiles = Record<string, number | null>;
+export type Table = (number | null)[][];
+/** A list's page; `next` is the cursor of the page after it. */
+export interface ListPage<Item> { items: Item[]; next: string | null }
+export type Channels = Record<string, number[]>;
+"""
+SIMPLE = {"string": "string", "number": "number", "integer": "number", "boolean": "boolean", "null": "null"}
+
+
+def type_of(schema: dict[str, Any]) -> str:
+    """A schema as a type of TypeScript."""
+    if "$ref" in schema:
+        return str(schema["$ref"]).rpartition("/")[2]
+    if "const" in schema:
+        return json.dumps(schema["const"])
+    if "enum" in schema:
+        return " | ".join(json.dumps(value) for value in schema["enum"])
+    for several in ("anyOf", "oneOf"):
+        if several in schema:
+            return " | ".join(dict.fromkeys(type_of(one) for one in schema[several]))
+    kind = schema.get("type")
+    if kind == "array":
+        return f"({type_of(schema.get('items', {}))})[]"
+    if kind == "object":
+        values = schema.get("additionalProperties", True)
+        return f"Record<string, {type_of(values) if isinstance(values, dict) else 'any'}>"
+    return SIMPLE.get(str(kind), "any")
+
+
+def interface(name: str, schema: dict[str, Any]) -> str:
+    """An interface, or an alias where the schema is no object with properties. An answer has all its fields."""
+    if "properties" not in schema:
+        return f"export type {name} = {type_of(schema)};\n"
+    fields = (f"  {json.dumps(field)}: {type_of(kind)};\n" for field, kind in schema["properties"].items())
+    return f"export interface {name} {{\n{''.join(fields)}}}\n"
+
+
+def text(document: dict[str, Any]) -> str:
+    """All types of an OpenAPI document."""
+    schemas = document["components"]["schemas"]
+    return GENERAL + "".join(interface(name, schema) for name, schema in sorted(schemas.items()))
+
+
+if __name__ == "__main__":
+    FILE.parent.mkdir(parents=True, exist_ok=True)
+    FILE.write_text(text(create_app(Settings(workers=0, database="sqlite:///:memory:")).openapi()), encoding="utf-8")
