@@ -17,8 +17,8 @@ from models.diagnosis.detection.projected_fit import ProjectedFit, project_fit
 from models.diagnosis.detection.raw_records.evidence import RawEvidence
 from models.diagnosis.detection.structure_axes import Where, axes_of
 from models.diagnosis.effects.catalogued import oil_temperature
+from models.diagnosis.effects.faults import FAULT_BY_SLUG
 from models.diagnosis.effects.grid import Column
-from models.diagnosis.effects.uncatalogued.catalogue import UNCATALOGUED_BY_SLUG
 from models.diagnosis.pooled_fit.baseline_fit import Baseline, from_better
 from models.diagnosis.pooled_fit.problem import FitProblem
 
@@ -77,7 +77,7 @@ def _investigated(
     result = search(baseline, projected, raw) if calls_for_search(alarms, raw) else None
     fault = None
     if result is not None and result.fault is not None:
-        fault = Where.of_evidence(UNCATALOGUED_BY_SLUG[result.fault.slugs[0]].axis, result.fault.evidence)
+        fault = Where.of_evidence(FAULT_BY_SLUG[result.fault.slugs[0]].axis, result.fault.evidence)
     return Investigation(
         baseline=baseline,
         projected=projected,

@@ -21,9 +21,9 @@ from models.diagnosis.criteria import (
     SINGLES_RESTARTED,
 )
 from models.diagnosis.detection.projected_fit import ProjectedFit
+from models.diagnosis.effects.faults import FAULTS
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.effects.grid import Column, columns_at_rows, columns_of
-from models.diagnosis.effects.uncatalogued.catalogue import UNCATALOGUED
 from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
 from models.diagnosis.pooled_fit.gram import gram_of
 from models.diagnosis.pooled_fit.problem import FitProblem
@@ -150,7 +150,7 @@ class Refits:
 
     def faults(self, best: float) -> list[Hypothesis]:
         """Uncatalogued rig faults that come near the best [nats], refitted; less the log odds of the choice among them."""
-        columns = columns_of([fault.effect for fault in UNCATALOGUED], self.problem.design.facts)
+        columns = columns_of(FAULTS, self.problem.design.facts)
         baseline = self.null.fit
         projected = beside(self.problem, baseline, columns)
         least = max(best, 0.0) * (1.0 - SCREEN_MARGIN_SHARE) - SCREEN_MARGIN
@@ -160,7 +160,7 @@ class Refits:
             added, drop = _added(columns, projected, candidate)
             linear = (candidate.evidence, drop)
             faults.append(self.refit(baseline.laws, (added,), candidate.shape_evidence, linear))
-        return [fault.against(float(np.log(len(UNCATALOGUED))), 0.0) for fault in faults]
+        return [fault.against(float(np.log(len(FAULTS))), 0.0) for fault in faults]
 
     def from_the_best_pair(
         self,

@@ -112,6 +112,8 @@ class Effect:
     tails: degrees of freedom of the amplitude's prior (`effects.amplitude_prior`), infinite for a normal one.
     resembles_temperature: whether an oil temperature that was not measured could look like it.
     counts_in_severity: its amplitude is the exponent by which ζ counts engagements (no torque is added along a life).
+    named: whether it may be named as a cause; where not, what it explains is uncatalogued and lies on `axis`
+    (`design.axes`).
     opposite_physics: a sentence for a negative amplitude, where `physics` holds for a positive one only.
     """
 
@@ -139,6 +141,8 @@ class Effect:
     grows_with: Measure | None = None
     resembles_temperature: Resemblance = Resemblance.NEVER
     counts_in_severity: bool = False
+    named: bool = True
+    axis: str = ""
     opposite_physics: str = ""
 
     def changes(self, scene: Scene, settings: Sequence[tuple[float, Shape]]) -> FloatArray:

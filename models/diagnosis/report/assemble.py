@@ -9,7 +9,7 @@ from models.diagnosis.attribution.verdict import Judgement, Verdict
 from models.diagnosis.design.design import Design
 from models.diagnosis.detection.lack_of_fit import Misfit, misfit_of
 from models.diagnosis.detection.structure_axes import axes_of
-from models.diagnosis.effects.uncatalogued.catalogue import UNCATALOGUED_BY_SLUG
+from models.diagnosis.effects.faults import FAULT_BY_SLUG
 from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.pooled_fit.run_scatter import run_scatter
 from models.diagnosis.report.candidates import candidates_of, with_signs
@@ -50,8 +50,9 @@ def report_of(
         notes=notes,
         tests=len(problem.design.runs),
         states=int(problem.design.facts.states.size),
-        resembles=UNCATALOGUED_BY_SLUG[judgement.fault].description if judgement.fault is not None else "",
+        resembles=FAULT_BY_SLUG[judgement.fault].title if judgement.fault is not None else "",
         scatter=scatter,
+        withheld=reason,
     )
     return Report(
         verdict=judgement.verdict,

@@ -12,8 +12,8 @@ from models.diagnosis.campaign import Campaign
 from models.diagnosis.design.design import build_design
 from models.diagnosis.diagnose import diagnose
 from models.diagnosis.effects.catalogue import BY_SLUG
-from models.diagnosis.effects.uncatalogued.catalogue import UNCATALOGUED, UNCATALOGUED_BY_SLUG
-from models.diagnosis.effects.uncatalogued.fault import UncataloguedFault
+from models.diagnosis.effects.effect import Effect
+from models.diagnosis.effects.faults import FAULT_BY_SLUG, FAULTS
 from models.diagnosis.pooled_fit.starts import starting_laws
 from models.friction.stribeck import torque
 from tests.models.diagnosis.campaigns import Planted, Where, campaign
@@ -43,9 +43,9 @@ def test_what_no_catalogue_holds_is_unexplained_and_described_in_the_summary(pla
     report = diagnose(campaign(3, planted, noise=0.004, gain=0.001), rng=np.random.default_rng(1))
     assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
     assert report.baseline is not None
-    assert report.baseline.where[0].axis == UNCATALOGUED_BY_SLUG[slug].axis
-    assert UNCATALOGUED_BY_SLUG[slug].description in report.summary
-    assert not {each.effect for each in report.candidates} & UNCATALOGUED_BY_SLUG.keys()
+    assert report.baseline.where[0].axis == FAULT_BY_SLUG[slug].axis
+    assert FAULT_BY_SLUG[slug].title in report.summary
+    assert not {each.effect for each in report.candidates} & FAULT_BY_SLUG.keys()
 
 
 def test_a_zero_that_settles_is_still_a_zero() -> None:
@@ -54,12 +54,12 @@ def test_a_zero_that_settles_is_still_a_zero() -> None:
 
     report = diagnose(campaign(3, settling_zero, noise=0.004, gain=0.001), rng=np.random.default_rng(1))
     assert (report.verdict, report.causes) == (Verdict.CAUSE_NAMED, ("torque_zero_shift",))
-    assert not [each.description for each in UNCATALOGUED if each.description in report.summary]
+    assert not [each.title for each in FAULTS if each.title in report.summary]
 
 
 def test_faults_have_slugs_of_their_own() -> None:
-    assert len(UNCATALOGUED_BY_SLUG) == len(UNCATALOGUED)
-    assert not UNCATALOGUED_BY_SLUG.keys() & BY_SLUG.keys()
+    assert len(FAULT_BY_SLUG) == len(FAULTS)
+    assert not FAULT_BY_SLUG.keys() & BY_SLUG.keys()
 
 
 def curved_pressure(at: Where) -> np.ndarray:
@@ -95,7 +95,7 @@ def test_a_gauges_hysteresis_is_reported_where_pressure_goes_both_ways() -> None
         runs.append(replace(run, plateaus=replace(run.plateaus, torque=run.plateaus.torque * behind)))
     report = diagnose(replace(given, stationary=tuple(runs)), rng=np.random.default_rng(1))
     assert report.verdict is Verdict.UNEXPLAINED_STRUCTURE
-    assert UNCATALOGUED_BY_SLUG["gauge_hysteresis"].description in report.summary
+    assert FAULT_BY_SLUG["gauge_hysteresis"].title in report.summary
 
 
 @pytest.fixture(scope="module")
@@ -104,12 +104,12 @@ def scene() -> Scene:
     return predict(design, starting_laws(design, frame_of(design))).scene
 
 
-@pytest.mark.parametrize("fault", UNCATALOGUED, ids=[each.effect.slug for each in UNCATALOGUED])
-def test_every_change_is_proportional_to_its_size(fault: UncataloguedFault, scene: Scene) -> None:
-    tried = fault.effect.grid(scene.facts)
+@pytest.mark.parametrize("fault", FAULTS, ids=[each.slug for each in FAULTS])
+def test_every_change_is_proportional_to_its_size(fault: Effect, scene: Scene) -> None:
+    tried = fault.grid(scene.facts)
     assert tried
     for each in tried:
-        one, three = (fault.effect.change(scene, size, each.shape) for size in (0.01, 0.03))
+        one, three = (fault.change(scene, size, each.shape) for size in (0.01, 0.03))
         np.testing.assert_allclose(three, 3 * one)
         assert np.isfinite(one).all()
-    assert any(np.abs(fault.effect.change(scene, 0.01, each.shape)).max() > 0 for each in tried)
+    assert any(np.abs(fault.change(scene, 0.01, each.shape)).max() > 0 for each in tried)

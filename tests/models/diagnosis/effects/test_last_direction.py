@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.diagnosis.effects.uncatalogued.direction import last_direction
+from models.diagnosis.effects.faults import last_direction
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,213 @@
+"""Faults of rigs that no effect of the catalogue describes: they compete with it and are never named.
+
+Smooth structure has no change points and no time constants. Without these rows a gain that settles while the sensor warms up
+passes for a zero that does, and another speed scale from a cycle on for fresh oil: the effect of the catalogue that
+resembles it has the right course and would win. Where a fault does best, what was found is uncatalogued, lies on the fault's
+axis, and the report describes it. Their size is a share of the torque, of the speed or of the pressure.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from models.arrays import FloatArray
+from models.diagnosis.baseline.laws import Scene
+from models.diagnosis.design.axes import CLOCK, CYCLES, PRESSURE, SPEED
+from models.diagnosis.design.facts import Facts
+from models.diagnosis.design.points import IntArray
+from models.diagnosis.effects.effect import Effect, Family, Kind, Shape, ShapeParameter, Tried
+from models.friction.stribeck import PARAMETER_NAMES
+
+#: Usual size of all of them [-]. Chosen; no table.
+USUAL_SIZE = 0.02
+#: A pressure or speed that differs from the one before by less than this share [-] was held. Chosen; no table.
+HELD_SHARE = 0.01
+#: Least share [-] of the plateaus that must have been reached from above, and from below: with fewer the direction is only
+#: another name for the level. Chosen; no table.
+LEAST_EACH_WAY = 0.1
+#: Time constants of a gain that settles [s], 0 for one that grows evenly, by its size in DRIFT_TIME [s]. Chosen; no table.
+SETTLING_TIMES, DRIFT_TIME = (0.0, 60.0, 150.0, 400.0), 1800.0
+#: Powers of the cycles in which a gain creeps [-]. Chosen; no table.
+CREEP_POWERS = (0.5, 1.0, 2.0)
+#: The first shape of a gain over life says whether it steps (at the cycle that follows) or creeps (by the power).
+_STEP, _CREEP = 0.0, 1.0
+
+
+def last_direction(values: FloatArray, previous: IntArray) -> FloatArray:
+    """[P] 1 where a value was last raised before a plateau, -1 where it was lowered, 0 where that is unknown. `previous` [P]
+    is the plateau before it, -1 where there is none; plateaus of a run follow each other."""
+    has_previous = previous >= 0
+    change = np.where(has_previous, values - values[np.maximum(previous, 0)], 0.0)
+    changed = ~has_previous | (np.abs(change) > HELD_SHARE * np.abs(values))
+    last_change = np.maximum.accumulate(np.where(changed, np.arange(values.size), 0))
+    return np.asarray(np.sign(change)[last_change], dtype=np.float64)
+
+
+def direction_if_both(scene: Scene, values: FloatArray) -> FloatArray:
+    """`last_direction` [P] of values at the scene's points, or 0 where nearly all changes go one way."""
+    direction = last_direction(values, scene.points.previous)
+    least = LEAST_EACH_WAY * np.count_nonzero(scene.points.steady)
+    each_way = min(np.count_nonzero(direction > 0), np.count_nonzero(direction < 0))
+    return direction if each_way >= max(least, 1.0) else np.zeros_like(direction)
+
+
+def _once(_facts: Facts) -> tuple[Tried, ...]:
+    return (Tried(shape=()),)
+
+
+def _onsets(facts: Facts) -> tuple[Tried, ...]:
+    return tuple(Tried(shape=(onset,)) for _, onset, _ in facts.onsets) if facts.states.size > 2 else ()
+
+
+def _gains_with_life(facts: Facts) -> tuple[Tried, ...]:
+    if facts.states.size < 3:
+        return ()
+    weight = -float(np.log(len(facts.onsets)))
+    steps = tuple(Tried(shape=(_STEP, onset), log_weight=weight) for _, onset, _ in facts.onsets)
+    weight = -float(np.log(len(CREEP_POWERS)))
+    return steps + tuple(Tried(shape=(_CREEP, power), log_weight=weight) for power in CREEP_POWERS)
+
+
+def _gains_with_clock(_facts: Facts) -> tuple[Tried, ...]:
+    return tuple(Tried(shape=(time, in_loops)) for time in SETTLING_TIMES for in_loops in (0.0, 1.0))
+
+
+def _gain_with_life(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    course, value = shape
+    cycles = scene.points.cycles
+    life = np.maximum((cycles - scene.facts.states[0]) / scene.facts.life, 0.0)
+    share = np.where(cycles > value, 1.0, 0.0) if course == _STEP else life**value
+    return np.asarray(amplitude * share * scene.curve, dtype=np.float64)
+
+
+def _gain_with_clock(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+    time, in_loops = shape
+    clock = np.maximum(scene.points.clock, 0.0)
+    share = -np.expm1(-clock / time) if time > 0 else clock / DRIFT_TIME
+    shown = scene.points.steady | (in_loops > 0)
+    return np.asarray(amplitude * np.where(shown, share, 0.0) * scene.curve, dtype=np.float64)
+
+
+def _stepped(relative: Callable[[Scene], FloatArray]) -> Callable[[Scene, float, Shape], FloatArray]:
+    """amplitude times `relative` [P] Nm after the cycle in the first shape, 0 before."""
+
+    def change(scene: Scene, amplitude: float, shape: Shape) -> FloatArray:
+        return np.asarray(amplitude * np.where(scene.points.cycles > shape[0], relative(scene), 0.0), dtype=np.float64)
+
+    return change
+
+
+def _by_parameter(parameter: str) -> Callable[[Scene], FloatArray]:
+    """θ ∂S/∂θ of a parameter of eq. 3 (one of PARAMETER_NAMES)."""
+    place = PARAMETER_NAMES.index(parameter)
+    return lambda scene: np.asarray(scene.gradient[:, place] * scene.parameters[:, place], dtype=np.float64)
+
+
+def _gauge_hysteresis(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
+    pressure = scene.points.pressure
+    return np.asarray(amplitude * (direction_if_both(scene, pressure) * pressure * scene.by_pressure), dtype=np.float64)
+
+
+def _speed_hysteresis(scene: Scene, amplitude: float, _shape: Shape) -> FloatArray:
+    return np.asarray(amplitude * direction_if_both(scene, scene.points.velocity) * scene.curve, dtype=np.float64)
+
+
+def _fault(
+    slug: str,
+    title: str,
+    formula: str,
+    axis: str,
+    grid: Callable[[Facts], tuple[Tried, ...]],
+    change: Callable[[Scene, float, Shape], FloatArray],
+    shapes: int = 0,
+) -> Effect:
+    """A fault with so many `shapes` that are taken from its grid; it changes the measured torque."""
+    return Effect(
+        slug=slug,
+        title=title,
+        physics=title,
+        formula=formula,
+        source="faults of rigs",
+        family=Family.SENSOR,
+        kind=Kind.ARTEFACT,
+        channels=(),
+        amplitude="size",
+        unit="-",
+        prior_sd=USUAL_SIZE,
+        positive=False,
+        scale=1.0,
+        shapes=tuple(ShapeParameter(name="course", unit="-", lowest=-np.inf, highest=np.inf) for _ in range(shapes)),
+        grid=grid,
+        change=change,
+        before_lag=False,
+        discrepancies=(),
+        named=False,
+        axis=axis,
+    )
+
+
+FAULTS: tuple[Effect, ...] = (
+    _fault(
+        "gain_with_clock",
+        "a gain of the torque that drifts while a test lasts, as a sensor's does that warms up",
+        "a S t/30 min, or a S (1 - e^{-t/τ})",
+        CLOCK,
+        _gains_with_clock,
+        _gain_with_clock,
+        shapes=2,
+    ),
+    _fault(
+        "gain_with_life",
+        "a gain of the torque that steps or creeps over the life, as after another calibration",
+        "a S from a cycle on, or a S (ζ/ζ_last)^q",
+        CYCLES,
+        _gains_with_life,
+        _gain_with_life,
+        shapes=2,
+    ),
+    _fault(
+        "speed_scale_step",
+        "another scale of the speed from a cycle on, as of another encoder or belt",
+        "a v ∂S/∂v from a cycle on",
+        CYCLES,
+        _onsets,
+        _stepped(lambda scene: scene.by_velocity * scene.points.velocity),
+        shapes=1,
+    ),
+    _fault(
+        "static_torque_step",
+        "a static torque that steps at a cycle",
+        "a M_s ∂S/∂M_s from a cycle on",
+        CYCLES,
+        _onsets,
+        _stepped(_by_parameter("static_torque")),
+        shapes=1,
+    ),
+    _fault(
+        "stribeck_velocity_step",
+        "a Stribeck velocity that steps at a cycle",
+        "a V_S ∂S/∂V_S from a cycle on",
+        CYCLES,
+        _onsets,
+        _stepped(_by_parameter("stribeck_velocity")),
+        shapes=1,
+    ),
+    _fault(
+        "gauge_hysteresis",
+        "a pressure that depends on whether it was last raised or lowered",
+        "± a p ∂S/∂p",
+        PRESSURE,
+        _once,
+        _gauge_hysteresis,
+    ),
+    _fault(
+        "speed_hysteresis",
+        "a torque that depends on whether the speed was last raised or lowered",
+        "± a S",
+        SPEED,
+        _once,
+        _speed_hysteresis,
+    ),
+)
+
+FAULT_BY_SLUG = {fault.slug: fault for fault in FAULTS}
