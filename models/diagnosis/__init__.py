@@ -10,6 +10,7 @@ effects       4  what could be wrong: the catalogue and the uncatalogued rig fau
 pooled_fit    5  one parameter vector fitted to the whole campaign
 detection     6  is anything there beyond noise
 attribution   7  which cause
+explanations     (beside 6 and 7) both as one posterior, which makes no verdict yet
 validation    8  does it predict what was held out
 experiments   9  which test to make next
 report       10  what is said; never changes a verdict

@@ -163,6 +163,24 @@ CORRECTION_COSINES, CORRECTION_HARMONICS, MOST_CORRECTION_AXES = 10, 5, 2
 #: Its deviations τ that are tried, shares of the torque (chosen; no table).
 CORRECTION_SIZES = (0.001, 0.003, 0.01, 0.03, 0.1)
 
+# --- explanations -------------------------------------------------------------------------------------------------------
+
+#: Prior probability that anything is wrong; the share of it that is nothing of the catalogue; the probability of a second
+#: thing beside the first. With 0.1 that anything is, a zero shift whose refit has 3 nats was adequate.
+ANYTHING_WRONG, UNCATALOGUED_SHARE, SECOND = 0.3, 0.25, 0.05
+#: Shares by which a template is off along what its form is uncertain in, and along every other smooth factor, averaged over;
+#: and those of another effect of its kind.
+TEMPLATE_ERRORS = ((0.0, 0.0), (0.25, 0.0), (0.25, 0.05), (0.25, 0.2))
+NEIGHBOUR_ERRORS = ((0.5, 0.5), (1.0, 1.0))
+#: p(nothing) from which the model is adequate, and the share from which what is unknown dominates; the probability of what
+#: is named.
+LIKELY, SURE = 0.5, 0.9
+#: Share of the posterior that may stay unexplored, share of the leader's lead by which a promise may underrate a rival, and
+#: refits at most (time only).
+NEGLIGIBLE, SLACK, MOST_REFITS = 0.01, 0.2, 14
+#: Up to this share of a vibration's evidence [-] what has no name counts as its trace in averages.
+VIBRATION_TRACE = 0.1
+
 # --- experiments ---------------------------------------------------------------------------------------------------------
 
 #: Tests advised at most; λ [nats] that one must bring to be worth its time, and that the best one must bring to be listed
@@ -188,15 +206,15 @@ LEAST_LISTED = 1e-3
 #: A run is outlying that makes this share of all error beyond noise, among at least so many runs, with an RMS error beyond
 #: noise of so many deviations (chosen; no table).
 OUTLYING_SHARE, OUTLYING_FEWEST_RUNS, OUTLYING_DEVIATIONS = 0.6, 4, 2.0
-#: Evidence [nats] from which the paragraph calls it weak, moderate and strong; below, none (derived: Kass and Raftery,
-#: J. Am. Stat. Assoc. 90 (1995) 773, natural logs of the Bayes factor: "positive" from 1, "strong" from 3, "very strong"
-#: from 5).
-WEAK_EVIDENCE, MODERATE_EVIDENCE, STRONG_EVIDENCE = 1.0, 3.0, 5.0
-#: In the paragraph: rivals at most, and the probabilities between which one is mentioned; effects at most whose detectable
-#: amplitude is given (chosen).
-RIVALS_MENTIONED, RIVAL_FROM, RIVAL_BELOW, VISIBLE_MENTIONED = 3, 0.001, 0.1, 3
+#: Evidence [nats] from which a test is said to add any (derived: Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773,
+#: natural log of the Bayes factor: "positive" from 1).
+WEAK_EVIDENCE = 1.0
+#: Effects at most whose detectable amplitude the paragraph gives (chosen).
+VISIBLE_MENTIONED = 3
 #: Probability from which an effect that was fitted beside a cause and is not named is mentioned (chosen).
 COMPANION_FROM = 0.3
+#: Words of the paragraph at most (chosen: with what is said of the remaining life 120, which are read once).
+MAX_WORDS = 105
 #: Held-out errors of so many times the fit's are explained in the paragraph (chosen: less is what gains make).
 FAR_FROM_FIT = 5.0
 #: An amplitude beyond so many prior deviations is larger than expected (chosen).

@@ -25,6 +25,7 @@ CHAPTERS = (
     "pooled_fit",
     "detection",
     "attribution",
+    "explanations",
     "extension",
     "validation",
     "experiments",

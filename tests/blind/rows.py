@@ -93,11 +93,15 @@ def trials(seed: int, size: float = 1.0) -> list[Trial]:
 
 
 def _pairs(seed: int, count: int) -> list[Trial]:
-    """Two effects of different families that do not undo each other's protocol."""
+    pairs = drawn_pairs(seed, count)
+    return [Trial("two", s, pair, 50.0) for s, pair in zip(_seeds("two", seed, count), pairs, strict=True)]
+
+
+def drawn_pairs(seed: int, count: int) -> list[tuple[str, str]]:
+    """Two effects of different families that do not undo each other's protocol, so many times."""
     able = [pair for pair in combinations(CATALOGUED, 2) if not set(pair) <= HISTORY]
     dice = np.random.default_rng([seed, 2])
-    drawn = [able[int(k)] for k in dice.integers(len(able), size=count)]
-    return [Trial("two", s, pair, 50.0) for s, pair in zip(_seeds("two", seed, count), drawn, strict=True)]
+    return [able[int(k)] for k in dice.integers(len(able), size=count)]
 
 
 def _special(seed: int, count: int) -> list[Trial]:

@@ -95,7 +95,7 @@ def contrasts_of(design: Design, prediction: Prediction) -> Contrasts:
         add(TEMPERATURE, warm * _cosine(1, pressure))
         if lives:
             add(TEMPERATURE, warm * _cosine(1, life))
-    return Contrasts(columns=np.stack(columns, axis=1), axes=tuple(axes)) if columns else _none(design)
+    return Contrasts(columns=np.stack(columns, axis=1), axes=tuple(axes)) if columns else no_contrasts(design)
 
 
 def _speed_waves(design: Design, prediction: Prediction) -> FloatArray:
@@ -107,7 +107,8 @@ def _speed_waves(design: Design, prediction: Prediction) -> FloatArray:
     return prediction.change_at_rows(design, np.abs(scene.curve)[:, None] * waves, before_lag=True)
 
 
-def _none(design: Design) -> Contrasts:
+def no_contrasts(design: Design) -> Contrasts:
+    """None at all."""
     return Contrasts(columns=np.zeros((design.torque.size, 0)), axes=())
 
 

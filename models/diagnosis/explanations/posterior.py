@@ -1,0 +1,345 @@
+"""The posterior over what may be behind a campaign: an exclusive list, each with a log prior and a log evidence.
+
+    nothing | e | e + f | u | S_k | e + S_k | e + u | ~e | T | a line
+
+e, f are effects of the catalogue, u faults of the same catalogue that may not be named, S_k smooth structure on axis k, ~e
+something like e that is in no catalogue, T an oil temperature that nobody measured, a line is torque that swings with the
+tests' clock or at one frequency in raw records. Their probabilities sum to one, and a verdict is read off them alone.
+
+The search goes up, best first: what the linear screen about a refitted alternative promises of one thing more is refitted,
+while it could hold more than NEGLIGIBLE of the posterior; the promise errs by a share SLACK of the leader's lead. Then
+down: the leader without each of its parts, from where it has the rest. Structure is refitted as an effect is, its likeliest
+form taken off: judged linearly it looked 7.5 nats strong where it was a false lead. It draws no random numbers.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import expit
+
+from models.diagnosis.attribution.unmeasured_temperature import temperature_evidence
+from models.diagnosis.criteria import (
+    ANYTHING_WRONG,
+    MOST_REFITS,
+    NEGLIGIBLE,
+    SECOND,
+    SLACK,
+    UNCATALOGUED_SHARE,
+    VIBRATION_TRACE,
+)
+from models.diagnosis.detection.periodogram import lines
+from models.diagnosis.detection.raw_records.evidence import RawEvidence
+from models.diagnosis.effects.catalogue import BY_SLUG, effects_for
+from models.diagnosis.effects.catalogued import oil_temperature
+from models.diagnosis.effects.effect import Kind, Shape
+from models.diagnosis.effects.faults import FAULT_BY_SLUG, FAULTS
+from models.diagnosis.effects.fitted_effect import FittedEffect
+from models.diagnosis.effects.grid import Column, columns_of
+from models.diagnosis.explanations.alternative import LINE, LINES, NOTHING, Alternative, axis_of, is_axis, neighbour_of
+from models.diagnosis.explanations.evidence import Evidence, evidence_of
+from models.diagnosis.explanations.refit import refit, refit_beside
+from models.diagnosis.explanations.screen import Start, starts, stiff
+from models.diagnosis.pooled_fit.baseline_fit import Baseline
+from models.diagnosis.pooled_fit.gauss_newton import Fit, fit
+from models.diagnosis.pooled_fit.problem import FitProblem
+from models.gaussian_evidence import log_sum
+
+#: What kinds of shapes that were not refitted may add to those that were at most [nats] (numerical: a bound on an estimate).
+_MOST_OTHER_KINDS = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Node:
+    """An alternative that was refitted: its fit, its log evidence [nats] with that of its kind of shapes and of raw records,
+    and what it had been promised to be."""
+
+    fit: Fit
+    evidence: Evidence
+    shape_evidence: tuple[float, ...]
+    log_evidence: float
+    promise: float
+
+    @property
+    def kind(self) -> tuple[tuple[str, Shape], ...]:
+        """The shapes that a refit does not move."""
+        shapes = [(e.effect.slug, e.shape, e.effect.shapes) for e in self.fit.effects]
+        return tuple(sorted((s, tuple(x for x, p in zip(v, q, strict=True) if not p.smooth)) for s, v, q in shapes))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Posterior:
+    """Log weights [nats] over nothing by alternative, prior included; of those that were refitted the best node; the
+    probability of each vibration, independent of the rest; the problem that all refits share, and the columns that were
+    screened."""
+
+    weights: Mapping[Alternative, float]
+    nodes: Mapping[Alternative, Node]
+    vibrations: Mapping[str, float]
+    prior: "Prior"
+    problem: FitProblem
+    columns: tuple[Column, ...]
+    refits: int
+
+    @property
+    def null(self) -> Node:
+        """Nothing at work."""
+        return self.nodes[NOTHING]
+
+    @property
+    def probabilities(self) -> dict[Alternative, float]:
+        """They sum to one; the most probable first."""
+        total = log_sum(list(self.weights.values()))
+        ranked = sorted(self.weights.items(), key=lambda item: -item[1])
+        return {alternative: float(np.exp(weight - total)) for alternative, weight in ranked}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prior:
+    """Log prior odds against nothing at work: ANYTHING_WRONG that anything is, UNCATALOGUED_SHARE of it nothing of the
+    catalogue (half of that a neighbour of an effect), SECOND a second thing beside the first; evenly within each."""
+
+    effects: int
+    unknowns: int
+
+    def __call__(self, alternative: Alternative) -> float:
+        if alternative == NOTHING:
+            return 0.0
+        wrong = np.log(ANYTHING_WRONG / (1 - ANYTHING_WRONG))
+        of_effect = np.log1p(-UNCATALOGUED_SHARE) - np.log(self.effects)
+        of_unknown = np.log(UNCATALOGUED_SHARE / 2) - np.log(self.unknowns)
+        if not alternative.causes:
+            has_axis = bool(axis_of(alternative.unknown))
+            return float(wrong + (of_unknown if has_axis else np.log(UNCATALOGUED_SHARE / 2) - np.log(self.effects)))
+        value = wrong + of_effect
+        if len(alternative.causes) > 1:  # in either order
+            value += np.log(SECOND) + np.log(2.0) + np.log1p(-UNCATALOGUED_SHARE) - np.log(max(self.effects - 1, 1))
+        if alternative.unknown:
+            value += np.log(SECOND) + of_unknown
+        return float(value)
+
+
+class Search:
+    """The nodes and what else is promised, as the search goes on."""
+
+    def __init__(self, baseline: Baseline, raw: Sequence[RawEvidence], without: frozenset[str]) -> None:
+        facts = baseline.problem.design.facts
+        effects = effects_for(facts, without)
+        self._raw = {r.effect: r.log_evidence for r in raw if r.effect in BY_SLUG and not is_vibration(r)}
+        self._columns = columns_of([*effects, *FAULTS], facts)
+        self.problem = baseline.problem
+        null = self._node(baseline.fit, (), ())
+        if null is None:
+            raise ArithmeticError("the baseline's evidence is not finite")
+        faults = {column.effect.slug for column in self._columns} & set(FAULT_BY_SLUG)
+        self.prior = Prior(
+            effects=max(len(effects), 1), unknowns=len(null.evidence.structure) + len(faults) + len(LINES)
+        )
+        firsts = [kinds[0] for kinds in starts(self._columns, null.evidence.screened).values()]
+        best = max(firsts, key=lambda start: start.promise, default=None)
+        if best is not None and best.promise > 0.0:  # the gains that suit the best, for the metric of all refits
+            likely = null.evidence.screened[best.gain]
+            self.problem = baseline.problem.with_noise(likely.noise(baseline.problem.noise))
+            again = self._node(fit(self.problem, baseline.fit.laws), (), ())
+            null = max(null, again, key=lambda node: node.log_evidence) if again is not None else null
+        self.nodes: dict[Alternative, list[Node]] = {NOTHING: [null]}
+        self.refits = 0
+        self._promises: dict[tuple[Alternative, Shape], tuple[float, Node, Start | None]] = {}
+        self._promise(NOTHING, null)
+
+    @property
+    def null(self) -> Node:
+        """Nothing at work."""
+        return self.nodes[NOTHING][0]
+
+    def run(self) -> None:
+        """Up and down until neither changes what leads."""
+        fallen = set[Alternative]()
+        while True:
+            self._up()
+            weights = self.weights()
+            leader = max(self.nodes, key=lambda alternative: weights[alternative])
+            if leader in fallen:
+                return
+            fallen.add(leader)
+            self._down(leader)
+
+    def weights(self) -> dict[Alternative, float]:
+        """Log weights of everything about the nodes: themselves, structure beside them, neighbours of single effects."""
+        out: dict[Alternative, float] = {}
+        for alternative, nodes in self.nodes.items():
+            out[alternative] = self._evidence(alternative) + self.prior(alternative)
+            if len(alternative.causes) > 1 or alternative.unknown:
+                continue
+            for axis in nodes[0].evidence.structure:
+                beside = Alternative(alternative.causes, axis)
+                if beside not in self.nodes:
+                    logs = [node.log_evidence + node.evidence.structure[axis] for node in nodes]
+                    out[beside] = log_sum(logs) + self.prior(beside)
+            if alternative.causes:
+                like = neighbour_of(alternative.causes[0])
+                logs = [n.log_evidence - n.evidence.whole + n.evidence.neighbour for n in nodes]
+                out[like] = log_sum(logs) + self.prior(like)
+        return out
+
+    def _evidence(self, alternative: Alternative) -> float:
+        """Log evidence over the kinds of shapes: of those refitted, and the others in proportion to what they promise."""
+        nodes = self.nodes[alternative]
+        value = log_sum([node.log_evidence for node in nodes])
+        left = [promise for (other, _), (promise, _, _) in self._promises.items() if other == alternative]
+        if not left or alternative == NOTHING:
+            return value
+        done = log_sum([node.promise for node in nodes])
+        return value + min(float(np.logaddexp(done, log_sum(left))) - done, _MOST_OTHER_KINDS)
+
+    def _up(self) -> None:
+        while self._promises and self.refits < MOST_REFITS:
+            weights = self.weights()
+            leader = max(self.nodes, key=lambda alternative: weights[alternative])
+            slack = SLACK * max(weights[leader] - weights[NOTHING], 0.0)
+            hopes = {key: self._hope(key, leader, slack) for key in self._promises}
+            key = max(hopes, key=lambda key: hopes[key])
+            if hopes[key] < log_sum(list(weights.values())) + np.log(NEGLIGIBLE):
+                return
+            promise, parent, start = self._promises.pop(key)
+            self.refits += 1
+            if start is None:
+                self._add_structure(key[0], parent, promise)
+            else:
+                shape_evidence = (*parent.shape_evidence, start.column.log_weight_around)
+                self._add(key[0], parent.fit, (*parent.fit.effects, start.fitted), shape_evidence, promise)
+
+    def _hope(self, key: tuple[Alternative, Shape], leader: Alternative, slack: float) -> float:
+        """A promise, less what refits of the same alternative fell short of theirs, and the slack where it explains what the
+        leader does in another way."""
+        alternative = key[0]
+        short = [n.log_evidence + self.prior(alternative) - n.promise for n in self.nodes.get(alternative, [])]
+        beside = set(leader.causes) <= set(alternative.causes) and leader.unknown in {"", alternative.unknown}
+        return self._promises[key][0] + min(short, default=0.0) + (0.0 if beside else slack)
+
+    def _down(self, leader: Alternative) -> None:
+        """The leader with one thing less, from where it has the rest."""
+        node = self.nodes[leader][0]
+        if is_axis(leader.unknown):
+            self._add(Alternative(leader.causes), node.fit, node.fit.effects, node.shape_evidence, -np.inf)
+            return
+        for place, effect in enumerate(node.fit.effects):
+            effects = tuple(e for k, e in enumerate(node.fit.effects) if k != place)
+            shape_evidence = tuple(x for k, x in enumerate(node.shape_evidence) if k != place)
+            self._add(leader.without(effect.effect.slug), node.fit, effects, shape_evidence, -np.inf)
+
+    def _add(
+        self,
+        alternative: Alternative,
+        start: Fit,
+        effects: tuple[FittedEffect, ...],
+        shape_evidence: tuple[float, ...],
+        promise: float,
+    ) -> None:
+        """One refit more of an alternative; the better one of each kind of shapes is kept."""
+        fitted = refit(self.problem, start.laws, effects)
+        node = None if fitted is None else self._node(fitted, alternative.causes, shape_evidence)
+        if node is None:
+            return
+        node = replace(node, promise=max(promise, node.log_evidence + self.prior(alternative)))
+        before = self.nodes.get(alternative, [])
+        first = not before or node.log_evidence > before[0].log_evidence
+        same = next((other for other in before if other.kind == node.kind), None)
+        if same is None or node.log_evidence > same.log_evidence:
+            kept = [node, *(other for other in before if other is not same)]
+            self.nodes[alternative] = sorted(kept, key=lambda node: -node.log_evidence)
+        if first and len(effects) == 1 and alternative.causes:
+            self._promise(alternative, node)
+
+    def _add_structure(self, alternative: Alternative, parent: Node, promise: float) -> None:
+        """Structure on an axis beside a parent, about the baseline that leaves its likeliest form."""
+        axis = alternative.unknown
+        fitted = refit_beside(self.problem, parent.fit, parent.evidence.patterns[axis])
+        node = None if fitted is None else self._node(fitted, alternative.causes, parent.shape_evidence)
+        if node is not None and axis in node.evidence.structure:
+            value = node.log_evidence + node.evidence.structure[axis]
+            self.nodes[alternative] = [replace(node, log_evidence=value, promise=promise)]
+
+    def _node(self, fitted: Fit, causes: tuple[str, ...], shape_evidence: tuple[float, ...]) -> Node | None:
+        """A fit with its evidence; single effects with the catalogue projected beside them."""
+        single = len(fitted.effects) < 2
+        evidence = evidence_of(self.problem, fitted, self._columns if single else (), smooth=single)
+        value = evidence.whole + sum(shape_evidence)
+        if not np.isfinite(value):
+            return None
+        if causes:
+            value += self._by_raw(causes, value - self.null.log_evidence)
+        return Node(fit=fitted, evidence=evidence, shape_evidence=shape_evidence, log_evidence=value, promise=value)
+
+    def _by_raw(self, causes: Sequence[str], gained: float) -> float:
+        """What raw records add [nats] to effects beyond what averages of the same samples show of them."""
+        return sum(max(self._raw.get(slug, 0.0) - max(gained, 0.0), 0.0) for slug in causes)
+
+    def _promise(self, parent: Alternative, node: Node) -> None:
+        """What the screen about a node promises of everything with one thing more; the larger promise stands."""
+        promises: dict[tuple[Alternative, Shape], tuple[float, Node, Start | None]] = {}
+        for slug, kinds in starts(self._columns, node.evidence.screened).items():
+            more = parent.and_effect(slug)
+            if more is None or (parent != NOTHING and more in self.nodes):
+                continue
+            for start in kinds:
+                value = node.log_evidence + start.promise + self._by_raw(more.causes, start.promise) + self.prior(more)
+                promises[more, stiff(start.column.shape, start.column)] = (value, node, start)
+        for axis, gained in node.evidence.structure.items():
+            more = Alternative(parent.causes, axis)
+            if more not in self.nodes:
+                promises[more, ()] = (node.log_evidence + gained + self.prior(more), node, None)
+        for key, promise in promises.items():
+            if key not in self._promises or promise[0] > self._promises[key][0]:
+                self._promises[key] = promise
+
+    def posterior(self, raw: Sequence[RawEvidence], without: frozenset[str]) -> Posterior:
+        """The list as far as it was searched; what was not refitted counts as it was screened."""
+        weights = self.weights()
+        for (alternative, _), (promise, _, start) in self._promises.items():
+            if alternative not in self.nodes and start is not None:
+                weights[alternative] = float(np.logaddexp(weights.get(alternative, -np.inf), promise))
+        null = self.null
+        swinging = {record.effect: record.log_evidence for record in raw if record.effect in LINES}
+        for unknown, value in {LINE: _worth(lines(self.problem, null.fit.residual).p_value), **swinging}.items():
+            line = Alternative((), unknown)
+            weights[line] = null.log_evidence + value + self.prior(line)
+        facts = self.problem.design.facts
+        if not facts.temperature_measured and oil_temperature.EFFECT.slug not in without:
+            warm = Alternative((oil_temperature.EFFECT.slug,))
+            weights[warm] = null.log_evidence + temperature_evidence(self.problem, null.fit) + self.prior(warm)
+        single = self.prior(Alternative(("",)))
+        swings = {record.effect: record.log_evidence for record in raw if is_vibration(record)}
+        loudest = max(swings.values(), default=0.0)
+        for alternative in list(weights):  # what a vibration leaves in averages is no second thing
+            trace = weights[alternative] - self.prior(alternative) - null.log_evidence
+            unnamed = not alternative.causes and (is_axis(alternative.unknown) or alternative.unknown in LINES)
+            if unnamed and loudest + single > 0 and trace < VIBRATION_TRACE * loudest:
+                weights[NOTHING] = float(np.logaddexp(weights[NOTHING], weights.pop(alternative)))
+        return Posterior(
+            weights={alternative: weight - null.log_evidence for alternative, weight in weights.items()},
+            nodes={alternative: nodes[0] for alternative, nodes in self.nodes.items()},
+            vibrations={slug: float(expit(value + single)) for slug, value in swings.items()},
+            prior=self.prior,
+            problem=self.problem,
+            columns=tuple(self._columns),
+            refits=self.refits,
+        )
+
+
+def _worth(p_value: float) -> float:
+    """What a p-value is worth at most [nats], 1/(-e p ln p) (Sellke, Bayarri and Berger, Am. Stat. 55 (2001) 62)."""
+    rare = -float(np.log(max(p_value, 1e-300)))
+    return rare - 1.0 - float(np.log(rare)) if rare > 1.0 else 0.0
+
+
+def is_vibration(record: RawEvidence) -> bool:
+    """Whether a record shows a vibration of the catalogue."""
+    return record.effect in BY_SLUG and BY_SLUG[record.effect].kind is Kind.VIBRATION
+
+
+def posterior_of(baseline: Baseline, raw: Sequence[RawEvidence], without: frozenset[str] = frozenset()) -> Posterior:
+    """Search the explanations of a baseline's campaign; effects `without` are not in the catalogue."""
+    search = Search(baseline, raw, without)
+    search.run()
+    return search.posterior([record for record in raw if record.effect not in without], without)

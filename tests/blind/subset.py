@@ -1,0 +1,224 @@
+"""`make blind SUBSET=name`: verdicts on a fixed set of campaigns, stored by name, so that two ways to decide compare.
+
+SUBSET=  the name under which results are stored (`.blind/NAME`); a run goes on where it ended, some 25 minutes of one core
+SEED=    other campaigns (1)                         ONLY=    rows whose names begin with these
+ENGINE=  posterior: judged by `models.diagnosis.explanations` instead of today's detection and attribution
+ABLATE=  a number of the diagnosis' criteria without which it is judged: `SECOND=0.25`, `MOST_REFITS=6`
+ARGS="--against OTHER": the rows of both beside each other, campaign by campaign the same ones
+"""
+
+import importlib
+import json
+import math
+import os
+import pkgutil
+import sys
+import zlib
+from ast import literal_eval
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import models.diagnosis
+from models.diagnosis.campaign import Campaign
+from models.diagnosis.design.design import build_design
+from models.diagnosis.detection.raw_records.evidence import raw_evidence
+from models.diagnosis.diagnose import diagnose
+from models.diagnosis.explanations.decide import decide, explanations_of
+from models.diagnosis.explanations.posterior import posterior_of
+from models.diagnosis.pooled_fit.baseline_fit import fit_baseline
+from tests.blind.rig.makers import CATALOGUED, OUTSIDE
+from tests.blind.rows import drawn_pairs
+from tests.blind.trials import Diagnose, Trial, judge
+
+STORE = Path(__file__).parents[2] / ".blind"
+#: Effects that only loops show, and those that only raw records do.
+LOOPS, RECORDS = {"channel_delay", "inertia_torque", "squeeze_film"}, {"shaft_ripple", "stick_slip"}
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What is kept of a trial."""
+
+    row: str
+    truth: frozenset[str]
+    verdict: str
+    causes: frozenset[str]
+    seconds: float
+
+    @property
+    def named(self) -> bool:
+        return self.verdict == "cause_named"
+
+    @property
+    def right(self) -> bool:
+        return self.named and self.causes == self.truth
+
+    @property
+    def wrong(self) -> bool:
+        return self.named and not self.causes <= self.truth
+
+    @property
+    def in_set(self) -> bool:
+        return self.verdict in {"cause_named", "cause_ambiguous"} and self.truth <= self.causes
+
+
+def trials(seed: int) -> dict[str, Trial]:
+    """The campaigns by name, in an order in which any part of them is a fair sample."""
+    made: dict[str, Trial] = {}
+
+    def add(row: str, number: int, *slugs: str, lam: float = 0.0, left: bool = False, **wanted: Any) -> None:
+        out = frozenset(slugs) if left else frozenset[str]()
+        trial = Trial(row, (seed, zlib.crc32(row.encode()), number), slugs, lam, out, wanted=wanted)
+        made[f"{row}-{seed}-{number}".replace("/", "_")] = trial
+
+    for k in range(3):
+        for j in range(5):
+            add("none", 5 * k + j)
+        for j in range(2):
+            add("none/plateaus", 2 * k + j, loops=False)
+        if k == 0:
+            add("raw/none", k, raw=True, loops=False)
+        for slug in CATALOGUED:
+            if k != 1:
+                add(f"fifty/{slug}", k, slug, lam=50.0)
+            if k == 0 and slug not in LOOPS | RECORDS:
+                add(f"plateaus/{slug}", k, slug, lam=80.0, loops=False)
+            if k == 1:
+                add(f"twenty/{slug}", k, slug, lam=20.0)
+                add(f"loud/{slug}", k, slug, lam=300.0)
+            if k == 0:
+                add(f"left/{slug}", k, slug, lam=50.0, left=True)
+            if k == 2:
+                add(f"left/{slug}", k, slug, lam=50.0, left=True, loops=slug in LOOPS | RECORDS)
+        for slug in OUTSIDE:
+            if k < 2:
+                add(f"outside/{slug}", k, slug, lam=50.0)
+        for j, pair in enumerate(drawn_pairs(seed + k, 4)):
+            add("two", 4 * k + j, *pair, lam=50.0)
+        for lam in (50.0, 200.0):
+            add(f"blindfold/{lam:.0f}", k, "oil_temperature", lam=lam, oil=False, moments=True)
+    return made
+
+
+@dataclass(frozen=True)
+class Said:
+    """What the posterior says of a campaign, as far as a report says it too."""
+
+    verdict: str
+    causes: tuple[str, ...]
+    candidates: tuple[Any, ...] = ()
+    baseline: None = None
+    gain: None = None
+    advice: tuple[Any, ...] = ()
+    statistics: Mapping[str, float] = field(default_factory=dict)
+
+
+def by_posterior(seen: Campaign, *, rng: np.random.Generator, without: frozenset[str] = frozenset()) -> Said:
+    """The verdict read off one posterior; it draws nothing from `rng`."""
+    del rng
+    raw = tuple(record for record in raw_evidence(seen) if record.effect not in without)
+    explanations = explanations_of(posterior_of(fit_baseline(build_design(seen)), raw, without))
+    verdict, causes = decide(explanations)
+    return Said(verdict=verdict.value, causes=causes)
+
+
+LOOKS = {"": diagnose, "posterior": by_posterior}
+
+
+def judged(name: str, trial: Trial, label: str, look: Diagnose = diagnose) -> Judged | None:
+    """The verdict on a trial, computed or read; None where no such campaign could be made."""
+    path = STORE / label / f"{name}.json"
+    if not path.exists():
+        outcome = judge(trial, look)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        stored = {"verdict": outcome.verdict, "causes": sorted(outcome.causes), "seconds": outcome.seconds}
+        path.with_suffix(".part").write_text(json.dumps(stored | {"candidates": outcome.candidates}), encoding="utf-8")
+        path.with_suffix(".part").rename(path)
+    said = json.loads(path.read_text(encoding="utf-8"))
+    if said["verdict"] == "unreachable":
+        return None
+    return Judged(trial.row, frozenset(trial.slugs), said["verdict"], frozenset(said["causes"]), said["seconds"])
+
+
+#: What is counted: title, beginnings of the rows, what counts, whether more is better.
+Row = tuple[str, tuple[str, ...], Callable[[Judged], bool], bool]
+ROWS: tuple[Row, ...] = (
+    ("nothing hidden: adequate", ("none", "raw/none"), lambda o: o.verdict == "model_adequate", True),
+    ("one effect, λ = 50, loops: named right", ("fifty/",), lambda o: o.right, True),
+    ("… in the set", ("fifty/",), lambda o: o.in_set, True),
+    ("… named wrong", ("fifty/",), lambda o: o.wrong, False),
+    ("one, λ = 80, no loops: named right", ("plateaus/",), lambda o: o.right, True),
+    ("… in the set", ("plateaus/",), lambda o: o.in_set, True),
+    ("… named wrong", ("plateaus/",), lambda o: o.wrong, False),
+    ("one, λ = 20: detected", ("twenty/",), lambda o: o.verdict != "model_adequate", True),
+    ("… in the set", ("twenty/",), lambda o: o.in_set, True),
+    ("… named wrong", ("twenty/",), lambda o: o.wrong, False),
+    ("one, λ = 300: named right", ("loud/",), lambda o: o.right, True),
+    ("… in the set", ("loud/",), lambda o: o.in_set, True),
+    ("… named wrong", ("loud/",), lambda o: o.wrong, False),
+    ("its own cause left out: named wrong", ("left/",), lambda o: o.wrong, False),
+    ("… unexplained or ambiguous", ("left/",), lambda o: not o.named and o.verdict != "model_adequate", True),
+    ("outside the catalogue: unexplained", ("outside/",), lambda o: o.verdict == "unexplained_structure", True),
+    ("… named", ("outside/",), lambda o: o.named, False),
+    ("two effects: the exact pair", ("two",), lambda o: o.right, True),
+    ("… in the set", ("two",), lambda o: o.in_set, True),
+    ("… named wrong", ("two",), lambda o: o.wrong, False),
+    ("no oil temperature: named wrong", ("blindfold/",), lambda o: o.wrong, False),
+    ("crashed", ("",), lambda o: o.verdict == "crashed", False),
+)
+
+
+def table(first: dict[str, Judged], second: dict[str, Judged], labels: tuple[str, str]) -> list[str]:
+    """Both beside each other on the campaigns that both have; worse where the difference of the pairs is beyond two of its
+    standard errors."""
+    both = sorted(first.keys() & second.keys())
+    lines = [f"| on the same campaigns | n | {labels[0]} | {labels[1]} | only {labels[0]} / only {labels[1]} | |"]
+    lines.append("|---|---|---|---|---|---|")
+    for title, rows, counts, more in ROWS:
+        pairs = [(counts(first[name]), counts(second[name])) for name in both if first[name].row.startswith(rows)]
+        lost, won = sum(a and not b for a, b in pairs), sum(b and not a for a, b in pairs)
+        worse = (lost - won if more else won - lost) > 2 * math.sqrt(max(lost + won, 1))
+        cells = f"{sum(a for a, _ in pairs)} | {sum(b for _, b in pairs)} | {lost} / {won} | {'worse' if worse else ''}"
+        lines.append(f"| {title} | {len(pairs)} | {cells} |")
+    seconds = [sum(each[name].seconds for name in both) / max(len(both), 1) for each in (first, second)]
+    lines.append(f"| seconds a campaign | {len(both)} | {seconds[0]:.2f} | {seconds[1]:.2f} | | |")
+    return lines
+
+
+def ablate(change: str) -> None:
+    """Set a number of the criteria in every module of the diagnosis that has it. Raises ValueError where none has."""
+    name, _, value = change.partition("=")
+    found = [
+        importlib.import_module(each.name)
+        for each in pkgutil.walk_packages(models.diagnosis.__path__, "models.diagnosis.")
+    ]
+    having = [module for module in found if hasattr(module, name)]
+    if not having:
+        raise ValueError(f"no module of the diagnosis has a number {name}")
+    for module in having:
+        setattr(module, name, literal_eval(value))
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Judge, and print the rows."""
+    label, seed = os.environ["SUBSET"], int(os.environ.get("SEED") or 1)
+    only = tuple((os.environ.get("ONLY") or "").split(","))
+    if os.environ.get("ABLATE"):
+        ablate(os.environ["ABLATE"])
+    chosen = {name: trial for name, trial in trials(seed).items() if trial.row.startswith(only)}
+    look = LOOKS[os.environ.get("ENGINE") or ""]
+    mine = {name: found for name, trial in chosen.items() if (found := judged(name, trial, label, look)) is not None}
+    other, against = mine, label
+    if "--against" in arguments:
+        against = arguments[arguments.index("--against") + 1]
+        stored = {name: trial for name, trial in chosen.items() if (STORE / against / f"{name}.json").exists()}
+        other = {name: found for name, trial in stored.items() if (found := judged(name, trial, against)) is not None}
+    print("\n".join(table(other, mine, (against, label))))
+
+
+if __name__ == "__main__":
+    main(sys.argv)
