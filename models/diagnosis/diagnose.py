@@ -23,7 +23,8 @@ from models.diagnosis.validation.extended_model import validate
 
 
 def diagnose(campaign: Campaign, *, rng: np.random.Generator, without: frozenset[str] = frozenset()) -> Report:
-    """What the baseline gets wrong in this campaign, why, and what an extension gains. The same rng, the same answer.
+    """What the baseline gets wrong in this campaign, why, and what an extension gains. The same rng, the same answer; each
+    part that draws has a stream of its own.
 
     Effects whose slugs are in `without` are taken out of the catalogue. What data lack is a verdict, `insufficient_data`; an
     exception is a bug.
@@ -38,12 +39,13 @@ def diagnose(campaign: Campaign, *, rng: np.random.Generator, without: frozenset
         return insufficient(str(lacking), design)
     columns = columns_of(effects_for(design.facts, without), design.facts)
     raw = tuple(record for record in raw_evidence(campaign) if record.effect not in without)
-    investigation = investigate(baseline, columns, raw, rng)
+    of_alarms, of_checks, of_gain, of_sizes = rng.spawn(4)
+    investigation = investigate(baseline, columns, raw, of_alarms)
     problem = investigation.problem
-    first = decide(investigation.evidence(without), Checks(problem, rng))
-    validation = validate(problem, investigation.projected.fit, first, investigation.where, rng)
+    first = decide(investigation.evidence(without), Checks(problem, of_checks))
+    validation = validate(problem, investigation.projected.fit, first, investigation.where, of_gain)
     judgement = revise(first, validation.held_out)
-    sizes = sizes_of(problem, judgement, rng)
+    sizes = sizes_of(problem, judgement, of_sizes)
     hypotheses = () if investigation.search is None else investigation.search.hypotheses
     advice = advise(campaign, problem, *rivals_of(judgement, hypotheses))
     return report_of(investigation, judgement, validation, sizes, advice)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import Connection
@@ -34,6 +35,28 @@ def diagnosis(database: Database, clutch_id: str, diagnosis_id: str) -> dict[str
         if row is None:
             raise NotFoundError(f"clutch {clutch_id!r} has no diagnosis {diagnosis_id!r}")
         return _items(connection, clutch_id, [row])[0]
+
+
+#: The columns of a plan as a table: a row a step.
+PLAN_COLUMNS = (
+    "test", "step", "kind", "pressures_bar", "speeds_rpm", "frequency_hz", "periods", "oil_temperature_c", "repeats",
+    "cycles", "pause_hours", "minutes", "separates", "probability",
+)  # fmt: skip
+
+
+def plan(database: Database, clutch_id: str, diagnosis_id: str) -> dict[str, Any]:
+    """The tests that a diagnosis advises, as a protocol. Raises NotFoundError."""
+    tests = [test for test in diagnosis(database, clutch_id, diagnosis_id)["advice"] if test.get("steps")]
+    return {"clutch_id": clutch_id, "diagnosis_id": diagnosis_id, "tests": tests}
+
+
+def plan_rows(protocol: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """The same as rows of a table: numbers of one cell with a space between them."""
+    for number, test in enumerate(protocol["tests"], start=1):
+        for place, step in enumerate(test["steps"], start=1):
+            lists = {name: " ".join(f"{value:g}" for value in step[name]) for name in ("pressures_bar", "speeds_rpm")}
+            why = {"separates": " ".join(test["separates"]), "probability": test["probability"]}
+            yield {"test": number, "step": place} | step | lists | why
 
 
 def page(

@@ -126,6 +126,38 @@ class AdviceOut(Answer):
     test: str = Field(description="The test in a sentence")
     separates: list[str] = Field(description="The two effects that it distinguishes; `baseline` stands for none")
     nats: Number = Field(description="Expected gain in log evidence, nats")
+    probability: Number = Field(default=None, description="Probability that it leaves one explanation alone")
+    narrows: Number = Field(
+        default=None,
+        description="Of a named cause, the standard deviation of its size after the test as a share of today's; else null",
+    )
+    minutes: Number = Field(default=None, description="Minutes on the rig, those of the duty cycles before it included")
+    steps: list["PlanStep"] = Field(default_factory=list, description="What the rig is to do, in order")
+
+
+class PlanStep(Answer):
+    """One test of a plan."""
+
+    kind: str = Field(description="`stationary_stribeck` or `dynamic_stribeck`")
+    pressures_bar: list[float] = Field(description="Line pressures in the order in which they are set, bar")
+    speeds_rpm: list[float] = Field(
+        description="Speeds in the order in which they are set, rpm; of a dynamic test the lowest and the highest"
+    )
+    frequency_hz: Number = Field(description="Frequency of the speed of a dynamic test, Hz; else null")
+    periods: int | None = Field(description="Periods at each pressure of a dynamic test; else null")
+    oil_temperature_c: Number = Field(description="Oil temperature, °C; null: as usual")
+    repeats: int = Field(description="How often the test is made")
+    cycles: Number = Field(description="Duty cycles since new at which it is made")
+    pause_hours: Number = Field(description="Rest before it, hours")
+    minutes: Number = Field(description="Minutes on the rig")
+
+
+class PlanOut(Answer):
+    """The tests that a diagnosis advises as a protocol, at most three, the first one first."""
+
+    clutch_id: ClutchName
+    diagnosis_id: DiagnosisName
+    tests: list[AdviceOut] = Field(description="The tests, best first")
 
 
 class VisibleOut(Answer):

@@ -11,6 +11,7 @@ bound, and of its model discrepancy, each held by its prior. Rows to come have t
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 from scipy.optimize import nnls
@@ -85,6 +86,17 @@ class CandidateDistances:
         columns = [0.5 * np.maximum(np.diag(projected.info), 0.0) for projected in projections]
         freedom = [projected.evidence - projected.profile for projected in projections]
         return np.stack(columns, axis=1), np.array(freedom)
+
+    def size_left(self, ahead: Sequence[list[Gram]]) -> float:
+        """The deviation of the size of the first candidate's first effect with runs to come, as a share of that without."""
+        place = int(self._problem.priors.free.sum())
+        gram, noise, deviations = self._measured[0], self._problem.noise, list[float]()
+        for joined in (gram, reduce(_joined, [more[0] for more in ahead], gram)):
+            corner = joined.with_gains(noise.run_gain, noise.curve_gain)[0][: joined.base, : joined.base]
+            scale = 1 / np.sqrt(np.maximum(np.diag(corner), 1e-300))
+            inverse = np.linalg.pinv(corner * scale[:, None] * scale, hermitian=True)
+            deviations.append(float(scale[place] * np.sqrt(max(inverse[place, place], 0.0))))
+        return deviations[1] / max(deviations[0], 1e-300)
 
     def _gram(self, rows: _Rows, rival: int) -> Gram:
         """What rows show of all candidates' differences from a rival, and of what that one can absorb; without priors

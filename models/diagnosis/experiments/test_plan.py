@@ -3,8 +3,9 @@
 With Δ_ab what a trial adds to λ_ab (`experiments.information`), evidence for a against b would, if a is true, be about
 normal afterwards: its mean what it is now, and Δ, and the change of what the freedom of both is worth; its variance
 1 + 2Δ + (PREDICTION_ERROR Δ)². a is left alone where it is above what `attribution.decide` asks for, for every b. Trials are
-ranked by the probability of that, over the candidates by their evidence, less COST_OF_RUN a run. A cause without a rival is
-compared with no effect at all, and of trials that are about as likely to leave it the one with most nats a run is taken.
+ranked by the probability of that, over the candidates by their evidence, less COST_OF_RUN a run; of those that are sure to
+decide (LEAST_NAMED) the shortest comes first. Of a cause without a rival the size is what is left to learn: the trial that
+narrows it most, less the same a run.
 """
 
 from collections.abc import Sequence
@@ -34,6 +35,7 @@ from models.diagnosis.effects.catalogued import oil_temperature, torque_zero_shi
 from models.diagnosis.effects.fitted_effect import FittedEffect
 from models.diagnosis.experiments.candidates import TRIALS, runs_of, with_trial
 from models.diagnosis.experiments.information import CandidateDistances
+from models.diagnosis.experiments.protocol import Step, steps_of
 from models.diagnosis.experiments.rivals import Rival
 from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.diagnosis.pooled_fit.gram import Gram
@@ -49,7 +51,9 @@ _WARM = "sweep_60c"
 class Advice:
     """A test that would decide between two effects (or between an effect and none, then `other` is BASELINE).
 
-    `key` names the test for machines (`experiments.candidates.TRIALS`), `nats` is what it is expected to bring.
+    `key` names the test for machines (`experiments.candidates.TRIALS`), `nats` is what it is expected to bring,
+    `probability` that it leaves one candidate alone; `narrows`: of a cause without a rival, its size's deviation after the
+    test as a share of today's (0 where it was not asked for); `steps` are what the rig is to do.
     """
 
     key: str
@@ -57,6 +61,14 @@ class Advice:
     effect: str
     other: str
     nats: float
+    probability: float = 0.0
+    narrows: float = 0.0
+    steps: tuple[Step, ...] = ()
+
+    @property
+    def minutes(self) -> float:
+        """Minutes on the rig."""
+        return sum(step.minutes for step in self.steps)
 
 
 def advise(
@@ -77,13 +89,28 @@ def advise(
         chance, other, nats = _brought(before, distances.with_freedom(rows), evidences, len(race))
         if np.isfinite(chance) and nats > LEAST_ADVISED:
             effect, rival = _names(fits[0], fits[other] if len(race) > 1 else None)
-            advice = Advice(key=key, test=TRIALS[key].text, effect=effect, other=rival, nats=nats)
-            runs = runs_of(key)
-            alone = (round(chance, 1), nats / runs)
-            ranked.append((alone if len(race) == 1 else (chance - COST_OF_RUN * runs, nats), advice))
+            narrows = distances.size_left(rows) if len(race) == 1 else 0.0
+            advice = Advice(
+                key=key,
+                test=TRIALS[key].text,
+                effect=effect,
+                other=rival,
+                nats=nats,
+                probability=chance,
+                narrows=narrows,
+                steps=steps_of(campaign, key),
+            )
+            # alone in the race, a cause is sure: what is left to learn is its size
+            worth = chance if len(race) > 1 else -narrows
+            ranked.append(((worth - COST_OF_RUN * runs_of(key), nats), advice))
     first = _thermometer(campaign, problem, fits)
     ranked.sort(key=lambda trial: trial[0], reverse=True)
     worthy = [advice for i, (_, advice) in enumerate(ranked) if i == 0 or advice.nats >= WORTHWHILE]
+    if len(race) > 1:
+        sure = sorted(
+            (advice for advice in worthy if advice.probability >= LEAST_NAMED), key=lambda advice: advice.minutes
+        )
+        worthy = [*sure, *(advice for advice in worthy if advice not in sure)]
     return (*first, *worthy)[:MOST_ADVISED]
 
 
@@ -173,7 +200,10 @@ def _thermometer(campaign: Campaign, problem: FitProblem, fits: Sequence[Fit]) -
     distances = CandidateDistances(problem, (usual, _bare(fits[0])))
     nats = float(distances.distances([distances.ahead(added)])[0, 1])
     test = f"{TRIALS[_WARM].text}, and oil temperature recorded from now on"
-    return [Advice(key=_WARM, test=test, effect=shift, other=effect.slug, nats=nats)]
+    odds = np.log(LEAST_NAMED / (1 - LEAST_NAMED))
+    chance = float(ndtr((nats - odds) / np.sqrt(1.0 + 2.0 * nats + (PREDICTION_ERROR * nats) ** 2)))
+    steps = steps_of(campaign, _WARM)
+    return [Advice(key=_WARM, test=test, effect=shift, other=effect.slug, nats=nats, probability=chance, steps=steps)]
 
 
 def _added(campaign: Campaign, design: Design, key: str) -> Design | None:

@@ -10,6 +10,9 @@ from models.diagnosis.detection.lack_of_fit import without_likely_gains
 from models.diagnosis.pooled_fit.gauss_newton import Fit
 from models.diagnosis.pooled_fit.problem import FitProblem
 
+#: What to do about it.
+ADVICE = "Check that run first."
+
 
 def outlying_run(problem: FitProblem, fitted: Fit) -> str:
     """A sentence on the run whose error is far larger than the others', or nothing."""
@@ -27,5 +30,5 @@ def outlying_run(problem: FitProblem, fitted: Fit) -> str:
     run = design.runs[worst]
     return (
         f"The run {run.run_id} at {run.cycles:,.0f} cycles is an outlier: the baseline's error there is {error:.2g} Nm RMS, "
-        f"elsewhere {usual:.2g} Nm. Check that run first."
+        f"elsewhere {usual:.2g} Nm. {ADVICE}"
     )

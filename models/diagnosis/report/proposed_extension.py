@@ -24,10 +24,7 @@ def reason_against(proposal: Proposal, gain: Gain | None, sizes: Sizes) -> str:
     if proposal is Proposal.WITHHELD_ERROR:
         return "The extension is not proposed: its error on held-out runs is larger than the baseline's."
     if proposal is Proposal.WITHHELD_LOG_SCORE and gain is not None:
-        return (
-            "The extension is not proposed: the log score of held-out runs is lower with it than without, by "
-            f"{-gain.log_score_gain:.3g} nats."
-        )
+        return "The extension is not proposed: held-out runs are less likely with it than without."
     unsure = [_unsure(slug, size) for slug, size in sizes.by_slug.items() if size.other_sign > SIGN_UNDETERMINED]
     return " ".join(unsure) if proposal is Proposal.PROPOSED else ""
 

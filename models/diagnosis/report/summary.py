@@ -1,7 +1,12 @@
-"""The paragraph that an engineer would sign: what was measured, what is wrong, why this cause, what to do next."""
+"""The paragraph that an engineer would sign: what was found, how sure, how large, what it does to predictions, what next.
+
+Sentences in the order in which one would ask, of MAX_WORDS words at most: where they are more, those that matter least are
+left out. The numbers behind them are the report's fields.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from models.diagnosis.attribution.explanations import credible_explanations
 from models.diagnosis.attribution.verdict import UNCATALOGUED, Explanation, Verdict
@@ -10,26 +15,23 @@ from models.diagnosis.criteria import (
     FAR_FROM_FIT,
     FEW_STATES,
     LARGE_AMPLITUDE,
-    RIVAL_BELOW,
-    RIVAL_FROM,
-    RIVALS_MENTIONED,
+    MAX_WORDS,
     VISIBLE_MENTIONED,
     WEAK_EVIDENCE,
     WORTHWHILE,
 )
 from models.diagnosis.design.axes import PRESSURE
 from models.diagnosis.detection.lack_of_fit import Misfit
-from models.diagnosis.detection.structure_axes import Where
 from models.diagnosis.effects.catalogue import BY_SLUG
 from models.diagnosis.experiments.test_plan import BASELINE, Advice
 from models.diagnosis.pooled_fit.run_scatter import RunScatter
+from models.diagnosis.report.outlying_run import ADVICE
 from models.diagnosis.report.report import Candidate, Visible
 from models.diagnosis.report.wording import (
     axis_name,
     conjunction,
     count_of,
     effect_name,
-    evidence_in_words,
     number,
     probability,
     signed,
@@ -39,12 +41,23 @@ from models.diagnosis.validation.held_out import Gain
 
 #: A share [%] below which its size is not given, and axes of structure that are mentioned at most.
 _LEAST_PERCENT, _AXES_MENTIONED = 0.1, 2
+#: Alternatives that are listed at most where there are many.
+_ALTERNATIVES = 4
+#: How much a sentence matters: it stays; it goes where words are short; it goes first.
+MUST, SHOULD, MAY = 0, 1, 2
+
+
+class Sentence(NamedTuple):
+    """A sentence and how much it matters."""
+
+    text: str
+    matters: int = MUST
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Findings:
-    """What a report says, before its paragraph; `resembles` is the uncatalogued rig fault that does about as well as the
-    best effect, `scatter` that of the runs' gains."""
+    """What a report says, before its paragraph; `resembles` is the fault that what has no name most resembles, `scatter`
+    that of the runs' gains, `withheld` why nothing may be adopted."""
 
     verdict: Verdict
     causes: tuple[str, ...]
@@ -60,141 +73,151 @@ class Findings:
     states: int
     resembles: str = ""
     scatter: RunScatter | None = None
+    withheld: str = ""
 
 
 def summarise(findings: Findings) -> str:
-    """Sentences, in the order in which one would ask."""
-    sentences = {
+    """The paragraph."""
+    say = {
         Verdict.MODEL_ADEQUATE: _adequate,
         Verdict.CAUSE_NAMED: _named,
         Verdict.CAUSE_AMBIGUOUS: _ambiguous,
         Verdict.UNEXPLAINED_STRUCTURE: _unexplained,
         Verdict.INSUFFICIENT_DATA: _insufficient,
-    }[findings.verdict](findings)
-    fitted = "was fitted" if findings.tests == 1 else "were fitted at once"
-    data = f"{count_of(findings.tests, 'test')} at {count_of(findings.states, 'state')} of use {fitted}."
-    parts = [data, *sentences, *_gained(findings), *_next(findings), *_noted(findings.notes)]
-    return " ".join(part for part in parts if part)
+    }[findings.verdict]
+    data = f"{count_of(findings.tests, 'test')} at {count_of(findings.states, 'state')} of use were examined."
+    if findings.tests == 1:
+        data = data.replace("were", "was")
+    sentences = [Sentence(data, MAY), *say(findings), *_noted(findings.notes)]
+    return " ".join(sentence.text for sentence in _short(sentences) if sentence.text)
 
 
-def _adequate(findings: Findings) -> list[str]:
+def _insufficient(_: Findings) -> list[Sentence]:
+    return [Sentence("That is too little to judge the model by.")]
+
+
+def _short(sentences: Sequence[Sentence]) -> list[Sentence]:
+    """Without what matters least, from the end, as long as there are more than MAX_WORDS words."""
+    kept = list(sentences)
+    for matters in (MAY, SHOULD):
+        for place in range(len(kept) - 1, -1, -1):
+            if sum(len(sentence.text.split()) for sentence in kept) > MAX_WORDS and kept[place].matters == matters:
+                del kept[place]
+    return kept
+
+
+def _adequate(findings: Findings) -> list[Sentence]:
     noise = "" if findings.baseline is None else f" of {number(findings.baseline.noise)} Nm"
-    parts = [
-        f"Nothing exceeds the noise{noise} and the scatter from run to run{_scatter(findings.scatter)}: the model is "
-        "adequate for these data."
+    nothing = next((item.probability for item in findings.explanations if not item.effects), 1.0)
+    sentences = [
+        Sentence(
+            f"The model is adequate (probability {probability(nothing)}): nothing exceeds the noise{noise} and the scatter "
+            f"from run to run{_scatter(findings.scatter)}."
+        )
     ]
-    catalogued = [visible for visible in findings.visible if visible.effect in BY_SLUG]
-    shown = [visible for visible in catalogued if _within_reach(visible, visible.amplitude)]
-    if shown:
-        sizes = "; ".join(_detectable(visible, visible.amplitude) for visible in shown[:VISIBLE_MENTIONED])
-        parts.append(f"These data would have shown, with 90 % power: {sizes}.")
-    partly = [
-        visible
-        for visible in catalogued
-        if _within_reach(visible, visible.least) and not _within_reach(visible, visible.amplitude)
-    ]
+    reach = [visible for visible in findings.visible if visible.amplitude <= LARGE_AMPLITUDE * visible.usual]
+    if reach:
+        sizes = conjunction([_detectable(visible, visible.amplitude) for visible in reach[:VISIBLE_MENTIONED]])
+        sentences.append(Sentence(f"These data would have shown {sizes}, nine times in ten.", SHOULD))
+    partly = [v for v in findings.visible if v not in reach and v.least <= LARGE_AMPLITUDE * v.usual]
     if partly:
-        sizes = "; ".join(_detectable(visible, visible.least) for visible in partly[:VISIBLE_MENTIONED])
-        parts.append(f"Only in some of its forms, others being absorbed by the baseline: {sizes}.")
-    hidden = [visible.effect for visible in catalogued if not _within_reach(visible, visible.least)]
+        sizes = conjunction([_detectable(visible, visible.least) for visible in partly[:VISIBLE_MENTIONED]])
+        sentences.append(Sentence(f"Only in some of its forms, others being absorbed by the baseline: {sizes}.", MAY))
+    hidden = [visible.effect for visible in findings.visible if visible not in reach and visible not in partly]
     if hidden:
         names = conjunction([effect_name(slug) for slug in hidden])
-        parts.append(f"Even a large effect would be absorbed by the baseline for: {names}.")
+        sentences.append(Sentence(f"Even a large effect would be absorbed by the baseline for: {names}.", SHOULD))
     if findings.states < FEW_STATES:
         say = "says" if findings.states == 1 else "say"
-        parts.append(f"{count_of(findings.states, 'state')} of use {say} little about a course over life.")
-    return parts
+        few = f"{count_of(findings.states, 'state')} of use {say} little about a course over life."
+        sentences.append(Sentence(few, SHOULD))
+    return sentences
 
 
 def _scatter(scatter: RunScatter | None) -> str:
-    """In brackets: the estimate and its interval, or that it is the prior's."""
+    """In brackets: the estimate, or that it is the prior's."""
     if scatter is None:
         return ""
     median, lower, upper = (f"{100 * share:.2g}" for share in (scatter.median, scatter.lower, scatter.upper))
     if scatter.assumed:
-        return f" (assumed to be {median} % of the torque, {lower} to {upper} %: these data hardly show it)"
-    return f" ({median} % of the torque, estimated; 90 % interval {lower} to {upper} %)"
-
-
-def _within_reach(visible: Visible, amplitude: float) -> bool:
-    return amplitude <= LARGE_AMPLITUDE * visible.usual
+        return f" (assumed to be {median} % of the torque; these data hardly show it)"
+    return f" ({median} % of the torque; 90 % interval {lower} to {upper} %)"
 
 
 def _detectable(visible: Visible, amplitude: float) -> str:
-    size = with_unit(number(amplitude), visible.unit)
-    return f"{effect_name(visible.effect)} ({BY_SLUG[visible.effect].amplitude}) from {size}"
+    return f"{effect_name(visible.effect)} from {with_unit(number(amplitude), visible.unit)}"
 
 
-def _named(findings: Findings) -> list[str]:
+def _named(findings: Findings) -> list[Sentence]:
     causes = set(findings.causes)
     chosen = [candidate for candidate in findings.candidates if candidate.effect in causes]
-    others = [candidate for candidate in findings.candidates if candidate.effect not in causes]
     names = " together with ".join(effect_name(slug) for slug in findings.causes)
-    exactly = sum(
-        explanation.probability for explanation in findings.explanations if causes <= set(explanation.effects)
-    )
-    parts = [
-        _error(findings),
-        f"The cause{'s are' if len(findings.causes) > 1 else ' is'} {names} (probability {probability(exactly)}).",
+    share = sum(item.probability for item in findings.explanations if causes <= set(item.effects))
+    sentences = [
+        Sentence(f"The cause{'s are' if len(causes) > 1 else ' is'} {names} (probability {probability(share)}).")
     ]
-    parts += [f"{_physics(candidate)} Here: {signed(candidate.estimate)}." for candidate in chosen]
+    for candidate in chosen:
+        sentences += [Sentence(_physics(candidate), SHOULD), Sentence(f"Size: {signed(candidate.estimate)}.")]
+    sentences.append(Sentence(_error(findings), MAY))
     companions = [
-        f"{effect_name(candidate.effect)} (probability {probability(candidate.probability)})"
-        for candidate in others
-        if candidate.probability >= COMPANION_FROM
+        f"{effect_name(item.effect)} (probability {probability(item.probability)})"
+        for item in findings.candidates
+        if item.effect not in causes and item.probability >= COMPANION_FROM
     ]
     if companions:
-        parts.append(
-            f"Another effect may be at work beside it, which these data do not confirm: {' or '.join(companions)}."
+        sentences.append(
+            Sentence(f"These data neither confirm nor exclude, beside it: {' or '.join(companions)}.", SHOULD)
         )
-    best = max((candidate.log_evidence_gain for candidate in chosen), default=0.0)
-    rivals = [
-        f"{evidence_in_words(best - candidate.log_evidence_gain)} over {effect_name(candidate.effect)}"
-        for candidate in others
-        if RIVAL_FROM < candidate.probability < RIVAL_BELOW
-        and candidate.log_evidence_gain < best - WEAK_EVIDENCE
-        and not set(candidate.beside) & causes  # it was fitted with the cause, not against it
-    ]
-    if rivals and chosen:
-        parts.append(f"With everything else refitted, the evidence for it is {conjunction(rivals[:RIVALS_MENTIONED])}.")
-    return parts
+    return [*sentences, *_gained(findings), *_next(findings)]
 
 
-def _ambiguous(findings: Findings) -> list[str]:
+def _ambiguous(findings: Findings) -> list[Sentence]:
     """The explanations among which the choice is, each with its probability, and each effect's size where it first comes."""
     sized = {candidate.effect: candidate.estimate for candidate in findings.candidates}
-    alternatives = []
-    for explanation in credible_explanations(findings.explanations):
-        names = [_alternative(slug, findings.resembles) for slug in explanation.effects] or ["nothing at all"]
+    listed = []
+    for item in credible_explanations(findings.explanations):
+        names = (
+            [effect_name(slug) for slug in item.effects if slug != UNCATALOGUED] if item.effects else ["nothing at all"]
+        )
+        if UNCATALOGUED in item.effects:
+            names.append(f"something that has no name{f', such as {findings.resembles}' if findings.resembles else ''}")
         sizes = [
             signed(estimate) if estimate.value != 0.0 else "not measured, so it cannot be excluded"
-            for slug in explanation.effects
+            for slug in item.effects
             if (estimate := sized.pop(slug, None)) is not None
         ]
-        inside = "; ".join([f"probability {probability(explanation.probability)}", *sizes])
-        alternatives.append(f"{' together with '.join(names)} ({inside})")
-    listing = f"{', '.join(alternatives[:-1])}, or {alternatives[-1]}"
-    return [_error(findings), f"These data cannot distinguish what explains it, the most probable first: {listing}."]
+        listed.append(f"{' together with '.join(names)} ({'; '.join([probability(item.probability), *sizes])})")
+    first = "Something is wrong that the model does not explain, and these data cannot tell which of these it is"
+    if sum(len(alternative.split()) for alternative in listed) > MAX_WORDS // 2:  # the sizes are in the report's fields
+        short = [
+            alternative if alternative.endswith("))") or ";" not in alternative else f"{alternative.split(';')[0]})"
+            for alternative in listed
+        ]
+        listed = [
+            *short[:_ALTERNATIVES],
+            *([f"{len(short) - _ALTERNATIVES} more"] if len(short) > _ALTERNATIVES else []),
+        ]
+    alternatives = listed[0] if len(listed) == 1 else f"{', '.join(listed[:-1])}, or {listed[-1]}"
+    sentences = [Sentence(f"{first} (with its probability): {alternatives}."), Sentence(_error(findings), MAY)]
+    return [*sentences, *_gained(findings), *_next(findings)]
 
 
-def _alternative(slug: str, resembles: str) -> str:
-    if slug != UNCATALOGUED:
-        return effect_name(slug)
-    return f"something that is not in the catalogue{f', such as {resembles}' if resembles else ''}"
-
-
-def _unexplained(findings: Findings) -> list[str]:
+def _unexplained(findings: Findings) -> list[Sentence]:
+    unknown = sum(item.probability for item in findings.explanations if UNCATALOGUED in item.effects)
+    resembles = f" It most resembles {findings.resembles}." if findings.resembles else ""
     return [
-        _error(findings),
-        "No effect of the catalogue explains it, alone or with another: a pattern beyond noise would be left, parts of the "
-        "data would ask for different sizes of the effect, or two effects would have to cancel each other. So no cause is "
-        "named.",
-        f"It most resembles {findings.resembles}." if findings.resembles else "",
+        Sentence(
+            f"The model is wrong in a way that no effect of the catalogue explains (probability {probability(unknown)}), so "
+            f"no cause is named.{resembles}"
+        ),
+        Sentence(_error(findings)),
+        *_gained(findings),
+        Sentence(
+            "Next: repeat one of these tests at once. What the rig did differently in one run is gone then; what stays "
+            f"depends on {_axes(findings.baseline) or 'the rig'}: look there.",
+            SHOULD,
+        ),
     ]
-
-
-def _insufficient(_: Findings) -> list[str]:
-    return ["That is too little to judge the model by."]
 
 
 def _error(findings: Findings) -> str:
@@ -203,45 +226,42 @@ def _error(findings: Findings) -> str:
     if misfit is None:
         return ""
     error = f"The baseline model's error is {number(misfit.rmse)} Nm RMS"
-    where = _axes(misfit.where)
+    where = _axes(misfit)
     if misfit.rmse <= misfit.noise:
-        along = f" along {where}" if where else ""
-        return f"{error}, no more than noise alone, but its residuals are not random: they are correlated{along}."
+        return f"{error}, no more than noise, but correlated{f' along {where}' if where else ''}."
     percent = 100 * misfit.unexplained_share
     share = f"{'less than 0.1' if percent < _LEAST_PERCENT else number(percent)} % of its square is no noise"
-    depends = f", and depends on {where}" if where else ""
-    return f"{error} (noise alone: {number(misfit.noise)} Nm); {share}{depends}."
+    return f"{error} (noise alone: {number(misfit.noise)} Nm); {share}{f', and depends on {where}' if where else ''}."
 
 
-def _axes(where: Sequence[Where]) -> str:
-    return " and ".join(axis_name(axis.axis) for axis in where[:_AXES_MENTIONED] if axis.strength > 0)
+def _axes(misfit: Misfit | None) -> str:
+    shown = () if misfit is None else misfit.where[:_AXES_MENTIONED]
+    return " and ".join(axis_name(axis.axis) for axis in shown if axis.strength > 0)
 
 
-def _gained(findings: Findings) -> list[str]:
+def _gained(findings: Findings) -> list[Sentence]:
+    """What the extension gains on runs that were held out, whether it improves remaining life, why it may not be adopted."""
     gain = findings.gain
-    if gain is None or findings.verdict in {Verdict.MODEL_ADEQUATE, Verdict.INSUFFICIENT_DATA}:
+    if findings.withheld:
+        return [Sentence(findings.withheld)]
+    if gain is None:
         return []
-    change = f"{abs(gain.reduction_percent):.1f} ± {gain.reduction_sd:.1f} %"
     way = "less" if gain.reduction_percent >= 0 else "more"
     model = {
-        Verdict.CAUSE_AMBIGUOUS: "the model extended by the most probable cause that could be fitted",
+        Verdict.CAUSE_AMBIGUOUS: "the model with the most probable of them",
         Verdict.UNEXPLAINED_STRUCTURE: "the model with a smooth correction",
     }.get(findings.verdict, "the extended model")
-    beyond = f"; the part beyond noise is {number(gain.excess_after)} Nm against {number(gain.excess_before)} Nm"
-    error = (
-        f"On runs that were held out, the error of {model} is {number(gain.rmse_after)} Nm against "
-        f"{number(gain.rmse_before)} Nm RMS ({change} {way}), noise and the scatter of gains included"
-        f"{beyond if max(gain.excess_after, gain.excess_before) > 0 else ''}."
-    )
-    error += _hardest(gain, findings.extended)
-    if gain.rmse_after > gain.rmse_before and gain.log_score_gain < 0:
-        error += " So it does not improve predictions there."
-    ahead = (
-        f"It {'also predicts' if gain.reduction_percent > 0 else 'predicts'} the last states better from the first ones."
-        if gain.forecast_log_score_gain > 0
-        else "It predicts the last states from the first ones no better: it does not improve remaining life."
-    )
-    return [error, ahead]
+    change = f"{abs(gain.reduction_percent):.1f} ± {gain.reduction_sd:.1f} % {way}"
+    sentences = [
+        Sentence(f"On runs held out, {model} errs by {change}.", SHOULD),
+        Sentence(_hardest(gain, findings.extended)),
+    ]
+    if findings.verdict is Verdict.UNEXPLAINED_STRUCTURE:
+        return sentences
+    ahead = "It also predicts the last states better from the first ones, so remaining life follows it."
+    if not gain.forecast_log_score_gain > 0:
+        ahead = "It predicts the last states from the first ones no better: remaining life does not follow its course."
+    return [*sentences, Sentence(ahead)]
 
 
 def _hardest(gain: Gain, extended: Misfit | None) -> str:
@@ -251,44 +271,38 @@ def _hardest(gain: Gain, extended: Misfit | None) -> str:
         return ""
     pressed = hardest.axis == PRESSURE
     size, unit = (1e-5, "bar") if pressed else (1.0, "cycles")
+    kept = "between others that were kept"
+    if hardest.beyond > 0.0:
+        kept = f"{number(size * hardest.beyond)} {unit} beyond all that were kept"
     place = f"{'at' if pressed else 'after'} {number(size * hardest.value)} {unit}"
-    kept = (
-        f"{number(size * hardest.beyond)} {unit} beyond all that were kept"
-        if hardest.beyond > 0.0
-        else "between others that were kept"
-    )
     return (
-        f" The model fits all runs together to {number(extended.rmse)} Nm. Held out, it errs most {place}, {kept}: by "
-        f"{number(hardest.rmse)} Nm RMS, with no gain of those runs known."
+        f"It errs most {place}, {kept}: by {number(hardest.rmse)} Nm RMS, beside {number(extended.rmse)} Nm in the fit."
     )
 
 
-def _next(findings: Findings) -> list[str]:
-    if not findings.advice or findings.verdict not in {Verdict.CAUSE_NAMED, Verdict.CAUSE_AMBIGUOUS}:
+def _next(findings: Findings) -> list[Sentence]:
+    """The first test of the plan, and what it is good for."""
+    if not findings.advice:
         return []
     best = findings.advice[0]
-    evidence = f"{evidence_in_words(best.nats)} evidence"
-    other = "no effect at all" if best.other == BASELINE else effect_name(best.other)
-    pair = f"{effect_name(best.effect)} and {other}"
     if best.nats < WEAK_EVIDENCE:
-        return ["No test that was considered would add evidence."]
-    if best.nats < WORTHWHILE:
-        return [f"No single test would decide; the most informative is: {best.test} ({evidence} between {pair})."]
+        return [Sentence("No test that was considered would add evidence.")]
+    chance = f"probability {probability(best.probability)}"
+    if best.narrows:
+        left = f"{100 * best.narrows:.0f} % of what it is"
+        return [Sentence(f"Next, to narrow its size: {best.test} (brings the uncertainty to {left}).")]
     if best.other == BASELINE:
-        return [f"To confirm it: {best.test}. That would give {evidence} on whether it is the cause."]
-    return [f"What would decide: {best.test}. It would give {evidence} between {pair}."]
+        return [Sentence(f"Next, to confirm it ({chance}): {best.test}.")]
+    pair = f"{effect_name(best.effect)} from {effect_name(best.other)}"
+    if best.nats < WORTHWHILE:
+        return [Sentence(f"No single test would decide. The best: {best.test} (it tells {pair}; {chance}).")]
+    return [Sentence(f"Next: {best.test}. It tells {pair} ({chance}).")]
 
 
-def _noted(notes: Sequence[str]) -> list[str]:
-    """Notes on the whole campaign, as sentences; those on single runs, which begin with its name, are counted."""
-    single = [note for note in notes if " " not in note.split(":")[0] and ":" in note and not _on_effect(note)]
-    whole = [note if note.endswith(".") else f"{note}." for note in notes if note not in single]
-    whole = [note[0].upper() + note[1:].replace("_", " ") if _on_effect(note) else note for note in whole]
-    return [*whole, f"The report has {count_of(len(single), 'note')} on single runs."] if single else whole
-
-
-def _on_effect(note: str) -> bool:
-    return note.split(":")[0] in BY_SLUG
+def _noted(notes: Sequence[str]) -> list[Sentence]:
+    """Notes on the whole campaign; those on single runs or effects, which begin with a name, stay in the report."""
+    whole = [note for note in notes if " " in note.split(":")[0] or ":" not in note]
+    return [Sentence(note if note.endswith(".") else f"{note}.", MUST if ADVICE in note else SHOULD) for note in whole]
 
 
 def _physics(candidate: Candidate) -> str:

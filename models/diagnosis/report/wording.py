@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 
-from models.diagnosis.criteria import MODERATE_EVIDENCE, STRONG_EVIDENCE, WEAK_EVIDENCE
 from models.diagnosis.design import axes
 from models.diagnosis.effects.estimate import Estimate
 
@@ -40,15 +39,6 @@ def conjunction(parts: Sequence[str]) -> str:
 def count_of(number: int, noun: str) -> str:
     """`1 test`, `2 tests`."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
-
-
-def evidence_in_words(nats: float) -> str:
-    """`no`, `weak`, `moderate` or `strong`, after Kass and Raftery."""
-    if nats < WEAK_EVIDENCE:
-        return "no"
-    if nats < MODERATE_EVIDENCE:
-        return "weak"
-    return "moderate" if nats < STRONG_EVIDENCE else "strong"
 
 
 def probability(value: float) -> str:

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from models.arrays import FloatArray
-from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, bar
+from service.columns import PASCALS_PER_BAR, RADIANS_PER_SECOND_PER_RPM, ZERO_CELSIUS, bar
 
 if TYPE_CHECKING:  # start-up time: they load the whole diagnosis
     from models.diagnosis.detection.lack_of_fit import Misfit
+    from models.diagnosis.experiments.protocol import Step
     from models.diagnosis.report.report import LoopTrace, Maps, Report
     from models.diagnosis.validation.held_out import Gain
 
@@ -51,7 +52,7 @@ def public(
     return {
         "verdict": report.verdict.value,
         "causes": list(report.causes),
-        "summary": report.summary,
+        "summary": " ".join(part for part in (report.summary, _remaining(report, before, after)) if part),
         "explanations": [
             {
                 "effects": list(explanation.effects),
@@ -84,7 +85,16 @@ def public(
         "extended": _misfit(report.extended),
         "gain": _gain(report.gain, before, after),
         "advice": [
-            {"key": test.key, "test": test.test, "separates": [test.effect, test.other], "nats": finite(test.nats)}
+            {
+                "key": test.key,
+                "test": test.test,
+                "separates": [test.effect, test.other],
+                "nats": finite(test.nats),
+                "probability": finite(test.probability),
+                "narrows": finite(test.narrows) if test.narrows else None,
+                "minutes": round(test.minutes, 1),
+                "steps": [_step(step, origin) for step in test.steps],
+            }
             for test in report.advice
         ],
         "visible": [
@@ -101,6 +111,30 @@ def public(
         "statistics": {name: finite(value) for name, value in report.statistics.items()},
         "maps": None if report.maps is None else _maps(report.maps, origin),
         "loops": [_loop(loop, origin) for loop in report.loops],
+    }
+
+
+def _remaining(report: Report, before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
+    """What adopting the extension would do to the median of the remaining life, in a sentence; nothing without one."""
+    medians = [(forecast.get("remaining_cycles") or {}).get("0.5") for forecast in (before, after)]
+    if report.extension is None or None in medians:
+        return ""
+    now, then = (f"{median:,.0f}" for median in medians)
+    return f"Adopting it changes the median of the remaining life from {now} to {then} cycles."
+
+
+def _step(step: Step, origin: float) -> dict[str, Any]:
+    return {
+        "kind": step.kind,
+        "pressures_bar": [round(bar(pressure), 4) for pressure in step.pressures],
+        "speeds_rpm": [round(speed / RADIANS_PER_SECOND_PER_RPM, 2) for speed in step.speeds],
+        "frequency_hz": step.frequency,
+        "periods": step.periods,
+        "oil_temperature_c": None if step.temperature is None else round(step.temperature - ZERO_CELSIUS, 2),
+        "repeats": step.repeats,
+        "cycles": step.cycles + origin,
+        "pause_hours": step.pause / 3600.0,
+        "minutes": round(step.minutes, 1),
     }
 
 

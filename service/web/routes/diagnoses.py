@@ -13,7 +13,7 @@ from service.logging import request_id
 from service.queries import diagnoses
 from service.queries.cache import to_json
 from service.run_files.json_run import checked
-from service.schemas.diagnosis import DiagnosisIn, DiagnosisOut, DiagnosisPage, ModelIn, ModelOut
+from service.schemas.diagnosis import DiagnosisIn, DiagnosisOut, DiagnosisPage, ModelIn, ModelOut, PlanOut
 from service.schemas.parameters import ClutchId, DiagnosisId
 from service.web.answers import JSON_TYPE, answer, described_body, json_body, now, preferred_wait, until_ended
 from service.web.auth import Admin, Ingester, Reader, name_of_caller, require
@@ -77,6 +77,12 @@ async def list_diagnoses(
 async def read_diagnosis(request: Request, context: Reader, clutch_id: ClutchId, diagnosis_id: DiagnosisId) -> Response:
     """One diagnosis with its maps and loops."""
     return await answer(request, lambda: diagnoses.diagnosis(context.database, clutch_id, diagnosis_id))
+
+
+@router.get("/diagnoses/{diagnosis_id}/plan", response_model=PlanOut, responses=READING)
+async def read_plan(request: Request, context: Reader, clutch_id: ClutchId, diagnosis_id: DiagnosisId) -> Response:
+    """The tests that a diagnosis advises as a protocol that a rig can run."""
+    return await answer(request, lambda: diagnoses.plan(context.database, clutch_id, diagnosis_id))
 
 
 @router.get("/model", response_model=ModelOut, responses=READING)

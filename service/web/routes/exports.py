@@ -9,6 +9,7 @@ from fastapi.responses import Response
 from service.lists import ALL_ITEMS, from_cursor, to_cursor
 from service.queries import (
     degradation,
+    diagnoses,
     fleet_priors,
     inspections,
     remaining_life,
@@ -20,7 +21,7 @@ from service.queries import (
 )
 from service.schemas.curves import LoopItem, SeriesItem
 from service.schemas.life import Method
-from service.schemas.parameters import LifeNumber, Quantity, State, TrackedQuantity
+from service.schemas.parameters import DiagnosisId, LifeNumber, Quantity, State, TrackedQuantity
 from service.web.answers import (
     RowsAndNext,
     TablePage,
@@ -77,6 +78,16 @@ async def list_inspections_csv(of: Asked) -> Response:
         return inspections.rows(items), to_cursor(place)
 
     return await table(of.request, inspections.COLUMNS, make)
+
+
+@router.get("/diagnoses/{diagnosis_id}/plan.csv", response_class=Response)
+async def diagnosis_plan_csv(of: Asked, diagnosis_id: DiagnosisId) -> Response:
+    """The tests that a diagnosis advises as CSV, a row a step."""
+
+    def make() -> RowsAndNext:
+        return diagnoses.plan_rows(diagnoses.plan(of.context.database, of.clutch_id, diagnosis_id)), None
+
+    return await table(of.request, diagnoses.PLAN_COLUMNS, make)
 
 
 @router.get("/remaining-useful-life.csv", response_class=Response)

@@ -17,6 +17,7 @@ from models.diagnosis.campaign import Campaign, StationaryRun
 from models.diagnosis.detection.lack_of_fit import Misfit
 from models.diagnosis.detection.structure_axes import Where
 from models.diagnosis.effects.estimate import Estimate
+from models.diagnosis.experiments.protocol import Step
 from models.diagnosis.experiments.test_plan import Advice
 from models.diagnosis.extension import Extension
 from models.diagnosis.report.report import Candidate, LoopTrace, Maps, Report, Visible
@@ -97,6 +98,21 @@ def _report(campaign: Campaign, extension: Extension | None) -> Report:
                 effect="torque_zero_shift",
                 other="baseline",
                 nats=12.0,
+                probability=0.9,
+                steps=(
+                    Step(
+                        kind="stationary_stribeck",
+                        pressures=(0.0, 4e5),
+                        speeds=(10.0, 20.0),
+                        frequency=None,
+                        periods=None,
+                        temperature=333.15,
+                        repeats=5,
+                        cycles=3000.0,
+                        pause=7200.0,
+                        minutes=12.34,
+                    ),
+                ),
             ),
         ),
         visible=(Visible(effect="torque_zero_shift", amplitude=0.2, least=0.1, usual=0.5, unit="Nm"),),

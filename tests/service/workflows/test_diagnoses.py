@@ -9,7 +9,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from models.diagnosis.extension import Extension, NotFiniteError
-from service.schemas.diagnosis import DiagnosisListed, DiagnosisOut, ModelOut
+from service.schemas.diagnosis import DiagnosisListed, DiagnosisOut, ModelOut, PlanOut
 from service.web.auth import SCOPES, Scope, make_key
 from service.workflows.replay import replay_clutch
 from storage import keys
@@ -74,6 +74,24 @@ def test_a_report_is_answered_stored_and_listed(client: TestClient) -> None:
     assert listed == {"items": [{k: v for k, v in report.items() if k not in ("maps", "loops")}], "next": None}
     post_tests(client, 4000)
     assert client.get(answer.headers["Location"]).json() == report | {"stale": True}
+
+
+def test_the_plan_of_a_diagnosis_is_a_protocol_that_a_rig_can_run(client: TestClient) -> None:
+    post_tests(client, 0, 1000, 2000, 3000)
+    at = client.post(f"{BASE}/diagnoses", json={"adopt": False}, headers={"Prefer": "wait=120"}).headers["Location"]
+    plan = client.get(f"{at}/plan")
+    PlanOut.model_validate(plan.json())
+    (test,) = plan.json()["tests"]
+    assert (test["probability"], test["minutes"], test["separates"]) == (0.9, 12.3, ["torque_zero_shift", "baseline"])
+    (step,) = test["steps"]
+    assert (step["pressures_bar"], step["speeds_rpm"]) == ([0.0, 4.0], [95.49, 190.99])
+    assert (step["oil_temperature_c"], step["repeats"], step["pause_hours"]) == (60.0, 5, 2.0)
+    table = client.get(f"{at}/plan.csv")
+    assert table.headers["content-type"].startswith("text/csv")
+    header, row = table.text.splitlines()
+    assert header.split(",")[:4] == ["test", "step", "kind", "pressures_bar"]
+    assert row.startswith("1,1,stationary_stribeck,0 4,95.49 190.99,")
+    assert client.get(f"{BASE}/diagnoses/unknown/plan").status_code == 404
 
 
 def test_what_is_adopted_moves_every_answer_and_back_again(client: TestClient) -> None:
