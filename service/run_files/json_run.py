@@ -103,18 +103,14 @@ def _too_many_marks(body: bytes, read: Callable[[Any], object]) -> InvalidError:
     try:
         end = next(islice(re.finditer(rb'["\[{]', body), MOST_MARKS, None)).start()
         head = pydantic_core.from_json(body[:end], allow_partial=True)
-        errors: list[FieldError] = []
-        total = 0
-        for look in (read, _check_channels):
+        for look in (_check_channels, read):
             try:
                 look(head)
             except InvalidError as error:
-                present = [field for field in error.errors if field.code not in _OF_THE_END]
-                total += len(present) and error.total - (len(error.errors) - len(present))
-                errors += present
-        if errors:
-            detail = f"{errors[0].message}; {total} errors or more"
-            return InvalidError(detail, errors=errors, total=total)
+                errors = [field for field in error.errors if field.code not in _OF_THE_END]
+                total = error.total - len(error.errors) + len(errors)
+                if errors:
+                    return InvalidError(f"{errors[0].message}; {total} errors or more", errors=errors, total=total)
     except ValueError:
         pass  # nested too deeply, or no JSON from its beginning on
     message = f"the body must not hold more than {MOST_MARKS} quotation marks and opening brackets, got more"
@@ -124,10 +120,9 @@ def _too_many_marks(body: bytes, read: Callable[[Any], object]) -> InvalidError:
 def _check_channels(sent: Any) -> None:
     """Raise InvalidError where a channel's values are no numbers."""
     channels = sent.get("channels") if isinstance(sent, dict) else None
-    if isinstance(channels, dict):
-        check_columns(
-            {name: values for name, values in channels.items() if name in CHANNELS and isinstance(values, list)}
-        )
+    for name, values in channels.items() if isinstance(channels, dict) else ():
+        if name in CHANNELS and isinstance(values, list):
+            check_columns({name: values})
 
 
 def _in_utf8(body: bytes) -> bytes:

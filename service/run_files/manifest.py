@@ -26,7 +26,10 @@ ANSWER = "answer.json"
 #: Cycles from which a file is not taken for a run. Chosen: far beyond what the service accepts (`schemas.limits`).
 _MOST_CYCLES = 1e15
 _NEEDED, _OPTIONAL = ("file", "kind", "cycles"), ("run_id", "origin", "started_at", "map")
-_RECORDS = (".csv", ".txt", ".tdms", ".mf4", ".mdf", ".parquet")
+_RECORDS = (
+    ".csv", ".txt", ".tsv", ".asc", ".dat", ".lvm", ".tdms", ".mf4", ".mdf", ".parquet", ".xlsx", ".xls", ".ods", ".mat", ".h5",
+    ".hdf5", ".zip",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

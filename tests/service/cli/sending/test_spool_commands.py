@@ -248,3 +248,51 @@ def test_a_push_that_is_killed_while_the_service_answers_is_known_to_have_been_s
         finally:
             server.shutdown()
             thread.join()
+
+
+def test_a_rigs_files_are_sent_with_its_name_and_what_else_is_given(terminal: Terminal) -> None:
+    asked: list[httpx2.Request] = []
+    terminal.service.instead = lambda request: asked.append(request)
+    folder = terminal.folder / "records"
+    folder.mkdir()
+    for name in ("b_2000.csv", "a_1000.xlsx", "notes.pdf"):
+        (folder / name).write_bytes(name.encode())
+    terminal("push", folder, "--clutch", "c1", "--url", URL, "--rig", "bench-3", "--patience", "0")
+    sent = [request for request in asked if request.url.path.endswith("/runs/file")]
+    assert sorted((request.url.params["filename"], request.url.params["rig"]) for request in sent) == [
+        ("a_1000.xlsx", "bench-3"),
+        ("b_2000.csv", "bench-3"),
+    ]
+    assert all("kind" not in request.url.params and "cycles" not in request.url.params for request in sent)
+    asked.clear()
+    terminal(
+        "push",
+        folder / "b_2000.csv",
+        "--clutch",
+        "c1",
+        "--url",
+        URL,
+        "--rig",
+        "bench-3",
+        "--cycles",
+        "7",
+        "--patience",
+        "0",
+    )
+    sent = [request for request in asked if request.url.path.endswith("/runs/file")]
+    assert [(request.url.params["rig"], request.url.params["cycles"]) for request in sent] == [("bench-3", "7.0")]
+
+
+def test_without_a_rig_a_record_needs_its_kind_and_cycles(terminal: Terminal) -> None:
+    record = written(terminal.folder / "a.csv", b"1,2")
+    assert "give --rig, or --kind and --cycles" in terminal("push", record, "--clutch", "c1", "--url", URL, code=64)
+
+
+def test_a_file_whose_reader_cannot_start_waits_in_the_spool(terminal: Terminal) -> None:
+    busy = "the reader of TDMS files cannot start here, which is not the file's fault"
+    terminal.service.instead = lambda request: problem(503, "busy", busy) if "/runs" in request.url.path else None
+    record = written(terminal.folder / "a.tdms", b"TDSm")
+    told = ("--clutch", "c1", "--url", URL, "--patience", "0")
+    assert "1 runs wait" in terminal("push", record, *told, "--rig", "bench-3", code=75)
+    terminal.service.instead = present
+    assert "1 stored" in terminal("spool", "send", "--url", URL)
